@@ -31,6 +31,12 @@ def modules() -> dict[str, Path]:
 
 
 @cache
+def tree(path: Path) -> ast.Module:
+    """A file's source, parsed once for all who read it."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
 def imported(name: str) -> tuple[str, ...]:
     """Modules that a module imports, late and for types only too."""
     return tuple(_imported(name))
@@ -39,7 +45,7 @@ def imported(name: str) -> tuple[str, ...]:
 def _imported(name: str) -> Iterator[str]:
     path = modules()[name]
     package = name if path.name == "__init__.py" else name.rpartition(".")[0]
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree(path)):
         if isinstance(node, ast.ImportFrom):
             above = package.rsplit(".", node.level - 1)[0] if node.level else ""
             source = ".".join(filter(None, (above, node.module)))
@@ -124,7 +130,7 @@ def test_a_constants_name_means_one_thing() -> None:
     blind trials' judge, or every file of a kind has its own, as an effect."""
     files: dict[str, set[str]] = {}
     for module, path in modules().items():
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        for node in tree(path).body:
             targets = getattr(node, "targets", [getattr(node, "target", None)])
             for each in (x for target in targets if target for x in ast.walk(target)):
                 if isinstance(each, ast.Name) and each.id.isupper():

@@ -14,7 +14,7 @@ import tyrecal_solvers.errors
 from tyrecal import errors
 from tyrecal.errors import TyrecalError
 
-from .test_architecture import modules
+from .test_architecture import modules, tree
 
 BUILTIN = {name for name, kind in vars(builtins).items() if isinstance(kind, type)}
 
@@ -38,7 +38,7 @@ def exceptions() -> dict[str, tuple[str, str]]:
     """Name to module and first base of every class that is an exception, wherever it is defined."""
     classes: dict[str, tuple[str, str]] = {}
     for module, path in modules().items():
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(tree(path)):
             if isinstance(node, ast.ClassDef) and node.bases:
                 classes[node.name] = module, ast.unparse(node.bases[0])
     found: dict[str, tuple[str, str]] = {}

@@ -94,13 +94,13 @@ def test_draws_have_the_stated_distribution() -> None:
 
 
 def test_the_seal_holds_the_truth_and_the_answers(tmp_path: Path) -> None:
-    folder, sealed = made(tmp_path, protocol(1, 1, 1))
+    folder, sealed = made(tmp_path, protocol(1, 1))
     with pytest.raises(InputError, match="sealed trials already"):
         make(folder, sealed, CASE, protocol(1), MAKER, ruler, seed=3)
     with pytest.raises(InputError, match=r"answers\.json is missing"):
         score(folder, sealed)
     answer(folder, SCALE, SCALE.model_rows)
-    assert len(score(folder, sealed)) == 3
+    assert len(score(folder, sealed)) == 2
     one = sorted((folder / "answers").glob("*.json"))[0]
     before = one.read_text()
     one.write_text(before.replace('"verdict": "', '"verdict": "not '))

@@ -228,6 +228,7 @@ def test_elements_that_do_not_mirror_are_refused(tmp_path: Path) -> None:
     assert "mirror at 180 degrees" in refused(tmp_path, edit)
 
 
+@pytest.mark.slow
 def test_an_unreachable_load_keeps_the_others(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -122,6 +122,7 @@ def test_they_solve_the_whole_problem(tyre: Round, pressed: State, found: Loaded
     np.testing.assert_allclose(gram[same], np.eye(10)[same], atol=1e-7)
 
 
+@pytest.mark.slow
 def test_a_wheel_free_along_the_load(tyre: Round, pressed: State, found: LoadedModes) -> None:
     """What the half turn reverses is as it was. A wheel far heavier than the tyre swings slowly on
     the tyre's stiffness, which statics knows, all else as if it were held; a wheel without mass

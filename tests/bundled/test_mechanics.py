@@ -132,7 +132,7 @@ def energy_3d(m: Model, p: float, fields: list[tuple[int, Array]], step: Array) 
     return total * 2 * np.pi / len(ANGLES)
 
 
-@pytest.mark.parametrize("n", [0, 1, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 3, 4))])
+@pytest.mark.parametrize("n", [1, *(pytest.param(n, marks=pytest.mark.slow) for n in (0, 2, 3, 4))])
 def test_second_variation_of_the_3d_energy(inflated: Inflated, n: int) -> None:
     """d2/de2 E(u0 + e Re[phi exp(i n Theta)]) = pi phi^H K(n) phi (2 pi for n = 0) about the
     inflated, twisted tyre, for its two lowest modes and a generic field. First derivative by

@@ -133,7 +133,12 @@ def agree(got: Array, wanted: Array) -> None:
     assert abs(got - wanted).max() <= 1e-5 * abs(wanted).max()
 
 
-@pytest.mark.parametrize("name", VARIABLES)
+LIKE_OTHERS = {"carcass area", "cord density", "belt modulus", "C01", "Z of a node"}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] * (n in LIKE_OTHERS)) for n in VARIABLES]
+)
 def test_against_central_differences(base: Modes, name: str) -> None:
     """d f/dp of eight modes, the change of the inflated state included: within 1e-5 of the mode
     that moves most. f = sqrt(lambda) / 2 pi."""

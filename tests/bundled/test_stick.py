@@ -35,6 +35,7 @@ def test_the_hold_is_the_contacts_stiffness_over_the_patch(tyre: Round, pressed:
         assert bool(abs(held(smooth, V)).max() > 1e-3) == (i == 0)
 
 
+@pytest.mark.slow
 def test_the_hold_goes_to_nothing_with_the_load(tyre: Round) -> None:
     """Over a patch as wide as the ring: its length, as a cylinder's on a rigid road, with the
     square root of the load (Hertz) where the rubber gives way, with the cubic where the road's

@@ -66,7 +66,7 @@ def test_every_module_of_a_command_is_listed() -> None:
         (2, ["modes", CASE, "--no-such-option"]),
         (2, ["no-such-command"]),
         (2, ["solvers", "--quiet", "--verbose"]),
-        (
+        pytest.param(
             3,
             [
                 "modes",
@@ -78,6 +78,7 @@ def test_every_module_of_a_command_is_listed() -> None:
                 "A_carcass=1e-8",
                 "--allow-unusual",
             ],
+            marks=pytest.mark.slow,
         ),
         (3, ["modes", CASE, *COARSE, "--solver", "abaqus"]),
         (

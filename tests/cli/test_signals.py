@@ -178,6 +178,7 @@ main.main(["modes", {CASE!r}])"""
     assert done.stderr == "\nterminated: nothing was changed\n"
 
 
+@pytest.mark.slow
 def test_when_the_command_is_done_nothing_counts_any_more(tmp_path: Path) -> None:
     (tmp_path / "sitecustomize.py").write_text(
         "import atexit, signal\natexit.register(signal.raise_signal, signal.SIGTERM)\n"

@@ -135,6 +135,7 @@ def test_a_refit_never_ends_above_where_it_began() -> None:
         assert misfit(again) <= misfit(d) * (1 + 1e-12)
 
 
+@pytest.mark.slow
 def test_the_interval_of_the_parameter_covers(chance: Chance) -> None:
     """The 90 % interval holds the true parameter, drawn from its prior, in 90 of 100 tyres, and one
     at most for the grid.

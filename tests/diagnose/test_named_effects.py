@@ -165,6 +165,7 @@ def test_an_effect_at_the_bound_of_its_range_is_not_named() -> None:
         assert ("e1 at the bound of its range" in verdict.words) == (kind != "named")
 
 
+@pytest.mark.slow
 def test_a_toggled_run_cancels_what_both_share(chance: Chance) -> None:
     """A tyre whose constants hide the effect: lambda rises by the switched run alone, and the 90 %
     interval then holds the truth in 9 of 10 (the e's are drawn from their prior).

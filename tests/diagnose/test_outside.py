@@ -40,7 +40,7 @@ def test_exchanged_labels_are_found_whatever_else_is_there(chance: Chance) -> No
     """
     toy = Toy(effects=3)  # to weigh three and their pairs costs a quarter of weighing six
     base, quiet, found = problem(toy), [], []
-    for effects in ({}, {"e1": 0.9}) * 10:
+    for effects in ({}, {"e1": 0.9}) * 6:
         plain = base.measured(drawn(toy, base, chance.random, effects, 0.03))
         y = plain.observations.y
         swapped = replace(plain, observations=with_exchanged(plain.observations, *LABELS[6:8]))

@@ -188,6 +188,7 @@ def test_an_effect_that_a_variable_sets_is_no_candidate(tmp_path: Path) -> None:
         study(case, Evaluator(TyreDesign(case)), path, effects=EFFECTS)
 
 
+@pytest.mark.slow
 def test_what_is_wrong_with_a_file_names_that_file(tmp_path: Path) -> None:
     one = written(tmp_path / "a.csv", asked(Query(X)).eta)
     copy = tmp_path / "copy.csv"

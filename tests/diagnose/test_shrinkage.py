@@ -56,6 +56,7 @@ def test_an_effect_shrinks_the_held_out_error(chance: Chance) -> None:
     chance.often(usual, 0.85)
 
 
+@pytest.mark.slow
 def test_an_effect_is_told_with_the_rung_that_its_shrinkage_gives() -> None:
     found = diagnosed(Toy(size=0.02, pressures=(160.0, 200.0, 240.0)), {"e1": 0.9}, 1)
     s = found.shrinkage

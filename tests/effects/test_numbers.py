@@ -128,6 +128,7 @@ def test_fanned_carcass_is_an_angular_layer() -> None:
 # masses, from the station table
 
 
+@pytest.mark.slow
 def test_masses() -> None:
     ply, plain = CASE.section.points[PLY], mass()
     share = ply[RIM, 0] / ply[:, 0] - 1

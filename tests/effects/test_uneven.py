@@ -27,6 +27,7 @@ from .support import CASE, CASES, START, data, decks
 
 SMALL = {"point_mass": 0.02, "road_contact": 2e4, "rotation": 10.0, "stiffness_splice": 0.2}
 each = pytest.mark.parametrize("id", SMALL)
+DEAR = {"stiffness_splice", "road_contact"}  # in time, of four
 
 
 def few(case: LoadedCase = CASE) -> LoadedCase:
@@ -66,7 +67,9 @@ def test_doublets_split_and_the_mean_stands_for_both(id: str) -> None:
     assert all("member" not in e for e in modes_result(CASE, START, plain)[0].content()["modes"])
 
 
-@each
+@pytest.mark.parametrize(
+    "id", [pytest.param(id, marks=[pytest.mark.slow] * (id in DEAR)) for id in SMALL]
+)
 def test_vanishes_with_its_parameter(id: str) -> None:
     """A hundredth of the size moves every member by a hundredth, up to second order: absent at 0,
     and linear there (rotation: the mean grows with the square)."""

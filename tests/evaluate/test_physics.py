@@ -46,6 +46,7 @@ def test_moduli_given_as_instantaneous(case_folder: Path) -> None:
     assert frequencies(given, C10=1e6 / 0.7) == pytest.approx(frequencies(CASE, C10=1e6), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_vibration_modulus_between_relaxed_and_instantaneous(case_folder: Path) -> None:
     """tau = 0.1 s: hardly stiffer at 0.1 Hz, almost instantaneous at 100 Hz."""
     slow, fast = (
@@ -89,6 +90,7 @@ def test_angular_spacing_fans_the_cords_out(case_folder: Path) -> None:
     assert frequencies(fanned) == pytest.approx(frequencies(CASE), rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_region_and_a_gap_can_have_their_own_rubber(case_folder: Path) -> None:
     """The same rubber under another name changes nothing; a heavy tread lowers everything."""
     text = (case_folder / "p235_75r17.yaml").read_text()

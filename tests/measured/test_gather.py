@@ -73,6 +73,7 @@ def test_a_file_is_no_repeat_of_itself(tmp_path: Path) -> None:
         gather([tmp_path / "t.csv", tmp_path / "sub" / ".." / "t.csv"])
 
 
+@pytest.mark.slow
 def test_two_references_and_geometry_of_its_own(tmp_path: Path) -> None:
     """What a file has beyond that is passed over, and told."""
     where = write(tmp_path / "where.uff", nodes())

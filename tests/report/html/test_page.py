@@ -91,7 +91,10 @@ def words_of(text: str) -> str:
 
 
 def test_tags_nest_ids_are_unique_and_links_lead_somewhere(folder: Path) -> None:
-    found = parsed(text_of(folder, folder))
+    links_lead_to_ids(parsed(kept_text_of(folder)))
+
+
+def links_lead_to_ids(found: Nesting) -> None:
     assert len(set(found.ids)) == len(found.ids)
     assert found.links and {link.removeprefix("#") for link in found.links} <= set(found.ids)
 
@@ -222,7 +225,9 @@ def test_several_folders_stand_side_by_side(folder: Path, copy: Path) -> None:
     fit["modes"] = fit["modes"][:2]
     (copy / "fit.json").write_text(json.dumps(fit))
     (copy / "diagnosis.json").unlink()
-    both = words_of(text_of(folder, copy)).replace("\u2212", "-")
+    page = text_of(folder, copy)
+    links_lead_to_ids(parsed(page))
+    both = words_of(page).replace("\u2212", "-")
     for words in (
         "objective initial33.13 Hz33.13 sigmas",
         "objective fitted8.60 Hz0.70 sigmas",
