@@ -105,8 +105,7 @@ def test_slope_next_to_nothing(id: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("method", "start"),
-    [("slsqp", 0.0), pytest.param("gauss-newton", 1.0, marks=pytest.mark.slow)],
+    ("method", "start"), [("slsqp", 0.0), pytest.param("gauss-newton", 1.0, marks=pytest.mark.slow)]
 )
 def test_a_fit_ends_where_an_effect_is_absent(method: str, start: float) -> None:
     """Frequencies lower than the plain tyre's want a filler softer than none: the bound 0."""
