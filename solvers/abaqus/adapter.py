@@ -68,9 +68,8 @@ class Abaqus:
 
     def write(self, decks: Decks, folder: Path) -> list[Path]:
         """Write the decks and, beside them, the case's options. Raises ``refusals``."""
-        program = self.command if self.version == "unknown" else []
         units = decks.request.get("own_deck", {})
-        paths = [read_options(decks.options, **units).save(folder, program)]
+        paths = [read_options(decks.options, **units).save(folder)]
         paths += (own := own_decks.save(decks.request, folder))
         for name, text in decks.texts("own deck" if units else self.dialect).items():
             paths.append(folder / name)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -24,12 +24,10 @@ class Options:
     length_m: float = 1.0
     mass_kg: float = 1.0
 
-    def save(self, folder: Path, program: Sequence[str] = ()) -> Path:
-        """Write them into a run folder, and the ``program``, where no version tells it from others:
-        its answers are its own."""
+    def save(self, folder: Path) -> Path:
+        """Write them into a run folder."""
         path = folder / OPTIONS_FILE
-        told = {**asdict(self), **({"command": [*program]} if program else {})}
-        path.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8", newline="")
+        path.write_text(json.dumps(asdict(self), indent=1) + "\n", encoding="utf-8", newline="")
         return path
 
 

@@ -65,8 +65,6 @@ class CalculiX:
     def write(self, decks: Decks, folder: Path) -> list[Path]:
         """Write the decks and, beside them, how to run them. Raises Refused."""
         settings = _settings(decks.options)
-        if self.version == "unknown":  # else the version tells this program's answers from others'
-            settings["command"] = self.command
         paths = own_decks.save(decks.request, folder)
         for name, text in decks.texts(self.dialect).items():
             paths.append(folder / name)

@@ -31,8 +31,9 @@ from ..simulate.case_folder import owner
 from ..simulate.deck.decks_design import design_of
 from ..simulate.evaluate.evaluator import Evaluator
 from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
+from ..simulate.evaluate.solver import solver_facts
 from ..simulate.evaluate.sources import sources
-from ..simulate.evaluate.store import Store, sources_of
+from ..simulate.evaluate.store import Store, solver_identity
 from ..simulate.provenance import provenance
 from ..studies.fitted import NOT_CONVERGED, has_good
 from ..tyre.case import LoadedCase, start_values, with_level
@@ -77,7 +78,7 @@ def run_case(task: CaseTask) -> Report:
         )
         question = _question(task, loaded, evaluator)
         report["provenance"] = provenance(loaded, evaluator.solver)
-        facts["solver"] = f"{evaluator.solver.name} {evaluator.solver.version}"
+        facts |= solver_facts(evaluator.solver)
         finished = _finished(task.folder, question)
         if finished is None:
             finished, files = _studied(task, loaded, evaluator, facts)
@@ -206,12 +207,7 @@ def _entry(outcome: StudyOutcome, task: CaseTask) -> dict[str, Any]:
 def _question(task: CaseTask, loaded: LoadedCase, evaluator: Evaluator) -> str:
     """Hash of all that the results depend on: the case and its files, what is asked, the tool."""
     files = [task.path, *loaded.files, *loaded.template_files]
-    solver = [
-        evaluator.solver.name,
-        evaluator.solver.version,
-        sources_of(type(evaluator.solver)),
-        sources(),
-    ]
+    solver = [*solver_identity(evaluator.solver), sources()]
     asked = [task.studies, asdict(task.asked), task.mesh, solver, [_digest(p) for p in files]]
     return sha256(json.dumps(asked).encode()).hexdigest()
 

@@ -118,12 +118,13 @@ def command(
     from ..studies.diagnose.diagnosis import STAGES
     from ..studies.diagnose.inverse_problem import Assumed
     from ..studies.diagnose.result import diagnosis_result
-    from ..studies.diagnose.study import parse_change
+    from ..studies.diagnose.study import parse_change, refuse_decks
     from ..studies.diagnose.study import study as diagnosed
     from ..studies.fit.targets import rims_of
     from ..tyre.effects import catalogue
 
     loaded, values = study.load(case, assignments)
+    refuse_decks(loaded)
     loaded = arguments.starting_at(loaded, values)
     for id in (*effects, *without):
         if id not in catalogue():

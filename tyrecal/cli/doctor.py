@@ -98,8 +98,9 @@ def _words(found: dict[str, Any]) -> list[str]:
     lines += ["", f"settings: {settings_words(found['settings'])}", "", "solvers:"]
     for solver in found["solvers"]:
         state = solver["problem"] or f"version {solver['version']}"
-        hint = f"; {HINTS[solver['name']]}" if solver["problem"] and solver["name"] in HINTS else ""
-        lines.append(f"  {solver['name']}: {state}{command_words(solver)}{hint}")
+        hint = HINTS.get(solver["name"]) if solver["problem"] else None
+        about = "; ".join(filter(None, (state, command_words(solver), hint)))
+        lines.append(f"  {solver['name']}: {about}")
     lines += ["", "records of evaluations:"]
     for record in found["records"]:
         lines.append(f"  {record['folder']}: {record['records']} records, {record['MB']:g} MB")

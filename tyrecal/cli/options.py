@@ -266,7 +266,7 @@ class Study:
         from ..simulate.evaluate.evaluator import Evaluator
 
         evaluator = Evaluator(design_of(loaded), self.solver, command=self.solver_command)
-        evaluator.solver  # noqa: B018  a solver that is not there is refused before anything is written
+        evaluator.solver  # noqa: B018  one that is not installed is refused before anything is read
         if loaded.decks:
             evaluator.refuse_lacking(evaluator.design)
             self.terminal.note(added_words(loaded.decks, evaluator.solver.dialect))
@@ -284,9 +284,11 @@ class Study:
         """The command's run, with the record behind ``evaluator``; ``study``: where it is not
         ``command``; measured, state: of the results' `provenance`. Raises InputError,
         OSError."""
+        from ..simulate.evaluate.solver import refuse_missing_program
         from ..simulate.provenance import provenance
         from .output import Run
 
+        refuse_missing_program(evaluator.solver)  # before anything is written
         block = provenance(loaded, evaluator.solver, measured, **state)
         run = Run(loaded.path, self.output, command, evaluator.solver, study, block, loaded)
         evaluator.folder, evaluator.keep = run.runs, self.terminal.verbose

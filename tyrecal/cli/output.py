@@ -36,6 +36,7 @@ from ..files import (
 )
 from ..interrupt import interrupts_put_off
 from ..simulate.case_folder import belongs_to, named_case, owner
+from ..simulate.evaluate.solver import solver_facts
 from ..simulate.provenance import stamped
 from ..simulate.settings import root
 from ..studies.result import Result
@@ -233,7 +234,7 @@ class Run:
             "host": platform.node(),
             "python": platform.python_version(),
             "tyrecal": __version__,
-            "solver": f"{self.solver.name} {self.solver.version}" if self.solver else None,
+            **solver_facts(self.solver),
             "record": str(self.store.folder) if self.store else None,
             **(counts or {}),
             **facts,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +46,7 @@ def command(selftest: str | None, output: Path | None, terminal: Terminal) -> in
     if not terminal.as_json:
         for solver in found:
             if solver["command"]:
-                terminal.say(f"{solver['name']}{command_words(solver)}")
+                terminal.say(f"{solver['name']} {command_words(solver)}")
         terminal.say(f"settings: {settings_words(settings_file())}")
     return 0
 
@@ -75,8 +74,10 @@ def settings_words(found: dict[str, Any]) -> str:
 
 def command_words(solver: dict[str, Any]) -> str:
     """The program that a solver of `installed` starts, and who says so."""
+    from ..simulate.program import join_command
+
     if not solver["command"]:
         return ""
     origin = solver["command_from"]
     whose = "its default" if origin == "default" else f"from {origin}"
-    return f" starts '{shlex.join(solver['command'])}', {whose}"
+    return f"starts '{join_command(solver['command'])}', {whose}"

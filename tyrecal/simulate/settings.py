@@ -7,13 +7,13 @@ A case may come from anybody, so it names no program. These do, the first that i
 from __future__ import annotations
 
 import os
-import shlex
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from ..errors import InputError
+from .program import resolve_program, split_command
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -88,20 +88,18 @@ def root() -> Path:
 
 
 def words(command: str | Sequence[str], origin: str, here: bool = True) -> list[str]:
-    """A command's words; no shell is used. ``here``: a relative path starts in the present folder,
-    never in the one that the solver runs in, else it is refused. Raises InputError."""
+    """A command's words, its program as a whole path (`resolve_program`). ``here``: a relative path
+    starts in the present folder, else it is refused. Raises InputError."""
     try:
-        found = shlex.split(command) if isinstance(command, str) else list(command)
+        parts = split_command(command) if isinstance(command, str) else list(command)
     except ValueError:
-        found = []
-    if not found or not all(isinstance(word, str) and word for word in found):
+        parts = []
+    if not parts or not all(isinstance(word, str) and word for word in parts):
         raise InputError(f"{origin} is {command!r}: must be a command, or a list of its words")
-    program = Path(found[0]).expanduser()
-    if len(program.parts) > 1 and not program.is_absolute():
-        if not here:
-            raise InputError(f"{origin} is {command!r}: must be a name or a whole path")
-        program = program.absolute()
-    return [str(program), *found[1:]]
+    program = os.path.expanduser(parts[0])  # noqa: PTH111  Path raises where nobody is named so
+    if not here and os.path.dirname(program) and not os.path.isabs(program):  # noqa: PTH117, PTH120
+        raise InputError(f"{origin} is {command!r}: must be a name or a whole path")
+    return resolve_program(parts)
 
 
 def command_of(solver: str) -> tuple[list[str], str]:

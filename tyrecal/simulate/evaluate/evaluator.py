@@ -19,7 +19,7 @@ from .executor import executor, in_order
 from .failure import DeckRefused, EvaluationFailed
 from .pressed import Pressed, pressed
 from .results import Evaluation, evaluation
-from .solver import Solver, find_solver
+from .solver import Solver, find_solver, refuse_missing_program
 from .store import Store, key_of
 
 SETTLED = ("no_equilibrium", "unstable")  # the deck's own doing: another run would say the same
@@ -287,7 +287,7 @@ class Evaluator:
             folder,
             self.keep,
             self.store,
-            command=self.command,
+            command=tuple(getattr(self.solver, "command", self.command)),
             shapes=self.shapes,
         )
 
@@ -324,6 +324,7 @@ class Evaluator:
         )
 
     def _run(self, folder: Path, time_limit_s: float) -> dict[str, Any]:
+        refuse_missing_program(self.solver)
         self.counts.runs += 1
         self.solver.run(folder, time_limit_s)
         return self.solver.read(folder)

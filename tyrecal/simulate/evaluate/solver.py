@@ -8,7 +8,10 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from ...errors import InputError
+from ...tyre.case.mistakes import suggestion
+from ..program import resolve_program, why_missing
 from ..settings import command_of
+from .failure import SolverUnavailable
 
 GROUP = "tyrecal.solvers"
 
@@ -23,7 +26,7 @@ class Solver(Protocol):
     static one, and those of `resolve.CAPABILITIES`; ``own_decks``: it runs a user's in three
     dimensions;
     A solver that starts a program has ``command`` too, a list of its words, which is the user's to
-    set (`tyrecal.simulate.settings`), never the case's;
+    set (`tyrecal.simulate.settings`), never the case's; the tool makes its program a whole path;
     refusals, failures: exceptions of `write`, `run` and `read` for a deck it cannot honour and
     for no solution; a failure's attribute ``cause``, where it has one, is `EvaluationFailed`'s.
     """
@@ -61,23 +64,40 @@ class Solver(Protocol):
 
 
 def find_solver(name: str, command: Sequence[str] = ()) -> Solver:
-    """The installed solver of that name, with the program that the user has set, or ``command``.
-
-    Raises InputError.
-    """
-    found = {entry.name: entry for entry in entry_points(group=GROUP)}
-    if name not in found:
-        raise InputError(f"solver '{name}' is not installed, only {', '.join(sorted(found))}")
-    solver: Solver = found[name].load()()
-    if command and not hasattr(solver, "command"):
+    """The installed solver of that name, with the program that the user has set, or ``command``;
+    whether it is there, `refuse_missing_program` says. Raises InputError."""
+    entries = {entry.name: entry for entry in entry_points(group=GROUP)}
+    if name not in entries:
+        raise InputError(f"solver '{name}' is not installed{suggestion(name, sorted(entries))}")
+    solver: Solver = entries[name].load()()
+    if hasattr(solver, "command"):
+        solver.command = resolve_program(command or command_of(name)[0] or solver.command)
+    elif command:
         raise InputError(f"solver '{name}' starts no program: it takes no --solver-command")
-    _set_command(solver, list(command) or command_of(name)[0])
     return solver
 
 
-def _set_command(solver: Any, command: list[str]) -> None:
-    if command and hasattr(solver, "command"):
-        solver.command = command
+def solver_facts(solver: Solver | None) -> dict[str, Any]:
+    """What run.json holds of a solver: ``solver``, its name and version, and ``solver_command``,
+    the words that start it, None where it starts no program."""
+    return {
+        "solver": solver and f"{solver.name} {solver.version}",
+        "solver_command": getattr(solver, "command", None),
+    }
+
+
+def refuse_missing_program(solver: Solver) -> None:
+    """Raises SolverUnavailable where the program that the solver starts is not there."""
+    if why := _missing(solver):
+        raise SolverUnavailable(
+            f"solver '{solver.name}': {why}; install it or give --solver-command PATH"
+            " ('tyrecal solvers' shows what each starts)"
+        )
+
+
+def _missing(solver: Any) -> str:
+    command = getattr(solver, "command", None)
+    return why_missing(command) if command else ""
 
 
 def installed() -> list[dict[str, Any]]:
@@ -101,12 +121,11 @@ def _described(entry: EntryPoint) -> dict[str, Any]:
         solver: Any = entry.load()()
         if hasattr(solver, "command"):
             command, origin = command_of(entry.name)
-            _set_command(solver, command)
+            solver.command = resolve_program(command or solver.command)
             facts["command"], facts["command_from"] = solver.command, origin or "default"
         facts["dialect"], facts["capabilities"] = solver.dialect, sorted(solver.capabilities)
         facts["version"] = solver.version
-        if solver.version == "unknown":
-            facts["problem"] = "its program was not found"
+        facts["problem"] = _missing(solver) or None
     except InputError as error:
         facts["problem"] = str(error)
     except Exception as error:  # whatever a stranger's code raises when it is imported

@@ -1,8 +1,8 @@
 """The record of evaluations: a folder of files named by what was asked of which solver.
 
 A key is the hash of every file that was written for a run (names and contents, but for the comment
-that a deck begins with), of the solver's name and version, and of the adapter's own sources, since
-they read the results.
+that a deck begins with), of the solver's name and version, of the program that it starts, and of
+the adapter's own sources, since they read the results.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from typing import Any
 
 from ...files import NotAFile, open_file, own_folder, read_bytes, refuse_link, whole
 from ..deck.decks import without_header
+from ..program import program_identity
 from .record import DIGEST, Damaged, pack, unpack
 from .recorded import check
 from .solver import Solver
@@ -37,7 +38,7 @@ log = logging.getLogger("tyrecal")
 def key_of(folder: Path, solver: Solver) -> str:
     """What ``solver`` is asked by the files in ``folder``, as 64 hexadecimal digits."""
     digest = sha256()
-    parts = [FORMAT, solver.name, solver.version, sources_of(type(solver))]
+    parts = [FORMAT, *solver_identity(solver)]
     pieces = [part.encode() for part in parts]
     for path in sorted(p for p in folder.rglob("*") if p.is_file()):
         name = path.relative_to(folder).as_posix().encode()
@@ -46,6 +47,13 @@ def key_of(folder: Path, solver: Solver) -> str:
         digest.update(b"%d:" % len(piece))
         digest.update(piece)
     return digest.hexdigest()
+
+
+def solver_identity(solver: Solver) -> list[str]:
+    """What tells a solver's answers from those of others: name, version, adapter, program."""
+    command = getattr(solver, "command", None)
+    program = program_identity(command) if command else []
+    return [solver.name, solver.version, sources_of(type(solver)), *program]
 
 
 _SOURCES: dict[type, str] = {}

@@ -175,6 +175,15 @@ def _under_load(
     return compare(case, evaluator, readings, tyres)
 
 
+def refuse_decks(case: LoadedCase) -> None:
+    """Raises InputError for decks in three dimensions, which have no section."""
+    if case.decks:
+        raise InputError(
+            "a diagnosis weighs effects, which change a section: this tyre stands in decks in three"
+            " dimensions"
+        )
+
+
 def spans_of(
     case: LoadedCase, evaluator: Evaluator, ids: Sequence[str] | None = None
 ) -> tuple[dict[str, Span], dict[str, str]]:
@@ -182,11 +191,7 @@ def spans_of(
     user's deck cannot have them. Raises ValueError where one of ``ids`` is no effect; InputError
     for decks in three dimensions.
     """
-    if case.decks:
-        raise InputError(
-            "a diagnosis weighs effects, which change a section: this tyre stands in decks in three"
-            " dimensions"
-        )
+    refuse_decks(case)
     able: dict[str, Span] = {}
     unable: dict[str, str] = {}
     stated = {path: abs(step) for each in sources(case)[0] for path, step in each.steps.items()}

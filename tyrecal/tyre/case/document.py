@@ -215,6 +215,9 @@ class _Reader:
         return data
 
     def scalar(self, node: ScalarNode, keys: Keys) -> Any:
+        if "\0" in node.value:  # no path and no command can hold one
+            self.document.add(keys, "must hold no NUL character")
+            return WRONG
         if _kind(node) not in ("int", "float", "bool", "null"):
             return node.value
         with suppress(ValueError, OverflowError):  # thousands of digits
