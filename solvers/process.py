@@ -50,7 +50,9 @@ def run_command(
                 **OWN_GROUP,
             )
         except OSError as error:
-            raise RunFailed("crashed", f"cannot start '{command[0]}'", error.strerror) from None
+            raise RunFailed(
+                "crashed", f"cannot start '{command[0]}'", error.strerror or ""
+            ) from None
         _running.append(process)
         try:
             return process.wait(time_limit_s)

@@ -260,7 +260,7 @@ def test_interrupted_and_resumed(tmp_path: Path) -> None:
     [
         (["none.yaml"], "none.yaml"),
         (["CASE", "CASE"], "given twice"),
-        (["CASE", "--studies", "fit,mode"], "'mode' is none of"),
+        (["CASE", "--studies", "fit,mode"], "no such study; did you mean 'modes'?"),
         (["CASE", "--write-baseline"], "needs --baseline"),
         (["CASE", "--steps", "1"], "--steps"),
         (["CASE", "--from-kPa", "300", "--to-kPa", "200"], "--from-kPa"),

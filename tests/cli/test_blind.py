@@ -33,9 +33,12 @@ def test_steps_out_of_order_are_refused(
             ["make", out, "--case", case, "--effects", "0", "--none", "0", "--outside", "0"],
             "at least one trial",
         ),
-        (["make", out, "--case", case, "--effect", "luck"], "this maker has only"),
+        (
+            ["make", out, "--case", case, "--effect", "luck"],
+            "there is no such effect of this maker's",
+        ),
         (["make", out, "--case", case, *COUNTS, "--truth", out + "/truth"], "must not lie in"),
-        (["answer", out, "--effect", "luck"], "no such effect"),
+        (["answer", out, "--effect", "luck"], "--effect luck: there is no such effect; known: "),
     ):
         assert refused(*command), command
         assert words in capsys.readouterr().err

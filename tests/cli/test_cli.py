@@ -132,7 +132,7 @@ def test_a_deck_that_the_solver_refuses(tmp_path: Path, capsys: pytest.CaptureFi
     ):
         out = tmp_path / "out"
         assert run("deck", case, "--solver", "calculix", "--output", str(out), *more) == 2
-        (told,) = capsys.readouterr().err.splitlines()
+        *_, told = capsys.readouterr().err.splitlines()
         assert told.startswith("error: ") and why in told
         assert not out.exists()
 
@@ -253,7 +253,7 @@ def test_a_number_that_a_variable_sets_is_said_not_to_count(
         assert f"{words} starts at 1e+06\n" in capsys.readouterr().err, arguments
     assert run("deck", str(path), "--output", str(out), "--set", "C10=3e6") == 0
     assert run("validate", CASE) == 0
-    assert capsys.readouterr().err == ""
+    assert "does not count" not in capsys.readouterr().err
 
 
 def test_results_go_on_where_their_project_was_moved(case_folder: Path, tmp_path: Path) -> None:
@@ -322,8 +322,15 @@ def test_a_template_that_runs_code_is_refused(
     ("arguments", "words"),
     [
         (["--set", "rebar_layers.belt_1.area_m2=3e-7"], "A_belt=VALUE"),
-        (["--set", "A_belt=3e-7", "--set", "A_belt=4e-7"], "set twice"),
-        (["--set", "pressure_kPa=200", "--pressure-kPa", "220"], "set twice"),
+        (["--set", "A_belt=3e-7", "--set", "A_belt=4e-7"], "--set A_belt=3e-7 and --set A"),
+        (
+            ["--set", "pressure_kPa=200", "--pressure-kPa", "220"],
+            "--set pressure_kPa=200 and --pressure-kPa 220: two values for one number",
+        ),
+        (
+            ["--set", "rebar_layers.belt_1.area_m2=3e-7", "--set", "A_belt=4e-7"],
+            "--set rebar_layers.belt_1.area_m2=3e-7 and --set A_belt=4e-7: two values",
+        ),
     ],
 )
 def test_an_assignment_is_never_ignored(

@@ -143,8 +143,8 @@ def test_an_added_effect_makes_a_case(
     [
         ([], "--measured FILE must be given"),
         (["--measured", "none.csv"], "none.csv"),
-        (["--measured", "M", "--effect", "magic"], "no such effect"),
-        (["--measured", "M", "--toggled", "M", "magic=0"], "what was switched"),
+        (["--measured", "M", "--effect", "magic"], "--effect magic: there is no such effect"),
+        (["--measured", "M", "--toggled", "M", "magic=0"], "there is no effect 'magic'"),
         (["--measured", "M", "--solver", "calculix"], "no exact slopes"),
         (["--measured", "M", "--toggled", "M", "bead_filler=nan"], "is not a number"),
         (["--measured", "M", "--toggled", "M", "bead_filler*1"], "switches nothing"),

@@ -65,7 +65,7 @@ def test_list_and_words_for_people(capsys: pytest.CaptureFixture[str]) -> None:
         (["--no-store"], "--no-store needs a --case"),
         (["cap_ply", "--store", "record"], "--store needs a --case"),
         (["cap_ply", "--no-pictures"], "--no-pictures needs a --case"),
-        (["cap_ply", "--case", "CASE", "--pressures-kPa", "200,x"], "'x' is no number"),
+        (["cap_ply", "--case", "CASE", "--pressures-kPa", "200,x"], "200,x: must be numbers in"),
         (["cap_ply", "--case", "CASE", "--pressures-kPa", "200,200"], "each once"),
         (["cap_ply", "--case", "CASE", "--solver", "calculix"], "gives no slopes"),
         (

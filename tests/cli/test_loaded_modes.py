@@ -70,13 +70,13 @@ def test_a_tyre_that_no_load_is_borne_by(
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--load-N", "0"], "--load-N 0: must be a finite load above 0"),
+        (["--load-N", "0"], "--load-N 0: must be a load above 0"),
         (["--load-N", "-5"], "above 0"),
-        (["--load-N", "nan"], "finite"),
+        (["--load-N", "nan"], "must be a number in N, as in 4000"),
         (["--sweep-load", "0"], "needs a load above 0"),
         (["--sweep-load", "1000,500"], "loads must rise"),
         (["--sweep-load", "500,0"], "above 0"),
-        (["--sweep-load", "much"], "'much' is not a number"),
+        (["--sweep-load", "much"], "--sweep-load much: must be numbers in N"),
         (["--sweep-load", "500", "--load-N", "500"], "not both"),
         (["--load-N", "500", "--fitted", CASE], "--fitted goes with --sweep-load"),
         (["--load-N", "500", "--pictures"], "--pictures goes with"),

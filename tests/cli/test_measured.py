@@ -292,7 +292,7 @@ def test_bad_files_get_one_sentence_and_exit_code_2(
         ([str(SHAPES)], "universal files hold no pressure; give --pressure-kPa"),
         ([str(SHAPES), "--pressure-kPa", "240", *TEST], "may be off: give repeats, a column sigma"),
         ([str(TABLE), "--output", str(TABLE)], "is one of the files to read"),
-        (["missing.uff"], "does not exist"),
+        (["missing.uff"], "missing.uff: there is no such file"),
         ([str(CASES / "pictures/modes.png")], "neither text nor a universal file"),
     ],
 )

@@ -82,13 +82,13 @@ def test_targets_without_a_sigma_have_that_of_the_fit(
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        (["--draws", "10"], "1000<=x"),
+        (["--draws", "10"], "--draws 10: must be a whole number, 1000 to 10000000, as in 100000"),
         (["--at-kPa", "2.4"], "--at-kPa 2.4: usual is 50 to 1200 kPa"),
-        (["--measured", "no.csv"], "does not exist"),
+        (["--measured", "no.csv"], "--measured no.csv: there is no such file"),
         (["--measured", "mass.csv"], "no frequency of the unloaded tyre"),
         (["--measured", "high.csv", "--mesh", "coarse", "--no-store"], "is it the right unit"),
         (["--solver", "calculix"], "gives no exact slopes"),
-        (["--seed", "-1"], "0<=x"),
+        (["--seed", "-1"], "--seed -1: must be a whole number, 0 to"),
     ],
 )
 def test_what_is_refused(

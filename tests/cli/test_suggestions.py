@@ -23,7 +23,7 @@ SLIPS = {  # what was typed: what is told
     f"modes {CASES / 'p235_75r1.yaml'}": f"no such file; did you mean '{CASE}'?",
     f"validate {CASES / 'p235_75r17'}": f"no such file; did you mean '{CASE}'?",
     f"modes {CASES}": f"{CASES}: is a folder, must be a case file\n",
-    f"sweep-pressure {CASE} --fitted nothere.json": "'nothere.json' does not exist",
+    f"sweep-pressure {CASE} --fitted nothere.json": "--fitted nothere.json: there is no such file",
     f"sweep-pressure {CASE} --fitted {CASES}": f"no fit.json in the folder '{CASES}'",
 }
 

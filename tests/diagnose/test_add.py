@@ -15,16 +15,16 @@ from ..case.test_guard import SLIPS
 
 def test_an_effect_is_added_with_the_files_comments_kept(case_folder: Path) -> None:
     old = case_folder / "p235_75r17.yaml"
-    new = add(old, "bead_filler", 1.5)
+    new = add(old, {"bead_filler": 1.5})
     added = [line for line in new.read_text().splitlines() if line not in old.read_text()]
     assert [line.strip() for line in added if line.strip() not in ("effects:",)] == [
         "bead_filler: 1.5"
     ]
     assert "# Table 1 of the paper" in new.read_text()
     with pytest.raises(InputError):
-        add(old, "bead_filler", 1.5)
+        add(old, {"bead_filler": 1.5})
     with pytest.raises(ValueError, match="no 'nothing'"):
-        add(old, "nothing", 1.5)
+        add(old, {"nothing": 1.5})
 
 
 def test_an_effect_is_added_to_a_case_whose_numbers_are_unusual(case_folder: Path) -> None:
@@ -34,4 +34,4 @@ def test_an_effect_is_added_to_a_case_whose_numbers_are_unusual(case_folder: Pat
     text = path.read_text()
     assert old in text
     path.write_text(text.replace(old, new, 1))
-    assert load_case(add(path, "bead_filler", 1.5), allow_unusual=True).case.effects
+    assert load_case(add(path, {"bead_filler": 1.5}), allow_unusual=True).case.effects

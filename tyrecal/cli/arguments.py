@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +24,8 @@ def load(
     Says which numbers of the file do not count. Returns (case, values of the variables). Raises
     CaseError, click.UsageError; both for numbers that no tyre has, too, unless they are allowed.
     """
-    from ..tyre.case import as_written, overruled, parse_assignment, start_values, with_level
+    from ..tyre.case import as_written, overruled, start_values, with_level
     from ..tyre.load import CaseError, load_case
-    from ..tyre.own_deck.numbers import as_known
     from ..tyre.values import overridden, with_values
 
     case = load_case(path, allow_unusual)
@@ -34,10 +33,7 @@ def load(
         if mesh_level:
             case = with_level(case, mesh_level)
         names = set(case.case.variables)
-        pairs = [parse_assignment(text) for text in assigned]
-        given = _once(
-            [(as_known(name, case.deck_numbers), value) for name, value in pairs], pressure_kPa
-        )
+        given = _given(case, assigned, pressure_kPa)
         for name, variable in case.case.variables.items():
             for number in set(variable.sets) & set(given):
                 raise click.UsageError(
@@ -45,6 +41,7 @@ def load(
                 )
         for sentence in overruled(case, given):
             terminal.note(sentence)
+        replaced = _replaced(case, assigned)
         case = overridden(case, given)
         values = {**start_values(case), **{k: v for k, v in given.items() if k in names}}
         case = with_values(case, values)
@@ -53,6 +50,8 @@ def load(
             if name == "pressure_kPa" and value == pressure_kPa:
                 option = f"--pressure-kPa {value:g}"
             refuse_unusual(case, option, name, value, allow_unusual)
+        for sentence in replaced:
+            terminal.note(sentence)
         return case, values
     except CaseError:
         raise
@@ -69,21 +68,30 @@ def refuse_unusual(loaded: Any, option: str, name: str, value: float, allowed: b
         raise click.UsageError(f"{option}: {message}")
 
 
+def parse_numbers(option: str, text: str, what: str) -> list[float]:
+    """Finite numbers, separated by commas; ``what`` they must be. Raises click.UsageError."""
+    from math import isfinite
+
+    try:
+        numbers = [float(word) for word in text.split(",")]
+    except ValueError:
+        numbers = []
+    if not numbers or not all(map(isfinite, numbers)):
+        raise click.UsageError(f"{option} {text}: must be {what}")
+    return numbers
+
+
 def parse_loads(text: str, option: str = "--loads-N", zero: bool = False) -> list[float]:
     """Loads in N; ``zero``: 0 may be the first. Raises click.UsageError."""
     from itertools import pairwise
 
     from ..tyre.case.schema import LARGEST_LOAD_N, LEAST_LOAD_N
 
-    loads: list[float] = []
-    for word in text.split(","):
-        try:
-            loads.append(float(word))
-        except ValueError:
-            raise click.UsageError(f"{option}: '{word.strip()}' is not a number") from None
-        if not (LEAST_LOAD_N <= loads[-1] <= LARGEST_LOAD_N or (zero and loads == [0.0])):
+    loads = parse_numbers(option, text, "numbers in N, as in 3000,5000")
+    for place, load in enumerate(loads):
+        if not (LEAST_LOAD_N <= load <= LARGEST_LOAD_N or (zero and load == place == 0)):
             raise click.UsageError(
-                f"{option} {loads[-1]:g}: must be a finite load above 0, of {LEAST_LOAD_N:g} to"
+                f"{option} {load:g}: must be a load above 0, of {LEAST_LOAD_N:g} to"
                 f" {LARGEST_LOAD_N:g} N"
             )
     for before, after in pairwise(loads):
@@ -135,15 +143,76 @@ def fitted_values(path: Path, loaded: Any, terminal: Terminal) -> dict[str, floa
     return values
 
 
-def _once(pairs: list[tuple[str, float]], pressure_kPa: float | None) -> dict[str, float]:
-    """Assignments by name, none of them twice."""
+def _given(loaded: Any, assigned: Sequence[str], pressure_kPa: float | None) -> dict[str, float]:
+    """What the user sets, by variable or path: each number once, by whatever names it is given.
+
+    Raises ValueError; click.UsageError where two values are given for one number.
+    """
+    from ..tyre.case import parse_assignment
+    from ..tyre.own_deck.numbers import as_known
+    from ..tyre.values import paths_of
+
+    for text in assigned:
+        _refuse_word(loaded, text)
+    options = [(f"--set {text}", *parse_assignment(text)) for text in assigned]
     if pressure_kPa is not None:
-        pairs = [*pairs, ("pressure_kPa", pressure_kPa)]
-    given = dict(pairs)
-    if len(given) < len(pairs):
-        twice = next(name for name in given if sum(n == name for n, _ in pairs) > 1)
-        raise click.UsageError(f"{twice} is set twice")
+        options.append((f"--pressure-kPa {pressure_kPa:g}", "pressure_kPa", pressure_kPa))
+    given: dict[str, float] = {}
+    first: dict[str, tuple[str, float]] = {}  # by path
+    for option, name, value in options:
+        paths = paths_of(loaded, name)
+        known = [first[path] for path in paths if path in first]
+        for other, before in known:
+            if before != value:
+                raise click.UsageError(f"{other} and {option}: two values for one number")
+        first |= dict.fromkeys(paths, (option, value))
+        if name in loaded.case.variables:
+            given = {n: x for n, x in given.items() if n not in paths} | {name: value}
+        elif not known:
+            given[as_known(name, loaded.deck_numbers)] = value
     return given
+
+
+def _refuse_word(loaded: Any, text: str) -> None:
+    """Raises click.UsageError where an assignment leads to a word of the case."""
+    from ..tyre.case.document import read_document
+    from ..tyre.case.mistakes import dotted
+    from ..tyre.values import paths_of, value_at
+
+    name = text.partition("=")[0].strip()
+    for path in paths_of(loaded, name) if "." in name else ():
+        word = value_at(loaded, path)
+        if isinstance(word, str):
+            places = {dotted(k): line for k, (line, _) in read_document(loaded.path).places.items()}
+            line = f"line {places[path]} of " if path in places else ""
+            raise click.UsageError(
+                f"--set {text}: {path} is a word, '{word}'; --set takes numbers, true and false:"
+                f" edit {line}{loaded.path}"
+            )
+
+
+def _replaced(loaded: Any, assigned: Sequence[str]) -> list[str]:
+    """A line for each number that --set replaces: its path, the case's value and the one used."""
+    from ..tyre.case import as_written, parse_assignment, start_values
+    from ..tyre.values import paths_of, value_at
+
+    lines = []
+    for name, value in map(parse_assignment, assigned):
+        paths = paths_of(loaded, name)
+        if name in loaded.case.variables:
+            before, what = start_values(loaded)[name], f"{name} ({', '.join(paths)})"
+        else:
+            before, what = value_at(loaded, paths[0]), paths[0]
+        lines.append(f"--set: {what} is {as_written(before)} in the case, {as_written(value)} here")
+    return list(dict.fromkeys(lines))
+
+
+def refuse_unknown(option: str, name: str, known: Collection[str], what: str) -> None:
+    """Raises click.UsageError where ``name`` is not among ``known``: what was probably meant."""
+    from ..tyre.case.mistakes import suggestion
+
+    if name not in known:
+        raise click.UsageError(f"{option} {name}: there is no such {what}{suggestion(name, known)}")
 
 
 def starting_at(loaded: Any, values: Mapping[str, float]) -> Any:

@@ -11,6 +11,7 @@ import click
 from ..files import json_text, refuse_link, write_text
 from . import arguments, options
 from .main import EXIT_BATCH
+from .parameters import Place, Whole, option
 from .terminal import Terminal
 
 STUDY_NAMES = (
@@ -20,14 +21,12 @@ STUDY_NAMES = (
     "footprint",
     "sample",
 )  # without importing what they need
-FILE_PATH = click.Path(path_type=Path, dir_okay=False)
+FILE_PATH = Place(folder=False)
 
 
 @click.command()
-@click.argument(
-    "cases", nargs=-1, required=True, type=click.Path(path_type=Path, exists=True, dir_okay=False)
-)
-@click.option(
+@click.argument("cases", nargs=-1, required=True, type=Place(exists=True, folder=False))
+@option(
     "--studies",
     default="fit",
     metavar="S1,S2,...",
@@ -35,23 +34,23 @@ FILE_PATH = click.Path(path_type=Path, dir_okay=False)
     help=f"Of {', '.join(STUDY_NAMES)}. After a fit, sweep and footprint study the fitted"
     " design too.",
 )
-@click.option("--junit", type=FILE_PATH, metavar="FILE", help="Write JUnit XML for a CI server.")
-@click.option(
+@option("--junit", type=FILE_PATH, metavar="FILE", help="Write JUnit XML for a CI server.")
+@option(
     "--baseline",
     type=FILE_PATH,
     metavar="FILE",
     help="Numbers to compare with, and how far each may drift.",
 )
-@click.option(
+@option(
     "--write-baseline",
     is_flag=True,
     help="Write the numbers to --baseline instead; its tolerances stay.",
 )
 @options.loads
 @options.pressures
-@click.option(
+@option(
     "--jobs",
-    type=click.IntRange(1, 256),
+    type=Whole(1, 256),
     default=1,
     metavar="N",
     show_default=True,
@@ -62,9 +61,9 @@ FILE_PATH = click.Path(path_type=Path, dir_okay=False)
     options.mesh,
     options.solver,
     options.solver_command,
-    click.option(
+    option(
         "--output",
-        type=click.Path(path_type=Path),
+        type=Place(),
         metavar="DIR",
         help="Folder for the results, one in it for each case (default: batch).",
     ),
@@ -194,8 +193,7 @@ def _studies(text: str) -> tuple[str, ...]:
     """The studies asked for, in the order in which they are done. Raises click.UsageError."""
     asked = [word.strip() for word in text.split(",")]
     for word in asked:
-        if word not in STUDY_NAMES:
-            raise click.UsageError(f"--studies: '{word}' is none of {', '.join(STUDY_NAMES)}")
+        arguments.refuse_unknown("--studies", word, STUDY_NAMES, "study")
     return tuple(name for name in STUDY_NAMES if name in asked)
 
 

@@ -9,23 +9,24 @@ from typing import Any
 import click
 
 from . import arguments, complete, options
+from .parameters import NumberWithin, Place, Whole, option
 from .terminal import Progress, Terminal, resume
 
-folder = click.argument("folder", type=click.Path(path_type=Path, file_okay=False), metavar="DIR")
-truth = click.option(
+folder = click.argument("folder", type=Place(file=False), metavar="DIR")
+truth = option(
     "--truth",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=Place(file=False),
     metavar="DIR",
     help="Where the sealed truth lies (default: DIR-truth, beside DIR).",
 )
 
 
-def trials(option: str, name: str, default: int, what: str) -> Any:
+def trials(flag: str, name: str, default: int, what: str) -> Any:
     """How many trials of a kind are made."""
-    number = click.IntRange(0)
+    number = Whole(0)
     help = f"Trials {what}."
-    return click.option(
-        option, name, type=number, default=default, show_default=True, metavar="N", help=help
+    return option(
+        flag, name, type=number, default=default, show_default=True, metavar="N", help=help
     )
 
 
@@ -43,17 +44,17 @@ def command() -> None:
 
 @command.command()
 @options.case_argument
-@click.option(
+@option(
     "--pressure-kPa",
     "pressures",
-    type=click.FloatRange(0, min_open=True),
+    type=NumberWithin(0, min_open=True),
     multiple=True,
     metavar="KPA",
     help="Measured at this pressure; repeatable (default: 2/3, all and 4/3 of the case's).",
 )
-@click.option(
+@option(
     "--noise-percent",
-    type=click.FloatRange(0, 20, min_open=True),
+    type=NumberWithin(0, 20, min_open=True),
     default=0.2,
     show_default=True,
     metavar="PERCENT",
@@ -107,10 +108,10 @@ def power(
 
 @command.command()
 @folder
-@click.option(
+@option(
     "--case",
     "case_path",
-    type=click.Path(path_type=Path),
+    type=Place(),
     required=True,
     metavar="CASE",
     shell_complete=complete.cases,
@@ -119,7 +120,7 @@ def power(
 @trials("--effects", "effects", 300, "with an effect of the catalogue")
 @trials("--none", "plain", 200, "without any")
 @trials("--outside", "outside", 80, "with what the catalogue does not hold")
-@click.option(
+@option(
     "--effect",
     "drawn",
     multiple=True,
@@ -127,7 +128,7 @@ def power(
     shell_complete=complete.effects,
     help="Draw these effects only; repeatable (default: all it can).",
 )
-@click.option("--seed", type=int, metavar="N", help="Of all that is drawn (default: a secret one).")
+@option("--seed", type=Whole(0), metavar="N", help="Of all that is drawn (default: a secret one).")
 @truth
 @options.every(options.jobs, options.allow_unusual)
 @options.talking
@@ -175,8 +176,7 @@ def make(
     store = Store((sealed / "record").resolve())
     maker = bundled_maker(case, store)
     for id in drawn:
-        if id not in maker.laws:
-            raise click.UsageError(f"--effect {id}: this maker has only {', '.join(maker.laws)}")
+        arguments.refuse_unknown("--effect", id, maker.laws, "effect of this maker's")
     if drawn:
         maker = replace(maker, laws={id: maker.laws[id] for id in drawn})
     counts = {"effect": effects, "none": plain, "outside": outside}
@@ -201,13 +201,13 @@ def make(
 
 @command.command()
 @folder
-@click.option(
+@option(
     "--emulated/--asked",
     default=True,
     show_default=True,
     help="Ask the model at some designs once, or for each trial.",
 )
-@click.option(
+@option(
     "--effect",
     "effects",
     multiple=True,
@@ -243,8 +243,7 @@ def answer(
     from ..tyre.effects import catalogue
 
     for id in effects:
-        if id not in catalogue():
-            raise click.UsageError(f"--effect {id}: no such effect, only {', '.join(catalogue())}")
+        arguments.refuse_unknown("--effect", id, catalogue(), "effect")
     refuse_open_truth(folder)
     protocol, case = read_protocol(folder), blind.case_of(folder)
     resume("answers that were given are kept; the same command goes on from there")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from . import options
+from .parameters import OneOf
 from .terminal import Terminal
 
 # Asked with _TYRECAL_COMPLETE, click tells what completes the words. Its own scripts would take
@@ -74,7 +75,7 @@ SCRIPTS = {"bash": BASH, "zsh": ZSH, "fish": FISH}
 
 
 @click.command()
-@click.argument("shell", type=click.Choice(list(SCRIPTS)))
+@click.argument("shell", type=OneOf(list(SCRIPTS)))
 @options.talking
 def command(shell: str, terminal: Terminal) -> int:
     """Print the script that makes SHELL complete commands, cases, solvers, effects and variables.

@@ -12,6 +12,7 @@ import click
 
 from . import arguments, options
 from .main import EXIT_INPUT
+from .parameters import option
 from .terminal import Terminal
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ MOST_SAID = 10  # doubts about a deck
 
 
 @click.command()
-@click.option(
+@option(
     "--check",
     is_flag=True,
     help="Only say what is in CASE, a case or an ABAQUS deck of your own (FILE.inp).",

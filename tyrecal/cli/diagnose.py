@@ -7,21 +7,22 @@ from pathlib import Path
 import click
 
 from . import arguments, complete, options
+from .parameters import NumberWithin, Place, option
 
-file = click.Path(path_type=Path, exists=True, dir_okay=False)
+file = Place(exists=True, folder=False)
 
 
 @click.command()
 @options.every(options.case_argument, options.assignments)
-@click.option("--measured", type=file, metavar="FILE", help="Measurements (CSV), labels or not.")
-@click.option(
+@option("--measured", type=file, metavar="FILE", help="Measurements (CSV), labels or not.")
+@option(
     "--repeats",
     multiple=True,
     type=file,
     metavar="FILE",
     help="The same measured again after dismounting; repeatable.",
 )
-@click.option(
+@option(
     "--toggled",
     multiple=True,
     type=(file, str),
@@ -29,7 +30,7 @@ file = click.Path(path_type=Path, exists=True, dir_okay=False)
     help="A run of the same tyre with one thing switched: EFFECT=VALUE (0: absent) or"
     " EFFECT*FACTOR; repeatable.",
 )
-@click.option(
+@option(
     "--effect",
     "effects",
     multiple=True,
@@ -37,43 +38,45 @@ file = click.Path(path_type=Path, exists=True, dir_okay=False)
     shell_complete=complete.effects,
     help="Consider these effects only; repeatable.",
 )
-@click.option(
+@option(
     "--without",
     multiple=True,
     metavar="EFFECT",
     shell_complete=complete.effects,
     help="Leave out an effect that is ruled out; repeatable.",
 )
-@click.option(
+@option(
     "--form-percent",
-    type=click.FloatRange(0, 20),
+    type=NumberWithin(0, 20),
     metavar="PERCENT",
     help="Error of the model's own form in every frequency (default: of its mesh, mode by mode, and"
     " of material laws, where the section is not exact).",
 )
-@click.option(
+@option(
     "--split-percent",
-    type=click.FloatRange(0, 20),
+    type=NumberWithin(0, 20),
     default=0.3,
     show_default=True,
     metavar="PERCENT",
     help="Split of pairs that every such tyre has.",
 )
-@click.option(
+@option(
     "--further",
-    type=click.FloatRange(0, 1),
+    type=NumberWithin(0, 1),
     default=0.05,
     show_default=True,
     metavar="SHARE",
     help="Prior of two effects over that of one, and of three over that of two.",
 )
-@click.option(
+@option(
     "--add",
+    "added",
+    multiple=True,
     metavar="EFFECT=VALUE",
     shell_complete=complete.effect_values,
-    help="Write a case with the effect in it, and do nothing else.",
+    help="Write a case with the effect in it, and do nothing else; repeatable.",
 )
-@click.option("--pictures/--no-pictures", default=True, help="Draw what was found.")
+@option("--pictures/--no-pictures", default=True, help="Draw what was found.")
 @options.study
 def command(
     case: Path,
@@ -86,7 +89,7 @@ def command(
     form_percent: float | None,
     split_percent: float,
     further: float,
-    add: str | None,
+    added: tuple[str, ...],
     pictures: bool,
     study: options.Study,
 ) -> int:
@@ -100,14 +103,19 @@ def command(
     tyrecal diagnose my.yaml --measured run1.csv --repeats run2.csv --repeats run3.csv --jobs 2
     tyrecal diagnose my.yaml --measured run1.csv --toggled clamped.csv spindle_lateral=0
     tyrecal diagnose my.yaml --add bead_filler=1.5
+    tyrecal diagnose my.yaml --add bead_filler=1.5 --add rim_width=-0.01
     """
     terminal = study.terminal
-    if add:
-        if assignments or measured:
-            raise click.UsageError("--add writes a case and nothing else: no --set, no --measured")
-        path = _added(case, add, study.output, study.allow_unusual)
+    if added:
+        from ..simulate.program import join_command
+
+        for flag in options.given("--add", "--output", "--allow-unusual"):
+            raise click.UsageError(f"--add writes a case and nothing else: no {flag}")
+        path = _with_effects(case, added, study.output, study.allow_unusual)
         terminal.result({"case": str(path)})
-        terminal.say(f"{path} has the effect in it; 'tyrecal fit {path}' calibrates it")
+        what = "the effect" if len(added) == 1 else "the effects"
+        fit = join_command(["tyrecal", "fit", str(path)])
+        terminal.say(f"{path} has {what} in it; next: {fit}")
         return 0
     if measured is None:
         raise click.UsageError("--measured FILE must be given, or --add EFFECT=VALUE")
@@ -118,17 +126,16 @@ def command(
     from ..studies.diagnose.diagnosis import STAGES
     from ..studies.diagnose.inverse_problem import Assumed
     from ..studies.diagnose.result import diagnosis_result
-    from ..studies.diagnose.study import parse_change, refuse_decks
+    from ..studies.diagnose.study import parse_change
     from ..studies.diagnose.study import study as diagnosed
     from ..studies.fit.targets import rims_of
     from ..tyre.effects import catalogue
 
     loaded, values = study.load(case, assignments)
-    refuse_decks(loaded)
     loaded = arguments.starting_at(loaded, values)
-    for id in (*effects, *without):
-        if id not in catalogue():
-            raise click.UsageError(f"'{id}': no such effect, only {', '.join(catalogue())}")
+    for flag, ids in (("--effect", effects), ("--without", without)):
+        for id in ids:
+            arguments.refuse_unknown(flag, id, catalogue(), "effect")
     considered = [id for id in effects or catalogue() if id not in without]
     if not considered:
         raise click.UsageError("--without leaves no effect to consider")
@@ -194,16 +201,20 @@ def command(
     return 0
 
 
-def _added(case: Path, assignment: str, output: Path | None, allowed: bool) -> Path:
+def _with_effects(case: Path, added: tuple[str, ...], output: Path | None, allowed: bool) -> Path:
     """The new case's file. Raises click.UsageError, CaseError."""
     from ..studies.diagnose.add import add
     from ..tyre.case import parse_assignment
     from ..tyre.load import load_case
 
     loaded = load_case(case, allowed)
+    effects: dict[str, float] = {}
     try:
-        id, value = parse_assignment(assignment)
-        arguments.refuse_unusual(loaded, f"--add {assignment}", f"effects.{id}", value, allowed)
-        return add(case, id, value, output)
+        for text in added:
+            id, value = parse_assignment(text)
+            arguments.refuse_unusual(loaded, f"--add {text}", f"effects.{id}", value, allowed)
+            if effects.setdefault(id, value) != value:
+                raise ValueError(f"{id} is given twice, as {effects[id]:g} and {value:g}")
+        return add(case, effects, output)
     except ValueError as error:
         raise click.UsageError(f"--add: {error}") from None

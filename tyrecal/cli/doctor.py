@@ -9,6 +9,7 @@ import click
 
 from . import complete, options
 from .main import EXIT_SOLVER
+from .parameters import Place, option
 from .solvers import command_words, settings_file, settings_words
 from .terminal import Terminal
 
@@ -19,7 +20,7 @@ HINTS = {
 
 
 @click.command()
-@click.option(
+@option(
     "--solver",
     default="bundled",
     show_default=True,
@@ -27,9 +28,9 @@ HINTS = {
     shell_complete=complete.solvers,
     help="Solver that the known tyre is given to.",
 )
-@click.option(
+@option(
     "--store",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=Place(file=False),
     envvar="TYRECAL_STORE",
     metavar="DIR",
     help="Record to look at (default: those of the results folders here; also from TYRECAL_STORE).",

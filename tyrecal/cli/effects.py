@@ -9,32 +9,33 @@ from typing import Any
 import click
 
 from . import arguments, complete, options
+from .parameters import Number, Place, option
 
 
 @click.command()
 @click.argument("name", required=False, shell_complete=complete.effects)
-@click.option(
+@option(
     "--case",
     "case",
-    type=click.Path(path_type=Path),
+    type=Place(),
     metavar="CASE",
     shell_complete=complete.cases,
     help="Compute what the effect does to this tyre.",
 )
 @options.fitted("Compute it for the design that 'tyrecal fit' found for the case.")
-@click.option(
+@option(
     "--value",
-    type=float,
+    type=Number(),
     metavar="V",
     help="Size of the effect NAME (default: the end of its range).",
 )
-@click.option(
+@option(
     "--pressures-kPa",
     "pressures",
     metavar="P1,P2,...",
     help="Default: two thirds of the case's, the case's, four thirds.",
 )
-@click.option("--pictures/--no-pictures", default=True, help="Draw each signature.")
+@option("--pictures/--no-pictures", default=True, help="Draw each signature.")
 @options.assignments
 @options.jobs
 @options.study_one_by_one
@@ -63,18 +64,16 @@ def command(
     from ..report.table import shown
     from ..simulate.evaluate.solver import installed
     from ..studies.effects import CatalogueEntry, run
-    from ..tyre.case.mistakes import suggestion
     from ..tyre.effects import IDS, catalogue
 
     terminal = study.terminal
 
-    if name is not None and name not in IDS:
-        raise click.UsageError(f"there is no effect '{name}'{suggestion(name, IDS)}")
+    if name is not None:
+        arguments.refuse_unknown("effects", name, IDS, "effect")
     if value is not None and name is None:
         raise click.UsageError("--value needs the NAME of an effect")
-    for option in [] if case else options.given():
-        if option not in ("--json", "--quiet", "--verbose"):
-            raise click.UsageError(f"{option} needs a --case")
+    for stated in [] if case else options.given():
+        raise click.UsageError(f"{stated} needs a --case")
     solvers = installed()
     chosen = [name] if name else IDS
     if not case:
@@ -130,21 +129,15 @@ def _variables_in(assignments: tuple[str, ...], values: Mapping[str, float]) -> 
 
 def _pressures(loaded: Any, text: str | None, allowed: bool) -> list[float]:
     """Pressures in kPa. Raises click.UsageError."""
-    from math import isfinite
-
     if text is None:
         nominal = loaded.case.pressure_kPa
         return [round(nominal * share / 3, 6) for share in (2, 3, 4)]
-    found = []
-    for word in text.split(","):
-        try:
-            found.append(float(word))
-        except ValueError:
-            raise click.UsageError(f"--pressures-kPa: '{word.strip()}' is no number") from None
-        if not (isfinite(found[-1]) and 0 < found[-1] < 2000) or found.count(found[-1]) > 1:
+    flag = "--pressures-kPa"
+    pressures = arguments.parse_numbers(flag, text, "numbers in kPa, as in 160,240")
+    for pressure in pressures:
+        if not 0 < pressure < 2000 or pressures.count(pressure) > 1:
             raise click.UsageError(
-                f"--pressures-kPa {found[-1]:g}: must be pressures between 0 and 2000, each once"
+                f"{flag} {pressure:g}: must be pressures between 0 and 2000, each once"
             )
-        option = f"--pressures-kPa {found[-1]:g}"
-        arguments.refuse_unusual(loaded, option, "pressure_kPa", found[-1], allowed)
-    return found
+        arguments.refuse_unusual(loaded, f"{flag} {pressure:g}", "pressure_kPa", pressure, allowed)
+    return pressures

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ import click
 
 from . import arguments, complete, options
 from .main import EXIT_FIT
+from .parameters import OneOf, Place, Whole, option
 from .terminal import Progress, Terminal
 
 if TYPE_CHECKING:
@@ -20,46 +20,46 @@ if TYPE_CHECKING:
 
 @click.command()
 @options.every(options.case_argument, options.assignments, options.pressure)
-@click.option(
+@option(
     "--method",
-    type=click.Choice(["slsqp", "gauss-newton"]),
+    type=OneOf(["slsqp", "gauss-newton"]),
     default="slsqp",
     show_default=True,
     help="Method of the loop: SciPy's SLSQP, or a damped Gauss-Newton method, which needs about a"
     " third of the designs, for solvers whose runs take minutes.",
 )
-@click.option(
+@option(
     "--measured",
-    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    type=Place(exists=True, folder=False),
     metavar="FILE",
     help="Measurements (CSV) in place of the case's targets, each in its own state (pressure, load,"
     " rim); with --pressure-kPa, those at that pressure alone. Frequencies without c and m get the"
     " likeliest labels.",
 )
-@click.option(
+@option(
     "--fix",
     multiple=True,
     metavar="NAME",
     shell_complete=complete.variables,
     help="Hold a variable at its start value.",
 )
-@click.option(
+@option(
     "--starts",
-    type=click.IntRange(1, 100000),
+    type=Whole(1, 100000),
     default=1,
     metavar="N",
     show_default=True,
     help="Starts: the case's own, the others drawn within the bounds.",
 )
-@click.option(
+@option(
     "--seed",
-    type=click.IntRange(0),
+    type=Whole(0),
     default=0,
     metavar="S",
     show_default=True,
     help="Seed of the drawn starts.",
 )
-@click.option("--pictures/--no-pictures", default=True, help="Draw convergence, section, modes.")
+@option("--pictures/--no-pictures", default=True, help="Draw convergence, section, modes.")
 @options.scheduler
 @options.study
 def command(
@@ -94,6 +94,7 @@ def command(
     from ..report.table import fit_doubts, fit_verdict, shown, tyre_doubts
     from ..simulate.deck.decks_design import design_of
     from ..simulate.evaluate.cluster import reached
+    from ..simulate.program import join_command
     from ..simulate.provenance import provenance
     from ..studies.fit.calibrate import calibrate, check, history_csv
     from ..studies.fit.problem import Problem
@@ -103,9 +104,8 @@ def command(
     terminal = study.terminal
     options.not_both(study.jobs, scheduler)
     loaded, values = study.load(case, assignments, pressure_kPa)
-    unknown = [name for name in fix if name not in values]
-    if unknown:
-        raise click.UsageError(f"--fix {unknown[0]}: no such variable, only {', '.join(values)}")
+    for name in fix:
+        arguments.refuse_unknown("--fix", name, values, "variable")
     loaded = arguments.starting_at(loaded, values)
     left_out: list[str] = []
     fixed = {name: values[name] for name in fix}
@@ -195,8 +195,8 @@ def command(
     if earlier:
         terminal.warn(f"the fit in '{run.folder}' had converged: it stays")
     study.finish(run)
-    file = shlex.quote(str(measured)) if measured else "FILE"
-    next_ = f"tyrecal diagnose {shlex.quote(str(case))} --measured {file}"
+    file = str(measured) if measured else "FILE"
+    next_ = join_command(["tyrecal", "diagnose", str(case), "--measured", file])
     if not loaded.case.deck and read_targets(loaded):
         terminal.say(f"next: {next_} says what the model lacks")
     return 0 if good else EXIT_FIT

@@ -9,6 +9,7 @@ import click
 
 from . import arguments, options
 from .main import EXIT_SOLVER
+from .parameters import option
 from .taken import taken
 from .terminal import Terminal
 
@@ -18,12 +19,12 @@ DESIGNS = ("initial", "fitted")
 @click.command()
 @options.every(options.case_or_last, options.assignments, options.pressure, options.loads)
 @options.fitted("Press the design that 'tyrecal fit' found for this case, too.")
-@click.option(
+@option(
     "--compare",
     metavar="initial,fitted",
     help="Designs to press (default: initial, and fitted where --fitted is given).",
 )
-@click.option("--pictures/--no-pictures", default=True, help="Draw the patches; write VTU.")
+@option("--pictures/--no-pictures", default=True, help="Draw the patches; write VTU.")
 @options.study
 def command(
     case: Path | None,
@@ -101,8 +102,7 @@ def _designs(
     """Values of the variables by design. Raises click.UsageError."""
     names = DESIGNS[: 2 if fitted else 1] if compare is None else tuple(compare.split(","))
     for name in names:
-        if name not in DESIGNS:
-            raise click.UsageError(f"--compare: '{name}' is no design, only {', '.join(DESIGNS)}")
+        arguments.refuse_unknown("--compare", name, DESIGNS, "design")
     if len(set(names)) < len(names):
         raise click.UsageError("--compare: a design is named twice")
     designs = {"initial": values}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -11,6 +10,7 @@ import click
 
 from ..errors import InputError
 from . import options
+from .parameters import Number, NumberWithin, OneOf, Place, option
 from .terminal import Terminal
 
 if TYPE_CHECKING:
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from ..tyre.own_deck.own_deck import OwnDeck
     from ..tyre.own_deck.own_decks import OwnDecks
 
-POSITIVE = click.FloatRange(min=0, min_open=True)
+POSITIVE = NumberWithin(min=0, min_open=True)
 
 
 def _length(flag: str, text: str, unit: str = "mm") -> Any:
-    return click.option(
+    return option(
         f"--{flag}-{unit}",
         f"{flag}_{unit}".replace("-", "_"),
         type=POSITIVE,
@@ -33,30 +33,30 @@ def _length(flag: str, text: str, unit: str = "mm") -> Any:
 
 @click.command()
 @click.argument("size", required=False)
-@click.option(
+@option(
     "--section",
     "file",
-    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    type=Place(exists=True, folder=False),
     metavar="FILE",
     help="CSV of your own section: stations, or an outer and an inner curve.",
 )
-@click.option(
+@option(
     "--deck",
     "deck_files",
-    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    type=Place(exists=True, folder=False),
     multiple=True,
     metavar="FILE.inp",
     help="ABAQUS deck of your own axisymmetric section; or those of your tyre in three dimensions,"
     " in the order in which they are run, each with --deck.",
 )
-@click.option(
+@option(
     "--crown-set",
     metavar="NSET",
     help="Of decks in three dimensions: the node set round the tyre (default: CROWN).",
 )
-@click.option(
+@option(
     "--units",
-    type=click.Choice(["m", "mm"]),
+    type=OneOf(["m", "mm"]),
     help="Of the deck: m, kg, s, Pa, or mm, t, s, MPa (default: told by its densities).",
 )
 @_length("crown", "Thickness at the crown, grooves spread over the tread.")
@@ -64,22 +64,22 @@ def _length(flag: str, text: str, unit: str = "mm") -> Any:
 @_length("bead", "Thickness at the rim's flange.")
 @_length("belt-width", "Width of the wider belt, along the carcass.")
 @_length("rim-width", "Width of the rim between its flanges.", "in")
-@click.option(
+@option(
     "--pressure-kPa",
     "pressure_kPa",
-    type=float,
+    type=Number(),
     metavar="P",
     help="Inflation pressure (default: usual for the type of tyre).",
 )
-@click.option(
+@option(
     "--output",
-    type=click.Path(path_type=Path),
+    type=Place(),
     metavar="CASE.yaml",
     help="Case file to write (default: named by the size, in this folder).",
 )
-@click.option("--force", is_flag=True, help="Write over files that exist.")
+@option("--force", is_flag=True, help="Write over files that exist.")
 @options.allow_unusual
-@click.option("--pictures/--no-pictures", default=True, help="Draw the section.")
+@option("--pictures/--no-pictures", default=True, help="Draw the section.")
 @options.talking
 def command(
     size: str | None,
@@ -197,7 +197,14 @@ def _write(
     )
     if picture:
         _draw(loaded, picture, terminal)
-    terminal.say(f"next: tyrecal modes {shlex.quote(str(target))}")
+    terminal.say(f"next: {_modes(target)}")
+
+
+def _modes(case: Path) -> str:
+    """The command to go on with."""
+    from ..simulate.program import join_command
+
+    return join_command(["tyrecal", "modes", str(case)])
 
 
 def _draw(loaded: Any, picture: Path, terminal: Terminal) -> None:
@@ -251,7 +258,7 @@ def _from_deck(
     loaded = load_case(target, allow_unusual=True)
     if picture:
         _draw(loaded, picture, terminal)
-    terminal.say(f"next: tyrecal modes {shlex.quote(str(target))}")
+    terminal.say(f"next: {_modes(target)}")
 
 
 def _from_decks(
@@ -274,7 +281,7 @@ def _from_decks(
         partial.write_text(text, encoding="utf-8")
     loaded = load_case(target, allow_unusual=True)
     terminal.result({"case": str(target), **known_of_decks(loaded, decks, terminal)})
-    terminal.say(f"next: tyrecal modes {shlex.quote(str(target))} --solver abaqus")
+    terminal.say(f"next: {_modes(target)} --solver abaqus")
 
 
 def _beside(

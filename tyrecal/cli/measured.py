@@ -8,41 +8,38 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from . import arguments, options
+from .parameters import Number, NumberWithin, OneOf, Place, Whole, option
 from .terminal import Terminal
 
 if TYPE_CHECKING:
     from ..measured.modal import Layout
 
 files = click.argument(
-    "files",
-    nargs=-1,
-    required=True,
-    metavar="FILE...",
-    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    "files", nargs=-1, required=True, metavar="FILE...", type=Place(exists=True, folder=False)
 )
-axle = click.option(
+axle = option(
     "--axle",
-    type=click.Choice(["x", "y", "z"]),
+    type=OneOf(["x", "y", "z"]),
     help="Axis of the test's coordinates along the axle (default: told by the sensors' places).",
 )
-centre = click.option(
+centre = option(
     "--centre",
     metavar="X,Y,Z",
     default="0,0,0",
     show_default=True,
     help="The wheel's centre in the test's coordinates, m.",
 )
-directions = click.option(
+directions = option(
     "--directions",
-    type=click.Choice(["cartesian", "cylindrical"]),
+    type=OneOf(["cartesian", "cylindrical"]),
     default="cartesian",
     show_default=True,
     help="Directions 1, 2, 3 of a sensor: along x, y, z, or radial, tangential, axial.",
 )
-highest = click.option(
+highest = option(
     "--highest-harmonic",
     "highest",
-    type=click.IntRange(0, 20),
+    type=Whole(0, 20),
     metavar="C",
     help="The most waves round the circumference that a mode of the band can have (default: 12).",
 )
@@ -62,49 +59,47 @@ def command() -> None:
 
 @command.command("import")
 @files
-@click.option(
+@option(
     "--output",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=Place(folder=False),
     metavar="FILE",
     default="measured.csv",
     show_default=True,
     help="The measurements CSV.",
 )
-@click.option(
+@option(
     "--pressure-kPa",
     "pressure_kPa",
-    type=float,
+    type=Number(),
     metavar="P",
     help="Inflation pressure of files that do not say it.",
 )
-@click.option(
+@option(
     "--band", metavar="F1,F2", help="Look for modes between these frequencies, Hz (default: all)."
 )
-@click.option(
+@option(
     "--sigma-percent",
     "assumed",
-    type=click.FloatRange(0, 20, min_open=True),
+    type=NumberWithin(0, 20, min_open=True),
     metavar="P",
     help="Standard deviation of one run that states none, in per cent.",
 )
-@click.option(
+@option(
     "--floor-percent",
     "floor",
-    type=click.FloatRange(0, 20),
+    type=NumberWithin(0, 20),
     default=0.1,
     show_default=True,
     metavar="P",
     help="No sigma below this, in per cent: what repeats do not show.",
 )
 @options.every(axle, centre, directions, highest)
-@click.option(
+@option(
     "--response",
-    type=click.Choice(["receptance", "mobility", "accelerance"]),
+    type=OneOf(["receptance", "mobility", "accelerance"]),
     help="What functions are that do not say it.",
 )
-@click.option(
-    "--pictures/--no-pictures", default=True, help="Draw functions and shapes beside the CSV."
-)
+@option("--pictures/--no-pictures", default=True, help="Draw functions and shapes beside the CSV.")
 @options.talking
 def import_files(
     files: tuple[Path, ...],
@@ -162,7 +157,7 @@ def import_files(
 
 
 @command.command()
-@click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
+@click.argument("file", type=Place(exists=True, folder=False))
 @options.every(axle, centre, directions, highest)
 @options.talking
 def sensors(
@@ -200,7 +195,7 @@ def sensors(
 
 @command.command("label")
 @options.case_argument
-@click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
+@click.argument("file", type=Place(exists=True, folder=False))
 @options.every(
     options.assignments,
     options.fitted("Expect the variables where this fit of CASE has them, as sure as it is."),
@@ -273,12 +268,8 @@ def _layout(
 
 
 def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
-    from math import isfinite
-
-    try:
-        numbers = tuple(float(word) for word in text.split(","))
-    except ValueError:
-        numbers = ()
-    if len(numbers) != count or not all(map(isfinite, numbers)):
-        raise click.UsageError(f"{option} {text}: must be {count} numbers, separated by commas")
-    return numbers
+    what = f"{count} numbers, separated by commas"
+    numbers = arguments.parse_numbers(option, text, what)
+    if len(numbers) != count:
+        raise click.UsageError(f"{option} {text}: must be {what}")
+    return tuple(numbers)

@@ -12,6 +12,7 @@ from . import arguments, options
 from .arguments import parse_loads
 from .main import EXIT_SOLVER
 from .options import Study
+from .parameters import option
 
 if TYPE_CHECKING:
     from ..tyre.case import LoadedCase
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     options.wheel,
     options.fitted("With --sweep-load: the design that 'tyrecal fit' found for this case, too."),
 )
-@click.option(
+@option(
     "--pictures/--no-pictures",
     default=None,
     help="Draw the section and each mode (default: no); with --sweep-load the frequencies"

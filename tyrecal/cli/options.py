@@ -28,6 +28,7 @@ import click
 from click.core import ParameterSource
 
 from . import arguments, complete
+from .parameters import Number, OneOf, Place, Whole, option
 from .terminal import SOLVERS, Terminal
 
 if TYPE_CHECKING:
@@ -39,70 +40,66 @@ if TYPE_CHECKING:
     from ..tyre.case import LoadedCase
     from .output import Run
 
-case_argument = click.argument(
-    "case", type=click.Path(path_type=Path), shell_complete=complete.cases
-)
-case_or_last = click.argument(
-    "case", type=click.Path(path_type=Path), required=False, shell_complete=complete.cases
-)
-solver = click.option(
+case_argument = click.argument("case", type=Place(), shell_complete=complete.cases)
+case_or_last = click.argument("case", type=Place(), required=False, shell_complete=complete.cases)
+solver = option(
     "--solver",
     default="",
     metavar="NAME",
     help="Solver (default: your settings', else the case's).",
     shell_complete=complete.solvers,
 )
-solver_command = click.option(
+solver_command = option(
     "--solver-command",
     callback=lambda ctx, param, value: _words(value),
     metavar="COMMAND",
     help="Program that the solver starts (default: TYRECAL_SOLVER_COMMAND, your settings file's,"
     " the solver's own; see tyrecal solvers).",
 )
-output = click.option(
+output = option(
     "--output",
-    type=click.Path(path_type=Path),
+    type=Place(),
     metavar="DIR",
     help="Folder for the results (default: NAME-of-case, here or in your settings' output).",
 )
-mesh = click.option(
+mesh = option(
     "--mesh",
     default="",
     metavar="LEVEL",
     help="Mesh level of the case, e.g. coarse or refined (default: the case's).",
     shell_complete=complete.levels,
 )
-as_json = click.option(
+as_json = option(
     "--json",
     "as_json",
     is_flag=True,
     help="Result as JSON on standard output, all else on standard error.",
 )
-quiet = click.option("--quiet", is_flag=True, help="Print nothing but errors.")
-verbose = click.option("--verbose", is_flag=True, help="Say more; keep run folders.")
-jobs = click.option(
+quiet = option("--quiet", is_flag=True, help="Print nothing but errors.")
+verbose = option("--verbose", is_flag=True, help="Say more; keep run folders.")
+jobs = option(
     "--jobs",
-    type=click.IntRange(1, 256),
+    type=Whole(1, 256),
     default=1,
     metavar="N",
     show_default=True,
     help="Designs evaluated at a time.",
 )
-store = click.option(
+store = option(
     "--store",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=Place(file=False),
     envvar="TYRECAL_STORE",
     metavar="DIR",
     help="Record of evaluations, which answers what was asked before (default: the folder 'record'"
     " of the results; also from TYRECAL_STORE).",
 )
-no_store = click.option("--no-store", is_flag=True, help="Neither ask nor keep a record.")
-allow_unusual = click.option(
+no_store = option("--no-store", is_flag=True, help="Neither ask nor keep a record.")
+allow_unusual = option(
     "--allow-unusual",
     is_flag=True,
     help="Compute with numbers that no tyre has, too: those outside their usual ranges.",
 )
-assignments = click.option(
+assignments = option(
     "--set",
     "assignments",
     multiple=True,
@@ -110,28 +107,28 @@ assignments = click.option(
     help="Set a variable or any number of the case; repeatable.",
     shell_complete=complete.assignments,
 )
-pressure = click.option(
+pressure = option(
     "--pressure-kPa",
     "pressure_kPa",
-    type=float,
+    type=Number(),
     metavar="P",
     help="Inflation pressure (default: the case's).",
 )
-loads = click.option(
+loads = option(
     "--loads-N",
     "loads",
     metavar="F1,F2,...",
     help="Vertical loads on the road, rising (footprint's default: road.loads_N of the case, and"
     " the loads of its targets).",
 )
-one_load = click.option(
+one_load = option(
     "--load-N",
     "load_N",
-    type=float,
+    type=Number(),
     metavar="F",
     help="Modes of the tyre on a flat road under this vertical load, about its deflected state.",
 )
-sweep_load = click.option(
+sweep_load = option(
     "--sweep-load",
     "sweep",
     metavar="F1,F2,...",
@@ -139,41 +136,41 @@ sweep_load = click.option(
 )
 
 
-wheel = click.option(
+wheel = option(
     "--wheel",
-    type=click.Choice(["held", "free-along-load"]),
+    type=OneOf(["held", "free-along-load"]),
     help="Under a load: the wheel's centre is held while the tyre vibrates, or free along the load"
     " with the rim's mass (default: road.wheel of the case).",
 )
 
 
-_from = click.option(
+_from = option(
     "--from-kPa",
     "from_kPa",
-    type=float,
+    type=Number(),
     default=100.0,
     metavar="A",
     show_default=True,
     help="Lowest pressure of a sweep.",
 )
-_to = click.option(
+_to = option(
     "--to-kPa",
     "to_kPa",
-    type=float,
+    type=Number(),
     default=320.0,
     metavar="B",
     show_default=True,
     help="Highest pressure of a sweep.",
 )
-_steps = click.option(
+_steps = option(
     "--steps",
-    type=click.IntRange(2, 10000),
+    type=Whole(2, 10000),
     default=12,
     metavar="N",
     show_default=True,
     help="Pressures of a sweep, both ends among them.",
 )
-scheduler = click.option(
+scheduler = option(
     "--scheduler",
     default="",
     metavar="ADDRESS|FILE",
@@ -186,15 +183,15 @@ def every(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """Apply several options in the order given."""
 
     def apply(function: Any) -> Any:
-        for option in reversed(options):
-            function = option(function)
+        for each in reversed(options):
+            function = each(function)
         return function
 
     return apply
 
 
 pressures = every(_from, _to, _steps)
-report = click.option(
+report = option(
     "--report",
     is_flag=True,
     help="Write report.html, a page of all that the folder of results holds.",
@@ -266,7 +263,7 @@ class Study:
         from ..simulate.evaluate.evaluator import Evaluator
 
         evaluator = Evaluator(design_of(loaded), self.solver, command=self.solver_command)
-        evaluator.solver  # noqa: B018  one that is not installed is refused before anything is read
+        evaluator.solver  # noqa: B018  a solver that is not there is refused before anything is written
         if loaded.decks:
             evaluator.refuse_lacking(evaluator.design)
             self.terminal.note(added_words(loaded.decks, evaluator.solver.dialect))
@@ -284,11 +281,9 @@ class Study:
         """The command's run, with the record behind ``evaluator``; ``study``: where it is not
         ``command``; measured, state: of the results' `provenance`. Raises InputError,
         OSError."""
-        from ..simulate.evaluate.solver import refuse_missing_program
         from ..simulate.provenance import provenance
         from .output import Run
 
-        refuse_missing_program(evaluator.solver)  # before anything is written
         block = provenance(loaded, evaluator.solver, measured, **state)
         run = Run(loaded.path, self.output, command, evaluator.solver, study, block, loaded)
         evaluator.folder, evaluator.keep = run.runs, self.terminal.verbose
@@ -352,6 +347,8 @@ def _talk(values: dict[str, Any]) -> Terminal:
     terminal = Terminal(*(values.pop(name) for name in ("as_json", "quiet", "verbose")))
     if terminal.quiet and terminal.verbose:
         raise click.UsageError("give --quiet or --verbose, not both")
+    if {"--store", "--no-store"} <= {*given()}:
+        raise click.UsageError("give --store or --no-store, not both")
     context, start = click.get_current_context(), time.monotonic()
     if terminal.verbose:
         logging.basicConfig(format="%(name)s: %(message)s")
@@ -366,19 +363,21 @@ def _talk(values: dict[str, Any]) -> Terminal:
 
 def fitted(text: str) -> Callable[[Any], Any]:
     """A finished fit whose design is studied too; ``text``: the option's help."""
-    path = click.Path(path_type=Path, exists=True)
-    return click.option("--fitted", type=path, metavar="fit.json|DIR", help=text)
+    path = Place(exists=True)
+    return option("--fitted", type=path, metavar="fit.json|DIR", help=text)
 
 
-def given() -> list[str]:
-    """The options that stand on the command line, not those of the environment."""
+def given(*without: str) -> list[str]:
+    """The options on the command line, ``without`` some and those of `TALK`; none that only the
+    environment or the settings give."""
     context = click.get_current_context()
-    return [
-        [*([] if context.params[option.name] else option.secondary_opts), *option.opts][0]
-        for option in context.command.params
-        if isinstance(option, click.Option)
-        and context.get_parameter_source(str(option.name)) is ParameterSource.COMMANDLINE
+    names = [
+        [*([] if context.params[each.name] else each.secondary_opts), *each.opts][0]
+        for each in context.command.params
+        if isinstance(each, click.Option)
+        and context.get_parameter_source(str(each.name)) is ParameterSource.COMMANDLINE
     ]
+    return [name for name in names if name not in (*without, "--json", "--quiet", "--verbose")]
 
 
 def say_idle(terminal: Terminal, jobs: int, why: str) -> None:

@@ -7,16 +7,15 @@ from pathlib import Path
 import click
 
 from . import options
+from .parameters import Place, option
 from .terminal import Terminal
 
 
 @click.command()
-@click.argument(
-    "folders", metavar="DIR...", nargs=-1, required=True, type=click.Path(path_type=Path)
-)
-@click.option(
+@click.argument("folders", metavar="DIR...", nargs=-1, required=True, type=Place())
+@option(
     "--output",
-    type=click.Path(path_type=Path),
+    type=Place(),
     metavar="FILE",
     help="The page (default: report.html in DIR, of several in the present folder).",
 )

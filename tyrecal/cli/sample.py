@@ -7,42 +7,43 @@ from pathlib import Path
 import click
 
 from . import arguments, options
+from .parameters import Number, Place, Whole, option
 
 
 @click.command()
 @options.every(options.case_argument, options.assignments, options.pressure)
-@click.option(
+@option(
     "--measured",
-    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    type=Place(exists=True, folder=False),
     metavar="FILE",
     help="Measurements (CSV), at any pressures, on any rims, in place of the case's targets.",
 )
-@click.option(
+@option(
     "--draws",
-    type=click.IntRange(1000, 10_000_000),
+    type=Whole(1000, 10_000_000),
     default=100_000,
     metavar="N",
     show_default=True,
     help="Draws in all.",
 )
-@click.option(
+@option(
     "--seed",
-    type=click.IntRange(0, 2**32 - 1),
+    type=Whole(0, 2**32 - 1),
     default=0,
     metavar="S",
     show_default=True,
     help="Seed of the draws.",
 )
-@click.option(
+@option(
     "--at-kPa",
     "at_kPa",
-    type=float,
+    type=Number(),
     multiple=True,
     metavar="P",
     help="Predict frequencies at this pressure, too; repeatable (default: a fifth below and above"
     " the case's).",
 )
-@click.option("--pictures/--no-pictures", default=True, help="Draw the corner picture.")
+@option("--pictures/--no-pictures", default=True, help="Draw the corner picture.")
 @options.study
 def command(
     case: Path,

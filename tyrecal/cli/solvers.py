@@ -8,18 +8,17 @@ from typing import Any
 import click
 
 from . import options
+from .parameters import OneOf, Place, option
 from .terminal import Terminal
 
 
 @click.command()
-@click.option(
+@option(
     "--selftest",
-    type=click.Choice(["abaqus"]),
+    type=OneOf(["abaqus"]),
     help="Write decks with expected frequencies, for somebody who has this program to run.",
 )
-@click.option(
-    "--output", type=click.Path(path_type=Path, file_okay=False), help="Folder of the selftest."
-)
+@option("--output", type=Place(file=False), help="Folder of the selftest.")
 @options.talking
 def command(selftest: str | None, output: Path | None, terminal: Terminal) -> int:
     """List the installed solvers: version, what they can do, why one cannot be used, which program

@@ -7,20 +7,18 @@ from pathlib import Path
 import click
 
 from . import options
+from .parameters import NumberWithin, Place, option
 from .terminal import Terminal, resume
 
 
 @click.command()
 @click.argument(
-    "folder",
-    metavar="DIR",
-    type=click.Path(path_type=Path, exists=True, file_okay=False),
-    envvar="TYRECAL_STORE",
+    "folder", metavar="DIR", type=Place(exists=True, file=False), envvar="TYRECAL_STORE"
 )
-@click.option("--verify", is_flag=True, help="Check every checksum; set damaged records aside.")
-@click.option(
+@option("--verify", is_flag=True, help="Check every checksum; set damaged records aside.")
+@option(
     "--prune",
-    type=click.FloatRange(0),
+    type=NumberWithin(0),
     metavar="SIZE_MB",
     help="Remove the least recently used until SIZE_MB are left.",
 )

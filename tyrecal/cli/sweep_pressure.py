@@ -9,6 +9,7 @@ import click
 
 from . import arguments, options
 from .main import EXIT_SOLVER
+from .parameters import option
 from .taken import taken
 
 
@@ -16,7 +17,7 @@ from .taken import taken
 @options.every(options.case_or_last, options.assignments)
 @options.pressures
 @options.fitted("Sweep the design that 'tyrecal fit' found for this case, too.")
-@click.option("--pictures/--no-pictures", default=True, help="Draw frequencies over pressure.")
+@option("--pictures/--no-pictures", default=True, help="Draw frequencies over pressure.")
 @options.study
 def command(
     case: Path | None,
@@ -92,9 +93,9 @@ def _pressures(
             f"--set {name}: the sweep sets the pressure, by --from-kPa, --to-kPa"
         )
     pressures = arguments.parse_pressures(low, high, steps, allow_unusual)
-    for option, value in (("--from-kPa", low), ("--to-kPa", high)):
+    for end, value in (("--from-kPa", low), ("--to-kPa", high)):
         try:
             with_values(loaded, {name: value})
         except ValueError as error:
-            raise click.UsageError(f"{option} {value:g}: {error}") from None
+            raise click.UsageError(f"{end} {value:g}: {error}") from None
     return list(pressures)

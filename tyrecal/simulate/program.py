@@ -14,12 +14,13 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from functools import lru_cache
-from hashlib import file_digest, sha256
+from hashlib import sha256
 from pathlib import Path
 
 from ..files import open_file
 
 WINDOWS = sys.platform == "win32"
+PIECE_BYTES = 1_000_000  # bytes of a file that are read at a time
 
 
 def split_command(text: str, windows: bool = WINDOWS) -> list[str]:
@@ -103,5 +104,8 @@ def program_identity(command: Sequence[str]) -> list[str]:
 
 @lru_cache
 def _file_hash(path: Path, changed: int, size: int) -> str:
+    digest = sha256()
     with open_file(path) as file:
-        return file_digest(file, sha256).hexdigest()
+        while piece := file.read(PIECE_BYTES):
+            digest.update(piece)
+    return digest.hexdigest()

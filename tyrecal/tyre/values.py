@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from difflib import get_close_matches
 from numbers import Real
 from typing import Any
 
@@ -16,9 +17,11 @@ from .case.schema import Case
 from .case.shape import explain
 from .case.stations import read_section_of
 from .case.variables import as_written
+from .plugins import IDS
 from .resolve import resolved
 from .usual import refusal
 
+MOST_MEANT = 3  # paths that are offered for a name that is none
 # numbers that stand alone: no other part of the case, and no mesh, depends on their values
 ALONE = {
     "pressure_kPa",
@@ -94,6 +97,17 @@ def unusual_value(loaded: LoadedCase, name: str, value: float) -> str | None:
     return next((message for message in found if message), None)
 
 
+def paths_of(loaded: LoadedCase, name: str) -> list[str]:
+    """Dotted paths of the numbers that the variable or the path ``name`` sets. Raises ValueError,
+    which says what was probably meant."""
+    return [dotted(keys) for keys in _keys(loaded, name)]
+
+
+def value_at(loaded: LoadedCase, path: str) -> Any:
+    """What the case has at a path of `paths_of`; None where it states no number."""
+    return at(loaded.case, find(loaded.case, path))
+
+
 def _keys(loaded: LoadedCase, name: str) -> list[Keys]:
     """Where the variable or the dotted path ``name`` leads."""
     variables = loaded.case.variables
@@ -101,10 +115,33 @@ def _keys(loaded: LoadedCase, name: str) -> list[Keys]:
     try:
         return [find(loaded.case, path) for path in paths]
     except KeyError as error:
+        if meant := " or ".join(f"'{path}'" for path in _meant(loaded, name)):
+            raise ValueError(f"there is no '{name}'; did you mean {meant}?") from None
         if "." in name:
             raise ValueError(f"{name}: {error.args[0]}") from None
-        known = [*variables, "pressure_kPa"]
-        raise ValueError(f"there is no variable '{name}'{suggestion(name, known)}") from None
+        known = suggestion(name, [*variables, "pressure_kPa"])
+        raise ValueError(f"there is no variable '{name}'{known}") from None
+
+
+def _meant(loaded: LoadedCase, name: str) -> list[str]:
+    """Paths that end as ``name`` does; else, where it is one word, the variable or path whose last
+    word is like it."""
+    dump = loaded.case.model_dump()
+    numbers = dict.fromkeys([*_numbers(dump, ()), *(f"effects.{id}" for id in IDS)])
+    if ends := [path for path in numbers if path.endswith(f".{name}")]:
+        return ends[:MOST_MEANT]
+    words = {path.rpartition(".")[2]: path for path in reversed(numbers)}
+    words |= {name: name for name in (*loaded.case.variables, "pressure_kPa")}
+    return [words[word] for word in get_close_matches(name, words, 1) if "." not in name]
+
+
+def _numbers(part: Any, keys: Keys) -> Iterator[str]:
+    """Dotted paths of all numbers of a case, stated or not."""
+    if isinstance(part, dict | list):
+        for key, value in part.items() if isinstance(part, dict) else enumerate(part):
+            yield from _numbers(value, (*keys, key))
+    elif not isinstance(part, str):
+        yield dotted(keys)
 
 
 def _number(case: Case, keys: Keys, value: float) -> float:

@@ -1,7 +1,8 @@
-"""A new case with an effect in it, the old file's comments kept."""
+"""A new case with effects in it, the old file's comments kept."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from ruamel.yaml import YAML
@@ -14,16 +15,16 @@ from ...tyre.load import load_case
 from ...tyre.values import with_values
 
 
-def add(path: Path, id: str, value: float, folder: Path | None = None) -> Path:
-    """Write CASE_EFFECT.yaml beside the case at ``path`` with the effect's parameter in it.
+def add(path: Path, effects: Mapping[str, float], folder: Path | None = None) -> Path:
+    """Write CASE_EFFECTS.yaml beside the case at ``path`` with the effects' parameters, by id.
 
     Its section and templates are named relative to the case, so it goes beside it, or into
     ``folder`` where that is the same. Raises InputError; ValueError for an unknown effect or a
     parameter that cannot be, OSError.
     """
     loaded = load_case(path, allow_unusual=True)  # of the old case its user was told
-    with_values(loaded, {f"effects.{id}": value})
-    target = path.with_name(f"{path.stem}_{id}{path.suffix}")
+    with_values(loaded, {f"effects.{id}": value for id, value in effects.items()})
+    target = path.with_name(f"{'_'.join((path.stem, *effects))}{path.suffix}")
     if folder is not None and folder.resolve() != path.parent.resolve():
         raise InputError(f"the new case goes beside the old one, to '{target}', not to '{folder}'")
     if target.exists():
@@ -34,10 +35,10 @@ def add(path: Path, id: str, value: float, folder: Path | None = None) -> Path:
     yaml.representer.add_representer(type(None), _null)
     data = yaml.load(path.read_text(encoding="utf-8"))
     if "effects" in data:
-        data["effects"][id] = value
+        data["effects"].update(effects)
     else:
         place = list(data).index("variables") if "variables" in data else len(data)
-        data.insert(place, "effects", {id: value})
+        data.insert(place, "effects", dict(effects))
     with whole(target) as partial, partial.open("w", encoding="utf-8") as file:
         yaml.dump(data, file)
     load_case(target, allow_unusual=True)

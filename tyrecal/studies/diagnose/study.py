@@ -175,15 +175,6 @@ def _under_load(
     return compare(case, evaluator, readings, tyres)
 
 
-def refuse_decks(case: LoadedCase) -> None:
-    """Raises InputError for decks in three dimensions, which have no section."""
-    if case.decks:
-        raise InputError(
-            "a diagnosis weighs effects, which change a section: this tyre stands in decks in three"
-            " dimensions"
-        )
-
-
 def spans_of(
     case: LoadedCase, evaluator: Evaluator, ids: Sequence[str] | None = None
 ) -> tuple[dict[str, Span], dict[str, str]]:
@@ -191,7 +182,11 @@ def spans_of(
     user's deck cannot have them. Raises ValueError where one of ``ids`` is no effect; InputError
     for decks in three dimensions.
     """
-    refuse_decks(case)
+    if case.decks:
+        raise InputError(
+            "a diagnosis weighs effects, which change a section: this tyre stands in decks in three"
+            " dimensions"
+        )
     able: dict[str, Span] = {}
     unable: dict[str, str] = {}
     stated = {path: abs(step) for each in sources(case)[0] for path, step in each.steps.items()}
@@ -236,11 +231,13 @@ def parse_change(text: str) -> Toggle:
     mark = "=" if "=" in text else "*"
     id, found, value = text.partition(mark)
     id, known = id.strip(), catalogue()
-    if not found or id not in known:
+    if not found:
         raise InputError(
-            f"'{text}' must say what was switched: EFFECT=VALUE or EFFECT*FACTOR, EFFECT one of"
-            f" {', '.join(known)}"
+            f"'{text}' must say what was switched: EFFECT=VALUE or EFFECT*FACTOR, as in"
+            " spindle_lateral=0"
         )
+    if id not in known:
+        raise InputError(f"'{text}': there is no effect '{id}'{suggestion(id, known)}")
     try:
         number = float(value)
     except ValueError:

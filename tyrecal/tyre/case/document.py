@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from functools import lru_cache
 from math import isfinite
 from pathlib import Path
@@ -16,7 +15,7 @@ from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEv
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.parser import Parser
 
-from .mistakes import Keys, Mistake, dotted, shortened
+from .mistakes import Keys, Mistake, dotted, nearby, shortened
 from .parts import WRONG
 
 MAX_TABLE_BYTES = 1_000_000  # of a table beside a case
@@ -91,7 +90,7 @@ def _compose(text: str) -> Node | None:
 def _text(path: Path, document: Document) -> str | None:
     try:
         if path.is_dir():
-            document.refuse(0, f"is a folder, must be a case file{_case_beside(path)}")
+            document.refuse(0, f"is a folder, must be a case file{nearby(path, '.yaml')}")
             return None
         if path.exists() and not path.is_file():
             document.refuse(0, "is not a regular file")
@@ -99,7 +98,7 @@ def _text(path: Path, document: Document) -> str | None:
         with path.open("rb") as file:
             content = file.read(MAX_CASE_BYTES + 1)
     except FileNotFoundError:
-        document.refuse(0, f"there is no such file{_case_beside(path)}")
+        document.refuse(0, f"there is no such file{nearby(path, '.yaml')}")
     except (OSError, ValueError) as error:
         document.refuse(0, f"cannot be read: {getattr(error, 'strerror', None) or error}")
     else:
@@ -114,17 +113,6 @@ def _text(path: Path, document: Document) -> str | None:
                 line = content.count(b"\n", 0, error.start) + 1
                 document.refuse(line, "the text must be in UTF-8")
     return None
-
-
-def _case_beside(path: Path) -> str:
-    """The case file that was probably meant, where one lies beside ``path``."""
-    with suppress(OSError, ValueError):
-        # Names alone are compared: any two paths in one long folder look alike.
-        name = path.name if path.suffix == ".yaml" else f"{path.name}.yaml"
-        beside = [found.name for found in path.parent.glob("*.yaml") if found.is_file()]
-        for close in get_close_matches(name, beside, 1):
-            return f"; did you mean '{path.with_name(close)}'?"
-    return ""
 
 
 class _Harmful(YAMLError):

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from difflib import get_close_matches
+from itertools import islice
+from pathlib import Path
 
 from ...errors import InputError
 from ...files import printable
 
+MOST_FILES = 1000  # whose names are compared with a mistyped one
+LEAST_ALIKE = {
+    "*": 0.6,
+    "*/*": 0.8,
+}  # how much of two names must be, beside a file and a folder down
 Keys = tuple[str | int, ...]
 """Keys and list indices that lead to a value of the case."""
 
@@ -58,3 +66,18 @@ def suggestion(name: str, known: Iterable[str], otherwise: str | None = None) ->
     if close:
         return f"; did you mean '{close[0]}'?"
     return f"; known: {', '.join(map(str, names)) or 'none'}" if otherwise is None else otherwise
+
+
+def nearby(path: Path, suffix: str) -> str:
+    """``; did you mean 'x'?``: the file with this suffix that was probably meant by ``path``, which
+    is not there; beside it, or one folder down. Empty where none has such a name."""
+    name = path.name.removesuffix(suffix) + suffix
+    folder = path.parent if path.parent.is_dir() else path.parent.parent
+    for pattern, alike in LEAST_ALIKE.items():
+        with suppress(OSError, ValueError):
+            files = (p for p in folder.glob(f"{pattern}{suffix}") if p.is_file())
+            # Names alone are compared: any two paths in one long folder look alike.
+            names = {p.name: p for p in islice(files, MOST_FILES) if p.parent.name[:1] != "."}
+            for close in get_close_matches(name, names, 1, alike):
+                return f"; did you mean '{names[close]}'?"
+    return ""

@@ -53,8 +53,10 @@ def parse_assignment(text: str) -> tuple[str, float]:
     return name, number
 
 
-def as_written(value: float) -> str:
-    """A number, or true or false, as a case file writes it."""
+def as_written(value: float | None) -> str:
+    """A number, true, false or null, as a case file writes it."""
+    if value is None:
+        return "null"
     return str(value).lower() if isinstance(value, bool) else f"{value:g}"
 
 

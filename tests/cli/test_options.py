@@ -1,0 +1,145 @@
+"""Every option of every command: given twice, and with a value that cannot be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+import pytest
+
+from .test_cli import CASE, run
+from .test_conventions import commands
+
+COMMANDS = commands()
+NUMBERS = click.types.FloatParamType | click.types.IntParamType
+
+
+def values_of(kind: click.ParamType, folder: Path) -> list[str]:
+    """Two values of a type; files and folders that must be there are in ``folder``."""
+    if isinstance(kind, click.Choice):
+        return [*map(str, kind.choices)]
+    if isinstance(kind, NUMBERS):
+        low = getattr(kind, "min", None) or 0
+        half = low + (getattr(kind, "max", None) or low + 100) / 2
+        return [
+            f"{half:.0f}" if isinstance(kind, click.types.IntParamType) else f"{half:g}",
+            f"{low + 1:g}",
+        ]
+    if isinstance(kind, click.Path) and kind.exists:
+        for name in ("one", "two"):
+            path = folder / name
+            path.touch() if kind.file_okay else path.mkdir(exist_ok=True)
+        return [str(folder / "one"), str(folder / "two")]
+    return ["one", "two"]
+
+
+def needed(command: click.Command, folder: Path) -> list[str]:
+    """What a command must be given."""
+    words = []
+    for param in command.params:
+        if param.required:
+            words += [*param.opts[:1]] if isinstance(param, click.Option) else []
+            words += values_of(param.type, folder)[:1]
+    return words
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_given_twice(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """With two values both act, or the command is refused and names both; one value is taken."""
+    command = COMMANDS[name]
+    others = needed(command, tmp_path)
+
+    def parsed(*words: str) -> object:
+        return command.make_context(name, [*others, *words]).params[option.name]
+
+    for option in command.params:
+        if not isinstance(option, click.Option):
+            continue
+        flag, opposite = option.opts[0], [*option.secondary_opts, option.opts[0]][0]
+        values = [
+            values_of(kind, tmp_path) for kind in getattr(option.type, "types", [option.type])
+        ]
+        one, two = ([] if option.is_flag else [pair[k] for pair in values] for k in (0, -1))
+        again = parsed(flag, *one, flag, *one)
+        if option.multiple:
+            both = parsed(flag, *one, flag, *two)
+            assert len(again) == len(both) == 2 and again[0] == again[1] == both[0] != both[1]
+            continue
+        assert again == parsed(flag, *one)
+        if (flag, one) != (opposite, two):
+            assert run(*name.split(), *others, flag, *one, opposite, *two) == 2, flag
+            (line,) = capsys.readouterr().err.splitlines()
+            assert all(word in line for word in (flag, opposite, *one, *two)), line
+
+
+def impossible(kind: click.ParamType, folder: Path) -> tuple[str, str]:
+    """A value that a type refuses, and words of what would be right; none where it takes all."""
+    if isinstance(kind, click.Choice):
+        return "something", f"must be {kind.choices[0]!s}"
+    if isinstance(kind, NUMBERS):
+        return "2,4", "must be a "
+    if isinstance(kind, click.Path) and kind.exists:
+        return "nothere", "there is no such fi" if kind.file_okay else "there is no such fo"
+    if isinstance(kind, click.Path) and not kind.dir_okay:
+        return str(folder), "is a folder, must be a file"
+    if isinstance(kind, click.Path) and not kind.file_okay:
+        return str(folder / "file"), "is a file, must be a folder"
+    return "", ""
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_value_that_cannot_be(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each option answers it by what it must be, and no click's words remain."""
+    (tmp_path / "file").touch()
+    for option in COMMANDS[name].params:
+        kinds = getattr(option.type, "types", [option.type])
+        value, right = impossible(kinds[0], tmp_path)
+        if not value or not isinstance(option, click.Option):
+            continue
+        words = [value, *["x"] * (len(kinds) - 1)]
+        given = [*name.split(), *needed(COMMANDS[name], tmp_path), option.opts[0], *words]
+        assert run(*given) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.startswith(f"error: {option.opts[0]} {value}: ") and right in line, line
+
+
+NUMBERS_AND_WORDS = {
+    "modes CASE --pressure-kPa 240kPa": "must be a number in kPa, as in 240",
+    "modes CASE --pressure-kPa nan": "must be a number in kPa, as in 240",
+    "modes CASE --load-N 4kN": "must be a number in N, as in 4000",
+    "modes CASE --jobs 0": "must be a whole number, 1 to 256, as in 1",
+    "sample CASE --draws 2.4e+05": "must be a whole number, 1000 to 10000000, as in 100000",
+    "diagnose CASE --split-percent nan": "must be a number in percent, 0 to 20, as in 0.3",
+    "blind power CASE --pressure-kPa 0": "must be a number in kPa, above 0, as in 240",
+    "init 205/60R15 --rim-width-in 7x": "must be a number in inches, above 0, as in 7.5",
+    "store . --prune big": "must be a number in MB, 0 or more, as in 100",
+    "modes CASE --wheel hold": "must be held or free-along-load; did you mean 'held'?",
+    "modes CASE --sweep-load 1,2kN": "must be numbers in N, as in 3000,5000",
+}
+
+
+@pytest.mark.parametrize("typed", NUMBERS_AND_WORDS)
+def test_what_a_value_must_be(typed: str, capsys: pytest.CaptureFixture[str]) -> None:
+    words = typed.replace("CASE", CASE).split()
+    assert run(*words) == 2
+    where = " ".join(words[-2:])
+    assert f"error: {where}: {NUMBERS_AND_WORDS[typed]} (see" in capsys.readouterr().err
+
+
+def test_settings_and_environment_are_not_the_second_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TYRECAL_STORE", "there")
+    given = [CASE, "--jobs", "3", "--store", "here"]
+    context = COMMANDS["modes"].make_context("modes", given, default_map={"jobs": 2})
+    assert context.params["jobs"] == 3 and context.params["store"] == Path("here")
+
+
+def test_store_and_no_store_exclude_each_other(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("modes", "none.yaml", "--store", "a", "--no-store") == 2
+    assert "--store or --no-store, not both" in capsys.readouterr().err
+    monkeypatch.setenv("TYRECAL_STORE", "there")
+    assert run("modes", "none.yaml", "--no-store") == 2
+    assert "no such file" in capsys.readouterr().err

@@ -1,0 +1,147 @@
+"""Options and types of all commands: what is said of a value that is wrong, or given twice.
+
+A command declares options by `option`, in place of click's, with the types of this module, whose
+errors say what would be right.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from functools import partial
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import click
+from click.core import ParameterSource
+
+# of a number, by the end of its option or metavar: unit and example
+ENDINGS = {
+    "kPa": ("kPa", "240"),
+    "N": ("N", "4000"),
+    "mm": ("mm", "12"),
+    "in": ("inches", "7.5"),
+    "MB": ("MB", "100"),
+    "percent": ("percent", "0.3"),
+}
+UNIT = re.compile(rf"[-_]({'|'.join(ENDINGS)})$")
+
+
+class Option(click.Option):
+    """An option that is refused where it is given twice with two values; one that is ``multiple``
+    collects them. What the environment and settings say does not count."""
+
+    def add_to_parser(self, parser: Any, ctx: click.Context) -> None:
+        """Have the parser keep every value."""
+        multiple, self.multiple = self.multiple, True
+        super().add_to_parser(parser, ctx)
+        self.multiple = multiple
+
+    def consume_value(
+        self, ctx: click.Context, opts: Mapping[str, Any]
+    ) -> tuple[Any, ParameterSource]:
+        """The value, and who gave it. Raises click.UsageError."""
+        values = opts.get(str(self.name))
+        if isinstance(values, list) and not self.multiple:
+            for other in [] if ctx.resilient_parsing else values[1:]:
+                self._refuse_two(ctx, values[0], other)
+            opts = {**opts, str(self.name): values[0]}
+        return super().consume_value(ctx, opts)
+
+    def _refuse_two(self, ctx: click.Context, one: Any, other: Any) -> None:
+        first, second = (self.type_cast_value(ctx, value) for value in (one, other))
+        if first == second:
+            return
+        name, *opposite = [*self.opts[:1], *self.secondary_opts[:1]]
+        if opposite:
+            raise click.UsageError(f"{name} and {opposite[0]} exclude each other", ctx)
+        raise click.UsageError(f"{name} is given twice, as {one} and {other}", ctx)
+
+
+option = partial(click.option, cls=Option)
+
+
+class _Answering(click.ParamType):
+    """Answers a wrong value by what it must be."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The value by its type; a number that is not finite is none. Raises click.UsageError."""
+        try:
+            converted = super().convert(value, param, ctx)
+            if not isinstance(converted, float) or isfinite(converted):
+                return converted
+        except click.BadParameter:
+            pass
+        option = f"{param.opts[0]} " if isinstance(param, click.Option) else ""
+        raise click.UsageError(f"{option}{value}: {self.answer(value, param)}", ctx)
+
+    def answer(self, value: Any, param: click.Parameter | None) -> str:
+        """What a value must be that cannot be ``value``."""
+        raise NotImplementedError
+
+
+class _Number(_Answering):
+    what = "a number"
+
+    def answer(self, value: Any, param: click.Parameter | None) -> str:
+        """Its unit and range, with an example."""
+        default = param.default if param and type(param.default) in (int, float) else 2
+        unit, example = "", f"{default:g}"
+        for name in [param.opts[0], param.metavar or ""] if param else []:
+            if found := UNIT.search(name):
+                unit, example = ENDINGS[found[1]]
+        words = self.what + (f" in {unit}" if unit else "")
+        low, high = getattr(self, "min", None), getattr(self, "max", None)
+        if low is not None:
+            is_open = getattr(self, "min_open", False)
+            words += f", above {low}" if is_open else f", {low}"
+            words += f" to {high}" if high is not None else "" if is_open else " or more"
+        return f"must be {words}, as in {example}"
+
+
+class Number(_Number, click.types.FloatParamType):
+    """A number in the unit that its option names."""
+
+
+class NumberWithin(_Number, click.FloatRange):
+    """A number within a range."""
+
+
+class Whole(_Number, click.IntRange):
+    """A whole number within a range."""
+
+    what = "a whole number"
+
+
+class OneOf(_Answering, click.Choice):
+    """One of several words."""
+
+    def answer(self, value: Any, param: click.Parameter | None) -> str:
+        """The words, and the one that was probably meant."""
+        from ..tyre.case.mistakes import suggestion
+
+        names = list(map(str, self.choices))
+        words = " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+        return f"must be {words}{suggestion(str(value), names, '')}"
+
+
+class Place(_Answering, click.Path):
+    """A file or a folder; ``exists``: one that is there."""
+
+    def __init__(self, exists: bool = False, file: bool = True, folder: bool = True):
+        super().__init__(exists, file_okay=file, dir_okay=folder, path_type=Path)
+
+    def answer(self, value: Any, param: click.Parameter | None) -> str:
+        """Why it cannot be had, and what lies near it."""
+        path = Path(value)
+        from ..tyre.case.mistakes import nearby
+
+        if not path.exists():
+            what = "file" if self.file_okay else "folder"
+            return f"there is no such {what}{nearby(path, path.suffix)}"
+        if path.is_dir() and not self.dir_okay:
+            return "is a folder, must be a file"
+        if not path.is_dir() and not self.file_okay:
+            return "is a file, must be a folder"
+        return "cannot be read"
