@@ -110,7 +110,7 @@ NUMBERS_AND_WORDS = {
     "modes CASE --pressure-kPa nan": "must be a number in kPa, as in 240",
     "modes CASE --load-N 4kN": "must be a number in N, as in 4000",
     "modes CASE --jobs 0": "must be a whole number, 1 to 256, as in 1",
-    "sample CASE --draws 2.4e+05": "must be a whole number, 1000 to 10000000, as in 100000",
+    "sample CASE --draws 2.5": "must be a whole number, 1000 to 10000000, as in 100000",
     "diagnose CASE --split-percent nan": "must be a number in percent, 0 to 20, as in 0.3",
     "blind power CASE --pressure-kPa 0": "must be a number in kPa, above 0, as in 240",
     "init 205/60R15 --rim-width-in 7x": "must be a number in inches, above 0, as in 7.5",
@@ -126,6 +126,12 @@ def test_what_a_value_must_be(typed: str, capsys: pytest.CaptureFixture[str]) ->
     assert run(*words) == 2
     where = " ".join(words[-2:])
     assert f"error: {where}: {NUMBERS_AND_WORDS[typed]} (see" in capsys.readouterr().err
+
+
+def test_a_whole_number_may_be_written_with_an_exponent() -> None:
+    """As `tyrecal sample` itself writes how many draws are enough."""
+    context = COMMANDS["sample"].make_context("sample", [CASE, "--draws", "2.4e+05"])
+    assert context.params["draws"] == 240_000
 
 
 def test_settings_and_environment_are_not_the_second_time(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -86,7 +86,7 @@ def test_states_that_a_case_cannot_be_in_are_refused() -> None:
         ("rim.free=1", "rim.free must be true or false, got 1"),
         ("C10=true", "C10_Pa must be a number, got true"),
         ("rim.free=yes", "rim.free is 'yes', must be a number"),
-        ("mesh.element=true", "mesh.element must be a number, got true"),
+        ("mesh.element=true", "mesh.element is a word, 'CGAX8R'; --set takes"),
     ],
 )
 def test_a_switch_is_true_or_false(

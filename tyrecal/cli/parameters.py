@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import partial
 from math import isfinite
 from pathlib import Path
@@ -109,9 +110,15 @@ class NumberWithin(_Number, click.FloatRange):
 
 
 class Whole(_Number, click.IntRange):
-    """A whole number within a range."""
+    """A whole number within a range, as 200000 or 2e5."""
 
     what = "a whole number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The number. Raises click.UsageError."""
+        with suppress(ValueError):
+            value = int(float(value)) if float(value).is_integer() else value
+        return super().convert(value, param, ctx)
 
 
 class OneOf(_Answering, click.Choice):
