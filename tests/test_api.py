@@ -93,6 +93,18 @@ def test_wrong_input_is_a_value_error_in_a_sentence(call: Any, words: str) -> No
     assert "\n" not in str(error.value)
 
 
+def test_values_of_variables_are_those_of_the_design_everywhere() -> None:
+    """What `with_values` sets and the same values of one question give the same numbers."""
+    case = tyrecal.load_case(CASE, mesh="coarse")
+    stiff = tyrecal.with_values(case, {"C10": 2e6})
+    hertz = [mode.frequency_Hz for mode in tyrecal.evaluate_modes(case, {"C10": 2e6})]
+    assert [mode.frequency_Hz for mode in tyrecal.evaluate_modes(stiff)] == hertz
+    (state,) = tyrecal.sweep_pressure(stiff, [240])
+    assert state.modes[0].frequency_Hz == pytest.approx(hertz[0], rel=1e-9)
+    with pytest.raises(ValueError, match="C10_Pa is set by the variable 'C10'"):
+        tyrecal.with_values(case, {"materials.rubber.C10_Pa": 2e6})
+
+
 @pytest.mark.lint
 def test_strict_types(tmp_path: Path) -> None:
     """mypy --strict knows what every function takes and returns, and what is not offered."""

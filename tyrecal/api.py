@@ -274,11 +274,11 @@ def emulate(
     True
     """
     from .studies.emulator import emulator
-    from .studies.fit.variable import DesignVariable, read_variable
+    from .studies.fit.variable import DesignVariable, read_variables
 
     if not reach > 0:
         raise ValueError(f"reach must be above 0, got {reach:g}")
-    variables = [read_variable(name, v) for name, v in case.case.variables.items()]
+    variables = read_variables(case)
     if not variables:
         raise ValueError("the case has no variables: there is nothing to emulate")
     box = [

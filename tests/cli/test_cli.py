@@ -321,7 +321,7 @@ def test_a_template_that_runs_code_is_refused(
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--set", "rebar_layers.belt_1.area_m2=3e-7"], "A_belt=VALUE"),
+        (["--set", "rebar_layers.belt_1.area_m2=3e-7"], "is set by the variable 'A_belt'"),
         (["--set", "A_belt=3e-7", "--set", "A_belt=4e-7"], "--set A_belt=3e-7 and --set A"),
         (
             ["--set", "pressure_kPa=200", "--pressure-kPa", "220"],

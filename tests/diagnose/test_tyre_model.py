@@ -18,7 +18,7 @@ from tyrecal.studies.diagnose.model import Answer, Query
 from tyrecal.studies.diagnose.regions import regions
 from tyrecal.studies.diagnose.study import spans_of
 from tyrecal.studies.diagnose.tyre_model import TyreModel, _key
-from tyrecal.studies.fit.variable import read_variable
+from tyrecal.studies.fit.variable import read_variables
 from tyrecal.tyre.case import LoadedCase, start_values
 from tyrecal.tyre.values import with_values
 
@@ -94,9 +94,7 @@ def test_coordinates_of_a_linear_and_a_logarithmic_variable() -> None:
     there = own.values(own.start + np.array([0.1, 0.0, 0.5]))
     assert there["A_belt"] == pytest.approx(np.exp(0.1) * start["A_belt"])
     assert there["C10"] == pytest.approx(start["C10"] + 4e5) and there["C10"] > 1.1e6
-    assert own.spread.tolist() == [
-        read_variable(name, v).spread for name, v in case.variables.items()
-    ]
+    assert own.spread.tolist() == [v.spread for v in read_variables(replace(CASE, case=case))]
     assert own._slope("C10", there) == 8e5 and own._slope("A_belt", there) == there["A_belt"]
     with_more = own.design(Query(own.start, {"frequency_stiffening": 0.3}))
     assert with_more["effects.frequency_stiffening"] == 0.3

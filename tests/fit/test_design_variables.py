@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from tyrecal.errors import InputError
 from tyrecal.simulate.deck.tyre_design import NEAR_ZERO
-from tyrecal.studies.fit.variable import DesignVariable, read_variable
+from tyrecal.studies.fit.variable import DesignVariable, read_variable, read_variables
+from tyrecal.tyre.case import start_values
 from tyrecal.tyre.case.schema import Variable
+from tyrecal.tyre.values import overridden
+
+from .tyre_in_states import CASE
+
+
+def read(variable: Variable) -> DesignVariable:
+    """As the variable "x" of a case."""
+    case = CASE.case.model_copy(update={"variables": {"x": variable}})
+    return read_variable(replace(CASE, case=case), "x")
 
 
 def test_a_variable_stays_next_to_0_where_it_moves_effects_alone() -> None:
     """Most effects leave the deck at 0, and have no slope there; other numbers have one."""
 
     def made(sets: list[str], lower: float, upper: float, start: float = 0.0) -> DesignVariable:
-        told = Variable(sets=sets, lower=lower, upper=upper, start=start, scale="linear")
-        return read_variable("x", told)
+        return read(Variable(sets=sets, lower=lower, upper=upper, start=start, scale="linear"))
 
     both, other = ["effects.a", "effects.b"], ["effects.a", "pressure_kPa"]
     near = made(both, 0.0, 2.0)
@@ -56,6 +68,16 @@ def test_how_well_a_start_is_known() -> None:
     assert spread(True, 1.9, 2.1) == pytest.approx(np.log(2.1 / 1.9) / 12**0.5)
     assert spread(False, 1.0, 5.0) == pytest.approx(1 / 12**0.5)
     assert spread(False, 1.0, 5.0, 10.0) == pytest.approx(0.2 / 4)
-    assert (
-        read_variable("x", Variable(sets=["a"], start=2, lower=1, upper=5, percent=7)).percent == 7
-    )
+    assert read(Variable(sets=["a"], start=2, lower=1, upper=5, percent=7)).percent == 7
+
+
+def test_a_variable_starts_where_its_user_has_set_it() -> None:
+    """Within its bounds; the case's own start stays what its file says."""
+    case = overridden(CASE, {"C10": 2e6})
+    assert start_values(case)["C10"] == read_variable(case, "C10").start == 2e6
+    assert case.case.variables["C10"].start == 1e6 and start_values(CASE)["C10"] == 1e6
+    outside = overridden(CASE, {"C10": 2e7})  # which other studies than a fit evaluate
+    with pytest.raises(InputError, match=r"'C10' starts at 2e.07: it must start within its"):
+        read_variables(outside)
+    with pytest.raises(ValueError, match="C10_Pa is set by the variable 'C10': set C10 instead"):
+        overridden(CASE, {"materials.rubber.C10_Pa": 2e6})

@@ -84,9 +84,7 @@ class BothColumns:
         self.labels = target_labels(case)
         self.evaluator = Evaluator(TyreDesign(case))
         self.free: list[DesignVariable] = [
-            read_variable(name, v)
-            for name, v in case.case.variables.items()
-            if name not in COLUMNS[0]
+            read_variable(case, name) for name in case.case.variables if name not in COLUMNS[0]
         ]
         self.weight = np.tile(np.sqrt([2.0 if label.c else 1.0 for label in self.labels]), 2)
         self.start = np.array([v.scaled(v.start) for v in self.free])

@@ -38,7 +38,7 @@ from tyrecal.studies.diagnose.tyre_model import TyreModel
 from tyrecal.studies.diagnose.uncertainties import sources
 from tyrecal.studies.emulator import emulator
 from tyrecal.studies.fit.targets import read_targets
-from tyrecal.studies.fit.variable import DesignVariable, read_variable
+from tyrecal.studies.fit.variable import DesignVariable, read_variables
 from tyrecal.studies.sample.box import drawn
 from tyrecal.studies.sample.posterior import Posterior
 from tyrecal.studies.sample.predict import conditional
@@ -49,7 +49,7 @@ from tyrecal.tyre.state import TyreState
 
 Array = np.ndarray
 CASE = exact(load_case(CASES / "p235_75r17.yaml"))
-VARIABLES = [read_variable(name, v) for name, v in CASE.case.variables.items()]
+VARIABLES = read_variables(CASE)
 LABELS = [target.label for target in read_targets(CASE)]
 PRESSURES = [192.0, 240.0, 288.0]
 RELATIVE_SIGMA = 0.003

@@ -54,7 +54,7 @@ from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.problem import Problem
 from tyrecal.studies.fit.targets import target_labels
 from tyrecal.studies.fit.uncertainty import uncertainty
-from tyrecal.studies.fit.variable import read_variable
+from tyrecal.studies.fit.variable import read_variables
 from tyrecal.studies.footprint import footprint_row
 from tyrecal.tyre.case import LoadedCase, start_values, with_level
 from tyrecal.tyre.case.schema import TargetFootprint, TargetMode, Targets
@@ -194,7 +194,7 @@ class EmulatedEvaluator:
 def coverage(count: int, seed: int) -> None:
     """Of 90 % intervals."""
     random = np.random.default_rng(seed)
-    variables = [read_variable(name, v) for name, v in CASE.case.variables.items()]
+    variables = read_variables(CASE)
     start = np.log(list(START.values()))
     box = np.stack([start - REACH, start + REACH], 1)
     made = {}

@@ -31,7 +31,7 @@ from tyrecal.studies.blind.statistics import (
 )
 from tyrecal.studies.emulator import Emulator, emulator
 from tyrecal.studies.fit.targets import target_labels
-from tyrecal.studies.fit.variable import START_SPREAD, read_variable
+from tyrecal.studies.fit.variable import START_SPREAD, read_variables
 from tyrecal.studies.labelling.expansion import Expansion, Prior, admissible, find_labels
 from tyrecal.studies.labelling.tree import DISCREPANCIES, FOREIGN_MARGIN, Frequencies, discrepancy
 from tyrecal.tyre.load import load_case
@@ -47,7 +47,7 @@ def emulated() -> Emulator:
     """All modes by the variables."""
     analysis = CASE.case.analysis.model_copy(update={"highest_harmonic": 5})
     wider = replace(CASE, case=CASE.case.model_copy(update={"analysis": analysis}))
-    variables = [read_variable(name, v) for name, v in CASE.case.variables.items()]
+    variables = read_variables(CASE)
     start = np.array([v.scaled(v.start) for v in variables])
     box = np.stack([start - REACH, start + REACH], 1)
     return emulator(Evaluator(TyreDesign(wider)), variables, box, [*MEASURED, *OTHERS], 60)

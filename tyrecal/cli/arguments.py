@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,18 +32,12 @@ def load(
     try:
         if mesh_level:
             case = with_level(case, mesh_level)
-        names = set(case.case.variables)
         given = _given(case, assigned, pressure_kPa)
-        for name, variable in case.case.variables.items():
-            for number in set(variable.sets) & set(given):
-                raise click.UsageError(
-                    f"{number} is set by the variable '{name}'; give --set {name}=VALUE instead"
-                )
         for sentence in overruled(case, given):
             terminal.note(sentence)
         replaced = _replaced(case, assigned)
         case = overridden(case, given)
-        values = {**start_values(case), **{k: v for k, v in given.items() if k in names}}
+        values = start_values(case)
         case = with_values(case, values)
         for name, value in given.items():
             option = f"--set {name}={as_written(value)}"
@@ -213,20 +207,3 @@ def refuse_unknown(option: str, name: str, known: Collection[str], what: str) ->
 
     if name not in known:
         raise click.UsageError(f"{option} {name}: there is no such {what}{suggestion(name, known)}")
-
-
-def starting_at(loaded: Any, values: Mapping[str, float]) -> Any:
-    """The case with its variables' start values replaced. Raises click.UsageError."""
-    from dataclasses import replace
-
-    variables = {
-        name: variable.model_copy(update={"start": values[name]})
-        for name, variable in loaded.case.variables.items()
-    }
-    for name, variable in variables.items():
-        if not variable.lower <= variable.start <= variable.upper:
-            raise click.UsageError(
-                f"--set {name}={variable.start:g}: a fit must start within the bounds"
-                f" {variable.lower:g} to {variable.upper:g}"
-            )
-    return replace(loaded, case=loaded.case.model_copy(update={"variables": variables}))

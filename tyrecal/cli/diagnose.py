@@ -129,10 +129,11 @@ def command(
     from ..studies.diagnose.study import parse_change
     from ..studies.diagnose.study import study as diagnosed
     from ..studies.fit.targets import rims_of
+    from ..studies.fit.variable import read_variables
     from ..tyre.effects import catalogue
 
-    loaded, values = study.load(case, assignments)
-    loaded = arguments.starting_at(loaded, values)
+    loaded, _ = study.load(case, assignments)
+    read_variables(loaded)  # refuses a start outside its bounds before anything is written
     for flag, ids in (("--effect", effects), ("--without", without)):
         for id in ids:
             arguments.refuse_unknown(flag, id, catalogue(), "effect")

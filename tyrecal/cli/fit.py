@@ -106,7 +106,6 @@ def command(
     loaded, values = study.load(case, assignments, pressure_kPa)
     for name in fix:
         arguments.refuse_unknown("--fix", name, values, "variable")
-    loaded = arguments.starting_at(loaded, values)
     left_out: list[str] = []
     fixed = {name: values[name] for name in fix}
     files = [measured] if measured else []

@@ -223,8 +223,7 @@ def label_file(
     from ..studies.labelling.label import fitted_prior, label
     from ..studies.labelling.result import labels_result
 
-    loaded, values = study.load(case, assignments)
-    loaded = arguments.starting_at(loaded, values)
+    loaded, _ = study.load(case, assignments)
     readings = read_measurements(file, labelled=False)
     if not any(each.is_unlabelled for each in readings):
         raise click.UsageError(f"{file}: every frequency has a label")

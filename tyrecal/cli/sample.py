@@ -77,8 +77,7 @@ def command(
 
     terminal = study.terminal
     needs_emcee()
-    loaded, values = study.load(case, assignments, pressure_kPa)
-    loaded = arguments.starting_at(loaded, values)
+    loaded, _ = study.load(case, assignments, pressure_kPa)
     for pressure in at_kPa:
         arguments.refuse_unusual(
             loaded, f"--at-kPa {pressure:g}", "pressure_kPa", pressure, study.allow_unusual

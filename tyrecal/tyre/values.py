@@ -17,6 +17,7 @@ from .case.schema import Case
 from .case.shape import explain
 from .case.stations import read_section_of
 from .case.variables import as_written
+from .own_deck.numbers import as_known
 from .plugins import IDS
 from .resolve import resolved
 from .usual import refusal
@@ -83,7 +84,15 @@ def set_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
 
 
 def overridden(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
-    """`with_values` of what the user sets, noted among the case's ``overrides``."""
+    """The case as its user sets it: a variable starts at its value (`start_values`), any other
+    number has it, and ``overrides`` lists them. Raises what `with_values` does, and ValueError for
+    the path of a number that a variable sets."""
+    values = {as_known(name, loaded.deck_numbers): value for name, value in values.items()}
+    variables = loaded.case.variables
+    for path in values.keys() - variables.keys():
+        for name, variable in variables.items():
+            if path in variable.sets:
+                raise ValueError(f"{path} is set by the variable '{name}': set {name} instead")
     changed = with_values(loaded, values)
     given = {n: x if isinstance(x, bool) else float(x) for n, x in values.items()}
     return replace(changed, overrides={**loaded.overrides, **given})

@@ -54,12 +54,12 @@ class TyreDesign:
 
     @cached_property
     def nominal(self) -> TyreDesign | None:
-        """The case with its variables at their start, pressure and effects as its file has them."""
+        """The case with its variables' starts, pressure and effects as its file has them."""
         read = self.plain.as_read or self.plain
         update = {"pressure_kPa": read.case.pressure_kPa, "effects": read.case.effects}
         case = replace(self.plain, case=self.plain.case.model_copy(update=update))
         try:
-            return TyreDesign(case, start_values(case))
+            return TyreDesign(case, start_values(read))
         except ValueError:  # only with what was set is it a tyre
             return None
 

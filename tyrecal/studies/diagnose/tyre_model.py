@@ -22,7 +22,7 @@ from ...tyre.state import TyreState, without
 from ...tyre.templates import TemplateFailed
 from ...tyre.values import with_values
 from ..fit import problem as fit
-from ..fit.variable import read_variable
+from ..fit.variable import read_variables
 from .expansion import ONE_SIDED_SLOPED, node_values
 from .form_error import MATERIAL_LAWS
 from .model import Answer, Coupling, ModelRow, Query, Span, state_of
@@ -84,7 +84,7 @@ class TyreModel:
         self.sources: Sequence[str] = [source.name for source in found]
         self.material_laws = 0.0 if known_from(case) == "exact" else MATERIAL_LAWS
         self.start = np.array([self._scaled(n, v) for n, v in start_values(case).items()])
-        self.spread = np.array([read_variable(n, v).spread for n, v in self._variables.items()])
+        self.spread = np.array([v.spread for v in read_variables(case)])
         self._plain = values_of(case, found)
         self._plain.setdefault("pressure_kPa", case.case.pressure_kPa)
         self._slopeless = {id for id, span in spans.items() if not self._has_slopes(id, span)}

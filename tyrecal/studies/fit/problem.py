@@ -98,9 +98,7 @@ class Problem:
         self.case, self.evaluator, self.notify, self.jobs = case, evaluator, notify, jobs
         self.fixed = dict(fixed or {})
         self.variables = [
-            read_variable(name, v)
-            for name, v in case.case.variables.items()
-            if name not in self.fixed
+            read_variable(case, name) for name in case.case.variables if name not in self.fixed
         ]
         self.targets, self.road = read_targets(case), read_road_targets(case)
         self.mass = read_mass_targets(case)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from ...errors import InputError
 from ...simulate.deck.tyre_design import NEAR_ZERO
-from ...tyre.case.schema import Variable
+from ...tyre.case import LoadedCase, start_values
 
 START_SPREAD = 0.5  # of ln of a variable that the case says no more of: 2.7 times at most, of 95 %
 
@@ -52,11 +53,23 @@ class DesignVariable:
         return value if self.log else self.upper - self.lower
 
 
-def read_variable(name: str, v: Variable) -> DesignVariable:
+def read_variables(case: LoadedCase) -> list[DesignVariable]:
+    """All variables of the case, as `read_variable` has each. Raises InputError."""
+    return [read_variable(case, name) for name in case.case.variables]
+
+
+def read_variable(case: LoadedCase, name: str) -> DesignVariable:
     """A variable as the optimiser has it: next to 0 where it moves effects and a bound is 0, as
-    most have no slope there, where their keywords leave the deck."""
+    most have no slope there, where their keywords leave the deck. Raises InputError where it starts
+    outside its bounds."""
+    v, start = case.case.variables[name], start_values(case)[name]
+    if not v.lower <= start <= v.upper:
+        raise InputError(
+            f"variable '{name}' starts at {start:g}: it must start within its bounds,"
+            f" {v.lower:g} to {v.upper:g}"
+        )
     effect = all(path.startswith("effects.") for path in v.sets)
     least = NEAR_ZERO * max(abs(v.lower), abs(v.upper)) if effect else 0.0
     lower, upper = v.lower or least, v.upper or -least
-    start = min(max(v.start, lower), upper)
+    start = min(max(start, lower), upper)
     return DesignVariable(name, start, lower, upper, v.scale == "log", v.percent)

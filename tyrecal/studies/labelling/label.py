@@ -72,7 +72,7 @@ def fitted_prior(case: LoadedCase, fit: FitResult) -> Prior:
     """What a fit of the case left open of the variables that it did not hold: values, standard
     errors and correlations; of those that it did not determine as far as `start_prior` says."""
     values = {name: each.value for name, each in fit.variables.items()}
-    variables = [read_variable(name, case.case.variables[name]) for name in values]
+    variables = [read_variable(case, name) for name in values]
     wide = np.diag(start_prior(variables).root)
     spread = np.zeros(len(variables))
     alike = np.eye(len(variables))

@@ -26,7 +26,7 @@ from ..diagnose.uncertainties import Source, calibrated, sources
 from ..emulator import Emulator, emulator, needs_slopes
 from ..fit.calibrate import calibrate
 from ..fit.targets import read_targets
-from ..fit.variable import DesignVariable, read_variable
+from ..fit.variable import DesignVariable, read_variables
 from .box import Drawn, grown
 from .chains import needs_emcee
 from .posterior import Posterior
@@ -98,7 +98,7 @@ def run(
     pressures = _pressures(case, {row.pressure_kPa for row in observations.rows}, at_kPa)
     rims = list(dict.fromkeys([None, *(row.rim for row in observations.rows)]))
     tyres = [_held(model, rim) for rim in rims]
-    variables = tuple(read_variable(n, v) for n, v in model.case.case.variables.items())
+    variables = tuple(read_variables(model.case))
     bounds = np.array([[v.scaled(v.lower), v.scaled(v.upper)] for v in variables])
     ends = DesignVariable(PRESSURE_NAME, case.case.pressure_kPa, min(pressures), max(pressures))
     states = [TyreState(p, 0.0, rim) for rim in rims for p in pressures]
@@ -174,7 +174,7 @@ def check(case: LoadedCase, evaluator: Evaluator, readings: Sequence[Measurement
     """Raises InputError where nothing can be sampled, before anything is evaluated."""
     needs_emcee()
     needs_slopes(evaluator)
-    if not case.case.variables:
+    if not read_variables(case):
         raise InputError("the case has no variables: there is nothing to sample")
     if PRESSURE_NAME in calibrated(case):
         raise InputError(

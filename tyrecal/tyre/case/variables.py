@@ -13,8 +13,10 @@ SWITCHES = {"true": True, "false": False}  # as a case file writes them
 
 
 def start_values(loaded: LoadedCase) -> dict[str, float]:
-    """The start value of every variable by name, in the unit of the numbers it sets."""
-    return {name: variable.start for name, variable in loaded.case.variables.items()}
+    """The start value of every variable by name, in the unit of the numbers it sets: its user's,
+    else the case file's."""
+    variables = loaded.case.variables
+    return {name: loaded.overrides.get(name, v.start) for name, v in variables.items()}
 
 
 def overruled(loaded: LoadedCase, given: Collection[str] = ()) -> list[str]:
