@@ -27,11 +27,11 @@ from .simulate.evaluate.failure import EvaluationFailed
 from .simulate.evaluate.pressed import Pressed
 from .simulate.evaluate.store import Store
 from .simulate.modes.label import Mode, labelled
-from .simulate.provenance import provenance
 from .studies.diagnose.diagnosis import Diagnosis
 from .studies.emulator import Emulator
-from .studies.fit.calibrate import METHODS, Fit, calibrate
-from .studies.fit.targets import states_of, target_labels
+from .studies.fit.calibrate import METHODS, Fit
+from .studies.fit.study import FitStudy
+from .studies.fit.targets import target_labels
 from .studies.pressure import State
 from .tyre.case import CaseError, LoadedCase, start_values, with_level
 from .tyre.effects import Effect, catalogue
@@ -145,11 +145,9 @@ def fit_case(
     if starts < 1:
         raise ValueError(f"starts must be at least 1, got {starts}")
     _values(case, fixed)
-    evaluator = _evaluator(case, solver, record)
-    fit = calibrate(case, evaluator, method, fixed, starts, seed, jobs)
-    of = provenance(case, evaluator.solver, **states_of(case))
-    fit.found = fit.found.stamped(of)
-    return fit
+    return FitStudy(case, _evaluator(case, solver, record), None, fixed).run(
+        method, starts, seed, jobs
+    )
 
 
 def sweep_pressure(

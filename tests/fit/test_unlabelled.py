@@ -18,8 +18,8 @@ from tyrecal.measured.tables import read_measurements
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.problem import Problem
+from tyrecal.studies.fit.study import FitStudy
 from tyrecal.studies.labelling.expansion import Expansion, Prior, find_labels
-from tyrecal.studies.labelling.fit import fit_unlabelled
 from tyrecal.studies.labelling.label import Labelled, fitted_prior, label, start_prior
 from tyrecal.studies.labelling.result import labels_told
 from tyrecal.studies.labelling.tree import (
@@ -200,14 +200,16 @@ def test_readings_get_the_labels_of_the_tyre(told: Labelled) -> None:
 
 
 @pytest.mark.numbers
-def test_a_fit_takes_the_likeliest_labels_and_tells_them(told: Labelled) -> None:
+def test_a_fit_takes_the_likeliest_labels_and_tells_them(tmp_path: Path) -> None:
     tyre: Any = Tyre()
-
-    def fitted(readings: Any) -> Any:
-        assert readings == with_labels()
-        return calibrate(case_with(measured(STATES)), tyre)
-
-    fit = fit_unlabelled(CASE, tyre, without_labels(), told, fitted)
+    path = tmp_path / "unlabelled.csv"
+    path.write_text(measurements_csv(without_labels()))
+    study = FitStudy(CASE, tyre, path)
+    assert study.needs_labels and not study.evaluates_one_by_one and not tyre.asked
+    fit = study.run()
+    found = {(t.c, t.m, t.kind, t.pressure_kPa, t.rim) for t in study.case.case.targets.modes}
+    known = [(each.label, each.state.of(CASE)) for each in with_labels() if each.label]
+    assert found == {(x.c, x.m, x.kind, state.pressure_kPa, state.rim) for x, state in known}
     for name, truth in TRUTH.items():
         assert fit.result["variables"][name]["value"] == pytest.approx(truth, rel=1e-3)
     assert fit.result["labels"]["settled"] and len(fit.result["labels"]["frequencies"]) == 16

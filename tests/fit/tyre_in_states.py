@@ -41,7 +41,9 @@ class TyreInStates(FakeEvaluator):
         powers = {n: 0.2 + 0.1 * np.sin(turns * (2 + k)) for k, n in enumerate(START)}
         super().__init__(base, powers, START)
         self.design, self.counts = TyreDesign(CASE), None
-        self.solver: Any = type("Fake", (), {"capabilities": {"spindle"}, "name": "fake"})
+        self.solver: Any = type(
+            "Fake", (), {"capabilities": {"spindle"}, "name": "fake", "version": "1"}
+        )
         self.asked: list[list[tuple[float, bool]]] = []
 
     def answer_all(self, questions: Any, jobs: int = 1) -> Iterator[Any]:

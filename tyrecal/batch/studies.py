@@ -19,8 +19,8 @@ from ..simulate.provenance import provenance
 from ..studies import footprint as pressed
 from ..studies import modes as evaluated
 from ..studies import pressure_result
-from ..studies.fit.calibrate import calibrate, history_csv
-from ..studies.fit.targets import states_of
+from ..studies.fit.calibrate import history_csv
+from ..studies.fit.study import FitStudy
 from ..studies.fitted import NOT_CONVERGED
 from ..studies.result import Failed, Result, ResultPart
 from ..studies.sample import study as sampling
@@ -63,9 +63,9 @@ class StudyOutcome:
 
 
 def fit(state: Studied) -> StudyOutcome:
-    """Calibrate from the case's own start. Raises what `calibrate` does."""
+    """Calibrate from the case's own start. Raises what `FitStudy` does."""
     state.no_fit = True
-    fitted = calibrate(state.case, state.evaluator)
+    fitted = FitStudy(state.case, state.evaluator).run()
     found = fitted.found
     state.no_fit = False
     state.designs["fitted"] = {n: fitted.fitted.values[n] for n in state.designs["initial"]}
@@ -76,8 +76,7 @@ def fit(state: Studied) -> StudyOutcome:
         numbers[f"fitted_Hz {where}"] = mode.fitted_Hz
     for each in found.footprint:
         numbers[f"fitted_{each.quantity} {each.state}"] = each.fitted
-    files = _files(state, found, **states_of(state.case))
-    files["fit_history.csv"] = history_csv(fitted.history)
+    files = found.texts() | {"fit_history.csv": history_csv(fitted.history)}
     if found.is_good:
         return StudyOutcome(quantities=numbers, files=files)
     words = found.message if found.moved else "the fit did not move"

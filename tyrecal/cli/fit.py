@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -12,10 +12,6 @@ from . import arguments, complete, options
 from .main import EXIT_FIT
 from .parameters import OneOf, Place, Whole, option
 from .terminal import Progress, Terminal
-
-if TYPE_CHECKING:
-    from ..measured.measurement import Measurement
-    from ..studies.fit.calibrate import Fit
 
 
 @click.command()
@@ -89,16 +85,12 @@ def command(
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --jobs 2
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --scheduler tcp://10.0.0.1:8786
     """
-    from ..measured.tables import read_measurements
-    from ..measured.targets import with_measured
     from ..report.table import fit_doubts, fit_verdict, shown, tyre_doubts
-    from ..simulate.deck.decks_design import design_of
     from ..simulate.evaluate.cluster import reached
     from ..simulate.program import join_command
-    from ..simulate.provenance import provenance
-    from ..studies.fit.calibrate import calibrate, check, history_csv
-    from ..studies.fit.problem import Problem
-    from ..studies.fit.targets import objective_unit, read_targets, states_of
+    from ..studies.fit.calibrate import history_csv
+    from ..studies.fit.study import FitStudy
+    from ..studies.fit.targets import objective_unit, read_targets
     from ..studies.fitted import NOT_CONVERGED, has_good
 
     terminal = study.terminal
@@ -106,25 +98,10 @@ def command(
     loaded, values = study.load(case, assignments, pressure_kPa)
     for name in fix:
         arguments.refuse_unknown("--fix", name, values, "variable")
-    left_out: list[str] = []
     fixed = {name: values[name] for name in fix}
-    files = [measured] if measured else []
-    evaluator, plain = study.evaluator(loaded), loaded
-    run, labelled = None, None
-    if measured:
-        readings = read_measurements(measured, labelled=False)
-        if any(each.is_unlabelled for each in readings):
-            from ..studies.labelling.label import label
-
-            run = study.run(loaded, "fit", evaluator, measured=files)
-            labelled = label(loaded, evaluator, readings, fixed=fixed, jobs=study.jobs)
-        told = labelled.readings if labelled else readings
-        loaded, left_out = with_measured(plain, measured, told)
-        evaluator = evaluator.of(design_of(loaded))
-    problem = Problem(loaded, evaluator, fixed)
-    check(problem)
-    alone = len(problem.labels) == starts == 1 and problem.exact_on_road == len(problem.road)
-    if alone and evaluator.has_gradients:
+    calibration = FitStudy(loaded, study.evaluator(loaded), measured, fixed)
+    evaluator = calibration.evaluator
+    if calibration.evaluates_one_by_one and starts == 1:
         why = f"a fit from one start asks solver '{evaluator.solver.name}' for one design at a time"
         if scheduler:
             raise click.UsageError(f"--scheduler changes nothing here: {why}; give --starts too")
@@ -135,29 +112,12 @@ def command(
             f"solver '{name}' gives no sensitivities: --method gauss-newton needs about a third of"
             " its runs"
         )
-    if run:
-        run.provenance = provenance(loaded, evaluator.solver, files, **states_of(loaded))
-    else:
-        run = study.run(loaded, "fit", evaluator, measured=files, **states_of(loaded))
-    unit = objective_unit(loaded)
+    run = study.run(loaded, "fit", evaluator)
     with terminal.progress("fit") as bar, reached(scheduler) as evaluator.scheduler:
+        unit = "sigma" if measured else objective_unit(loaded)
         points = _Points(terminal, bar, unit)
-
-        def fit_to(readings: Sequence[Measurement]) -> Fit:
-            nonlocal loaded, left_out
-            if measured and readings:
-                loaded, left_out = with_measured(plain, measured, readings)
-                evaluator.design = design_of(loaded)
-            return calibrate(
-                loaded, evaluator, method, fixed, starts, seed, study.jobs, points.notify, bar.at
-            )
-
-        if labelled:
-            from ..studies.labelling.fit import fit_unlabelled
-
-            fit = fit_unlabelled(plain, evaluator, readings, labelled, fit_to, fixed, study.jobs)
-        else:
-            fit = fit_to([])
+        fit = calibration.run(method, starts, seed, study.jobs, points.notify, bar.at)
+    loaded, run.provenance = calibration.case, calibration.provenance
     fit.found = run.write(fit.found)
     result = fit.result
     run.write_text("fit_history.csv", history_csv(fit.history))
@@ -169,7 +129,7 @@ def command(
     else:
         terminal.show(shown(*tables))
     terminal.say("\n".join(fit_verdict(result)))
-    for each in left_out:
+    for each in calibration.left_out:
         terminal.note(f"{measured}: not used: {each}")
     for warning in (*tyre_doubts(result), *fit_doubts(result)):
         terminal.warn(warning)

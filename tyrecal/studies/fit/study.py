@@ -1,0 +1,117 @@
+"""A case calibrated to its targets or to a file of measurements: what `tyrecal fit` does, and the
+same from Python and in a batch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ...measured.measurement import Measurement
+from ...measured.tables import read_measurements
+from ...measured.targets import with_measured
+from ...simulate.deck.decks_design import design_of
+from ...simulate.evaluate.evaluator import Evaluator
+from ...simulate.provenance import provenance
+from ...tyre.case import LoadedCase
+from ..labelling.label import label
+from ..labelling.result import labels_told
+from .calibrate import Fit, FitNotify, calibrate, check
+from .problem import Problem
+from .targets import states_of
+
+MOST_FITS = 5  # to frequencies without labels
+
+
+class FitStudy:
+    """A calibration that has been read and checked, and that `run` computes.
+
+    case: with the targets that it is fitted to; left_out: what was measured and is not one of them;
+    evaluator: of ``case``. Raises InputError, DeckRefused, OSError before anything is evaluated.
+    """
+
+    def __init__(
+        self,
+        case: LoadedCase,
+        evaluator: Evaluator,
+        measured: Path | None = None,
+        fixed: Mapping[str, float] | None = None,
+    ):
+        """measured: takes the place of the case's targets; fixed: values of variables that are
+        held."""
+        self._plain, self.measured, self.fixed = case, measured, dict(fixed or {})
+        self.evaluator = evaluator.of(design_of(case))
+        self.case, self.left_out = case, list[str]()
+        self.readings = read_measurements(measured, labelled=False) if measured else []
+        self.needs_labels = any(each.is_unlabelled for each in self.readings)
+        if not self.needs_labels:
+            self._fit_to(self.readings)
+            check(self._problem)
+
+    def _fit_to(self, readings: Sequence[Measurement]) -> None:
+        """Take readings that have labels as targets. Raises InputError."""
+        if self.measured:
+            self.case, self.left_out = with_measured(self._plain, self.measured, readings)
+            self.evaluator.design = design_of(self.case)
+
+    @property
+    def _problem(self) -> Problem:
+        return Problem(self.case, self.evaluator, self.fixed)
+
+    @property
+    def evaluates_one_by_one(self) -> bool:
+        """Whether one start asks for one design at a time: in one state, with exact slopes."""
+        if self.needs_labels:
+            one_state = len({each.state.of(self._plain) for each in self.readings}) == 1
+        else:
+            problem = self._problem
+            exact = problem.exact_on_road == len(problem.road)
+            one_state = exact and len(problem.labels) == 1
+        return one_state and self.evaluator.has_gradients
+
+    def run(
+        self,
+        method: str = "slsqp",
+        starts: int = 1,
+        seed: int = 0,
+        jobs: int = 1,
+        notify: FitNotify | None = None,
+        finished: Callable[[int, int], None] = lambda done, starts: None,
+    ) -> Fit:
+        """Calibrate, as `calibrate` says; the result has its provenance.
+
+        Frequencies without labels are fitted with the likeliest ones, which are found anew about
+        the design that was fitted, until they are the same. Raises what `label` and `calibrate` do.
+        """
+
+        def calibrated() -> Fit:
+            return calibrate(
+                self.case, self.evaluator, method, self.fixed, starts, seed, jobs, notify, finished
+            )
+
+        fit = self._fit_with_labels(calibrated, jobs) if self.needs_labels else calibrated()
+        fit.found = fit.found.stamped(self.provenance)
+        return fit
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """What the result is of."""
+        files = [self.measured] if self.measured else []
+        return provenance(self.case, self.evaluator.solver, files, **states_of(self.case))
+
+    def _fit_with_labels(self, calibrated: Callable[[], Fit], jobs: int) -> Fit:
+        case, evaluator, readings, fixed = self._plain, self.evaluator, self.readings, self.fixed
+        likeliest = label(case, evaluator, readings, fixed=fixed, jobs=jobs)
+        for _ in range(MOST_FITS):
+            used = likeliest
+            self._fit_to(used.readings)
+            fit = calibrated()
+            likeliest = label(case, evaluator, readings, None, fit.fitted.values, fixed, jobs)
+            same = likeliest.labels == used.labels
+            if same:
+                break
+        found = replace(likeliest.found, settled=likeliest.found.settled and same)
+        labels = labels_told(case, replace(likeliest, found=found))
+        fit.found = fit.found.model_copy(update={"labels": labels})
+        return fit
