@@ -169,8 +169,8 @@ def sweep_pressure(
     160 kPa: 31.1 Hz
     240 kPa: 37.0 Hz
     """
-    from .studies.fitted import pressure_name
     from .studies.pressure import Failure, sweep
+    from .tyre.state import pressure_name
 
     design = _values(case, values)
     for pressure in pressures_kPa:

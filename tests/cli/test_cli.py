@@ -226,6 +226,9 @@ def test_wrong_options_of_fit(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert "bounds" in capsys.readouterr().err
     assert run("fit", CASE, *out, "--fix", "A_belt", "--fix", "A_carcass", "--fix", "C10") == 2
     assert "no variable is free" in capsys.readouterr().err
+    assert run("fit", CASE, *out, "--pressure-kPa", "200") == 2
+    assert "no target was measured at 200 kPa, only at 240 kPa" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_folder_of_another_case_is_refused(

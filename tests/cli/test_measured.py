@@ -161,7 +161,7 @@ def test_fits_take_what_is_at_their_pressure(
     (pressed,) = loaded.case.targets.footprint
     assert (pressed.vertical_stiffness_N_per_m, pressed.sigma_N_per_m) == (2e5, 4000)
     assert loaded.case.analysis.highest_harmonic == 5
-    assert left_out == ["2 values at 200, 239.4 kPa"]
+    assert left_out == ["2 values at 200 kPa, 239.4 kPa"]
     code = run(
         "fit",
         str(CASES / "p235_75r17.yaml"),

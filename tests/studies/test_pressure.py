@@ -12,12 +12,13 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode
 from tyrecal.simulate.modes.label import Label, label_modes
-from tyrecal.studies.fitted import InputError, pressure_name, read_fitted
+from tyrecal.studies.fitted import InputError, read_fitted
 from tyrecal.studies.pressure import State, findings, sweep
 from tyrecal.studies.pressure_result import slopes, sweep_result
 from tyrecal.tyre.case import start_values
 from tyrecal.tyre.case.identity import tyre_sha256
 from tyrecal.tyre.load import load_case
+from tyrecal.tyre.state import pressure_name
 
 from ..conftest import CASES
 from ..fit.fake import LABELS, shape

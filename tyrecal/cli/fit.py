@@ -130,7 +130,7 @@ def command(
         terminal.show(shown(*tables))
     terminal.say("\n".join(fit_verdict(result)))
     for each in calibration.left_out:
-        terminal.note(f"{measured}: not used: {each}")
+        terminal.note(f"{measured or case}: not used: {each}")
     for warning in (*tyre_doubts(result), *fit_doubts(result)):
         terminal.warn(warning)
     if pictures or study.report:

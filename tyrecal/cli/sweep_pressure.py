@@ -83,8 +83,8 @@ def _pressures(
     allow_unusual: bool,
 ) -> list[float]:
     """The pressures of the sweep, kPa. Raises click.UsageError."""
-    from ..studies.fitted import pressure_name
     from ..tyre.case import parse_assignment
+    from ..tyre.state import pressure_name
     from ..tyre.values import with_values
 
     name = pressure_name(loaded)

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
+from itertools import compress
 from math import hypot
 from pathlib import Path
 
 from ..errors import InputError
 from ..simulate.modes.label import Label
-from ..tyre.case import LoadedCase
+from ..tyre.case import LoadedCase, start_values
+from ..tyre.case.parts import RimSupport
 from ..tyre.case.schema import MEASURED_SIGMA, TargetFootprint, TargetMass, TargetMode, Targets
-from ..tyre.state import TyreState
+from ..tyre.state import AS_THE_CASE, PRESSURE_PATH, RIM_FREE, WHEEL_FREE, TyreState, pressure_name
 from ..tyre.values import set_values
 from .measurement import Measurement
 from .tables import read_measurements
 
 SAME_PRESSURE_kPa = 0.5  # pressures that differ by less are one
+PRESSED_RIM: RimSupport = "fixed"  # of areas and stiffnesses
 
 
 def with_measured(
@@ -38,19 +41,16 @@ def with_measured(
             known.append(each.pressure_kPa)
     near = lambda p: min(known, key=lambda other: abs(other - p))
     placed = [replace(each, pressure_kPa=near(each.pressure_kPa)) for each in rest]
-    varied = any("pressure_kPa" in v.sets for v in case.case.variables.values())
-    here = [each for each in placed if each.pressure_kPa == own]
-    others = [r for r, each in zip(rest, placed, strict=True) if each.pressure_kPa != own]
-    notes = []
-    if varied or "pressure_kPa" in case.overrides or (len(known) == 2 and not here):
-        at = ", ".join(f"{p:g}" for p in sorted({each.pressure_kPa for each in others}))
-        if not here:
-            elsewhere = f", only at {at} kPa; give --pressure-kPa" if others else ""
-            raise InputError(f"{path}: no target was measured at {own:g} kPa{elsewhere}")
-        notes = [f"{len(others)} values at {at} kPa"] * bool(others)
-        placed = here
     if not placed:
         raise InputError(f"{path}: no target but the mass was measured")
+    varied = pressure_name(case) != PRESSURE_PATH
+    one_other = len(known) == 2 and all(each.pressure_kPa != own for each in placed)
+    states = [
+        each.state if each.quantity == "frequency_Hz" else replace(each.state, rim=PRESSED_RIM)
+        for each in placed
+    ]
+    count, left_out = _in_set_state(case, str(path), states, varied or one_other)
+    placed = list(compress(placed, count))
     _refuse_states(case, placed)
     analysis = case.case.analysis
     targets = Targets(
@@ -64,7 +64,58 @@ def with_measured(
         "targets": targets,
         "analysis": analysis.model_copy(update={"highest_harmonic": highest}),
     }
-    return replace(case, case=case.case.model_copy(update=wanted)), notes
+    return replace(case, case=case.case.model_copy(update=wanted)), left_out
+
+
+def in_set_state(case: LoadedCase, held: Collection[str] = ()) -> tuple[LoadedCase, list[str]]:
+    """The case with those of its targets alone that were measured in the state that its user has
+    set, pressure or rim, and what was left out. held: variables that do not vary.
+
+    Raises InputError where none was measured there.
+    """
+    targets, name = case.case.targets, pressure_name(case)
+    stated = case.case.pressure_kPa
+    if name in held:
+        stated = start_values(case.as_read or case)[name]
+    at = lambda p, rim: TyreState(stated if p is None else p, 0.0, rim)
+    states = [at(t.pressure_kPa, t.rim) for t in targets.modes]
+    states += [at(t.pressure_kPa, PRESSED_RIM) for t in targets.footprint]
+    count, left_out = _in_set_state(case, f"{case.path}", states, name in held)
+    modes = list(compress(targets.modes, count))
+    footprint = list(compress(targets.footprint, count[len(targets.modes) :]))
+    kept = targets.model_copy(update={"modes": modes, "footprint": footprint})
+    return replace(case, case=case.case.model_copy(update={"targets": kept})), left_out
+
+
+def _in_set_state(
+    case: LoadedCase, source: str, states: Sequence[TyreState], at_pressure: bool
+) -> tuple[list[bool], list[str]]:
+    """Which targets count, by the states of all, and which do not: those at the case's pressure,
+    where its user has set it or ``at_pressure``; those with its wheel free, or held, where he has
+    set that. Raises InputError where none does."""
+    set_by_user = case.overrides.keys()
+    at_pressure = at_pressure or PRESSURE_PATH in set_by_user
+    on_rim = not set_by_user.isdisjoint((RIM_FREE, WHEEL_FREE))
+    own, told = AS_THE_CASE.told(case), [state.told(case) for state in states]
+    count = [
+        (not at_pressure or state.pressure_kPa == own.pressure_kPa)
+        and (not on_rim or (state.rim == "free") == (own.rim == "free"))
+        for state in told
+    ]
+    if all(count):
+        return count, []
+    others = [state for state, counts in zip(told, count, strict=True) if not counts]
+    words = lambda s: f"{s.pressure_kPa:g} kPa" + f" with the rim {s.rim}" * on_rim
+    there = ", ".join(words(s) for s in sorted({*others}, key=lambda s: (s.pressure_kPa, s.rim)))
+    if any(count):
+        return count, [f"{len(others)} values at {there}"]
+    one = others[0]
+    change = [f"{pressure_name(case)}={one.pressure_kPa:g}"] * at_pressure
+    change += [f"rim.free={'true' if one.rim == 'free' else 'false'}"] * on_rim
+    raise InputError(
+        f"{source}: no target was measured at {words(own)}, only at {there}: set"
+        f" {' and '.join(change)}, or give measurements at {words(own)} (--measured FILE)"
+    )
 
 
 def _refuse_states(case: LoadedCase, readings: Sequence[Measurement]) -> None:

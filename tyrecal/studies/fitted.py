@@ -11,6 +11,7 @@ from ..errors import InputError
 from ..files import read_json
 from ..tyre.case import LoadedCase, start_values
 from ..tyre.case.identity import is_of_tyre, tyre_sha256
+from ..tyre.state import pressure_name
 from ..tyre.values import with_values
 
 NOT_CONVERGED = "not_converged"  # folder of a fit that may not take a better one's place
@@ -91,11 +92,3 @@ def has_good(path: Path) -> bool:
         return is_good(read_json(path, follow=False))
     except (OSError, ValueError, KeyError, TypeError):
         return False
-
-
-def pressure_name(case: LoadedCase) -> str:
-    """What sets the pressure: the case's variable that does so, else its path."""
-    for name, variable in case.case.variables.items():
-        if "pressure_kPa" in variable.sets:
-            return name
-    return "pressure_kPa"

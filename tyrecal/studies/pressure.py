@@ -16,8 +16,8 @@ from ..simulate.modes.find import Found, find_modes
 from ..simulate.modes.follow import follow
 from ..simulate.modes.label import FAMILIES, Label, Mode, labelled
 from ..tyre.case import LoadedCase
+from ..tyre.state import pressure_name
 from .fit.targets import target_labels
-from .fitted import pressure_name
 from .result import ResultPart
 
 BENT = "concave", "convex"

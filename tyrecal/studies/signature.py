@@ -14,8 +14,8 @@ from ..simulate.evaluate.results import Evaluation
 from ..simulate.modes.label import Label, Mode, paired_labels
 from ..tyre.case import LoadedCase
 from ..tyre.effects import catalogue
+from ..tyre.state import pressure_name
 from .fit.targets import target_labels
-from .fitted import pressure_name
 
 Array = np.ndarray
 

@@ -27,6 +27,7 @@ SPRINGS = tuple(
     for axis in axes
 )
 """Numbers of a case that are compliances of what holds its rim."""
+PRESSURE_PATH, RIM_FREE = "pressure_kPa", "rim.free"
 WHEEL_FREE = "effects.wheel_free"
 STANDING = "effects.road_contact"  # which a wheel that hangs freely does not
 
@@ -59,6 +60,16 @@ class TyreState:
         pressure = case.case.pressure_kPa if self.pressure_kPa is None else self.pressure_kPa
         return TyreState(pressure, self.load_N, self.rim or rim_of(case))
 
+    def kept(self, before: LoadedCase, after: LoadedCase) -> TyreState:
+        """The state of a target of the case ``before``, as the case ``after``, in which its user
+        has set numbers, has to state it. A pressure that a variable sets stays its own."""
+        pressure, rim = self.pressure_kPa, self.rim
+        if pressure is None and pressure_name(before) == PRESSURE_PATH:
+            pressure = before.case.pressure_kPa
+        if rim is None and is_free(before) != is_free(after):
+            rim = rim_of(before)
+        return TyreState(pressure, self.load_N, rim).of(after)
+
     def numbers(self, case: LoadedCase) -> dict[str, float]:
         """What it sets of the case, by path: nothing where it is as the case.
 
@@ -75,9 +86,7 @@ class TyreState:
                 " rim: {spindle: {lateral_m_per_N: 1e-7}}"
             )
         if state.rim:
-            found |= {"rim.free": state.rim == "free", WHEEL_FREE: 0.0} | dict.fromkeys(
-                SPRINGS, 0.0
-            )
+            found |= {RIM_FREE: state.rim == "free", WHEEL_FREE: 0.0} | dict.fromkeys(SPRINGS, 0.0)
             point = case.case.rim.reference_point_m
             if state.rim == "free":
                 found[STANDING] = 0.0
@@ -107,10 +116,40 @@ def without(
     return {name: value for name, value in values.items() if name not in taken}
 
 
+def with_states_kept(before: LoadedCase, after: LoadedCase) -> LoadedCase:
+    """The case ``after``, in which its user has set numbers, with its targets in the states that
+    they have in the case ``before``: they were measured there."""
+    if AS_THE_CASE.kept(before, after) == AS_THE_CASE:
+        return after
+    targets = after.case.targets
+    modes = []
+    for mode in targets.modes:
+        state = TyreState(mode.pressure_kPa, 0.0, mode.rim).kept(before, after)
+        own = {"pressure_kPa": state.pressure_kPa, "rim": state.rim}
+        modes.append(mode.model_copy(update=own))
+    footprint = []
+    for target in targets.footprint:
+        state = TyreState(target.pressure_kPa).kept(before, after)
+        footprint.append(target.model_copy(update={"pressure_kPa": state.pressure_kPa}))
+    kept = targets.model_copy(update={"modes": modes, "footprint": footprint})
+    return replace(after, case=after.case.model_copy(update={"targets": kept}))
+
+
+def is_free(case: LoadedCase) -> bool:
+    """Whether nothing holds the case's wheel while it vibrates."""
+    return case.case.rim.free or bool(case.case.effects["wheel_free"])
+
+
+def pressure_name(case: LoadedCase) -> str:
+    """What sets the pressure: the case's variable that does so, else its path."""
+    names = (name for name, v in case.case.variables.items() if PRESSURE_PATH in v.sets)
+    return next(names, PRESSURE_PATH)
+
+
 def rim_of(case: LoadedCase) -> RimSupport:
     """How the case has its rim held; a compliance that a variable sets counts as one."""
     c = case.case
-    if c.rim.free or c.effects["wheel_free"]:
+    if is_free(case):
         return "free"
     set_by_variables = {path for v in c.variables.values() for path in v.sets}
     effects = (c.effects[path.removeprefix("effects.")] for path in SPRINGS if "effects" in path)

@@ -20,6 +20,7 @@ from .case.variables import as_written
 from .own_deck.numbers import as_known
 from .plugins import IDS
 from .resolve import resolved
+from .state import with_states_kept
 from .usual import refusal
 
 MOST_MEANT = 3  # paths that are offered for a name that is none
@@ -85,15 +86,15 @@ def set_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
 
 def overridden(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
     """The case as its user sets it: a variable starts at its value (`start_values`), any other
-    number has it, and ``overrides`` lists them. Raises what `with_values` does, and ValueError for
-    the path of a number that a variable sets."""
+    number has it, and ``overrides`` lists them. Targets keep the states that they were measured in.
+    Raises what `with_values` does, and ValueError for the path of a number that a variable sets."""
     values = {as_known(name, loaded.deck_numbers): value for name, value in values.items()}
     variables = loaded.case.variables
     for path in values.keys() - variables.keys():
         for name, variable in variables.items():
             if path in variable.sets:
                 raise ValueError(f"{path} is set by the variable '{name}': set {name} instead")
-    changed = with_values(loaded, values)
+    changed = with_states_kept(loaded, with_values(loaded, values))
     given = {n: x if isinstance(x, bool) else float(x) for n, x in values.items()}
     return replace(changed, overrides={**loaded.overrides, **given})
 

@@ -14,7 +14,7 @@ from ...simulate.evaluate.executor import executor, in_order
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...tyre.case import LoadedCase
 from ...tyre.case.schema import cannot_fit
-from ..fitted import pressure_name
+from ...tyre.state import pressure_name
 from ..result import csv_text
 from . import gauss_newton, slsqp
 from .problem import Point, Problem

@@ -10,11 +10,12 @@ from typing import Any
 
 from ...measured.measurement import Measurement
 from ...measured.tables import read_measurements
-from ...measured.targets import with_measured
+from ...measured.targets import in_set_state, with_measured
 from ...simulate.deck.decks_design import design_of
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.provenance import provenance
-from ...tyre.case import LoadedCase
+from ...tyre.case import LoadedCase, start_values
+from ...tyre.values import with_values
 from ..labelling.label import label
 from ..labelling.result import labels_told
 from .calibrate import Fit, FitNotify, calibrate, check
@@ -40,20 +41,24 @@ class FitStudy:
     ):
         """measured: takes the place of the case's targets; fixed: values of variables that are
         held."""
-        self._plain, self.measured, self.fixed = case, measured, dict(fixed or {})
-        self.evaluator = evaluator.of(design_of(case))
-        self.case, self.left_out = case, list[str]()
+        self.measured, self.fixed = measured, dict(fixed or {})
+        self._plain = with_values(case, {**start_values(case), **self.fixed})
+        self.evaluator = evaluator.of(design_of(self._plain))
         self.readings = read_measurements(measured, labelled=False) if measured else []
         self.needs_labels = any(each.is_unlabelled for each in self.readings)
+        self.case, self.left_out = self._plain, list[str]()
         if not self.needs_labels:
-            self._fit_to(self.readings)
+            self._set_targets(self.readings)
             check(self._problem)
 
-    def _fit_to(self, readings: Sequence[Measurement]) -> None:
-        """Take readings that have labels as targets. Raises InputError."""
+    def _set_targets(self, readings: Sequence[Measurement]) -> None:
+        """Those of the case, or ``readings`` of the measured file that have labels. Raises
+        InputError."""
         if self.measured:
             self.case, self.left_out = with_measured(self._plain, self.measured, readings)
-            self.evaluator.design = design_of(self.case)
+        else:
+            self.case, self.left_out = in_set_state(self._plain, self.fixed)
+        self.evaluator.design = design_of(self.case)
 
     @property
     def _problem(self) -> Problem:
@@ -105,7 +110,7 @@ class FitStudy:
         likeliest = label(case, evaluator, readings, fixed=fixed, jobs=jobs)
         for _ in range(MOST_FITS):
             used = likeliest
-            self._fit_to(used.readings)
+            self._set_targets(used.readings)
             fit = calibrated()
             likeliest = label(case, evaluator, readings, None, fit.fitted.values, fixed, jobs)
             same = likeliest.labels == used.labels
