@@ -36,12 +36,11 @@ Array = np.ndarray
 LEAST_CHANGE = 1e-15  # of F^2 / (2 F0^2), by which SLSQP stops: the gradient ends a search before
 
 
-class _Ended(Exception):
-    """Ends a run of SLSQP before its own criteria do; the reason in words, "" to start again."""
-
-
 class _Run:
-    """One run of SLSQP from ``best``, which it moves; ``left``: designs that it may evaluate."""
+    """One run of SLSQP from ``best``, which it moves; ``left``: designs that it may evaluate.
+
+    ``objective`` and ``gradient`` end the run before SLSQP's own criteria do: they raise
+    StopIteration with the reason in words, without one if another run may go on."""
 
     def __init__(
         self, problem: Problem, start: Point, tolerance: float, watch: CrossingWatch, left: int
@@ -69,8 +68,8 @@ class _Run:
                 constraints=[inside],
                 options={"ftol": LEAST_CHANGE, "maxiter": MOST_DESIGNS},
             )
-        except _Ended as end:
-            return str(end)
+        except StopIteration as stop:
+            return str(stop.value or "")
         return ""
 
     def evaluate(self, y: Array) -> Point:
@@ -79,32 +78,32 @@ class _Run:
         return self.problem.evaluate(np.clip(x, self.problem.lower, self.problem.upper))
 
     def objective(self, y: Array) -> float:
-        """F^2 / (2 F0^2). Raises _Ended."""
+        """F^2 / (2 F0^2). Raises StopIteration."""
         self.left -= 1
         try:
             point = self.evaluate(y)
         except EvaluationFailed:
             if self.left <= 0:
-                raise _Ended(USED_UP) from None
+                raise StopIteration(USED_UP) from None
             return np.inf
         end = self.watch.judge(self.best, point)
         self.best = min(self.best, point, key=lambda p: p.objective)
         if end or self.left <= 0:
-            raise _Ended(end or USED_UP)
+            raise StopIteration(end or USED_UP)
         edge_moved = self.watch.edge is not self.edge
         if edge_moved or is_converged(self.problem, self.best, self.tolerance):
-            raise _Ended
+            raise StopIteration
         return 0.5 * (point.objective / self.F0) ** 2
 
     def gradient(self, y: Array) -> Array:
-        """The objective's gradient at a design that SLSQP accepts. Raises _Ended if it is no lower
-        than the one before."""
+        """Its gradient at a design that SLSQP accepts. Raises StopIteration if that is no lower than
+        the one accepted before."""
         try:
             point = self.evaluate(y)
         except EvaluationFailed:  # the line search has given up
-            raise _Ended from None
+            raise StopIteration from None
         if self.now and point.objective >= self.now.objective:
-            raise _Ended
+            raise StopIteration
         self.now = point
         return self.T.T @ point.jacobian.T @ point.residuals / self.F0**2
 
