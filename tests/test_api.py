@@ -3,20 +3,32 @@
 from __future__ import annotations
 
 import doctest
+import inspect
 import subprocess
 import sys
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import tyrecal
 from tyrecal import api
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.simulate.modes.label import Label
 
+from .cli.test_cli import run
 from .conftest import CASES, ROOT
 
 CASE, DATA = CASES / "p235_75r17.yaml", CASES / "p235_75r17_wheeler.csv"
 FUNCTIONS = [name for name in tyrecal.__all__ if name[0].islower() and name != "with_values"]
+
+
+@pytest.fixture(scope="module")
+def coarse() -> tyrecal.LoadedCase:
+    return tyrecal.load_case(CASE, mesh="coarse")
 
 
 def test_the_package_is_light() -> None:
@@ -82,20 +94,48 @@ def test_the_example_of(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
         (lambda case: tyrecal.evaluate_footprint(case, [2e3, 1e3]), r"got \[2000.0, 1000.0\]"),
         (lambda case: tyrecal.evaluate_footprint(case, [float("nan")]), "above 0 and rise"),
         (lambda case: tyrecal.diagnose_case(case, DATA, effects=["rim_with"]), "'rim_width'"),
-        (lambda case: tyrecal.diagnose_case(case, DATA, effects="rim_width"), "not one of the eff"),
     ],
 )
-def test_wrong_input_is_a_value_error_in_a_sentence(call: Any, words: str) -> None:
+def test_wrong_input_is_a_value_error_in_a_sentence(
+    call: Any, words: str, coarse: tyrecal.LoadedCase
+) -> None:
     """Not a failure of the solver, and never silently another question."""
-    case = tyrecal.load_case(CASE, mesh="coarse")
     with pytest.raises(ValueError, match=words) as error:
-        call(case)
+        call(coarse)
     assert "\n" not in str(error.value)
 
 
-def test_values_of_variables_are_those_of_the_design_everywhere() -> None:
+def test_a_fit_to_a_file_is_that_of_the_command(coarse: tyrecal.LoadedCase, tmp_path: Path) -> None:
+    """The same content of fit.json; what was measured elsewhere is told."""
+    path, record = tmp_path / "measured.csv", str(tmp_path / "record")
+    path.write_text(DATA.read_text() + "frequency_Hz,2,0,,,160,0,70,0.5\n")
+    given = ["--mesh", "coarse", "--no-pictures", "--store", record, "--fix", "C10"]
+    given += ["--measured", str(path), "--pressure-kPa", "240", "--output", str(tmp_path / "out")]
+    assert run("fit", str(CASE), *given) == 0
+    case = tyrecal.with_values(coarse, {"pressure_kPa": 240})
+    fit = tyrecal.fit_case(case, path, fixed="C10", record=record)
+    assert fit.result == tyrecal.read_results(tmp_path / "out")["fit"]
+    assert fit.result["provenance"]["measured_sha256"] == sha256(path.read_bytes()).hexdigest()
+    assert fit.left_out == ["1 values at 160 kPa"]
+    assert repr(fit).startswith("Fit(converged, ") and len(repr(fit)) < 150
+
+
+def test_what_is_shown_in_a_notebook_is_short(coarse: tyrecal.LoadedCase) -> None:
+    mode = tyrecal.Mode(Label(2, 1), 66.123, 2, 0.9, 0, None)  # type: ignore[arg-type]
+    assert repr(mode) == "Mode([2,1], 66.12 Hz, doublet)"
+    assert (
+        repr(tyrecal.State("", 240.0, [mode], None)) == "State(240 kPa: 1 modes, 66.1 to 66.1 Hz)"
+    )
+    case = tyrecal.with_values(coarse, {"C10": 2e6})
+    words = "P235/75R17 on an 8 inch rim, 240 kPa, mesh coarse, C10=2e+06"
+    assert repr(case) == f"LoadedCase({str(CASE)!r}: {words})"
+    filler = tyrecal.list_effects()["bead_filler"]
+    assert repr(filler) == "Effect(bead_filler: Bead filler, 0 to 3)"
+
+
+def test_values_of_variables_are_those_of_the_design_everywhere(coarse: tyrecal.LoadedCase) -> None:
     """What `with_values` sets and the same values of one question give the same numbers."""
-    case = tyrecal.load_case(CASE, mesh="coarse")
+    case = coarse
     stiff = tyrecal.with_values(case, {"C10": 2e6})
     hertz = [mode.frequency_Hz for mode in tyrecal.evaluate_modes(case, {"C10": 2e6})]
     assert [mode.frequency_Hz for mode in tyrecal.evaluate_modes(stiff)] == hertz
@@ -103,6 +143,88 @@ def test_values_of_variables_are_those_of_the_design_everywhere() -> None:
     assert state.modes[0].frequency_Hz == pytest.approx(hertz[0], rel=1e-9)
     with pytest.raises(ValueError, match="C10_Pa is set by the variable 'C10'"):
         tyrecal.with_values(case, {"materials.rubber.C10_Pa": 2e6})
+
+
+@pytest.fixture
+def unrun(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """No solver runs: what comes so far was accepted."""
+
+    def refuse(*given: Any) -> Any:
+        raise EvaluationFailed("crashed", "the solver would have run")
+
+    monkeypatch.setattr(Evaluator, "_ask", refuse)
+    monkeypatch.chdir(tmp_path)
+
+
+VALUES = {"C10": 1.1e6}
+NATURAL: dict[str, list[dict[str, Any]]] = {  # arguments beside the case, that each function takes
+    "load_case": [{"path": CASE}, {"path": str(CASE), "mesh": "coarse"}],
+    "with_values": [{"values": VALUES}, {"values": {"pressure_kPa": np.float32(200)}}],
+    "evaluate_modes": [{}, {"values": VALUES}, {"values": None}],
+    "fit_case": [
+        {},
+        {"measured": DATA},
+        {"measured": str(DATA), "fixed": "C10"},
+        {"fixed": ["C10", "A_belt"], "starts": np.int64(2)},
+        {"fixed": VALUES},
+    ],
+    "sweep_pressure": [{"pressures_kPa": x} for x in (200, 200.0, (200, 240), np.array([200.0]))],
+    "evaluate_footprint": [
+        {"loads_N": x} for x in (3000, [1e3, 2e3], iter([1e3]), np.float64(1e3))
+    ],
+    "diagnose_case": [
+        {"measured": DATA, "effects": "rim_width"},
+        {"measured": str(DATA), "effects": ("rim_width", "cap_ply")},
+    ],
+    "emulate": [{}, {"pressures_kPa": [200, 280]}, {"reach": 1}],
+    "list_effects": [{}],
+    "read_results": [{"folder": CASES / "ci"}, {"folder": str(CASES / "ci")}],
+}
+WRONG = [2.5, "neither", object(), [None], {"C10": "soft"}, None, -1, b"x"]
+NEVER_WRONG = {"allow_unusual"}  # true or false, as anything is
+
+
+def accepted(name: str, given: dict[str, Any], case: Any) -> bool:
+    """Whether a call comes as far as the solver, or returns; else it is refused in a sentence."""
+    function = getattr(tyrecal, name)
+    takes_case = "case" in inspect.signature(function).parameters
+    try:
+        function(**{**({"case": case} if takes_case else {}), **given})
+    except EvaluationFailed:
+        pass
+    except (ValueError, FileNotFoundError) as error:
+        if "could be evaluated" in str(error):  # an emulator's designs: all of them failed
+            return True
+        words = str(error)
+        assert words and "\n" not in words, words
+        assert any(part in words for part in (*given, *VALUES, "neither")), f"{given}: {words}"
+        return False
+    return True
+
+
+@pytest.mark.parametrize("name", NATURAL)
+def test_natural_calls_are_accepted(name: str, coarse: tyrecal.LoadedCase, unrun: None) -> None:
+    """A path for a case or a file, a plain number or name where there may be several."""
+    for given in NATURAL[name]:
+        assert accepted(name, given, coarse), given
+    if "case" in inspect.signature(getattr(tyrecal, name)).parameters:
+        assert accepted(name, NATURAL[name][0], str(CASE))
+
+
+@pytest.mark.parametrize("name", NATURAL)
+def test_wrong_arguments_are_named(name: str, coarse: tyrecal.LoadedCase, unrun: None) -> None:
+    """Each argument of each function as what it cannot be: no error from within."""
+    parameters = inspect.signature(getattr(tyrecal, name)).parameters
+    for parameter in sorted(parameters.keys() - NEVER_WRONG):
+        refused = sum(
+            not accepted(name, {**NATURAL[name][0], parameter: value}, coarse) for value in WRONG
+        )
+        assert refused >= 4, parameter
+
+
+def test_the_walk_knows_every_function() -> None:
+    functions = {name for name in api.__all__ if inspect.isfunction(getattr(tyrecal, name))}
+    assert functions == NATURAL.keys()
 
 
 @pytest.mark.lint
@@ -123,11 +245,14 @@ modes = tyrecal.evaluate_modes(case, {"C10": 1.1e6}, record=Path("record"))
 assert_type(modes, list[tyrecal.Mode])
 assert_type(modes[0].frequency_Hz, float)
 fit = tyrecal.fit_case(case, fixed={"C10": 1e6}, starts=2, jobs=2)
+fit = tyrecal.fit_case("case.yaml", Path("measured.csv"), fixed="C10")
 assert_type(fit.fitted.objective, float)
 (state,) = tyrecal.sweep_pressure(case, [240.0])
+tyrecal.sweep_pressure(Path("case.yaml"), 240)
 assert_type(state, tyrecal.State)
 assert_type(tyrecal.evaluate_footprint(case, [1e3])[0]["area_m2"], float)
 found = tyrecal.diagnose_case(case, "measured.csv", effects=["rim_width"])
+tyrecal.diagnose_case(case, "measured.csv", repeats="again.csv", effects="rim_width")
 assert_type(found.verdict.words, str)
 assert_type(tyrecal.list_effects()["rim_width"].low, float)
 try:

@@ -1,10 +1,12 @@
-"""What other programs may call: one function for each thing the command line does.
+"""What other programs may call: cases read and changed, modes, fits, sweeps, footprints, diagnoses.
 
-``solver`` is the name of an installed solver ("": the case's), ``record`` a folder that answers
-what was asked before and is told what is new (None: neither), ``jobs`` how many designs are
-evaluated at a time. Values of variables are in the units of the numbers that they set; those not
-given are the case's start values. All functions raise CaseError or ValueError where the input is
-wrong and EvaluationFailed where the solver failed.
+``case`` is a `LoadedCase`, or the path of a case file. Those functions that evaluate designs take
+``solver``, the name of an installed solver ("": the case's), and ``record``, a folder that answers
+what was evaluated before and keeps what is new (None: neither). ``jobs`` is how many designs are
+evaluated at a time, where they are independent. Values of variables are in the units of the numbers
+that they set; those not given are the case's start values. A wrong argument raises ValueError in a
+sentence that names it, a case with mistakes CaseError, which is one, and a solver that fails
+EvaluationFailed.
 
 Numbers that no tyre has, most often slips of unit, are wrong input of `load_case`, `with_values`,
 `sweep_pressure` and `evaluate_footprint`, unless ``allow_unusual``. Values of designs to evaluate
@@ -13,13 +15,15 @@ are free: a search may try what it likes.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from itertools import pairwise
 from math import inf, log
+from numbers import Integral, Real
+from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
-from .files import read_json
+from .files import printable, read_json
 from .simulate.deck.decks_design import design_of
 from .simulate.deck.tyre_design import TyreDesign
 from .simulate.evaluate.evaluator import Evaluator, Question
@@ -34,6 +38,7 @@ from .studies.fit.study import FitStudy
 from .studies.fit.targets import target_labels
 from .studies.pressure import State
 from .tyre.case import CaseError, LoadedCase, start_values, with_level
+from .tyre.case.mistakes import suggestion
 from .tyre.effects import Effect, catalogue
 from .tyre.load import load_case as _load_case
 from .tyre.values import overridden, unusual_value
@@ -60,6 +65,7 @@ __all__ = [
     "sweep_pressure",
     "with_values",
 ]
+MOST_SHOWN = 60  # characters of a wrong argument
 
 
 def load_case(path: Path | str, mesh: str = "", allow_unusual: bool = False) -> LoadedCase:
@@ -75,16 +81,16 @@ def load_case(path: Path | str, mesh: str = "", allow_unusual: bool = False) -> 
     >>> softer.case.pressure_kPa
     200.0
     """
-    loaded = _load_case(path, allow_unusual)
-    return with_level(loaded, mesh) if mesh else loaded
+    loaded = _load_case(_path("path", path), allow_unusual)
+    return with_level(loaded, mesh) if _text("mesh", mesh) else loaded
 
 
 def with_values(
-    case: LoadedCase, values: Mapping[str, float], allow_unusual: bool = False
+    case: LoadedCase | Path | str, values: Mapping[str, float], allow_unusual: bool = False
 ) -> LoadedCase:
-    """The case with variables, or any of its numbers by path, set; ``overrides`` and the
-    provenance of results say so. Raises ValueError for an unknown name, an impossible value, or
-    one that no tyre has.
+    """The case with any of its numbers set, by path, and with variables that start at other values,
+    by name; ``overrides`` and the provenance of results list them. Raises ValueError for an unknown
+    name, an impossible value, or one that no tyre has.
 
     >>> case = load_case("cases/p235_75r17.yaml", mesh="coarse")
     >>> with_values(case, {"rebar_layers.belt_1.angle_deg": 68}).overrides
@@ -93,14 +99,15 @@ def with_values(
     Traceback (most recent call last):
     ValueError: pressure_kPa is 2.2: usual is 50 to 1200 kPa; did you mean 2.2 bar, 220 kPa? ...
     """
-    changed = overridden(case, values)
-    for name, value in values.items():
+    given = _mapping("values", values)
+    changed = overridden(_case(case), given)
+    for name, value in given.items():
         _refuse_unusual(changed, name, name, value, allow_unusual)
     return changed
 
 
 def evaluate_modes(
-    case: LoadedCase,
+    case: LoadedCase | Path | str,
     values: Mapping[str, float] | None = None,
     *,
     solver: str = "",
@@ -114,45 +121,48 @@ def evaluate_modes(
     >>> f"{modes[0].label} {modes[0].frequency_Hz:.1f} Hz"
     '[0,0] axial 37.3 Hz'
     """
-    answer = _evaluator(case, solver, record).evaluate(Question(_values(case, values)))
-    return labelled(answer)
+    case = _case(case)
+    design = _design(case, values)
+    return labelled(_evaluator(case, solver, record).evaluate(Question(design)))
 
 
 def fit_case(
-    case: LoadedCase,
+    case: LoadedCase | Path | str,
+    measured: Path | str | None = None,
     *,
     method: str = "slsqp",
-    fixed: Mapping[str, float] | None = None,
+    fixed: Mapping[str, float] | Iterable[str] | str | None = None,
     starts: int = 1,
     seed: int = 0,
     jobs: int = 1,
     solver: str = "",
     record: Path | str | None = None,
 ) -> Fit:
-    """Calibrate the case's variables to its targets; ``fixed`` holds some at a value.
+    """Calibrate the case's variables to its targets, or to a file of measurements (CSV) in their
+    place, as ``tyrecal fit --measured`` does: frequencies without labels get the likeliest ones.
 
+    ``fixed`` holds variables at values, or at their start where it is a name or several.
     ``method`` is "slsqp" (SciPy's) or "gauss-newton", which needs about a third of the designs.
     ``result`` holds what fit.json does, ``provenance`` too, ``fitted`` the design: ``values``,
     ``objective`` in Hz, ``modes`` by label and, of targets in several states, ``states``: modes of
-    each.
+    each. ``left_out`` lists the measurements that are no targets.
 
-    >>> fit = fit_case(load_case("cases/p235_75r17.yaml", mesh="coarse"), fixed={"C10": 1e6})
+    >>> fit = fit_case(load_case("cases/p235_75r17.yaml", mesh="coarse"), fixed="C10")
     >>> fit.result["converged"], f"{fit.initial.objective:.0f} to {fit.fitted.objective:.0f} Hz"
     (True, '33 to 6 Hz')
     """
-    if method not in METHODS:
+    if _text("method", method) not in METHODS:
         raise ValueError(f"method '{method}' is none of {', '.join(METHODS)}")
-    if starts < 1:
-        raise ValueError(f"starts must be at least 1, got {starts}")
-    _values(case, fixed)
-    return FitStudy(case, _evaluator(case, solver, record), None, fixed).run(
-        method, starts, seed, jobs
-    )
+    case = _case(case)
+    held = _held(case, fixed)
+    file = None if measured is None else _file("measured", measured)
+    counts = _count("starts", starts, 1), _count("seed", seed, 0), _count("jobs", jobs, 1)
+    return FitStudy(case, _evaluator(case, solver, record), file, held).run(method, *counts)
 
 
 def sweep_pressure(
-    case: LoadedCase,
-    pressures_kPa: Sequence[float],
+    case: LoadedCase | Path | str,
+    pressures_kPa: float | Iterable[float],
     values: Mapping[str, float] | None = None,
     *,
     allow_unusual: bool = False,
@@ -160,8 +170,8 @@ def sweep_pressure(
     solver: str = "",
     record: Path | str | None = None,
 ) -> list[State]:
-    """Modes at each pressure (kPa): ``modes`` by rising frequency, ``frequencies`` by label, and
-    ``slopes`` d ln f / d ln p by label, None where the solver has none.
+    """Modes at each pressure (kPa), or at one: ``modes`` by rising frequency, ``frequencies`` by
+    label, and ``slopes`` d ln f / d ln p by label, None where the solver has none.
 
     >>> case = load_case("cases/p235_75r17.yaml", mesh="coarse")
     >>> for state in sweep_pressure(case, [160, 240]):
@@ -172,13 +182,18 @@ def sweep_pressure(
     from .studies.pressure import Failure, sweep
     from .tyre.state import pressure_name
 
-    design = _values(case, values)
-    for pressure in pressures_kPa:
-        _with_values(case, {**design, pressure_name(case): pressure})
+    case = _case(case)
+    design, pressures = _design(case, values), _numbers("pressures_kPa", pressures_kPa)
+    jobs = _count("jobs", jobs, 1)
+    for pressure in pressures:
+        try:
+            _with_values(case, {**design, pressure_name(case): pressure})
+        except ValueError as error:
+            raise ValueError(f"pressures_kPa: {error}") from None
         _refuse_unusual(case, "pressures_kPa", pressure_name(case), pressure, allow_unusual)
     evaluator = _evaluator(case, solver, record)
     states = []
-    for outcome in sweep(case, evaluator, {"": design}, list(pressures_kPa), jobs):
+    for outcome in sweep(case, evaluator, {"": design}, pressures, jobs):
         if isinstance(outcome, Failure):
             raise outcome.failed
         states.append(outcome)
@@ -186,17 +201,17 @@ def sweep_pressure(
 
 
 def evaluate_footprint(
-    case: LoadedCase,
-    loads_N: Sequence[float],
+    case: LoadedCase | Path | str,
+    loads_N: float | Iterable[float],
     values: Mapping[str, float] | None = None,
     *,
     allow_unusual: bool = False,
     solver: str = "",
     record: Path | str | None = None,
 ) -> list[dict[str, float]]:
-    """The tyre on a flat road at rising loads (N), one entry each: ``load_N``, ``deflection_m``,
-    ``area_m2``, ``length_m``, ``width_m``, ``mean_pressure_Pa``, ``peak_pressure_Pa``,
-    ``vertical_stiffness_N_per_m``.
+    """The tyre on a flat road at rising loads (N), or at one, an entry each: ``load_N``,
+    ``deflection_m``, ``area_m2``, ``length_m``, ``width_m``, ``mean_pressure_Pa``,
+    ``peak_pressure_Pa``, ``vertical_stiffness_N_per_m``.
 
     >>> case = load_case("cases/p235_75r17.yaml", mesh="coarse")
     >>> (at_1_kN,) = evaluate_footprint(case, [1000])
@@ -205,13 +220,14 @@ def evaluate_footprint(
     """
     from .studies.footprint import footprint_row
 
-    design = _values(case, values)
-    rise = [after - before for before, after in pairwise([0.0, *loads_N])]
+    case = _case(case)
+    design, loads = _design(case, values), _numbers("loads_N", loads_N)
+    rise = [after - before for before, after in pairwise([0.0, *loads])]
     if not rise or not all(0 < each < inf for each in rise):
-        raise ValueError(f"loads_N must be above 0 and rise, got {list(loads_N)}")
-    for load in loads_N:
+        raise ValueError(f"loads_N must be above 0 and rise, got {loads}")
+    for load in loads:
         _refuse_unusual(case, "loads_N", "road.loads_N.0", load, allow_unusual)
-    found: Pressed = _evaluator(case, solver, record).press(design, list(loads_N))
+    found: Pressed = _evaluator(case, solver, record).press(design, loads)
     if found.failed:
         raise found.failed
     mesh = TyreDesign(case, design).tyre.mesh
@@ -219,35 +235,40 @@ def evaluate_footprint(
 
 
 def diagnose_case(
-    case: LoadedCase,
+    case: LoadedCase | Path | str,
     measured: Path | str,
     *,
-    repeats: Iterable[Path | str] = (),
-    effects: Sequence[str] | None = None,
+    repeats: Path | str | Iterable[Path | str] = (),
+    effects: str | Iterable[str] | None = None,
     jobs: int = 1,
     solver: str = "",
     record: Path | str | None = None,
 ) -> Diagnosis:
     """Where the case and measurements (a CSV file) part, and which effect explains it.
 
-    ``repeats`` are the same measurements after mounting anew, ``effects`` the ids to consider
-    (None: all). ``verdict`` says what can be told, in ``words`` too; ``probabilities`` are by
-    effect, "none" and "outside" among them; ``gap`` is what calibration leaves.
+    ``repeats`` are the same measurements after mounting anew, a file or several; ``effects`` the
+    ids to consider, one or several (None: all). ``verdict`` says what can be told, in ``words``
+    too; ``probabilities`` are by effect, "none" and "outside" among them; ``gap`` is what
+    calibration leaves.
 
     >>> case = load_case("cases/p235_75r17.yaml", mesh="coarse")
-    >>> found = diagnose_case(case, "cases/p235_75r17_wheeler.csv", effects=["rim_width"])
+    >>> found = diagnose_case(case, "cases/p235_75r17_wheeler.csv", effects="rim_width")
     >>> found.verdict.kind, found.verdict.key
     ('undecided', None)
     """
     from .studies.diagnose.study import study
 
-    others = [Path(path) for path in repeats]
-    evaluator = _evaluator(case, solver, record)
-    return study(case, evaluator, Path(measured), others, jobs=jobs, effects=effects).diagnosis
+    case = _case(case)
+    file = _file("measured", measured)
+    again = [repeats] if isinstance(repeats, str | PathLike) else repeats
+    others = [_file("repeats", path) for path in _listed("repeats", again, "a file")]
+    ids = None if effects is None else _names("effects", effects)
+    jobs, evaluator = _count("jobs", jobs, 1), _evaluator(case, solver, record)
+    return study(case, evaluator, file, others, jobs=jobs, effects=ids).diagnosis
 
 
 def emulate(
-    case: LoadedCase,
+    case: LoadedCase | Path | str,
     *,
     reach: float = 0.3,
     evaluations: int = 0,
@@ -274,8 +295,10 @@ def emulate(
     from .studies.emulator import emulator
     from .studies.fit.variable import DesignVariable, read_variables
 
-    if not reach > 0:
+    case = _case(case)
+    if not _number("reach", reach) > 0:
         raise ValueError(f"reach must be above 0, got {reach:g}")
+    evaluations, jobs = _count("evaluations", evaluations, 0), _count("jobs", jobs, 1)
     variables = read_variables(case)
     if not variables:
         raise ValueError("the case has no variables: there is nothing to emulate")
@@ -284,8 +307,11 @@ def emulate(
         for v in variables
         for x in [v.scaled(v.start)]
     ]
-    if pressures_kPa:
-        low, high = pressures_kPa
+    if pressures_kPa is not None:
+        ends = _numbers("pressures_kPa", pressures_kPa)
+        if len(ends) != 2:
+            raise ValueError(f"pressures_kPa must be two, from one to another, got {ends}")
+        low, high = ends
         if not 0 < low < high < inf:
             raise ValueError(f"pressures_kPa must rise from above 0, got {low:g} to {high:g}")
         start = min(max(case.case.pressure_kPa, low), high)
@@ -320,17 +346,33 @@ def read_results(folder: Path | str) -> dict[str, Any]:
     >>> sorted(results), results["modes"]["pressure_kPa"]
     (['modes', 'modes_shapes', 'run'], 240.0)
     """
-    paths = sorted(Path(folder).glob("*.json"))
+    paths = sorted(_path("folder", folder).glob("*.json"))
     if not paths:
-        raise FileNotFoundError(f"there are no results in '{folder}'")
+        raise FileNotFoundError(f"there are no results in the folder '{folder}'")
     return {path.stem: read_json(path, follow=False) for path in paths}
 
 
-def _values(case: LoadedCase, values: Mapping[str, float] | None) -> dict[str, float]:
+def _design(case: LoadedCase, values: Mapping[str, float] | None) -> dict[str, float]:
     """The whole design. Raises ValueError where the case cannot have it."""
-    design = {**start_values(case), **(values or {})}
+    design = {**start_values(case), **({} if values is None else _mapping("values", values))}
     _with_values(case, design)
     return design
+
+
+def _held(
+    case: LoadedCase, fixed: Mapping[str, float] | Iterable[str] | str | None
+) -> dict[str, float]:
+    """Values of the variables that are held. Raises ValueError."""
+    if fixed is None or isinstance(fixed, Mapping):
+        held = {} if fixed is None else _mapping("fixed", fixed)
+    else:
+        held = {name: start_values(case).get(name, 0.0) for name in _names("fixed", fixed)}
+    for name in held:
+        if name not in case.case.variables:
+            known = suggestion(name, case.case.variables)
+            raise ValueError(f"fixed: there is no variable '{name}'{known}")
+    _with_values(case, {**start_values(case), **held})
+    return held
 
 
 def _refuse_unusual(
@@ -342,6 +384,86 @@ def _refuse_unusual(
 
 
 def _evaluator(case: LoadedCase, solver: str, record: Path | str | None) -> Evaluator:
-    return Evaluator(
-        design_of(case), solver, store=Store(Path(record).resolve()) if record else None
-    )
+    store = None
+    if record is not None:
+        folder = _path("record", record)
+        if folder.exists() and not folder.is_dir():
+            raise ValueError(f"record must be a folder, '{folder}' is a file")
+        store = Store(folder.resolve())
+    evaluator = Evaluator(design_of(case), _text("solver", solver), store=store)
+    evaluator.solver  # noqa: B018  a solver that is not there is refused before anything else
+    return evaluator
+
+
+# Arguments as callers write them. Each function raises ValueError in a sentence that names one.
+
+
+def _case(case: LoadedCase | Path | str) -> LoadedCase:
+    if isinstance(case, LoadedCase):
+        return case
+    return load_case(_path("case", case, "a LoadedCase, or the path of a case file"))
+
+
+def _path(name: str, value: Path | str, wanted: str = "a path") -> Path:
+    if isinstance(value, str | PathLike) and (text := fspath(value)) and isinstance(text, str):
+        return Path(text)
+    raise _wrong(name, wanted, value)
+
+
+def _file(name: str, value: Path | str) -> Path:
+    path = _path(name, value, "the path of a file")
+    if not path.is_file():
+        raise ValueError(f"{name}: there is no file '{path}'")
+    return path
+
+
+def _text(name: str, value: str) -> str:
+    if isinstance(value, str):
+        return value
+    raise _wrong(name, "text", value)
+
+
+def _number(name: str, value: float) -> float:
+    if isinstance(value, Real) and not isinstance(value, bool):
+        return float(value)
+    raise _wrong(name, "a number", value)
+
+
+def _count(name: str, value: int, least: int) -> int:
+    if not isinstance(value, Integral) or isinstance(value, bool):
+        raise _wrong(name, "a whole number", value)
+    if value < least:
+        raise ValueError(f"{name} must be at least {least}, got {value}")
+    return int(value)
+
+
+def _mapping(name: str, values: Mapping[str, float]) -> dict[str, float]:
+    if isinstance(values, Mapping) and all(isinstance(key, str) for key in values):
+        return dict(values)
+    raise _wrong(name, "names with values, as in {'C10': 1e6}", values)
+
+
+def _numbers(name: str, values: float | Iterable[float]) -> list[float]:
+    several = [values] if isinstance(values, Real) else values
+    return [_number(name, each) for each in _listed(name, several, "a number")]
+
+
+def _names(name: str, values: str | Iterable[str]) -> list[str]:
+    several = [values] if isinstance(values, str) else values
+    return [_text(name, each) for each in _listed(name, several, "a name")]
+
+
+def _listed(name: str, values: Any, one: str) -> list[Any]:
+    """All of several values; ``one``: what a single one is."""
+    if not isinstance(values, str | bytes | Mapping):
+        try:
+            return list(values)
+        except TypeError:
+            pass
+    raise _wrong(name, f"{one}, or a list of several", values)
+
+
+def _wrong(name: str, wanted: str, value: object) -> ValueError:
+    text = printable(repr(value))
+    shown = text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
+    return ValueError(f"{name} must be {wanted}, got {shown}")

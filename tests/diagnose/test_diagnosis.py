@@ -29,8 +29,9 @@ def diagnosed(toy: Toy, effects: dict[str, float], seed: int, **keys: object) ->
 
 def test_every_stage_is_told_once_and_in_order() -> None:
     told: list[str] = []
-    diagnosed(Toy(effects=1), {"e0": 0.5}, 0, stage=told.append)
+    found = diagnosed(Toy(effects=1), {"e0": 0.5}, 0, stage=told.append)
     assert told == list(STAGES)
+    assert repr(found) == f"Diagnosis({found.verdict.kind}: {found.verdict.words})"
 
 
 @pytest.mark.slow

@@ -129,7 +129,7 @@ def command(
     else:
         terminal.show(shown(*tables))
     terminal.say("\n".join(fit_verdict(result)))
-    for each in calibration.left_out:
+    for each in fit.left_out:
         terminal.note(f"{measured or case}: not used: {each}")
     for warning in (*tyre_doubts(result), *fit_doubts(result)):
         terminal.warn(warning)

@@ -30,6 +30,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations_with_replacement
 from math import log
+from numbers import Real
 
 import numpy as np
 
@@ -82,17 +83,28 @@ class Emulator:
     stated_errors: Array
     stated_error: float
 
+    def __repr__(self) -> str:
+        names = ", ".join(v.name for v in self.variables)
+        made = f"{self.evaluations} evaluations, stated error {self.stated_error:.2g}"
+        return f"Emulator({len(self.labels)} modes by {names}: {made})"
+
     def frequencies(self, values: Mapping[str, float]) -> dict[Label, float]:
         """Hz by label of a design, by the values of its variables; those not given are at their
         start. Raises ValueError for an unknown name, and outside the box."""
         names = [v.name for v in self.variables]
-        if unknown := set(values) - set(names):
-            raise ValueError(f"there is no variable '{min(unknown)}', only {', '.join(names)}")
-        x = np.array([v.scaled(values.get(v.name, v.start)) for v in self.variables])
+        if not isinstance(values, Mapping):
+            raise ValueError(f"values must be names with values, got {values!r}")
+        for name, value in values.items():
+            if name not in names:
+                raise ValueError(f"there is no variable '{name}', only {', '.join(names)}")
+            if not isinstance(value, Real):
+                raise ValueError(f"{name} is {value!r}, must be a number")
+        given = [(v, values.get(v.name, v.start)) for v in self.variables]
+        x = np.array([v.scaled(y) if y > 0 or not v.log else -np.inf for v, y in given])
         for v, t, edges in zip(
             self.variables, (x - self.centre) / self.half, self.box, strict=True
         ):
-            if abs(t) > 1 + 1e-9:
+            if not abs(t) <= 1 + 1e-9:
                 low, high = map(v.value, edges)
                 raise ValueError(
                     f"{v.name} is {values.get(v.name, v.start):g}: the emulator knows"

@@ -34,6 +34,11 @@ class State:
     modes: list[Mode]
     slopes: dict[Label, float] | None
 
+    def __repr__(self) -> str:
+        low, high = (self.modes[place].frequency_Hz for place in (0, -1))
+        ends = f"{len(self.modes)} modes, {low:.1f} to {high:.1f} Hz"
+        return f"State({self.pressure_kPa:g} kPa: {ends})"
+
     @property
     def frequencies(self) -> dict[Label, float]:
         """Hz by label."""

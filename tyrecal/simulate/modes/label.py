@@ -103,6 +103,10 @@ class Mode:
     position: int
     raw: RawMode
 
+    def __repr__(self) -> str:
+        doublet = ", doublet" if self.multiplicity == 2 else ""
+        return f"Mode({self.label}, {self.frequency_Hz:.2f} Hz{doublet})"
+
 
 def _columns(c_is_zero: bool) -> Array:
     """(3 components, DEGREE + 1, 5 columns): 1 where a polynomial belongs to the column."""

@@ -69,6 +69,9 @@ class Diagnosis:
     exchanged: tuple[Label, Label] | None = None  # labels that were put right before all else
     readings: tuple[float, ...] = (1.0,)  # their probabilities; all else is of the likeliest
 
+    def __repr__(self) -> str:
+        return f"Diagnosis({self.verdict.kind}: {self.verdict.words})"
+
     def hypothesis(self, key: str) -> Hypothesis:
         """The hypothesis of that key."""
         return next(h for h in self.hypotheses if h.key == key)

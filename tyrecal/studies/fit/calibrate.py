@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -33,12 +33,21 @@ FitNotify = Callable[[int, Mapping[str, float], Point | EvaluationFailed], None]
 
 @dataclass
 class Fit:
-    """A finished fit; history: design points in order."""
+    """A finished fit; history: design points in order; left_out: measurements that were no
+    targets, and why."""
 
     found: FitResult
     history: list[dict[str, Any]]
     initial: Point
     fitted: Point
+    left_out: list[str] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        found = self.found
+        ended = "converged" if found.converged else "not converged"
+        unit, before, after = found.objective_unit, self.initial.objective, self.fitted.objective
+        values = ", ".join(f"{name}={each.value:.4g}" for name, each in found.variables.items())
+        return f"Fit({ended}, {before:.4g} to {after:.4g} {unit}: {values})"
 
     @property
     def result(self) -> dict[str, Any]:

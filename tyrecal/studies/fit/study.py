@@ -96,7 +96,7 @@ class FitStudy:
             )
 
         fit = self._fit_with_labels(calibrated, jobs) if self.needs_labels else calibrated()
-        fit.found = fit.found.stamped(self.provenance)
+        fit.found, fit.left_out = fit.found.stamped(self.provenance), self.left_out
         return fit
 
     @property

@@ -31,6 +31,11 @@ class LoadedCase:
     deck: OwnDeck | None = None  # that the section is of, where the case names one
     decks: OwnDecks | None = None  # in three dimensions, in place of a section
 
+    def __repr__(self) -> str:
+        case, given = self.case, (f", {name}={value:g}" for name, value in self.overrides.items())
+        words = f"{case.name}, {case.pressure_kPa:g} kPa, mesh {case.mesh.level}{''.join(given)}"
+        return f"LoadedCase({str(self.path)!r}: {words})"
+
     @property
     def section(self) -> Section:
         """The section. Raises InputError where there is none."""

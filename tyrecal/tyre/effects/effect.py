@@ -54,6 +54,12 @@ class Effect:
     beside: Callable[[LoadedCase, float], LoadedCase] | None = None
     pressure_power: int = 0
 
+    def __repr__(self) -> str:
+        return (
+            f"Effect({self.id}: {self.title}, {self.low:g} to {self.high:g} {self.unit}".rstrip()
+            + ")"
+        )
+
     def range_on(self, case: LoadedCase) -> tuple[float, float]:
         """low, high on this tyre: with its pressure to the power of `pressure_power` over that of a
         passenger tyre, whose stiffness goes with it. So a compliance of the clamp (-1) takes the
