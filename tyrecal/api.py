@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from .files import printable, read_json
+from .measured.load import load_case as _load_case
 from .simulate.deck.decks_design import design_of
 from .simulate.deck.tyre_design import TyreDesign
 from .simulate.evaluate.evaluator import Evaluator, Question
@@ -40,7 +41,6 @@ from .studies.pressure import State
 from .tyre.case import CaseError, LoadedCase, start_values, with_level
 from .tyre.case.mistakes import suggestion
 from .tyre.effects import Effect, catalogue
-from .tyre.load import load_case as _load_case
 from .tyre.values import overridden, unusual_value
 from .tyre.values import with_values as _with_values
 
@@ -236,7 +236,7 @@ def evaluate_footprint(
 
 def diagnose_case(
     case: LoadedCase | Path | str,
-    measured: Path | str,
+    measured: Path | str | None = None,
     *,
     repeats: Path | str | Iterable[Path | str] = (),
     effects: str | Iterable[str] | None = None,
@@ -244,7 +244,8 @@ def diagnose_case(
     solver: str = "",
     record: Path | str | None = None,
 ) -> Diagnosis:
-    """Where the case and measurements (a CSV file) part, and which effect explains it.
+    """Where the case and measurements part, and which effect explains it. ``measured`` is a CSV
+    file (None: the one that the case's targets stand in).
 
     ``repeats`` are the same measurements after mounting anew, a file or several; ``effects`` the
     ids to consider, one or several (None: all). ``verdict`` says what can be told, in ``words``
@@ -259,7 +260,9 @@ def diagnose_case(
     from .studies.diagnose.study import study
 
     case = _case(case)
-    file = _file("measured", measured)
+    file = case.measured if measured is None else _file("measured", measured)
+    if file is None:
+        raise ValueError("measured must be given: the case's targets stand in no file")
     again = [repeats] if isinstance(repeats, str | PathLike) else repeats
     others = [_file("repeats", path) for path in _listed("repeats", again, "a file")]
     ids = None if effects is None else _names("effects", effects)

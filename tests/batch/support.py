@@ -34,6 +34,17 @@ def vary(folder: Path, count: int, coarse: bool = True) -> list[Path]:
     return paths
 
 
+def measured_elsewhere(path: Path) -> Path:
+    """Put the case's targets in a file beside it; the file."""
+    file = path.with_suffix(".csv")
+    shutil.copy(CASES / "p235_75r17_wheeler.csv", file)
+    text = path.read_text()
+    start = text.index("  source:", text.index("\ntargets:"))
+    end = text.index("\n\n", start)
+    path.write_text(f"{text[:start]}  file: {file.name}{text[end:]}")
+    return file
+
+
 def poison(path: Path, C10_Pa: float = 1e4) -> None:
     """Make the rubber so soft that the inflated tyre is not stable; with a tenth of this C10 no
     mesh can be inflated."""

@@ -93,6 +93,21 @@ def test_a_baseline_keeps_its_tolerances_and_only_what_is_good() -> None:
     assert again["tolerances"] == {"fit/objective": {"absolute": 9}}
 
 
+def test_a_study_that_is_new_in_a_baseline_brings_its_tolerances(tmp_path: Path) -> None:
+    now = [
+        report("a", sample=entry(**{"median C10": 1.0}), diagnose=entry(**{"verdict named": 1.0}))
+    ]
+    before = {"format": 1, "tolerances": {"fit/objective": {"absolute": 9}}, "cases": {}}
+    path = tmp_path / "baseline.json"
+    path.write_text(json.dumps(baseline_of(now, before)))
+    known = read_baseline(path)
+    assert known["tolerances"]["fit/objective"] == {"absolute": 9}
+    assert known["tolerances"]["sample/median"] == DEFAULTS["sample/median"]
+    other = [report("a", diagnose=entry(**{"verdict undecided": 1.0}))]
+    (gone,) = compare(other, known)["drifted"]
+    assert drift_line(gone) == "verdict named: 1 is gone"
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

@@ -81,6 +81,13 @@ def test_what_only_one_side_has_is_said() -> None:
     ]
 
 
+def test_a_verdict_is_told() -> None:
+    told = {**entry(words="no gap is seen"), "verdict": "no_gap", "effect": None}
+    (suite,) = parsed(junit([report("a", fit=entry(), diagnose=told)], None, STARTED))
+    assert suite.findtext("system-out") == "diagnose: no_gap: no gap is seen"
+    assert suite.get("failures") == suite.get("errors") == "0"
+
+
 @settings(max_examples=25)  # each is held against the schema
 @given(some.text(min_size=1))
 def test_any_words_give_valid_xml(words: str) -> None:

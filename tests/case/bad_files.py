@@ -44,6 +44,40 @@ edit("parent_templates", "templates", "inside the case's", PRESSURE, f"{PRESSURE
 edit("missing_templates", "templates", "must be a folder", PRESSURE, f"{PRESSURE}\ntemplates: t")
 
 
+# files of measurements
+MODES = GOOD[GOOD.index("  modes:\n") : GOOD.index("uncertainties:")]
+FILE = "targets.file"
+edit("absolute_file", FILE, "inside the case's folder", MODES, "  file: /etc/passwd\n")
+edit("parent_file", FILE, "inside the case's folder", MODES, "  file: ../measured.csv\n")
+edit("missing_file_of_targets", FILE, "none of this name", MODES, "  file: measured.csv\n")
+edit("folder_of_targets", FILE, "none of this name", MODES, "  file: .\n")
+edit("number_for_file", FILE, "must be text", MODES, "  file: 5\n")
+edit("file_and_modes", "targets.modes", "absent with file", MODES, f"  file: {CSV}\n{MODES}")
+edit(
+    "file_and_mass",
+    "targets.mass",
+    "absent with file",
+    MODES,
+    f"  file: {CSV}\n  mass: {{mass_kg: 1, sigma_kg: 1}}\n",
+)
+
+
+def _linked_measurements(folder: Path) -> Path:
+    (folder / "measured.csv").symlink_to(CASES / "p235_75r17_wheeler.csv")
+    (folder / "case.yaml").write_text(GOOD.replace(MODES, "  file: measured.csv\n"))
+    return folder / "case.yaml"
+
+
+def _many_measurements(folder: Path) -> Path:
+    (folder / "measured.csv").write_bytes(b"1" * 1_000_001)
+    (folder / "case.yaml").write_text(GOOD.replace(MODES, "  file: measured.csv\n"))
+    return folder / "case.yaml"
+
+
+made("linked_measurements", FILE, "link to a place outside", _linked_measurements)
+made("many_measurements", FILE, "larger than", _many_measurements)
+
+
 def _link(folder: Path) -> Path:
     (folder / CSV).unlink()
     (folder / CSV).symlink_to(CASES / CSV)

@@ -20,7 +20,7 @@ from tyrecal.cli import batch, progress
 from tyrecal.cli.progress import seconds_left
 
 from ..batch.data import entry, report
-from ..batch.support import poison, vary
+from ..batch.support import measured_elsewhere, poison, vary
 from ..conftest import ROOT
 from .test_after_a_good_fit import contents, unmoved
 from .test_cli import run
@@ -108,6 +108,51 @@ def test_a_batch_samples_as_the_command_does(tmp_path: Path) -> None:
     assert numbers["median C10"] == found["variables"]["C10"]["median"]
     (row,) = [r for r in found["predicted"] if r["c"] == 4 and r["m"] and r["pressure_kPa"] == 240]
     assert numbers["predicted_Hz 240 kPa [4,1]"] == row["frequency_Hz"]
+
+
+def test_a_batch_fits_to_the_file_that_a_case_names(tmp_path: Path) -> None:
+    """As the command does with --measured; again where the file has changed; what needs such a file
+    says so of a case without one."""
+    case, other = vary(tmp_path / "cases", 2)
+    other.write_text(case.read_text())
+    file, out, own = measured_elsewhere(case), tmp_path / "out", tmp_path / "own"
+    assert batched([case], out, "--studies", "fit") == 0
+    given = ["--measured", str(file), "--output", str(own), "--store", str(out / "record")]
+    assert run("fit", str(other), *given, "--no-pictures", "--quiet") == 0
+    assert (out / case.stem / "fit.json").read_bytes() == (own / "fit.json").read_bytes()
+    before = json.loads((own / "fit.json").read_text())
+    assert before["provenance"]["targets"] == file.name and before["objective_unit"] == "sigma"
+    file.write_text(file.read_text().replace("31.7", "32.7"))
+    assert batched([case], out, "--studies", "fit") == 0
+    after = result(out)["cases"][0]["studies"]["fit"]["quantities"]["objective"]
+    assert after != before["objective_Hz"]
+    assert batched([other], tmp_path / "lacking", "--studies", "diagnose") == 5
+    lacking = result(tmp_path / "lacking")["cases"][0]["studies"]["diagnose"]
+    assert (lacking["status"], lacking["cause"]) == ("error", "input")
+    assert "targets: {file: measured.csv}" in lacking["words"]
+
+
+@pytest.mark.slow
+def test_a_batch_diagnoses_as_the_command_does(tmp_path: Path) -> None:
+    (case,) = vary(tmp_path / "cases", 1)
+    measured_elsewhere(case)
+    out, own = tmp_path / "out", tmp_path / "own"
+    asked = ["--studies", "diagnose", "--baseline", str(tmp_path / "b.json")]
+    assert batched([case], out, *asked, "--write-baseline", "--junit", str(out / "junit.xml")) == 0
+    options = ["--output", str(own), "--no-pictures", "--quiet", "--store", str(out / "record")]
+    assert run("diagnose", str(case), *options) == 0  # the case names what was measured
+    for file in ("diagnosis.json", "diagnosis.md", "diagnosis_section.json"):
+        assert (out / case.stem / file).read_bytes() == (own / file).read_bytes(), file
+    found = json.loads((own / "diagnosis.json").read_text())
+    (entry,) = result(out)["cases"][0]["studies"].values()
+    assert (entry["verdict"], entry["effect"]) == (found["verdict"], found["effect"])
+    assert entry["quantities"]["gap_rms_percent"] == found["gap"]["rms_percent"]
+    assert entry["quantities"]["probability none"] == found["probabilities"]["none"]
+    value = found["calibrated"]["without"]["C10"]["value"]
+    assert entry["quantities"]["calibrated C10"] == value
+    SCHEMA.validate(str(out / "junit.xml"))
+    assert f"diagnose: {found['verdict']}: {found['words']}" in (out / "junit.xml").read_text()
+    assert batched([case], out, *asked) == 0
 
 
 def test_the_numbers_are_those_of_the_files(done: Path) -> None:

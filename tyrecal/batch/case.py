@@ -5,7 +5,8 @@ case could not be read; ``studies``, each with
 
 * ``status``: ``good``; ``failed``, finished but not as it should (a fit that did not converge, a
   load that was not reached); ``error``, there is no result; ``skipped``, see `studies.study`;
-* ``cause`` and ``words``, or None; ``quantities``, name to number;
+* ``cause`` and ``words``, or None; ``quantities``, name to number; of a diagnosis its ``verdict``,
+  and the ``effect`` that it names or None;
 
 and ``facts``, which are volatile: seconds by study and of a core, when, where, which solver, how
 often it ran and the record answered, or ``answered``: all of it by the case's folder.
@@ -27,6 +28,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..files import json_text, own_folder, read_bytes, read_json, set_aside, write_runs, write_text
+from ..measured.load import load_case
 from ..simulate.case_folder import owner
 from ..simulate.deck.decks_design import design_of
 from ..simulate.evaluate.evaluator import Evaluator
@@ -37,7 +39,6 @@ from ..simulate.evaluate.store import Store, solver_identity
 from ..simulate.provenance import provenance
 from ..studies.fitted import NOT_CONVERGED, has_good
 from ..tyre.case import LoadedCase, start_values, with_level
-from ..tyre.load import load_case
 from ..tyre.values import unusual_value, with_values
 from .studies import Asked, Studied, StudyOutcome, study
 
@@ -201,6 +202,7 @@ def _entry(outcome: StudyOutcome, task: CaseTask) -> dict[str, Any]:
         "cause": outcome.cause,
         "words": words,
         "quantities": outcome.quantities,
+        **outcome.verdict,
     }
 
 

@@ -36,6 +36,13 @@ DEFAULTS = {  # of a baseline that is written for the first time; people edit th
     "footprint/mean_pressure_Pa": {"relative": 0.01},
     "footprint/peak_pressure_Pa": {"relative": 0.03},
     "footprint/vertical_stiffness_N_per_m": {"relative": 0.01},
+    "sample/median": {"relative": 0.05},  # chains differ by a share of their spread
+    "sample/predicted_Hz": {"relative": 1e-3},
+    "diagnose/verdict": {"absolute": 0.0},
+    "diagnose/gap_p_value": {"absolute": 0.01},
+    "diagnose/gap_rms_percent": {"relative": 0.01},
+    "diagnose/probability": {"absolute": 0.02},
+    "diagnose/calibrated": {"relative": 0.01},
 }
 Figures = dict[str, dict[str, dict[str, float]]]  # by case, study, quantity
 
@@ -54,9 +61,16 @@ def numbers_of(reports: Sequence[Report]) -> Figures:
 
 
 def baseline_of(reports: Sequence[Report], before: Mapping[str, Any] | None) -> dict[str, Any]:
-    """A new baseline, with the tolerances of the one ``before``."""
-    tolerances = before["tolerances"] if before else DEFAULTS
-    return {"format": 1, "tolerances": tolerances, "cases": numbers_of(reports)}
+    """A new baseline, with the tolerances of the one ``before``, and of what that did not have."""
+    cases = numbers_of(reports)
+    tolerances = dict(before["tolerances"] if before else DEFAULTS)
+    for studies in cases.values():
+        for study, quantities in studies.items():
+            for quantity in quantities:
+                kind = f"{study}/{quantity.partition(' ')[0]}"
+                if not _named(tolerances, study, quantity) and kind in DEFAULTS:
+                    tolerances[kind] = DEFAULTS[kind]
+    return {"format": 1, "tolerances": tolerances, "cases": cases}
 
 
 def read_baseline(path: Path) -> dict[str, Any]:

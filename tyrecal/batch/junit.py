@@ -45,6 +45,11 @@ def junit(reports: Sequence[Report], drift: Mapping[str, Any] | None, started: s
                 SubElement(properties, "property", value)
         counts = dict.fromkeys(OUTCOMES.values(), 0)
         missing, said = _unlike(drift, report["name"])
+        said += [
+            f"{study}: {entry['verdict']}: {entry['words']}"
+            for study, entry in report["studies"].items()
+            if "verdict" in entry
+        ]
         for study, entry in {**report["studies"], **dict.fromkeys(missing, SKIPPED)}.items():
             time = _time(seconds.get(study, 0.0))
             attributes = {"classname": report["name"], "name": study, "time": time}

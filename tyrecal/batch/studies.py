@@ -11,11 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
+from ..errors import InputError
+from ..files import json_text
 from ..simulate.evaluate.evaluator import Evaluator
 from ..simulate.evaluate.failure import EvaluationFailed
-from ..simulate.provenance import provenance
+from ..simulate.provenance import provenance, stamped
 from ..studies import footprint as pressed
 from ..studies import modes as evaluated
 from ..studies import pressure_result
@@ -50,6 +53,11 @@ class Studied:
     asked: Asked
     no_fit: bool = False
 
+    @property
+    def measured(self) -> list[Path]:
+        """The file that the case's targets stand in, where it names one."""
+        return [self.case.measured] if self.case.measured else []
+
 
 @dataclass
 class StudyOutcome:
@@ -60,6 +68,7 @@ class StudyOutcome:
     words: str | None = None
     quantities: Numbers = field(default_factory=dict)
     files: dict[str, str] = field(default_factory=dict)
+    verdict: dict[str, str | None] = field(default_factory=dict)  # of a diagnosis
 
 
 def fit(state: Studied) -> StudyOutcome:
@@ -122,15 +131,56 @@ def footprint(state: Studied) -> StudyOutcome:
 
 def sample(state: Studied) -> StudyOutcome:
     """Draw the variables under the case's targets. Raises what `sample.study.run` does."""
-    drawn = sampling.run(state.case, state.evaluator, None, sampling.MANY_DRAWS)
+    readings = sampling.measured_readings(state.case)
+    drawn = sampling.run(state.case, state.evaluator, readings, sampling.MANY_DRAWS)
     found = result(drawn, 0)
     numbers = {f"median {name}": each.median for name, each in found.variables.items()}
     for row in found.predicted:
         numbers[f"predicted_Hz {row.pressure_kPa:g} kPa {row.label}"] = row.frequency_Hz
-    files = _files(state, found, load_N=0.0) | {"sample_draws.csv": draws_csv(drawn)}
+    states = sampling.states_sampled(state.case, readings)
+    files = _files(state, found, measured=state.measured, **states)
+    files["sample_draws.csv"] = draws_csv(drawn)
     if doubts := found.doubts():
         return StudyOutcome("failed", "not_sampled", "; ".join(doubts), numbers, files)
     return StudyOutcome(quantities=numbers, files=files)
+
+
+def diagnose(state: Studied) -> StudyOutcome:
+    """Weigh the effects by the file that the case's targets stand in. Raises what
+    `diagnose.study.study` does."""
+    from ..report.diagnosis import page
+    from ..report.shape_data import parts_data
+    from ..studies.diagnose import study as diagnosing
+    from ..studies.diagnose.evidence import NONE, OUTSIDE
+
+    case, measured = state.case, state.case.measured
+    if measured is None:
+        raise InputError(
+            "the case names no file of measurements to be diagnosed with: give it one, as in"
+            " targets: {file: measured.csv}"
+        )
+    found = diagnosing.study(case, state.evaluator, measured)
+    states = diagnosing.states_measured(case, measured)
+    block = provenance(case, state.evaluator.solver, [measured], **states)
+    told = found.result.stamped(block)
+    section = parts_data(case, [part.region for part in told.section_map])
+    parts = stamped(section.model_dump(exclude_unset=True), block)
+    files = {
+        **told.texts(),
+        "diagnosis_section.json": json_text(parts),
+        "diagnosis.md": page(found, case.case.name, measured.name),
+    }
+    numbers = {
+        f"verdict {told.verdict} {told.effect or ''}".rstrip(): 1.0,  # gone where it is another
+        "gap_p_value": told.gap.p_value,
+        "gap_rms_percent": told.gap.rms_percent,
+    }
+    for key in dict.fromkeys(filter(None, (NONE, OUTSIDE, told.likeliest))):
+        numbers[f"probability {key}"] = told.probabilities[key]
+    for name, each in found.variables["without"].items():
+        numbers[f"calibrated {name}"] = each["value"]
+    verdict = {"verdict": told.verdict, "effect": told.effect}
+    return StudyOutcome("good", None, told.words, numbers, files, verdict)
 
 
 STUDIES: dict[str, Callable[[Studied], StudyOutcome]] = {  # in the order in which they are done
@@ -139,6 +189,7 @@ STUDIES: dict[str, Callable[[Studied], StudyOutcome]] = {  # in the order in whi
     "sweep-pressure": sweep_pressure,
     "footprint": footprint,
     "sample": sample,
+    "diagnose": diagnose,
 }
 OF_FITTED = ("sweep-pressure", "footprint")  # they want the fitted design where there is a fit
 

@@ -24,8 +24,8 @@ def load(
     Says which numbers of the file do not count. Returns (case, values of the variables). Raises
     CaseError, click.UsageError; both for numbers that no tyre has, too, unless they are allowed.
     """
-    from ..tyre.case import as_written, overruled, start_values, with_level
-    from ..tyre.load import CaseError, load_case
+    from ..measured.load import load_case
+    from ..tyre.case import CaseError, as_written, overruled, start_values, with_level
     from ..tyre.values import overridden, with_values
 
     case = load_case(path, allow_unusual)

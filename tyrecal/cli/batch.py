@@ -20,6 +20,7 @@ STUDY_NAMES = (
     "sweep-pressure",
     "footprint",
     "sample",
+    "diagnose",
 )  # without importing what they need
 FILE_PATH = Place(folder=False)
 
@@ -227,6 +228,10 @@ def _tell(result: Mapping[str, Any], terminal: Terminal) -> None:
     """What is not as it should be, what drifted, and how many."""
     from ..report.batch import drift_table, failures_table
 
+    for case in result["cases"]:
+        for entry in case["studies"].values():
+            if "verdict" in entry:
+                terminal.say(f"{case['name']}: {entry['verdict']}: {entry['words']}")
     failures = failures_table(result)
     if failures:
         terminal.show(failures, beside_json=True)

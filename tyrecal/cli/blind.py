@@ -157,6 +157,7 @@ def make(
     """
     from dataclasses import replace
 
+    from ..measured.load import load_case
     from ..simulate.deck.tyre_design import TyreDesign
     from ..simulate.evaluate.evaluator import Evaluator
     from ..simulate.evaluate.store import Store
@@ -167,7 +168,6 @@ def make(
     from ..studies.blind.power import powers, words
     from ..studies.blind.protocol import Protocol
     from ..studies.blind.ruler import measure, ruler_of
-    from ..tyre.load import load_case
 
     if not effects + plain + outside:
         raise click.UsageError("there must be at least one trial")

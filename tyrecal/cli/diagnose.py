@@ -14,7 +14,12 @@ file = Place(exists=True, folder=False)
 
 @click.command()
 @options.every(options.case_argument, options.assignments)
-@option("--measured", type=file, metavar="FILE", help="Measurements (CSV), labels or not.")
+@option(
+    "--measured",
+    type=file,
+    metavar="FILE",
+    help="Measurements (CSV), labels or not (default: targets.file of the case).",
+)
 @option(
     "--repeats",
     multiple=True,
@@ -96,7 +101,7 @@ def command(
     """Find where CASE and measurements part, and which effect explains it.
 
     Writes diagnosis.json, diagnosis.md (one page in words) and pictures. The model is calibrated
-    to the measurements first; its targets play no part.
+    to the measurements first; targets that stand in the case file play no part.
 
     \b
     tyrecal diagnose cases/p235_75r17.yaml --measured cases/p235_75r17_wheeler.csv
@@ -117,23 +122,20 @@ def command(
         fit = join_command(["tyrecal", "fit", str(path)])
         terminal.say(f"{path} has {what} in it; next: {fit}")
         return 0
-    if measured is None:
-        raise click.UsageError("--measured FILE must be given, or --add EFFECT=VALUE")
-    from ..measured.tables import read_measurements
-    from ..measured.targets import in_states
     from ..report.diagnosis import page
     from ..report.shape_data import parts_data
     from ..studies.diagnose.diagnosis import STAGES
     from ..studies.diagnose.inverse_problem import Assumed
-    from ..studies.diagnose.result import diagnosis_result
-    from ..studies.diagnose.study import parse_change
+    from ..studies.diagnose.study import parse_change, states_measured
     from ..studies.diagnose.study import study as diagnosed
-    from ..studies.fit.targets import rims_of
     from ..studies.fit.variable import read_variables
     from ..tyre.effects import catalogue
 
     loaded, _ = study.load(case, assignments)
     read_variables(loaded)  # refuses a start outside its bounds before anything is written
+    measured = measured or loaded.measured
+    if measured is None:
+        raise click.UsageError("--measured FILE must be given, or --add EFFECT=VALUE")
     for flag, ids in (("--effect", effects), ("--without", without)):
         for id in ids:
             arguments.refuse_unknown(flag, id, catalogue(), "effect")
@@ -146,23 +148,9 @@ def command(
             option, name = f"--toggled {change.id}={change.value:g}", f"effects.{change.id}"
             arguments.refuse_unusual(loaded, option, name, change.value, False)
     evaluator = study.evaluator(loaded)
-    files = [measured, *repeats, *(path for path, _ in changes)]
-    readings = [
-        each
-        for path in files
-        for each in in_states(loaded, read_measurements(path, labelled=path != measured))
-    ]
-    states = [each.state for each in readings]
-    pressures, at = ({each.pressure_kPa for each in readings}, {each.load_N for each in readings})
-    run = study.run(
-        loaded,
-        "diagnose",
-        evaluator,
-        measured=files,
-        pressure_kPa=sorted(pressures),
-        load_N=sorted(at),
-        rim=rims_of(loaded, states) if any(each.rim for each in states) else (),
-    )
+    others = [*repeats, *(path for path, _ in changes)]
+    states = states_measured(loaded, measured, others)
+    run = study.run(loaded, "diagnose", evaluator, measured=[measured, *others], **states)
     form = None if form_percent is None else form_percent / 100
     assumed = Assumed(form, split_percent / 100, further=further)
     with terminal.progress("diagnose", STAGES) as bar:
@@ -178,11 +166,7 @@ def command(
             considered,
             stage=bar.begin,
         )
-    told = run.write(
-        diagnosis_result(
-            found.diagnosis, found.under_load, found.variables, found.section, found.labels
-        )
-    )
+    told = run.write(found.result)
     parts = parts_data(loaded, [part.region for part in told.section_map])
     run.write_json("diagnosis_section.json", parts)
     words = page(found, loaded.case.name, measured.name)

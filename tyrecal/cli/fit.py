@@ -114,7 +114,7 @@ def command(
         )
     run = study.run(loaded, "fit", evaluator)
     with terminal.progress("fit") as bar, reached(scheduler) as evaluator.scheduler:
-        unit = "sigma" if measured else objective_unit(loaded)
+        unit = "sigma" if calibration.measured else objective_unit(loaded)
         points = _Points(terminal, bar, unit)
         fit = calibration.run(method, starts, seed, study.jobs, points.notify, bar.at)
     loaded, run.provenance = calibration.case, calibration.provenance
@@ -130,7 +130,7 @@ def command(
         terminal.show(shown(*tables))
     terminal.say("\n".join(fit_verdict(result)))
     for each in fit.left_out:
-        terminal.note(f"{measured or case}: not used: {each}")
+        terminal.note(f"{calibration.measured or case}: not used: {each}")
     for warning in (*tyre_doubts(result), *fit_doubts(result)):
         terminal.warn(warning)
     if pictures or study.report:
@@ -154,8 +154,10 @@ def command(
     if earlier:
         terminal.warn(f"the fit in '{run.folder}' had converged: it stays")
     study.finish(run)
-    file = str(measured) if measured else "FILE"
-    next_ = join_command(["tyrecal", "diagnose", str(case), "--measured", file])
+    words = ["tyrecal", "diagnose", str(case)]
+    if measured or not loaded.measured:
+        words += ["--measured", str(measured or "FILE")]
+    next_ = join_command(words)
     if not loaded.case.deck and read_targets(loaded):
         terminal.say(f"next: {next_} says what the model lacks")
     return 0 if good else EXIT_FIT

@@ -68,11 +68,16 @@ def command(
     tyrecal sample my.yaml --measured measured.csv --at-kPa 180 --at-kPa 260 --jobs 2
     """
     from ..report.table import shown
-    from ..studies.fit.targets import rims_of
     from ..studies.sample.chains import needs_emcee
     from ..studies.sample.result import draws_csv, result
-    from ..studies.sample.study import SAMPLE_STAGES, check, modal, run
-    from ..tyre.state import AS_THE_CASE
+    from ..studies.sample.study import (
+        SAMPLE_STAGES,
+        check,
+        measured_readings,
+        modal,
+        run,
+        states_sampled,
+    )
     from .main import EXIT_FIT
 
     terminal = study.terminal
@@ -82,23 +87,13 @@ def command(
         arguments.refuse_unusual(
             loaded, f"--at-kPa {pressure:g}", "pressure_kPa", pressure, study.allow_unusual
         )
-    readings = None
-    if measured:
-        from ..measured.tables import read_measurements
-        from ..measured.targets import in_states
-
-        readings = in_states(loaded, read_measurements(measured))
+    measured = measured or loaded.measured
+    readings = measured_readings(loaded, measured)
     evaluator = study.evaluator(loaded)
     check(loaded, evaluator, readings)
-    states = [each.state for each in modal(readings or ())]
-    output = study.run(
-        loaded,
-        "sample",
-        evaluator,
-        measured=[measured] if measured else [],
-        load_N=0.0,
-        rim=rims_of(loaded, [AS_THE_CASE, *states]) if any(each.rim for each in states) else (),
-    )
+    files = [measured] if measured else []
+    states = states_sampled(loaded, readings)
+    output = study.run(loaded, "sample", evaluator, measured=files, **states)
     with terminal.progress("sample", SAMPLE_STAGES) as bar:
         evaluator.on_progress = bar.at
         sample = run(loaded, evaluator, readings, draws, seed, at_kPa, study.jobs, bar.begin)

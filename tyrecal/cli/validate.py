@@ -29,8 +29,8 @@ def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
     tyrecal validate cases/p235_75r17.yaml
     tyrecal validate my.yaml --json
     """
+    from ..measured.load import judged
     from ..tyre.case import overruled
-    from ..tyre.load import judged
 
     loaded, mistakes = judged(case, allow_unusual)
     if loaded and (refused := _refused(loaded)):
@@ -54,7 +54,7 @@ def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
     for sentence in overruled(loaded):
         terminal.warn(sentence)
     terminal.say(f"{case}: no mistakes")
-    if not loaded.case.targets.weights:
+    if not (loaded.case.targets.weights or loaded.measured):
         terminal.note("it has no targets: 'tyrecal fit' needs some, or --measured FILE")
     return 0
 

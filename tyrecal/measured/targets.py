@@ -28,33 +28,64 @@ def with_measured(
     """The case with what was measured as targets, each in its state, and what was left out, why.
 
     labelled: the file's measurements, where labels were found for those that had none. Of a doublet
-    with two members of the unloaded tyre their mean. Where the user has set the pressure, or a
-    variable sets it, only what was measured there is taken. Raises InputError where nothing is
-    left, or the case cannot be in a state; OSError.
+    with two members of the unloaded tyre their mean. Where the user has set the pressure or the
+    rim, or a variable sets the pressure, only what was measured there is taken. Raises InputError
+    where nothing is left, or the case cannot be in a state; OSError.
     """
-    readings = read_measurements(path) if labelled is None else labelled
-    own = case.case.pressure_kPa
-    rest = [each for each in readings if each.quantity != "mass_kg"]
-    known = [own]  # pressures that differ by little are one
-    for each in rest:
-        if all(abs(each.pressure_kPa - p) > SAME_PRESSURE_kPa for p in known):
-            known.append(each.pressure_kPa)
-    near = lambda p: min(known, key=lambda other: abs(other - p))
-    placed = [replace(each, pressure_kPa=near(each.pressure_kPa)) for each in rest]
+    readings = readings_of(case, path) if labelled is None else labelled
+    placed = _placed(case, readings)
     if not placed:
         raise InputError(f"{path}: no target but the mass was measured")
+    pressures = {each.pressure_kPa for each in placed}
+    one_other = len(pressures) == 1 and case.case.pressure_kPa not in pressures
     varied = pressure_name(case) != PRESSURE_PATH
-    one_other = len(known) == 2 and all(each.pressure_kPa != own for each in placed)
     states = [
         each.state if each.quantity == "frequency_Hz" else replace(each.state, rim=PRESSED_RIM)
         for each in placed
     ]
     count, left_out = _in_set_state(case, str(path), states, varied or one_other)
-    placed = list(compress(placed, count))
+    return _with_targets(case, path, list(compress(placed, count)), readings), left_out
+
+
+def with_own_file(case: LoadedCase) -> LoadedCase:
+    """The case with its file of measurements, where it names one, as targets, all that have labels,
+    each in its state. Raises InputError, OSError."""
+    if case.measured is None:
+        return case
+    readings = [each for each in readings_of(case, case.measured, False) if not each.is_unlabelled]
+    return _with_targets(case, case.measured, _placed(case, readings), readings)
+
+
+def readings_of(case: LoadedCase, path: Path, labelled: bool = True) -> list[Measurement]:
+    """What `read_measurements` reads. In the case's own file a value on the case's rim stays on the
+    rim that the case file has, whatever its user has set since."""
+    readings = read_measurements(path, labelled)
+    if path != case.measured:
+        return readings
+    read = case.as_read or case
+    return [replace(each, rim=each.state.kept(read, case).rim) for each in readings]
+
+
+def _placed(case: LoadedCase, readings: Sequence[Measurement]) -> list[Measurement]:
+    """Those that have a state, at pressures of which those that differ by little are one."""
+    rest = [each for each in readings if each.quantity != "mass_kg"]
+    known = [case.case.pressure_kPa]
+    for each in rest:
+        if all(abs(each.pressure_kPa - p) > SAME_PRESSURE_kPa for p in known):
+            known.append(each.pressure_kPa)
+    near = lambda p: min(known, key=lambda other: abs(other - p))
+    return [replace(each, pressure_kPa=near(each.pressure_kPa)) for each in rest]
+
+
+def _with_targets(
+    case: LoadedCase, path: Path, placed: Sequence[Measurement], readings: Sequence[Measurement]
+) -> LoadedCase:
+    """The case with those that are ``placed``, and the mass among ``readings``, as its targets.
+    Raises InputError where it cannot be in a state."""
     _refuse_states(case, placed)
-    analysis = case.case.analysis
+    analysis, own = case.case.analysis, case.case.targets.source if path == case.measured else ""
     targets = Targets(
-        source=path.name,
+        source=own or path.name,
         modes=_modes(case, placed),
         footprint=_footprint(case, placed),
         mass=next((_mass(each) for each in readings if each.quantity == "mass_kg"), None),
@@ -64,7 +95,7 @@ def with_measured(
         "targets": targets,
         "analysis": analysis.model_copy(update={"highest_harmonic": highest}),
     }
-    return replace(case, case=case.case.model_copy(update=wanted)), left_out
+    return replace(case, case=case.case.model_copy(update=wanted))
 
 
 def in_set_state(case: LoadedCase, held: Collection[str] = ()) -> tuple[LoadedCase, list[str]]:

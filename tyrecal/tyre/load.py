@@ -1,4 +1,7 @@
-"""A case file read and judged: everything that is wrong with it in one go."""
+"""A case file read and judged: everything that is wrong with it in one go.
+
+Measurements are not read here: `measured.load` does so, for targets in a file.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ from .case.loaded import LoadedCase
 from .case.mistakes import CaseError, Keys, Mistake, dotted
 from .case.schema import Case, cannot_fit
 from .case.shape import disagreements, explain, without
-from .case.stations import check_templates, read_stations
+from .case.stations import check_templates, measured_file, read_stations
 from .effects import EffectRefused
 from .own_deck.own_deck import OwnDeck
 from .own_deck.own_decks import OwnDecks
@@ -47,13 +50,20 @@ def judged(
 ) -> tuple[LoadedCase | None, list[Mistake]]:
     """The case, None where it is wrong, and the mistakes that `validate` finds."""
     loaded, mistakes = _read(Path(path), allow_unusual)
-    if loaded and loaded.case.targets.weights and loaded.case.variables:
-        reason = cannot_fit(loaded.case.targets.weights, len(loaded.case.variables))
-        if reason:
-            document = read_document(Path(path))
-            document.add(("targets",), reason)
-            return None, document.mistakes
+    if loaded and not loaded.measured and (mistake := unfit_targets(loaded)):
+        return None, [mistake]
     return loaded, mistakes
+
+
+def unfit_targets(loaded: LoadedCase) -> Mistake | None:
+    """Why no fit can use the targets of the case, as a mistake in its file; None where one can."""
+    weights, variables = loaded.case.targets.weights, loaded.case.variables
+    reason = cannot_fit(weights, len(variables)) if weights and variables else None
+    if reason is None:
+        return None
+    document = read_document(loaded.path)
+    document.add(("targets",), reason)
+    return document.mistakes[0]
 
 
 def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mistake]]:
@@ -74,6 +84,7 @@ def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mist
     elif deck is None:
         section = read_stations(document, data, path.parent)
     check_templates(document, data, path.parent)
+    measured = measured_file(document, data, path.parent)
     _add(document, problems(data, section))
     meshable = not (deck or any(m.key.startswith(("mesh", "section")) for m in document.mistakes))
     if section and meshable and (message := folds(data, section)):
@@ -84,7 +95,7 @@ def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mist
     if case is None or not (section or isinstance(deck, OwnDecks)) or document.mistakes:
         return None, sorted(document.mistakes, key=lambda m: (m.file != str(path), m.line))
     own = {"decks": deck} if isinstance(deck, OwnDecks) else {"deck": deck}
-    loaded = LoadedCase(case, path, section, path.parent, file_data, **own)
+    loaded = LoadedCase(case, path, section, path.parent, file_data, measured=measured, **own)
     try:
         resolved(loaded)
     except EffectRefused as error:

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from ...files import own_folder
+from ...measured.load import load_case
 from ...measured.tables import read_measurements
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.pool import process_pool
 from ...tyre.case import LoadedCase
-from ...tyre.load import load_case
 from ..diagnose.diagnosis import Diagnosis, diagnose
 from ..diagnose.evidence import NONE
 from ..diagnose.expansion import Expansion, expand

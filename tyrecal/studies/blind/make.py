@@ -271,8 +271,9 @@ def copy_case(case: LoadedCase, folder: Path) -> None:
     target = folder / "case"
     target.mkdir(exist_ok=True)
     shutil.copyfile(case.path, target / case.path.name)
-    stations = case.case.section.file
-    (target / stations).parent.mkdir(parents=True, exist_ok=True)
-    shutil.copyfile(case.folder / stations, target / stations)
+    for path in case.files:
+        copy = target / path.relative_to(case.folder)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(path, copy)
     if templates := case.case.templates:
         shutil.copytree(case.folder / templates, target / templates, dirs_exist_ok=True)

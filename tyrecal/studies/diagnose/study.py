@@ -10,12 +10,12 @@ from typing import Any
 
 from ...errors import InputError
 from ...measured.measurement import Measurement
-from ...measured.tables import read_measurements
-from ...measured.targets import in_states
+from ...measured.targets import in_states, readings_of
 from ...simulate.evaluate.evaluator import Evaluator
 from ...tyre.case import LoadedCase
 from ...tyre.case.mistakes import suggestion
 from ...tyre.effects import Effect, catalogue
+from ..fit.targets import rims_of
 from ..labelling.label import label
 from ..labelling.result import labels_told
 from ..labels import Labels
@@ -29,6 +29,7 @@ from .model import Answer, Query, Span
 from .next_measurement import OtherStates
 from .observations import Observations, observe
 from .regions import regions
+from .result import DiagnosisResult, diagnosis_result
 from .section_told import section_told
 from .tyre_model import TyreModel
 from .uncertainties import EFFECT_PATH, Source, calibrated, sources
@@ -64,6 +65,13 @@ class DiagnosedCase:
         return section_told(self.model.case, self.sources, self.diagnosis) if stated else []
 
     @property
+    def result(self) -> DiagnosisResult:
+        """What diagnosis.json holds."""
+        return diagnosis_result(
+            self.diagnosis, self.under_load, self.variables, self.section, self.labels
+        )
+
+    @property
     def asked_for(self) -> tuple[str, ...] | None:
         """The effects considered, where they are not all of the catalogue."""
         known = {*self.diagnosis.problem.spans, *self.inexpressible, *self.calibrated}
@@ -90,8 +98,8 @@ def study(
     """
     switched = [path for path, _ in toggled]
     paths = [measured, *repeats, *switched]
-    given = read_measurements(measured, labelled=False)
-    runs = {path: in_states(case, read_measurements(path)) for path in paths[1:]}
+    given = readings_of(case, measured, labelled=False)
+    runs = {path: in_states(case, readings_of(case, path)) for path in paths[1:]}
     runs[measured] = in_states(case, given)
     _check_copies(paths, runs)
     elsewhere = {
@@ -152,6 +160,22 @@ def study(
         _under_load(case, evaluator, own, diagnosis, model),
         labels_told(case, weighed_anew(told, diagnosis.readings)) if told else None,
     )
+
+
+def states_measured(
+    case: LoadedCase, measured: Path, others: Sequence[Path] = ()
+) -> dict[str, Any]:
+    """The states of all that is ``measured``, and in ``others`` too, as `provenance` takes them.
+    Raises InputError where the case cannot be in one of them; OSError."""
+    readings = in_states(case, readings_of(case, measured, labelled=False))
+    for path in others:
+        readings += in_states(case, readings_of(case, path))
+    states = [each.state for each in readings]
+    return {
+        "pressure_kPa": sorted({each.pressure_kPa for each in readings}),
+        "load_N": sorted({each.load_N for each in readings}),
+        "rim": rims_of(case, states) if any(each.rim for each in states) else (),
+    }
 
 
 def _under_load(

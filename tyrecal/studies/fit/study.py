@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ...measured.measurement import Measurement
-from ...measured.tables import read_measurements
-from ...measured.targets import in_set_state, with_measured
+from ...measured.targets import in_set_state, readings_of, with_measured
 from ...simulate.deck.decks_design import design_of
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.provenance import provenance
@@ -41,10 +40,11 @@ class FitStudy:
     ):
         """measured: takes the place of the case's targets; fixed: values of variables that are
         held."""
-        self.measured, self.fixed = measured, dict(fixed or {})
+        self.measured, self.fixed = measured or case.measured, dict(fixed or {})
         self._plain = with_values(case, {**start_values(case), **self.fixed})
         self.evaluator = evaluator.of(design_of(self._plain))
-        self.readings = read_measurements(measured, labelled=False) if measured else []
+        file = self.measured
+        self.readings = readings_of(self._plain, file, labelled=False) if file else []
         self.needs_labels = any(each.is_unlabelled for each in self.readings)
         self.case, self.left_out = self._plain, list[str]()
         if not self.needs_labels:

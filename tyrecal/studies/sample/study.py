@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ...errors import InputError
 from ...measured.measurement import Measurement
+from ...measured.targets import in_states, readings_of
 from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator
 from ...tyre.case import LoadedCase
 from ...tyre.case.parts import RimSupport
-from ...tyre.state import SPRINGS, WHEEL_FREE, TyreState
+from ...tyre.state import AS_THE_CASE, SPRINGS, WHEEL_FREE, TyreState
 from ...tyre.values import set_values
 from ..diagnose.covariance import covariance
 from ..diagnose.inverse_problem import Assumed, places
@@ -25,7 +28,7 @@ from ..diagnose.tyre_model import TyreModel
 from ..diagnose.uncertainties import Source, calibrated, sources
 from ..emulator import Emulator, emulator, needs_slopes
 from ..fit.calibrate import calibrate
-from ..fit.targets import read_targets
+from ..fit.targets import read_targets, rims_of
 from ..fit.variable import DesignVariable, read_variables
 from .box import Drawn, grown
 from .chains import needs_emcee
@@ -190,6 +193,21 @@ def check(case: LoadedCase, evaluator: Evaluator, readings: Sequence[Measurement
             )
     if not (read_targets(case) if readings is None else modal(readings)):
         raise InputError("there is no frequency of the unloaded tyre to sample the variables by")
+
+
+def measured_readings(case: LoadedCase, measured: Path | None = None) -> list[Measurement] | None:
+    """What the file holds, by default the one that the case's targets stand in; None: they stand in
+    the case. Raises InputError, OSError."""
+    path = measured or case.measured
+    return in_states(case, readings_of(case, path)) if path else None
+
+
+def states_sampled(case: LoadedCase, readings: Sequence[Measurement] | None) -> dict[str, Any]:
+    """The states of the readings, or of the case's targets, as `provenance` takes them."""
+    rows = targets_as_readings(case, None) if readings is None else modal(readings)
+    states = [each.state for each in rows]
+    several = any(each.rim for each in states)
+    return {"load_N": 0.0, "rim": rims_of(case, [AS_THE_CASE, *states]) if several else ()}
 
 
 def modal(readings: Sequence[Measurement]) -> list[Measurement]:

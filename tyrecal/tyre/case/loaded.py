@@ -30,6 +30,7 @@ class LoadedCase:
     as_read: LoadedCase | None = None  # before any number was set; None: none was
     deck: OwnDeck | None = None  # that the section is of, where the case names one
     decks: OwnDecks | None = None  # in three dimensions, in place of a section
+    measured: Path | None = None  # the file that its targets stand in, where it names one
 
     def __repr__(self) -> str:
         case, given = self.case, (f", {name}={value:g}" for name, value in self.overrides.items())
@@ -53,10 +54,11 @@ class LoadedCase:
 
     @property
     def files(self) -> list[Path]:
-        """That the section stands in."""
+        """Those that the case names, but for its templates."""
+        named = [self.measured] if self.measured else []
         if own := self.deck or self.decks:
-            return [own.path.parent / name for name in own.texts]
-        return [self.folder / self.case.section.file]
+            return [*named, *(own.path.parent / name for name in own.texts)]
+        return [*named, self.folder / self.case.section.file]
 
     @property
     def template_files(self) -> list[Path]:

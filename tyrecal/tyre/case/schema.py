@@ -218,12 +218,20 @@ class TargetMass(Part):
 
 
 class Targets(Part):
-    """What was measured, and where it comes from."""
+    """What was measured, and where it comes from; ``file``: a measurements CSV that holds it."""
 
     source: Text = ""
+    file: Text | None = None
     modes: list[TargetMode] = Field(default_factory=list)
     footprint: list[TargetFootprint] = Field(default_factory=list)
     mass: TargetMass | None = None
+
+    @classmethod
+    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+        if values.get("file") is not None:
+            for key in ("modes", "footprint", "mass"):
+                if values.get(key):
+                    yield key, "must be absent with file, which holds what was measured"
 
     @property
     def loads_N(self) -> list[float]:

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 
 from .mistakes import Keys, suggestion
 from .parts import WRONG, Cord, DeckSource, Part, RebarLayer, Rim, Rubber, SectionSource
-from .schema import Case, Road, TargetFootprint, TargetMode, Uncertainty, Variable
+from .schema import Case, Road, TargetFootprint, TargetMode, Targets, Uncertainty, Variable
 
 UNIONS = (Union, UnionType)
 KINDS: dict[str, type[BaseModel]] = {"rubber": Rubber, "cord": Cord}
@@ -19,6 +19,7 @@ SINGLE: dict[str, type[Part]] = {
     "deck": DeckSource,
     "rim": Rim,
     "road": Road,
+    "targets": Targets,
 }
 MESSAGES = {
     "missing": "must be given",

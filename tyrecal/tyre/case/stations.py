@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from .document import MAX_TABLE_BYTES, Document
 from .mistakes import Keys, Mistake, dotted, shortened
 from .parts import WRONG, SectionSource
+from .shape import table
 
 if TYPE_CHECKING:
     from ..section.section import Section
@@ -42,6 +43,24 @@ def check_templates(document: Document, data: dict[str, Any], folder: Path) -> N
                 document.add(("templates",), "must be a folder, there is none of this name")
         except ValueError as error:
             document.add(("templates",), str(error))
+
+
+def measured_file(document: Document, data: dict[str, Any], folder: Path) -> Path | None:
+    """The file of measurements that the case's targets stand in; None where there is none, or,
+    with the mistake recorded, it is no file of the case's folder."""
+    name = table(data, "targets").get("file")
+    if not isinstance(name, str):
+        return None
+    try:
+        path = inside(folder, name)
+        if not path.is_file():
+            raise ValueError("must be a file, there is none of this name")
+        if path.stat().st_size > MAX_TABLE_BYTES:
+            raise ValueError(f"the file is larger than {MAX_TABLE_BYTES} bytes")
+    except ValueError as error:
+        document.add(("targets", "file"), str(error))
+        return None
+    return path
 
 
 def read_stations(document: Document, data: dict[str, Any], folder: Path) -> Section | None:
