@@ -75,7 +75,8 @@ def command(
     stiffnesses on the road.
 
     Writes fit.json, fit.csv, fit_history.csv and pictures. --set NAME=VALUE on a variable changes
-    where the fit starts.
+    where the fit starts. --pressure-kPa and --set rim.free=true choose the targets that were
+    measured so.
 
     \b
     tyrecal fit cases/p235_75r17.yaml
