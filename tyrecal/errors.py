@@ -10,6 +10,7 @@
             DeckRefused             a deck that the solver refuses
             Damaged                 a record that is not as it was written
         NotAFile                    a link, pipe or device where a file of ours should be
+        NotWritten                  a file or folder that cannot be written
         EvaluationFailed, 3         one run of the solver, with its cause and folder
         SolverUnavailable, 3        no run at all can be made
         Interrupted                 a signal, with the exit code that the shell gives it

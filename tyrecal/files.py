@@ -62,11 +62,12 @@ PREVIOUS = "previous"  # folder for what a new run of the same study did not wri
 
 def take_place(new: Path, folder: Path, study: str) -> None:
     """Move the files of ``new``, a run's results, to ``folder`` in the place of those of an
-    earlier run of ``study``; see `set_aside`. Raises OSError."""
-    files = sorted(new.iterdir())
-    set_aside(folder, study, {file.name for file in files})
-    for file in files:
-        file.replace(folder / file.name)
+    earlier run of ``study``; see `set_aside`. Raises NotAFile, NotWritten."""
+    with writing(folder):
+        files = sorted(new.iterdir())
+        set_aside(folder, study, {file.name for file in files})
+        for file in files:
+            file.replace(folder / file.name)
 
 
 def set_aside(folder: Path, study: str, written: Collection[str]) -> None:
@@ -119,6 +120,37 @@ class NotAFile(TyrecalError, OSError):
         return f"'{self.filename}' {self.strerror}"
 
 
+class NotWritten(TyrecalError, OSError):
+    """A file or folder that cannot be written: arguments and attributes of an OSError."""
+
+    def __str__(self) -> str:
+        return f"cannot write to '{self.filename}': {self.strerror}"
+
+
+@contextlib.contextmanager
+def writing(path: Path | str) -> Iterator[None]:
+    """Raises NotWritten, which names ``path``, where the system refuses what is done in it."""
+    try:
+        yield
+    except TyrecalError:
+        raise
+    except OSError as error:
+        raise NotWritten(error.errno, error.strerror or str(error), str(path)) from None
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder, and those above it, unless it is there. Raises NotWritten."""
+    with writing(path):
+        path.mkdir(parents=True, exist_ok=True)
+
+
+def os_words(error: OSError) -> str:
+    """What the system refuses, in words: the file and the reason."""
+    if isinstance(error, TyrecalError) or not error.strerror:
+        return str(error)
+    return f"'{error.filename}': {error.strerror}" if error.filename else error.strerror
+
+
 def refuse_link(path: Path) -> None:
     """Raises NotAFile where ``path`` is a link (on Windows also a junction)."""
     junction = getattr(os.path, "isjunction", lambda path: False)  # from Python 3.12 on
@@ -127,9 +159,9 @@ def refuse_link(path: Path) -> None:
 
 
 def own_folder(path: Path) -> Path:
-    """``path``, made if need be, as one of our own folders. Raises NotAFile for a link; OSError."""
+    """``path``, made if need be, as one of our own folders. Raises NotAFile, NotWritten."""
     refuse_link(path)
-    path.mkdir(parents=True, exist_ok=True)
+    make_folder(path)
     return path
 
 
@@ -175,8 +207,8 @@ def whole(path: Path, many_writers: bool = False) -> Iterator[Path]:
     """A path beside ``path`` to write to; it takes its place at the end, or is removed.
 
     Nobody can have laid a link there: its name is drawn, and the file is new. Leftovers of writers
-    that were killed go, unless there are ``many_writers``. Raises OSError, naming ``path``, where
-    the disc is full or the folder cannot be written.
+    that were killed go, unless there are ``many_writers``. Raises NotWritten where the disc is full
+    or the folder cannot be written.
     """
     partial = path.with_name(f".{path.name}.{secrets.token_hex(8)}.partial")
     try:
@@ -192,7 +224,7 @@ def whole(path: Path, many_writers: bool = False) -> Iterator[Path]:
         with contextlib.suppress(OSError):
             partial.unlink(missing_ok=True)
         if isinstance(error, OSError):
-            raise OSError(error.errno, error.strerror or str(error), str(path)) from None
+            raise NotWritten(error.errno, error.strerror or str(error), str(path)) from None
         raise
 
 

@@ -80,7 +80,7 @@ SLIPS = {  # name: text of the good case, text in its place, key, what was meant
         "solver:\n",
         "road: {loads_N: [40000]}\nsolver:\n",
         "road.loads_N.0",
-        "34000 N, where this size lies flat on its rim",
+        "34000 N, the load at which this tyre bottoms on its rim",
     ),
     "per cent of an effect": (
         "solver:\n",
@@ -168,7 +168,7 @@ SETTINGS = [  # arguments after the case, and what was meant
     (["modes", "--set", "C10=1.0"], "--set C10=1: usual is"),
     (["modes", "--set", "materials.rubber.density_kg_per_m3=1.1"], "1.1 g/cm3, 1100 kg/m3"),
     (["modes", "--load-N", "4"], "--load-N 4: usual is 100 to 34000 N"),
-    (["modes", "--load-N", "400000"], "where this size lies flat on its rim"),
+    (["modes", "--load-N", "400000"], "N, the load at which this tyre bottoms on its rim"),
     (["modes", "--sweep-load", "0,2,4"], "--sweep-load 2: usual is"),
     (["footprint", "--loads-N", "4,5"], "4 kN, 4000 N"),
     (["deck", "--loads-N", "4,5"], "4 kN, 4000 N"),

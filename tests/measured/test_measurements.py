@@ -31,7 +31,10 @@ def read(tmp_path: Path, *lines: str, header: str = HEADER) -> list:
     ("line", "words"),
     [
         ("frequency_Hz,2,0,,,240,0,79500,20", "did you mean 79500 mHz, 79.5 Hz?"),
-        ("frequency_Hz,2,0,,,2.4,0,79.5,0.2", "the pressure is 2.4 kPa, must be 20 to 2000"),
+        (
+            "frequency_Hz,2,0,,,2.4,0,79.5,0.2",
+            "2.4 kPa: usual is 20 to 2000 kPa; did you mean 2.4 bar, 240 kPa",
+        ),
         ("frequency_Hz,2,0,,,240,0,0.2,0.02", "frequency_Hz is 0.2: no tyre has that, usual is"),
         ("frequency_Hz,2,0,,,240,0,79.5,0", "greater than 0"),
         ("frequency_Hz,2,0,,,240,0,79.5,-1", "greater than 0"),

@@ -147,7 +147,10 @@ def test_sigma_is_that_of_its_unit_or_of_all_in_percent(tmp_path: Path) -> None:
         (PLAIN + "2,0,,240,79.5x\n", "line 4: frequency_Hz is '79.5x', must be a number"),
         (PLAIN + "2,0,,240,-79.5\n", "line 4: frequency_Hz is -79.5, must be greater than 0"),
         (PLAIN + "2,0,,240,nan\n", "line 4: frequency_Hz is 'nan', must be a number"),
-        (PLAIN + "2,0,,2.4,79.5\n", "line 4: the pressure is 2.4 kPa, must be 20 to 2000; which"),
+        (
+            PLAIN + "2,0,,2.4,79.5\n",
+            "line 4: the pressure is 2.4 kPa: usual is 20 to 2000 kPa; did you mean 2.4 bar",
+        ),
         (PLAIN + "2,0,,240,79500\n", "line 4: frequency_Hz is 79500: no tyre has that"),
         (PLAIN + "2,4,,240,79.5\n", "line 4: m is '4', must be a whole number from 0 to 3"),
         (PLAIN + "2.5,0,,240,79.5\n", "line 4: c is '2.5', must be a whole number from 0 to 20"),

@@ -27,7 +27,16 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..files import json_text, own_folder, read_bytes, read_json, set_aside, write_runs, write_text
+from ..files import (
+    json_text,
+    os_words,
+    own_folder,
+    read_bytes,
+    read_json,
+    set_aside,
+    write_runs,
+    write_text,
+)
 from ..measured.load import load_case
 from ..simulate.case_folder import owner
 from ..simulate.deck.decks_design import design_of
@@ -186,7 +195,7 @@ def _failed(error: Exception) -> StudyOutcome:
     if isinstance(error, InputError):
         return StudyOutcome("error", "input", str(error))
     if isinstance(error, OSError):
-        return StudyOutcome("error", "disc", str(error))
+        return StudyOutcome("error", "disc", os_words(error))
     trace = error.__traceback__
     while trace and trace.tb_next:
         trace = trace.tb_next

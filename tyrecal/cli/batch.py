@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from ..files import json_text, refuse_link, write_text
+from ..files import json_text, make_folder, refuse_link, write_text
 from . import arguments, options
 from .main import EXIT_BATCH
 from .parameters import Place, Whole, option
@@ -263,5 +263,5 @@ def _some(names: Sequence[str], most: int = 10) -> str:
 
 
 def _write(path: Path, text: str) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(path.parent)
     write_text(path, text)

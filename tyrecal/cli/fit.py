@@ -159,7 +159,7 @@ def command(
     if measured or not loaded.measured:
         words += ["--measured", str(measured or "FILE")]
     next_ = join_command(words)
-    if not loaded.case.deck and read_targets(loaded):
+    if good and not loaded.case.deck and read_targets(loaded):
         terminal.say(f"next: {next_} says what the model lacks")
     return 0 if good else EXIT_FIT
 

@@ -174,7 +174,7 @@ def _write(
     terminal: Terminal,
 ) -> None:
     """Write case, section and picture, none over an existing file and only what is right."""
-    from ..files import whole
+    from ..files import make_folder, whole
     from ..tyre.load import load_case
 
     table = target.with_name(draft.file)
@@ -183,7 +183,7 @@ def _write(
     for path in [*contents, *([picture] if picture else [])]:
         if path.exists() and not force:
             raise InputError(f"'{path}' exists already; give --force to write over it")
-    target.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(target.parent)
     for path, content in contents.items():
         with whole(path) as partial:
             partial.write_bytes(content)

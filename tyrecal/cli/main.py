@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import InputError, TyrecalError
-from ..files import CHANGED
+from ..files import CHANGED, os_words
 from ..interrupt import SIGNALS, exit_code, interrupt_heard, interrupts_remembered
 from .terminal import RESUME, coloured, error, say
 
@@ -194,7 +194,8 @@ def main(arguments: list[str] | None = None) -> None:
         code = _exit_code(failure)
         if code is None:
             raise
-        for line in str(failure).splitlines():
+        words = os_words(failure) if isinstance(failure, OSError) else str(failure)
+        for line in words.splitlines():
             error(line)
         sys.exit(code)
 

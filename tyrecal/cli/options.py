@@ -352,8 +352,8 @@ def _talk(values: dict[str, Any]) -> Terminal:
     context, start = click.get_current_context(), time.monotonic()
     if terminal.verbose:
         logging.basicConfig(format="%(name)s: %(message)s")
-        for name in ("tyrecal", SOLVERS):
-            logging.getLogger(name).setLevel(logging.INFO)
+        logging.getLogger("tyrecal").setLevel(logging.INFO)
+        logging.getLogger(SOLVERS).setLevel(logging.DEBUG)
         path = context.command_path
         context.call_on_close(
             lambda: terminal.detail(f"{path} took {time.monotonic() - start:.1f} s")

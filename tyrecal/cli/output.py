@@ -23,7 +23,9 @@ from ..errors import InputError
 from ..files import (
     PREVIOUS,
     RUN,
+    NotWritten,
     json_text,
+    make_folder,
     open_file,
     own_folder,
     read_json,
@@ -33,6 +35,7 @@ from ..files import (
     take_place,
     write_runs,
     write_text,
+    writing,
 )
 from ..interrupt import interrupts_put_off
 from ..simulate.case_folder import belongs_to, named_case, owner
@@ -91,7 +94,7 @@ def lock(folder: Path, command: str, started: str) -> Lock | None:
         ) from None
     except (OSError, NotImplementedError) as error:
         if isinstance(error, PermissionError):
-            raise
+            raise NotWritten(error.errno, error.strerror, str(folder)) from None
         log.warning(
             "folder '%s' cannot be locked (%s): give no second command there meanwhile",
             folder,
@@ -141,7 +144,7 @@ class Run:
         resume("nothing was computed; the same command starts from the beginning")
         if self.folder.exists() and not self.folder.is_dir():
             raise InputError(f"'{self.folder}' is a file; give a folder with --output")
-        self.folder.mkdir(parents=True, exist_ok=True)
+        make_folder(self.folder)
         self._lock = lock(self.folder, command, self.started)
         click.get_current_context().call_on_close(self._close)
         for own in (self.runs, self.folder / PREVIOUS):
@@ -151,7 +154,8 @@ class Run:
             drop_new(self.folder)
             if solver:
                 self._drop_unfinished()
-        self.new = Path(tempfile.mkdtemp(prefix=NEW, dir=self.folder))
+        with writing(self.folder):
+            self.new = Path(tempfile.mkdtemp(prefix=NEW, dir=self.folder))
         self._write_facts()
         click.get_current_context().call_on_close(self._say_unfinished)
 

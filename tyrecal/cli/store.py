@@ -39,6 +39,10 @@ def command(folder: Path, verify: bool, prune: float | None, terminal: Terminal)
         resume("what was removed by then is evaluated anew when it is needed")
     own = folder / "record"
     refuse_link(own)
+    if not own.is_dir() and not any(folder.glob("[0-9a-f][0-9a-f]")):
+        below = next((path.parent for path in sorted(folder.glob("*/record"))), None)
+        hint = f"; did you mean '{below}'?" if below else ""
+        raise click.UsageError(f"'{folder}': there is no record of evaluations here{hint}")
     store = Store(own if own.is_dir() else folder, opened=float("inf"))
     removed = None if prune is None else store.prune(round(1e6 * prune))
     found = store.summary(verify)

@@ -13,7 +13,7 @@ from typing import Any
 
 import click
 
-from ..files import json_text, printable
+from ..files import NotWritten, json_text, printable
 from .progress import BETWEEN_S, clock
 
 SOLVERS = "tyrecal_solvers"  # logger of the solvers that ship
@@ -53,7 +53,7 @@ def _reaching(err: bool) -> Iterator[None]:
         os.dup2(nowhere, (sys.stderr if err else sys.stdout).fileno())
         os.close(nowhere)
         if not err and not isinstance(error, BrokenPipeError):
-            raise OSError(error.errno, error.strerror, "standard output") from None
+            raise NotWritten(error.errno, error.strerror, "standard output") from None
 
 
 def resume(words: str) -> None:
@@ -162,7 +162,7 @@ def _listening(progress: Progress) -> Iterator[Progress]:
     log = logging.getLogger(SOLVERS)
     level = log.level
     log.addHandler(listener)
-    log.setLevel(logging.INFO)
+    log.setLevel(min(level or logging.INFO, logging.INFO))  # --verbose wants more
     try:
         yield progress
     finally:
@@ -179,7 +179,8 @@ class Progress:
         self._what, self._stages, self._say = what, stages, say
         self._bar: Any = None
         self._task: Any = None
-        self._done, self._total, self._began = 0.0, 0, time.monotonic()
+        self._done, self._began = 0.0, time.monotonic()
+        self._total = self._before = self._piece = 0  # of the stage; before the last piece; of it
         self._of_stage = self._said = self._began
 
     def show_on(self, bar: Any) -> None:
@@ -194,13 +195,17 @@ class Progress:
         if self._say and (stage or not self._stages):
             self._said = time.monotonic()
             self._say(f"{self._what} ...")
-        self._reset(0)
+        self._reset()
 
     def at(self, done: int, total: int) -> None:
-        """``done`` of ``total`` are finished; another total is another piece of work."""
-        if total != self._total or not done:
-            self._reset(total)
-        self._show(done, self._what)
+        """``done`` of ``total`` are finished, of what was begun last: 0, or another total, begins
+        a further piece of the stage, which is counted on top of those before."""
+        if total != self._piece or not done:
+            self._before, self._piece = self._total, total
+            self._total += total
+            if self._bar:
+                self._bar.update(self._task, total=self._total)
+        self._show(self._before + done, self._what)
 
     def within(self, done: int, total: int) -> None:
         """``done`` of ``total`` parts of the next one are finished."""
@@ -212,10 +217,11 @@ class Progress:
         """What is being done, in a few words."""
         self._show(self._done, f"{text:.60}")
 
-    def _reset(self, total: int) -> None:
-        self._done, self._total, self._of_stage = 0.0, total, time.monotonic()
+    def _reset(self) -> None:
+        self._done, self._of_stage = 0.0, time.monotonic()
+        self._total = self._before = self._piece = 0
         if self._bar:
-            self._bar.reset(self._task, total=total or None)
+            self._bar.reset(self._task, total=None)
 
     def _show(self, done: float, words: str) -> None:
         self._done, now = done, time.monotonic()
@@ -240,7 +246,7 @@ class _Loads(logging.Handler):
     """Passes on what the solver reaches on the road: ``loads``, (done, total), of its records."""
 
     def __init__(self, progress: Progress):
-        super().__init__()
+        super().__init__(logging.INFO)
         self.progress = progress
 
     def emit(self, record: logging.LogRecord) -> None:

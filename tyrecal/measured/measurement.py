@@ -9,12 +9,13 @@ from math import nan
 from ..simulate.modes.label import Label
 from ..tyre.case.parts import RimSupport
 from ..tyre.state import TyreState
-from ..tyre.usual import USUAL_MEASUREMENTS
+from ..tyre.usual import USUAL, USUAL_MEASUREMENTS, Usual
+from ..units import PRESSURE
 
 CSV_COLUMNS = ("quantity", "c", "m", "kind", "member", "pressure_kPa", "load_N", "value", "sigma")
 RIM_COLUMN = "rim"  # where some stand on another rim than the case's
 AS_CASE = "case"
-PRESSURE_RANGE_kPa = (20.0, 2000.0)
+PRESSURE_USUAL = Usual(20, 2000, "kPa", PRESSURE)
 MeasurementKey = tuple[str, Label | None, str, float, float, RimSupport | None]
 
 
@@ -57,14 +58,14 @@ class Measurement:
     @property
     def mistake(self) -> str | None:
         """A sentence, where no tyre has such a value."""
-        low, high = PRESSURE_RANGE_kPa
         if not self.value > 0:
             return f"{self.quantity} is {self.value:g}, must be greater than 0"
         if refusal := USUAL_MEASUREMENTS[self.quantity].refusal(self.value):
             return f"{self.quantity} is {self.value:g}: no tyre has that, {refusal}"
-        if self.quantity != "mass_kg" and not low <= self.pressure_kPa <= high:
-            said = f"the pressure is {self.pressure_kPa:g} kPa, must be {low:g} to {high:g}"
-            return f"{said}; which unit?"
+        if self.quantity != "mass_kg" and (refusal := PRESSURE_USUAL.refusal(self.pressure_kPa)):
+            return f"the pressure is {self.pressure_kPa:g} kPa: {refusal}"
+        if self.load_N and (refusal := USUAL["road.loads_N.*"].refusal(self.load_N)):
+            return f"the load is {self.load_N:g} N: {refusal}"
         if self.quantity in ("contact_area_m2", "vertical_stiffness_N_per_m") and not self.load_N:
             return f"the load is 0, must be greater than 0 for {self.quantity}"
         if self.rim not in (None, "fixed") and self.quantity != "frequency_Hz":

@@ -293,7 +293,7 @@ def _up_to_the_rim(usual: Usual, data: Mapping[str, Any], section: Section) -> U
     most = float(f"{1e3 * kPa * width * 2 * sqrt(2 * R * h - h * h):.2g}")
     if not usual.low < most < usual.high:
         return usual
-    return replace(usual, high=most, reason=", where this size lies flat on its rim")
+    return replace(usual, high=most, reason=", the load at which this tyre bottoms on its rim")
 
 
 def _angle(layer: Mapping[str, Any], section: Section) -> Usual | None:

@@ -239,7 +239,8 @@ class ContactNewton:
             if bound is None and self._stale and not rough:
                 self._form(contact)
             self.iterations += 1
-            log.info("%g N: out of balance by %.0e of it", load, size / load)
+            residual = size / load
+            log.debug("%g N: Newton iteration %d, residual %.0e", load, self.iterations, residual)
             energy = self._energy(contact, load, height) if bound else 0.0
             step, rise = self._step(
                 contact, force, lacking, ROUGH_LINEAR_RTOL if rough else LINEAR_RTOL

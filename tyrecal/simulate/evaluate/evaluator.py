@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ...files import printable
+from ...files import NotWritten, printable
 from ...interrupt import interrupts_put_off, raise_interrupt
 from ..deck.decks import Decks, Design
 from . import folders
@@ -223,7 +223,7 @@ class Evaluator:
         except OSError as error:
             folders.drop(folder)
             place = error.filename or str(folder)
-            raise OSError(error.errno, error.strerror or str(error), place) from None
+            raise NotWritten(error.errno, error.strerror or str(error), place) from None
         except BaseException:
             folders.drop(folder)
             raise

@@ -21,7 +21,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from ...files import NotAFile, open_file, own_folder, read_bytes, refuse_link, whole
+from ...files import NotAFile, make_folder, open_file, own_folder, read_bytes, refuse_link, whole
 from ..deck.decks import without_header
 from ..program import program_identity
 from .record import DIGEST, Damaged, pack, unpack
@@ -118,7 +118,7 @@ class Store:
             data = pack(key, about, content)
             if len(data) > MAX_RECORD_BYTES:
                 raise ValueError(f"an answer of {len(data) / 1e6:.0f} MB is too large")
-            self.folder.mkdir(parents=True, exist_ok=True)
+            make_folder(self.folder)
             own_folder(path.parent)
             with whole(path, many_writers=True) as partial:
                 partial.write_bytes(data)

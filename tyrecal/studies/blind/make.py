@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...files import refuse_link, whole
+from ...files import make_folder, refuse_link, whole
 from ...measured.measurement import CSV_COLUMNS
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.evaluate.pool import process_pool
@@ -72,8 +72,8 @@ def make(
         raise InputError(f"{folder} holds sealed trials already; make others in another folder")
     if sealed.resolve().is_relative_to(folder.resolve()):
         raise InputError(f"the truth must not lie in {folder}, which is answered")
-    folder.mkdir(parents=True, exist_ok=True)
-    sealed.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
+    make_folder(sealed)
     for path in (*folder.rglob("*"), sealed / "made", sealed / "record"):
         refuse_link(path)
     write_ruler(folder, ruler())
@@ -134,7 +134,7 @@ def _resumed(
     path = sealed / "made" / f"{sha256(asked.encode()).hexdigest()[:16]}.json"
     if path.exists():
         return read_trial(read_json(path), labels_of(case))
-    path.parent.mkdir(exist_ok=True)
+    make_folder(path.parent)
     trial = _make(protocol, case, maker, truth)
     write_json(path, plain_trial(trial))
     return trial
@@ -196,7 +196,7 @@ def _swap(
 
 def write_trials(folder: Path, protocol: Protocol, trials: list[Trial]) -> None:
     """One CSV a trial, all of the same form, digits and time."""
-    (folder / "trials").mkdir(exist_ok=True)
+    make_folder(folder / "trials")
     for trial in trials:
         lines = [",".join(CSV_COLUMNS)]
         read = values(trial, protocol)
@@ -269,11 +269,11 @@ def kept_seed(sealed: Path, seed: int | None) -> int:
 def copy_case(case: LoadedCase, folder: Path) -> None:
     """The case file and what it names, for who answers."""
     target = folder / "case"
-    target.mkdir(exist_ok=True)
+    make_folder(target)
     shutil.copyfile(case.path, target / case.path.name)
     for path in case.files:
         copy = target / path.relative_to(case.folder)
-        copy.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(copy.parent)
         shutil.copyfile(path, copy)
     if templates := case.case.templates:
         shutil.copytree(case.folder / templates, target / templates, dirs_exist_ok=True)

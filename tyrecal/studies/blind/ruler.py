@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -167,10 +168,16 @@ def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> dict[str, Any]:
     """The ruler as plain data. Raises what the model says where the plain tyre has no solution."""
     x0 = np.asarray(model.start, float)
     count = len(x0)
-    first, *around = model.answers(
-        [Query(x0, constants=True)]
-        + [Query(x0 + side * CURVATURE_STEP * unit) for unit in np.eye(count) for side in (1, -1)]
-    )
+    steps = [side * CURVATURE_STEP * unit for unit in np.eye(count) for side in (1, -1)]
+    plain = [Query(x0, constants=True), *(Query(x0 + step) for step in steps)]
+    sizes = {
+        id: sorted({f * end for end in (span.low, span.high) if end for f in SHARES})
+        for id, span in model.spans.items()
+    }
+    with_effects = [Query(x0, {id: e}) for id, each in sizes.items() for e in each]
+    answers = model.answers([*plain, *with_effects])  # all at once: one count of the progress
+    first, *around = answers[: len(plain)]
+    left = iter(answers[len(plain) :])
     for answer in (first, *around):
         if not isinstance(answer, Answer):
             raise answer
@@ -181,10 +188,9 @@ def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> dict[str, Any]:
     )
     hessian = (hessian + hessian.transpose(0, 2, 1)) / 2
     signatures = {}
-    for id, span in model.spans.items():
-        sizes = sorted({f * end for end in (span.low, span.high) if end for f in SHARES})
-        asked = model.answers([Query(x0, {id: e}) for e in sizes])
-        known = [(e, a) for e, a in zip(sizes, asked, strict=True) if isinstance(a, Answer)]
+    for id, each in sizes.items():
+        asked = list(islice(left, len(each)))
+        known = [(e, a) for e, a in zip(each, asked, strict=True) if isinstance(a, Answer)]
         zero = (0.0, Answer(first.eta, first.jacobian, 0 * first.split))
         known = sorted([*known, zero], key=lambda pair: pair[0])
         if len(known) > 1:

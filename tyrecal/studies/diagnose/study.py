@@ -15,6 +15,7 @@ from ...simulate.evaluate.evaluator import Evaluator
 from ...tyre.case import LoadedCase
 from ...tyre.case.mistakes import suggestion
 from ...tyre.effects import Effect, catalogue
+from ..far_off import far_off
 from ..fit.targets import rims_of
 from ..labelling.label import label
 from ..labelling.result import labels_told
@@ -36,7 +37,6 @@ from .uncertainties import EFFECT_PATH, Source, calibrated, sources
 from .under_load import UnderLoad, Values, compare
 from .where import FieldValue
 
-MAX_FREQUENCY_RATIO = 2.0  # between measured and computed; beyond, the unit is wrong
 MAX_MASS_RATIO = 1.5  # as the mass: a rim weighs as much as its tyre
 
 
@@ -323,11 +323,8 @@ def check_units(
     values = zip(observations.rows, observations.y, strict=True)
     for row, y in sorted(values, key=lambda each: each[0].label is None):  # frequencies first
         ratio = exp(y - at[row.row])
-        if row.label and not 1 / MAX_FREQUENCY_RATIO < ratio < MAX_FREQUENCY_RATIO:
-            raise InputError(
-                f"{runs[row.run]}: {row} was measured {ratio:.2g} times as high as the model has"
-                " it; is it the right unit, mode and pressure?"
-            )
+        if row.label and (words := far_off(str(row), exp(y), exp(at[row.row]))):
+            raise InputError(f"{runs[row.run]}: {words}")
         if not row.label and not 1 / MAX_MASS_RATIO < ratio < MAX_MASS_RATIO:
             raise InputError(
                 f"{runs[row.run]}: the mass is {ratio:.2g} times the model's; is it in kg, and of"

@@ -15,6 +15,7 @@ from ...simulate.evaluate.failure import EvaluationFailed
 from ...tyre.case import LoadedCase
 from ...tyre.case.schema import cannot_fit
 from ...tyre.state import pressure_name
+from ..far_off import far_off
 from ..result import csv_text
 from . import gauss_newton, slsqp
 from .problem import Point, Problem
@@ -72,13 +73,14 @@ def calibrate(
     starts that cannot be evaluated are counted and replaced. jobs: processes for the drawn starts,
     and for the neighbours of a point of the first one, where the solver gives no slopes. notify is
     told of every design here, finished of every start. Raises what `check` does; EvaluationFailed
-    when the case's own start cannot be evaluated.
+    when the case's own start cannot be evaluated; InputError where a target is far off it.
     """
     problem = Problem(case, evaluator, fixed, notify, jobs)
     check(problem)
     initial = problem.evaluate(problem.start())
     if not np.isfinite(initial.objective):
         raise InputError("the targets' weights and standard deviations leave no finite objective")
+    _refuse_far_off(problem, initial)
     reports = [_run(problem, problem.start(), method)]
     replaced = 0
     if starts > 1:
@@ -118,6 +120,16 @@ def check(problem: Problem) -> None:
                 )
         if own:
             problem.evaluator.refuse_lacking(problem.evaluator.design.at(own))
+
+
+def _refuse_far_off(problem: Problem, initial: Point) -> None:
+    """Raises InputError for a target that is not even near the model's start."""
+    source = problem.case.case.targets.source
+    where = f"{problem.case.path}: targets" + (f" of {source}" if source else "")
+    for target in problem.targets:
+        mode = initial.states[target.state][target.label]
+        if words := far_off(str(target.label), target.frequency_Hz, mode.frequency_Hz):
+            raise InputError(f"{where}: {words}")
 
 
 def _run(problem: Problem, start: Array, method: str) -> StartReport:
