@@ -35,6 +35,10 @@ def read(tmp_path: Path, *lines: str, header: str = HEADER) -> list:
             "frequency_Hz,2,0,,,2.4,0,79.5,0.2",
             "2.4 kPa: usual is 20 to 2000 kPa; did you mean 2.4 bar, 240 kPa",
         ),
+        (
+            "contact_area_m2,,,,,240,4,0.02,0.001",
+            "the load is 4 N: usual is 100 to 60000 N; did you mean 4 kN, 4000 N",
+        ),
         ("frequency_Hz,2,0,,,240,0,0.2,0.02", "frequency_Hz is 0.2: no tyre has that, usual is"),
         ("frequency_Hz,2,0,,,240,0,79.5,0", "greater than 0"),
         ("frequency_Hz,2,0,,,240,0,79.5,-1", "greater than 0"),
@@ -76,7 +80,8 @@ def test_a_wrong_line_is_named(tmp_path: Path, line: str, words: str) -> None:
         ("frequency_Hz,0,1,,symmetric,240,4e3,79.5,1", "frequency_Hz,0,1,,,240,4e3,79.5,1"),
         ("frequency_Hz,2,0,,,240,0,79.5,0.2", "frequency_Hz,2,0,,,240,-1,79.5,0.2"),
         ("frequency_Hz,2,0,,,240,0,79.5,0.2", "frequency_Hz,2,0,,,240,some,79.5,0.2"),
-        ("contact_area_m2,,,,,240,0.5,0.02,0.001", "contact_area_m2,,,,,240,0,0.02,0.001"),
+        ("contact_area_m2,,,,,240,100,0.02,0.001", "contact_area_m2,,,,,240,0,0.02,0.001"),
+        ("contact_area_m2,,,,,240,100,0.02,0.001", "contact_area_m2,,,,,240,99,0.02,0.001"),
         ("mass_kg,,,,,20,0,12.5,0.05", "mass_kg,,,,1,20,0,12.5,0.05"),
         ("mass_kg,,,,,20,0,12.5,0.05", "mass_kg,,,axial,,20,0,12.5,0.05"),
     ],
@@ -97,7 +102,7 @@ def test_ten_thousand_lines_are_read_and_no_more(tmp_path: Path) -> None:
 
 def test_pairs_and_single_values_of_another_load_or_pressure_do_not_meet(tmp_path: Path) -> None:
     line = "frequency_Hz,2,0,,{},{},{},79.5,0.2"
-    apart = [line.format(1, 240, 0), line.format("", 250, 0), line.format("symmetric", 250, 1)]
+    apart = [line.format(1, 240, 0), line.format("", 250, 0), line.format("symmetric", 250, 100)]
     assert len(read(tmp_path, *apart)) == 3
     for member in ("2", ""):  # whichever comes first
         with pytest.raises(InputError, match="line 3: gives a pair a member"):

@@ -240,7 +240,7 @@ class ContactNewton:
                 self._form(contact)
             self.iterations += 1
             residual = size / load
-            log.debug("%g N: Newton iteration %d, residual %.0e", load, self.iterations, residual)
+            log.debug("%g N: Newton iteration %d, residual %.2g", load, self.iterations, residual)
             energy = self._energy(contact, load, height) if bound else 0.0
             step, rise = self._step(
                 contact, force, lacking, ROUGH_LINEAR_RTOL if rough else LINEAR_RTOL
