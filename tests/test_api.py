@@ -134,7 +134,7 @@ def test_what_is_shown_in_a_notebook_is_short(coarse: tyrecal.LoadedCase) -> Non
 
 
 def test_values_of_variables_are_those_of_the_design_everywhere(coarse: tyrecal.LoadedCase) -> None:
-    """What `with_values` sets and the same values of one question give the same numbers."""
+    """Set by `with_values`, or given with a question, they give the same numbers."""
     case = coarse
     stiff = tyrecal.with_values(case, {"C10": 2e6})
     hertz = [mode.frequency_Hz for mode in tyrecal.evaluate_modes(case, {"C10": 2e6})]

@@ -1,4 +1,4 @@
-"""What other programs may call: cases read and changed, modes, fits, sweeps, footprints, diagnoses.
+"""Functions for other programs: cases read and changed, modes, fits, sweeps, footprints, diagnoses.
 
 ``case`` is a `LoadedCase`, or the path of a case file. Those functions that evaluate designs take
 ``solver``, the name of an installed solver ("": the case's), and ``record``, a folder that answers
@@ -227,11 +227,11 @@ def evaluate_footprint(
         raise ValueError(f"loads_N must be above 0 and rise, got {loads}")
     for load in loads:
         _refuse_unusual(case, "loads_N", "road.loads_N.0", load, allow_unusual)
-    found: Pressed = _evaluator(case, solver, record).press(design, loads)
-    if found.failed:
-        raise found.failed
+    pressed: Pressed = _evaluator(case, solver, record).press(design, loads)
+    if pressed.failed:
+        raise pressed.failed
     mesh = TyreDesign(case, design).tyre.mesh
-    return [footprint_row(found, footprint, mesh) for footprint in found.footprints]
+    return [footprint_row(pressed, footprint, mesh) for footprint in pressed.footprints]
 
 
 def diagnose_case(
@@ -253,8 +253,8 @@ def diagnose_case(
     calibration leaves.
 
     >>> case = load_case("cases/p235_75r17.yaml", mesh="coarse")
-    >>> found = diagnose_case(case, "cases/p235_75r17_wheeler.csv", effects="rim_width")
-    >>> found.verdict.kind, found.verdict.key
+    >>> diagnosis = diagnose_case(case, "cases/p235_75r17_wheeler.csv", effects="rim_width")
+    >>> diagnosis.verdict.kind, diagnosis.verdict.key
     ('undecided', None)
     """
     from .studies.diagnose.study import study

@@ -81,9 +81,9 @@ def test_what_only_one_side_has_is_said() -> None:
     ]
 
 
-def test_a_verdict_is_told() -> None:
-    told = {**entry(words="no gap is seen"), "verdict": "no_gap", "effect": None}
-    (suite,) = parsed(junit([report("a", fit=entry(), diagnose=told)], None, STARTED))
+def test_a_verdict_is_in_the_suites_output() -> None:
+    diagnosis = {**entry(words="no gap is seen"), "verdict": "no_gap", "effect": None}
+    (suite,) = parsed(junit([report("a", fit=entry(), diagnose=diagnosis)], None, STARTED))
     assert suite.findtext("system-out") == "diagnose: no_gap: no gap is seen"
     assert suite.get("failures") == suite.get("errors") == "0"
 

@@ -137,22 +137,26 @@ def test_a_batch_diagnoses_as_the_command_does(tmp_path: Path) -> None:
     (case,) = vary(tmp_path / "cases", 1)
     measured_elsewhere(case)
     out, own = tmp_path / "out", tmp_path / "own"
-    asked = ["--studies", "diagnose", "--baseline", str(tmp_path / "b.json")]
-    assert batched([case], out, *asked, "--write-baseline", "--junit", str(out / "junit.xml")) == 0
-    options = ["--output", str(own), "--no-pictures", "--quiet", "--store", str(out / "record")]
-    assert run("diagnose", str(case), *options) == 0  # the case names what was measured
+    options = ["--studies", "diagnose", "--baseline", str(tmp_path / "b.json")]
+    assert (
+        batched([case], out, *options, "--write-baseline", "--junit", str(out / "junit.xml")) == 0
+    )
+    command = ["--output", str(own), "--no-pictures", "--quiet", "--store", str(out / "record")]
+    assert run("diagnose", str(case), *command) == 0  # the case names what was measured
     for file in ("diagnosis.json", "diagnosis.md", "diagnosis_section.json"):
         assert (out / case.stem / file).read_bytes() == (own / file).read_bytes(), file
-    found = json.loads((own / "diagnosis.json").read_text())
+    diagnosis = json.loads((own / "diagnosis.json").read_text())
     (entry,) = result(out)["cases"][0]["studies"].values()
-    assert (entry["verdict"], entry["effect"]) == (found["verdict"], found["effect"])
-    assert entry["quantities"]["gap_rms_percent"] == found["gap"]["rms_percent"]
-    assert entry["quantities"]["probability none"] == found["probabilities"]["none"]
-    value = found["calibrated"]["without"]["C10"]["value"]
+    assert (entry["verdict"], entry["effect"]) == (diagnosis["verdict"], diagnosis["effect"])
+    assert entry["quantities"]["gap_rms_percent"] == diagnosis["gap"]["rms_percent"]
+    assert entry["quantities"]["probability none"] == diagnosis["probabilities"]["none"]
+    value = diagnosis["calibrated"]["without"]["C10"]["value"]
     assert entry["quantities"]["calibrated C10"] == value
     SCHEMA.validate(str(out / "junit.xml"))
-    assert f"diagnose: {found['verdict']}: {found['words']}" in (out / "junit.xml").read_text()
-    assert batched([case], out, *asked) == 0
+    assert (
+        f"diagnose: {diagnosis['verdict']}: {diagnosis['words']}" in (out / "junit.xml").read_text()
+    )
+    assert batched([case], out, *options) == 0
 
 
 def test_the_numbers_are_those_of_the_files(done: Path) -> None:

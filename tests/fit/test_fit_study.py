@@ -86,11 +86,11 @@ def test_a_state_that_is_set_chooses_the_targets_measured_there(
     values: Mapping[str, float], kept: TyreState
 ) -> None:
     case = case_with(measured([OWN, FREE if "rim.free" in values else SOFT]))
-    found = study(overridden(case, values))
-    assert states(found.case) == {OWN} and len(found.case.case.targets.modes) == 9
+    fit = study(overridden(case, values))
+    assert states(fit.case) == {OWN} and len(fit.case.case.targets.modes) == 9
     hertz = [mode.frequency_Hz for mode in measured([kept])]
-    assert [mode.frequency_Hz for mode in found.case.case.targets.modes] == hertz
-    (left_out,) = found.left_out
+    assert [mode.frequency_Hz for mode in fit.case.case.targets.modes] == hertz
+    (left_out,) = fit.left_out
     assert left_out.startswith("9 values at ") and study(case).left_out == []
 
 

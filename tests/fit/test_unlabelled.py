@@ -207,9 +207,9 @@ def test_a_fit_takes_the_likeliest_labels_and_tells_them(tmp_path: Path) -> None
     study = FitStudy(CASE, tyre, path)
     assert study.needs_labels and not study.evaluates_one_by_one and not tyre.asked
     fit = study.run()
-    found = {(t.c, t.m, t.kind, t.pressure_kPa, t.rim) for t in study.case.case.targets.modes}
+    modes = {(t.c, t.m, t.kind, t.pressure_kPa, t.rim) for t in study.case.case.targets.modes}
     known = [(each.label, each.state.of(CASE)) for each in with_labels() if each.label]
-    assert found == {(x.c, x.m, x.kind, state.pressure_kPa, state.rim) for x, state in known}
+    assert modes == {(x.c, x.m, x.kind, state.pressure_kPa, state.rim) for x, state in known}
     for name, truth in TRUTH.items():
         assert fit.result["variables"][name]["value"] == pytest.approx(truth, rel=1e-3)
     assert fit.result["labels"]["settled"] and len(fit.result["labels"]["frequencies"]) == 16

@@ -108,16 +108,16 @@ def test_values_stay_on_the_rim_and_at_the_pressure_of_the_case_file(tmp_path: P
 def test_a_fit_takes_the_file_and_its_frequencies_without_labels(tmp_path: Path) -> None:
     case = load_case(case_of(tmp_path, [*ROWS, ",66,0.4,240,case\n"]))
     assert len(case.case.targets.modes) == 3 and judged(case.path) == (case, [])
-    found = study(case)
-    assert found.needs_labels and found.measured == case.measured and len(found.readings) == 4
+    own = study(case)
+    assert own.needs_labels and own.measured == case.measured and len(own.readings) == 4
     other = study(case, measured=CASES / "p235_75r17_wheeler.csv")
     assert len(other.case.case.targets.modes) == 9
 
 
-def test_results_tell_the_file(tmp_path: Path) -> None:
+def test_results_state_the_file(tmp_path: Path) -> None:
     case = load_case(case_of(tmp_path, ROWS))
-    found = FitStudy(case, Evaluator(None)).provenance  # type: ignore[arg-type]
-    assert found["targets"] == "measured.csv" and len(found["measured_sha256"]) == 64
+    block = FitStudy(case, Evaluator(None)).provenance  # type: ignore[arg-type]
+    assert block["targets"] == "measured.csv" and len(block["measured_sha256"]) == 64
 
 
 def test_a_blind_trials_case_has_its_file_with_it(tmp_path: Path) -> None:

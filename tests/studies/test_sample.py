@@ -21,6 +21,7 @@ from tyrecal.studies.sample.result import draws_csv, result
 from tyrecal.studies.sample.study import Sample, check, run, targets_as_readings
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.state import SPRINGS
+from tyrecal.tyre.values import overridden
 
 from ..chance import Chance, generator
 from ..conftest import CASES
@@ -117,6 +118,7 @@ def test_targets_are_read_with_their_sigma_or_what_the_fit_leaves() -> None:
     assert [each.sigma for each in read] == [0.7] + 7 * [1.5]
     assert [each.value for each in read][:2] == [31.7, 37.8]
     assert {(each.pressure_kPa, each.quantity) for each in read} == {(240.0, "frequency_Hz")}
+    assert targets_as_readings(overridden(case, {"pressure_kPa": 200}), 1.5) == read
 
 
 def sampled(draws: int = 20_000) -> Sample:

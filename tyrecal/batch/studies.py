@@ -159,28 +159,29 @@ def diagnose(state: Studied) -> StudyOutcome:
             "the case names no file of measurements to be diagnosed with: give it one, as in"
             " targets: {file: measured.csv}"
         )
-    found = diagnosing.study(case, state.evaluator, measured)
+    diagnosed = diagnosing.study(case, state.evaluator, measured)
     states = diagnosing.states_measured(case, measured)
     block = provenance(case, state.evaluator.solver, [measured], **states)
-    told = found.result.stamped(block)
-    section = parts_data(case, [part.region for part in told.section_map])
+    diagnosis = diagnosed.result.stamped(block)
+    section = parts_data(case, [part.region for part in diagnosis.section_map])
     parts = stamped(section.model_dump(exclude_unset=True), block)
     files = {
-        **told.texts(),
+        **diagnosis.texts(),
         "diagnosis_section.json": json_text(parts),
-        "diagnosis.md": page(found, case.case.name, measured.name),
+        "diagnosis.md": page(diagnosed, case.case.name, measured.name),
     }
+    verdict = " ".join(filter(None, ("verdict", diagnosis.verdict, diagnosis.effect)))
     numbers = {
-        f"verdict {told.verdict} {told.effect or ''}".rstrip(): 1.0,  # gone where it is another
-        "gap_p_value": told.gap.p_value,
-        "gap_rms_percent": told.gap.rms_percent,
+        verdict: 1.0,  # gone where it is another
+        "gap_p_value": diagnosis.gap.p_value,
+        "gap_rms_percent": diagnosis.gap.rms_percent,
     }
-    for key in dict.fromkeys(filter(None, (NONE, OUTSIDE, told.likeliest))):
-        numbers[f"probability {key}"] = told.probabilities[key]
-    for name, each in found.variables["without"].items():
+    for key in dict.fromkeys(filter(None, (NONE, OUTSIDE, diagnosis.likeliest))):
+        numbers[f"probability {key}"] = diagnosed.diagnosis.probabilities[key]
+    for name, each in diagnosed.variables["without"].items():
         numbers[f"calibrated {name}"] = each["value"]
-    verdict = {"verdict": told.verdict, "effect": told.effect}
-    return StudyOutcome("good", None, told.words, numbers, files, verdict)
+    facts = {"verdict": diagnosis.verdict, "effect": diagnosis.effect}
+    return StudyOutcome("good", None, diagnosis.words, numbers, files, facts)
 
 
 STUDIES: dict[str, Callable[[Studied], StudyOutcome]] = {  # in the order in which they are done

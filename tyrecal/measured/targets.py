@@ -57,8 +57,8 @@ def with_own_file(case: LoadedCase) -> LoadedCase:
 
 
 def readings_of(case: LoadedCase, path: Path, labelled: bool = True) -> list[Measurement]:
-    """What `read_measurements` reads. In the case's own file a value on the case's rim stays on the
-    rim that the case file has, whatever its user has set since."""
+    """The measurements of a file. In the case's own one a value on the case's rim stays on the rim
+    that the case file has, whatever its user has set since. Raises as `read_measurements` does."""
     readings = read_measurements(path, labelled)
     if path != case.measured:
         return readings
@@ -127,15 +127,15 @@ def _in_set_state(
     set_by_user = case.overrides.keys()
     at_pressure = at_pressure or PRESSURE_PATH in set_by_user
     on_rim = not set_by_user.isdisjoint((RIM_FREE, WHEEL_FREE))
-    own, told = AS_THE_CASE.told(case), [state.told(case) for state in states]
+    own, whole = AS_THE_CASE.told(case), [state.told(case) for state in states]
     count = [
         (not at_pressure or state.pressure_kPa == own.pressure_kPa)
         and (not on_rim or (state.rim == "free") == (own.rim == "free"))
-        for state in told
+        for state in whole
     ]
     if all(count):
         return count, []
-    others = [state for state, counts in zip(told, count, strict=True) if not counts]
+    others = [state for state, counts in zip(whole, count, strict=True) if not counts]
     words = lambda s: f"{s.pressure_kPa:g} kPa" + f" with the rim {s.rim}" * on_rim
     there = ", ".join(words(s) for s in sorted({*others}, key=lambda s: (s.pressure_kPa, s.rim)))
     if any(count):

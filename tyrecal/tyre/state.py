@@ -141,7 +141,7 @@ def is_free(case: LoadedCase) -> bool:
 
 
 def pressure_name(case: LoadedCase) -> str:
-    """What sets the pressure: the case's variable that does so, else its path."""
+    """The name of the variable that sets the pressure, else the path of that number."""
     names = (name for name, v in case.case.variables.items() if PRESSURE_PATH in v.sets)
     return next(names, PRESSURE_PATH)
 

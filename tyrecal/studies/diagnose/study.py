@@ -66,7 +66,7 @@ class DiagnosedCase:
 
     @property
     def result(self) -> DiagnosisResult:
-        """What diagnosis.json holds."""
+        """The content of diagnosis.json."""
         return diagnosis_result(
             self.diagnosis, self.under_load, self.variables, self.section, self.labels
         )

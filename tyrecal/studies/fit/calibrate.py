@@ -44,11 +44,10 @@ class Fit:
     left_out: list[str] = field(default_factory=list)
 
     def __repr__(self) -> str:
-        found = self.found
-        ended = "converged" if found.converged else "not converged"
-        unit, before, after = found.objective_unit, self.initial.objective, self.fitted.objective
-        values = ", ".join(f"{name}={each.value:.4g}" for name, each in found.variables.items())
-        return f"Fit({ended}, {before:.4g} to {after:.4g} {unit}: {values})"
+        result, before, after = self.found, self.initial.objective, self.fitted.objective
+        ended = "converged" if result.converged else "not converged"
+        values = ", ".join(f"{name}={each.value:.4g}" for name, each in result.variables.items())
+        return f"Fit({ended}, {before:.4g} to {after:.4g} {result.objective_unit}: {values})"
 
     @property
     def result(self) -> dict[str, Any]:

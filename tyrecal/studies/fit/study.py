@@ -101,7 +101,7 @@ class FitStudy:
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """What the result is of."""
+        """The block ``provenance`` of the result."""
         files = [self.measured] if self.measured else []
         return provenance(self.case, self.evaluator.solver, files, **states_of(self.case))
 
@@ -116,7 +116,7 @@ class FitStudy:
             same = likeliest.labels == used.labels
             if same:
                 break
-        found = replace(likeliest.found, settled=likeliest.found.settled and same)
-        labels = labels_told(case, replace(likeliest, found=found))
+        last = replace(likeliest.found, settled=likeliest.found.settled and same)
+        labels = labels_told(case, replace(likeliest, found=last))
         fit.found = fit.found.model_copy(update={"labels": labels})
         return fit

@@ -196,8 +196,8 @@ def check(case: LoadedCase, evaluator: Evaluator, readings: Sequence[Measurement
 
 
 def measured_readings(case: LoadedCase, measured: Path | None = None) -> list[Measurement] | None:
-    """What the file holds, by default the one that the case's targets stand in; None: they stand in
-    the case. Raises InputError, OSError."""
+    """Readings of the file, by default the one that the case's targets stand in; None: they stand
+    in the case. Raises InputError, OSError."""
     path = measured or case.measured
     return in_states(case, readings_of(case, path)) if path else None
 
