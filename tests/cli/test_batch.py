@@ -351,13 +351,13 @@ def test_a_renamed_batch_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[s
 
 def test_wrong_cases_are_errors_of_theirs(tmp_path: Path) -> None:
     first, second, third = vary(tmp_path / "c", 3)
-    first.write_text("format: 9\n")
+    first.write_text(first.read_text().replace("format: 1", "format: 9"))
     second.write_text(second.read_text().replace("name: bundled", "name: none"))
     asked = ["--studies", "modes", "--quiet", "--mesh", "fine"]
     assert batched([first, second, third], tmp_path / "out", *asked) == 5
     entries = [case["studies"]["modes"] for case in result(tmp_path / "out")["cases"]]
     assert {each["cause"] for each in entries} == {"input"}
-    assert "tyre_00.yaml, line 1" in entries[0]["words"]
+    assert "tyre_00.yaml, line 3" in entries[0]["words"]
     assert "mesh level 'fine' is not one of the case's" in entries[2]["words"]
     assert batched([second], tmp_path / "out", "--quiet") == 5
     (entry,) = result(tmp_path / "out")["cases"][0]["studies"].values()

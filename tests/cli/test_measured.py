@@ -174,7 +174,7 @@ def test_fits_take_what_is_at_their_pressure(
     )
     assert code == 2
     told = capsys.readouterr().err
-    assert "no target was measured at 150 kPa, only at 200, 239.4, 240, 240.5 kPa" in told
+    assert "no target was measured at 150 kPa, only at 200 kPa, 239.4 kPa, 240 kPa: set" in told
 
 
 def test_sensors_are_judged_before_a_test(

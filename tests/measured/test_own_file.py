@@ -11,6 +11,7 @@ import pytest
 from tyrecal.errors import InputError
 from tyrecal.measured.load import judged, load_case
 from tyrecal.measured.targets import with_measured
+from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.studies.blind.make import copy_case
 from tyrecal.studies.fit.study import FitStudy
@@ -61,7 +62,11 @@ def test_what_a_file_holds_are_targets_each_in_its_state(tmp_path: Path) -> None
     ("row", "line", "words"),
     [
         ('"[4,0]",110,0,240,\n', 5, "sigma is 0, must be greater than 0"),
-        ('"[4,0]",110,0.4,2.4,\n', 5, "the pressure is 2.4 kPa, must be 20 to 2000; which unit?"),
+        (
+            '"[4,0]",110,0.4,2.4,\n',
+            5,
+            "the pressure is 2.4 kPa: usual is 20 to 2000 kPa; did you mean 2.4 bar, 240 kPa?",
+        ),
         ('"[4,0]",110,0.4,240,springs\n', 5, "the rim has no springs in this case"),
         ('"[2,0]",81,0.4,240,case\n', 5, "measures the same as line 3"),
         ('"[4,0]",110\n', 5, "2 cells, the headings are 5"),
@@ -116,7 +121,7 @@ def test_a_fit_takes_the_file_and_its_frequencies_without_labels(tmp_path: Path)
 
 def test_results_state_the_file(tmp_path: Path) -> None:
     case = load_case(case_of(tmp_path, ROWS))
-    block = FitStudy(case, Evaluator(None)).provenance  # type: ignore[arg-type]
+    block = FitStudy(case, Evaluator(TyreDesign(case))).provenance
     assert block["targets"] == "measured.csv" and len(block["measured_sha256"]) == 64
 
 

@@ -137,7 +137,8 @@ def _in_set_state(
         return count, []
     others = [state for state, counts in zip(whole, count, strict=True) if not counts]
     words = lambda s: f"{s.pressure_kPa:g} kPa" + f" with the rim {s.rim}" * on_rim
-    there = ", ".join(words(s) for s in sorted({*others}, key=lambda s: (s.pressure_kPa, s.rim)))
+    others.sort(key=lambda s: (s.pressure_kPa, s.rim))
+    there = ", ".join(dict.fromkeys(map(words, others)))  # loads are not what is compared
     if any(count):
         return count, [f"{len(others)} values at {there}"]
     one = others[0]

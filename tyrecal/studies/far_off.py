@@ -7,7 +7,7 @@ from __future__ import annotations
 
 MAX_FREQUENCY_RATIO = 2.0  # between measured and computed; beyond, something else was measured
 SLIPS = (10.0, 0.1)  # factors of a decimal point in the wrong place
-NEAR = 1.3  # ratio to the model at which such a slip explains the value
+SLIP_FITS = 1.3  # ratio to the model at which such a slip explains the value
 
 
 def far_off(what: str, measured_Hz: float, model_Hz: float) -> str:
@@ -16,7 +16,7 @@ def far_off(what: str, measured_Hz: float, model_Hz: float) -> str:
     ratio = measured_Hz / model_Hz
     if 1 / MAX_FREQUENCY_RATIO < ratio < MAX_FREQUENCY_RATIO:
         return ""
-    meant = [f"{measured_Hz * f:.6g} Hz" for f in SLIPS if 1 / NEAR < ratio * f < NEAR]
+    meant = [f"{measured_Hz * f:.6g} Hz" for f in SLIPS if 1 / SLIP_FITS < ratio * f < SLIP_FITS]
     hint = f", or did you mean {meant[0]}" if meant else ""
     return (
         f"{what} was measured at {measured_Hz:.6g} Hz, {ratio:.2g} times the model's"

@@ -27,7 +27,7 @@ from .resolve import resolved
 from .state import TyreState
 from .usual import unusual
 
-OF_A_CASE = {"section", "deck", "materials"}  # keys, one of which every case has
+TYRE_KEYS = {"section", "deck", "materials"}  # keys, one of which every case has
 
 
 def load_case(path: Path | str, allow_unusual: bool = False) -> LoadedCase:
@@ -73,7 +73,7 @@ def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mist
     data = document.data
     if data is None:
         return None, document.mistakes
-    if not OF_A_CASE & data.keys():
+    if not TYRE_KEYS & data.keys():
         how = "'tyrecal init SIZE' or 'tyrecal init --deck FILE.inp'"
         document.refuse(0, f"holds no tyre: write a case with {how}")
         return None, document.mistakes[-1:]
