@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import compress
@@ -135,15 +136,18 @@ def _in_set_state(
     ]
     if all(count):
         return count, []
-    others = [state for state, counts in zip(whole, count, strict=True) if not counts]
     words = lambda s: f"{s.pressure_kPa:g} kPa" + f" with the rim {s.rim}" * on_rim
-    others.sort(key=lambda s: (s.pressure_kPa, s.rim))
-    there = ", ".join(dict.fromkeys(map(words, others)))  # loads are not what is compared
+    others = Counter(
+        TyreState(state.pressure_kPa, 0.0, state.rim if on_rim else None)
+        for state, counts in zip(whole, count, strict=True)
+        if not counts
+    )
+    there = ", ".join(map(words, sorted(others, key=lambda s: (s.pressure_kPa, s.rim))))
     if any(count):
-        return count, [f"{len(others)} values at {there}"]
-    one = others[0]
-    change = [f"{pressure_name(case)}={one.pressure_kPa:g}"] * at_pressure
-    change += [f"rim.free={'true' if one.rim == 'free' else 'false'}"] * on_rim
+        return count, [f"{others.total()} values at {there}"]
+    ((most, _),) = others.most_common(1)
+    change = [f"{pressure_name(case)}={most.pressure_kPa:g}"] * at_pressure
+    change += [f"rim.free={'true' if most.rim == 'free' else 'false'}"] * on_rim
     raise InputError(
         f"{source}: no target was measured at {words(own)}, only at {there}: set"
         f" {' and '.join(change)}, or give measurements at {words(own)} (--measured FILE)"
