@@ -16,6 +16,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate import store as store_module
 from tyrecal.simulate.evaluate.evaluator import Counts, Evaluator, Question
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.simulate.evaluate.pool import warm_up
 from tyrecal.simulate.evaluate.record import Damaged, pack, unpack
 from tyrecal.simulate.evaluate.results import Evaluation, HarmonicShape
 from tyrecal.simulate.evaluate.store import Store
@@ -225,6 +226,7 @@ def _write(folder: Path, number: int) -> None:
 
 
 def test_many_writers_of_one_record(tmp_path: Path) -> None:
+    warm_up()  # tests that come later in this process find the fork server that they expect
     workers = [
         get_context("forkserver").Process(target=_write, args=(tmp_path, i)) for i in (1, 2, 3)
     ]
