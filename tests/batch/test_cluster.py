@@ -137,7 +137,7 @@ def test_a_task_that_kills_workers_is_given_up(tmp_path: Path) -> None:
         for _ in range(3):
             own.add_worker()
         with executor(scheduler=own.address) as workers:
-            wait_for(lambda: len(workers.client.scheduler_info(-1)["workers"]) == 3)
+            wait_for(lambda: len(workers.client.scheduler_info(n_workers=-1)["workers"]) == 3)
             answers = dict(workers.each(square, [5.0, 3.0, 7.0]))
         assert answers[0] == 25 and answers[2] == 49
         assert isinstance(answers[1], EvaluationFailed) and "2 workers died" in str(answers[1])

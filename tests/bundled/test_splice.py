@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 from tyrecal_solvers.bundled.modes.harmonics import Vibration
 from tyrecal_solvers.bundled.nonuniform import splice
 from tyrecal_solvers.bundled.nonuniform.splice import SpliceSector
@@ -32,7 +33,7 @@ def test_a_heavier_sector_weighs_where_it_is(vibration: Vibration, inflated: Inf
     for n in range(top + 1):
         for wave in (1.0, 1j) if n else (1.0,):
             field = fields.field(n, wave * u)
-            inside = np.trapezoid((wave * np.exp(1j * n * angle)).real ** 2, angle)
+            inside = trapezoid((wave * np.exp(1j * n * angle)).real ** 2, angle)
             whole = np.pi if n else 2 * np.pi
             wanted = plain * whole + (more - plain) * inside
             assert (field * fields.inertia(field)).sum() == pytest.approx(wanted, rel=1e-6)

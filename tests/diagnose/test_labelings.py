@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 from scipy.stats import multivariate_normal
 
 from tyrecal.simulate.modes.label import Label
@@ -52,7 +53,7 @@ def evidence(there: InverseProblem, toy: Toy, id: str = "") -> float:
     e = np.linspace(0, 1, 2001)
     means = toy.base + np.outer(e, toy.g[id]) if id else toy.base[None]
     ln = multivariate_normal.logpdf(there.observations.y - means, np.zeros(len(S)), S)
-    return float(np.log(np.trapezoid(np.exp(ln - ln.max()), e)) + ln.max()) if id else float(ln)
+    return float(np.log(trapezoid(np.exp(ln - ln.max()), e)) + ln.max()) if id else float(ln)
 
 
 @pytest.mark.parametrize("p", [0.9, 0.5])

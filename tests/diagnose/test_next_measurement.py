@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
+from scipy.integrate import trapezoid
 
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.inverse_problem import Toggle
@@ -164,7 +165,7 @@ def test_information_is_none_of_what_is_known_and_at_most_what_is_open() -> None
         normal = lambda m: np.exp(-((y - m) ** 2) / 2) / np.sqrt(2 * np.pi)
         both = 0.6 * normal(0) + 0.4 * normal(off)
         left = lambda p, both=both: -p * np.log(np.maximum(p / both, 1e-300))
-        rest = np.trapezoid(left(0.6 * normal(0)) + left(0.4 * normal(off)), y)
+        rest = trapezoid(left(0.6 * normal(0)) + left(0.4 * normal(off)), y)
         assert before <= found <= open_ - rest + 1e-9
         before = found
     assert found == pytest.approx(open_, rel=1e-9)

@@ -6,6 +6,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.observations import Observable, Observations
@@ -50,7 +51,7 @@ def test_one_split_is_folded_normal() -> None:
         wanted = np.logaddexp(*terms) - np.log(tau * np.sqrt(2 * np.pi))
         assert ln(s, apart) == pytest.approx([wanted], rel=1e-6)
     grid = np.linspace(0, 0.06, 2001)
-    total = np.trapezoid([np.exp(ln(s, 0.004)[0]) for s in grid], grid)
+    total = trapezoid([np.exp(ln(s, 0.004)[0]) for s in grid], grid)
     assert total == pytest.approx(1, abs=1e-3)
     none = Splits.of(observed(np.array([[0.05, 0.001]]), 0.004), 0.0)
     assert none.chi2() == pytest.approx((0.05**2 + 0.001**2) / 16e-6)

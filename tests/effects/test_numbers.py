@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
@@ -64,7 +65,7 @@ def length(line: Array) -> Array:
 
 def swept(line: Array, weight: Array | float = 1.0) -> float:
     """Integral of ``weight`` over both halves of the surface that a line sweeps, m2."""
-    return float(np.trapezoid(2 * 2 * np.pi * line[:, 0] * weight, length(line)))
+    return float(trapezoid(2 * 2 * np.pi * line[:, 0] * weight, length(line)))
 
 
 # the same deck as a case written by hand

@@ -103,6 +103,7 @@ def _draw(axes: Axes, section: SectionData, size: float) -> dict[str, Artist]:
         look = {"fc": "none", "ec": "0.25", "hatch": "/////", "lw": 0.0}
         axes.add_collection(PolyCollection(elements, **look))
         entries["held by the rim"] = Patch(**look)
+    axes.autoscale_view()  # collections alone do so from Matplotlib 3.11 on
     return entries
 
 
