@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,15 +12,31 @@ from tyrecal.studies.blind.make import USUAL_LABELS, labels_of
 from tyrecal.studies.blind.power import NAMED_AS_A_RULE, powers, words
 from tyrecal.studies.blind.protocol import Protocol
 from tyrecal.studies.blind.ruler import measure, ruler_of
+from tyrecal.studies.diagnose.model import Answer, Query
 from tyrecal.studies.diagnose.separability import VISIBLE
 from tyrecal.tyre.case.schema import Targets
 
 from .toy import CASE, Scale, protocol
 
 SCALE = Scale()
+
 RULER = ruler_of(measure(SCALE, SCALE.model_rows), labels_of(CASE))
 RULES = protocol()
 FOUND = {power.id: power for power in powers(RULER, RULES)}
+
+
+def test_all_designs_are_asked_for_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that the progress has one total, and workers always something to do."""
+    scale, counts = Scale(), list[int]()
+    answers = scale.answers
+
+    def counted(points: Sequence[Query]) -> list[Answer | Exception]:
+        counts.append(len(points))
+        return answers(points)
+
+    monkeypatch.setattr(scale, "answers", counted)
+    measure(scale, scale.model_rows)
+    assert len(counts) == 1 and counts[0] > 3 * len(scale.spans)
 
 
 def lam(id: str, e: float) -> float:

@@ -75,7 +75,7 @@ def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mist
         return None, document.mistakes
     if not TYRE_KEYS & data.keys():
         how = "'tyrecal init SIZE' or 'tyrecal init --deck FILE.inp'"
-        document.refuse(0, f"holds no tyre: write a case with {how}")
+        document.refuse(1, f"holds no tyre: write a case with {how}")
         return None, document.mistakes[-1:]
     file_data = deepcopy(data)
     before = len(document.mistakes)
