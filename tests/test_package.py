@@ -57,7 +57,7 @@ def test_every_file_of_a_package_ships() -> None:
 
 
 def core() -> list[metadata.Distribution]:
-    """What `pip install .` installs: tyrecal, all it needs, all that those need."""
+    """The packages that `pip install .` installs: tyrecal, all it needs, all that those need."""
     found: dict[str, metadata.Distribution] = {}
     waiting = [Requirement("tyrecal")]
     while waiting:

@@ -98,8 +98,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_the_named_program_gives_version_and_answers(here: Path) -> None:
     """And stands in run.json by its whole path."""
-    asked = ["--solver", "calculix", "--solver-command", "./ccx", "--output", "out"]
-    assert run("modes", CASE, "--mesh", "coarse", *asked) == 3
+    options = ["--solver", "calculix", "--solver-command", "./ccx", "--output", "out"]
+    assert run("modes", CASE, "--mesh", "coarse", *options) == 3
     assert (here / "mine").read_text() == "ran\nran\n" and not (here / "other").exists()
     facts = json.loads((here / "out" / "run.json").read_text())["modes"]
     assert (facts["solver"], facts["solver_command"]) == ("calculix 9.99", [str(here / "ccx")])
@@ -164,8 +164,8 @@ def test_a_program_that_is_not_there(
 ) -> None:
     """One sentence: what was looked for, where, and what to do; no run's folder is left."""
     (here / "plain").touch()
-    asked = ["--solver", "calculix", "--solver-command", command, "--output", "out"]
-    assert run("modes", CASE, "--mesh", "coarse", *asked) == 3
+    options = ["--solver", "calculix", "--solver-command", command, "--output", "out"]
+    assert run("modes", CASE, "--mesh", "coarse", *options) == 3
     assert capsys.readouterr().err == (
         f"error: solver 'calculix': {why.format(here=here)}; install it or give --solver-command"
         " PATH ('tyrecal solvers' shows what each starts)\n"

@@ -41,7 +41,7 @@ ENV = {**os.environ, "UV_PYTHON_DOWNLOADS": "never"}  # what is tested is what t
 
 
 def run(words: list[str | Path], folder: Path = ROOT) -> str:
-    """What a command prints. Raises CalledProcessError."""
+    """The output of a command. Raises CalledProcessError."""
     return subprocess.run(
         words, check=True, cwd=folder, env=ENV, text=True, stdout=subprocess.PIPE
     ).stdout
@@ -107,7 +107,7 @@ def main() -> int:
     if lowest not in here:
         print(f"not run: there is no Python 3.{lowest} here")
         return 1
-    asked = {
+    environments = {
         f"lowest versions, Python 3.{lowest}": (here[lowest], LOWEST),
         f"newest versions, Python 3.{newest}": (here[newest], "highest"),
     }
@@ -115,7 +115,7 @@ def main() -> int:
         folder = Path(name)
         run([sys.executable, "-m", "pip", "install", "-q", "--target", folder / "uv", "uv"])
         jobs = []
-        for number, (words, (python, resolution)) in enumerate(asked.items()):
+        for number, (words, (python, resolution)) in enumerate(environments.items()):
             start, place = time.monotonic(), folder / f"env{number}"
             versions = install(folder / "uv/bin/uv", python, resolution, place)
             print(f"{words}, installed [{time.monotonic() - start:.0f} s]:")

@@ -145,7 +145,7 @@ def make_folder(path: Path) -> None:
 
 
 def os_words(error: OSError) -> str:
-    """What the system refuses, in words: the file and the reason."""
+    """An error of the system in words: the file and the reason."""
     if isinstance(error, TyrecalError) or not error.strerror:
         return str(error)
     return f"'{error.filename}': {error.strerror}" if error.filename else error.strerror

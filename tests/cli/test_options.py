@@ -34,7 +34,7 @@ def values_of(kind: click.ParamType, folder: Path) -> list[str]:
 
 
 def needed(command: click.Command, folder: Path) -> list[str]:
-    """What a command must be given."""
+    """The arguments and options that a command requires, as words."""
     words = []
     for param in command.params:
         if param.required:

@@ -54,17 +54,17 @@ def test_a_stage_has_a_name_a_place_and_a_rest_of_its_own(clock: Clock) -> None:
 
 def test_further_pieces_of_a_stage_are_counted_on_top(clock: Clock) -> None:
     """One count for all, however many batches of evaluations it is made of."""
-    said: list[str] = []
-    progress = Progress("weigh effects", (), said.append)
+    lines: list[str] = []
+    progress = Progress("weigh effects", (), lines.append)
     for piece in range(3):
         progress.at(0, 4)
         for done in range(1, 5):
             clock.now += 40.0
             progress.at(done, 4)
-        assert said[-1] == f"weigh effects, {4 * (piece + 1)} of {4 * (piece + 1)} done, " + (
+        assert lines[-1] == f"weigh effects, {4 * (piece + 1)} of {4 * (piece + 1)} done, " + (
             f"{(160 * (piece + 1)) // 60}:{(160 * (piece + 1)) % 60:02d} elapsed"
         )
-    assert [int(line.split(", ")[1].split()[0]) for line in said] == list(range(1, 13))
+    assert [int(line.split(", ")[1].split()[0]) for line in lines] == list(range(1, 13))
 
 
 def test_lines_come_now_and_then_only(clock: Clock) -> None:

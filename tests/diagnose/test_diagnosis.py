@@ -28,10 +28,10 @@ def diagnosed(toy: Toy, effects: dict[str, float], seed: int, **keys: object) ->
 
 
 def test_every_stage_is_told_once_and_in_order() -> None:
-    told: list[str] = []
-    found = diagnosed(Toy(effects=1), {"e0": 0.5}, 0, stage=told.append)
-    assert told == list(STAGES)
-    assert repr(found) == f"Diagnosis({found.verdict.kind}: {found.verdict.words})"
+    stages: list[str] = []
+    diagnosis = diagnosed(Toy(effects=1), {"e0": 0.5}, 0, stage=stages.append)
+    assert stages == list(STAGES)
+    assert repr(diagnosis) == f"Diagnosis({diagnosis.verdict.kind}: {diagnosis.verdict.words})"
 
 
 @pytest.mark.slow

@@ -44,7 +44,7 @@ def test_a_step_is_the_first_of_slsqp(size: float, key: int) -> None:
     turn = np.linalg.inv(np.linalg.cholesky(H)).T
     value = lambda y: (0.5 * y @ y + (turn.T @ J.T @ r) @ y, y + turn.T @ J.T @ r)
     inside = {"type": "ineq", "fun": lambda y: G @ turn @ y - h, "jac": lambda y: G @ turn}
-    found = minimize(
+    first = minimize(
         value,
         np.zeros(3),
         jac=True,
@@ -53,4 +53,4 @@ def test_a_step_is_the_first_of_slsqp(size: float, key: int) -> None:
         options={"maxiter": 1, "ftol": 1e-15},
     )
     step = quadratic_step(H * size**2, J.T @ r * size**2, size * np.linalg.norm(r), G, h)
-    assert step == pytest.approx(turn @ found.x, abs=1e-9)
+    assert step == pytest.approx(turn @ first.x, abs=1e-9)

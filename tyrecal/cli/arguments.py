@@ -138,7 +138,7 @@ def fitted_values(path: Path, loaded: Any, terminal: Terminal) -> dict[str, floa
 
 
 def _given(loaded: Any, assigned: Sequence[str], pressure_kPa: float | None) -> dict[str, float]:
-    """What the user sets, by variable or path: each number once, by whatever names it is given.
+    """Values that the user sets, by variable or path: each number once.
 
     Raises ValueError; click.UsageError where two values are given for one number.
     """

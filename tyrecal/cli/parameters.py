@@ -78,7 +78,7 @@ class _Answering(click.ParamType):
         raise click.UsageError(f"{option}{value}: {self.answer(value, param)}", ctx)
 
     def answer(self, value: Any, param: click.Parameter | None) -> str:
-        """What a value must be that cannot be ``value``."""
+        """Words for what would be right in place of ``value``."""
         raise NotImplementedError
 
 
@@ -90,8 +90,8 @@ class _Number(_Answering):
         default = param.default if param and type(param.default) in (int, float) else 2
         unit, example = "", f"{default:g}"
         for name in [param.opts[0], param.metavar or ""] if param else []:
-            if found := UNIT.search(name):
-                unit, example = ENDINGS[found[1]]
+            if match := UNIT.search(name):
+                unit, example = ENDINGS[match[1]]
         words = self.what + (f" in {unit}" if unit else "")
         low, high = getattr(self, "min", None), getattr(self, "max", None)
         if low is not None:

@@ -92,7 +92,7 @@ def why_missing(command: Sequence[str]) -> str:
 
 
 def program_identity(command: Sequence[str]) -> list[str]:
-    """What tells a command from others, wherever its program lies: the hash of the program's
+    """The marks by which commands differ, wherever the program is: the hash of the program's
     file, or its name where it cannot be read, and the other words."""
     program = Path(command[0])
     try:

@@ -114,7 +114,7 @@ def paths_of(loaded: LoadedCase, name: str) -> list[str]:
 
 
 def value_at(loaded: LoadedCase, path: str) -> Any:
-    """What the case has at a path of `paths_of`; None where it states no number."""
+    """The value in the case at a path of `paths_of`; None if it states no number."""
     return at(loaded.case, find(loaded.case, path))
 
 

@@ -29,11 +29,11 @@ def drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
             _drawn[key] = _picture(found, ANY_CHAPTER, name, words, file, draw)
         return Markup(_drawn[key].replace(ANY_CHAPTER, prefix))
 
-    def corner(found: SampleResult) -> Figure:
+    def corner(sampled: SampleResult) -> Figure:
         """Drawn before the page takes the picture of it."""
-        key = repr(found)
+        key = repr(sampled)
         if key not in _corners:
-            _corners[key] = _draw_corner(found)
+            _corners[key] = _draw_corner(sampled)
         return _corners[key]
 
     monkeypatch.setattr(page, "_picture", picture)

@@ -94,9 +94,9 @@ def test_tags_nest_ids_are_unique_and_links_lead_somewhere(folder: Path) -> None
     links_lead_to_ids(parsed(kept_text_of(folder)))
 
 
-def links_lead_to_ids(found: Nesting) -> None:
-    assert len(set(found.ids)) == len(found.ids)
-    assert found.links and {link.removeprefix("#") for link in found.links} <= set(found.ids)
+def links_lead_to_ids(tags: Nesting) -> None:
+    assert len(set(tags.ids)) == len(tags.ids)
+    assert tags.links and {link.removeprefix("#") for link in tags.links} <= set(tags.ids)
 
 
 def test_table_2_is_there(folder: Path) -> None:

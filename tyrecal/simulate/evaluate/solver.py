@@ -78,8 +78,8 @@ def find_solver(name: str, command: Sequence[str] = ()) -> Solver:
 
 
 def solver_facts(solver: Solver | None) -> dict[str, Any]:
-    """What run.json holds of a solver: ``solver``, its name and version, and ``solver_command``,
-    the words that start it, None where it starts no program."""
+    """The entries of run.json about a solver: ``solver``, its name and version; ``solver_command``,
+    the words that start it, None if it starts no program."""
     return {
         "solver": solver and f"{solver.name} {solver.version}",
         "solver_command": getattr(solver, "command", None),

@@ -50,7 +50,7 @@ def key_of(folder: Path, solver: Solver) -> str:
 
 
 def solver_identity(solver: Solver) -> list[str]:
-    """What tells a solver's answers from those of others: name, version, adapter, program."""
+    """The marks by which answers of solvers differ: name, version, adapter, program."""
     command = getattr(solver, "command", None)
     program = program_identity(command) if command else []
     return [solver.name, solver.version, sources_of(type(solver)), *program]

@@ -218,7 +218,7 @@ class TargetMass(Part):
 
 
 class Targets(Part):
-    """What was measured, and where it comes from; ``file``: a measurements CSV that holds it."""
+    """Measured values and their source; ``file``: a measurements CSV that holds it."""
 
     source: Text = ""
     file: Text | None = None
