@@ -95,8 +95,10 @@ def test_a_relative_path_is_not_that_of_the_run_folder(
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("jobs: 0", "line 1: jobs is 0"),
-        ("jobs: 2\nsolvers: bundled", "line 2: solvers is bundled"),
+        ("jobs: 0", "line 1: jobs is 0: must be at least 1"),
+        ("jobs: many", "line 1: jobs is many: must be a whole number"),
+        ("jobs: 2\nsolvers: bundled", "solvers is bundled: is not a known key; did you mean"),
+        ('commands: {calculix: "ccx \\0"}', "must hold no NUL character"),
         ("jobs: [", "not YAML"),
         ("commands:\n  calculix: ''", "commands.calculix is ''"),
         ("output: results", "must be a whole path"),

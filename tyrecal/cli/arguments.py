@@ -201,6 +201,15 @@ def _replaced(loaded: Any, assigned: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(lines))
 
 
+def refuse_set(assigned: Sequence[str], path: str, options: str) -> None:
+    """Raises click.UsageError where --set gives a number, or one in a list, at a path, or of a
+    variable, that ``options`` give."""
+    for text in assigned:
+        name = text.partition("=")[0].strip()
+        if name == path or name.startswith(f"{path}."):
+            raise click.UsageError(f"--set {text}: {options} give that here")
+
+
 def refuse_unknown(option: str, name: str, known: Collection[str], what: str) -> None:
     """Raises click.UsageError where ``name`` is not among ``known``: what was probably meant."""
     from ..tyre.case.mistakes import suggestion

@@ -77,6 +77,7 @@ def command(
     evaluator.refuse_lacking(design)
     if loads is not None:
         evaluator.needs_road()
+        arguments.refuse_set(assignments, "road.loads_N", "--loads-N")
         asked = arguments.parse_loads(loads)
         arguments.refuse_unusual_loads(loaded, "--loads-N", asked, allow_unusual)
         decks = Decks(design, loads_N=tuple(asked))

@@ -83,15 +83,11 @@ def _pressures(
     allow_unusual: bool,
 ) -> list[float]:
     """The pressures of the sweep, kPa. Raises click.UsageError."""
-    from ..tyre.case import parse_assignment
     from ..tyre.state import pressure_name
     from ..tyre.values import with_values
 
     name = pressure_name(loaded)
-    if name in [parse_assignment(text)[0] for text in assignments]:
-        raise click.UsageError(
-            f"--set {name}: the sweep sets the pressure, by --from-kPa, --to-kPa"
-        )
+    arguments.refuse_set(assignments, name, "--from-kPa and --to-kPa")
     pressures = arguments.parse_pressures(low, high, steps, allow_unusual)
     for end, value in (("--from-kPa", low), ("--to-kPa", high)):
         try:

@@ -37,6 +37,7 @@ def typed(path: Path, kind: type[SettingsModel]) -> SettingsModel:
     from pydantic import ValidationError
 
     from ..tyre.case.document import read_document
+    from ..tyre.case.shape import explain
 
     document = read_document(path)
     if document.data is None or document.mistakes:
@@ -44,8 +45,8 @@ def typed(path: Path, kind: type[SettingsModel]) -> SettingsModel:
     try:
         return kind.model_validate(document.data)
     except ValidationError as error:
-        for each in error.errors():
-            document.add(each["loc"], each["msg"])
+        for keys, message in explain(error, known=kind.model_fields):
+            document.add(keys, message)
         raise InputError("\n".join(str(each) for each in document.mistakes)) from None
 
 

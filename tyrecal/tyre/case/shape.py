@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
@@ -48,8 +48,11 @@ NAME = "must be one word of letters, digits, - and _, a letter first"
 ONE_LINE = "must be text without line breaks or control characters"
 
 
-def explain(error: ValidationError, start: Keys = ()) -> Iterator[tuple[Keys, str]]:
-    """Keys and messages of the schema's complaint about the part at ``start`` of the case."""
+def explain(
+    error: ValidationError, start: Keys = (), known: Iterable[str] | None = None
+) -> Iterator[tuple[Keys, str]]:
+    """Keys and messages of the schema's complaint about the part at ``start`` of the case, or about
+    another file, which has the keys ``known``."""
     for item in error.errors(include_url=False, include_input=False):
         keys, kind, context = (*start, *item["loc"]), item["type"], item.get("ctx", {})
         material: type[BaseModel] | None = None
@@ -59,8 +62,8 @@ def explain(error: ValidationError, start: Keys = ()) -> Iterator[tuple[Keys, st
         if keys[-1:] == ("[key]",):
             yield keys[:-1], NAME
         elif kind == "extra_forbidden":
-            known = fields_at(keys[:-1], material)
-            yield keys, f"is not a known key{suggestion(str(keys[-1]), known)}"
+            names = fields_at(keys[:-1], material) if known is None else known
+            yield keys, f"is not a known key{suggestion(str(keys[-1]), names)}"
         elif kind.startswith("union_tag"):
             yield (*keys, "kind"), MESSAGES[kind].format(**context)
         elif kind == "disagree":
