@@ -99,7 +99,6 @@ def test_sizes_are_drawn_on_both_sides(chance: Chance) -> None:
     chance.distributed(drawn[drawn > 0], uniform(0.4, 1.6).cdf)
 
 
-@pytest.mark.slow
 def test_the_emulated_model_is_the_model_between_its_designs_and_goes_straight_on_beyond() -> None:
     scale = Scale()
     twin = emulate(scale)

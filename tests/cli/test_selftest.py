@@ -17,7 +17,6 @@ from tyrecal.simulate.doctor.self_check import RECORDED_HZ
 from .test_cli import run
 
 
-@pytest.mark.slow
 def test_pairs_of_decks_and_what_they_should_give(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

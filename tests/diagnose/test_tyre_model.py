@@ -54,7 +54,6 @@ def test_slopes_against_differences() -> None:
         assert own.constants[-1, k] == pytest.approx(wanted[-1], rel=0.02, abs=1e-9)
 
 
-@pytest.mark.slow
 def test_parts_of_the_section_make_the_whole() -> None:
     """All rubber heavier together is the density; all parts and the pressure stiffer by the same
     factor raise every frequency by half of it."""
