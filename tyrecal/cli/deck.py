@@ -70,6 +70,8 @@ def command(
     from ..simulate.evaluate.failure import DeckRefused
     from .output import Run
 
+    if loads is not None:
+        arguments.refuse_set(assignments, "road.loads_N", "--loads-N")
     loaded, values = arguments.load(case, mesh, assignments, pressure_kPa, terminal, allow_unusual)
     design = design_of(loaded, values)
     evaluator = Evaluator(design, solver)
@@ -77,7 +79,6 @@ def command(
     evaluator.refuse_lacking(design)
     if loads is not None:
         evaluator.needs_road()
-        arguments.refuse_set(assignments, "road.loads_N", "--loads-N")
         asked = arguments.parse_loads(loads)
         arguments.refuse_unusual_loads(loaded, "--loads-N", asked, allow_unusual)
         decks = Decks(design, loads_N=tuple(asked))

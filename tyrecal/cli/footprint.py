@@ -54,10 +54,11 @@ def command(
 
     terminal = study.terminal
     case, fitted, study = taken(case, fitted, study)
+    if loads is not None:
+        arguments.refuse_set(assignments, "road.loads_N", "--loads-N")
     loaded, values = study.load(case, assignments, pressure_kPa)
     asked = loaded.case.loads_N
     if loads is not None:
-        arguments.refuse_set(assignments, "road.loads_N", "--loads-N")
         asked = arguments.parse_loads(loads)
         arguments.refuse_unusual_loads(loaded, "--loads-N", asked, study.allow_unusual)
     evaluator = study.evaluator(loaded)
