@@ -86,8 +86,8 @@ def common(lines: list[str]) -> None:
     ("edit", "words"),
     [
         (("slurm", "slurms"), ["line 2", "queueing_system", "'slurm', 'pbs' or 'local'"]),
-        (("workers: 8", "workers: 0"), ["line 3", "workers", "greater than or equal to 1"]),
-        (("cores: 4", "core: 4"), ["core", "Extra inputs"]),
+        (("workers: 8", "workers: 0"), ["line 3", "workers", "must be at least 1"]),
+        (("cores: 4", "core: 4"), ["core", "did you mean 'cores'?"]),
         (("6GB", "lots"), ["line 5", "memory"]),
         (('"02:30:00"', "two hours"), ["line 6", "walltime"]),
         (("account: tyres", "account: ["), ["line"]),
