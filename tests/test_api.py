@@ -62,7 +62,7 @@ def test_all_that_is_offered_is_there_and_nothing_else() -> None:
         tyrecal.fit_everything  # noqa: B018
 
 
-SLOW = {"diagnose_case", "evaluate_footprint", "read_results", "emulate"}
+SLOW = {"diagnose_case", "evaluate_footprint", "read_results"}
 
 
 @pytest.mark.parametrize(

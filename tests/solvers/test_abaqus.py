@@ -66,7 +66,6 @@ def tyrecal(*arguments: object) -> int:
     return int(leaving.value.code or 0)
 
 
-@pytest.mark.slow
 def test_modes_are_those_of_the_bundled_solver(coarse: Callable[..., Path], tmp_path: Path) -> None:
     case = coarse()
     common = ("--pressure-kPa", 200, "--quiet")
