@@ -38,10 +38,10 @@ from tyrecal.simulate.evaluate.store import Store
 from tyrecal.simulate.modes.label import Label, Mode, label_modes
 from tyrecal.simulate.modes.match import match
 from tyrecal.simulate.modes.subspace import mac
-from tyrecal.tyre import resolve
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.load import load_case
-from tyrecal.tyre.section.mesh import SectionMesh, build_mesh
+from tyrecal.tyre.section import mesh as mesh_module
+from tyrecal.tyre.section.mesh import SectionMesh, build_mesh, kept_mesh
 from tyrecal.tyre.values import with_values
 
 ROOT = Path(__file__).parents[2]
@@ -139,14 +139,14 @@ def straight(*arguments: object) -> SectionMesh:
 @contextmanager
 def common(law: bool = True, sides: bool = True) -> Iterator[None]:
     """The bundled solver with CalculiX's cord law, sides, or both, in this process."""
-    resolve._mesh.cache_clear()
+    kept_mesh.cache_clear()
     with ExitStack() as switched:
         if law:
             switched.enter_context(patch.object(cords, "LogarithmicCord", StVenantKirchhoff))
         if sides:
-            switched.enter_context(patch.object(resolve, "build_mesh", straight))
+            switched.enter_context(patch.object(mesh_module, "build_mesh", straight))
         yield
-    resolve._mesh.cache_clear()
+    kept_mesh.cache_clear()
 
 
 @contextmanager

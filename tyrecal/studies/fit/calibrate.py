@@ -20,7 +20,7 @@ from ..result import csv_text
 from . import gauss_newton, slsqp
 from .problem import Point, Problem
 from .result import FitResult, StartReport, fit_result
-from .search import AT_CROSSING, Descend, is_converged, minimise
+from .search import AT_CROSSING, CONVERGED, Descend, is_converged, minimise
 
 Array = np.ndarray
 METHODS: dict[str, Descend] = {"slsqp": slsqp.descend, "gauss-newton": gauss_newton.descend}
@@ -136,7 +136,7 @@ def _run(problem: Problem, start: Array, method: str) -> StartReport:
     tolerance = _tolerance(problem)
     outcome = minimise(problem, start, tolerance, METHODS[method])
     converged = is_converged(problem, outcome.point, max(10 * TOLERANCE, tolerance))
-    converged = converged or outcome.message == AT_CROSSING
+    converged = converged or outcome.message in (CONVERGED, AT_CROSSING)
     values, history = dict(first.values), _history(problem)
     return StartReport(values, outcome.point, outcome.message, converged, history)
 

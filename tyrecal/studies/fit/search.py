@@ -20,6 +20,7 @@ Array = np.ndarray
 MOST_DESIGNS = 100
 EXACT = 1e-3  # Hz, an objective below every measurement's resolution
 LEAST_GAIN = 1e-9  # of the squared objective: a smaller gain is none
+NO_GAIN = 1e-6  # of the squared objective: half of this of the objective, below every resolution
 DAMPING = 0.01  # share of the mean diagonal of J^T J that is added to it at the start of a search
 ROOM = 0.1  # of the gap of the [0, 0] modes, between a bounded step and where labels change places
 CREEPING = 3e-4  # of the objective, less than ROOM costs: a gain that is not worth another step
@@ -77,6 +78,16 @@ def projected_gradient(problem: Problem, point: Point) -> float:
 def is_converged(problem: Problem, point: Point, tolerance: float) -> bool:
     """Whether no admissible change lowers the objective, or the fit is exact for all purposes."""
     return point.objective <= EXACT or projected_gradient(problem, point) <= tolerance
+
+
+def has_nothing_to_gain(problem: Problem, point: Point) -> bool:
+    """Whether a whole Gauss-Newton step, without what pushes against a bound, promises no gain. It
+    tells a minimum where round-off hides how the objective falls."""
+    g = point.gradient
+    held = (point.x <= problem.lower + 1e-9) & (g > 0) | (point.x >= problem.upper - 1e-9) & (g < 0)
+    J = point.jacobian[:, ~held]
+    left = point.residuals - J @ np.linalg.lstsq(J, point.residuals, rcond=None)[0]
+    return bool(point.objective**2 - left @ left <= NO_GAIN * point.objective**2)
 
 
 @dataclass

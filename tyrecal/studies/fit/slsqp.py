@@ -28,6 +28,7 @@ from .search import (
     USED_UP,
     CrossingWatch,
     Descent,
+    has_nothing_to_gain,
     is_converged,
     room_to_move,
 )
@@ -123,7 +124,7 @@ def descend(
         if not end and watch.bounds(point):
             end = AT_CROSSING
         if not end and gain <= LEAST_GAIN * point.objective**2 and watch.edge is run.edge:
-            end = NO_LOWER
+            end = CONVERGED if has_nothing_to_gain(problem, point) else NO_LOWER
         if end:
             return Descent(point, end, watch.edge)
     return Descent(point, CONVERGED)
