@@ -69,10 +69,14 @@ def minimise(problem: Problem, start: Array, tolerance: float, descend: Descend)
 
 def projected_gradient(problem: Problem, point: Point) -> float:
     """Norm of dF/dx without what pushes against a bound, Hz per unit of x."""
-    g = point.gradient.copy()
-    g[(point.x <= problem.lower + 1e-9) & (g > 0)] = 0.0
-    g[(point.x >= problem.upper - 1e-9) & (g < 0)] = 0.0
-    return float(np.linalg.norm(g))
+    return float(np.linalg.norm(point.gradient[~_pushes_against_bound(problem, point)]))
+
+
+def _pushes_against_bound(problem: Problem, point: Point) -> Array:
+    """Which variables (variables,) are at a bound beyond which the objective is lower."""
+    g = point.gradient
+    below = (point.x <= problem.lower + 1e-9) & (g > 0)
+    return np.asarray(below | (point.x >= problem.upper - 1e-9) & (g < 0))
 
 
 def is_converged(problem: Problem, point: Point, tolerance: float) -> bool:
@@ -83,9 +87,7 @@ def is_converged(problem: Problem, point: Point, tolerance: float) -> bool:
 def has_nothing_to_gain(problem: Problem, point: Point) -> bool:
     """Whether a whole Gauss-Newton step, without what pushes against a bound, promises no gain. It
     tells a minimum where round-off hides how the objective falls."""
-    g = point.gradient
-    held = (point.x <= problem.lower + 1e-9) & (g > 0) | (point.x >= problem.upper - 1e-9) & (g < 0)
-    J = point.jacobian[:, ~held]
+    J = point.jacobian[:, ~_pushes_against_bound(problem, point)]
     left = point.residuals - J @ np.linalg.lstsq(J, point.residuals, rcond=None)[0]
     return bool(point.objective**2 - left @ left <= NO_GAIN * point.objective**2)
 
