@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.linalg import qr
-from tyrecal_solvers.bundled.section.parts.cords import LogarithmicCord
+from tyrecal_solvers.bundled.section.parts.cords import TRANSITION, LogarithmicCord
 
 Array = np.ndarray
 H = 1e-30
@@ -35,15 +35,35 @@ def test_force_and_tangent_by_complex_step(q: Array) -> None:
 
 
 def test_a_cord_that_bears_no_compression_is_slack_below_its_length(q: Array) -> None:
-    """W, f and D are 0 there, and those of any cord above it, where both are in one layer."""
+    """W, f and D are 0 there, and those of any cord above it, less a constant of W."""
     one = replace(CORD, compressed=np.array([0.0, 0.0, 1.0, 1.0]))
     q *= (np.array([0.9, 1.1, 0.9, 1.1]) / np.sqrt((q * q).sum(-1)))[:, None]
     for got, any_cord in ((one.energy, CORD.energy), (one.force, CORD.force), (one.tangent,) * 2):
         assert not got(q)[0].any()
-        np.testing.assert_array_equal(got(q)[1:], any_cord(q)[1:])
+        np.testing.assert_array_equal(got(q)[2:], any_cord(q)[2:])
+    np.testing.assert_array_equal(one.force(q)[1], CORD.force(q)[1])
+    np.testing.assert_array_equal(one.tangent(q)[1], CORD.tangent(q)[1])
+    constant = STIFFNESS[1] * TRANSITION**2 / 10
+    assert one.energy(q)[1] == pytest.approx(CORD.energy(q)[1] + constant, rel=1e-14)
+
+
+@pytest.mark.parametrize("share", [-1.001, -0.999, -0.3, 0.0, 0.8, 0.999, 1.001])
+def test_a_cord_goes_slack_smoothly(q: Array, share: float) -> None:
+    """Force and tangent are derivatives by complex steps throughout, and all three are continuous:
+    next to the ends of the transition they are those of the ends."""
+    slack = replace(CORD, compressed=np.zeros(4))
+    direction = q / np.sqrt((q * q).sum(-1))[:, None]
+    at = np.exp(share * TRANSITION) * direction
     steps = np.eye(3) * 1j * H
-    close(one.force(q), np.stack([one.energy(q + s).imag / H for s in steps], -1))
-    close(one.tangent(q), np.stack([one.force(q + s).imag / H for s in steps], -1))
+    force = np.stack([slack.energy(at + s).imag / H for s in steps], -1)
+    np.testing.assert_allclose(slack.force(at), force, rtol=1e-11, atol=1e-9)
+    D = np.stack([slack.force(at + s).imag / H for s in steps], -1)
+    np.testing.assert_allclose(slack.tangent(at), D, rtol=1e-11, atol=1e-4)
+    end = np.exp(np.sign(share) * TRANSITION) * direction
+    if abs(abs(share) - 1) < 0.01:
+        for law in (slack.energy, slack.force, slack.tangent):
+            largest = abs(law(np.exp(TRANSITION) * direction)).max()
+            assert abs(law(at) - law(end)).max() < 2e-3 * largest
 
 
 def test_an_artificial_tension_holds_every_direction_alike(q: Array) -> None:
