@@ -6,9 +6,10 @@
 A layer under the compression N per width, in rubber of shear modulus G on both sides, gives way
 sideways in waves of the wave number q from N = 2 G / q on (the rubber resists with 2 G q): at any
 N, if the mesh has waves that are short enough. Printed: [0,0] axial and torsional, [1,1] and [4,0]
-of the tyre that `tyrecal init` writes, in Hz, at a twentieth of its pressure and at all of it, with
-the whole bead held and with its surface, with more and more elements and rows between the plies.
-With --tension_only cords bear no compression, which is what ever finer wrinkles come to.
+of the tyre that `tyrecal init` writes, but all of its cords bearing compression, in Hz, at a
+twentieth of its pressure and at all of it, with the whole bead held and with its surface, with more
+and more elements and rows between the plies.
+With --tension_only no cord bears compression, which is what ever finer wrinkles come to.
 """
 
 from __future__ import annotations
@@ -47,10 +48,10 @@ def finer(case: LoadedCase, along: int, rows: int) -> LoadedCase:
     return changed(case, mesh=with_part(mesh, levels=levels, level="finer"))
 
 
-def tension_only(case: LoadedCase) -> LoadedCase:
-    """With cords that bear no compression."""
+def with_compression(case: LoadedCase, bears: bool) -> LoadedCase:
+    """With cords of which all bear compression, or none."""
     materials = {
-        name: with_part(m, bears_compression=False) if isinstance(m, Cord) else m
+        name: with_part(m, bears_compression=bears) if isinstance(m, Cord) else m
         for name, m in case.case.materials.items()
     }
     return changed(case, materials=materials)
@@ -84,7 +85,7 @@ def main(codes: list[str], slack: bool) -> None:
     print("| size | held | kPa | elements, rows | axial | torsional | [1,1] | [4,0] |")
     print("|---" * 8 + "|")
     for code in codes:
-        case = tension_only(by_size(code)) if slack else by_size(code)
+        case = with_compression(by_size(code), not slack)
         for holds in ("whole_bead", "bead_surface"):
             held = changed(case, rim=with_part(case.case.rim, holds=holds))
             for share in (LOW, 1.0):

@@ -10,12 +10,15 @@ import pytest
 from tyrecal.simulate.deck.abaqus import claimed, solid_claims
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.case.new_case import from_file, from_size
+from tyrecal.tyre.case.parts import Cord
 from tyrecal.tyre.effects import EffectRefused
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.resolve import Tyre, resolved
 from tyrecal.tyre.section.construction import LIGHT_TRUCK, PASSENGER, TRUCK, Compound
 from tyrecal.tyre.section.size import parse_size
 from tyrecal.tyre.values import set_values
+
+from ..conftest import CASES
 
 CODES = {"205/55R16": PASSENGER, "LT245/75R16": LIGHT_TRUCK, "315/80R22.5": TRUCK}
 
@@ -68,6 +71,26 @@ def test_bead_wires_have_their_steel(case: LoadedCase) -> None:
         made.wires * made.wire, rel=5e-3
     )
     assert layer.regions == ["bead"] and layer.angle_deg == 90
+
+
+def test_textile_and_carcass_cords_go_slack_belts_and_wires_do_not(case: LoadedCase) -> None:
+    """By layer; and each material has a spread of its own."""
+    cords = {n: m for n, m in case.case.materials.items() if isinstance(m, Cord)}
+    for name, layer in case.case.rebar_layers.items():
+        bears = cords[layer.material].bears_compression
+        assert bears == name.startswith(("belt_", "bead_wire")), name
+    assert {f"{name}_modulus" for name in cords} < set(case.case.uncertainties)
+
+
+def test_a_section_of_one_rubber_has_a_slack_carcass_too(tmp_path: Path) -> None:
+    """And stiff belts, as a line of its case."""
+    draft = from_file(CASES / "205_60r15.csv", parse_size("205/60R15"), None, None)
+    (tmp_path / draft.file).write_bytes(draft.content)
+    (tmp_path / "tyre.yaml").write_text(draft.text)
+    cords = load_case(tmp_path / "tyre.yaml").case.materials
+    bears = {n: m.bears_compression for n, m in cords.items() if isinstance(m, Cord)}
+    assert bears == {"belt_cord": True, "carcass_cord": False}
+    assert draft.text.count("bears_compression: false}\n") == 1
 
 
 def test_wear_takes_the_tread_and_leaves_what_lies_under_it(case: LoadedCase) -> None:

@@ -86,7 +86,9 @@ def _flow(part: Any) -> str:
 
 
 def _short(value: float) -> str:
-    """A number as one writes it: 0.3, 66.0, 1.9e+11, 2.42e-7."""
+    """A number or switch as one writes it: 0.3, 66.0, 1.9e+11, 2.42e-7, false."""
+    if isinstance(value, bool):
+        return json.dumps(value)
     if isinstance(value, int) or value == 0 or 1e-3 <= abs(value) < 1e5:
         return repr(value)
     mantissa, _, power = f"{value:.12e}".partition("e")

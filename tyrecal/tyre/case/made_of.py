@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..section.construction import BASE, CAP, TURN_UP, Compound, Construction, Ply
+from ..section.construction import BASE, CAP, TURN_UP, Compound, Construction, CordMaterial, Ply
 from ..section.curve import length_along
 from ..section.section import Section, SectionError
 
@@ -16,6 +16,8 @@ Keys = dict[str, Any]
 RELAXATION_S = 0.1  # of the one Prony term that usual values say anything of
 COMPOUND_DENSITY_PERCENT, CORD_MODULUS_PERCENT = 2.0, 5.0  # standard deviations over makers
 BELT_ANGLE_DEG, WIRE_ANGLE_DEG = 2.0, 90.0
+BELT_CORD = CordMaterial(172.2e9, 0.3, 5900.0)  # Bekakos et al. (2016), like the carcass
+CARCASS_CORD = CordMaterial(9.87e9, 0.3, 1500.0, bears_compression=False)
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,8 @@ def one_rubber(section: Section, carcass_plies: int = 1) -> MadeOf:
     """A section of which only the lines are known, of the materials of Bekakos et al. (2016).
 
     Lines from the crown to the bead become the carcass (each of ``carcass_plies`` layers), lines
-    that end at the shoulder the belts. Raises SectionError where no line can be the carcass.
+    that end at the shoulder the belts. Unlike theirs, the carcass goes slack where compressed, as
+    textile cords do. Raises SectionError where no line can be the carcass.
     """
     there = ~np.isnan(section.points).any(-1)
     inside = list(zip(section.names, there, strict=True))[1:-1]
@@ -59,8 +62,8 @@ def one_rubber(section: Section, carcass_plies: int = 1) -> MadeOf:
     rubber = {"C10_Pa": 1e6, "C01_Pa": 0.0, "D1_per_Pa": 5.085e-8}
     materials = {
         "rubber": {"kind": "rubber", **rubber, "prony": _prony(0.3), "density_kg_per_m3": 1100.0},
-        **({"belt_cord": _cord(172.2e9, 0.3, 5900.0)} if belts else {}),
-        "carcass_cord": _cord(9.87e9, 0.3, 1500.0),
+        **({"belt_cord": _cord(BELT_CORD)} if belts else {}),
+        "carcass_cord": _cord(CARCASS_CORD),
     }
     return MadeOf(materials, [{"material": "rubber"}], layers, variables)
 
@@ -104,7 +107,7 @@ def constructed(made: Construction, section: Section) -> MadeOf:
     return MadeOf(
         materials={
             **{name: _rubber(compound) for name, compound in compounds.items()},
-            **{name: _cord(*numbers) for name, numbers in made.cords.items()},
+            **{name: _cord(cord) for name, cord in made.cords.items()},
         },
         solids=solids,
         layers=layers,
@@ -172,13 +175,14 @@ def _prony(g: float) -> list[Keys]:
     return [{"g": g, "k": 0.0, "tau_s": RELAXATION_S}]
 
 
-def _cord(modulus: float, poissons_ratio: float, density: float) -> Keys:
-    return {
+def _cord(cord: CordMaterial) -> Keys:
+    keys: Keys = {
         "kind": "cord",
-        "youngs_modulus_Pa": modulus,
-        "poissons_ratio": poissons_ratio,
-        "density_kg_per_m3": density,
+        "youngs_modulus_Pa": cord.youngs_modulus,
+        "poissons_ratio": cord.poissons_ratio,
+        "density_kg_per_m3": cord.density,
     }
+    return keys if cord.bears_compression else {**keys, "bears_compression": False}
 
 
 def _layer(line: str, ply: Ply) -> Keys:

@@ -10,13 +10,16 @@ the inner surface and the cords: one of 50 Shore A alone would wrinkle at 850 kP
 20 degrees from the circumference: from 24 on they contract the carcass under them until its cords,
 which have no bending stiffness here, are not stable.
 
+Textile cords and the carcass of a truck, thin steel cord in soft rubber, go slack where they are
+compressed. Belts and bead wires of steel, held straight by stiff skim or by each other, bear it.
+
 Hardnesses, densities, cords and gauges are what textbooks and cut tyres show, not one maker's:
 Gent and Walter, The Pneumatic Tire (NHTSA 2006), ch. 2 and 7; French, Tyre Technology (1989).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 HARDNESS_SPREAD = 4.0  # Shore A, a standard deviation over makers
 POISSONS_RATIO = 0.475  # of rubber: elements do not lock, and it hardly yields in volume
@@ -58,6 +61,17 @@ def gent_C10(hardness: float) -> float:
 
 
 @dataclass(frozen=True)
+class CordMaterial:
+    """Young's modulus, Pa, Poisson's ratio and density, kg/m3, of the cord's own area; and whether
+    it bears compression or goes slack."""
+
+    youngs_modulus: float
+    poissons_ratio: float
+    density: float
+    bears_compression: bool = True
+
+
+@dataclass(frozen=True)
 class Ply:
     """Cords of one layer: their material, area of one in m2, spacing in m, angle from the meridian
     in degrees."""
@@ -86,7 +100,7 @@ class Construction:
 
     name: str
     compounds: dict[str, Compound]
-    cords: dict[str, tuple[float, float, float]]
+    cords: dict[str, CordMaterial]
     carcass: tuple[Ply, ...]
     belts: tuple[Belt, ...]
     cap: Ply | None
@@ -111,10 +125,10 @@ class Construction:
         return ("inner", "ply", *belts, *([CAP] if self.cap else []), BASE, "outer")
 
 
-# E in Pa, Poisson's ratio, density in kg/m3, of the cord's own area
-STEEL_CORD = (190e9, 0.3, 7850.0)
-POLYESTER_CORD = (7.5e9, 0.3, 1380.0)  # 1670 dtex/2, dipped, at the strain of an inflated carcass
-NYLON_CORD = (3e9, 0.3, 1140.0)  # 1400 dtex/2
+STEEL_CORD = CordMaterial(190e9, 0.3, 7850.0)
+# 1670 dtex/2, dipped, at the strain of an inflated carcass
+POLYESTER_CORD = CordMaterial(7.5e9, 0.3, 1380.0, bears_compression=False)
+NYLON_CORD = CordMaterial(3e9, 0.3, 1140.0, bears_compression=False)  # 1400 dtex/2
 
 SOFT = {  # of passenger cars
     "tread": Compound(65, 1150, 0.5),
@@ -186,8 +200,8 @@ TRUCK = Construction(
         "inner_liner": Compound(72, 1150),
         "belt_skim": Compound(78, 1190),
     },
-    cords={"steel_cord": STEEL_CORD},
-    carcass=(Ply("steel_cord", 6.5e-7, 2.0e-3, 0.0),),  # 3 + 9 + 15 x 0.175
+    cords={"steel_cord": STEEL_CORD, "carcass_cord": replace(STEEL_CORD, bears_compression=False)},
+    carcass=(Ply("carcass_cord", 6.5e-7, 2.0e-3, 0.0),),  # 3 + 9 + 15 x 0.175
     belts=(
         Belt(Ply("steel_cord", HEAVY.area, HEAVY.spacing, 50.0), share=0.75),  # transition belt
         Belt(HEAVY),
