@@ -21,6 +21,7 @@ from ..process import end_commands
 from ..rings import about_axle, ring_modes
 from .results import Fields, pairs, read_eigenvalues, read_fields, read_mass
 from .runner import clear, run_job
+from .slack import read_strips, refuse_slack
 
 Array = np.ndarray
 SECTOR, SETTINGS, INFLATE = "sector.inp", "calculix.json", "inflate"
@@ -104,6 +105,8 @@ class CalculiX:
         run_one(INFLATE, SECTOR)
         if not state.exists() or not state.stat().st_size:
             raise RunFailed("no_results", f"CalculiX left no {state.name}")
+        if strips := read_strips(folder / SECTOR):
+            refuse_slack(strips, _inflated(folder / f"{INFLATE}.frd")[0])
         if settings["parallel"] == 1:  # in this thread, so that Ctrl-C ends ccx at once
             for job in jobs:
                 run_modes(job)

@@ -15,7 +15,6 @@ from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.tyre.case import LoadedCase
-from tyrecal.tyre.effects.edit import changed, with_part
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.templates import TemplateFailed
 from tyrecal.tyre.values import with_values
@@ -61,15 +60,6 @@ def test_wrong_options_are_refused(tmp_path: Path, options: dict, words: str) ->
 def test_decks_that_cannot_be_written(options: dict, words: str) -> None:
     with pytest.raises(TemplateFailed, match=words):
         Decks(TyreDesign(main_case(**options))).texts("calculix")
-
-
-def test_cords_that_bear_no_compression_are_refused() -> None:
-    case = main_case()
-    cord = with_part(case.case.materials["carcass_cord"], bears_compression=False)
-    case = changed(case, materials={**case.case.materials, "carcass_cord": cord})
-    with pytest.raises(TemplateFailed, match=r"carcass_cord.bears_compression must be true"):
-        Decks(TyreDesign(case)).texts("calculix")
-    assert Decks(TyreDesign(case)).texts("abaqus")["inflate.inp"].count("*NO COMPRESSION") == 1
 
 
 def test_a_vibration_frequency_is_refused(tmp_path: Path) -> None:

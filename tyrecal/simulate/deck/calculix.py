@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
 
 from ...tyre.case import Case
-from ...tyre.case.parts import Cord
+from ...tyre.case.parts import RebarLayer
 from ...tyre.resolve import Tyre
 from ...tyre.section.section import SectionError
 from ...tyre.templates import TemplateFailed
 from .abaqus import claimed, deck_name, solid_claims
-from .sector import INNER_FACE, Sector, build_sector
+from .sector import INNER_FACE, Sector, Strip, build_sector
 
 ELEMENT_TYPES = ("C3D20R", "C3D20", "C3D8")
 PLY_THICKNESS_M = 2e-4
@@ -43,12 +44,6 @@ def calculix_context(tyre: Tyre) -> dict[str, Any]:
         )
     surfaces = tyre.section.names[0], tyre.section.names[-1]
     for name, layer in c.rebar_layers.items():
-        cord = c.materials[layer.material]
-        if isinstance(cord, Cord) and not cord.bears_compression:
-            raise TemplateFailed(
-                f"materials.{layer.material}.bears_compression must be true: for CalculiX a ply is"
-                " a thin solid, stiff both ways"
-            )
         if layer.line in surfaces:
             raise TemplateFailed(
                 f"rebar_layers.{name}.line must be inside the section: for CalculiX a ply is a thin"
@@ -153,9 +148,25 @@ def _plies(case: Case, sector: Sector) -> list[dict[str, Any]]:
                     "elements": [(number, *sector.bricks[strip.element])],
                     "stiffness": _tensor(cord.youngs_modulus_Pa * share, along),
                     "density": cord.density_kg_per_m3 * share,
+                    "taut": None if cord.bears_compression else _taut(sector, strip, name, layer),
                 }
             )
     return plies
+
+
+def _taut(sector: Sector, strip: Strip, name: str, layer: RebarLayer) -> str:
+    """JSON of a ply whose cords bear no compression, as the solver's adapter reads it to refuse a
+    state that compresses them."""
+    a, b, c, d = sector.bricks[strip.element][:4]
+    return json.dumps(
+        {
+            "layer": name,
+            "region": sector.regions[strip.element],
+            "material": layer.material,
+            "angle_deg": layer.angle_deg,
+            "ends": [[a, b], [d, c]],
+        }
+    )
 
 
 def _tensor(stiffness: float, along: np.ndarray) -> list[float]:
