@@ -31,6 +31,7 @@ def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
     """
     from ..measured.load import judged
     from ..tyre.case import overruled
+    from ..tyre.case.slack_hint import slack_cord_hint
 
     loaded, mistakes = judged(case, allow_unusual)
     if loaded and (refused := _refused(loaded)):
@@ -56,6 +57,8 @@ def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
     terminal.say(f"{case}: no mistakes")
     if not (loaded.case.targets.weights or loaded.measured):
         terminal.note("it has no targets: 'tyrecal fit' needs some, or --measured FILE")
+    if "road" in loaded.file_data and (hint := slack_cord_hint(loaded)):
+        terminal.note(hint)
     return 0
 
 
