@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from math import pi
 
 INCH, POUND, POUND_FORCE = 0.0254, 0.45359237, 4.4482216152605  # m, kg, N
+LENGTH = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "inch": INCH, "in": INCH}
 QUANTITIES: dict[str, dict[str, float]] = {
     "frequency_Hz": {
         "Hz": 1.0,
@@ -18,6 +19,8 @@ QUANTITIES: dict[str, dict[str, float]] = {
         "rpm": 1 / 60,
     },
     "contact_area_m2": {"m2": 1.0, "cm2": 1e-4, "mm2": 1e-6, "in2": INCH**2, "sq.in": INCH**2},
+    "contact_length_m": LENGTH,
+    "contact_width_m": LENGTH,
     "vertical_stiffness_N_per_m": {
         "N/m": 1.0,
         "N_per_m": 1.0,

@@ -109,6 +109,18 @@ SLIPS = {  # name: text of the good case, text in its place, key, what was meant
         "targets.footprint.0.contact_area_m2",
         "160 cm2, 0.016 m2",
     ),
+    "mm of a patch": (
+        "  modes:\n",
+        "  footprint: [{load_N: 4000, contact_width_m: 141, sigma_m: 2}]\n  modes:\n",
+        "targets.footprint.0.contact_width_m",
+        "141 mm, 0.141 m",
+    ),
+    "mm of its sigma": (
+        "  modes:\n",
+        "  footprint: [{load_N: 4000, contact_length_m: 0.132, sigma_m: 2}]\n  modes:\n",
+        "targets.footprint.0.sigma_m",
+        "2 mm, 0.002 m",
+    ),
     "N/mm": (
         "  modes:\n",
         "  footprint: [{load_N: 4000, vertical_stiffness_N_per_m: 220, "

@@ -1,4 +1,4 @@
-"""A stand-in with areas and stiffnesses that are powers of the variables, and the real modes."""
+"""A stand-in with patches and stiffnesses that are powers of the variables, and the real modes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,10 @@ CASE = with_level(load_case(CASES / "p235_75r17.yaml"), "coarse")
 START = start_values(CASE)
 AREA = {"A_belt": -0.05, "A_carcass": -0.2, "C10": -0.1}
 STIFFNESS = {"A_belt": 0.1, "A_carcass": 0.15, "C10": 0.3}
+LENGTH = {"A_belt": 0.0, "A_carcass": -0.12, "C10": -0.2}
+WIDTH = {"A_belt": 0.0, "A_carcass": -0.08, "C10": 0.1}
 AREA_0, STIFFNESS_0 = np.pi * 0.08 * 0.05, 1.5 * 4000 / 0.02  # of Hertz at 4 kN
+LENGTH_0, WIDTH_0 = 0.16, 0.10
 
 
 def power(values: Mapping[str, float], powers: Mapping[str, float]) -> float:
@@ -33,7 +36,7 @@ def power(values: Mapping[str, float], powers: Mapping[str, float]) -> float:
 
 
 class Elastic(Hertz):
-    """Areas and stiffnesses, as powers of the variables."""
+    """Areas, lengths, widths and stiffnesses, as powers of the variables."""
 
     def write(self, decks: Any, folder: Path) -> list[Path]:
         """The real decks; remembers what the formulas need."""
@@ -41,13 +44,16 @@ class Elastic(Hertz):
         if decks.loads_N:
             self.size = power(decks.values, AREA) ** 0.5
             self.factor = power(decks.values, STIFFNESS)
+            self.long = LENGTH_0 * power(decks.values, LENGTH)
+            self.wide = WIDTH_0 * power(decks.values, WIDTH)
         return paths
 
     def footprint(self, load: float) -> dict[str, Any]:
         """One load."""
         found = super().footprint(load)
         found["stiffness_N_per_m"] *= self.factor
-        return found
+        scale = (load / 4e3) ** (1 / 3)
+        return found | {"contact_length_m": scale * self.long, "contact_width_m": scale * self.wide}
 
 
 class Roadless(Bundled):

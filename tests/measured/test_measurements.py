@@ -39,6 +39,12 @@ def read(tmp_path: Path, *lines: str, header: str = HEADER) -> list:
             "contact_area_m2,,,,,240,4,0.02,0.001",
             "the load is 4 N: usual is 100 to 60000 N; did you mean 4 kN, 4000 N",
         ),
+        (
+            "contact_length_m,,,,,220,4000,132,2",
+            "contact_length_m is 132: no tyre has that, usual is 0.005 to 1 m; did you mean"
+            " 132 mm, 0.132 m?",
+        ),
+        ("contact_width_m,,,,,220,0,0.14,0.002", "greater than 0 for contact_width_m"),
         ("frequency_Hz,2,0,,,240,0,0.2,0.02", "frequency_Hz is 0.2: no tyre has that, usual is"),
         ("frequency_Hz,2,0,,,240,0,79.5,0", "greater than 0"),
         ("frequency_Hz,2,0,,,240,0,79.5,-1", "greater than 0"),

@@ -74,6 +74,39 @@ def test_other_quantities_and_loads(tmp_path: Path) -> None:
     assert told["mass_kg"] == pytest.approx((13.6078, 0), rel=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("length", "width", "values"),
+    [
+        ("contact length [mm]", "contact width [cm]", "132;14,1"),
+        ("contact_length_m", "contact_width_m", "0,132;0,141"),
+        ("patch length (cm)", "patch-width mm", "13,2;141"),
+        ("Latschlänge [mm]", "Latschbreite [mm]", "132;141"),
+        ("footprint length inch", "footprint width [in]", "5,19685;5,55118"),
+    ],
+)
+def test_lengths_and_widths_of_a_patch(
+    tmp_path: Path, length: str, width: str, values: str
+) -> None:
+    """One sigma with a unit of length is that of both."""
+    head = f"load [N];pressure [kPa];{length};{width};sigma [mm]\n"
+    read_back = {each.quantity: each for each in read(tmp_path, f"{head}4000;220;{values};2\n")}
+    assert read_back["contact_length_m"].value == pytest.approx(0.132, rel=1e-5)
+    assert read_back["contact_width_m"].value == pytest.approx(0.141, rel=1e-5)
+    assert {each.sigma for each in read_back.values()} == {0.002} and len(read_back) == 2
+    again = read(tmp_path, measurements_csv(list(read_back.values())))
+    assert [each.value for each in again] == pytest.approx([0.132, 0.141], rel=1e-5)
+
+
+def test_a_length_has_a_unit_and_a_mode_none(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"has no unit; write it as 'contact length \[m\]'"):
+        read(tmp_path, "load [N];pressure [kPa];contact length\n4000;220;132\n")
+    with pytest.raises(InputError, match="the unit must be one of m, mm, cm, inch"):
+        read(tmp_path, "load [N];pressure [kPa];contact length [kPa]\n4000;220;132\n")
+    head = "mode n,mode m,pressure [kPa],frequency [Hz]\n"
+    with pytest.raises(InputError, match=r"label is '2', must be like \[2,1\]"):
+        read(tmp_path, f"{head}2,0,240,85\n")
+
+
 def test_loaded_modes_have_a_symmetry(tmp_path: Path) -> None:
     head = "c,m,member,load [N],pressure [kPa],frequency [Hz]\n"
     (found,) = read(tmp_path, f"{head}2,0,symmetric,4000,240,85\n")

@@ -17,6 +17,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..files import read_json
+from ..tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from .case import Report
 
 DEFAULTS = {  # of a baseline that is written for the first time; people edit them
@@ -24,8 +25,7 @@ DEFAULTS = {  # of a baseline that is written for the first time; people edit th
     "fit/mass_kg": {"relative": 1e-3},
     "fit/variable": {"relative": 0.01},  # the valley is flat: frequencies say more
     "fit/fitted_Hz": {"relative": 1e-3},
-    "fit/fitted_contact_area_m2": {"relative": 0.01},
-    "fit/fitted_vertical_stiffness_N_per_m": {"relative": 0.01},
+    **{f"fit/fitted_{name}": {"relative": 0.01} for name in FOOTPRINT_QUANTITIES},
     "modes/mass_kg": {"relative": 1e-6},
     "modes/frequency_Hz": {"relative": 1e-5},
     "sweep-pressure/frequency_Hz": {"relative": 1e-3},

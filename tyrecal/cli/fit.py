@@ -71,8 +71,8 @@ def command(
     scheduler: str,
     study: options.Study,
 ) -> int:
-    """Calibrate the variables of CASE to its targets: frequencies, and contact areas and vertical
-    stiffnesses on the road.
+    """Calibrate the variables of CASE to its targets: frequencies, and contact areas, lengths,
+    widths and vertical stiffnesses on the road.
 
     Writes fit.json, fit.csv, fit_history.csv and pictures. --set NAME=VALUE on a variable changes
     where the fit starts. --pressure-kPa and --set rim.free=true choose the targets that were

@@ -13,6 +13,10 @@ HEADINGS = {
     "frequency_Hz": "frequency freq f fn eigenfrequency natural_frequency resonance_frequency"
     " frequenz eigenfrequenz frequence frequence_propre",
     "contact_area_m2": "contact_area area footprint_area kontaktflache aufstandsflache",
+    "contact_length_m": "contact_length patch_length footprint_length kontaktlange aufstandslange"
+    " latschlange longueur_de_contact",
+    "contact_width_m": "contact_width patch_width footprint_width kontaktbreite aufstandsbreite"
+    " latschbreite largeur_de_contact",
     "vertical_stiffness_N_per_m": "vertical_stiffness radial_stiffness stiffness kz"
     " vertikalsteifigkeit federrate",
     "mass_kg": "mass tyre_mass tire_mass weight masse gewicht",
@@ -35,7 +39,9 @@ HEADINGS = {
 MEANING = {name: meaning for meaning, names in HEADINGS.items() for name in names.split()}
 BRACKETED = re.compile(r"^(.*?)\s*(?:[\[(](.*?)[\])]\s*)?$")  # name [unit]
 ENDING = re.compile(r"^(.+)[\s_](hz|kpa|bar|psi|n|m2|n[\s_]per[\s_]m|kg|kn|percent)$")
+LENGTH_ENDING = re.compile(r"^(.+)[\s_](m|mm|cm|in|inch)$")  # 'mode m' ends in no unit
 TABLES = {"pressure": units.PRESSURE, "load": units.LOAD, **units.QUANTITIES}
+LENGTHS = {name for name, table in units.QUANTITIES.items() if table is units.LENGTH}
 
 
 @dataclass(frozen=True)
@@ -45,7 +51,7 @@ class TableColumn:
     index: int
     factor: float = 1.0  # to our unit
     percent: bool = False  # of the value
-    of: str = ""  # the quantity that a sigma's unit belongs to; "" where it has none or is in %
+    of: tuple[str, ...] = ()  # quantities that a sigma's unit belongs to; () of none, and of %
 
 
 def meaning_of(heading: str) -> str | None:
@@ -96,10 +102,14 @@ def _column(index: int, heading: str, meaning: str, unit: str) -> TableColumn:
             raise ValueError(f": the unit must be one of {', '.join(table)}")
         return TableColumn(index, factor)
     if meaning == "sigma" and unit and unit != "%":
-        for quantity, table in units.QUANTITIES.items():
-            if factor := units.factor(table, unit):
-                return TableColumn(index, factor, of=quantity)
-        raise ValueError(": unknown unit")
+        factors = {
+            quantity: factor
+            for quantity, table in units.QUANTITIES.items()
+            if (factor := units.factor(table, unit))
+        }
+        if not factors:
+            raise ValueError(": unknown unit")
+        return TableColumn(index, next(iter(factors.values())), of=tuple(factors))
     return TableColumn(index, percent=unit == "%")
 
 
@@ -110,5 +120,16 @@ def _heading(text: str) -> tuple[str, str]:
     name = name.lower().translate(str.maketrans("éèêüäö", "eeeuao")).strip(" .:")
     if not unit and (match := ENDING.match(name)):
         name, unit = match[1], re.sub(r"\s", "_", match[2])
+    elif not unit and (match := LENGTH_ENDING.match(name)) and _is_length(match[1]):
+        name, unit = match[1], match[2]
     unit = "%" if unit == "percent" else unit
-    return re.sub(r"[\s\-_.]+", "_", name).strip("_"), units.plain(unit)
+    return _words(name), units.plain(unit)
+
+
+def _is_length(name: str) -> bool:
+    return MEANING.get(_words(name)) in {*LENGTHS, "sigma"}
+
+
+def _words(name: str) -> str:
+    """Its words, joined by low lines."""
+    return re.sub(r"[\s\-_.]+", "_", name).strip("_")

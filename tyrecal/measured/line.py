@@ -56,8 +56,9 @@ class Line:
             raise ValueError(f"load is {load:g}, must be at least 0")
         quantities = self._quantities()
         sigma = self.columns["sigma"] if self.cell("sigma") else None
-        if sigma and sigma.of and sigma.of not in quantities:
-            raise ValueError(f"sigma has the unit of {sigma.of}, which has no value here")
+        if sigma and sigma.of and not {*sigma.of} & {*quantities}:
+            which = " or ".join(sigma.of)
+            raise ValueError(f"sigma has the unit of {which}, which has no value here")
         if sigma and not sigma.of and not sigma.percent and len(quantities) > 1:
             raise ValueError(
                 f"sigma can be that of {' or '.join(quantities)}: write its unit, as in"
@@ -69,7 +70,7 @@ class Line:
             if quantity == "frequency_Hz":
                 label = self._label()
                 member = self._member(label, bool(load)) if label else ""
-            own = self.number("sigma") if sigma and sigma.of in ("", quantity) else nan
+            own = self.number("sigma") if sigma and (not sigma.of or quantity in sigma.of) else nan
             if sigma and sigma.percent:
                 own *= 0.01 * value
             at, rim = pressure, self._rim()

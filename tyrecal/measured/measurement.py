@@ -8,6 +8,7 @@ from math import nan
 
 from ..simulate.modes.label import Label
 from ..tyre.case.parts import RimSupport
+from ..tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ..tyre.state import TyreState
 from ..tyre.usual import USUAL, USUAL_MEASUREMENTS, Usual
 from ..units import PRESSURE
@@ -66,7 +67,7 @@ class Measurement:
             return f"the pressure is {self.pressure_kPa:g} kPa: {refusal}"
         if self.load_N and (refusal := USUAL["road.loads_N.*"].refusal(self.load_N)):
             return f"the load is {self.load_N:g} N: {refusal}"
-        if self.quantity in ("contact_area_m2", "vertical_stiffness_N_per_m") and not self.load_N:
+        if self.quantity in FOOTPRINT_QUANTITIES and not self.load_N:
             return f"the load is 0, must be greater than 0 for {self.quantity}"
         if self.rim not in (None, "fixed") and self.quantity != "frequency_Hz":
             return f"rim is {self.rim}, must be fixed or empty for {self.quantity}"

@@ -13,14 +13,15 @@ from ..errors import InputError
 from ..simulate.modes.label import Label
 from ..tyre.case import LoadedCase, start_values
 from ..tyre.case.parts import RimSupport
-from ..tyre.case.schema import MEASURED_SIGMA, TargetFootprint, TargetMass, TargetMode, Targets
+from ..tyre.case.schema import TargetFootprint, TargetMass, TargetMode, Targets
+from ..tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ..tyre.state import AS_THE_CASE, PRESSURE_PATH, RIM_FREE, WHEEL_FREE, TyreState, pressure_name
 from ..tyre.values import set_values
 from .measurement import Measurement
 from .tables import read_measurements
 
 SAME_PRESSURE_kPa = 0.5  # pressures that differ by less are one
-PRESSED_RIM: RimSupport = "fixed"  # of areas and stiffnesses
+PRESSED_RIM: RimSupport = "fixed"  # of all that is measured of the patch
 
 
 def with_measured(
@@ -208,7 +209,7 @@ def _footprint(case: LoadedCase, readings: Sequence[Measurement]) -> list[Target
                 "load_N": each.load_N,
                 "pressure_kPa": each.state.of(case).pressure_kPa,
                 each.quantity: each.value,
-                MEASURED_SIGMA[each.quantity]: each.sigma,
+                FOOTPRINT_QUANTITIES[each.quantity].sigma: each.sigma,
             }
         )
         for each in readings

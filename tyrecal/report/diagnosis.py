@@ -13,6 +13,7 @@ from ..studies.diagnose.several import PRIOR_NONE, present
 from ..studies.diagnose.study import DiagnosedCase
 from ..studies.diagnose.under_load import LoadedRow
 from ..studies.diagnose.verdict import NAMED, NO_GAP, UNDECIDED
+from ..tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ..units import in_engineers_units, said
 from .table import map_resolution
 
@@ -287,9 +288,8 @@ def _measured(row: LoadedRow) -> str:
     percent = f" ± {100 * row.sigma / row.value:.1f} %"
     if row.member:
         return f"{row.member} {row.value:.2f} Hz{percent}"
-    if row.quantity == "contact_area_m2":
-        return f"contact area {1e4 * row.value:.1f} cm²{percent}"
-    return f"vertical stiffness {1e-3 * row.value:.1f} N/mm{percent}"
+    quantity = FOOTPRINT_QUANTITIES[row.quantity]
+    return f"{quantity.words} {quantity.per_SI * row.value:.1f} {quantity.unit}{percent}"
 
 
 def _which(study: DiagnosedCase) -> Iterator[str]:

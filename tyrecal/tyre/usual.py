@@ -14,13 +14,13 @@ from dataclasses import dataclass, field, replace
 from math import pi, sqrt
 from typing import TYPE_CHECKING, Any
 
-from ..units import INCH, LOAD, PRESSURE, QUANTITIES
+from ..units import INCH, LENGTH, LOAD, PRESSURE, QUANTITIES
 from .case.checks import Problems, at, find
-from .case.mistakes import Keys, dotted
+from .case.mistakes import Keys
 from .case.parts import number
-from .case.schema import MEASURED_SIGMA as SIGMAS
 from .case.shape import entries, table
 from .effects import catalogue
+from .footprint_quantities import FOOTPRINT_QUANTITIES
 from .plugins import IDS
 
 if TYPE_CHECKING:
@@ -30,10 +30,8 @@ READING_RTOL = 0.05  # readings that differ by less are one: bar and atm
 Slips = Mapping[str, float | Callable[[float], float]]
 """What may have been written instead, and the factor, or the function, to the right unit."""
 ALL_THE_SAME = " (--allow-unusual takes it as it is)"
-_OF_SIGMA = {
-    "sigma_Hz": "frequency_Hz",
-    "sigma_kg": "mass_kg",
-    **{sigma: of for of, sigma in SIGMAS.items()},
+_SIGMAS = {"frequency_Hz": "sigma_Hz", "mass_kg": "sigma_kg"} | {
+    name: each.sigma for name, each in FOOTPRINT_QUANTITIES.items()
 }
 
 
@@ -83,7 +81,6 @@ def inverse(of: float) -> Callable[[float], float]:
 
 AREA, FREQUENCY = QUANTITIES["contact_area_m2"], {**QUANTITIES["frequency_Hz"], "mHz": 1e-3}
 STIFFNESS = QUANTITIES["vertical_stiffness_N_per_m"]
-LENGTH = {"mm": 1e-3, "cm": 1e-2, "inch": INCH}
 STRESS = {"MPa": 1e6, "GPa": 1e9, "kPa": 1e3, "bar": 1e5, "psi": 6894.757}
 DENSITY = {"g/cm3": 1e3, "t/mm3": 1e12, "kg/mm3": 1e9, "lb/in3": 27679.9, "lb/ft3": 16.0185}
 MASS_UNITS = {"g": 1e-3, "t": 1e3}
@@ -110,6 +107,8 @@ CELSIUS: Slips = {"K": lambda T: T - 273.15, "degrees Fahrenheit": lambda T: (T 
 USUAL_MEASUREMENTS = {
     "frequency_Hz": Usual(2, 1000, "Hz", FREQUENCY),
     "contact_area_m2": Usual(1e-4, 0.5, "m2", AREA),
+    "contact_length_m": Usual(0.005, 1.0, "m", LENGTH),
+    "contact_width_m": Usual(0.005, 0.8, "m", LENGTH),
     "vertical_stiffness_N_per_m": Usual(1e4, 1e7, "N/m", STIFFNESS),
     "mass_kg": Usual(0.5, 500, "kg", QUANTITIES["mass_kg"]),
 }
@@ -188,10 +187,7 @@ USUAL: dict[str, Usual] = {
     "targets.mass.weight": Usual(0, 1e4, "", least=1e-4),
     "targets.footprint.*.pressure_kPa": Usual(50, 1200, "kPa", PRESSURE),
     "targets.footprint.*.load_N": Usual(100, 6e4, "N", LOAD),
-    "targets.footprint.*.contact_area_m2": USUAL_MEASUREMENTS["contact_area_m2"],
-    "targets.footprint.*.vertical_stiffness_N_per_m": USUAL_MEASUREMENTS[
-        "vertical_stiffness_N_per_m"
-    ],
+    **{f"targets.footprint.*.{name}": USUAL_MEASUREMENTS[name] for name in FOOTPRINT_QUANTITIES},
     "targets.footprint.*.weight": Usual(0, 1e4, "", least=1e-4),
     "uncertainties.*.percent": Usual(0.001, 100, "%"),
     "solver.time_limit_s": Usual(1, 1e6, "s"),
@@ -266,11 +262,12 @@ def _ranges(
     elif here == "rebar_layers" and last == "angle_deg":
         if section and (angle := _angle(table(table(data, here), str(keys[1])), section)):
             yield angle, ""
-    elif here == "targets" and last in _OF_SIGMA:
-        value = number(at(data, keys[:-1]), _OF_SIGMA[last])
-        if value and value > 0:
-            whole = USUAL[dotted((*keys[:2], *["*"] * (len(keys) - 3), _OF_SIGMA[last]))]
-            yield replace(whole, low=SMALLEST_SIGMA * value, high=LARGEST_SIGMA * value), ""
+    elif here == "targets" and last in _SIGMAS.values():
+        for quantity in (name for name, sigma in _SIGMAS.items() if sigma == last):
+            value = number(at(data, keys[:-1]), quantity)
+            if value and value > 0:
+                whole = USUAL_MEASUREMENTS[quantity]
+                yield replace(whole, low=SMALLEST_SIGMA * value, high=LARGEST_SIGMA * value), ""
     else:
         words = tuple(map(str, keys))
         load = last == "load_N" or words[:2] == ("road", "loads_N")

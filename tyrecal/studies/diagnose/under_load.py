@@ -14,8 +14,8 @@ from ...simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from ...simulate.modes.label import Label
 from ...simulate.modes.loaded import Member
 from ...tyre.case import LoadedCase
+from ...tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ...tyre.templates import TemplateFailed
-from ..fit.road import ROW
 from ..footprint import footprint_row
 from ..loaded import load_tyres
 from .tyre_model import asked_for
@@ -26,7 +26,7 @@ Values = Mapping[str, float]
 
 @dataclass(frozen=True)
 class LoadedRow:
-    """A measured contact area, vertical stiffness or mode at a load."""
+    """A measured quantity of the patch, a vertical stiffness or a mode at a load."""
 
     quantity: str
     member: Member | None  # of a mode
@@ -117,7 +117,7 @@ def _footprints(
     rows = {each.load_N: footprint_row(pressed, each, mesh) for each in pressed.footprints}
     for quantity, member, load in wanted:
         if load in rows:
-            yield (quantity, member, load), rows[load][ROW.get(quantity, quantity)]
+            yield (quantity, member, load), rows[load][FOOTPRINT_QUANTITIES[quantity].row]
     if pressed.failed:
         raise pressed.failed
 

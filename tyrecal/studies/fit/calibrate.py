@@ -26,7 +26,7 @@ Array = np.ndarray
 METHODS: dict[str, Descend] = {"slsqp": slsqp.descend, "gauss-newton": gauss_newton.descend}
 TOLERANCE = 1e-3  # projected gradient, Hz per unit of a logarithm: 1e-5 Hz for a change of 1 %
 SLOPE_NOISE_HZ = 50.0  # differences of a step that suits the digits: this times the step
-SLOPE_ERROR = 1e-4  # of d ln q / d x of areas and stiffnesses, by the curvature within a step
+SLOPE_ERROR = 1e-4  # of d ln q / d x of patches and stiffnesses, by the curvature within a step
 MOST_REPLACED = 20  # replaced starts per start asked for
 
 FitNotify = Callable[[int, Mapping[str, float], Point | EvaluationFailed], None]

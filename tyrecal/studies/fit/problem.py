@@ -2,8 +2,8 @@
 
 F = sqrt( sum over modes, doublets twice, of w (f_num - f_ref)^2 )
 
-With standard deviations sigma, and other targets q (on the road contact areas, vertical
-stiffnesses and modes, and the mass):
+With standard deviations sigma, and other targets q (on the road contact areas, lengths,
+widths, vertical stiffnesses and modes, and the mass):
 
 F = sqrt( sum over modes, doublets twice, of w ((f_num - f_ref) / sigma)^2
           + sum over other targets of w ((q_num - q_ref) / sigma)^2 )
@@ -115,7 +115,7 @@ class Problem:
         self.difference_step = (
             None if evaluator.has_gradients else getattr(evaluator.solver, "difference_step", STEP)
         )
-        # how many of the road's targets, the first, have exact slopes: areas and stiffnesses
+        # how many of the road's targets, the first, have exact slopes: all but modes
         exact = self.road and self.difference_step is None
         exact = exact and "footprint_gradients" in evaluator.solver.capabilities
         self.exact_on_road = sum(not t.member for t in self.road) if exact else 0

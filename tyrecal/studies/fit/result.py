@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from ...simulate.modes.label import Label
+from ...tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ...tyre.state import AS_THE_CASE
 from ...tyre.values import with_values
 from ..labels import Labels
@@ -35,8 +36,10 @@ from .uncertainty import FitUncertainty, uncertainty
 MIN_STEP = 1e-6  # of a scaled variable, below which the fit did not move, or is at a bound
 NEAR_BEST_HZ = 0.05  # of the objective: the fit could have ended there
 ROAD_QUANTITIES = {  # targets that are no modes
-    "contact_area_m2": Column("contact area, cm²", ".1f", 1e4),
-    "vertical_stiffness_N_per_m": Column("vertical stiffness, N/mm", ".1f", 1e-3),
+    **{
+        name: Column(f"{each.words}, {each.unit}", ".1f", each.per_SI)
+        for name, each in FOOTPRINT_QUANTITIES.items()
+    },
     "mass_kg": Column("mass, kg", ".2f"),
 }
 MOST_PROPOSED = 4  # states in a table
@@ -123,7 +126,13 @@ class FittedFootprint(ResultPart):
     """A target on the road that is no mode, or the mass, SI."""
 
     load_N: float = 0.0
-    quantity: Literal["contact_area_m2", "vertical_stiffness_N_per_m", "mass_kg"]
+    quantity: Literal[
+        "contact_area_m2",
+        "contact_length_m",
+        "contact_width_m",
+        "vertical_stiffness_N_per_m",
+        "mass_kg",
+    ]
     initial: float
     fitted: float
     target: float

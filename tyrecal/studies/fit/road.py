@@ -1,11 +1,11 @@
-"""Targets on the road: contact areas, vertical stiffnesses and modes at a load.
+"""Targets on the road: contact areas, lengths and widths, vertical stiffnesses, modes at a load.
 
 Every design is pressed, in each state, at the loads with a target alone, in one run; friction
 remembers the loads on the way, which changes a stiffness by 0.2 % at most.
 
-Slopes of areas and stiffnesses are the solver's own where it has them. Else, and of modes at a
-load, they are differences: areas are reproducible to 1e-12 of themselves, stiffnesses to 1e-10, so
-that over 1e-5 they have five digits.
+Slopes of all but modes are the solver's own where it has them. Else, and of modes at a load, they
+are differences: areas, lengths and widths are reproducible to 1e-12 of themselves, stiffnesses to
+1e-10, so that over 1e-5 they have five digits.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.evaluate.pressed import Pressed
 from ...tyre.case import LoadedCase
+from ...tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ...tyre.state import without
 from ..footprint import footprint_row
 from ..loaded import LoadedTyre, load_tyres
@@ -29,9 +30,6 @@ Designs = Sequence[Mapping[str, float]]
 Placed = Mapping[int, ValueTarget]  # targets by their places among all
 Quantities = dict[int, float]  # by place
 PRESS_STEP = 1e-5  # of a scaled variable: the root of the precision of a stiffness
-ROW = {"contact_area_m2": "area_m2"}  # quantities with another name in a row of a footprint
-# and in a footprint's slopes
-SLOPE = {"vertical_stiffness_N_per_m": "stiffness_N_per_m"}
 
 
 def press(
@@ -71,7 +69,7 @@ def press_with_slopes(
     values: Mapping[str, float],
     names: Sequence[str],
 ) -> tuple[Array, Array]:
-    """Quantities (targets,) of a design, areas and stiffnesses, and their exact slopes (targets,
+    """Quantities (targets,) of a design, none a mode, and their exact slopes (targets,
     variables) by the variables ``names``. Raises EvaluationFailed, DeckRefused."""
     quantities, slopes = np.empty(len(targets)), np.zeros((len(targets), len(names)))
     for state in dict.fromkeys(t.state.unloaded for t in targets):
@@ -85,7 +83,7 @@ def press_with_slopes(
         at = {each.load_N: each.slopes for each in pressed.footprints}
         for place, quantity in _of_patches(case, design, pressed, here).items():
             own = here[place]
-            rates, name = at[own.state.load_N], SLOPE.get(own.quantity, own.quantity)
+            rates, name = at[own.state.load_N], FOOTPRINT_QUANTITIES[own.quantity].slope
             quantities[place] = quantity
             slopes[place] = [rates[v][name] if v in rates else 0.0 for v in names]
     return quantities, slopes
@@ -114,7 +112,8 @@ def _of_patches(
     mesh = TyreDesign(case, values).tyre.mesh
     rows = {each.load_N: footprint_row(pressed, each, mesh) for each in pressed.footprints}
     return {
-        place: rows[t.state.load_N][ROW.get(t.quantity, t.quantity)] for place, t in targets.items()
+        place: rows[t.state.load_N][FOOTPRINT_QUANTITIES[t.quantity].row]
+        for place, t in targets.items()
     }
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from ...simulate.modes.label import Label
 from ...simulate.modes.loaded import Member
 from ...tyre.case import LoadedCase
-from ...tyre.case.schema import MEASURED_SIGMA
+from ...tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ...tyre.state import AS_THE_CASE, TyreState
 
 RIM_WORDS = {"springs": "spindle"}  # of provenance
@@ -40,8 +40,8 @@ class Target:
 
 @dataclass(frozen=True)
 class ValueTarget:
-    """Anything else, with its standard deviation in the same unit: on the road a contact area, a
-    tangent vertical stiffness, or the frequency of the mode ``member``; the mass."""
+    """Anything else, with its standard deviation in the same unit: on the road one of
+    `FOOTPRINT_QUANTITIES`, or the frequency of the mode ``member``; the mass."""
 
     quantity: str
     value: float
@@ -78,19 +78,19 @@ def target_labels(case: LoadedCase) -> list[Label]:
 
 
 def read_road_targets(case: LoadedCase) -> list[ValueTarget]:
-    """Targets on the road: areas and stiffnesses, then modes."""
+    """Targets on the road: those of the patch and stiffnesses, then modes."""
     targets = case.case.targets
     found = [
         ValueTarget(
-            quantity,
-            getattr(t, quantity),
-            getattr(t, sigma),
+            name,
+            getattr(t, name),
+            getattr(t, quantity.sigma),
             t.weight,
             TyreState(t.pressure_kPa, t.load_N).of(case),
         )
         for t in targets.footprint
-        for quantity, sigma in MEASURED_SIGMA.items()
-        if getattr(t, quantity) is not None
+        for name, quantity in FOOTPRINT_QUANTITIES.items()
+        if getattr(t, name) is not None
     ]
     return found + [
         ValueTarget(

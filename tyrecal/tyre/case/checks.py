@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ValidationError
 
+from ..footprint_quantities import FOOTPRINT_QUANTITIES
 from ..own_deck.numbers import canonical
 from ..plugins import IDS
 from .mistakes import Keys, dotted, suggestion
 from .parts import WHOLE_BEAD, WRONG, number
-from .schema import MEASURED_SIGMA, Analysis
+from .schema import Analysis
 from .shape import KINDS, entries, explain, table, type_at, with_defaults
 
 if TYPE_CHECKING:
@@ -115,7 +116,7 @@ def _targets(data: Mapping[str, Any]) -> Problems:
             yield ("targets", "modes", i), f"the mode {name} is a target already{there}"
     for i, target in enumerate(entries(table(data, "targets"), "footprint")):
         load = number(target, "load_N") if isinstance(target, dict) else None
-        for quantity in MEASURED_SIGMA:
+        for quantity in FOOTPRINT_QUANTITIES:
             if load is None or target.get(quantity) is None:
                 continue
             first = seen.setdefault((load, number(target, "pressure_kPa"), quantity), i)

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
+from ..footprint_quantities import FOOTPRINT_QUANTITIES
 from ..plugins import IDS
 from .parts import (
     WHOLE_BEAD,
@@ -46,8 +47,6 @@ from .parts import (
 
 LEAST_LOAD_N, LARGEST_LOAD_N = 1.0, 1e6  # outside, no tyre finds its balance on a road
 Load = Annotated[Positive, Field(ge=LEAST_LOAD_N, le=LARGEST_LOAD_N)]
-MEASURED_SIGMA = {"contact_area_m2": "sigma_m2", "vertical_stiffness_N_per_m": "sigma_N_per_m"}
-"""What a footprint target can hold, and the key of its standard deviation."""
 Weight = Annotated[NotNegative, Field(le=1e6)]
 Pressure = Annotated[Number, Field(ge=0, lt=2000)]  # kPa
 
@@ -180,33 +179,38 @@ class TargetMode(Part):
 
 
 class TargetFootprint(Part):
-    """A measured contact area, or tangent vertical stiffness, at a load, with its sigma; its
-    pressure, by default the case's."""
+    """A measured contact area, length or width, or tangent vertical stiffness, at a load, with its
+    sigma; its pressure, by default the case's."""
 
     load_N: Load
     pressure_kPa: Pressure | None = None
     contact_area_m2: Positive | None = None
     sigma_m2: Positive | None = None
+    contact_length_m: Positive | None = None
+    contact_width_m: Positive | None = None
+    sigma_m: Positive | None = None
     vertical_stiffness_N_per_m: Positive | None = None
     sigma_N_per_m: Positive | None = None
     weight: Weight = 1.0
 
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
-        given = [key for key in MEASURED_SIGMA if values.get(key) is not None]
+        given = [key for key in FOOTPRINT_QUANTITIES if values.get(key) is not None]
         if not given and WRONG in values.values():  # a misspelt key, which is reported
             return
         if not given:
-            both = " or ".join(MEASURED_SIGMA)
-            yield "load_N", f"must come with what was measured at this load, {both}"
+            every = " or ".join(FOOTPRINT_QUANTITIES)
+            yield "load_N", f"must come with what was measured at this load, {every}"
         elif len(given) > 1:
             yield given[1], f"must be a target of its own: this one holds {given[0]} already"
         else:
-            for key, sigma in MEASURED_SIGMA.items():
-                if key in given and values.get(sigma) is None:
-                    yield sigma, f"must be given: the standard deviation of {key}, in its unit"
-                if key not in given and values.get(sigma) is not None:
-                    yield sigma, f"must be absent: it is of {key}, this target is {given[0]}"
+            own = FOOTPRINT_QUANTITIES[given[0]].sigma
+            if values.get(own) is None:
+                yield own, f"must be given: the standard deviation of {given[0]}, in its unit"
+            for key, quantity in FOOTPRINT_QUANTITIES.items():
+                if quantity.sigma != own and values.get(quantity.sigma) is not None:
+                    words = f"must be absent: it is of {key}, this target is {given[0]}"
+                    yield quantity.sigma, words
 
 
 class TargetMass(Part):
