@@ -67,7 +67,9 @@ def test_both_designs(
         ),
     }
     printed = capsys.readouterr()
-    assert "the fitted tyre's area is larger" in printed.out and printed.err == "footprint ...\n"
+    plan, progress = printed.err.splitlines()
+    assert "2 designs x 1 state x 2 loads: 4 runs" in plan and progress == "footprint ..."
+    assert "the fitted tyre's area is larger" in printed.out
     facts = json.loads((out / "run.json").read_text())["footprint"]
     assert (facts["command"], facts["solver_runs"]) == ("footprint", 2)
 

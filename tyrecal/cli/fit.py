@@ -56,6 +56,7 @@ from .terminal import Progress, Terminal
     help="Seed of the drawn starts.",
 )
 @option("--pictures/--no-pictures", default=True, help="Draw convergence, section, modes.")
+@options.dry_run
 @options.scheduler
 @options.study
 def command(
@@ -68,6 +69,7 @@ def command(
     starts: int,
     seed: int,
     pictures: bool,
+    dry_run: bool,
     scheduler: str,
     study: options.Study,
 ) -> int:
@@ -113,6 +115,9 @@ def command(
             f"solver '{name}' gives no sensitivities: --method gauss-newton needs about a third of"
             " its runs"
         )
+    plan = calibration.pressing_plan(method, starts, study.jobs)
+    if (plan.runs or dry_run) and study.planned(plan, dry_run):
+        return 0
     run = study.run(loaded, "fit", evaluator)
     with terminal.progress("fit") as bar, reached(scheduler) as evaluator.scheduler:
         unit = "sigma" if calibration.measured else objective_unit(loaded)

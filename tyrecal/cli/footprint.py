@@ -25,6 +25,7 @@ DESIGNS = ("initial", "fitted")
     help="Designs to press (default: initial, and fitted where --fitted is given).",
 )
 @option("--pictures/--no-pictures", default=True, help="Draw the patches; write VTU.")
+@options.dry_run
 @options.study
 def command(
     case: Path | None,
@@ -34,6 +35,7 @@ def command(
     fitted: Path | None,
     compare: str | None,
     pictures: bool,
+    dry_run: bool,
     study: options.Study,
 ) -> int:
     """Press the tyre of CASE on a flat road, load after load.
@@ -45,12 +47,13 @@ def command(
 
     \b
     tyrecal footprint
-    tyrecal footprint cases/p235_75r17.yaml
+    tyrecal footprint cases/p235_75r17.yaml --dry-run
     tyrecal footprint cases/p235_75r17.yaml --fitted p235_75r17/fit.json --jobs 2
     tyrecal footprint cases/p235_75r17.yaml --loads-N 3000,5000 --set road.friction=0 --json
     """
     from ..report.shape_data import patches_data
     from ..studies.footprint import run
+    from ..studies.pressing_plan import PressedState, plan_pressing
 
     terminal = study.terminal
     case, fitted, study = taken(case, fitted, study)
@@ -67,6 +70,10 @@ def command(
     designs = _designs(compare, values, fitted, loaded, terminal)
     if len(designs) == 1:
         options.say_idle(terminal, study.jobs, "one design is pressed alone; --fitted adds another")
+    pressed_to = [PressedState(len(asked))]
+    plan = plan_pressing(loaded, evaluator, pressed_to, len(designs), study.jobs)
+    if study.planned(plan, dry_run):
+        return 0
     output = study.run(loaded, "footprint", evaluator, load_N=asked)
     with terminal.progress("footprint") as bar:
         evaluator.on_progress = bar.at

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     help="Draw the section and each mode (default: no); with --sweep-load the frequencies"
     " over the load (default: yes).",
 )
+@options.dry_run
 @options.study
 def command(
     case: Path,
@@ -44,6 +45,7 @@ def command(
     wheel: str | None,
     fitted: Path | None,
     pictures: bool | None,
+    dry_run: bool,
     study: options.Study,
 ) -> int:
     """Evaluate one design of CASE: frequencies with their labels, in modes.json.
@@ -62,6 +64,7 @@ def command(
     """
     from ..report.shape_data import tyre_data
     from ..studies import modes as studies
+    from ..studies.pressing_plan import PressedState, plan_pressing
     from ..tyre.effects.edit import changed, with_part
 
     loads = wanted_loads(load_N, sweep)
@@ -69,6 +72,8 @@ def command(
         raise click.UsageError("--fitted goes with --sweep-load")
     if wheel and not loads:
         raise click.UsageError("--wheel goes with --load-N or --sweep-load")
+    if dry_run and not loads:
+        raise click.UsageError("--dry-run goes with --load-N or --sweep-load")
     if pictures and load_N is not None:
         raise click.UsageError("--pictures goes with --sweep-load, or without a load")
     terminal = study.terminal
@@ -87,6 +92,11 @@ def command(
         evaluator.needs_road(modes=True)
     if fitted:
         designs["fitted"] = arguments.fitted_values(fitted, loaded, terminal)
+    if loads:
+        pressed_to = [PressedState(sum(load > 0 for load in loads), modes=True)]
+        plan = plan_pressing(loaded, evaluator, pressed_to, len(designs), study.jobs)
+        if study.planned(plan, dry_run):
+            return 0
     if sweep is not None:
         run = study.run(loaded, "modes", evaluator, "sweep-load", load_N=loads)
         draw = pictures is not False

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
     from ..simulate.evaluate.evaluator import Evaluator
     from ..simulate.evaluate.failure import EvaluationFailed
+    from ..studies.pressing_plan import PressingPlan
     from ..studies.result import Result
     from ..tyre.case import LoadedCase
     from .output import Run
@@ -190,6 +191,12 @@ def every(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return apply
 
 
+dry_run = option(
+    "--dry-run",
+    is_flag=True,
+    help="Print the size of the problem of the tyre on the road, the number of runs, about how long"
+    " they take and their memory; run and write nothing.",
+)
 pressures = every(_from, _to, _steps)
 report = option(
     "--report",
@@ -301,6 +308,15 @@ class Study:
             self.terminal.note(
                 f"results of '{run.study}' in '{run.folder}' are those of an earlier run"
             )
+
+    def planned(self, plan: PressingPlan, dry_run: bool) -> bool:
+        """Say how long a run on the road is likely to take; whether that is all that is wanted."""
+        if dry_run:
+            self.terminal.result(plan.content())
+            self.terminal.say(str(plan))
+        else:
+            self.terminal.note(str(plan))
+        return dry_run
 
     def notify(self, words: str, failure: EvaluationFailed | None) -> None:
         """How a study goes: a place that was reached, or why it was not."""

@@ -3,6 +3,7 @@ same from Python and in a batch."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +18,7 @@ from ...tyre.case import LoadedCase, start_values
 from ...tyre.values import with_values
 from ..labelling.label import label
 from ..labelling.result import labels_told
+from ..pressing_plan import DESIGNS_OF_FIT, PressedState, PressingPlan, plan_pressing
 from .calibrate import Fit, FitNotify, calibrate, check
 from .problem import Problem
 from .targets import states_of
@@ -74,6 +76,26 @@ class FitStudy:
             exact = problem.exact_on_road == len(problem.road)
             one_state = exact and len(problem.labels) == 1
         return one_state and self.evaluator.has_gradients
+
+    def pressing_plan(self, method: str, starts: int, jobs: int) -> PressingPlan:
+        """Size, runs and likely time of the designs on the road; without states where nothing was
+        measured there."""
+        free = [name for name in self._plain.case.variables if name not in self.fixed]
+        if self.needs_labels:
+            loaded = [each for each in self.readings if each.load_N]
+            places = {(each.state, each.label is not None) for each in loaded}
+            exact = False
+        else:
+            problem = self._problem
+            places = {(each.state, bool(each.member)) for each in problem.road}
+            exact = problem.exact_on_road > 0
+        loads = Counter((state.unloaded, modal) for state, modal in places)
+        states = [
+            PressedState(count, modal, *((len(free), 0) if exact and not modal else (0, len(free))))
+            for (_, modal), count in loads.items()
+        ]
+        designs = DESIGNS_OF_FIT[method] * starts
+        return plan_pressing(self.case, self.evaluator, states, designs, min(jobs, starts), True)
 
     def run(
         self,

@@ -1,0 +1,99 @@
+"""The plan of a run on the road: its numbers by hand, its words, and what the commands print."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tyrecal.studies.pressing_plan import FIRST_LOAD_S, PressedState, PressingPlan
+
+from ..cli.test_cli import CASE, run
+
+PLAN = PressingPlan(nodes=1000, places_round=17, designs=2, states=(PressedState(8),))
+
+
+def test_its_numbers_by_hand() -> None:
+    """3000 displacements in the section, 51000 round half the tyre; 2 designs x (8 + 2) loads."""
+    plan = replace(PLAN, states=(PressedState(8), PressedState(2)))
+    assert (plan.section_unknowns, plan.unknowns, plan.runs) == (3000, 51000, 20)
+    one = replace(PLAN, designs=1, states=(PressedState(1),))
+    assert one.seconds == pytest.approx(FIRST_LOAD_S * 51000 * 3000 / 1e9)
+    assert replace(one, designs=6).seconds == pytest.approx(6 * (one.seconds or 0))
+    assert replace(one, designs=6, at_once=2).seconds == pytest.approx(3 * (one.seconds or 0))
+    assert replace(one, at_once=2).memory_bytes == pytest.approx(2 * (one.memory_bytes or 0))
+    halved = replace(one, nodes=500)
+    assert (halved.seconds or 0) == pytest.approx((one.seconds or 0) / 4)
+
+
+def test_more_that_is_wanted_takes_longer() -> None:
+    first, *more = (
+        replace(PLAN, states=(state,)).seconds or 0.0
+        for state in (
+            PressedState(1),
+            PressedState(2),
+            PressedState(1, modes=True),
+            PressedState(1, sensitivities=3),
+            PressedState(1, neighbours=3),
+        )
+    )
+    assert min(more) > first and more[-1] == pytest.approx(4 * first)
+    assert replace(PLAN, states=(PressedState(1, neighbours=3),)).runs == 8
+
+
+def test_its_words() -> None:
+    assert str(replace(PLAN, designs=1)).startswith(
+        "size: 3000 unknowns in the section, 51000 in 3-D (1000 nodes x 17 stations round half the"
+        " tyre); 1 design x 1 state x 8 loads: 8 runs; about "
+    )
+    plan = replace(
+        PLAN, states=(PressedState(1), PressedState(2)), is_estimate=True, is_timed=False
+    )
+    assert str(plan).endswith("; about 2 designs x 2 states x 1 or 2 loads: about 6 runs")
+    assert plan.content()["seconds"] is None
+    assert "nothing is pressed" in str(replace(PLAN, states=()))
+
+
+@pytest.mark.parametrize(
+    ("words", "counts"),
+    [
+        (["footprint", CASE, "--loads-N", "2000,4000"], (1, 1, [2], 2)),
+        (["modes", CASE, "--sweep-load", "0,1000,4000"], (1, 1, [2], 2)),
+        (["modes", CASE, "--load-N", "4000"], (1, 1, [1], 1)),
+        (["fit", CASE], (15, 0, [], 0)),
+    ],
+)
+def test_a_dry_run_prints_it_and_runs_nothing(
+    words: list[str],
+    counts: tuple[int, int, list[int], int],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    out = tmp_path / "out"
+    assert run(*words, "--mesh", "coarse", "--output", str(out), "--dry-run", "--json") == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert tuple(printed[key] for key in ("designs", "states", "loads", "runs")) == counts
+    assert printed["section_unknowns"] == 699 and printed["unknowns"] == 17 * 699
+    assert not out.exists()
+
+
+def test_a_dry_run_of_a_fit_over_two_pressures(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two stiffnesses at one pressure and a length at another; ten designs of Gauss-Newton."""
+    table = tmp_path / "measured.csv"
+    table.write_text(
+        "load [N],pressure [kPa],vertical stiffness [N/mm],contact length [mm],sigma [%]\n"
+        "3000,240,230,,2\n4000,240,235,,2\n4000,200,,170,2\n"
+    )
+    words = ["fit", CASE, "--measured", str(table), "--mesh", "coarse", "--dry-run"]
+    assert run(*words, "--method", "gauss-newton", "--starts", "2") == 0
+    printed = capsys.readouterr().out
+    assert "about 20 designs x 2 states x 1 or 2 loads: about 60 runs; about" in printed
+
+
+def test_modes_without_a_load_have_no_plan(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("modes", CASE, "--dry-run") == 2
+    assert "--dry-run goes with --load-N or --sweep-load" in capsys.readouterr().err

@@ -1,0 +1,158 @@
+"""How large the problem of pressing a tyre on the road is, and about how long it takes, before it
+runs. Commands print it before they start, and with --dry-run instead of starting."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..simulate.deck.tyre_design import TyreDesign
+from ..simulate.evaluate.evaluator import Evaluator
+from ..tyre.case import LoadedCase
+
+# The costs of the bundled solver's factorisation grow as its entries: unknowns of the whole problem
+# times those of a section. Seconds of one processor, and bytes, for 1e9 of them.
+FIRST_LOAD_S, FURTHER_LOAD_S = 150.0, 40.0
+MODES_AT_LOAD_S = 30.0  # in addition, for the modes at each load
+MEMORY_BYTES, PROCESS_BYTES = 2.5e9, 1.5e8  # the latter of a process without any
+SENSITIVITY_SHARE = 0.08  # of a press, for the exact sensitivities by one variable
+DESIGNS_OF_FIT = {"slsqp": 15, "gauss-newton": 10}  # most that a start takes, as a rule
+
+
+@dataclass(frozen=True)
+class PressedState:
+    """One state of a design, and the loads to which it is pressed there.
+
+    loads: how many; modes: those at each load are wanted; sensitivities: number of variables with
+    exact ones; neighbours: further designs, from which sensitivities are differences.
+    """
+
+    loads: int
+    modes: bool = False
+    sensitivities: int = 0
+    neighbours: int = 0
+
+
+@dataclass(frozen=True)
+class PressingPlan:
+    """Size of the problem, number of runs, likely time and memory.
+
+    nodes: of the section; places_round: nodes round half the tyre, from the patch to the top, which
+    has a half turn's symmetry; designs: about how many; at_once: how many designs run side by side;
+    is_timed: the solver is the one that the estimates hold for.
+    """
+
+    nodes: int
+    places_round: int
+    designs: int
+    states: tuple[PressedState, ...]
+    at_once: int = 1
+    is_timed: bool = True
+    is_estimate: bool = False
+
+    @property
+    def section_unknowns(self) -> int:
+        """Displacements of the section's nodes."""
+        return 3 * self.nodes
+
+    @property
+    def unknowns(self) -> int:
+        """Displacements of the pressed tyre's nodes: nodes x places round half the tyre."""
+        return self.section_unknowns * self.places_round
+
+    @property
+    def runs(self) -> int:
+        """Loads that are reached in all: designs x states x loads."""
+        return self.designs * sum(each.loads * (1 + each.neighbours) for each in self.states)
+
+    @property
+    def seconds(self) -> float | None:
+        """Likely time on quiet processors, nothing answered from the record; None: not known."""
+        if not self.is_timed:
+            return None
+        of_design = 0.0
+        for each in self.states:
+            press = FIRST_LOAD_S + FURTHER_LOAD_S * (each.loads - 1) + self._modes_s(each)
+            of_design += press * (1 + SENSITIVITY_SHARE * each.sensitivities + each.neighbours)
+        return 1e-9 * self._entries * of_design * self.designs / self.at_once
+
+    def _modes_s(self, state: PressedState) -> float:
+        return MODES_AT_LOAD_S * state.loads if state.modes else 0.0
+
+    @property
+    def memory_bytes(self) -> float | None:
+        """Likely memory of all that run side by side; None: not known."""
+        of_one = 1e-9 * self._entries * MEMORY_BYTES + PROCESS_BYTES
+        return self.at_once * of_one if self.is_timed else None
+
+    @property
+    def _entries(self) -> float:
+        return float(self.unknowns) * self.section_unknowns
+
+    def content(self) -> dict[str, Any]:
+        """The JSON that --dry-run --json prints."""
+        return {
+            "format": 1,
+            "section_unknowns": self.section_unknowns,
+            "unknowns": self.unknowns,
+            "designs": self.designs,
+            "states": len(self.states),
+            "loads": [each.loads for each in self.states],
+            "runs": self.runs,
+            "seconds": self.seconds and float(f"{self.seconds:.3g}"),
+            "memory_bytes": self.memory_bytes and float(f"{self.memory_bytes:.3g}"),
+        }
+
+    def __str__(self) -> str:
+        if not self.states:
+            return "no target is of a tyre on the road: nothing is pressed"
+        loads = sorted({each.loads for each in self.states})
+        about = "about " * self.is_estimate
+        size = (
+            f"size: {self.section_unknowns} unknowns in the section, {self.unknowns} in 3-D"
+            f" ({self.nodes} nodes x {self.places_round} stations round half the tyre)"
+        )
+        counts = (
+            f"{about}{_count(self.designs, 'design')} x {_count(len(self.states), 'state')}"
+            f" x {_count(loads[-1], 'load', loads[:-1])}: {about}{_count(self.runs, 'run')}"
+        )
+        words = [size, counts]
+        if self.seconds is not None and self.memory_bytes is not None:
+            words += [f"about {_time(self.seconds)}", f"{self.memory_bytes / 1e9:.1f} GB of memory"]
+        return "; ".join(words)
+
+
+def _count(number: int, noun: str, more: Sequence[int] = ()) -> str:
+    """'1 state', '2 states', '1 or 2 loads'."""
+    numbers = " or ".join(map(str, [*more, number]))
+    return f"{numbers} {noun}{'s' * (number != 1)}"
+
+
+def _time(seconds: float) -> str:
+    """A time in its largest unit, to two digits."""
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= 1.5 * size:
+            return f"{seconds / size:.2g} {unit}"
+    return f"{seconds:.2g} s"
+
+
+def plan_pressing(
+    case: LoadedCase,
+    evaluator: Evaluator,
+    states: Sequence[PressedState],
+    designs: int = 1,
+    at_once: int = 1,
+    is_estimate: bool = False,
+) -> PressingPlan:
+    """The plan of ``designs`` tyres of a case that are each pressed in ``states``. Raises what the
+    section's mesh does."""
+    return PressingPlan(
+        nodes=len(TyreDesign(case).tyre.mesh.nodes),
+        places_round=2 * len(case.case.road.element_angles_deg) + 1,
+        designs=designs,
+        states=tuple(states),
+        at_once=max(1, min(at_once, designs)),
+        is_timed=evaluator.solver.name == "bundled",
+        is_estimate=is_estimate,
+    )
