@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import Refused, RunFailed
 from . import VERSION
-from .deck.start import write_start
+from .deck.start import PressedShape, write_pressed_start, write_start
 
 JOB, PRESS, OLDJOB = "modes", "press", "inflate"
 # of the tool's request, as in `request.Request`
@@ -24,6 +24,7 @@ class Decks(Protocol):
     request: Mapping[str, Any]
     loads_N: tuple[float, ...]
     start: np.ndarray | None
+    pressed_start: PressedShape | None
 
     def texts(self, dialect: str) -> dict[str, str]:
         """File name to text."""
@@ -52,6 +53,7 @@ class Bundled:
             "coupled",
             "rotation",
             "start",
+            "pressed_start",
             "own_deck",
         }
     )
@@ -65,6 +67,8 @@ class Bundled:
             paths.append(folder / name)
             if decks.start is not None and name == f"{OLDJOB}.inp":
                 text += write_start(folder, decks.start)
+            if decks.pressed_start is not None and name == f"{PRESS}.inp":
+                text += write_pressed_start(folder, decks.pressed_start)
             paths[-1].write_text(text, encoding="utf-8", newline="")
         request = {k: decks.request[k] for k in REQUEST_KEYS if k in decks.request}
         if decks.loads_N:

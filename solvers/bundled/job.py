@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from threadpoolctl import ThreadpoolController
 from ..errors import RunFailed
 from .deck.keywords import COMPLEX_STEP, DataLine, DeckError, Keyword, read_deck
 from .deck.request import Request, read_request, read_sector
-from .deck.start import read_start
+from .deck.start import PressedStart, read_pressed_start, read_start
 from .deck.steps import Deck, DeckStep
 from .frequency_step import FrequencyStep, Inflated
 from .modes.cavity import read_cavity
@@ -22,7 +22,7 @@ from .modes.harmonics import HarmonicModes
 from .modes.sensitivity import state_rate
 from .modes.wheel import free_along_load
 from .results import StepResult, write
-from .road.road_data import ROAD_NUMBERS, InflatedTangent, ModesAtLoad, read_road
+from .road.road_data import ROAD_NUMBERS, InflatedTangent, ModesAtLoad, RoadData, read_road
 from .section import mechanics
 from .section.band import Numbering
 from .section.boundary import keeps_half_turn, numbering
@@ -50,7 +50,8 @@ def run(folder: Path, job: str, oldjob: str | None, time_limit: float = float("i
             if analysis.road is not None:
                 from .road import footprint_job  # late: only what is pressed needs it
 
-                footprint_job.write(folder / job, analysis.model, analysis.press())
+                pressed_start = read_pressed_start(folder, texts[job])
+                footprint_job.write(folder / job, analysis.model, analysis.press(pressed_start))
             else:
                 write(folder / job, analysis.model, analysis.run())
         except (np.linalg.LinAlgError, OverflowError, ZeroDivisionError) as error:
@@ -111,9 +112,9 @@ class Job:
                 results.append(self._result(step, modes, *work.rates(modes)))
         return results or [self._result(self.steps[-1], [], {}, {})]
 
-    def press(self) -> dict[str, Any]:
+    def press(self, start: PressedStart | None = None) -> dict[str, Any]:
         """Footprints of a job with a road, one per step with a force on it, modes and slopes
-        there."""
+        there; ``start``: another tyre on the road, whose state begins the first load."""
         assert self.road is not None
         wanted: list[float] = []
         vibrations: dict[float, ModesAtLoad] = {}
@@ -140,11 +141,9 @@ class Job:
                 raise DeckError(row.line, "loads on the road must push it to the tyre, and rise")
         if not wanted:
             raise DeckError(self.steps[-1].procedure.line, "no *CLOAD presses the road")
-        last = max(i for i, each in enumerate(self.steps) if each.procedure.name == "STATIC")
+        last, model, equations, acting = self._on_road()
         step = self.steps[last]
-        model = self.tyre.models(None, step.long_term, False)
-        equations, acting = numbering(model, step), pressures(model, step)
-        from .road import footprint_job  # late, as in `run`
+        from .road import footprint_job, pressed_start  # late, as in `run`
 
         found = footprint_job.press(
             model,
@@ -156,10 +155,29 @@ class Job:
             self._check_time,
             vibrations,
             self._inflated_tangents(model, equations, acting, last),
+            partial(pressed_start.begin, start, self._of_start) if start else None,
         )
         if self.tyre.request.cavity:
             found |= self._cavity(model, found)
         return {"pressure_Pa": step.pressure, "mass_kg": self.mass_kg, **found}
+
+    def _on_road(self) -> tuple[int, Model, Numbering, list[Pressure]]:
+        """The place of the last static step, and the model, equations and pressures in it."""
+        last = max(i for i, each in enumerate(self.steps) if each.procedure.name == "STATIC")
+        step = self.steps[last]
+        model = self.tyre.models(None, step.long_term, False)
+        return last, model, numbering(model, step), pressures(model, step)
+
+    def _of_start(self, texts: Mapping[str, str]) -> tuple[Model, list[Pressure], RoadData]:
+        """Model, pressures and road of the tyre to start from. Raises DeckError."""
+        jobs = {name.removesuffix(".inp"): text for name, text in texts.items()}
+        oldjob, job = self.tyre.deck.jobs
+        other = Job(Deck(jobs, job, oldjob), Request())
+        assert other.road is not None
+        for step in other.steps:
+            step.held = other._off_road(step)
+        _, model, _, acting = other._on_road()
+        return model, acting, other.road
 
     def _off_road(self, step: DeckStep) -> list[DataLine]:
         """What a step holds but the road."""

@@ -39,11 +39,12 @@ def press(
     notify: Callable[[str, PressOutcome], None] = lambda design, outcome: None,
 ) -> dict[str, PressOutcome]:
     """Every design (name to values of the variables) at rising loads, or why not even at the
-    first one. Raises DeckRefused and what else ``Evaluator.press`` raises for wrong input."""
+    first one; those after the first begin from its state on the road. Raises DeckRefused and what
+    else ``Evaluator.press`` raises for wrong input."""
     found: dict[str, PressOutcome] = {}
-    for design, outcome in zip(
-        designs, evaluator.press_all(designs.values(), loads_N, jobs), strict=True
-    ):
+    base = next(iter(designs.values())) if len(designs) > 1 else None
+    outcomes = evaluator.press_all(designs.values(), loads_N, jobs, base=base)
+    for design, outcome in zip(designs, outcomes, strict=True):
         found[design] = outcome
         notify(design, outcome)
     return found

@@ -1,12 +1,16 @@
-"""Where Newton's method begins: an inflated shape in a file beside the deck, whose hash the deck's
-last line states as a comment, so that an answer is a function of the deck alone."""
+"""Where Newton's method begins: an inflated shape in a file next to the deck, or another tyre on
+the road in a folder next to it. The deck's last line states the hash as a comment, so that an
+answer is a function of the deck alone."""
 
 from __future__ import annotations
 
 import io
 import re
+from collections.abc import Mapping
+from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -14,7 +18,84 @@ from ...errors import Refused
 
 Array = np.ndarray
 FILE = "start.npy"
+PRESSED_FOLDER, PRESSED_FILE = "start", "start/pressed.npz"
 COMMENT = re.compile(r"^\*\* Newton's method starts from (\S+), SHA-256 ([0-9a-f]{64})$", re.M)
+
+
+class PressedShape(Protocol):
+    """Another tyre of the same mesh on the road, whose state is a good start."""
+
+    texts: Mapping[str, str]
+    """Its decks, file name to text."""
+
+    nodes: Array
+    """Deck numbers (n,)."""
+
+    inflated: Array
+    """Displacements (n, 3) before any load, m."""
+
+    displacement: Array
+    """Displacements (ring, n, 3) on the road, of rings all round, m."""
+
+    load_N: float
+    deflection_m: float
+
+
+@dataclass(frozen=True)
+class PressedStart:
+    """`PressedShape` as it was read, and the hash that names it."""
+
+    texts: Mapping[str, str]
+    nodes: Array
+    inflated: Array
+    displacement: Array
+    load_N: float
+    deflection_m: float
+    sha256: str
+
+
+def write_pressed_start(folder: Path, shape: PressedShape) -> str:
+    """Put a tyre on the road next to the deck; the deck's last line. Raises OSError."""
+    content = io.BytesIO()
+    np.savez(
+        content,
+        nodes=shape.nodes,
+        inflated=shape.inflated,
+        displacement=shape.displacement,
+        load_N=shape.load_N,
+        deflection_m=shape.deflection_m,
+    )
+    (folder / PRESSED_FOLDER).mkdir()
+    (folder / PRESSED_FILE).write_bytes(content.getvalue())
+    for name, text in shape.texts.items():
+        path = folder / PRESSED_FOLDER / name
+        path.write_text(text, encoding="utf-8", newline="")
+    return _last_line(PRESSED_FILE, _hash_pressed(content.getvalue(), shape.texts))
+
+
+def read_pressed_start(folder: Path, text: str) -> PressedStart | None:
+    """The tyre on the road that a deck's ``text`` names, None where it names none.
+
+    Raises Refused where it is not there, or another one is; OSError.
+    """
+    named = COMMENT.search(text)
+    if not named:
+        return None
+    path = folder / PRESSED_FILE
+    if named[1] != PRESSED_FILE or not path.is_file():
+        raise Refused(f"the deck names a tyre to start from, and {PRESSED_FILE} is not there")
+    texts = {
+        each.name: each.read_text(encoding="utf-8")
+        for each in sorted((folder / PRESSED_FOLDER).glob("*.inp"))
+    }
+    content = path.read_bytes()
+    if _hash_pressed(content, texts) != named[2]:
+        raise Refused(f"{PRESSED_FOLDER} is not the tyre that the deck names: its SHA-256 differs")
+    with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+        fields = ("nodes", "inflated", "displacement")
+        nodes, inflated, displacement = (arrays[name] for name in fields)
+        load, deflection = float(arrays["load_N"]), float(arrays["deflection_m"])
+    return PressedStart(texts, nodes, inflated, displacement, load, deflection, named[2])
 
 
 def write_start(folder: Path, shape: Array) -> str:
@@ -23,7 +104,7 @@ def write_start(folder: Path, shape: Array) -> str:
     content = io.BytesIO()
     np.save(content, np.ascontiguousarray(shape, dtype="<f8"), allow_pickle=False)
     (folder / FILE).write_bytes(content.getvalue())
-    return f"** Newton's method starts from {FILE}, SHA-256 {_hash(content.getvalue())}\n"
+    return _last_line(FILE, _hash(content.getvalue()))
 
 
 def read_start(folder: Path, text: str) -> Array | None:
@@ -44,6 +125,21 @@ def read_start(folder: Path, text: str) -> Array | None:
     if shape.ndim != 2 or shape.shape[1] != 4 or shape.dtype.kind != "f":
         raise Refused(f"{FILE} must have four numbers a node: its own, and its displacement")
     return shape
+
+
+def _last_line(file: str, digest: str) -> str:
+    return f"** Newton's method starts from {file}, SHA-256 {digest}\n"
+
+
+def _hash_pressed(content: bytes, texts: Mapping[str, str]) -> str:
+    """The hash of a tyre on the road; comments of its decks do not count."""
+    lines = [
+        line
+        for name in sorted(texts)
+        for line in [name, *texts[name].splitlines()]
+        if not line.startswith("**")
+    ]
+    return _hash(content + "\n".join(lines).encode())
 
 
 def _hash(content: bytes) -> str:

@@ -41,8 +41,8 @@ class Deck:
     """
 
     def __init__(self, texts: dict[str, str], job: str, oldjob: str | None):
-        self._order = [oldjob, job] if oldjob else [job]
-        self._keywords = {name: read_keywords(texts[name], name) for name in self._order}
+        self.jobs = [oldjob, job] if oldjob else [job]
+        self._keywords = {name: read_keywords(texts[name], name) for name in self.jobs}
         for k in [] if oldjob else self._keywords[job]:
             if k.name == "SYMMETRIC MODEL GENERATION":
                 raise DeckError(k.line, "this job revolves a section job: name that with --oldjob")
@@ -52,7 +52,7 @@ class Deck:
         steps, their numbers carrying ``tangents``."""
         models: list[list[Keyword]] = []
         steps = []
-        for place, name in enumerate(self._order):
+        for place, name in enumerate(self.jobs):
             own = [(line, index, value) for job, line, index, value in tangents if job == name]
             keywords = self._keywords[name]
             model, blocks = grammar.check(seed(keywords, own) if own else keywords, place > 0)

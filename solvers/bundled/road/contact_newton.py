@@ -7,11 +7,13 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_matrix
 
 from ...errors import Indefinite, Inverted, NoEquilibrium
+from ..section.parts.cords import CordsAtStations
 from ..solid3d.gmres import gmres
 from ..solid3d.revolved import Revolved
 from .contact import Bound, Contact, FlatRoad
@@ -24,8 +26,9 @@ log = logging.getLogger("tyrecal_solvers")
 CONTACT_FORCE_RTOL = 1e-8  # out-of-balance force over the load
 MAX_NEWTON = 40  # Newton iterations a load
 # GMRES iterations of a step, after which the preconditioner is formed anew
-MAX_GMRES_BEFORE_NEW_FACTOR = 15
+MAX_GMRES_BEFORE_NEW_FACTOR = 25
 MAX_GMRES = 60
+BUCKLING_STRAIN = 1e-3  # logarithmic, from which on compressed cords are named as the cause
 NEAR_LOAD = 2.0  # of a load, up to which Coulomb's friction is tried at once
 SAME_FACTOR = 1.1  # of a load, up to which its preconditioner is worth keeping
 LINEAR_RTOL = 1e-2  # residual of the linear problem, relative
@@ -34,7 +37,7 @@ UNIT_RTOL = 1e-4  # the same of the vertical stiffness, which is off by about it
 MAX_UNIT_RESIDUAL = 1e-3  # of the same
 ROUGH_LINEAR_RTOL = 0.3  # residual of the linear problem as long as the contact changes much
 MAX_LINEAR_RESIDUAL = 0.5  # more is left only of a tangent that is far from a stable one
-MAX_SETBACKS = 2  # steps that may fail to halve the residual, with Coulomb's friction
+MAX_SETBACKS = 5  # steps that may fail to halve the residual, with Coulomb's friction
 COULOMB_RTOL = 1e-2  # residual over the load, before Coulomb's friction is tried
 FRICTION_BOUND_RTOL = 0.1  # the same, before the friction's bounds are taken anew
 SOFT_ELASTIC_SLIP = 1e-4  # m: an elastic slip that is no obstacle
@@ -61,6 +64,16 @@ class PressedState:
     unit: tuple[Array, float]
 
 
+@dataclass(frozen=True)
+class FirstGuess:
+    """Where the first load begins."""
+
+    load: float  # N
+    moved: Array  # (2, k, q, 3): what the load adds to the inflated tyre's parts, m
+    deflection: float  # m
+    factor: ContactUpdate
+
+
 class ContactNewton:
     """Presses a tyre from its inflated state ``U`` (k, n, 3) to rising loads; ``settled`` is called
     with each state that slip is to count from."""
@@ -78,18 +91,25 @@ class ContactNewton:
         self.free_radius = road.height
         self.flat = self._flat_height(tyre.model.mesh.X, np.flatnonzero(~symmetry.free.any(1)))
         self.road = road
-        tyre.residual(U)
-        self.order = Elimination(tyre.tangents(np.float32), symmetry)
+        self._inflated = U
         self.parts = symmetry.parts(U)
         self.height = self.free_radius
         self.load = 0.0
         self._bound = road.forces(U, self.free_radius).bound(1.0)
+        self.first: FirstGuess | None = None
         self._factor: ContactUpdate | None = None
         self._used = 0
         self._stale = False  # the preconditioner is of a load that was much smaller
         self._formed_at = 0.0  # its load, N
         self._slope: tuple[Array, float] | None = None  # of parts and height by the load
         self.factorisations = self.products = self.iterations = 0
+
+    @cached_property
+    def order(self) -> Elimination:
+        """The order of elimination, from the inflated tyre's tangents."""
+        tyre = Revolved(self.tyre.model, self.tyre.loads, self.tyre.around)
+        tyre.residual(self._inflated)
+        return Elimination(tyre.tangents(np.float32), self.symmetry)
 
     def to(self, load: float) -> PressedState:
         """The equilibrium at ``load`` (N), in smaller steps where need be.
@@ -113,7 +133,7 @@ class ContactNewton:
                 if step < smallest:
                     raise NoEquilibrium(
                         f"no equilibrium between {self.load:.4g} and {target:.4g} N"
-                        f"{self.depth()}: {error}"
+                        f"{self.depth()}: {self._buckling() or error}"
                     ) from None
                 continue
             self.parts, self.height, self.load = found.parts, found.height, target
@@ -135,6 +155,22 @@ class ContactNewton:
                     f"no equilibrium between {self.load:.4g} and {load:.4g} N{self.depth()}:"
                     f" at its stiffness there it would go down by {1e3 * down:.0f} mm"
                 )
+
+    def _buckling(self) -> str:
+        """The cords that are compressed most at the last state, in words; "": none by much."""
+        parts = [part for part in self.tyre.parts if isinstance(part, CordsAtStations)]
+        strain, layer, nodes = min(
+            (part.most_compressed() for part in parts),
+            key=lambda place: place[0],
+            default=(0.0, "", np.zeros(0, int)),
+        )
+        if strain > -BUCKLING_STRAIN:
+            return ""
+        r, z = self.tyre.model.mesh.X[nodes].real.mean(0)
+        return (
+            f"the cords of layer {layer} buckle, compressed by {-100 * strain:.2g} % at"
+            f" r, z = {r:.3f}, {z:.3f} m"
+        )
 
     def depth(self) -> str:
         """In words, how far down the last load reached has pressed the tyre; "" before any."""
@@ -170,6 +206,7 @@ class ContactNewton:
     def _newton(self, load: float) -> PressedState:
         """With Coulomb's friction from where the last load's stiffness points; where that does not
         converge, by Tresca's friction, with the last normal forces, to where it does."""
+        found = self._from_first_guess(load)
         parts, height = self.parts, self.height
         self._stale = self._factor is not None and load > SAME_FACTOR * self._formed_at
         if self._slope:
@@ -177,8 +214,8 @@ class ContactNewton:
             height += (load - self.load) * self._slope[1]
         else:
             height -= FIRST_COMPLIANCE * load
-        near = load <= NEAR_LOAD * self.load
-        found = self._by_coulomb(parts, height, load) if near else None
+        if not found and load <= NEAR_LOAD * self.load:
+            found = self._by_coulomb(parts, height, load)
         bound, reached = self._bound, FRICTION_BOUND_RTOL
         for _ in range(MAX_NEWTON):
             if found:
@@ -197,6 +234,20 @@ class ContactNewton:
         unit = self._unit(contact)
         self._slope = -unit[0] / 2, -unit[1] / 2
         return PressedState(parts, height, contact, 2 / unit[1], unit)
+
+    def _from_first_guess(self, load: float) -> tuple[Array, float, Contact] | None:
+        """The equilibrium from the first guess; None where there is none, or it is a bad one."""
+        guess, self.first = self.first, None
+        if guess is None or self.load or load != guess.load:
+            return None
+        self._factor, self._formed_at = guess.factor, load
+        try:
+            height = self.free_radius - guess.deflection
+            return self._settle(self.parts + guess.moved, height, load, None, CONTACT_FORCE_RTOL)
+        except (NoEquilibrium, Indefinite, Inverted):
+            log.info("%g N: the start was too far away, loaded from nothing", load)
+            self._factor, self._used = None, 0
+            return None
 
     def _by_coulomb(
         self, parts: Array, height: float, load: float

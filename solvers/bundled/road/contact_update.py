@@ -10,6 +10,7 @@ Columns of Y are formed when a component's contact first changes, and kept.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
@@ -32,6 +33,12 @@ class ContactUpdate:
         self._blocks: list[list[Array]] = []  # Y by the times of forming, by the factor's fronts
         self._compliance = np.zeros((0, 0))
         self._active = np.zeros(0, int)
+
+    def copy(self) -> ContactUpdate:
+        """The same, whose further columns are its own."""
+        other = copy(self)
+        other._column, other._blocks = self._column.copy(), list(self._blocks)
+        return other
 
     def to(self, contact: csr_matrix) -> None:
         """Take ``contact`` (2 k q 3, 2 k q 3), N/m, not necessarily symmetric, in place of the

@@ -4,11 +4,11 @@ JOB.json: pressure_Pa, mass_kg, free_radius_m, failure, cause, ``footprints`` [l
 (x down, y, z), deflection_m, stiffness_N_per_m, contact_area_m2]; where a request has sensitivities
 ``slopes``, by variable those of numbers; with a gas cavity_Hz of the
 cavity's first wave, free and in ``footprints`` (fore-aft, vertical). JOB.npz: nodes, points, angles
-of the whole tyre, and per footprint i the arrays of its patch and the displacement, as NAME_i;
-where modes were asked for: mode_frequency_Hz (m,), mode_shape (m, ring, node, 3) at mode_node,
-modal mass 1 kg; with friction the patch's forces along the road in these, mode_traction_N (m,),
-their sizes summed, and sliding_frequency_Hz, sliding_shape of the same tyre while nothing holds the
-patch along the road.
+of the whole tyre, the displacement of the inflated one, and per footprint i the arrays of its patch
+and the displacement, as NAME_i; where modes were asked for: mode_frequency_Hz (m,), mode_shape
+(m, ring, node, 3) at mode_node, modal mass 1 kg; with friction the patch's forces along the road in
+these, mode_traction_N (m,), their sizes summed, and sliding_frequency_Hz, sliding_shape of the same
+tyre while nothing holds the patch along the road.
 """
 
 from __future__ import annotations
@@ -63,9 +63,11 @@ def press(
     check: Callable[[], None],
     vibrations: Mapping[float, ModesAtLoad] = MappingProxyType({}),
     tangents: Mapping[str, InflatedTangent] = MappingProxyType({}),
+    begin: Callable[[ContactNewton, Array], None] | None = None,
 ) -> dict[str, Any]:
     """Footprints at the ``wanted`` loads (N) of a tyre inflated to ``U`` (n, 3), with modes where
-    there are ``vibrations``, and derivatives by the numbers of the deck that ``tangents`` are of.
+    there are ``vibrations``, and derivatives by the numbers of the deck that ``tangents`` are of;
+    ``begin`` gives the first load its guess, from the deck's node numbers (n,).
 
     Raises DeckError; RunFailed where not even the first load is reached.
     """
@@ -91,6 +93,8 @@ def press(
         work = ContactNewton(tyre, symmetry, road, start, check, slopes.follow)
     except Refused as error:
         raise DeckError(0, f"a pressed tyre must be symmetric: {error}") from None
+    if begin:
+        begin(work, np.array(list(model.mesh.index)))
     footprints: list[dict[str, Any]] = []
     failure = cause = ""
     for load in wanted:
@@ -113,6 +117,7 @@ def press(
         log.info("load %d of %d is reached: %g N", *reached, load, extra={"loads": reached})
     return {
         "free_radius_m": work.free_radius,
+        "inflated": U,
         "angles": np.concatenate([rings, 2 * np.pi - rings[-2:0:-1]]),
         "footprints": footprints,
         "failure": failure,
@@ -227,7 +232,8 @@ def _at(around: HalfCircle, angles: Array, U: Array) -> Array:
 def write(stem: Path, model: Model, result: dict[str, Any]) -> None:
     """Write STEM.json and STEM.npz."""
     numbers = np.array(list(model.mesh.index))
-    arrays = {"nodes": numbers, "points": model.mesh.X, "angles": result["angles"]}
+    arrays: dict[str, Any] = {"nodes": numbers, "points": model.mesh.X}
+    arrays |= {name: result[name] for name in ("angles", "inflated")}
     lines = []
     for i, footprint in enumerate(result["footprints"]):
         footprint = {**footprint, "node": numbers[footprint["node"]]}
@@ -239,7 +245,7 @@ def write(stem: Path, model: Model, result: dict[str, Any]) -> None:
         lines.append({**footprint, "rim_N": footprint["rim_N"].tolist()})
     with stem.with_name(stem.name + ".npz").open("wb") as file:
         np.savez(file, **arrays)
-    plain = {k: v for k, v in result.items() if k != "angles"}
+    plain = {k: v for k, v in result.items() if k not in arrays}
     text = json.dumps({"format": 1, **plain, "footprints": lines}, indent=1)
     stem.with_name(stem.name + ".json").write_text(text + "\n", encoding="utf-8", newline="")
 
@@ -250,7 +256,7 @@ def read(stem: Path) -> dict[str, Any]:
         stem.with_name(stem.name + ".json").read_text(encoding="utf-8")
     )
     with np.load(stem.with_name(stem.name + ".npz"), allow_pickle=False) as arrays:
-        for name in ("nodes", "points", "angles"):
+        for name in ("nodes", "points", "angles", "inflated"):
             answer[name] = arrays[name]
         for i, footprint in enumerate(answer["footprints"]):
             footprint["rim_N"] = np.array(footprint["rim_N"])

@@ -26,7 +26,7 @@ class Revolved:
     def __init__(self, model: Model, loads: Sequence[TyrePart], around: Circumference):
         self.model, self.loads, self.around = model, loads, around
         nodes = len(model.mesh.X)
-        self._parts = [part.at_stations(nodes) for part in (*model.parts, *loads)]
+        self.parts = [part.at_stations(nodes) for part in (*model.parts, *loads)]
 
     def _stations(self, U: Array) -> tuple[Array, Array]:
         """Displacement and its derivative by the angle at the stations (3n, s)."""
@@ -36,7 +36,7 @@ class Revolved:
     def _nodes(self, forces: list[tuple[Array, Array]]) -> Array:
         """Nodal forces (k, n, 3) from each part's, by u and by du/dTheta (e, 3a, s)."""
         by_u, by_du = (
-            sum(part.gather(f) for part, f in zip(self._parts, each, strict=True))
+            sum(part.gather(f) for part, f in zip(self.parts, each, strict=True))
             for each in zip(*forces, strict=True)
         )
         weights = self.around.weights[:, None]
@@ -49,17 +49,17 @@ class Revolved:
         Raises Inverted."""
         self._U = U
         u, du = self._stations(U)
-        return self._nodes([p.force(u, du) for p in self._parts])
+        return self._nodes([p.force(u, du) for p in self.parts])
 
     def potential(self) -> float:
         """Strain energy less the pressure's work at the last state, J."""
-        return sum(float(p.energy() @ self.around.weights) for p in self._parts)
+        return sum(float(p.energy() @ self.around.weights) for p in self.parts)
 
     def product(self, V: Array) -> Array:
         """Tangent stiffness times V (k, n, 3), N."""
         u, du = self._stations(V)
-        return self._nodes([p.product(u, du) for p in self._parts])
+        return self._nodes([p.product(u, du) for p in self.parts])
 
     def tangents(self, precision: Precision = np.float64) -> list[Tangents]:
         """Per part: connectivity; d2W/du du, du dv and dv dv, v = du/dTheta, (s, e, 3a, 3a)."""
-        return [(p.connectivity, *p.tangents(precision)) for p in self._parts]
+        return [(p.connectivity, *p.tangents(precision)) for p in self.parts]

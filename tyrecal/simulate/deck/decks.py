@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -24,6 +25,7 @@ LEADS_OUTSIDE = re.compile(  # but for comments: an absolute path or one upwards
     r"^(?!\*\*).*=[ \t]*[\"']?(?:[/\\~@]|\.\.|[a-z]:[/\\]).*|^\*[ \t]*USER[ \t]*SUBROUTINE.*",
     re.MULTILINE | re.IGNORECASE,
 )
+DesignKey = tuple[str, float, tuple[tuple[str, float], ...]]  # what tells designs apart
 DeckSlopes = dict[str, list[tuple[str, int, int, float]]]
 
 
@@ -78,8 +80,27 @@ class Design(Protocol):
     def explained(self, refusal: str) -> str:
         """A solver's refusal of its texts in words for who made it."""
 
+    @property
+    def advice_on_road(self) -> str:
+        """A sentence that helps where the tyre cannot be pressed; "": nothing is known."""
+
     def texts(self, dialect: str, request: Mapping[str, Any]) -> dict[str, str]:
         """File name to text, without the header. Raises TemplateFailed."""
+
+
+@dataclass(frozen=True)
+class PressedTyre:
+    """A tyre on the road, from which another one's first load begins: its design and decks, node
+    numbers (n,), displacements before the load (n, 3) and under it (ring, n, 3), m, load and
+    deflection."""
+
+    of: DesignKey
+    texts: Mapping[str, str]
+    nodes: np.ndarray
+    inflated: np.ndarray
+    displacement: np.ndarray
+    load_N: float
+    deflection_m: float
 
 
 class Decks:
@@ -93,14 +114,16 @@ class Decks:
         loads_N: tuple[float, ...] = (),
         loaded_modes: int = 0,
         start: np.ndarray | None = None,
+        pressed_start: PressedTyre | None = None,
     ):
         """gradients: variables whose places in the deck are wanted; modes_per_harmonic: the
         design's, or a larger number for a second look; loads_N: press the tyre on the road with
         these instead of finding modes; loaded_modes: how many to find there; start (n, 4): node
         numbers and displacements, m, of a shape near the inflated one, for solvers that can use
-        it (``start``)."""
+        it (``start``); pressed_start: a tyre on the road near this one (``pressed_start``)."""
         self.design, self.gradients = design, gradients
         self.loads_N, self.loaded_modes, self.start = loads_N, loaded_modes, start
+        self.pressed_start = pressed_start
         self.request = {**design.request, "loads_N": loads_N, "loaded_modes": loaded_modes}
         if modes_per_harmonic:
             self.request["modes_per_harmonic"] = modes_per_harmonic

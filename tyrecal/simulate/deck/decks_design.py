@@ -83,6 +83,11 @@ class DecksDesign:
         """The solver's own words."""
         return refusal
 
+    @property
+    def advice_on_road(self) -> str:
+        """None: these decks are not pressed."""
+        return ""
+
     def texts(self, dialect: str, request: Mapping[str, Any]) -> dict[str, str]:
         """File name to text, without the header. Raises TemplateFailed."""
         if request["loads_N"]:

@@ -12,6 +12,7 @@ from typing import Any
 
 from ...tyre.case import LoadedCase, number_at, start_values
 from ...tyre.case.schema import SolverChoice
+from ...tyre.case.slack_hint import slack_cord_hint
 from ...tyre.effects import catalogue
 from ...tyre.resolve import Tyre, resolved
 from ...tyre.templates import TemplateFailed, environment, render
@@ -149,6 +150,11 @@ class TyreDesign:
     def explained(self, refusal: str) -> str:
         """A solver's refusal of a line, in the lines of the user's own deck."""
         return explained(self.tyre, refusal, HEADER_LINES)
+
+    @property
+    def advice_on_road(self) -> str:
+        """The lines that let thin cords go slack, where they bear compression."""
+        return slack_cord_hint(self.case)
 
     def texts(self, dialect: str, request: Mapping[str, Any]) -> dict[str, str]:
         """File name to text, without the header. Raises TemplateFailed."""

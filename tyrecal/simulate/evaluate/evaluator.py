@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -13,7 +14,7 @@ import numpy as np
 
 from ...files import NotWritten, printable
 from ...interrupt import interrupts_put_off, raise_interrupt
-from ..deck.decks import Decks, Design
+from ..deck.decks import Decks, Design, DesignKey, PressedTyre
 from . import folders
 from .executor import executor, in_order
 from .failure import DeckRefused, EvaluationFailed
@@ -26,7 +27,6 @@ SETTLED = ("no_equilibrium", "unstable")  # the deck's own doing: another run wo
 MODES_ON_TOP = 3  # times the time limit of a load, where modes are sought there too
 T = TypeVar("T")
 Array = np.ndarray
-DesignKey = tuple[str, float, tuple[tuple[str, float], ...]]
 
 
 @dataclass(frozen=True)
@@ -73,6 +73,10 @@ class Evaluator:
     on_progress: Callable[[int, int], None] = field(default=_unwatched, repr=False)
     # of nominal designs: node numbers and displacements, see `_start_of`
     shapes: dict[DesignKey, Array] = field(default_factory=dict, repr=False)
+    # by design and load, N, see `_pressed`; None: it cannot bear the load
+    pressed_tyres: dict[tuple[DesignKey, float], PressedTyre | None] = field(
+        default_factory=dict, repr=False
+    )
     _solver: Solver | None = field(default=None, repr=False)
 
     @property
@@ -131,16 +135,57 @@ class Evaluator:
         loads_N: Sequence[float],
         modes: int = 0,
         gradients: tuple[str, ...] = (),
+        base: Mapping[str, float] | None = None,
     ) -> Pressed:
         """One design on the road at rising loads, as far as the solver gets, with so many ``modes``
-        at each; gradients: names of variables whose slopes are wanted (`Footprint.slopes`).
+        at each; gradients: names of variables whose slopes are wanted (`Footprint.slopes`); base:
+        values of the design whose state on the road begins the first load (None: the inflated
+        tyre).
 
         Raises what `evaluate` does; DeckRefused too where the solver has no road.
         """
         self.needs_road(bool(modes))
-        design = self._with(values)
-        decks = Decks(design, gradients, loads_N=tuple(loads_N), loaded_modes=modes)
-        return self._ask(decks, lambda answer, kept: pressed(answer, loads_N, kept, modes))
+        design, loads = self._with(values), tuple(loads_N)
+        start = None
+        if base and not modes and _key(self._with(base)) != _key(design):
+            start = self._pressed(base, loads, gradients)
+        decks = Decks(design, gradients, loads_N=loads, loaded_modes=modes, pressed_start=start)
+        try:
+            answer = self._ask(decks, lambda answer, kept: pressed(answer, loads_N, kept, modes))
+        except EvaluationFailed as failure:
+            raise _advised(failure, design) from None
+        if answer.failed:
+            answer = replace(answer, failed=_advised(answer.failed, design))
+        if base and not start:
+            self._remember(design, answer)
+        return answer
+
+    def _pressed(
+        self, base: Mapping[str, float], loads: tuple[float, ...], gradients: tuple[str, ...]
+    ) -> PressedTyre | None:
+        """The design ``base`` on the road, from which others begin at the first load. It is pressed
+        before them, so that their answers depend on no other question; with their ``gradients``, so
+        that its own answer is recorded only once. None where it cannot bear the load, or the solver
+        cannot begin from it."""
+        if "pressed_start" not in self.solver.capabilities:
+            return None
+        design = self._with(base)
+        key = _key(design), loads[0]
+        if key not in self.pressed_tyres:
+            self.pressed_tyres[key] = None
+            with contextlib.suppress(EvaluationFailed):
+                self._remember(design, self.press(base, loads, gradients=gradients))
+        return self.pressed_tyres[key]
+
+    def _remember(self, design: Design, answer: Pressed) -> None:
+        """Keep a tyre on the road for those that begin from it."""
+        if answer.inflated is None:
+            return
+        first = answer.footprints[0]
+        texts = Decks(design, loads_N=(first.load_N,)).texts(self.solver.dialect)
+        place = first.displacement, first.load_N, first.deflection_m
+        tyre = PressedTyre(_key(design), texts, answer.nodes, answer.inflated, *place)
+        self.pressed_tyres[tyre.of, first.load_N] = tyre
 
     def needs_road(self, modes: bool = False) -> None:
         """Raises DeckRefused where the solver cannot press a tyre on a road, or has no modes of it
@@ -252,9 +297,10 @@ class Evaluator:
         jobs: int = 1,
         modes: int = 0,
         gradients: tuple[str, ...] = (),
+        base: Mapping[str, float] | None = None,
     ) -> Iterator[Pressed | EvaluationFailed]:
         """`press` for each design, in their order; ``jobs`` at a time."""
-        asked = [(values, loads_N, modes, gradients) for values in designs]
+        asked = [(values, loads_N, modes, gradients, base) for values in designs]
         return _not_refused(self._each("press", asked, jobs))
 
     def _each(self, ask: str, asked: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[Any]:
@@ -267,6 +313,9 @@ class Evaluator:
             return
         if ask == "evaluate" and (nominal := self.design.nominal):
             self._inflated(nominal)  # before the workers each ask for it
+        if ask == "press" and asked[0][-1]:
+            _, loads, _, gradients, base = asked[0]
+            self._pressed(base, tuple(loads), gradients)
         with executor(jobs, self.scheduler) as workers:
             answers = workers.each(partial(_answer_and_count, self.worker(), ask), asked)
             for done, answer in enumerate(in_order(answers), start=1):
@@ -289,6 +338,7 @@ class Evaluator:
             self.store,
             command=tuple(getattr(self.solver, "command", self.command)),
             shapes=self.shapes,
+            pressed_tyres=self.pressed_tyres,
         )
 
     def of(self, design: Design) -> Evaluator:
@@ -345,6 +395,14 @@ class Evaluator:
 def _key(design: Design) -> DesignKey:
     """What tells nominal designs apart."""
     return design.header, design.pressure_kPa, tuple(sorted(design.values.items()))
+
+
+def _advised(failure: EvaluationFailed, design: Design) -> EvaluationFailed:
+    """A failure on the road, with what may help."""
+    if failure.cause != "no_equilibrium" or not design.advice_on_road:
+        return failure
+    words = f"{failure.words}; {design.advice_on_road}"
+    return EvaluationFailed(failure.cause, words, failure.folder)
 
 
 def _shape(found: Evaluation) -> Array:

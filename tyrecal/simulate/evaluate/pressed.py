@@ -67,7 +67,8 @@ class Pressed:
     """One design at rising loads.
 
     nodes (n,): deck numbers; points (n, 2): R, Z in m, not inflated; angles (k,): of the rings,
-    rad from the patch's middle, 0 <= angle < 2 pi; free_radius_m: inflated, without a load.
+    rad from the patch's middle, 0 <= angle < 2 pi; free_radius_m: inflated, without a load;
+    inflated (n, 3): the displacement without a load, m, of a solver that tells it.
     failed: why the load after the last footprint was not reached, or None. cavity_Hz: of the first
     wave in the cavity before any load, where there is a gas.
     """
@@ -81,6 +82,7 @@ class Pressed:
     footprints: tuple[Footprint, ...]
     failed: EvaluationFailed | None = None
     cavity_Hz: float | None = None
+    inflated: Array | None = None
 
 
 def pressed(
@@ -118,6 +120,7 @@ def pressed(
         if words
         else None,
         cavity_Hz=answer.get("cavity_Hz"),
+        inflated=answer.get("inflated"),
     )
 
 

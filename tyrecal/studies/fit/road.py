@@ -18,7 +18,7 @@ from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.evaluate.pressed import Pressed
-from ...tyre.case import LoadedCase
+from ...tyre.case import LoadedCase, start_values
 from ...tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ...tyre.state import without
 from ..footprint import footprint_row
@@ -77,7 +77,9 @@ def press_with_slopes(
         design = state.design(case, values)
         # a state's own numbers hang on no variable
         left = tuple(without(case, dict.fromkeys(names, 0.0), state.numbers(case)))
-        pressed = evaluator.press(design, _loads(here), gradients=left)
+        loads = _loads(here)
+        base = _base(case, targets, loads, names)
+        pressed = evaluator.press(design, loads, gradients=left, base=base)
         if pressed.failed:
             raise pressed.failed
         at = {each.load_N: each.slopes for each in pressed.footprints}
@@ -87,6 +89,19 @@ def press_with_slopes(
             quantities[place] = quantity
             slopes[place] = [rates[v][name] if v in rates else 0.0 for v in names]
     return quantities, slopes
+
+
+def _base(
+    case: LoadedCase, targets: Sequence[ValueTarget], loads: Sequence[float], names: Sequence[str]
+) -> dict[str, float] | None:
+    """The start of the fit in the first state, from whose equilibrium on the road all designs and
+    states begin that have the same first load (None: the others)."""
+    first = targets[0].state.unloaded
+    own = {i: t for i, t in enumerate(targets) if t.state.unloaded == first}
+    if _loads(own)[:1] != list(loads[:1]):
+        return None
+    starts = start_values(case)
+    return first.design(case, {name: starts[name] for name in names})
 
 
 def _loads(targets: Placed) -> list[float]:

@@ -24,7 +24,7 @@ from ...deck.keywords import DataLine, DeckError, Keyword
 from .. import shapes
 from ..elements import Lines
 from ..laws.energy_law import EnergyLaw
-from .elastic import Elastic
+from .elastic import Elastic, ElasticAtStations
 from .part import Rows, SectionJob, TyrePart, consistent_mass, on_diagonals
 
 Array = np.ndarray
@@ -73,6 +73,32 @@ class LogarithmicCord(EnergyLaw):
         return replace(self, tension=tension)
 
 
+@dataclass(frozen=True)
+class Cords(Elastic):
+    """Cords of rebar layers; ``layers``: the name of each element's layer."""
+
+    layers: tuple[str, ...] = ()
+
+    def at_stations(self, nodes: int) -> CordsAtStations:
+        return CordsAtStations(self, nodes)
+
+
+class CordsAtStations(ElasticAtStations):
+    """Cords at every station, which can tell where they are compressed most."""
+
+    def __init__(self, part: Cords, nodes: int):
+        super().__init__(part, nodes)
+        self._layers = part.layers
+
+    def most_compressed(self) -> tuple[float, str, Array]:
+        """The lowest logarithmic strain of cords that bear compression, the layer that it is in,
+        and the nodes of its element."""
+        bear = np.asarray(self.law.compressed) > 0
+        strain = np.where(bear, np.log(stretch(self.z)), 0.0)
+        element = int(strain.reshape(self.e, -1).min(1).argmin())
+        return float(strain.min()), self._layers[element], self.connectivity[element]
+
+
 def stretch(q: Array) -> Array:
     """lambda (p,) of the cord vectors q (p, 3)."""
     return np.sqrt((q * q).sum(-1))
@@ -111,6 +137,7 @@ def read(job: SectionJob) -> list[TyrePart]:
 
 @dataclass(frozen=True)
 class _Layer:
+    name: str
     lines: Lines
     rows: Rows
     stiffness: Array  # E A / s (e, g), N/m
@@ -138,10 +165,10 @@ def _layer(job: SectionJob, k: Keyword, row: DataLine, lines: Lines) -> _Layer:
     smeared = area / width
     rows = cord_rows(lines, np.cos(angle), np.sin(angle))
     stiffness, mass = material.youngs_modulus * smeared, material.density * smeared
-    return _Layer(lines, rows, stiffness, mass, material.tension_only)
+    return _Layer(row.text(0), lines, rows, stiffness, mass, material.tension_only)
 
 
-def _cords(layers: list[_Layer]) -> Elastic:
+def _cords(layers: list[_Layer]) -> Cords:
     """All layers as one part: what is added up once is added up in one order."""
     join = lambda pick: np.concatenate([pick(layer) for layer in layers])
     rows = Rows(
@@ -153,7 +180,7 @@ def _cords(layers: list[_Layer]) -> Elastic:
     )
     shared = layers[0].lines.N.ndim == 2
     per_radian = join(lambda layer: layer.mass * layer.lines.R * layer.lines.weights)
-    return Elastic(
+    return Cords(
         join(lambda layer: layer.lines.connectivity),
         rows,
         LogarithmicCord(
@@ -161,4 +188,5 @@ def _cords(layers: list[_Layer]) -> Elastic:
             compressed=join(lambda layer: np.full(layer.mass.size, float(not layer.tension_only))),
         ),
         consistent_mass(layers[0].lines.N if shared else join(lambda y: y.lines.N), per_radian),
+        tuple(layer.name for layer in layers for _ in layer.lines.connectivity),
     )
