@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from tyrecal.simulate.deck.abaqus import claimed, solid_claims
+from tyrecal.simulate.deck.decks import Decks
+from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.case.new_case import from_file, from_size
 from tyrecal.tyre.case.parts import Cord
@@ -80,6 +82,15 @@ def test_textile_and_carcass_cords_go_slack_belts_and_wires_do_not(case: LoadedC
         bears = cords[layer.material].bears_compression
         assert bears == name.startswith(("belt_", "bead_wire")), name
     assert {f"{name}_modulus" for name in cords} < set(case.case.uncertainties)
+
+
+def test_abaqus_is_told_which_cords_bear_no_compression(case: LoadedCase) -> None:
+    """`*NO COMPRESSION` in the materials of textile and carcass cords, and in no other."""
+    text = Decks(TyreDesign(case)).texts("abaqus")["inflate.inp"]
+    blocks = [block.split("\n", 1) for block in text.split("*MATERIAL, NAME=")[1:]]
+    slack = {name.lower() for name, rest in blocks if "*NO COMPRESSION" in rest}
+    truck = CODES[case.case.size] is TRUCK
+    assert slack == ({"carcass_cord"} if truck else {"polyester_cord", "nylon_cord"})
 
 
 def test_a_section_of_one_rubber_has_a_slack_carcass_too(tmp_path: Path) -> None:
