@@ -66,7 +66,7 @@ def inflate(
 def test_the_whole_load_is_tried_first(small: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     newton = Newton(lambda *state: True)
     U, used, looks = inflate(small, monkeypatch, newton)
-    assert newton.asked == [(1.0, 1.0, 11)] and used == 2 and not looks
+    assert newton.asked == [(1.0, 1.0, 18)] and used == 2 and not looks
     assert U.ravel()[0] == 1.0
 
 
@@ -82,7 +82,7 @@ def test_stiff_rubber_is_let_down(
     newton = Newton(lambda _, before, share, now: now == 8 or 1 < before <= most * now)
     U, used, looks = inflate(small, monkeypatch, newton)
     assert [s for _, s, _ in newton.asked] == pytest.approx([1, *stiffness])
-    assert [longest for *_, longest in newton.asked] == [11, 30] + [11] * (len(stiffness) - 1)
+    assert [longest for *_, longest in newton.asked] == [18, 30] + [18] * (len(stiffness) - 1)
     assert all(share == 1.0 for share, *_ in newton.asked)
     assert tuple(U.ravel()[:2]) == (1.0, 1.0) and used == 2 * len(newton.asked)
     assert looks == [1, *range(2, len(newton.asked))]

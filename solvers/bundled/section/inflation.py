@@ -22,7 +22,7 @@ FORCE_RTOL = 1e-9  # out-of-balance force over pressure force; the next step is 
 ROUND_OFF_RTOL = 1e-6  # accepted where round-off lets the force fall no further
 MIN_PRESSURE_STEP = 1 / 256
 MAX_ITERATIONS = 30
-MAX_QUICK_ITERATIONS = 11  # iterations after which another path is likely to be shorter
+MAX_QUICK_ITERATIONS = 18  # iterations after which another path is likely to be shorter
 STIFFENING = 8.0  # multiple of the rubber's stiffness that inflates without trouble
 SECTION_RADIUS = 0.3  # meridional radius of curvature over the section's height, for the start
 EASED = 300.0  # bulk over shear modulus of rubber that inflates in few iterations
@@ -168,10 +168,12 @@ def _newton(
     if not (np.isfinite(energy) and np.isfinite(force).all()):
         return None, 0, "the start is no shape that the tyre can have"
     smallest, used, inertia, before = 1e-3 * tension, 0, 0.0, float("inf")
-    for _ in range(longest):
+    for iteration in range(longest + 1):
         size = float(np.linalg.norm(force))
         if size <= FORCE_RTOL * scale or (size <= ROUND_OFF_RTOL * scale and size > 0.5 * before):
             return U, used, ""
+        if iteration == longest:
+            break
         before = size
         taut = model.with_laws(methodcaller("tautened", tension))
         band = numbering.assemble(mechanics.tangents(taut, U, loads, harmonics=False)[0])
