@@ -93,6 +93,7 @@ class CordsAtStations(ElasticAtStations):
     def most_compressed(self) -> tuple[float, str, Array]:
         """The lowest logarithmic strain of cords that bear compression, the layer that it is in,
         and the nodes of its element."""
+        assert isinstance(self.law, LogarithmicCord)
         bear = np.asarray(self.law.compressed) > 0
         strain = np.where(bear, np.log(stretch(self.z)), 0.0)
         element = int(strain.reshape(self.e, -1).min(1).argmin())
