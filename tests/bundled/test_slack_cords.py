@@ -128,3 +128,22 @@ def test_slopes_are_exact_on_both_sides_of_slack_and_between(
     step = 1e-4
     wanted = (solved(kPa, 1 + step)[0] - solved(kPa, 1 - step)[0]) / (2 * step)
     assert slopes == pytest.approx(wanted, abs=2e-5 * abs(wanted).max())
+
+
+def test_the_layer_that_is_compressed_most_is_named() -> None:
+    """A tube bent by the strain e at its outermost cords: -e on the inside of the bend, to what the
+    outermost station lacks of it."""
+    strain, nodes, z = 1e-3, 3, np.linspace(0.0, LENGTH, 3)
+    X = np.stack([np.full(nodes, R), z], -1)
+    layer = Layer(np.arange(nodes)[None], 1e-6, 1e-3, STIFFNESS * 1e3, 0.0, 0.0, False)
+    around = half_circle(np.full(40, np.pi / 40))
+    deck = support.deck(X, np.empty((0, 4), int), Rubber(), [layer])
+    tube = Revolved(support.model_of(deck), [], around)
+    bent = np.zeros((len(around.angles), nodes, 3))
+    bent[..., 2] = strain * np.cos(around.angles)[:, None] * z
+    tube.residual(bent)
+    (part,) = (each for each in tube.parts if isinstance(each, cords.CordsAtStations))
+    lowest, name, where = part.most_compressed()
+    assert lowest == pytest.approx(np.log1p(-strain), rel=1e-2)
+    assert sorted(where) == [0, 1, 2]
+    assert f"\n{name}, " in deck

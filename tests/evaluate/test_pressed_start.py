@@ -1,0 +1,96 @@
+"""A design on the road begins at another one's state: the same answer, and a function of its deck."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tyrecal_solvers.bundled.adapter import JOB, OLDJOB, PRESS
+from tyrecal_solvers.bundled.job import run
+from tyrecal_solvers.bundled.road import footprint_job, pressed_start
+from tyrecal_solvers.errors import Refused
+
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.pressed import Pressed
+from tyrecal.simulate.evaluate.store import Store
+from tyrecal.tyre.case import LoadedCase, start_values
+from tyrecal.tyre.load import load_case
+
+from .test_pressed_slopes import small_case
+
+LOADS = [1500.0]
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory: pytest.TempPathFactory) -> LoadedCase:
+    return load_case(small_case(tmp_path_factory.mktemp("case")))
+
+
+def moved(case: LoadedCase) -> dict[str, float]:
+    """Another design, at another pressure."""
+    start = start_values(case)
+    return {**start, "A_carcass": 1.3 * start["A_carcass"], "p": 1.15 * start["p"]}
+
+
+def numbers(pressed: Pressed) -> bytes:
+    """All that depends on the state."""
+    first = pressed.footprints[0]
+    parts = (first.displacement, first.pressure_Pa, first.stiffness_N_per_m, first.deflection_m)
+    return b"".join(np.asarray(part).tobytes() for part in parts)
+
+
+@pytest.mark.slow
+def test_the_answer_is_that_from_nothing_and_its_bytes_depend_on_no_memory(
+    case: LoadedCase, tmp_path: Path
+) -> None:
+    """Within the tolerance of the out-of-balance force, 1e-8; run alone from its folder, with the
+    start's factor forgotten, the same bytes."""
+    base, values = start_values(case), moved(case)
+    evaluator = Evaluator(TyreDesign(case), folder=tmp_path / "runs", keep=True)
+    begun = evaluator.press(values, LOADS, base=base)
+    assert evaluator.counts.runs == 2  # the base first
+    cold = Evaluator(TyreDesign(case)).press(values, LOADS)
+    for name in ("deflection_m", "stiffness_N_per_m", "contact_area_m2"):
+        one, other = (getattr(each.footprints[0], name) for each in (begun, cold))
+        assert one == pytest.approx(other, rel=1e-6), name
+    pressed_start._FACTORS.clear()
+    (folder,) = (path.parent.parent for path in (tmp_path / "runs").rglob("start/pressed.npz"))
+    alone = tmp_path / "alone"
+    shutil.copytree(folder, alone)
+    for made in (*alone.glob(f"{PRESS}.npz"), *alone.glob(f"{PRESS}.json")):
+        made.unlink()
+    run(alone, PRESS, OLDJOB)
+    assert footprint_job.read(alone / PRESS)["footprints"][0]["stiffness_N_per_m"] == (
+        begun.footprints[0].stiffness_N_per_m
+    )
+    assert not (alone / f"{JOB}.inp").exists()
+
+
+@pytest.mark.slow
+def test_the_order_of_the_questions_does_not_matter(case: LoadedCase, tmp_path: Path) -> None:
+    base, values = start_values(case), moved(case)
+    fresh = lambda: Evaluator(TyreDesign(case), store=Store(tmp_path / "record"))
+    first = fresh()
+    alone = numbers(first.press(values, LOADS, base=base))
+    again = fresh()
+    assert numbers(again.press(values, LOADS, base=base)) == alone
+    assert (again.counts.runs, again.counts.recorded) == (0, 2)
+    workers = Evaluator(TyreDesign(case)).press_all([base, values], LOADS, jobs=2, base=base)
+    assert [numbers(each) for each in workers if isinstance(each, Pressed)][1] == alone
+
+
+@pytest.mark.slow
+def test_a_start_that_is_not_the_one_named_is_refused(case: LoadedCase, tmp_path: Path) -> None:
+    evaluator = Evaluator(TyreDesign(case), folder=tmp_path, keep=True)
+    evaluator.press(moved(case), LOADS, base=start_values(case))
+    (start,) = tmp_path.rglob("start/pressed.npz")
+    inflate = start.with_name(f"{OLDJOB}.inp")
+    inflate.write_text(inflate.read_text().replace("CAVITY, P, 2", "CAVITY, P, 3"))
+    with pytest.raises(Refused, match="start is not the tyre that the deck names"):
+        run(start.parent.parent, PRESS, OLDJOB)
+    start.unlink()
+    with pytest.raises(Refused, match=r"start/pressed.npz is not there"):
+        run(start.parent.parent, PRESS, OLDJOB)
