@@ -1,4 +1,4 @@
-"""A design on the road begins at another one's state: the same answer, and a function of its deck."""
+"""A design on the road begins at another one's state: the same answer, by its deck alone."""
 
 from __future__ import annotations
 

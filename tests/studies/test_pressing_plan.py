@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.studies.pressing_plan import FIRST_LOAD_S, PressedState, PressingPlan
+from tyrecal.studies.pressing_plan import FIRST_LOAD_S, FURTHER_DESIGN_S, PressedState, PressingPlan
 
 from ..cli.test_cli import CASE, run
 
@@ -21,8 +21,9 @@ def test_its_numbers_by_hand() -> None:
     assert (plan.section_unknowns, plan.unknowns, plan.runs) == (3000, 51000, 20)
     one = replace(PLAN, designs=1, states=(PressedState(1),))
     assert one.seconds == pytest.approx(FIRST_LOAD_S * 51000 * 3000 / 1e9)
-    assert replace(one, designs=6).seconds == pytest.approx(6 * (one.seconds or 0))
-    assert replace(one, designs=6, at_once=2).seconds == pytest.approx(3 * (one.seconds or 0))
+    of_six = (1 + 5 * FURTHER_DESIGN_S / FIRST_LOAD_S) * (one.seconds or 0)
+    assert replace(one, designs=6).seconds == pytest.approx(of_six)
+    assert replace(one, designs=6, at_once=2).seconds == pytest.approx(of_six / 2)
     assert replace(one, at_once=2).memory_bytes == pytest.approx(2 * (one.memory_bytes or 0))
     halved = replace(one, nodes=500)
     assert (halved.seconds or 0) == pytest.approx((one.seconds or 0) / 4)
@@ -39,7 +40,7 @@ def test_more_that_is_wanted_takes_longer() -> None:
             PressedState(1, neighbours=3),
         )
     )
-    assert min(more) > first and more[-1] == pytest.approx(4 * first)
+    assert min(more) > first
     assert replace(PLAN, states=(PressedState(1, neighbours=3),)).runs == 8
 
 

@@ -14,6 +14,7 @@ from ..tyre.case import LoadedCase
 # The costs of the bundled solver's factorisation grow as its entries: unknowns of the whole problem
 # times those of a section. Seconds of one processor, and bytes, for 1e9 of them.
 FIRST_LOAD_S, FURTHER_LOAD_S = 150.0, 40.0
+FURTHER_DESIGN_S = 35.0  # of the first load of a design or state that begins at another one's
 MODES_AT_LOAD_S = 30.0  # in addition, for the modes at each load
 MEMORY_BYTES, PROCESS_BYTES = 2.5e9, 1.5e8  # the latter of a process without any
 SENSITIVITY_SHARE = 0.08  # of a press, for the exact sensitivities by one variable
@@ -71,11 +72,14 @@ class PressingPlan:
         """Likely time on quiet processors, nothing answered from the record; None: not known."""
         if not self.is_timed:
             return None
-        of_design = 0.0
+        # designs and states begin at the first one's equilibrium, except where modes are wanted
+        total = 0.0 if all(each.modes for each in self.states) else FIRST_LOAD_S - FURTHER_DESIGN_S
         for each in self.states:
-            press = FIRST_LOAD_S + FURTHER_LOAD_S * (each.loads - 1) + self._modes_s(each)
-            of_design += press * (1 + SENSITIVITY_SHARE * each.sensitivities + each.neighbours)
-        return 1e-9 * self._entries * of_design * self.designs / self.at_once
+            begun = FIRST_LOAD_S if each.modes else FURTHER_DESIGN_S
+            press = begun + FURTHER_LOAD_S * (each.loads - 1) + self._modes_s(each)
+            share = 1 + SENSITIVITY_SHARE * each.sensitivities + each.neighbours
+            total += self.designs * press * share
+        return 1e-9 * self._entries * total / self.at_once
 
     def _modes_s(self, state: PressedState) -> float:
         return MODES_AT_LOAD_S * state.loads if state.modes else 0.0
