@@ -116,7 +116,7 @@ def command(
             " its runs"
         )
     plan = calibration.pressing_plan(method, starts, study.jobs)
-    if (plan.runs or dry_run) and study.planned(plan, dry_run):
+    if (plan.runs or dry_run) and study.print_plan(plan, dry_run):
         return 0
     run = study.run(loaded, "fit", evaluator)
     with terminal.progress("fit") as bar, reached(scheduler) as evaluator.scheduler:

@@ -72,7 +72,7 @@ def command(
         options.say_idle(terminal, study.jobs, "one design is pressed alone; --fitted adds another")
     pressed_to = [PressedState(len(asked))]
     plan = plan_pressing(loaded, evaluator, pressed_to, len(designs), study.jobs)
-    if study.planned(plan, dry_run):
+    if study.print_plan(plan, dry_run):
         return 0
     output = study.run(loaded, "footprint", evaluator, load_N=asked)
     with terminal.progress("footprint") as bar:

@@ -95,7 +95,7 @@ def command(
     if loads:
         pressed_to = [PressedState(sum(load > 0 for load in loads), modes=True)]
         plan = plan_pressing(loaded, evaluator, pressed_to, len(designs), study.jobs)
-        if study.planned(plan, dry_run):
+        if study.print_plan(plan, dry_run):
             return 0
     if sweep is not None:
         run = study.run(loaded, "modes", evaluator, "sweep-load", load_N=loads)

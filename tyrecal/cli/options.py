@@ -309,8 +309,9 @@ class Study:
                 f"results of '{run.study}' in '{run.folder}' are those of an earlier run"
             )
 
-    def planned(self, plan: PressingPlan, dry_run: bool) -> bool:
-        """Say how long a run on the road is likely to take; whether that is all that is wanted."""
+    def print_plan(self, plan: PressingPlan, dry_run: bool) -> bool:
+        """Print the plan of a run on the road: as the result of a dry run, else as a remark.
+        Returns ``dry_run``."""
         if dry_run:
             self.terminal.result(plan.content())
             self.terminal.say(str(plan))

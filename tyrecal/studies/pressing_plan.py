@@ -40,8 +40,9 @@ class PressingPlan:
     """Size of the problem, number of runs, likely time and memory.
 
     nodes: of the section; places_round: nodes round half the tyre, from the patch to the top, which
-    has a half turn's symmetry; designs: about how many; at_once: how many designs run side by side;
-    is_timed: the solver is the one that the estimates hold for.
+    has a half turn's symmetry; designs: how many, or about how many where ``is_estimate``;
+    at_once: how many of them run side by side; is_timed: the solver is the one that the estimates
+    hold for.
     """
 
     nodes: int
