@@ -46,6 +46,8 @@ def of_fit(told: Mapping[str, Any]) -> Figures:
         found |= {name: v["value"], f"{name} %": 100 * v["standard_error"] / v["value"]}
     for mode in told["modes"]:
         found[f"off {label_of(mode)}"] = mode["deviation_percent"]
+    for each in told.get("footprint", []):
+        found[f"off {each['quantity']} {each['pressure_kPa']:g}"] = each["deviation_percent"]
     if "labels" in told:
         found["labels %"] = 100 * told["labels"]["labelings"][0]["probability"]
         rows = sum(mode["multiplicity"] for mode in told["modes"]) - len(told["variables"])
@@ -61,11 +63,13 @@ def of_modes(told: Mapping[str, Any]) -> Figures:
 
 
 def of_footprint(told: Mapping[str, Any]) -> Figures:
-    """footprint.json: cm2, N/mm"""
+    """footprint.json: cm2, N/mm, mm"""
     found: Figures = {}
     for row in told["rows"]:
         found[f"cm2 at {row['load_N']:g}"] = 1e4 * row["area_m2"]
         found[f"N/mm at {row['load_N']:g}"] = row["vertical_stiffness_N_per_m"] / 1e3
+        for name in ("length", "width"):
+            found[f"{name} at {row['load_N']:g}"] = 1e3 * row[f"{name}_m"]
     return found
 
 
@@ -130,6 +134,7 @@ class Step:
 
 TYRE, REAL = "cases/p235_75r17.yaml", "cases/205_60r15.yaml"
 PRESSED = f"--loads-N {','.join(map(str, LOADS_N))} --no-pictures"
+AT_SIZE = "--loads-N 2000,4000,6000 --no-pictures"
 STEPS = {
     "fit": Step(f"tyrecal fit {TYRE} --no-pictures", "fit.json", of_fit),
     "fit gauss-newton": Step(
@@ -169,6 +174,18 @@ STEPS = {
         " --no-pictures",
         "diagnosis.json",
         of_diagnosis,
+    ),
+    "size code": Step(f"tyrecal footprint {{size}} {AT_SIZE}", "footprint.json", of_footprint),
+    "stiffnesses": Step(
+        "tyrecal fit {size} --mesh coarse --measured cases/205_60r15_two_pressures.csv --fix A_belt"
+        " --fix C10_tread --method gauss-newton --no-pictures",
+        "fit.json",
+        of_fit,
+    ),
+    "predicted": Step(
+        f"tyrecal footprint {{size}} --fitted {{stiffnesses}}/fit.json --compare fitted {AT_SIZE}",
+        "footprint.json",
+        of_footprint,
     ),
     "one effect": Step("python -m tests.studies.real_data", "", of_table),
     "both": Step(
@@ -392,6 +409,38 @@ CLAIMS += [
     )
     for name, row in EFFECTS.items()
 ]
+# the public set of a 205/60R15 at 220 kPa, by load in N: N/mm, then length and width in mm
+PUBLIC_SET = {2000: (197.3, 87.4, 120.7), 4000: (209.7, 131.8, 141.1), 6000: (221.3, 169.1, 151.0)}
+
+
+def against_set(what: str, public: float) -> Callable[[Record], list[float]]:
+    """A figure of the tyre from its size code, then of the fitted one, each with its deviation
+    from the public set, %."""
+
+    def figures(record: Record) -> list[float]:
+        values = [record[step][what] for step in ("size code", "predicted")]
+        return [x for value in values for x in (value, 100 * value / public - 100)]
+
+    return figures
+
+
+for load_N, row in PUBLIC_SET.items():
+    for (name, what), value in zip(
+        (("stiffness", "N/mm"), ("length", "length"), ("width", "width")), row, strict=True
+    ):
+        words = f"| {name} at {load_N} N | {value} | {{}} | {{}} % | {{}} | {{}} % |"
+        CLAIMS.append(("real_data", words, against_set(f"{what} at {load_N}", value)))
+CLAIMS += [
+    (
+        "real_data",
+        "C10_sidewall {} MPa ± {} % and A_carcass {}e-7 m² ± {} %, after {} designs",
+        of(
+            "stiffnesses",
+            *(("C10_sidewall", 1e-6), "C10_sidewall %", ("A_carcass", 1e7), "A_carcass %"),
+            "evaluations",
+        ),
+    )
+]
 
 
 def plain(page: str) -> str:
@@ -437,6 +486,18 @@ def with_exact_section(folder: Path) -> Path:
     return case
 
 
+def from_size_code(folder: Path) -> Path:
+    """The case of a 205/60R15 at 220 kPa that `tyrecal init` writes."""
+    case = folder / "205_60r15.yaml"
+    if not case.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        words = ["init", "205/60R15", "--pressure-kPa", "220", "--no-pictures", "--quiet"]
+        subprocess.run(
+            [sys.executable, "-m", "tyrecal", *words, "--output", str(case)], cwd=ROOT, check=True
+        )
+    return case
+
+
 def _all_but_tables(folder: str, names: list[str]) -> list[str]:
     return [name for name in names if not name.endswith(".csv")]
 
@@ -445,6 +506,7 @@ def run(name: str, folder: Path) -> Figures:
     """A step's figures. Raises CalledProcessError."""
     step = STEPS[name]
     places = {each: str(folder / each.replace(" ", "_")) for each in STEPS}
+    places["size"] = str(from_size_code(folder / "size"))
     places["exact"] = str(with_exact_section(folder / "exact"))
     words = shlex.split(step.command.format(**places))
     words = (
