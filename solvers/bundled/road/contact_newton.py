@@ -365,6 +365,17 @@ class ContactNewton:
         found, used, left = gmres(product, precondition, right, tolerance, MAX_GMRES, begin)
         return found[:-1].reshape(shape), float(found[-1]) * scale, used, left
 
+    def solve_closely(
+        self, tangent: Tangent, force: Array, lacking: float, tolerance: float
+    ) -> tuple[Array, float, float]:
+        """Parts, rise and residual as `solve` has them, with a preconditioner of this state where
+        that of another one does not reach the ``tolerance``."""
+        parts, rise, _, left = self.solve(tangent, force, lacking, tolerance)
+        if left > tolerance:
+            self._form(tangent.contact)
+            parts, rise, _, left = self.solve(tangent, force, lacking, tolerance)
+        return parts, rise, left
+
     def _form(self, contact: Contact) -> ContactUpdate:
         """The preconditioner at the last state. Raises Indefinite; the one before is gone, as two
         at a time would double the memory."""
@@ -377,7 +388,7 @@ class ContactNewton:
     def _unit(self, contact: Contact) -> tuple[Array, float]:
         """Parts and the road's rise that answer a unit of the force of half the tyre."""
         tangent = Tangent.of(contact, self.symmetry)
-        found, rise, _, left = self.solve(tangent, 0 * self.parts, 1.0, UNIT_RTOL)
+        found, rise, left = self.solve_closely(tangent, 0 * self.parts, 1.0, UNIT_RTOL)
         if left > MAX_UNIT_RESIDUAL:
             raise NoEquilibrium(f"the vertical stiffness was not found in {MAX_GMRES} iterations")
         return found, rise

@@ -146,7 +146,7 @@ class _Path:
 def _solved(
     work: ContactNewton, tangent: Tangent, force: Array, lacking: float
 ) -> tuple[Array, float]:
-    parts, rise, _, left = work.solve(tangent, force, lacking, SMOOTH_RTOL)
+    parts, rise, left = work.solve_closely(tangent, force, lacking, SMOOTH_RTOL)
     if left > SMOOTH_RTOL:
         raise NoEquilibrium(f"a derivative was not found in {MAX_GMRES} iterations")
     return parts, rise

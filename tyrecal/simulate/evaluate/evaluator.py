@@ -156,7 +156,7 @@ class Evaluator:
             raise _advised(failure, design) from None
         if answer.failed:
             answer = replace(answer, failed=_advised(answer.failed, design))
-        if base and not start:
+        if base:
             self._remember(design, answer)
         return answer
 

@@ -120,6 +120,7 @@ class Problem:
         exact = exact and "footprint_gradients" in evaluator.solver.capabilities
         self.exact_on_road = sum(not t.member for t in self.road) if exact else 0
         self.points: dict[tuple[float, ...], Point | EvaluationFailed] = {}
+        self.best: Point | None = None  # from whose state on the road the next design begins
 
     def start(self) -> Array:
         """Coordinates of the case's start values."""
@@ -147,6 +148,8 @@ class Problem:
             if self.notify:
                 self.notify(len(self.points), values, self.points[key])
         known = self.points[key]
+        if isinstance(known, Point) and (not self.best or known.objective < self.best.objective):
+            self.best = known
         if isinstance(known, EvaluationFailed):
             raise known
         return known
@@ -187,7 +190,10 @@ class Problem:
         quantities, slopes = np.empty(0), np.empty((0, len(self.variables)))
         if patches := self.road[: self.exact_on_road]:
             names = [v.name for v in self.variables]
-            quantities, rates = press_with_slopes(self.case, self.evaluator, patches, values, names)
+            base = self.best.values if self.best else values
+            quantities, rates = press_with_slopes(
+                self.case, self.evaluator, patches, values, names, base
+            )
             slopes = rates * [v.slope(values[v.name]) for v in self.variables]
         if others := self.road[self.exact_on_road :]:
             ask = lambda designs: press(self.case, self.evaluator, others, designs, self.jobs)

@@ -18,7 +18,7 @@ from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.evaluate.pressed import Pressed
-from ...tyre.case import LoadedCase, start_values
+from ...tyre.case import LoadedCase
 from ...tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ...tyre.state import without
 from ..footprint import footprint_row
@@ -68,9 +68,11 @@ def press_with_slopes(
     targets: Sequence[ValueTarget],
     values: Mapping[str, float],
     names: Sequence[str],
+    base: Mapping[str, float],
 ) -> tuple[Array, Array]:
     """Quantities (targets,) of a design, none a mode, and their exact slopes (targets,
-    variables) by the variables ``names``. Raises EvaluationFailed, DeckRefused."""
+    variables) by the variables ``names``; ``base``: the design from whose state on the road in the
+    first state all others begin. Raises EvaluationFailed, DeckRefused."""
     quantities, slopes = np.empty(len(targets)), np.zeros((len(targets), len(names)))
     for state in dict.fromkeys(t.state.unloaded for t in targets):
         here = {i: t for i, t in enumerate(targets) if t.state.unloaded == state}
@@ -78,8 +80,8 @@ def press_with_slopes(
         # a state's own numbers hang on no variable
         left = tuple(without(case, dict.fromkeys(names, 0.0), state.numbers(case)))
         loads = _loads(here)
-        base = _base(case, targets, loads, names)
-        pressed = evaluator.press(design, loads, gradients=left, base=base)
+        begin = _base(case, targets, loads, base)
+        pressed = evaluator.press(design, loads, gradients=left, base=begin)
         if pressed.failed:
             raise pressed.failed
         at = {each.load_N: each.slopes for each in pressed.footprints}
@@ -92,16 +94,16 @@ def press_with_slopes(
 
 
 def _base(
-    case: LoadedCase, targets: Sequence[ValueTarget], loads: Sequence[float], names: Sequence[str]
+    case: LoadedCase,
+    targets: Sequence[ValueTarget],
+    loads: Sequence[float],
+    values: Mapping[str, float],
 ) -> dict[str, float] | None:
-    """The start of the fit in the first state, from whose equilibrium on the road all designs and
-    states begin that have the same first load (None: the others)."""
+    """The design ``values`` in the first state, from whose equilibrium those begin that have the
+    same first load (None: the others)."""
     first = targets[0].state.unloaded
     own = {i: t for i, t in enumerate(targets) if t.state.unloaded == first}
-    if _loads(own)[:1] != list(loads[:1]):
-        return None
-    starts = start_values(case)
-    return first.design(case, {name: starts[name] for name in names})
+    return first.design(case, values) if _loads(own)[:1] == list(loads[:1]) else None
 
 
 def _loads(targets: Placed) -> list[float]:
