@@ -26,6 +26,7 @@ def test_the_adapter_writes_the_decks_and_what_they_cannot_say(tmp_path: Path) -
         request={"highest_harmonic": 3, "modes_per_harmonic": 4, "own_frequency": True, "other": 1},
         loads_N=(),
         start=None,
+        pressed_start=None,
         texts=lambda dialect: {"modes.inp": f"** ä {dialect}\n"},
         tangents=lambda dialect: tangents,
     )

@@ -73,7 +73,7 @@ def test_the_deck_says_how_the_wheel_stands(
     asked: list[Any] = []
 
     def press(*given: Any) -> dict[str, Any]:
-        asked.extend(given[-2].values())
+        asked.extend(given[-3].values())
         raise RunFailed("crashed", "enough")
 
     monkeypatch.setattr(footprint_job, "press", press)

@@ -30,6 +30,7 @@ MAX_GMRES_BEFORE_NEW_FACTOR = 25
 MAX_GMRES = 60
 BUCKLING_STRAIN = 1e-3  # logarithmic, from which on compressed cords are named as the cause
 NEAR_LOAD = 2.0  # of a load, up to which Coulomb's friction is tried at once
+SAME_SHARE = 0.02  # of a load, up to which a first guess counts as one at this load
 SAME_FACTOR = 1.1  # of a load, up to which its preconditioner is worth keeping
 LINEAR_RTOL = 1e-2  # residual of the linear problem, relative
 SMOOTH_RTOL = 1e-5  # the same of derivatives, by which a fit descends
@@ -72,6 +73,7 @@ class FirstGuess:
     moved: Array  # (2, k, q, 3): what the load adds to the inflated tyre's parts, m
     deflection: float  # m
     factor: ContactUpdate
+    share: float = 1.0  # of the load, at which this tyre has about this deflection
 
 
 class ContactNewton:
@@ -92,6 +94,7 @@ class ContactNewton:
         self.flat = self._flat_height(tyre.model.mesh.X, np.flatnonzero(~symmetry.free.any(1)))
         self.road = road
         self._inflated = U
+        tyre.residual(U)
         self.parts = symmetry.parts(U)
         self.height = self.free_radius
         self.load = 0.0
@@ -242,8 +245,15 @@ class ContactNewton:
             return None
         self._factor, self._formed_at = guess.factor, load
         try:
-            height = self.free_radius - guess.deflection
-            return self._settle(self.parts + guess.moved, height, load, None, CONTACT_FORCE_RTOL)
+            parts, height = self.parts + guess.moved, self.free_radius - guess.deflection
+            if abs(guess.share - 1) > SAME_SHARE:
+                near = guess.share * load
+                parts, height, contact = self._settle(parts, height, near, None, COULOMB_RTOL)
+                tangent = Tangent.of(contact, self.symmetry)
+                moved, rise, *_ = self.solve(tangent, 0 * parts, 1.0, LINEAR_RTOL)
+                parts = parts - (load - near) / 2 * moved
+                height -= (load - near) / 2 * rise
+            return self._settle(parts, height, load, None, CONTACT_FORCE_RTOL)
         except (NoEquilibrium, Indefinite, Inverted):
             log.info("%g N: the start was too far away, loaded from nothing", load)
             self._factor, self._used = None, 0

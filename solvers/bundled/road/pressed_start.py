@@ -9,7 +9,7 @@ alone gives the same bytes.
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -28,7 +28,7 @@ Array = np.ndarray
 MOST_FACTORS = 1  # remembered at a time: each takes about 0.7 GB with the default mesh
 ReadTyre = Callable[[Mapping[str, str]], tuple[Model, list[Pressure], RoadData]]
 
-_FACTORS: OrderedDict[str, ContactUpdate] = OrderedDict()
+_FACTORS: OrderedDict[str, tuple[ContactUpdate, float]] = OrderedDict()
 
 
 def begin(start: PressedStart, read: ReadTyre, work: ContactNewton, numbers: Array) -> None:
@@ -45,14 +45,16 @@ def begin(start: PressedStart, read: ReadTyre, work: ContactNewton, numbers: Arr
             _FACTORS.popitem(last=False)
         _FACTORS[start.sha256] = _factor(start, read, work, inflated, pressed)
     moved = work.symmetry.parts(pressed - inflated) * work.symmetry.mask
-    factor = _FACTORS[start.sha256].copy()
-    work.first = FirstGuess(start.load_N, moved, start.deflection_m, factor)
+    factor, pressure = _FACTORS[start.sha256]
+    own = _pressure([load for load in work.tyre.loads if isinstance(load, Pressure)])
+    share = own / pressure if own and pressure else 1.0
+    work.first = FirstGuess(start.load_N, moved, start.deflection_m, factor.copy(), share)
 
 
 def _factor(
     start: PressedStart, read: ReadTyre, work: ContactNewton, inflated: Array, pressed: Array
-) -> ContactUpdate:
-    """The start's tangent on the road, factorised, with its contact's columns."""
+) -> tuple[ContactUpdate, float]:
+    """The start's tangent on the road, factorised, with its contact's columns; its pressure, Pa."""
     model, loads, data = read(start.texts)
     symmetry = work.symmetry
     X, faces = model.mesh.X, model.mesh.faces[data.tread].connectivity
@@ -65,4 +67,9 @@ def _factor(
     stiffness = symmetry.fold(contact.matrix(positive=True))
     factor = ContactUpdate(Factor(Elimination(tangents, symmetry), tangents, stiffness))
     factor.to(symmetry.fold(contact.matrix()))
-    return factor
+    return factor, _pressure(loads)
+
+
+def _pressure(loads: Sequence[Pressure]) -> float:
+    """The highest, Pa."""
+    return max((float(np.real(load.pressure)) for load in loads), default=0.0)

@@ -399,7 +399,7 @@ def _key(design: Design) -> DesignKey:
 
 def _advised(failure: EvaluationFailed, design: Design) -> EvaluationFailed:
     """A failure on the road, with what may help."""
-    if failure.cause != "no_equilibrium" or not design.advice_on_road:
+    if "no equilibrium" not in failure.words or not design.advice_on_road:
         return failure
     words = f"{failure.words}; {design.advice_on_road}"
     return EvaluationFailed(failure.cause, words, failure.folder)
