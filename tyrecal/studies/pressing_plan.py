@@ -88,7 +88,8 @@ class PressingPlan:
     @property
     def memory_bytes(self) -> float | None:
         """Likely memory of all that run side by side; None: not known."""
-        of_one = 1e-9 * self._entries * MEMORY_BYTES + PROCESS_BYTES
+        factors = 1 + (self.designs * len(self.states) > 1)  # the first design's, too
+        of_one = factors * 1e-9 * self._entries * MEMORY_BYTES + PROCESS_BYTES
         return self.at_once * of_one if self.is_timed else None
 
     @property
