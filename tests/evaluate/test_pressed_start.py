@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.adapter import JOB, OLDJOB, PRESS
 from tyrecal_solvers.bundled.job import run
 from tyrecal_solvers.bundled.road import footprint_job, pressed_start
-from tyrecal_solvers.errors import Refused
+from tyrecal_solvers.bundled.road.contact_newton import FirstGuess
+from tyrecal_solvers.errors import Indefinite, Refused
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
@@ -67,6 +69,30 @@ def test_the_answer_is_that_from_nothing_and_its_bytes_depend_on_no_memory(
         begun.footprints[0].stiffness_N_per_m
     )
     assert not (alone / f"{JOB}.inp").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("bad", ["unstable", "far away"])
+def test_a_bad_start_is_given_up(
+    case: LoadedCase, bad: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The answer is then that from nothing, to the byte."""
+    base, values = start_values(case), moved(case)
+    cold = numbers(Evaluator(TyreDesign(case)).press(values, LOADS))
+    pressed_start._FACTORS.clear()
+    own = pressed_start._factor
+
+    def factor(*given: Any) -> Any:
+        if bad == "unstable":
+            raise Indefinite("no minimum")
+        return own(*given)
+
+    def guess(load: float, parts: Any, deflection: float, *more: Any) -> FirstGuess:
+        return FirstGuess(load, -50 * parts, deflection, *more)
+
+    monkeypatch.setattr(pressed_start, "_factor", factor)
+    monkeypatch.setattr(pressed_start, "FirstGuess", guess)
+    assert numbers(Evaluator(TyreDesign(case)).press(values, LOADS, base=base)) == cold
 
 
 @pytest.mark.slow

@@ -256,7 +256,7 @@ class ContactNewton:
             return self._settle(parts, height, load, None, CONTACT_FORCE_RTOL)
         except (NoEquilibrium, Indefinite, Inverted):
             log.info("%g N: the start was too far away, loaded from nothing", load)
-            self._factor, self._used = None, 0
+            self._factor, self._used, self._formed_at = None, 0, 0.0
             return None
 
     def _by_coulomb(

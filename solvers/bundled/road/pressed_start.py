@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from ...errors import Indefinite
 from ..deck.start import PressedStart
 from ..section.model import Model
 from ..section.parts.pressure import Pressure
@@ -33,7 +34,7 @@ _FACTORS: OrderedDict[str, tuple[ContactUpdate, float]] = OrderedDict()
 
 def begin(start: PressedStart, read: ReadTyre, work: ContactNewton, numbers: Array) -> None:
     """Give ``work`` its first guess; ``numbers`` (n,): its nodes in the deck. A start of another
-    mesh is passed over. Raises DeckError, Indefinite."""
+    mesh, or one that is not stable, is passed over. Raises DeckError."""
     around, rings = work.symmetry.around, len(work.symmetry.around.angles)
     same_mesh = np.array_equal(start.nodes, numbers)
     if around.waves.size or not same_mesh or len(start.displacement) != 2 * (rings - 1):
@@ -43,7 +44,10 @@ def begin(start: PressedStart, read: ReadTyre, work: ContactNewton, numbers: Arr
     if start.sha256 not in _FACTORS:
         while len(_FACTORS) >= MOST_FACTORS:
             _FACTORS.popitem(last=False)
-        _FACTORS[start.sha256] = _factor(start, read, work, inflated, pressed)
+        try:
+            _FACTORS[start.sha256] = _factor(start, read, work, inflated, pressed)
+        except Indefinite:
+            return
     moved = work.symmetry.parts(pressed - inflated) * work.symmetry.mask
     factor, pressure = _FACTORS[start.sha256]
     own = _pressure([load for load in work.tyre.loads if isinstance(load, Pressure)])
