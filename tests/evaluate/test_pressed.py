@@ -124,3 +124,16 @@ def test_unless_asked_otherwise_all_is_done_in_this_process(
     questions = [Question({"C10": value}) for value in (1e6, 2e6)]
     plain = stand_in.evaluator(tmp_path / "plain")
     assert len(list(plain.evaluate_all(questions))) == len(list(plain.answer_all(questions))) == 2
+
+
+def test_a_tyre_that_finds_no_equilibrium_ends_with_the_line_that_helps(tmp_path: Path) -> None:
+    """Only then: a tyre that is flat on its rim has another cause."""
+    pressing = evaluator(tmp_path, reach=1e3)
+    read = pressing.solver.read
+    buckled = {"failure": "no equilibrium between 1000 and 4000 N: the cords of layer BELT buckle"}
+    pressing.solver.read = lambda folder: {**read(folder), **buckled}  # type: ignore[method-assign]
+    pressed = pressing.press({}, LOADS)
+    assert pressed.failed and pressed.failed.words.startswith(buckled["failure"] + "; cords of ")
+    assert pressed.failed.words.endswith("materials.carcass_cord.bears_compression: false")
+    flat = evaluator(tmp_path / "flat", reach=1e3).press({}, LOADS)
+    assert flat.failed and "bears_compression" not in flat.failed.words
