@@ -5,8 +5,9 @@
 Laws that are the model's own at small strain: cords linear in Green's strain, as CalculiX has them;
 rubber with a fifth of its shear modulus by C01; rubber that softens, C20 = -0.3 C10 and
 C30 = 0.1 C10 (Yeoh), whose modulus is least, 30 % less, at a shear of 1, where W1 / C10 =
-1 - 0.6 x + 0.3 x^2, x = I1 - 3 = 1. Of tyres as `tyrecal init` writes them and of the paper's as it
-is fitted: d = ln f_other - ln f of all modes at three pressures, in three parts: what all share,
+1 - 0.6 x + 0.3 x^2, x = I1 - 3 = 1. Of tyres as `tyrecal init` writes them, except that all cords
+bear compression, as another law of a cord changes nothing where it is slack; and of the paper's as
+it is fitted: d = ln f_other - ln f of all modes at three pressures, in three parts: what all share,
 what a family has beside that, and a mode beside both. Printed: their rms in per cent, and the
 length l of ln p over which they are alike:
 rho = 2 sum d d' / (sum d^2 + sum d'^2) = exp(-(ln p - ln p')^2 / (2 l^2)).
@@ -31,7 +32,7 @@ from tyrecal.tyre.load import load_case
 
 from .calculix import common, rewritten
 from .form_error import FITTED, LABELS, PRESSURES, alike_over
-from .wrinkles import by_size
+from .wrinkles import by_size, with_compression
 
 Array = np.ndarray
 SIZES_OF_LAWS = ["175/70R13", "205/60R15", "275/40R20", "11R22.5"]
@@ -88,7 +89,7 @@ def computed(tell: Callable[[str], None] = lambda line: None) -> tuple[list[floa
     tyres: dict[str, tuple[LoadedCase, Mapping[str, float]]] = {
         "P235/75R17, fitted": (load_case(CASES / "p235_75r17.yaml"), FITTED)
     }
-    tyres |= {size: (by_size(size), {}) for size in SIZES_OF_LAWS}
+    tyres |= {size: (with_compression(by_size(size), True), {}) for size in SIZES_OF_LAWS}
     found: list[list[Array]] = []
     tell(f"| tyre | law | all, family, mode, % | length |\n{4 * '|---'}|")
     for name, (case, design) in tyres.items():

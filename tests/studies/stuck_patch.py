@@ -84,7 +84,7 @@ def vibration_of(case: Any) -> tuple[Vibration, Array]:
         pass
     finally:
         footprint_job.press = real
-    _, equations, loads, U, road, _, _, wanted, _ = got
+    _, equations, loads, U, road, _, _, wanted, *_ = got
     (vibrating,) = wanted.values()
     vibration = Vibration(vibrating.model, U, loads, equations, 0.0)
     return vibration, np.unique(vibrating.model.mesh.faces[road.tread].connectivity)

@@ -151,10 +151,10 @@ def plan_pressing(
     at_once: int = 1,
     is_estimate: bool = False,
 ) -> PressingPlan:
-    """The plan of ``designs`` tyres of a case that are each pressed in ``states``. Raises what the
-    section's mesh does."""
+    """The plan of ``designs`` tyres of a case that are each pressed in ``states``; decks in three
+    dimensions, which are not, have no nodes of a section. Raises what the section's mesh does."""
     return PressingPlan(
-        nodes=len(TyreDesign(case).tyre.mesh.nodes),
+        nodes=0 if case.decks else len(TyreDesign(case).tyre.mesh.nodes),
         places_round=2 * len(case.case.road.element_angles_deg) + 1,
         designs=designs,
         states=tuple(states),
