@@ -8,7 +8,6 @@ alone gives the same bytes.
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -26,10 +25,10 @@ from .road_data import RoadData
 from .tread import tread_of
 
 Array = np.ndarray
-MOST_FACTORS = 1  # remembered at a time: each takes about 0.7 GB with the default mesh
 ReadTyre = Callable[[Mapping[str, str]], tuple[Model, list[Pressure], RoadData]]
 
-_FACTORS: OrderedDict[str, tuple[ContactUpdate, float]] = OrderedDict()
+# of the last start, by its hash: one takes about 0.7 GB with the default mesh
+_FACTORS: dict[str, tuple[ContactUpdate, float]] = {}
 
 
 def begin(start: PressedStart, read: ReadTyre, work: ContactNewton, numbers: Array) -> None:
@@ -42,8 +41,7 @@ def begin(start: PressedStart, read: ReadTyre, work: ContactNewton, numbers: Arr
     pressed = start.displacement[:rings]
     inflated = np.multiply.outer(around.turn(0).real, start.inflated)
     if start.sha256 not in _FACTORS:
-        while len(_FACTORS) >= MOST_FACTORS:
-            _FACTORS.popitem(last=False)
+        _FACTORS.clear()
         try:
             _FACTORS[start.sha256] = _factor(start, read, work, inflated, pressed)
         except Indefinite:
