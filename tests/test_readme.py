@@ -164,7 +164,7 @@ def test_ci_runs_the_readmes_test_command_then_what_it_leaves_out() -> None:
         f"{test_command} || failed=1",
         ".venv-test/bin/python -m tests.kernels || failed=1",
         ".venv-test/bin/python -m tests.versions || failed=1",
-        '.venv-test/bin/pytest -n 2 -m "not quick" || failed=1',
+        '.venv-test/bin/pytest -n 3 -m "not quick" || failed=1',
         "exit ${failed:-0}",
     ]
 
