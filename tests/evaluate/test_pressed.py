@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
-from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.evaluator import Evaluator, PressQuestion, Question
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.simulate.evaluate.store import Store
 
@@ -119,8 +119,14 @@ def test_unless_asked_otherwise_all_is_done_in_this_process(
         "tyrecal.simulate.evaluate.evaluator.executor", lambda *asked: pytest.fail("elsewhere")
     )
     asked = evaluator(tmp_path)
-    assert len(list(asked.press_all([{}, {"C10": 9e5}], LOADS))) == asked.counts.runs == 2
-    assert len(list(asked.press_all([{}], LOADS, jobs=2))) == 1  # one design needs no other
+    assert (
+        len(list(asked.press_all([PressQuestion({}, LOADS), PressQuestion({"C10": 9e5}, LOADS)])))
+        == asked.counts.runs
+        == 2
+    )
+    assert (
+        len(list(asked.press_all([PressQuestion({}, LOADS)], jobs=2))) == 1
+    )  # one design needs no other
     questions = [Question({"C10": value}) for value in (1e6, 2e6)]
     plain = stand_in.evaluator(tmp_path / "plain")
     assert len(list(plain.evaluate_all(questions))) == len(list(plain.answer_all(questions))) == 2

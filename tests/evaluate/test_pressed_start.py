@@ -15,11 +15,14 @@ from tyrecal_solvers.bundled.road.contact_newton import FirstGuess
 from tyrecal_solvers.errors import Indefinite, Refused
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
-from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.evaluator import Evaluator, PressQuestion
 from tyrecal.simulate.evaluate.pressed import Pressed
 from tyrecal.simulate.evaluate.store import Store
+from tyrecal.studies.fit.road import press_with_slopes
+from tyrecal.studies.fit.targets import ValueTarget
 from tyrecal.tyre.case import LoadedCase, start_values
 from tyrecal.tyre.load import load_case
+from tyrecal.tyre.state import TyreState
 
 from .test_pressed_slopes import small_case
 
@@ -104,8 +107,27 @@ def test_the_order_of_the_questions_does_not_matter(case: LoadedCase, tmp_path: 
     again = fresh()
     assert numbers(again.press(values, LOADS, base=base)) == alone
     assert (again.counts.runs, again.counts.recorded) == (0, 2)
-    workers = Evaluator(TyreDesign(case)).press_all([base, values], LOADS, jobs=2, base=base)
+    both = [PressQuestion(each, LOADS, base=base) for each in (base, values)]
+    evaluator = Evaluator(TyreDesign(case))
+    workers = evaluator.press_all(both, jobs=2)
     assert [numbers(each) for each in workers if isinstance(each, Pressed)][1] == alone
+    assert evaluator.counts.runs == 2
+
+
+@pytest.mark.slow
+def test_states_that_run_side_by_side_give_the_same_bytes(case: LoadedCase) -> None:
+    """Stiffnesses at two pressures, each with its sensitivities, as a fit asks for them."""
+    start = start_values(case)
+    targets = [
+        ValueTarget("vertical_stiffness_N_per_m", 2e5, 1e3, 1.0, TyreState(kPa, LOADS[0]))
+        for kPa in (220.0, 250.0)
+    ]
+    one, two = (
+        press_with_slopes(case, evaluator, targets, start, ["A_carcass"], start, jobs)
+        for jobs, evaluator in ((1, Evaluator(TyreDesign(case))), (2, Evaluator(TyreDesign(case))))
+    )
+    assert one[0].tobytes() == two[0].tobytes() and one[1].tobytes() == two[1].tobytes()
+    assert np.all(one[0] > 0) and np.all(one[1] > 0)
 
 
 @pytest.mark.slow

@@ -197,9 +197,9 @@ def test_areas_at_two_pressures_are_pressed_in_their_states() -> None:
     asked: list[tuple[float | None, list[float]]] = []
     press_all = tyre.press_all
 
-    def asking(designs: Any, loads: Any, jobs: int) -> Any:
-        asked.append((designs[0].get("pressure_kPa"), list(loads)))
-        return press_all(designs, loads, jobs)
+    def asking(questions: Any, jobs: int) -> Any:
+        asked.append((questions[0].values.get("pressure_kPa"), list(questions[0].loads_N)))
+        return press_all(questions, jobs)
 
     tyre.press_all = asking  # type: ignore[assignment, method-assign]
     point = Problem(case, tyre).evaluate(np.log(list(pressed.START.values())))

@@ -207,7 +207,12 @@ def coverage(count: int, seed: int) -> None:
     tyre: Any = EmulatedEvaluator(made)
 
     def press(
-        case: Any, evaluator: Any, targets: Any, values: Mapping[str, float], names: Sequence[str]
+        case: Any,
+        evaluator: Any,
+        targets: Any,
+        values: Mapping[str, float],
+        names: Sequence[str],
+        *_: Any,
     ) -> tuple[Array, Array]:
         found, slopes = area.at(values)
         return np.array([found]), slopes[None, [list(START).index(name) for name in names]]

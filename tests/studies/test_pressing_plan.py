@@ -8,7 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.studies.pressing_plan import FIRST_LOAD_S, FURTHER_DESIGN_S, PressedState, PressingPlan
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.studies import pressing_plan
+from tyrecal.studies.pressing_plan import (
+    FIRST_LOAD_S,
+    FURTHER_DESIGN_S,
+    PressedState,
+    PressingPlan,
+    plan_pressing,
+)
+from tyrecal.tyre.load import load_case
 
 from ..cli.test_cli import CASE, run
 
@@ -42,6 +52,17 @@ def test_more_that_is_wanted_takes_longer() -> None:
     )
     assert min(more) > first
     assert replace(PLAN, states=(PressedState(1, neighbours=3),)).runs == 8
+
+
+def test_no_more_run_side_by_side_than_the_memory_holds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two designs fit in memory of 2.5 times what one needs; in less than one's, one is tried."""
+    case = load_case(CASE)
+    evaluator = Evaluator(TyreDesign(case))
+    states = [PressedState(1), PressedState(1)]
+    one = plan_pressing(case, evaluator, states, designs=3).memory_bytes or 0.0
+    for available, at_once in ((2.5 * one, 2), (0.5 * one, 1), (None, 6)):
+        monkeypatch.setattr(pressing_plan, "available_memory_bytes", lambda a=available: a)
+        assert plan_pressing(case, evaluator, states, 3, at_once=8).at_once == at_once
 
 
 def test_its_words() -> None:

@@ -77,7 +77,7 @@ def command(
     output = study.run(loaded, "footprint", evaluator, load_N=asked)
     with terminal.progress("footprint") as bar:
         evaluator.on_progress = bar.at
-        found, pressed, meshes = run(loaded, evaluator, designs, asked, study.jobs, study.notify)
+        found, pressed, meshes = run(loaded, evaluator, designs, asked, plan.at_once, study.notify)
     if not pressed:
         return EXIT_SOLVER
     patches = patches_data(loaded.case.name, pressed, meshes)

@@ -100,7 +100,8 @@ def command(
     if sweep is not None:
         run = study.run(loaded, "modes", evaluator, "sweep-load", load_N=loads)
         draw = pictures is not False
-        return over_loads(loaded, evaluator, run, designs, loads, study, draw)
+        jobs = plan.at_once if loads else 1
+        return over_loads(loaded, evaluator, run, designs, loads, study, jobs, draw)
     run = study.run(loaded, "modes", evaluator, load_N=loads[0] if loads else 0.0)
     if loads:
         return at_load(loaded, evaluator, run, values, loads[0], study)
@@ -172,6 +173,7 @@ def over_loads(
     designs: Mapping[str, Mapping[str, float]],
     loads_N: Sequence[float],
     study: Study,
+    jobs: int,
     pictures: bool,
 ) -> int:
     """Modes over the load, in load_sweep.json, .csv and .png."""
@@ -179,7 +181,7 @@ def over_loads(
 
     with study.terminal.progress("modes on the road") as bar:
         evaluator.on_progress = bar.at
-        found = run(loaded, evaluator, designs, loads_N, study.jobs, study.notify)
+        found = run(loaded, evaluator, designs, loads_N, jobs, study.notify)
     if not found.rows:
         return EXIT_SOLVER
     figures = {}

@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import Field
 
 from ..simulate.deck.tyre_design import TyreDesign
-from ..simulate.evaluate.evaluator import Evaluator
+from ..simulate.evaluate.evaluator import Evaluator, PressQuestion
 from ..simulate.evaluate.failure import EvaluationFailed
 from ..simulate.evaluate.pressed import Footprint, Pressed
 from ..tyre.case import LoadedCase
@@ -43,7 +43,8 @@ def press(
     else ``Evaluator.press`` raises for wrong input."""
     found: dict[str, PressOutcome] = {}
     base = next(iter(designs.values())) if len(designs) > 1 else None
-    outcomes = evaluator.press_all(designs.values(), loads_N, jobs, base=base)
+    questions = [PressQuestion(values, loads_N, base=base) for values in designs.values()]
+    outcomes = evaluator.press_all(questions, jobs)
     for design, outcome in zip(designs, outcomes, strict=True):
         found[design] = outcome
         notify(design, outcome)

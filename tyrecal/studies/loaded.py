@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..simulate.evaluate.evaluator import Evaluator, Question
+from ..simulate.evaluate.evaluator import Evaluator, PressQuestion, Question
 from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from ..simulate.evaluate.pressed import Footprint, Pressed
 from ..simulate.modes.find import Found, find_modes
@@ -90,7 +90,8 @@ def load_tyres(
     }
     able = [name for name, each in unloaded.items() if not isinstance(each, EvaluationFailed)]
     loads = [load for load in loads_N if load]
-    answers = evaluator.press_all([designs[name] for name in able], loads, jobs, _count(case))
+    questions = [PressQuestion(designs[name], loads, _count(case)) for name in able]
+    answers = evaluator.press_all(questions, jobs)
     found: dict[str, LoadOutcome] = {}
     for name in designs:
         free = unloaded[name]

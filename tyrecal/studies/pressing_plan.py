@@ -4,7 +4,8 @@ runs. Commands print it before they start, and with --dry-run instead of startin
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from ..simulate.deck.tyre_design import TyreDesign
@@ -152,13 +153,26 @@ def plan_pressing(
     is_estimate: bool = False,
 ) -> PressingPlan:
     """The plan of ``designs`` tyres of a case that are each pressed in ``states``; decks in three
-    dimensions, which are not, have no nodes of a section. Raises what the section's mesh does."""
-    return PressingPlan(
+    dimensions, which are not, have no nodes of a section. At most ``at_once`` run side by side, and
+    no more than the memory holds. Raises what the section's mesh does."""
+    plan = PressingPlan(
         nodes=0 if case.decks else len(TyreDesign(case).tyre.mesh.nodes),
         places_round=2 * len(case.case.road.element_angles_deg) + 1,
         designs=designs,
         states=tuple(states),
-        at_once=max(1, min(at_once, designs)),
         is_timed=evaluator.solver.name == "bundled",
         is_estimate=is_estimate,
     )
+    most, available = designs * len(states), available_memory_bytes()
+    if plan.memory_bytes and available is not None:
+        most = min(most, int(available / plan.memory_bytes))
+    return replace(plan, at_once=max(1, min(at_once, most)))
+
+
+def available_memory_bytes() -> float | None:
+    """Memory that a program can have without swapping; None where the system does not state it."""
+    try:
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+        return 1024.0 * next(int(x.split()[1]) for x in lines if x.startswith("MemAvailable:"))
+    except (OSError, ValueError, StopIteration):
+        return None

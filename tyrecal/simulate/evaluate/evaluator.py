@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from math import isclose
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -39,6 +39,16 @@ class Question:
     values: Mapping[str, float]
     gradients: tuple[str, ...] = ()
     modes_per_harmonic: int | None = None
+
+
+class PressQuestion(NamedTuple):
+    """One design on the road; the fields are the arguments of `Evaluator.press`."""
+
+    values: Mapping[str, float]
+    loads_N: Sequence[float]
+    modes: int = 0
+    gradients: tuple[str, ...] = ()
+    base: Mapping[str, float] | None = None
 
 
 @dataclass
@@ -291,19 +301,12 @@ class Evaluator:
         return self._each("evaluate", [(question,) for question in questions], jobs)
 
     def press_all(
-        self,
-        designs: Iterable[Mapping[str, float]],
-        loads_N: Sequence[float],
-        jobs: int = 1,
-        modes: int = 0,
-        gradients: tuple[str, ...] = (),
-        base: Mapping[str, float] | None = None,
+        self, questions: Iterable[PressQuestion], jobs: int = 1
     ) -> Iterator[Pressed | EvaluationFailed]:
-        """`press` for each design, in their order; ``jobs`` at a time."""
-        asked = [(values, loads_N, modes, gradients, base) for values in designs]
-        return _not_refused(self._each("press", asked, jobs))
+        """`press` for each question, in their order; ``jobs`` at a time."""
+        return _not_refused(self._each("press", list(questions), jobs))
 
-    def _each(self, ask: str, asked: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[Any]:
+    def _each(self, ask: str, asked: Sequence[Any], jobs: int) -> Iterator[Any]:
         self.on_progress(0, len(asked))
         if len(asked) <= 1 or (jobs <= 1 and not self.scheduler):
             for done, arguments in enumerate(asked, start=1):
@@ -313,12 +316,19 @@ class Evaluator:
             return
         if ask == "evaluate" and (nominal := self.design.nominal):
             self._inflated(nominal)  # before the workers each ask for it
-        if ask == "press" and asked[0][-1]:
-            _, loads, _, gradients, base = asked[0]
-            self._pressed(base, tuple(loads), gradients)
+        first = self._press_bases(asked) if ask == "press" else {}
+        done = len(first)
+        if first:
+            self.on_progress(done, len(asked))
+        others = [arguments for place, arguments in enumerate(asked) if place not in first]
         with executor(jobs, self.scheduler) as workers:
-            answers = workers.each(partial(_answer_and_count, self.worker(), ask), asked)
-            for done, answer in enumerate(in_order(answers), start=1):
+            work = partial(_answer_and_count, self.worker(), ask)
+            answers = in_order(workers.each(work, others))
+            for place in range(len(asked)):
+                if place in first:
+                    yield first[place]
+                    continue
+                answer, done = next(answers), done + 1
                 self.on_progress(done, len(asked))
                 if isinstance(answer, EvaluationFailed):  # its process died
                     yield answer
@@ -326,6 +336,16 @@ class Evaluator:
                 found, counts = answer
                 self.counts.add(counts)
                 yield found
+
+    def _press_bases(self, asked: Sequence[PressQuestion]) -> dict[int, Any]:
+        """Press the designs from which others begin, in this process, before the workers each do.
+        Returns the answers of those that are asked for themselves, by their places."""
+        own = [place for place, each in enumerate(asked) if each.values == each.base]
+        answers = {place: _answer(self, "press", asked[place]) for place in own}
+        for each in asked:
+            if each.base:
+                self._pressed(each.base, tuple(each.loads_N), each.gradients)
+        return answers
 
     def worker(self) -> Evaluator:
         """The same for another process, wherever it is, with counts of its own."""

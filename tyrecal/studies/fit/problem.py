@@ -192,7 +192,7 @@ class Problem:
             names = [v.name for v in self.variables]
             base = self.best.values if self.best else values
             quantities, rates = press_with_slopes(
-                self.case, self.evaluator, patches, values, names, base
+                self.case, self.evaluator, patches, values, names, base, self.jobs
             )
             slopes = rates * [v.slope(values[v.name]) for v in self.variables]
         if others := self.road[self.exact_on_road :]:

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from ...simulate.deck.tyre_design import TyreDesign
-from ...simulate.evaluate.evaluator import Evaluator
+from ...simulate.evaluate.evaluator import Evaluator, PressQuestion
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.evaluate.pressed import Pressed
 from ...tyre.case import LoadedCase
@@ -69,23 +69,33 @@ def press_with_slopes(
     values: Mapping[str, float],
     names: Sequence[str],
     base: Mapping[str, float],
+    jobs: int,
 ) -> tuple[Array, Array]:
     """Quantities (targets,) of a design, none a mode, and their exact slopes (targets,
     variables) by the variables ``names``; ``base``: the design from whose state on the road in the
-    first state all others begin. Raises EvaluationFailed, DeckRefused."""
+    first state all others begin. ``jobs`` states at a time. Raises EvaluationFailed,
+    DeckRefused."""
     quantities, slopes = np.empty(len(targets)), np.zeros((len(targets), len(names)))
-    for state in dict.fromkeys(t.state.unloaded for t in targets):
-        here = {i: t for i, t in enumerate(targets) if t.state.unloaded == state}
-        design = state.design(case, values)
+    groups = {
+        state: {i: t for i, t in enumerate(targets) if t.state.unloaded == state}
+        for state in dict.fromkeys(t.state.unloaded for t in targets)
+    }
+    questions = []
+    for state, here in groups.items():
+        loads = _loads(here)
         # a state's own numbers hang on no variable
         left = tuple(without(case, dict.fromkeys(names, 0.0), state.numbers(case)))
-        loads = _loads(here)
         begin = _base(case, targets, loads, base)
-        pressed = evaluator.press(design, loads, gradients=left, base=begin)
+        design = state.design(case, values)
+        questions.append(PressQuestion(design, loads, gradients=left, base=begin))
+    answers = list(evaluator.press_all(questions, jobs))
+    for here, question, pressed in zip(groups.values(), questions, answers, strict=True):
+        if isinstance(pressed, EvaluationFailed):
+            raise pressed
         if pressed.failed:
             raise pressed.failed
         at = {each.load_N: each.slopes for each in pressed.footprints}
-        for place, quantity in _of_patches(case, design, pressed, here).items():
+        for place, quantity in _of_patches(case, question.values, pressed, here).items():
             own = here[place]
             rates, name = at[own.state.load_N], FOOTPRINT_QUANTITIES[own.quantity].slope
             quantities[place] = quantity
@@ -113,7 +123,8 @@ def _loads(targets: Placed) -> list[float]:
 def _footprints(
     case: LoadedCase, evaluator: Evaluator, targets: Placed, designs: Designs, jobs: int
 ) -> Iterator[Quantities | EvaluationFailed]:
-    outcomes = evaluator.press_all(designs, _loads(targets), jobs)
+    questions = [PressQuestion(values, _loads(targets)) for values in designs]
+    outcomes = evaluator.press_all(questions, jobs)
     for values, outcome in zip(designs, outcomes, strict=True):
         if isinstance(outcome, EvaluationFailed):
             yield outcome

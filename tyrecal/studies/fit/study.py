@@ -68,13 +68,14 @@ class FitStudy:
 
     @property
     def evaluates_one_by_one(self) -> bool:
-        """Whether one start asks for one design at a time: in one state, with exact slopes."""
+        """Whether one start runs the solver once at a time: in one state, with exact slopes."""
         if self.needs_labels:
             one_state = len({each.state.of(self._plain) for each in self.readings}) == 1
         else:
             problem = self._problem
             exact = problem.exact_on_road == len(problem.road)
-            one_state = exact and len(problem.labels) == 1
+            on_road = {each.state.unloaded for each in problem.road}
+            one_state = exact and len(problem.labels) == 1 and len(on_road) <= 1
         return one_state and self.evaluator.has_gradients
 
     def pressing_plan(self, method: str, starts: int, jobs: int) -> PressingPlan:
@@ -95,7 +96,8 @@ class FitStudy:
             for (_, modal), count in loads.items()
         ]
         designs = DESIGNS_OF_FIT[method] * starts
-        return plan_pressing(self.case, self.evaluator, states, designs, min(jobs, starts), True)
+        at_once = starts if starts > 1 else sum(1 + each.neighbours for each in states)
+        return plan_pressing(self.case, self.evaluator, states, designs, min(jobs, at_once), True)
 
     def run(
         self,
@@ -111,6 +113,8 @@ class FitStudy:
         Frequencies without labels are fitted with the likeliest ones, which are found anew about
         the design that was fitted, until they are the same. Raises what `label` and `calibrate` do.
         """
+        plan = self.pressing_plan(method, starts, jobs)
+        jobs = plan.at_once if plan.runs else jobs  # as the memory allows
 
         def calibrated() -> Fit:
             return calibrate(
