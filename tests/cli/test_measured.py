@@ -214,9 +214,22 @@ def one_sensor() -> list[dict[str, Any]]:
     ]
 
 
+def test_a_frequency_without_a_label_is_written_without_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As a list that `fit` and `measured label` read."""
+    path, output = write(tmp_path / "one.uff", *one_sensor()), tmp_path / "m.csv"
+    given = ["--pressure-kPa", "240", "--sigma-percent", "0.3", "--directions", "cylindrical"]
+    assert run("measured", "import", str(path), *given, "--output", str(output)) == 0
+    words = "1 of 1 values are frequencies without a label (aliasing: sensors at 1 angle, "
+    assert words in " ".join(capsys.readouterr().err.split())
+    (row,) = read_measurements(output, labelled=False)
+    assert row.is_unlabelled and row.value == pytest.approx(66.1, rel=1e-4)
+    assert row.sigma == pytest.approx(0.003 * 66.1, rel=1e-2) and row.pressure_kPa == 240
+
+
 F = np.arange(20.0, 80.0, 0.5)
 BAD: list[tuple[list[dict[str, Any]], list[str], str]] = [
-    (one_sensor(), [], "no mode could be told: aliasing: sensors at 1 angle,"),
     ([geometry(scale=1e3), shape(mode_in_plane())], [], "largest radius about z is 390 m, no tyre"),
     ([units(1e3), geometry(), shape(mode_in_plane())], [], "largest radius about z is 0.00039 m"),
     ([shape(mode_in_plane())], [], "node 1 has no coordinates; give the file with data set 15 or"),

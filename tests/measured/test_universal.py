@@ -192,7 +192,6 @@ def test_a_file_cut_off_anywhere_is_refused_with_its_line(tmp_path: Path, binary
         ([units(float("nan"))], "the factor of the length is nan"),
         ([function(some(80)[:, 0], np.arange(80.0), abscissa_spec_data_type=17)], "is over time"),
         ([function(some(80)[:, 0], np.arange(80.0) - 9)], "must rise from 0 or more, got -9 Hz"),
-        ([function(some(80)[:, 0], np.arange(80.0), rsp_dir=5)], "direction is 5, must be 1 to 3"),
     ],
 )
 def test_wrong_sets_are_named(tmp_path: Path, sets: list[dict[str, Any]], words: str) -> None:

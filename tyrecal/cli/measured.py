@@ -31,10 +31,15 @@ centre = option(
 )
 directions = option(
     "--directions",
-    type=OneOf(["cartesian", "cylindrical"]),
-    default="cartesian",
-    show_default=True,
-    help="Directions 1, 2, 3 of a sensor: along x, y, z, or radial, tangential, axial.",
+    type=OneOf(["stated", "cartesian", "cylindrical"]),
+    help="Directions 1, 2, 3 of a sensor: as the file's coordinate systems say, along x, y, z, or"
+    " radial, tangential, axial (default: as the file says; if it does not, what the shapes fit).",
+)
+leave_out = option(
+    "--leave-out",
+    multiple=True,
+    metavar="CHANNEL",
+    help="Leave a channel out: NODE, NODE:DIRECTION or COMPONENT, such as 12:3 or hub; repeatable.",
 )
 highest = option(
     "--highest-harmonic",
@@ -93,7 +98,7 @@ def command() -> None:
     metavar="P",
     help="No sigma below this, in per cent: what repeats do not show.",
 )
-@options.every(axle, centre, directions, highest)
+@options.every(axle, centre, directions, highest, leave_out)
 @option(
     "--response",
     type=OneOf(["receptance", "mobility", "accelerance"]),
@@ -110,8 +115,9 @@ def import_files(
     floor: float,
     axle: str | None,
     centre: str,
-    directions: str,
+    directions: str | None,
     highest: int | None,
+    leave_out: tuple[str, ...],
     response: str | None,
     pictures: bool,
     terminal: Terminal,
@@ -139,7 +145,8 @@ def import_files(
     if limits and not 0 <= limits[0] < limits[1]:
         raise click.UsageError(f"--band {band}: must rise from 0 or more")
     layout = _layout(axle, centre, directions, highest, limits, response or "")
-    found = gather(files, pressure_kPa, layout, floor / 100, (assumed or 0.0) / 100)
+    sigmas = floor / 100, (assumed or 0.0) / 100
+    found = gather(files, pressure_kPa, layout, *sigmas, leave_out)
     write_text(output, measurements_csv(found.rows))
     if pictures and found.runs:
         from ..report.measured import draw_measured
@@ -158,14 +165,15 @@ def import_files(
 
 @command.command()
 @click.argument("file", type=Place(exists=True, folder=False))
-@options.every(axle, centre, directions, highest)
+@options.every(axle, centre, directions, highest, leave_out)
 @options.talking
 def sensors(
     file: Path,
     axle: str | None,
     centre: str,
-    directions: str,
+    directions: str | None,
     highest: int | None,
+    leave_out: tuple[str, ...],
     terminal: Terminal,
 ) -> int:
     """Say which modes the sensors of a universal FILE can tell apart.
@@ -175,13 +183,17 @@ def sensors(
     \b
     tyrecal measured sensors run1.uff --directions cylindrical
     """
+    from ..measured.arrangement import arrange
     from ..measured.gather import label_entry
     from ..measured.modal import sensors_in
     from ..measured.universal import read_universal
     from ..report.measured import sensors_words
 
     layout = _layout(axle, centre, directions, highest)
-    told = sensors_in(read_universal(file), layout).told_apart()
+    (test,), notes = arrange([read_universal(file)], leave_out)
+    for note in notes:
+        terminal.note(note)
+    told = sensors_in(test, layout).told_apart()
     if terminal.as_json:
         told_apart = [
             {**label_entry(label), "told": not alike, "looks_like": [str(x) for x in alike]}
@@ -253,7 +265,7 @@ def label_file(
 def _layout(
     axle: str | None,
     centre: str,
-    directions: str,
+    directions: str | None,
     highest: int | None,
     band: Any = None,
     response: str = "",
@@ -263,7 +275,7 @@ def _layout(
 
     x, y, z = _numbers("--centre", centre, 3)
     most = HIGHEST_HARMONIC if highest is None else highest
-    return Layout(axle or "", (x, y, z), directions == "cylindrical", most, band, response)
+    return Layout(axle or "", (x, y, z), directions or "", most, band, response)
 
 
 def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:

@@ -10,13 +10,15 @@ from typing import Any
 
 from ..errors import InputError
 from ..simulate.modes.label import Label
+from .arrangement import arrange
 from .measurement import Measurement
-from .modal import LabelledMode, Layout, ModalTest, measurements_of, read_modal_test
+from .modal import Geometry, LabelledMode, Layout, ModalTest, measurements_of, read_modal_test
 from .repeats import FLOOR, combined
 from .tables import read_table
 from .universal import Place, Universal, is_universal, read_universal
 
 SAME_PLACE_m = 1e-6  # m
+SAME_UNLABELLED = 0.01  # relative, of repeats without a label
 MIN_EXPLAINED = 0.98  # of the functions' mean square; less, and modes are missing
 
 
@@ -35,42 +37,71 @@ def gather(
     layout: Layout | None = None,
     floor: float = FLOOR,
     assumed: float = 0.0,
+    leave_out: Sequence[str] = (),
 ) -> Gathered:
     """Measurements of several files; those of the same thing are repeats.
 
-    pressure_kPa: of files that do not say theirs; floor, assumed: relative, see ``combined``.
+    pressure_kPa: of files that do not say theirs; floor, assumed: relative, see ``combined``;
+    leave_out: channels, see ``arrange``. Frequencies without labels come last.
     Raises InputError, OSError.
     """
     for k, path in enumerate(paths):
         if path.resolve() in [other.resolve() for other in paths[:k]]:
             raise InputError(f"{path}: is given twice; as its own repeat it would tell nothing")
     universal = [read_universal(path) for path in paths if is_universal(path)]
-    nodes = all_nodes(universal)
-    values: list[Measurement] = []
+    axes = {node: each for file in universal for node, each in file.axes.items()}
+    geometry = Geometry(all_nodes(universal), axes)
+    tables = [path for path in paths if path not in [file.path for file in universal]]
+    values = [row for path in tables for row in read_table(path, pressure_kPa)]
     runs: list[ModalTest] = []
-    notes: list[str] = []
-    for path in paths:
-        file = next((each for each in universal if each.path == path), None)
-        if file is None:
-            values += read_table(path, pressure_kPa)
-            continue
-        notes += [f"{path}: {count} of {what} not used" for what, count in file.skipped.items()]
-        if not file.shapes and not file.functions and file.nodes and len(universal) > 1:
-            continue  # the geometry of the others
+    notes = [
+        f"{file.path}: not used: {what}" + f" ({count} times)" * (count > 1)
+        for file in universal
+        for what, count in file.skipped.items()
+    ]
+    measured = [f for f in universal if f.shapes or f.functions or not f.nodes]
+    arranged = arrange(measured or universal, leave_out)
+    notes += arranged.notes
+    for test in arranged.tests:
         if pressure_kPa is None:
-            raise InputError(f"{path}: universal files hold no pressure; give --pressure-kPa")
-        run = read_modal_test(file, nodes, layout or Layout())
+            raise InputError(f"{test.path}: universal files hold no pressure; give --pressure-kPa")
+        run = read_modal_test(test, geometry, layout or Layout())
         runs.append(run)
+        notes += [f"{test.path}: {note}" for note in run.notes]
         if run.explained < MIN_EXPLAINED:
             notes.append(
-                f"{path}: the modes make {run.explained:.0%} of the functions; one may be missing:"
-                " look at the picture, try a narrower --band"
+                f"{test.path}: the modes make {run.explained:.0%} of the functions; one may be"
+                " missing: look at the picture, try a narrower --band"
             )
         values += measurements_of(run, pressure_kPa)
-    if not values:
-        why = next((each.judged.why for run in runs for each in run.modes), "")
-        raise InputError(f"{paths[0]}: no mode could be told: {why}")
-    return Gathered(combined(values, floor, assumed), runs, notes)
+    rows = combined([each for each in values if not each.is_unlabelled], floor, assumed)
+    more = [each for each in values if each.is_unlabelled]
+    without_label = _without_labels(more, rows, floor, assumed)
+    if without_label:
+        why = next((e.judged.why for run in runs for e in run.modes if not e.judged.label), "")
+        notes.append(
+            f"{len(without_label)} of {len(rows) + len(without_label)} values are frequencies"
+            f" without a label{f' ({why})' * bool(why)}; 'tyrecal fit' and 'tyrecal measured label'"
+            " label them by the model"
+        )
+    return Gathered(rows + without_label, runs, notes)
+
+
+def _without_labels(
+    values: Sequence[Measurement], labelled: Sequence[Measurement], floor: float, assumed: float
+) -> list[Measurement]:
+    """One value for each frequency without a label; those of several runs that are near each other
+    are repeats. One that states no sigma has the largest (relative) of ``labelled``."""
+    groups: list[list[Measurement]] = []
+    for each in sorted(values, key=lambda v: (v.pressure_kPa, v.rim or "", v.value)):
+        last = groups[-1] if groups else [each]
+        near = each.value <= (1 + SAME_UNLABELLED) * last[0].value and each.state == last[0].state
+        if groups and near and each.run not in [other.run for other in last]:
+            last.append(each)
+        else:
+            groups.append([each])
+    usual = max((row.sigma / row.value for row in labelled if row.label), default=0.0)
+    return [row for group in groups for row in combined(group, floor, assumed or usual)]
 
 
 def all_nodes(files: Sequence[Universal]) -> dict[int, Place]:

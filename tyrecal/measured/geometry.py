@@ -30,12 +30,14 @@ def sensors_of(
     axle: str = "",
     centre: Place = (0.0, 0.0, 0.0),
     cylindrical: bool = False,
+    axes: Mapping[int, Array] | None = None,
 ) -> Sensors:
     """Sensors of signals (node, direction 1 to 3).
 
     nodes: coordinates in m; axle: x, y or z (default: the axis along which all nodes
     spread least); centre: of the wheel, in m; cylindrical: directions 1, 2, 3 are radial,
-    tangential and axial at each sensor, else along x, y and z.
+    tangential and axial at each sensor, else along the node's ``axes`` (unit vectors (3, 3), a row
+    each), and where it has none along x, y and z.
 
     Raises InputError where a node has no place, or the places are no tyre's.
     """
@@ -56,12 +58,12 @@ def sensors_of(
             f" ({low:g} to {high:g}); is the unit of length (data set 164) right?"
         )
     directions = np.zeros((len(signals), 3))
-    for row, (_, direction) in enumerate(signals):
+    for row, (node, direction) in enumerate(signals):
         sign, k = np.sign(direction), abs(direction) - 1
         if cylindrical:
             directions[row, k] = sign
             continue
-        along = sign * np.eye(3)[k]
+        along = sign * (axes or {}).get(node, np.eye(3))[k]
         c, s = np.cos(angle[row]), np.sin(angle[row])
         directions[row] = (c * along[x] + s * along[y], c * along[y] - s * along[x], along[z])
     return Sensors(np.column_stack([R, angle, X[:, z]]), directions)

@@ -99,6 +99,12 @@ class Labeller:
         each = -0.5 * np.log(v).sum(1) - 0.5 * len(parts) * np.log(np.maximum(square, 1e-300))
         return float(np.logaddexp.reduce(each))
 
+    def ln_evidence(self, shape: Array) -> float:
+        """ln of the mean probability density of a real shape (k,) over all labels, but for a
+        constant: comparable between readings of one shape's directions."""
+        each = [self._evidence(values, vectors.T @ shape) for values, vectors in self._spectra]
+        return float(np.logaddexp.reduce(each) - np.log(len(each)))
+
     def odds(self, i: int, j: int, nu: float = 1e-2) -> float:
         """Expected ln of the odds of label i against j on its own shapes, at noise nu:
         (tr(Sj^-1 Si) - k + ln|Sj| - ln|Si|) / 2."""

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import compress
 
 import numpy as np
 
@@ -16,24 +17,39 @@ from .identify import FORMS, Responses, identify
 from .labels import Judged, Labeller
 from .measurement import Measurement
 from .sensors import MeasuredMode, Sensors, real_part
-from .universal import Function, MeasuredShape, Place, Signal, Universal
+from .universal import Function, MeasuredShape, Place, Signal, Universal, channel_name
 
 Array = np.ndarray
 
 MAX_DOUBLET_SPLIT = 0.05  # relative distance of a doublet's members, at most
 MIN_COLLINEARITY = 0.5  # modal phase collinearity below which a shape has no real part to speak of
+MIN_LN_ODDS_OF_DIRECTIONS = 1.0  # of a mode, mean, from which on one meaning is clearly the better
+MAX_NOISE = 0.5  # share of noise in a bad channel's mean square
 
 
 @dataclass(frozen=True)
 class Layout:
-    """How a test's coordinates and directions are meant, and what can be in its band."""
+    """How a test's coordinates and directions are meant, and what can be in its band.
+
+    directions: of 1, 2, 3: ``stated`` as the file's coordinate systems say, ``cartesian`` along x,
+    y, z, or ``cylindrical``, radial, tangential, axial; "": stated where nodes have systems of
+    their own, else cartesian or cylindrical, whichever the shapes clearly fit better.
+    """
 
     axle: str = ""  # x, y or z; "": told by the sensors' places
     centre: Place = (0.0, 0.0, 0.0)  # m
-    cylindrical: bool = False  # directions 1, 2, 3 are radial, tangential, axial
+    directions: str = ""
     highest: int = HIGHEST_HARMONIC  # the largest c that is possible
     band: tuple[float, float] | None = None  # Hz; None: all
     form: str = ""  # of functions that do not say theirs
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Where nodes are, and where the directions of those with a system of their own point."""
+
+    nodes: Mapping[int, Place]
+    axes: Mapping[int, Array]
 
 
 @dataclass(frozen=True)
@@ -51,13 +67,14 @@ class LabelledMode:
 
 @dataclass(frozen=True)
 class ModalTest:
-    """All of one file; the functions are None where it holds shapes."""
+    """All of one test; the functions are None where it holds shapes."""
 
     name: str
     modes: tuple[LabelledMode, ...]
     frequency_Hz: Array | None = None  # (n,)
     functions: Array | None = None  # (k, n) from which the modes were identified
     fitted: Array | None = None  # (k, n) what the modes make, NaN outside the band
+    notes: tuple[str, ...] = ()  # what a user has to know
 
     @property
     def explained(self) -> float:
@@ -68,29 +85,108 @@ class ModalTest:
         return float(1 - rest / np.sum(np.abs(self.functions[np.isfinite(self.fitted)]) ** 2))
 
 
-def read_modal_test(file: Universal, nodes: Mapping[int, Place], layout: Layout) -> ModalTest:
-    """Modes of a file by rising frequency; shapes in it come before functions.
+@dataclass(frozen=True)
+class _Found:
+    """A mode before its label."""
+
+    mode: MeasuredMode
+    signals: tuple[Signal, ...]
+    place: str
+
+
+def read_modal_test(file: Universal, geometry: Geometry, layout: Layout) -> ModalTest:
+    """Modes of a test by rising frequency; shapes in it come before functions.
 
     Raises InputError.
     """
     with _naming(file):
-        return (_from_shapes if file.shapes else _identified)(file, nodes, layout)
+        if file.shapes:
+            modes, test = _from_shapes(file), ModalTest(str(file.path), ())
+        else:
+            modes, test = _identified(file, layout)
+        labelled, note = _labelled_by_directions(modes, geometry, layout)
+        return replace(
+            test, modes=tuple(settled(labelled)), notes=test.notes + (note,) * bool(note)
+        )
 
 
 def sensors_in(file: Universal, layout: Layout) -> Labeller:
     """Judge of the sensors of a file. Raises InputError."""
     with _naming(file):
-        signals = list(_signals(file.shapes[0])) if file.shapes else []
+        signals = tuple(_signals(file.shapes[0])) if file.shapes else ()
         if file.functions and not signals:
-            signals = list(next(iter(_by_reference(file.functions).values())))
+            signals = tuple(next(iter(_by_reference(file.functions).values())))
         if not signals:
             raise InputError("nothing was measured in it")
-        return _labeller(signals, file.nodes, layout)
+        readings = _readings(signals, Geometry(file.nodes, file.axes), layout)
+        first, *others = readings.values()
+        if any(each.told_apart() != first.told_apart() for each in others):
+            raise InputError(f"the file does not say what its directions are; {_ASK}")
+        return first
 
 
-def _labeller(signals: Sequence[Signal], nodes: Mapping[int, Place], layout: Layout) -> Labeller:
-    sensors = sensors_of(signals, nodes, layout.axle, layout.centre, layout.cylindrical)
-    return Labeller(sensors, layout.highest)
+_ASK = "give --directions cartesian (along x, y, z) or cylindrical (radial, tangential, axial)"
+
+
+def _readings(signals: Sequence[Signal], geometry: Geometry, layout: Layout) -> dict[str, Labeller]:
+    """Judges of the signals by what the directions can mean, the file's own statement first; those
+    whose sensors are the same as the first's are left out."""
+    if layout.directions:
+        names = [layout.directions]
+    else:
+        names = ["stated", "cartesian"] if geometry.axes else ["cartesian", "cylindrical"]
+    readings: dict[str, Sensors] = {}
+    for name in names:
+        axes = geometry.axes if name == "stated" else {}
+        place = (geometry.nodes, layout.axle, layout.centre, name == "cylindrical", axes)
+        sensors = sensors_of(signals, *place)
+        same = [np.allclose(sensors.directions, each.directions) for each in readings.values()]
+        if not any(same):
+            readings[name] = sensors
+    return {name: Labeller(sensors, layout.highest) for name, sensors in readings.items()}
+
+
+def _labelled_by_directions(
+    modes: Sequence[_Found], geometry: Geometry, layout: Layout
+) -> tuple[list[LabelledMode], str]:
+    """Modes with their labels, by the meaning of the directions that their shapes fit best; and a
+    sentence where there was a choice. Raises InputError where no meaning is clearly the best."""
+    labellers = {
+        signals: _readings(signals, geometry, layout) for signals in {f.signals for f in modes}
+    }
+    names = list(dict.fromkeys(name for each in labellers.values() for name in each))
+    evidence = dict.fromkeys(names, 0.0)
+    for each in modes:
+        shape = real_part(each.mode.amplitude)[0]
+        readings = labellers[each.signals]
+        for name in names:
+            judge = readings.get(name) or next(iter(readings.values()))
+            evidence[name] += judge.ln_evidence(shape / (np.abs(shape).max() or 1.0))
+    best = max(names, key=lambda name: evidence[name])
+    lead = evidence[best] - max([evidence[name] for name in names if name != best], default=0.0)
+    chosen, note = best, ""
+    if len(names) > 1 and (best != "stated" or "stated" not in names):
+        clear = lead > MIN_LN_ODDS_OF_DIRECTIONS * len(modes)
+        if names[0] == "stated":
+            if clear:
+                raise InputError(
+                    "the shapes do not fit the directions of the file's coordinate systems, but"
+                    " those along x, y, z; give --directions stated or cartesian"
+                )
+            chosen = "stated"
+        elif not clear:
+            raise InputError(
+                "the shapes do not tell whether directions 1, 2, 3 are along x, y, z or radial,"
+                f" tangential, axial; {_ASK}"
+            )
+        elif best != names[0]:
+            note = f"the shapes fit {best} directions clearly better: --directions {best} is taken"
+    labelled = []
+    for each in modes:
+        readings = labellers[each.signals]
+        judge = readings.get(chosen) or next(iter(readings.values()))
+        labelled.append(_labelled(each.mode, judge, each.place))
+    return labelled, note
 
 
 @contextmanager
@@ -108,29 +204,25 @@ def _signals(shape: MeasuredShape) -> tuple[Signal, ...]:
     return tuple((shape.nodes[i], int(k) + 1) for i, k in zip(rows, columns, strict=True))
 
 
-def _from_shapes(file: Universal, nodes: Mapping[int, Place], layout: Layout) -> ModalTest:
-    labellers: dict[tuple[Signal, ...], Labeller] = {}
-    told = []
+def _from_shapes(file: Universal) -> list[_Found]:
+    modes = []
     for shape in file.shapes:
         signals = _signals(shape)
-        if signals not in labellers:
-            if not signals:
-                raise InputError(f"{shape.place}: every value is 0")
-            labellers[signals] = _labeller(signals, nodes, layout)
+        if not signals:
+            raise InputError(f"{shape.place}: every value is 0")
         amplitude = shape.values[np.isfinite(shape.values)]
         mode = MeasuredMode(shape.frequency_Hz, amplitude, shape.damping)
-        told.append(_labelled(mode, labellers[signals], shape.place))
-    return ModalTest(str(file.path), tuple(settled(told)))
+        modes.append(_Found(mode, signals, shape.place))
+    return modes
 
 
-def _identified(file: Universal, nodes: Mapping[int, Place], layout: Layout) -> ModalTest:
+def _identified(file: Universal, layout: Layout) -> tuple[list[_Found], ModalTest]:
     if not file.functions:
         others = ", ".join(f"{count} x {what}" for what, count in file.skipped.items())
         raise InputError(
             "there is neither a mode shape nor a frequency-response function"
             + (f", only {others}" if others else "")
         )
-    table = _by_reference(file.functions)
     first = file.functions[0]
     form = first.form or layout.form
     if form not in FORMS:
@@ -139,48 +231,69 @@ def _identified(file: Universal, nodes: Mapping[int, Place], layout: Layout) -> 
             " measured; give --response"
         )
     f = first.frequency_Hz
-    signals = list(next(iter(table.values())))
-    labeller = _labeller(signals, nodes, layout)
+    band = layout.band or (f[0], f[-1])
+    functions, notes = _without_bad_channels(file.functions, band)
+    if not functions:
+        raise InputError("every channel is 0 in the whole band")
+    table = _by_reference(functions)
     values = np.vstack([[each.values for each in row.values()] for row in table.values()])
-    points = np.tile([node for node, _ in signals], len(table))
-    low, high = layout.band or (f[0], f[-1])
-    found = identify(Responses(f, values, form, points), low, high)
+    points = np.array([node for row in table.values() for node, _ in row])
+    identified = identify(Responses(f, values, form, points), *band)
     f, values = f[f > 0], values[:, f > 0]
-    told = []
-    for mode in found.modes:
-        residues = mode.amplitude.reshape(len(table), -1)
-        strongest = residues[np.argmax(np.linalg.norm(residues, axis=1))]
-        told.append(_labelled(replace(mode, amplitude=strongest), labeller, str(file.path)))
-    return ModalTest(str(file.path), tuple(settled(told)), f, values, found.fitted)
+    modes = []
+    for mode in identified.modes:
+        parts = np.split(mode.amplitude, np.cumsum([len(row) for row in table.values()])[:-1])
+        strongest = int(np.argmax([np.linalg.norm(part) for part in parts]))
+        signals = tuple(list(table.values())[strongest])
+        moved = replace(mode, amplitude=parts[strongest])
+        modes.append(_Found(moved, signals, str(file.path)))
+    name = str(file.path)
+    return modes, ModalTest(name, (), f, values, identified.fitted, tuple(notes))
 
 
-def _by_reference(functions: list[Function]) -> dict[Signal, dict[Signal, Function]]:
-    """Functions by reference, then by signal, all with the same signals and frequencies."""
+def _without_bad_channels(
+    functions: Sequence[Function], band: tuple[float, float]
+) -> tuple[list[Function], list[str]]:
+    """Functions without those that are 0 in the band, or mostly noise although no smaller than the
+    others, and a sentence that names their channels.
+
+    The third differences over the lines leave little of a resonance; those of white noise have 20
+    times its mean square, and their median is ln 2 of that.
+    """
+    inside = [(each.frequency_Hz > 0) & _within(each.frequency_Hz, band) for each in functions]
+    values = [each.values[lines] for each, lines in zip(functions, inside, strict=True)]
+    sizes = np.array([np.mean(np.abs(H) ** 2) if len(H) else 0.0 for H in values])
+    rough = np.array([np.median(np.abs(np.diff(H, 3)) ** 2) if len(H) > 3 else 0.0 for H in values])
+    noise = rough / (20 * np.log(2) * np.where(sizes > 0, sizes, 1.0))
+    noisy = (noise > MAX_NOISE) & (sizes >= np.median(sizes))
+    noisy &= noisy.mean() < 0.5  # else the test is noise, and no channel of it
+    names = [channel_name(each.response, each.response_part) for each in functions]
+    notes = []
+    for bad, words in ((sizes == 0, "0 in the whole band"), (noisy, "mostly noise")):
+        if bad.any():
+            bad_names = dict.fromkeys(compress(names, bad))
+            notes.append(f"left out, {words}: channel {', '.join(bad_names)}")
+    return list(compress(functions, (sizes > 0) & ~noisy)), notes
+
+
+def _within(f: Array, band: tuple[float, float]) -> Array:
+    return (f >= band[0]) & (f <= band[1])
+
+
+def _by_reference(functions: Sequence[Function]) -> dict[Signal, dict[Signal, Function]]:
+    """Functions by reference, then by signal, all at the same frequencies. A reference need not
+    have all signals. Raises InputError."""
     table: dict[Signal, dict[Signal, Function]] = {}
     first = functions[0]
     for each in functions:
-        row = table.setdefault(each.reference, {})
-        if each.response in row:
-            raise InputError(
-                f"{each.place}: node {each.response[0]}, direction {each.response[1]} was measured"
-                " before in this file; give each repeat a file of its own"
-            )
         same = len(each.frequency_Hz) == len(first.frequency_Hz)
         if not same or not np.allclose(each.frequency_Hz, first.frequency_Hz):
             raise InputError(f"{each.place}: its frequencies are not those of the first")
         if each.form != first.form:
-            raise InputError(f"{each.place}: is a {each.form}, the first a {first.form}")
-        row[each.response] = each
-    wanted = set(next(iter(table.values())))
-    for reference, row in table.items():
-        if set(row) != wanted:
-            node, direction = min(wanted ^ set(row))
-            raise InputError(
-                f"node {node}, direction {direction} was not measured with every reference"
-                f" ({reference[0]} is another)"
-            )
-    order = sorted(wanted)
-    return {reference: {s: row[s] for s in order} for reference, row in table.items()}
+            words = [form or "function that does not say which" for form in (each.form, first.form)]
+            raise InputError(f"{each.place}: is a {words[0]}, the first a {words[1]}")
+        table.setdefault(each.reference, {})[each.response] = each
+    return {reference: {s: row[s] for s in sorted(row)} for reference, row in table.items()}
 
 
 def _labelled(mode: MeasuredMode, labeller: Labeller, place: str) -> LabelledMode:
@@ -225,11 +338,18 @@ def settled(told: list[LabelledMode]) -> list[LabelledMode]:
 
 
 def measurements_of(test: ModalTest, pressure_kPa: float) -> list[Measurement]:
-    """The frequencies of the modes that have a label."""
-    found = []
-    for each in test.modes:
-        if label := each.judged.label:
-            what = ("frequency_Hz", label, each.member, pressure_kPa, 0.0)
-            value, sigma = each.mode.frequency_Hz, each.mode.sigma_Hz
-            found.append(Measurement(*what, value, sigma, test.name, each.place))
-    return found
+    """The frequencies of all modes; those that have no label go without one."""
+    return [
+        Measurement(
+            "frequency_Hz",
+            each.judged.label,
+            each.member,
+            pressure_kPa,
+            0.0,
+            each.mode.frequency_Hz,
+            each.mode.sigma_Hz,
+            test.name,
+            each.place,
+        )
+        for each in test.modes
+    ]

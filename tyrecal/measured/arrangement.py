@@ -1,0 +1,208 @@
+"""How a test was measured: which channels count, which side of its functions was moved over the
+tyre, and which files are parts of one test.
+
+``gather`` calls it once for all universal files. By reciprocity the response at i to a force at j
+is the response at j to a force at i; so where the hammer was moved past fixed accelerometers, the
+impacts are the shape's points. Files with a common reference that measure other channels are parts
+of one test, those that measure the same ones are repeats.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from .universal import Function, MeasuredShape, Universal, channel_name
+
+TYRE_NAMES = re.compile(r"tyre|tire|reifen|pneu|tread", re.IGNORECASE)  # in a component's name
+SAME_CHANNELS = 0.5  # share of a file's channels that another has, from which on they are repeats
+
+
+class Arranged(NamedTuple):
+    """Tests, a universal file each that holds what counts of one or several, and what a user has to
+    know."""
+
+    tests: list[Universal]
+    notes: list[str]
+
+
+def arrange(files: Sequence[Universal], leave_out: Sequence[str] = ()) -> Arranged:
+    """Tests in ``files``, in their order.
+
+    leave_out: channels to drop, NODE, NODE:DIRECTION or COMPONENT, or COMPONENT before either.
+    Raises InputError where one of them is no channel, or components count the same nodes.
+    """
+    files, notes = _without(files, leave_out), list[str]()
+    everything = [each for file in files for each in file.functions]
+    moved = {_response(each) for each in everything}, {_reference(each) for each in everything}
+    if len(moved[1]) > len(moved[0]):
+        files = [replace(f, functions=[_exchange(each) for each in f.functions]) for f in files]
+        notes.append(
+            f"the impacts were moved over {len(moved[1])} channels past {len(moved[0])} fixed:"
+            " by reciprocity they are the shapes' points"
+        )
+    files, more = _motions(files)
+    files, others = _of_the_tyre(files)
+    tests, joined = _join(files)
+    return Arranged(tests, [*notes, *more, *others, *joined])
+
+
+def _response(each: Function) -> tuple[str, int, int]:
+    return (each.response_part, each.response[0], abs(each.response[1]))
+
+
+def _reference(each: Function) -> tuple[str, int, int]:
+    return (each.reference_part, each.reference[0], abs(each.reference[1]))
+
+
+def _exchange(each: Function) -> Function:
+    return replace(
+        each,
+        response=each.reference,
+        reference=each.response,
+        response_part=each.reference_part,
+        reference_part=each.response_part,
+    )
+
+
+def _kept(
+    files: Sequence[Universal], keep: Callable[[Function], bool]
+) -> tuple[list[Universal], list[Function]]:
+    """Files with the functions to keep, and the others."""
+    left_out = [each for file in files for each in file.functions if not keep(each)]
+    return [replace(f, functions=[e for e in f.functions if keep(e)]) for f in files], left_out
+
+
+def _without(files: Sequence[Universal], leave_out: Sequence[str]) -> list[Universal]:
+    """Files without the channels that a user takes away. Raises InputError."""
+    result = list(files)
+    for name in leave_out:
+        matches = _matcher(name)
+        gone = {
+            id(each)
+            for file in result
+            for each in file.functions
+            if matches(*_response(each)) or matches(*_reference(each))
+        }
+        result = [
+            replace(file, functions=[each for each in file.functions if id(each) not in gone])
+            for file in result
+        ]
+        shapes = [[_shape_without(shape, matches) for shape in file.shapes] for file in result]
+        if not gone and not any(changed for each in shapes for _, changed in each):
+            raise InputError(f"--leave-out {name}: no file has such a channel")
+        result = [
+            replace(file, shapes=[shape for shape, _ in each])
+            for file, each in zip(result, shapes, strict=True)
+        ]
+    return result
+
+
+def _matcher(name: str) -> Callable[[str, int, int], bool]:
+    """Whether a channel (component, node, direction) is what ``name`` says. Raises InputError."""
+    match = re.fullmatch(r"(?:([^:]*[^:\d][^:]*)(?::|$))?(?:(\d+)(?::(\d))?)?", name.strip())
+    if not match or not name.strip():
+        raise InputError(
+            f"--leave-out {name}: must be NODE, NODE:DIRECTION or COMPONENT, like 12 or 12:3"
+        )
+    part, *numbers = match.groups()
+    wanted = [int(number) if number else None for number in numbers]
+
+    def matches(component: str, node: int, direction: int) -> bool:
+        same = all(a in (None, b) for a, b in zip(wanted, (node, direction), strict=True))
+        return same and (part is None or part.lower() == component.lower())
+
+    return matches
+
+
+def _shape_without(
+    shape: MeasuredShape, matches: Callable[[str, int, int], bool]
+) -> tuple[MeasuredShape, bool]:
+    """The shape without some of its values, and whether it had them."""
+    gone = np.array([[matches("", node, k) for k in (1, 2, 3)] for node in shape.nodes])
+    return replace(shape, values=np.where(gone, np.nan, shape.values)), bool(gone.any())
+
+
+def _motions(files: Sequence[Universal]) -> tuple[list[Universal], list[str]]:
+    """Files without channels that are no motion along a direction 1, 2 or 3."""
+    files, gone = _kept(files, lambda each: abs(each.response[1]) in (1, 2, 3))
+    names = dict.fromkeys(channel_name(each.response, each.response_part) for each in gone)
+    if not gone:
+        return files, []
+    words = "no motion along a direction 1, 2 or 3"
+    return files, [f"left out, {words}: channel {', '.join(names)}"]
+
+
+def _of_the_tyre(files: Sequence[Universal]) -> tuple[list[Universal], list[str]]:
+    """Files without what was measured on other components than the tyre. Raises InputError where
+    two components count the same nodes, and their names do not say which one is the tyre."""
+    nodes: defaultdict[str, set[int]] = defaultdict(set)
+    for file in files:
+        for each in file.functions:
+            nodes[each.response_part].add(each.response[0])
+    tyre = {part for part in nodes if TYRE_NAMES.search(part)} or set(nodes)
+    for part in tyre:
+        for other in tyre:
+            if part < other and (both := nodes[part] & nodes[other]):
+                raise InputError(
+                    f"{_first(files, other).place}: node {min(both)} is one of the component"
+                    f" '{other}' and one of '{part}'; take away what is not on the tyre, as in"
+                    f" --leave-out {other or part}"
+                )
+    files, gone = _kept(files, lambda each: each.response_part in tyre)
+    parts = dict.fromkeys(each.response_part or "without a name" for each in gone)
+    if not gone:
+        return files, []
+    return files, [
+        f"left out, not on the tyre: {len(gone)} functions of component {', '.join(parts)}"
+    ]
+
+
+def _first(files: Sequence[Universal], part: str) -> Function:
+    return next(e for file in files for e in file.functions if e.response_part == part)
+
+
+def _channels(file: Universal) -> dict[tuple[object, object], Function]:
+    """Functions by reference and response. Raises InputError where one was measured twice."""
+    channels: dict[tuple[object, object], Function] = {}
+    for each in file.functions:
+        if channels.setdefault((_reference(each), _response(each)), each) is not each:
+            node, direction = each.response
+            raise InputError(
+                f"{each.place}: node {node}, direction {direction} was measured before in this"
+                " file; give each repeat a file of its own"
+            )
+    return channels
+
+
+def _join(files: Sequence[Universal]) -> tuple[list[Universal], list[str]]:
+    """Files, those that are parts of one test as one."""
+    tests: list[list[Universal]] = []
+    channels: list[dict[tuple[object, object], Function]] = []
+    for file in files:
+        mine = _channels(file)
+        for test, known in zip(tests, channels, strict=True):
+            common = {key[0] for key in mine} & {key[0] for key in known}
+            if common and len(mine.keys() & known.keys()) < SAME_CHANNELS * len(mine):
+                test.append(file)
+                known.update({key: each for key, each in mine.items() if key not in known})
+                break
+        else:
+            tests.append([file])
+            channels.append(mine)
+    joined, notes = [], []
+    for test, known in zip(tests, channels, strict=True):
+        if len(test) == 1:
+            joined += test
+            continue
+        joined.append(replace(test[0], functions=list(known.values())))
+        names = ", ".join(Path(file.path).name for file in test)
+        notes.append(f"one test in {len(test)} files with a common reference: {names}")
+    return joined, notes
