@@ -3,14 +3,37 @@ right, or one sentence says what is missing."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
+from tyrecal.errors import InputError
+from tyrecal.measured.arrangement import arrange
 from tyrecal.measured.gather import Gathered, gather
 from tyrecal.measured.modal import Layout
+from tyrecal.measured.universal import read_universal
 
-from .ten_modes import MODES, WAYS, files
+from .ten_modes import (
+    AXES,
+    MODES,
+    NUMBERS,
+    POINTS,
+    WAYS,
+    F,
+    accelerances,
+    along_xyz,
+    files,
+    functions,
+    nodes,
+    shapes,
+    systems_18,
+    units,
+    with_component,
+)
+from .test_universal import function, write
 
 pytestmark = pytest.mark.numbers
 
@@ -44,3 +67,138 @@ def test_ten_modes_are_right_however_they_are_written(tmp_path: Path, way: str) 
         assert any(NOTES[way] in note for note in result.notes), result.notes
     else:
         assert not result.notes
+
+
+def few(each: dict[str, Any]) -> dict[str, Any]:
+    """A shape at its first three nodes alone."""
+    return each | {name: each[name][:3] for name in ("node_nums", "r1", "r2", "r3")}
+
+
+REFUSED = [
+    (
+        lambda: [nodes(2411, 17), *functions(accelerances())],
+        r"\(type 2411, line 1\): the directions of node 1 are in coordinate system 17, which the"
+        " file does not define",
+    ),
+    (
+        lambda: [nodes(15, 11), systems_18() | {"cs_type": np.full(16, 2)}],
+        r"data set 2 \(type 18, line \d+\): system 11 is spherical; tyrecal reads Cartesian and",
+    ),
+    (
+        lambda: [systems_18() | {"x_point": systems_18()["ref_o"]}],
+        "the axes of system 11 are not at right angles",
+    ),
+    (lambda: [systems_18(), systems_18()], "system 11 is given in two data sets"),
+    (
+        lambda: [nodes(), nodes(places=1.01 * POINTS)],
+        r"data set 2 \(type 2411, line \d+\): node 1 is given twice, at different places",
+    ),
+    (
+        lambda: [units(), units(1e3)],
+        r"data set 2 \(type 164, line 7\): the factor of the length is 1000.0, before 1.0",
+    ),
+    (
+        lambda: [nodes(), *functions(along_xyz(), orddenom_spec_data_type=12)],
+        "nor a frequency-response function, only 1 x acceleration over acceleration, channel 1:1,",
+    ),
+    (
+        lambda: [
+            nodes(),
+            *with_component(functions(along_xyz()), "ring"),
+            *with_component(functions(along_xyz()), "hub"),
+        ],
+        "node 1 is one of the component 'ring' and one of 'hub'; take away what is not on the tyre",
+    ),
+    (
+        lambda: [nodes(15, NUMBERS + 10), systems_18(), *shapes(AXES)],
+        "the shapes do not fit the directions of the file's coordinate systems",
+    ),
+    (
+        lambda: [nodes(), few(shapes(AXES)[3])],
+        r"the shapes do not tell whether directions .* give --directions cartesian \(along",
+    ),
+    (
+        lambda: [nodes(), *functions(along_xyz()), functions(along_xyz())[3]],
+        "node 2, direction 1 was",
+    ),
+]
+
+
+@pytest.mark.parametrize(("sets", "words"), REFUSED, ids=[words[-30:] for _, words in REFUSED])
+def test_what_cannot_be_used_is_refused_by_its_place(
+    tmp_path: Path, sets: Callable[[], list[dict[str, Any]]], words: str
+) -> None:
+    path = write(tmp_path / "f.uff", *sets())
+    with pytest.raises(InputError, match=words) as error:
+        gather([path], 240.0, LAYOUT, assumed=0.002)
+    assert str(error.value).startswith(str(path)) and "\n" not in str(error.value)
+
+
+def test_a_type_that_may_change_places_is_refused_and_elements_are_not(tmp_path: Path) -> None:
+    """781 are nodes of an older kind; 2412 and 1858 change no frequency and no shape."""
+    path = write(tmp_path / "f.uff", units(), nodes(), *shapes(AXES))
+    whole = path.read_text()
+    for kind, known in ((781, False), (3333, False), (2412, True), (1858, True)):
+        path.write_text(f"{whole}    -1\n{kind:6d}\n         1\n    -1\n")
+        if known:
+            assert len(gather([path], 240.0, LAYOUT, assumed=0.002).rows) == 10
+        else:
+            with pytest.raises(
+                InputError, match=rf"\(type {kind}, line \d+\): tyrecal does not read"
+            ):
+                gather([path], 240.0, LAYOUT)
+
+
+def test_channels_can_be_taken_away(tmp_path: Path) -> None:
+    """By node, direction and component; a name that fits none is refused."""
+    sets = [nodes(), *with_component(functions(along_xyz()), "Ring"), *functions(along_xyz())]
+    path = write(tmp_path / "f.uff", *sets)
+    file = read_universal(path)
+    for names, left in (
+        (["ring"], 48),
+        (["RING", "3"], 45),
+        (["ring", "3:2", "4:2"], 46),
+        (["ring:3", "ring:4:2", "ring"], 48),
+    ):
+        assert len(arrange([file], names).tests[0].functions) == left
+    for name, words in (("77", "no file has such a channel"), ("3:x:1", "must be NODE, NODE:DIR")):
+        with pytest.raises(InputError, match=f"--leave-out {name}: {words}"):
+            arrange([file], [name])
+    shaped = read_universal(write(tmp_path / "s.uff", *shapes(AXES)))
+    (test,), _ = arrange([shaped], ["5:2", "7"])
+    gone = np.isnan(test.shapes[0].values)
+    assert gone[4].tolist() == [False, True, False] and gone[6].all()
+    assert gone[np.delete(np.arange(16), [4, 6])].sum() == np.isnan(shaped.shapes[0].values).sum()
+
+
+def test_repeats_of_a_test_in_parts_stay_repeats(tmp_path: Path) -> None:
+    """Two runs of four parts, given one after the other, are two tests; a channel that each part
+    has, such as the driving point, does not make them repeats."""
+    sets = functions(along_xyz())
+    driving = function(along_xyz()[0, 0], F, 99, ref_node=99, ref_dir=1, ord_data_type=5, binary=1)
+    parts = [[driving, *sets[k : k + 12]] for k in range(0, 48, 12)]
+    runs = [read_universal(write(tmp_path / f"{k}.uff", *p)) for k, p in enumerate(2 * parts)]
+    tests, notes = arrange(runs)
+    assert [len(test.functions) for test in tests] == [49, 49] and len(notes) == 2
+    assert notes[1].endswith("4.uff, 5.uff, 6.uff, 7.uff")
+    others = [
+        read_universal(write(tmp_path / f"o{k}.uff", *functions(along_xyz(k), k))) for k in (0, 1)
+    ]
+    assert len(arrange(others).tests) == 2  # another reference
+
+
+@pytest.mark.parametrize(
+    ("head", "name"),
+    [
+        (b"MATLAB 5.0 MAT-file, Platform: GLNXA64" + bytes(200), r"MATLAB file \(.mat\)"),
+        (b"MATLAB 7.3 MAT-file" + bytes(493) + b"\x89HDF\r\n\x1a\n", r"MATLAB file \(.mat\)"),
+        (b"\x89HDF\r\n\x1a\n" + bytes(100), "HDF5 file"),
+        (b"$ a comment\n[MDI_HEADER]\nFILE_TYPE = 'tir'\n", r"tyre property file \(.tir\)"),
+        (b"**HEADER\nRELEASE 1.3\n", "TYDEX file"),
+    ],
+)
+def test_other_formats_are_named(tmp_path: Path, head: bytes, name: str) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(head)
+    with pytest.raises(InputError, match=f"this is a {name}; tyrecal reads tables"):
+        gather([path], 240.0)

@@ -23,7 +23,9 @@ Array = np.ndarray
 
 MAX_DOUBLET_SPLIT = 0.05  # relative distance of a doublet's members, at most
 MIN_COLLINEARITY = 0.5  # modal phase collinearity below which a shape has no real part to speak of
-MIN_LN_ODDS_OF_DIRECTIONS = 1.0  # of a mode, mean, from which on one meaning is clearly the better
+# ln of the odds from which on one meaning of the directions is clearly the better: of all modes
+# together, and of one mode in the mean
+LN_ODDS_OF_DIRECTIONS, LN_ODDS_OF_DIRECTIONS_PER_MODE = 10.0, 1.0
 MAX_NOISE = 0.5  # share of noise in a bad channel's mean square
 
 
@@ -118,9 +120,9 @@ def sensors_in(file: Universal, layout: Layout) -> Labeller:
             signals = tuple(next(iter(_by_reference(file.functions).values())))
         if not signals:
             raise InputError("nothing was measured in it")
-        readings = _readings(signals, Geometry(file.nodes, file.axes), layout)
-        first, *others = readings.values()
-        if any(each.told_apart() != first.told_apart() for each in others):
+        first, *others = _readings(signals, Geometry(file.nodes, file.axes), layout).values()
+        apart = first.told_apart()
+        if any(each is not first and each.told_apart() != apart for each in others):
             raise InputError(f"the file does not say what its directions are; {_ASK}")
         return first
 
@@ -129,64 +131,65 @@ _ASK = "give --directions cartesian (along x, y, z) or cylindrical (radial, tang
 
 
 def _readings(signals: Sequence[Signal], geometry: Geometry, layout: Layout) -> dict[str, Labeller]:
-    """Judges of the signals by what the directions can mean, the file's own statement first; those
-    whose sensors are the same as the first's are left out."""
+    """Judges of the signals by what the directions can mean, the file's own statement first. Where
+    two meanings put the sensors in the same directions, one judge has both."""
     if layout.directions:
         names = [layout.directions]
     else:
         names = ["stated", "cartesian"] if geometry.axes else ["cartesian", "cylindrical"]
-    readings: dict[str, Sensors] = {}
+    judges: dict[str, Labeller] = {}
     for name in names:
         axes = geometry.axes if name == "stated" else {}
         place = (geometry.nodes, layout.axle, layout.centre, name == "cylindrical", axes)
         sensors = sensors_of(signals, *place)
-        same = [np.allclose(sensors.directions, each.directions) for each in readings.values()]
-        if not any(same):
-            readings[name] = sensors
-    return {name: Labeller(sensors, layout.highest) for name, sensors in readings.items()}
+        known = [
+            j for j in judges.values() if np.allclose(j.sensors.directions, sensors.directions)
+        ]
+        judges[name] = known[0] if known else Labeller(sensors, layout.highest)
+    return judges
 
 
 def _labelled_by_directions(
     modes: Sequence[_Found], geometry: Geometry, layout: Layout
 ) -> tuple[list[LabelledMode], str]:
-    """Modes with their labels, by the meaning of the directions that their shapes fit best; and a
-    sentence where there was a choice. Raises InputError where no meaning is clearly the best."""
-    labellers = {
-        signals: _readings(signals, geometry, layout) for signals in {f.signals for f in modes}
-    }
-    names = list(dict.fromkeys(name for each in labellers.values() for name in each))
-    evidence = dict.fromkeys(names, 0.0)
-    for each in modes:
-        shape = real_part(each.mode.amplitude)[0]
-        readings = labellers[each.signals]
-        for name in names:
-            judge = readings.get(name) or next(iter(readings.values()))
-            evidence[name] += judge.ln_evidence(shape / (np.abs(shape).max() or 1.0))
-    best = max(names, key=lambda name: evidence[name])
-    lead = evidence[best] - max([evidence[name] for name in names if name != best], default=0.0)
-    chosen, note = best, ""
-    if len(names) > 1 and (best != "stated" or "stated" not in names):
-        clear = lead > MIN_LN_ODDS_OF_DIRECTIONS * len(modes)
-        if names[0] == "stated":
-            if clear:
-                raise InputError(
-                    "the shapes do not fit the directions of the file's coordinate systems, but"
-                    " those along x, y, z; give --directions stated or cartesian"
-                )
-            chosen = "stated"
-        elif not clear:
+    """Modes with their labels, by the meaning of the directions that their shapes fit; and a
+    sentence where that is not the format's. Raises InputError where no meaning is clearly right."""
+    judges = {s: _readings(s, geometry, layout) for s in {each.signals for each in modes}}
+    names = list(next(iter(judges.values())))
+    if any(len(set(each.values())) > 1 for each in judges.values()):
+        chosen = _meaning(
+            {
+                n: sum(judges[e.signals][n].ln_evidence(_unit(e.mode)[0]) for e in modes)
+                for n in names
+            },
+            len(modes),
+        )
+    else:
+        chosen = names[0]
+    note = f"the shapes fit {chosen} directions clearly better: --directions {chosen} is taken"
+    labelled = [_labelled(each.mode, judges[each.signals][chosen], each.place) for each in modes]
+    return labelled, note if chosen != names[0] else ""
+
+
+def _meaning(evidence: Mapping[str, float], count: int) -> str:
+    """The meaning of the directions with the most evidence (ln of the probability of ``count``
+    shapes), the first of two the file's own statement or the format's. Raises InputError."""
+    first, other = evidence
+    lead = evidence[other] - evidence[first]
+    clear = abs(lead) > max(LN_ODDS_OF_DIRECTIONS, LN_ODDS_OF_DIRECTIONS_PER_MODE * count)
+    if first == "stated":
+        if lead > 0 and clear:
             raise InputError(
-                "the shapes do not tell whether directions 1, 2, 3 are along x, y, z or radial,"
-                f" tangential, axial; {_ASK}"
+                "the shapes do not fit the directions of the file's coordinate systems, but those"
+                " along x, y, z; give --directions stated or cartesian"
             )
-        elif best != names[0]:
-            note = f"the shapes fit {best} directions clearly better: --directions {best} is taken"
-    labelled = []
-    for each in modes:
-        readings = labellers[each.signals]
-        judge = readings.get(chosen) or next(iter(readings.values()))
-        labelled.append(_labelled(each.mode, judge, each.place))
-    return labelled, note
+        return first
+    if not clear:
+        raise InputError(
+            "the shapes do not tell whether directions 1, 2, 3 are along x, y, z or radial,"
+            f" tangential, axial; {_ASK}"
+        )
+    return other if lead > 0 else first
 
 
 @contextmanager
@@ -297,9 +300,8 @@ def _by_reference(functions: Sequence[Function]) -> dict[Signal, dict[Signal, Fu
 
 
 def _labelled(mode: MeasuredMode, labeller: Labeller, place: str) -> LabelledMode:
-    shape, collinearity = real_part(mode.amplitude)
-    size = np.abs(shape).max()
-    judged = labeller.judge(shape / (size or 1.0))
+    shape, collinearity = _unit(mode)
+    judged = labeller.judge(shape)
     R = labeller.sensors.points[:, 0]
     belt = R / R.max() > BELT
     part = np.mean(shape[belt] ** 2) / (np.mean(shape**2) or 1.0)
@@ -308,7 +310,13 @@ def _labelled(mode: MeasuredMode, labeller: Labeller, place: str) -> LabelledMod
     if judged.label and collinearity < MIN_COLLINEARITY:
         why = f"the shape is complex (collinearity {collinearity:.2f})"
         judged = replace(judged, label=None, why=why)
-    return LabelledMode(mode, labeller.sensors, shape / (size or 1.0), collinearity, judged, place)
+    return LabelledMode(mode, labeller.sensors, shape, collinearity, judged, place)
+
+
+def _unit(mode: MeasuredMode) -> tuple[Array, float]:
+    """The real part of a shape (k,), of unit largest value, and its collinearity."""
+    shape, collinearity = real_part(mode.amplitude)
+    return shape / (np.abs(shape).max() or 1.0), collinearity
 
 
 def settled(told: list[LabelledMode]) -> list[LabelledMode]:

@@ -21,6 +21,7 @@ from ..errors import InputError
 from ..files import read_bytes
 from ..tyre.usual import LARGEST_SIGMA
 from .columns import TableColumn, meaning_of, read_columns
+from .formats import other_format
 from .line import Line
 from .measurement import CSV_COLUMNS, RIM_COLUMN, Measurement
 
@@ -115,6 +116,11 @@ def _refuse(mistakes: Iterable[str]) -> None:
 def _lines(path: Path) -> tuple[list[tuple[str, list[str]]], bool]:
     """Lines that are not empty, with their places; whether a comma can be a decimal one."""
     raw = read_bytes(path)
+    if name := other_format(raw):
+        raise InputError(
+            f"{path}: this is a {name}; tyrecal reads tables (CSV) and universal files with mode"
+            " shapes or frequency-response functions: export one of these"
+        )
     if raw[:2] == b"PK":
         raise InputError(f"{path}: a workbook; save the sheet as CSV")
     wide = raw[:2] in (b"\xff\xfe", b"\xfe\xff")
