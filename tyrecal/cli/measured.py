@@ -104,6 +104,11 @@ def command() -> None:
     type=OneOf(["receptance", "mobility", "accelerance"]),
     help="What functions are that do not say it.",
 )
+@option(
+    "--keep-going",
+    is_flag=True,
+    help="Leave out repeats that contradict each other, and list them, instead of stopping.",
+)
 @option("--pictures/--no-pictures", default=True, help="Draw functions and shapes beside the CSV.")
 @options.talking
 def import_files(
@@ -119,6 +124,7 @@ def import_files(
     highest: int | None,
     leave_out: tuple[str, ...],
     response: str | None,
+    keep_going: bool,
     pictures: bool,
     terminal: Terminal,
 ) -> int:
@@ -128,7 +134,8 @@ def import_files(
     FILE: a modal table (CSV), or a universal file with mode shapes (data set 55) or
     frequency-response functions (58) and their geometry (15, 2411). What several files, or lines
     of a table, measure of one thing are repeats: the value is their mean, sigma that mean's
-    standard deviation. A shape that the sensors do not determine gets no label, and is left out.
+    standard deviation. Repeats that differ by more than the file's other repeats stop the
+    import. A shape that the sensors do not determine gets no label, and is left out.
 
     \b
     tyrecal measured import modes.csv --pressure-kPa 240 --sigma-percent 0.3
@@ -146,7 +153,7 @@ def import_files(
         raise click.UsageError(f"--band {band}: must rise from 0 or more")
     layout = _layout(axle, centre, directions, highest, limits, response or "")
     sigmas = floor / 100, (assumed or 0.0) / 100
-    found = gather(files, pressure_kPa, layout, *sigmas, leave_out)
+    found = gather(files, pressure_kPa, layout, *sigmas, leave_out, keep_going)
     write_text(output, measurements_csv(found.rows))
     if pictures and found.runs:
         from ..report.measured import draw_measured

@@ -13,7 +13,8 @@ from ..simulate.modes.label import Label
 from .arrangement import arrange
 from .measurement import Measurement
 from .modal import Geometry, LabelledMode, Layout, ModalTest, measurements_of, read_modal_test
-from .repeats import FLOOR, combined
+from .repeats import FLOOR, combined, one_for_both
+from .slips import contradictions
 from .tables import read_table
 from .universal import Place, Universal, is_universal, read_universal
 
@@ -38,12 +39,14 @@ def gather(
     floor: float = FLOOR,
     assumed: float = 0.0,
     leave_out: Sequence[str] = (),
+    keep_going: bool = False,
 ) -> Gathered:
     """Measurements of several files; those of the same thing are repeats.
 
     pressure_kPa: of files that do not say theirs; floor, assumed: relative, see ``combined``;
-    leave_out: channels, see ``arrange``. Frequencies without labels come last.
-    Raises InputError, OSError.
+    leave_out: channels, see ``arrange``; keep_going: leave out repeats that contradict each other.
+    Frequencies without labels come last. Raises InputError, where repeats contradict each other
+    too; OSError.
     """
     for k, path in enumerate(paths):
         if path.resolve() in [other.resolve() for other in paths[:k]]:
@@ -74,7 +77,16 @@ def gather(
                 " missing: look at the picture, try a narrower --band"
             )
         values += measurements_of(run, pressure_kPa)
-    rows = combined([each for each in values if not each.is_unlabelled], floor, assumed)
+    labelled = one_for_both([each for each in values if not each.is_unlabelled])
+    slips = contradictions(labelled)
+    if slips and not keep_going:
+        raise InputError("\n".join(map(str, slips)))
+    left_out = {id(each) for slip in slips for each in slip.left_out}
+    notes += [f"left out: {each}" for each in slips]
+    kept = [each for each in labelled if id(each) not in left_out]
+    if labelled and not kept:
+        raise InputError(f"{paths[0]}: all repeats contradict each other, none is left")
+    rows = combined(kept, floor, assumed)
     more = [each for each in values if each.is_unlabelled]
     without_label = _without_labels(more, rows, floor, assumed)
     if without_label:

@@ -37,7 +37,7 @@ def combined(
     it is so large that no fit would read it.
     """
     groups: dict[MeasurementKey, list[Measurement]] = {}
-    for each in _one_for_both(values):
+    for each in one_for_both(values):
         groups.setdefault(each.key, []).append(each)
     pooled = {q: _pooled(groups, q) for q in {key[0] for key in groups}}
     rows = []
@@ -76,9 +76,9 @@ def _pooled(groups: dict[MeasurementKey, list[Measurement]], quantity: str) -> f
     return total / freedom if freedom else None
 
 
-def _one_for_both(values: Sequence[Measurement]) -> list[Measurement]:
-    """The two members of a doublet as one, their mean, where some runs tell other members than
-    others do."""
+def one_for_both(values: Sequence[Measurement]) -> list[Measurement]:
+    """The values with the two members of a doublet as one, their mean, where some runs have other
+    members than others have."""
     places: dict[tuple[object, ...], dict[str, list[Measurement]]] = {}
     for each in values:
         place = (each.quantity, each.label, each.state)

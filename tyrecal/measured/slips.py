@@ -1,0 +1,139 @@
+"""Repeats that contradict each other: found before any of them is averaged.
+
+All repeats of one quantity together show how far two runs of one thing may differ. With y = ln x,
+run i of n runs of one label differs from the mean of the other n - 1 by d_i; its studentised
+deviation is
+
+    t_i = |d_i| sqrt((n - 1) / n) / s,    s^2 = the scatter of all repeats of the file without it.
+
+The largest is taken away, then the largest of the rest, and so on; the slips are those up to the
+last that Student's t does not allow (Rosner's generalised extreme studentised deviate). So two
+slips do not hide each other, and none makes the scatter that judges it. `combined` must never
+average what stands here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .measurement import Measurement
+
+FALSE_REPORTS = 0.002  # of files without a slip
+FEW_REPEATS = (
+    3  # degrees of freedom; with fewer, the file itself does not show what its repeats scatter
+)
+LARGEST_STEP = {"frequency_Hz": 0.05, "mass_kg": 0.05}  # relative, between repeats of such a file
+LARGEST_STEP_ELSE = 0.25
+MOST_SLIPS = 12  # slips that are looked for
+USUAL_STEPS = [digit * 10.0**power for power in range(2, -8, -1) for digit in (5, 2.5, 2, 1.25, 1)]
+SMALLEST_SCATTER = 1e-4  # of the value: what no two set-ups of a test go below
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """Runs of one thing, of which one is off by more than repeats of its file are."""
+
+    slip: Measurement  # the run that is off; of two runs, the later one
+    others: tuple[Measurement, ...]  # the other runs of the same thing
+    usual: float  # relative standard deviation of all other repeats; 0 where there are too few
+
+    @property
+    def left_out(self) -> tuple[Measurement, ...]:
+        """Runs that must not be averaged: the slip; of two runs both, as either may be it."""
+        return (self.slip,) if len(self.others) > 1 else (self.slip, *self.others)
+
+    def __str__(self) -> str:
+        slip, others = self.slip, self.others
+        mean = float(np.mean([each.value for each in others]))
+        which = f"{mean:.6g}" if len(others) == 1 else f"{mean:.6g}, the mean of the others,"
+        places = ", ".join(each.place + _run(each) for each in others[:3])
+        scatter = f", other repeats by {self.usual:.2g} %" if self.usual else ""
+        return (
+            f"{slip.place}: {slip.name} is {slip.value:.6g}{_run(slip)}, but {which} in {places};"
+            f" they differ by {100 * abs(slip.value / mean - 1):.2g} %{scatter}. Is it a slip, or"
+            " another mode? Correct it, or leave it out with --keep-going"
+        )
+
+
+def _run(each: Measurement) -> str:
+    """The run's own name, where its file has one."""
+    name = each.run.removeprefix(each.place.rpartition(", line ")[0]).strip()
+    return f" (run {name})" if name and not each.place.startswith(name) else ""
+
+
+def contradictions(values: Sequence[Measurement]) -> list[Contradiction]:
+    """Every run that differs from its label's other runs by more than the file's repeats do."""
+    quantities = dict.fromkeys(each.quantity for each in values)
+    return [
+        contradiction
+        for quantity in quantities
+        for contradiction in _of_quantity([each for each in values if each.quantity == quantity])
+    ]
+
+
+def _of_quantity(values: list[Measurement]) -> list[Contradiction]:
+    from scipy.stats import t as student
+
+    groups: dict[object, list[Measurement]] = {}
+    for each in values:
+        groups.setdefault(each.key, []).append(each)
+    repeated = [runs for runs in groups.values() if len(runs) > 1]
+    half_step = _step([each.value for each in values]) / 2
+    largest = LARGEST_STEP.get(values[0].quantity, LARGEST_STEP_ELSE)
+    # a group of two is one comparison
+    comparisons = sum(len(runs) if len(runs) > 2 else 1 for runs in repeated)
+    removed: list[Contradiction] = []
+    slips = 0
+    for _ in range(min(MOST_SLIPS, comparisons)):
+        squares = sum(float(np.sum(_deviations(runs) ** 2)) for runs in repeated)
+        freedom = sum(len(runs) - 1 for runs in repeated)
+        if not freedom:
+            break
+        own, worst, at = max(
+            (
+                (d**2 * len(runs) / (len(runs) - 1), runs, i)  # what run i adds to the squares
+                for runs in repeated
+                for i, d in enumerate(_deviations(runs))
+            ),
+            key=lambda each: each[0],
+        )
+        n = len(worst)
+        rest, left = max(0.0, squares - own), freedom - 1
+        floor = max(SMALLEST_SCATTER, half_step / max(each.value for each in worst))
+        usual = np.sqrt(rest / left) if left else 0.0
+        limit = np.inf
+        if left:
+            tail = FALSE_REPORTS / 2 / comparisons
+            limit = float(student.isf(tail, left)) * max(usual, floor)
+        step = float(np.sqrt(own * n / (n - 1)))  # relative, from the mean of the others
+        stated = max(np.nan_to_num(each.sigma) / each.value for each in worst)
+        few = left < FEW_REPEATS and step > max(largest, 4 * stated)
+        runs = worst[:at] + worst[at + 1 :]
+        slip = worst[at]
+        if n == 2:
+            runs, slip = worst[:1], worst[1]
+        removed.append(
+            Contradiction(slip, tuple(runs), 100 * usual if left >= FEW_REPEATS else 0.0)
+        )
+        if np.sqrt(own) > limit or few:
+            slips = len(removed)
+        repeated = [each for each in repeated if each is not worst] + [runs] * (len(runs) > 1)
+    return sorted(removed[:slips], key=lambda each: values.index(each.slip))
+
+
+def _deviations(runs: Sequence[Measurement]) -> np.ndarray:
+    y = np.log([each.value for each in runs])
+    return np.asarray(y - y.mean())
+
+
+def _step(values: Sequence[float]) -> float:
+    """The largest usual step that all values are multiples of: the last digit that was written, or
+    a spectrum's line. 0 where there is none."""
+    x = np.array(values)
+    for step in USUAL_STEPS:
+        if np.all(abs(x / step - np.rint(x / step)) < 1e-6):
+            return step
+    return 0.0
