@@ -9,10 +9,11 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Protocol
 
-from .element_types import NODES_AND_SECTION
+from ..language.element_types import NODES_AND_SECTION
+from ..language.rule import Rule
+from ..language.spelling import named
+from ..language.step_rules import STEP_PROCEDURES
 from .grammar import RULES, UNJUDGED
-from .rule import Rule
-from .step_rules import STEP_PROCEDURES
 
 LONGEST = {"number": 20, "integer": 10, "name": 80}  # characters of a field
 FORM = {
@@ -156,7 +157,7 @@ def _parameters(block: Block, rule: Rule, names: _Names) -> Iterator[Finding]:
         wanted = rule.parameters[name]
         if wanted.islower():
             yield from _value(block, None, wanted, value, names, f"{name}=")
-        elif _named(value) not in wanted.split("|"):
+        elif value.upper() not in wanted.split("|"):
             words = " or ".join(word or "no value" for word in wanted.split("|"))
             yield Finding(block, None, f"{name}={value} must be {words}")
     for group in rule.needs:
@@ -169,7 +170,7 @@ def _parameters(block: Block, rule: Rule, names: _Names) -> Iterator[Finding]:
 
 def _data(block: Block, rule: Rule, names: _Names) -> Iterator[Finding]:
     """Data lines: their number, then each field."""
-    given = [f"{key}={_named(value)}" for key, value in block.parameters.items()]
+    given = [f"{key}={value.upper()}" for key, value in block.parameters.items()]
     variant = next((v for k, v in rule.variants.items() if k in (*block.parameters, *given)), None)
     forms = rule.fields if variant is None else variant
     lines = (forms,) if isinstance(forms, str) else forms
@@ -208,9 +209,9 @@ def _value(
     if kind in ("text", "any"):
         return
     if kind.startswith("+"):
-        names.given.add((kind[1:], _named(text)))
+        names.given.add((kind[1:], named(text)))
     elif kind in NUMBERED or kind not in FORM:
-        names.used.append((kind, _named(text), block, row))
+        names.used.append((kind, named(text), block, row))
     form = kind if kind in FORM else "name"
     if kind in NUMBERED and text.strip().isdigit():
         form = "integer"
@@ -223,7 +224,7 @@ def _value(
 
 
 def _elements(block: Block, names: _Names) -> Iterator[Finding]:
-    kind = _named(block.parameters.get("TYPE", ""))
+    kind = named(block.parameters.get("TYPE", ""))
     if kind not in NODES_AND_SECTION:
         yield Finding(block, None, f"TYPE={kind} is not known to the grammar", sure=False)
         return
@@ -252,7 +253,7 @@ def _unnamed(blocks: Sequence[Block], names: _Names) -> Iterator[Finding]:
             yield Finding(block, None, f"its elements {_set(block)} have no *{section}")
     bodies: dict[str, Block] = {}
     for block in blocks:
-        if block.name == "RIGID BODY" and (tied := _named(block.parameters.get("TIE NSET", ""))):
+        if block.name == "RIGID BODY" and (tied := named(block.parameters.get("TIE NSET", ""))):
             if tied in bodies:
                 yield Finding(block, None, f"the nodes {tied} are of another rigid body already")
             bodies[tied] = block
@@ -261,7 +262,7 @@ def _unnamed(blocks: Sequence[Block], names: _Names) -> Iterator[Finding]:
         oriented = "ORIENTATION" in block.parameters
         if oriented and any(kind.startswith("SFMGAX") for kind in names.types):
             yield Finding(block, None, "takes no ORIENTATION on axisymmetric elements")
-        fanned = _named(block.parameters.get("GEOMETRY", "")) in ("ANGULAR", "LIFT EQUATION")
+        fanned = block.parameters.get("GEOMETRY", "") in ("ANGULAR", "LIFT EQUATION")
         if fanned and not oriented and any(map(HOLDS_LAYERS_IN_3D.match, names.types)):
             words = "needs an ORIENTATION, a cylindrical one, on elements in three dimensions"
             yield Finding(block, None, words)
@@ -269,7 +270,7 @@ def _unnamed(blocks: Sequence[Block], names: _Names) -> Iterator[Finding]:
 
 def _set(block: Block) -> str:
     """The element set that it names."""
-    return _named(block.parameters.get("ELSET", ""))
+    return named(block.parameters.get("ELSET", ""))
 
 
 @cache
@@ -282,8 +283,3 @@ def _form(text: str) -> tuple[list[tuple[str, bool]], str]:
         count, _, kind = word.rpartition("*")
         kinds += [(kind.removesuffix("?"), kind.endswith("?"))] * int(count or 1)
     return kinds, ""
-
-
-def _named(text: str) -> str:
-    """A name as ABAQUS compares them."""
-    return " ".join(text.strip().strip('"').upper().split())

@@ -5,11 +5,8 @@ The manual's sentences, none of them tried by a run.
 
 from __future__ import annotations
 
-from .model_rules import MODEL_RULES
-from .rule import Rule
-from .step_rules import STEP_RULES
+from ..language.table import RULES as RULES
 
-RULES: dict[str, Rule] = {**MODEL_RULES, **STEP_RULES}
 # that ask for output, say how to iterate, or that we never write: their parameters and data are
 # not judged
 UNJUDGED = {

@@ -143,7 +143,7 @@ def _viscoelastic(m: Material, k: Keyword) -> None:
     for row in k.rows:
         if len(row.fields) > 3 and any(row.fields[3:]):
             raise DeckError(row.line, "a term of a Prony series is g, k and tau")
-        m.prony.append((row.number(0), row.number(1, 0.0), row.number(2)))
+        m.prony.append((row.number(0, 0.0), row.number(1, 0.0), row.number(2)))
     if any(np.real(x) < 0 for term in m.prony for x in term):
         raise DeckError(k.line, "g, k and tau of a Prony series must not be negative")
     if any(np.real(r) <= 0 for r in m._relaxed()):
@@ -154,7 +154,7 @@ def _modulus_table(k: Keyword) -> ModulusTable:
     """Rows of loss and storage: G''/G0, 1 - G'/G0, K''/K0, 1 - K'/K0, frequency in Hz. A
     vibration without damping has no use for the losses."""
     frequency = [row.real(4) for row in k.rows]
-    ratios = [1 - row.number(1) for row in k.rows]
+    ratios = [1 - row.number(1, 0.0) for row in k.rows]
     if len(frequency) < 2 or any(b <= a for a, b in pairwise([0.0, *frequency])):
         raise DeckError(k.line, "a table of moduli has two rows or more, their frequencies rise")
     if any(np.real(ratio) <= 0 for ratio in ratios) or any(row.number(3, 0.0) for row in k.rows):

@@ -97,6 +97,8 @@ def _instance(made: Assembly, parts: dict[str, Part], block: Block) -> None:
             sets[f"{name}.{each}"] = [(defined[0][0], of)]
         for n, m in numbers.items():
             sets[f"{name}.{n}"] = [(block, lambda m=m: [m])]  # type: ignore[misc]
+    root.add_nodes(block, list(nodes.values()))
+    root.add_elements(block, list(elements.values()))
     for other in part.other:
         if other.name not in MESH_READERS:
             _other(made, other, f"{name}.", parts)

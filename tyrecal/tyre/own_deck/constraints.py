@@ -100,7 +100,7 @@ class Constraints:
         ends = np.array([[self.root.nodes[n] for n in pair] for pair in segments])
         away, _ = nearest(np.array([self.root.nodes[n] for n in slaves]), ends)
         given = block.parameters.get("POSITION TOLERANCE", "")
-        allowed = Row(block.place, (given,)).number(0) if given else 0.0
+        allowed = Row(block.place, given).number(0) if given else 0.0
         if block.get("ADJUST") != "NO":
             allowed = 0.0
         for n, distance in zip(slaves, away, strict=True):

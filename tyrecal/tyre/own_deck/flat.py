@@ -230,7 +230,7 @@ def _layers(
             if not row.number(j) > 0:
                 raise option.refused(f"the {what} must be positive", row)
         name = re.sub(r"\W", "_", row.name(0)) or "LAYER"
-        rows.append(Row(row.place, (name, *row.fields[1:4], flat_name, *row.fields[5:])))
+        rows.append(Row(row.place, ",".join((name, *row.fields[1:4], flat_name, *row.fields[5:]))))
         found.append(
             Ply(
                 row.name(0),

@@ -55,7 +55,7 @@ def _tolerances(block: Block, length: float) -> str:
         ("ABSOLUTE EXTERIOR TOLERANCE", length),
     ):
         if text := block.get(name):
-            found += f", {name}={written(Row(block.place, (text,)).number(0) * scale)}"
+            found += f", {name}={written(Row(block.place, text).number(0) * scale)}"
     return found
 
 

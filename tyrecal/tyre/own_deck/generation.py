@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .scope import Point, Scope, mirror_of, nodes_of, reflected
+from .scope import MOST, Point, Scope, mirror_of, nodes_of, reflected
 from .text import Block, Row, named
 
 
@@ -101,7 +101,7 @@ def _on_arc(
 
 def _nfill(scope: Scope, block: Block) -> None:
     """Two sets, intervals between, increment: nodes on straight lines between their nodes."""
-    bias = Row(block.place, (block.parameters.get("BIAS", "1"),)).number(0)
+    bias = Row(block.place, block.parameters.get("BIAS", "1")).number(0)
     if bias <= 0:
         raise block.refused("BIAS must be positive")
     numbers: list[int] = []
@@ -114,8 +114,8 @@ def _nfill(scope: Scope, block: Block) -> None:
         if len(pairs[0]) != len(pairs[1]):
             raise block.refused(f"the sets have {len(pairs[0])} and {len(pairs[1])} nodes", row)
         count, step = row.integer(2), row.integer(3, 1)
-        if count < 1:
-            raise block.refused("the number of intervals must be 1 or more", row)
+        if not 1 <= count <= MOST:
+            raise block.refused(f"the number of intervals must be from 1 to {MOST}", row)
         lengths = bias ** -np.arange(count)  # each is bias times the one behind it
         shares = np.cumsum(lengths) / lengths.sum()
         for first, last in zip(*pairs, strict=True):
@@ -136,9 +136,11 @@ def _unsorted(scope: Scope, name: str) -> bool:
 
 def _ncopy(scope: Scope, block: Block) -> None:
     """Copies of a set, shifted, or mirrored about a line."""
-    shift = Row(block.place, (block.need("CHANGE NUMBER"),)).integer(0)
+    shift = Row(block.place, block.need("CHANGE NUMBER")).integer(0)
     old = scope.nodes_in(block.need("OLD SET"), block)
-    times = Row(block.place, (block.parameters.get("MULTIPLE", "1"),)).integer(0)
+    times = Row(block.place, block.parameters.get("MULTIPLE", "1")).integer(0)
+    if not 1 <= times <= MOST:
+        raise block.refused(f"MULTIPLE must be from 1 to {MOST}")
     if ("SHIFT" in block.parameters) == ("REFLECT" in block.parameters):
         raise block.refused("needs SHIFT or REFLECT=LINE")
     move: Callable[[Point, int], Point]
@@ -187,12 +189,16 @@ def _listed(scope: Scope, block: Block, members: Callable, known: dict) -> list[
     """Members of a set's data lines: numbers and names of other sets, or first, last, step."""
     found: list[int] = []
     what = "node" if block.name == "NSET" else "element"
+    in_order = sorted(known) if "GENERATE" in block.parameters else []
     for row in block.rows:
         if "GENERATE" in block.parameters:
             first, last, step = row.integer(0), row.integer(1), row.integer(2, 1)
             if step < 1 or last < first or (last - first) % step:
                 raise block.refused(f"{first} to {last} is no whole number of steps {step}", row)
-            some = list(range(first, last + 1, step))
+            numbers = range(first, last + 1, step)
+            some = [n for n in in_order if n in numbers]  # a range may have gaps
+            if not some:
+                raise block.refused(f"no {what} from {first} to {last} is defined", row)
         else:
             some = []
             for text in filter(None, row.fields):
@@ -221,7 +227,7 @@ def _element(scope: Scope, block: Block) -> None:
         if len(fields) != count + 1:
             raise block.refused(f"a {kind} element has {count} nodes, got {len(fields) - 1}", row)
         number = row.integer(0)
-        nodes = tuple(Row(row.place, (text,)).integer(0) for text in fields[1:])
+        nodes = tuple(Row(row.place, text).integer(0) for text in fields[1:])
         scope.make(block, row, number, kind, nodes)
         numbers.append(number)
     scope.add_elements(block, numbers)
@@ -253,7 +259,7 @@ def _elgen(scope: Scope, block: Block) -> None:
 
 def _elcopy(scope: Scope, block: Block) -> None:
     """Copies of a set, on nodes of shifted numbers; of mirrored nodes in the reverse order."""
-    one = lambda name: Row(block.place, (block.need(name),)).integer(0)
+    one = lambda name: Row(block.place, block.need(name)).integer(0)
     shift, nodes = one("ELEMENT SHIFT"), one("SHIFT NODES")
     made = []
     for n in scope.elements_in(block.need("OLD SET"), block):

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 
-from .text import Block, named
+from .text import NO_ROWS, RULES, Block
 
 Values = tuple[str, ...] | None  # that a parameter may have; None: any, "": without one
 
@@ -66,7 +66,7 @@ MESH: dict[str, dict[str, Values]] = {
 }
 MATERIAL: dict[str, dict[str, Values]] = {
     "DENSITY": {},
-    "ELASTIC": {"TYPE": ("ISOTROPIC", "ISO"), "MODULI": ("LONG TERM",)},
+    "ELASTIC": {"TYPE": ("ISOTROPIC",), "MODULI": ("LONG TERM",)},
     "HYPERELASTIC": {
         "NEO HOOKE": ("",),
         "MOONEY-RIVLIN": ("",),
@@ -87,7 +87,7 @@ MODEL_LEVEL: dict[str, dict[str, Values]] = {
     "END PART": {},
     "ASSEMBLY": {"NAME": None},
     "END ASSEMBLY": {},
-    "INSTANCE": {"NAME": None, "PART": None},
+    "INSTANCE": {"NAME": None, "PART": None, "NSET": None, "ELSET": None},
     "END INSTANCE": {},
     "SECTION CONTROLS": {"NAME": None, "HOURGLASS": ("STIFFNESS",)},
     "MATERIAL": {"NAME": None},
@@ -157,6 +157,7 @@ def sort(blocks: Sequence[Block]) -> Sorted:
     found = Sorted()
     step: list[Block] | None = None
     part = assembly = instance = False
+    after_a_step = False
     over: Block | None = None  # the *MATERIAL or section that options may follow
     for block in blocks:
         name = block.name
@@ -173,13 +174,15 @@ def sort(blocks: Sequence[Block]) -> Sorted:
             if name == "END STEP":
                 if not found.inflation:
                     _step(step, found)
-                step = None
+                step, after_a_step = None, True
             continue
         if name in NO_EFFECT:
             found.passed.append(block)
             continue
         if name in ("END STEP", *STEP_LEVEL) and name != "BOUNDARY":
             raise block.refused("stands outside a step")
+        if after_a_step:
+            raise block.refused("stands after a step: the model's keywords stand before *STEP")
         _check(block, {**MESH, **MATERIAL, **MODEL_LEVEL}, "the model")
         found.model.append(block)
         if name in MATERIAL:
@@ -251,6 +254,9 @@ def _check(block: Block, known: dict[str, dict[str, Values]], where: str) -> Non
         hint = INSTEAD.get(block.name) or (f"did you mean *{close[0]}?" if close else "")
         hint = hint or "delete it where it changes nothing"
         raise block.refused(f"is not honoured in {where}; {hint}")
+    rule = RULES.get(block.name)
+    if block.rows and rule and rule.rows == NO_ROWS:
+        raise block.refused("takes no data lines", block.rows[0])
     parameters = known[block.name]
     for name, value in block.parameters.items():
         if name not in parameters:
@@ -258,7 +264,7 @@ def _check(block: Block, known: dict[str, dict[str, Values]], where: str) -> Non
             hint = f"; did you mean {close[0]}?" if close else ""
             raise block.refused(f"the parameter {name} is not honoured{hint}")
         values = parameters[name]
-        if values is not None and named(value) not in values:
+        if values is not None and value not in values:
             expected = " or ".join(v or "no value" for v in values)
             raise block.refused(f"{name}={value} is not honoured, only {expected}")
         if values is None and not value:

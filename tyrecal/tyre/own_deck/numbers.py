@@ -69,7 +69,7 @@ def field_names(block: Block) -> list[str]:
             raise block.refused(f"{laws[0]} and {laws[1]} are two laws")
         order = int(block.parameters.get("N", "1"))
         return LAW_CONSTANTS[laws[0] if laws else "POLYNOMIAL"](order)
-    if block.name == "ELASTIC" and block.get("TYPE", "ISOTROPIC") not in ("ISOTROPIC", "ISO"):
+    if block.name == "ELASTIC" and block.get("TYPE", "ISOTROPIC") != "ISOTROPIC":
         return []
     if block.name == "VISCOELASTIC":
         return FIELDS["PRONY" if "TIME" in block.parameters else "TABULAR"]
@@ -193,7 +193,7 @@ def written(value: float) -> str:
 
 def is_marked(block: Block) -> bool:
     """Whether its numbers depend on marks or parameters."""
-    return any("{{" in field or "<" in field for row in block.rows for field in row.fields) or any(
+    return any("{{" in row.line or "<" in row.line for row in block.rows) or any(
         "<" in value for value in block.parameters.values()
     )
 
@@ -211,9 +211,7 @@ def filled(block: Block, numbers: Numbers, parameters: Mapping[str, Any]) -> Blo
         return PARAMETER.sub(lambda m: _parameter(block, parameters, m[1]), field)
 
     rows = tuple(
-        Row(row.place, tuple(map(text, row.fields)))
-        if any("{{" in field or "<" in field for field in row.fields)
-        else row
+        Row(row.place, text(row.line)) if "{{" in row.line or "<" in row.line else row
         for row in block.rows
     )
     values = {k: text(v) if "<" in v else v for k, v in block.parameters.items()}
@@ -302,7 +300,7 @@ def replaced(block: Block, changes: Mapping[tuple[int, int], float]) -> Block:
             fields = [f"{assigned(rows[i])[0]} = {written(value)}"]
         else:
             fields[j] = written(value)
-        rows[i] = Row(rows[i].place, tuple(fields))
+        rows[i] = Row(rows[i].place, ",".join(fields))
     return Block(block.name, block.place, block.parameters, tuple(rows))
 
 

@@ -62,7 +62,7 @@ def read_law(k: Keyword) -> Hyperelastic:
 
 
 def _numbers(k: Keyword, names: list[str]) -> list[Scalar]:
-    """The constants in their order, those that are left out at the end being 0."""
+    """The constants in their order; those that are left out are 0."""
     lines = -(-len(names) // ON_A_LINE)
     if not 1 <= len(k.rows) <= lines:
         of = "one data line" if lines == 1 else f"up to {lines} data lines"
@@ -72,8 +72,8 @@ def _numbers(k: Keyword, names: list[str]) -> list[Scalar]:
         if extra:
             raise DeckError(row.line, f"data '{extra[0]}' of *{k.name} is not honoured")
     numbers: list[Scalar] = []
-    for i, name in enumerate(names):
+    for i in range(len(names)):
         row = k.rows[min(i // ON_A_LINE, len(k.rows) - 1)]
         place = i % ON_A_LINE if i // ON_A_LINE < len(k.rows) else ON_A_LINE
-        numbers.append(row.number(place, 0.0 if name[0] == "D" else None))
+        numbers.append(row.number(place, 0.0))
     return numbers

@@ -22,10 +22,14 @@ MODEL_RULES: dict[str, Rule] = {
     "ASSEMBLY": Rule("model", "NAME=name", rows=NO_ROWS, needs=("NAME",), once="job"),
     "END ASSEMBLY": Rule("part", rows=NO_ROWS),
     "INSTANCE": Rule(
-        "part", "NAME=name; PART=part", "number...", rows=ANY_ROWS, needs=("NAME", "PART")
+        "part",
+        "NAME=name; PART=part; NSET=+nset; ELSET=+elset; INSTANCE=name; LIBRARY=name",
+        "number...",
+        rows=ANY_ROWS,
+        needs=("NAME", "PART"),
     ),
     "END INSTANCE": Rule("part", rows=NO_ROWS),
-    "NODE": Rule("part", "NSET=+nset; SYSTEM=R|C|S", "integer number 5*number?"),
+    "NODE": Rule("part", "NSET=+nset; SYSTEM=R|C|S", "integer 6*number?"),
     "SYSTEM": Rule("part", fields="6*number?", rows=(0, 2)),
     "NGEN": Rule("part", "NSET=+nset; LINE=C|P", "2*integer integer? integer? 6*number?"),
     "NFILL": Rule("part", "NSET=+nset; BIAS=number", "2*nset integer integer?"),
@@ -90,7 +94,10 @@ MODEL_RULES: dict[str, Rule] = {
     "HOURGLASS STIFFNESS": Rule("part", fields="4*number?", rows=ONE_ROW, under=OF_SECTION),
     "SECTION CONTROLS": Rule(
         "part model",
-        "NAME=+controls; SECOND ORDER ACCURACY=YES|NO|; HOURGLASS=STIFFNESS|ENHANCED",
+        (
+            "NAME=+controls; SECOND ORDER ACCURACY=YES|NO|; "
+            "HOURGLASS=STIFFNESS|ENHANCED|VISCOUS|RELAX STIFFNESS|COMBINED"
+        ),
         "number...",
         rows=(0, 1),
         needs=("NAME",),
@@ -165,7 +172,11 @@ MODEL_RULES: dict[str, Rule] = {
     "DENSITY": Rule("model", fields="number number?", under=OF_MATERIAL, once="parent"),
     "ELASTIC": Rule(
         "model",
-        "TYPE=name; MODULI=LONG TERM|INSTANTANEOUS",
+        (
+            "TYPE=ISOTROPIC|ORTHOTROPIC|ANISOTROPIC|ENGINEERING CONSTANTS|LAMINA|TRACTION|"
+            "COUPLED TRACTION|SHEAR|SHORT FIBER|BILAMINA; MODULI=LONG TERM|INSTANTANEOUS; "
+            "DEPENDENCIES=integer; COMPRESSION FACTOR=number"
+        ),
         "number number? number?",
         under=OF_MATERIAL,
         once="parent",
@@ -178,7 +189,7 @@ MODEL_RULES: dict[str, Rule] = {
             "NEO HOOKE; MOONEY-RIVLIN; POLYNOMIAL; REDUCED POLYNOMIAL; YEOH; ARRUDA-BOYCE; "
             "OGDEN; VAN DER WAALS; MARLOW; USER; N=1|2|3|4|5|6; MODULI=LONG TERM|INSTANTANEOUS"
         ),
-        "number 7*number?",
+        "8*number?",
         alone=HYPERELASTIC_LAWS,
         under=OF_MATERIAL,
         once="parent",
@@ -190,7 +201,7 @@ MODEL_RULES: dict[str, Rule] = {
         needs=("TIME|FREQUENCY",),
         under=OF_MATERIAL,
         once="parent",
-        variants={"TIME=PRONY": "3*number", "FREQUENCY=TABULAR": "5*number"},
+        variants={"TIME=PRONY": "2*number? number", "FREQUENCY=TABULAR": "4*number? number"},
     ),
     "ACOUSTIC MEDIUM": Rule("model", "BULK MODULUS", "number 2*number?", under=OF_MATERIAL),
     "FLUID BEHAVIOR": Rule("model", "NAME=+fluid; USER", rows=NO_ROWS, needs=("NAME",)),
@@ -209,7 +220,8 @@ MODEL_RULES: dict[str, Rule] = {
     "AMPLITUDE": Rule(
         "model",
         (
-            "NAME=+amplitude; DEFINITION=name; VALUE=RELATIVE|ABSOLUTE; "
+            "NAME=+amplitude; DEFINITION=TABULAR|EQUALLY SPACED|PERIODIC|MODULATED|DECAY|"
+            "SMOOTH STEP|SOLUTION DEPENDENT|ACTUATOR|BUBBLE|USER; VALUE=RELATIVE|ABSOLUTE; "
             "TIME=STEP TIME|TOTAL TIME; SMOOTH=number"
         ),
         "number...",

@@ -1,0 +1,245 @@
+"""A deck's text as keyword blocks that remember their places, included files among them.
+
+Everything that reads a deck reads it here: user decks, the bundled solver, the checks for ABAQUS
+and CalculiX. Keywords, parameters and their words come out as the manual spells them in full.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple, Self
+
+from ..errors import Refused
+from .element_types import NODES_AND_SECTION
+from .spelling import full_keyword, full_parameters, named
+
+MOST_BYTES = 100_000_000  # of a deck and all that it includes
+MOST_CHARACTERS = 4096  # with those that continue it; ABAQUS reads 256 of each
+DEEPEST_INCLUDE = 5  # files that include others
+
+
+class Place(NamedTuple):
+    """A line (from 1) of a file; a subclass says which error a mistake there is."""
+
+    file: str
+    line: int
+
+    def error(self, message: str) -> Exception:
+        """The error to raise for what stands here."""
+        return DeckError(self, message)
+
+    def __str__(self) -> str:
+        return f"{self.file}, line {self.line}" if self.line else self.file
+
+
+class DeckError(Refused):
+    """A deck that cannot be honoured, or is none; the sentence begins with file and line.
+
+    place: its line is 0 where no single line is to blame.
+    """
+
+    def __init__(self, place: Place, message: str):
+        super().__init__(f"{place}: {message}")
+        self.place, self.message = place, message
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """A data line, including the lines that continue it."""
+
+    place: Place
+    line: str
+
+    @cached_property
+    def fields(self) -> tuple[str, ...]:
+        """The text between the commas, without the blanks around it."""
+        return tuple(text.strip() for text in self.line.split(","))
+
+    def text(self, index: int, default: str = "") -> str:
+        """A field as it is written, ``default`` if it is missing or blank."""
+        return (self.fields[index] if index < len(self.fields) else "") or default
+
+    def name(self, index: int) -> str:
+        """A field as the name of a set, surface or material."""
+        return named(self.text(index))
+
+    def number(self, index: int, default: float | None = None) -> float:
+        """A field as a finite number."""
+        text = self.text(index)
+        if not text and default is not None:
+            return default
+        try:
+            value = float(text.replace("D", "E").replace("d", "e"))
+        except ValueError:
+            what = f"'{text}' is not a number" if text else f"number {index + 1} is missing"
+            raise self.place.error(what) from None
+        if value - value != 0.0:
+            raise self.place.error(f"'{text}' is not a finite number")
+        return value
+
+    def integer(self, index: int, default: int | None = None) -> int:
+        """A field as a whole number."""
+        text = self.text(index)
+        if not text and default is not None:
+            return default
+        try:
+            return int(text)
+        except ValueError:
+            what = f"'{text[:40]}' is no whole number" if text else f"number {index + 1} is missing"
+            raise self.place.error(what) from None
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """A keyword with its parameters and its data lines."""
+
+    name: str
+    place: Place
+    parameters: Mapping[str, str]  # upper-case names
+    rows: Sequence[Row] = field(default=())
+
+    def get(self, parameter: str, default: str = "") -> str:
+        """A parameter as a name, ``default`` if it is not given."""
+        return named(self.parameters.get(parameter, default))
+
+    def need(self, parameter: str) -> str:
+        """A parameter that must be given."""
+        value = self.get(parameter)
+        if not value:
+            raise self.refused(f"needs {parameter}=")
+        return value
+
+    def only_row(self) -> Row:
+        """The data line of a keyword that takes one."""
+        if len(self.rows) != 1:
+            raise self.refused(f"takes one data line, it has {len(self.rows)}")
+        return self.rows[0]
+
+    def refused(self, message: str, row: Row | None = None) -> Exception:
+        """The error for a mistake in a data line, or in the keyword."""
+        return (row.place if row else self.place).error(f"*{self.name}: {message}")
+
+
+@dataclass
+class Reader:
+    """Reads a deck in ``folder`` and the files that it includes, whose places are of ``kind``."""
+
+    folder: Path
+    kind: type[Place] = Place
+    most_bytes: int = MOST_BYTES
+    blocks: list[Block] = field(default_factory=list)
+    texts: dict[str, str] = field(default_factory=dict)  # by file
+    _rows: list[Row] = field(default_factory=list)  # of the last block
+
+    def read(self, file: str) -> Self:
+        """Read a file of the folder. Raises OSError and the error of the places."""
+        self._read(file, self.kind(file, 1), (), False)
+        return self
+
+    def read_text(self, file: str, text: str) -> Self:
+        """Read a text whose lines count as those of ``file``."""
+        self._lines(file, text, (), False)
+        return self
+
+    def _read(self, file: str, place: Place, above: tuple[str, ...], only_data: bool) -> None:
+        self.texts[file] = text = self._text(file, place)
+        self._lines(file, text, above, only_data)
+
+    def _lines(self, file: str, text: str, above: tuple[str, ...], only_data: bool) -> None:
+        for start, line in self._logical_lines(file, text):
+            if not line.startswith("*"):
+                if not self.blocks:
+                    raise start.error(f"data '{line[:40]}' before the first keyword")
+                self._rows.append(Row(start, line))
+                continue
+            block = self._keyword(start, line)
+            if only_data:
+                raise block.refused("stands in a file of data lines")
+            if block.name != "INCLUDE":
+                self._rows = []
+                kept = {k: v for k, v in block.parameters.items() if k != "INPUT"}
+                self.blocks.append(Block(block.name, start, kept, self._rows))
+            if block.name == "INCLUDE" or "INPUT" in block.parameters:
+                other = self._included(block, (*above, file))
+                self._read(other, start, (*above, file), block.name != "INCLUDE")
+
+    def _logical_lines(self, file: str, text: str) -> Iterator[tuple[Place, str]]:
+        """Lines without comments, each with the lines that continue it, and where they begin."""
+        pending, start = "", self.kind(file, 0)
+        for count, raw in enumerate(text.split("\n"), start=1):
+            line = raw.strip()
+            if line.startswith("**") or not line:
+                continue
+            if pending and (pending.startswith("*") or not line.startswith("*")):
+                line = pending + line
+            else:
+                if pending:
+                    yield start, pending
+                start = self.kind(file, count)
+            if len(line) > MOST_CHARACTERS:
+                raise start.error(f"more than {MOST_CHARACTERS} characters in a line are not read")
+            pending = ""
+            if line.endswith(",") and (line.startswith("*") or self._is_short_element(line)):
+                pending = line
+            else:
+                yield start, line
+        if pending.startswith("*"):
+            raise start.error(f"'{pending[:60]}' ends in a comma, but the file ends there")
+        if pending:
+            yield start, pending
+
+    def _is_short_element(self, line: str) -> bool:
+        """Whether an element's data line ends before its last node; its last comma says nothing."""
+        if not self.blocks or self.blocks[-1].name != "ELEMENT":
+            return False
+        nodes, _ = NODES_AND_SECTION.get(self.blocks[-1].get("TYPE"), (0, ""))
+        return not nodes or line.count(",") <= nodes
+
+    def _keyword(self, place: Place, line: str) -> Block:
+        name, *parts = line[1:].split(",")
+        try:
+            name = full_keyword(name)
+            pairs = [part.partition("=") for part in parts if part.strip()]
+            given = [(key, value.strip() if equals else "") for key, equals, value in pairs]
+            parameters: dict[str, str] = {}
+            for key, value in full_parameters(name, given):
+                if key in parameters:
+                    raise place.error(f"*{name}: {key} is given twice")
+                parameters[key] = value
+        except ValueError as error:
+            raise place.error(f"*{named(name)}: {error}") from None
+        return Block(name, place, parameters)
+
+    def _included(self, block: Block, above: tuple[str, ...]) -> str:
+        """The name of the file that a keyword includes."""
+        other = block.parameters.get("INPUT", "").strip().strip('"')
+        if not other or (block.name == "INCLUDE" and len(block.parameters) > 1):
+            raise block.refused("takes INPUT=FILE and nothing else")
+        path = Path(other)
+        if path.is_absolute() or ".." in path.parts or "\\" in other:
+            raise block.refused(f"INPUT={other} leads out of the deck's folder: copy it there")
+        inside = (self.folder / path).resolve().is_relative_to(self.folder.resolve())
+        if not inside or not (self.folder / path).is_file():
+            raise block.refused(f"INPUT={other} is no file in the deck's folder")
+        if other in above or len(above) > DEEPEST_INCLUDE:
+            raise block.refused(f"INPUT={other} includes itself, or is too deep")
+        return other
+
+    def _text(self, file: str, place: Place) -> str:
+        left = self.most_bytes - sum(len(text) for text in self.texts.values())
+        with (self.folder / file).open("rb") as stream:
+            content = stream.read(left + 1)
+        if len(content) > left:
+            raise place.error(f"decks of more than {self.most_bytes / 1e6:g} MB are not read")
+        try:
+            return content.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            return content.decode("latin-1")  # headings have umlauts; keywords are plain letters
+
+
+def names_of(blocks: Sequence[Block]) -> list[str]:
+    """The keywords of blocks, each once, in their order."""
+    return list(dict.fromkeys(block.name for block in blocks))
