@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..bundled.deck.keywords import DeckError, read_keywords
+from ..language.text import WHOLE_DECK, DeckError, read_keywords
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ def read_question(path: Path) -> AskedModes:
             row = k.only_row()
             modes = row.integer(0) if not (row.text(1) or row.text(2)) else None
         elif k.name == "DSLOAD":
-            pressure = max(float(row.number(2).real) for row in k.rows)
+            pressure = max(row.number(2) for row in k.rows)
     if procedures != 1:
-        raise DeckError(0, f"{path.name} needs one *FREQUENCY step, it has {procedures}")
+        raise DeckError(WHOLE_DECK, f"{path.name} needs one *FREQUENCY step, it has {procedures}")
     return AskedModes(modes, pressure)

@@ -137,8 +137,8 @@ class Bundled:
 
 def examine(text: str, long_term: bool) -> float | tuple[int, str]:
     """The mass, kg, of the tyre in a section job's model, or a refusal: its line and words."""
+    from ..language.text import DeckError, read_keywords
     from .deck.grammar import check
-    from .deck.keywords import DeckError, read_keywords
     from .section.mechanics import total_mass
     from .section.model import build
 
@@ -146,4 +146,4 @@ def examine(text: str, long_term: bool) -> float | tuple[int, str]:
         section, _ = check(read_keywords(text), False)
         return total_mass(build(section, None, long_term)).real
     except DeckError as error:
-        return int(error.line), str(error).partition(": ")[2]
+        return error.place.line, error.message

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from .deck.keywords import COMPLEX_STEP, DataLine, DeckError, Keyword
+from ..language.text import COMPLEX_STEP, Block, DeckError, Row
 from .deck.request import Request
 from .deck.steps import Deck, DeckStep, Tangent
 from .modes.bordered import Bordered
@@ -44,9 +44,9 @@ class Inflated:
     request: Request
     # model blocks: of the section's job; of the job that revolves it, of the section in a splice,
     # both empty where there is none
-    section: list[Keyword]
-    revolve: list[Keyword]
-    sector: list[Keyword]
+    section: list[Block]
+    revolve: list[Block]
+    sector: list[Block]
     models: Models
     half: bool  # they are of half the section, which stands for the whole
     U: Array  # displacements (nodes, 3), m
@@ -83,7 +83,7 @@ class FrequencyStep:
         self.dynamic_Hz = step.procedure.number("PROPERTY EVALUATION")
         # how many modes, the lowest and the highest frequency, the shift in cycles squared
         rows = step.procedure.rows
-        self.row = rows[0] if rows else DataLine(step.procedure.line, [])
+        self.row = rows[0] if rows else Row(step.procedure.place, "")
         self.model = _model(tyre, step, self.dynamic_Hz, tyre.request.own_frequency)
         self.equations = vibrating(self.model, step)
         self.vibration = Vibration(
@@ -91,9 +91,9 @@ class FrequencyStep:
             tyre.U,
             loads(self.model, step),
             self.equations,
-            self.row.real(3, 0.0) * (2 * np.pi) ** 2,
+            self.row.number(3, 0.0) * (2 * np.pi) ** 2,
             *tyre.wheel_and_cavity(self.model, step),
-            lowest_Hz=self.row.real(1, 0.0),
+            lowest_Hz=self.row.number(1, 0.0),
         )
         self.factor = self.vibration.factor(0)
 
@@ -103,7 +103,7 @@ class FrequencyStep:
         if self.model.tables:
             solver = SelfConsistent(self.vibration, self.model.tables)
         modes = self._modes(solver)
-        return [m.below(self.row.real(2)) for m in modes] if self.row.text(2) else modes
+        return [m.below(self.row.number(2)) for m in modes] if self.row.text(2) else modes
 
     def _modes(self, solver: HasModes) -> list[HarmonicModes]:
         tyre, step = self.tyre, self.step
@@ -196,17 +196,17 @@ def nonuniform_modes(
     tyre: Inflated, step: DeckStep, vibration: HasModes, harmonics: list[int], count: int
 ) -> list[HarmonicModes]:
     """The ``count`` lowest modes of each harmonic. Raises DeckError, RunFailed."""
-    line = step.procedure.line
+    place = step.procedure.place
     attached, turns = tyre.attached(), _turns(step)
     if bool(attached) + turns + bool(tyre.sector) > 1:
         raise DeckError(
-            line,
+            place,
             "of masses and springs on the tyre, a sector of other stuff, and its turning, one"
             " at a time is honoured",
         )
     if not (isinstance(vibration, Vibration) and vibration.plain):
         raise DeckError(
-            line,
+            place,
             "masses and springs on the tyre, a sector of other stuff, or its turning, are not"
             " honoured together with a rim that moves, air in the cavity or rubber at each"
             " mode's own frequency",
@@ -220,7 +220,7 @@ def nonuniform_modes(
         return modes
     if attached:
         if not vibration.numbering.free[attached.rows, attached.components].all():
-            raise DeckError(line, "masses and springs on nodes that are held do nothing")
+            raise DeckError(place, "masses and springs on nodes that are held do nothing")
         return attached_modes(vibration, attached, harmonics, count, tyre.check)
     return _sector_modes(tyre, step, vibration, harmonics, count)
 
@@ -229,18 +229,18 @@ def _sector_modes(
     tyre: Inflated, step: DeckStep, vibration: Vibration, harmonics: list[int], count: int
 ) -> list[HarmonicModes]:
     """With a sector of other stuff, at the static moduli."""
-    line = step.procedure.line
+    place = step.procedure.place
     if step.procedure.number("PROPERTY EVALUATION") is not None or vibration.shift:
-        raise DeckError(line, "a sector of other stuff is honoured at the static moduli")
+        raise DeckError(place, "a sector of other stuff is honoured at the static moduli")
     if tyre.request.sensitivities:
-        raise DeckError(line, "a tyre with a sector of other stuff has no exact derivatives")
+        raise DeckError(place, "a tyre with a sector of other stuff has no exact derivatives")
     assert tyre.request.sector
     model, other = (
         build(keywords, None, step.long_term, half=tyre.half)
         for keywords in (tyre.section, tyre.sector)
     )
     if model.mesh is not other.mesh:
-        raise DeckError(line, "the sector's section job must have the same mesh")
+        raise DeckError(place, "the sector's section job must have the same mesh")
     sector = SpliceSector(np.radians(float(tyre.request.sector["width_deg"])), other)
     return sector_modes(
         vibration, tyre.U, pressures(model, step), model, sector, harmonics, count, tyre.check

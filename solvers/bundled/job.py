@@ -12,7 +12,7 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from ..errors import RunFailed
-from .deck.keywords import COMPLEX_STEP, DataLine, DeckError, Keyword, read_deck
+from ..language.text import COMPLEX_STEP, Block, DeckError, Row, read_deck
 from .deck.request import Request, read_request, read_sector
 from .deck.start import PressedStart, read_pressed_start, read_start
 from .deck.steps import Deck, DeckStep
@@ -81,7 +81,7 @@ class Job:
         deck: Deck,
         request: Request,
         deadline: float = float("inf"),
-        sector: Sequence[Keyword] = (),
+        sector: Sequence[Block] = (),
         start: np.ndarray | None = None,
     ):
         section, revolve, self.steps = deck.read([])
@@ -120,27 +120,27 @@ class Job:
         vibrations: dict[float, ModesAtLoad] = {}
         for step in self.steps:
             if step.centrifugal:
-                raise DeckError(step.procedure.line, "a turning tyre on a road is not honoured")
+                raise DeckError(step.procedure.place, "a turning tyre on a road is not honoured")
             if step.procedure.name == "FREQUENCY":
                 if not wanted:
-                    line = step.procedure.line
-                    raise DeckError(line, "modes of a tyre on a road come after a force on it")
+                    place = step.procedure.place
+                    raise DeckError(place, "modes of a tyre on a road come after a force on it")
                 vibrations[wanted[-1]] = self._vibrating(step)
                 continue
             if step.procedure.name != "STATIC":
-                raise DeckError(step.procedure.line, "a turning tyre on a road is not honoured")
+                raise DeckError(step.procedure.place, "a turning tyre on a road is not honoured")
             step.held = self._off_road(step)
             if not step.forces:
                 self._static(step)
                 continue
             row = step.forces[-1]
             if row.text(0) != self.road.node or row.integer(1) != 1:
-                raise DeckError(row.line, "the force on the road is along the first axis")
-            wanted.append(-row.real(2))
+                raise DeckError(row.place, "the force on the road is along the first axis")
+            wanted.append(-row.number(2))
             if not wanted[-1] > max([0.0, *wanted[:-1]]):
-                raise DeckError(row.line, "loads on the road must push it to the tyre, and rise")
+                raise DeckError(row.place, "loads on the road must push it to the tyre, and rise")
         if not wanted:
-            raise DeckError(self.steps[-1].procedure.line, "no *CLOAD presses the road")
+            raise DeckError(self.steps[-1].procedure.place, "no *CLOAD presses the road")
         last, model, equations, acting = self._on_road()
         step = self.steps[last]
         from .road import footprint_job, pressed_start  # late, as in `run`
@@ -179,7 +179,7 @@ class Job:
         _, model, _, acting = other._on_road()
         return model, acting, other.road
 
-    def _off_road(self, step: DeckStep) -> list[DataLine]:
+    def _off_road(self, step: DeckStep) -> list[Row]:
         """What a step holds but the road."""
         assert self.road is not None
         return [row for row in step.held if row.text(0) != self.road.node]
@@ -223,15 +223,17 @@ class Job:
     def _vibrating(self, step: DeckStep) -> ModesAtLoad:
         """What a *FREQUENCY step on the road asks for."""
         assert self.road is not None
-        line, row = step.procedure.line, step.procedure.only_row()
+        place, row = step.procedure.place, step.procedure.only_row()
         if any(row.fields[1:]):
-            raise DeckError(row.line, "limits and shifts of a loaded tyre's modes are not honoured")
+            raise DeckError(
+                row.place, "limits and shifts of a loaded tyre's modes are not honoured"
+            )
         if not any(r.text(0) == self.road.node and r.integer(1) == 1 for r in step.held):
             raise DeckError(
-                line, f"node {self.road.node} must hold the road while the tyre vibrates"
+                place, f"node {self.road.node} must hold the road while the tyre vibrates"
             )
         if step.output not in self.model.mesh.node_sets:
-            raise DeckError(line, "modes on the road need a *NODE FILE with a set of the section")
+            raise DeckError(place, "modes on the road need a *NODE FILE with a set of the section")
         numbers = self.model.mesh.node_sets[step.output]
         nodes = np.array([self.model.mesh.index[n] for n in numbers])
         dynamic_Hz = step.procedure.number("PROPERTY EVALUATION")

@@ -7,7 +7,7 @@ and CalculiX. Keywords, parameters and their words come out as the manual spells
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple, Self
@@ -19,6 +19,7 @@ from .spelling import full_keyword, full_parameters, named
 MOST_BYTES = 100_000_000  # of a deck and all that it includes
 MOST_CHARACTERS = 4096  # with those that continue it; ABAQUS reads 256 of each
 DEEPEST_INCLUDE = 5  # files that include others
+COMPLEX_STEP = 1e-30  # so small that its square vanishes against every real part
 
 
 class Place(NamedTuple):
@@ -46,12 +47,19 @@ class DeckError(Refused):
         self.place, self.message = place, message
 
 
+WHOLE_DECK = Place("deck", 0)
+
+
 @dataclass(frozen=True, eq=False)
 class Row:
-    """A data line, including the lines that continue it."""
+    """A data line, including the lines that continue it.
+
+    tangents: by a field's index, d number / d variable if a slope is computed.
+    """
 
     place: Place
     line: str
+    tangents: Mapping[int, float] | None = None
 
     @cached_property
     def fields(self) -> tuple[str, ...]:
@@ -80,6 +88,13 @@ class Row:
             raise self.place.error(f"'{text}' is not a finite number")
         return value
 
+    def value(self, index: int, default: float | None = None) -> complex | float:
+        """A field as a number; its imaginary part is the tangent times COMPLEX_STEP."""
+        number = self.number(index, default)
+        if self.tangents and index in self.tangents:
+            return complex(number, COMPLEX_STEP * self.tangents[index])
+        return number
+
     def integer(self, index: int, default: int | None = None) -> int:
         """A field as a whole number."""
         text = self.text(index)
@@ -101,6 +116,11 @@ class Block:
     parameters: Mapping[str, str]  # upper-case names
     rows: Sequence[Row] = field(default=())
 
+    @cached_property
+    def identity(self) -> tuple[object, ...]:
+        """What the block says, wherever it stands: a key for what is derived from it."""
+        return self.name, tuple(self.parameters.items()), tuple(row.line for row in self.rows)
+
     def get(self, parameter: str, default: str = "") -> str:
         """A parameter as a name, ``default`` if it is not given."""
         return named(self.parameters.get(parameter, default))
@@ -111,6 +131,11 @@ class Block:
         if not value:
             raise self.refused(f"needs {parameter}=")
         return value
+
+    def number(self, parameter: str) -> float | None:
+        """A parameter as a number, None if it is not given."""
+        text = self.parameters.get(parameter, "")
+        return Row(self.place, text).number(0) if text else None
 
     def only_row(self) -> Row:
         """The data line of a keyword that takes one."""
@@ -127,7 +152,7 @@ class Block:
 class Reader:
     """Reads a deck in ``folder`` and the files that it includes, whose places are of ``kind``."""
 
-    folder: Path
+    folder: Path | None  # None: nothing is included
     kind: type[Place] = Place
     most_bytes: int = MOST_BYTES
     blocks: list[Block] = field(default_factory=list)
@@ -219,6 +244,8 @@ class Reader:
         if not other or (block.name == "INCLUDE" and len(block.parameters) > 1):
             raise block.refused("takes INPUT=FILE and nothing else")
         path = Path(other)
+        if self.folder is None:
+            raise block.refused("is not honoured: no file is included here")
         if path.is_absolute() or ".." in path.parts or "\\" in other:
             raise block.refused(f"INPUT={other} leads out of the deck's folder: copy it there")
         inside = (self.folder / path).resolve().is_relative_to(self.folder.resolve())
@@ -230,7 +257,7 @@ class Reader:
 
     def _text(self, file: str, place: Place) -> str:
         left = self.most_bytes - sum(len(text) for text in self.texts.values())
-        with (self.folder / file).open("rb") as stream:
+        with ((self.folder or Path()) / file).open("rb") as stream:
             content = stream.read(left + 1)
         if len(content) > left:
             raise place.error(f"decks of more than {self.most_bytes / 1e6:g} MB are not read")
@@ -238,6 +265,51 @@ class Reader:
             return content.decode("utf-8-sig")
         except UnicodeDecodeError:
             return content.decode("latin-1")  # headings have umlauts; keywords are plain letters
+
+
+def read_keywords(text: str, job: str = "") -> list[Block]:
+    """The keyword blocks of a job's deck that includes nothing. Raises DeckError."""
+    return Reader(None).read_text(f"{job}.inp" if job else WHOLE_DECK.file, text).blocks
+
+
+def read_deck(path: Path) -> str:
+    """The text of a deck, or of a file next to it. Raises DeckError if it is no file of text, or
+    too large; OSError."""
+    if path.exists() and not path.is_file():
+        raise DeckError(WHOLE_DECK, f"{path.name} is not a regular file")
+    with path.open("rb") as file:
+        content = file.read(MOST_BYTES + 1)
+    if len(content) > MOST_BYTES:
+        raise DeckError(WHOLE_DECK, f"{path.name} is larger than {MOST_BYTES / 1e6:g} MB")
+    try:
+        return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeDecodeError:
+        raise DeckError(WHOLE_DECK, f"{path.name} is not text in UTF-8") from None
+
+
+def seed(blocks: Sequence[Block], tangents: Sequence[tuple[int, int, float]]) -> list[Block]:
+    """Copies of the blocks in which the numbers at (line, field) carry a tangent.
+
+    tangents: (1-based line, 0-based field, d number / d variable).
+    Raises DeckError if a place holds no data field.
+    """
+    by_line: dict[int, dict[int, float]] = {}
+    for line, index, value in tangents:
+        by_line.setdefault(line, {})[index] = value
+    result = []
+    for block in blocks:
+        if any(row.place.line in by_line for row in block.rows):
+            rows = [replace(row, tangents=by_line.pop(row.place.line, None)) for row in block.rows]
+            for row in rows:
+                if row.tangents and max(row.tangents) >= len(row.fields):
+                    words = "a sensitivity is asked for, but the line has no such field"
+                    raise DeckError(row.place, words)
+            block = replace(block, rows=rows)
+        result.append(block)
+    if by_line:
+        words = "a sensitivity is asked for, but the line holds no data"
+        raise DeckError(Place(WHOLE_DECK.file, min(by_line)), words)
+    return result
 
 
 def names_of(blocks: Sequence[Block]) -> list[str]:

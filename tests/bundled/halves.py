@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from tyrecal_solvers.bundled.deck.keywords import read_keywords
 from tyrecal_solvers.bundled.section.kept_fields import KeptFields
 from tyrecal_solvers.bundled.section.model import Model, build
 from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 from tyrecal_solvers.bundled.section.symmetry import MirrorHalf
+from tyrecal_solvers.language.text import read_keywords
 
 from . import support
 

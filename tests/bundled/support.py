@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.sparse import csr_array
-from tyrecal_solvers.bundled.deck import grammar, keywords
+from tyrecal_solvers.bundled.deck import grammar
 from tyrecal_solvers.bundled.modes import harmonics
 from tyrecal_solvers.bundled.road.contact_newton import ContactNewton, PressedState
 from tyrecal_solvers.bundled.section import inflation, mechanics, model
@@ -19,6 +19,7 @@ from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 from tyrecal_solvers.bundled.section.parts.spin import spinning
 from tyrecal_solvers.bundled.section.sparse import Sparse
 from tyrecal_solvers.errors import NoEquilibrium
+from tyrecal_solvers.language import text as language
 
 from tyrecal.tyre.section.mesh import build_mesh
 from tyrecal.tyre.section.section import read_section
@@ -191,7 +192,7 @@ def _outline(solids: Array) -> list[Array]:
 
 def model_of(text: str) -> Model:
     """The model of a deck with static moduli."""
-    return model.build(grammar.check(keywords.read_keywords(text), False)[0], None, True)
+    return model.build(grammar.check(language.read_keywords(text), False)[0], None, True)
 
 
 def numbering(m: Model, held: Array | None = None) -> Numbering:

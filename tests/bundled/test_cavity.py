@@ -7,12 +7,12 @@ import pytest
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 from scipy.special import jvp, yvp
-from tyrecal_solvers.bundled.deck.keywords import COMPLEX_STEP
 from tyrecal_solvers.bundled.modes import cavity
 from tyrecal_solvers.bundled.modes.cavity import GasCavity, coupling
 from tyrecal_solvers.bundled.section import elements, mechanics
 from tyrecal_solvers.bundled.section.parts import pressure
 from tyrecal_solvers.bundled.section.parts.pressure import surface_point
+from tyrecal_solvers.language.text import COMPLEX_STEP
 
 from . import support
 from .wheel_and_gas import SHIFT, STEEL, inflated

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled.deck.keywords import DeckError, read_keywords
 from tyrecal_solvers.bundled.road.contact import Bound, Contact, FlatRoad
 from tyrecal_solvers.bundled.road.patch import patch
 from tyrecal_solvers.bundled.road.road_data import read_road
 from tyrecal_solvers.bundled.solid3d.circumference import Circumference, half_circle
 from tyrecal_solvers.bundled.solid3d.gmres import gmres
+from tyrecal_solvers.language.text import DeckError, read_keywords
 
 from . import support
 from .contact import Round, ball, ring

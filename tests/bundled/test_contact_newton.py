@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.road import contact_newton, footprint_job
 from tyrecal_solvers.bundled.road.contact_newton import ContactNewton
 from tyrecal_solvers.errors import Indefinite, NoEquilibrium, RunFailed
+from tyrecal_solvers.language.text import DeckError
 
 from . import support
 from .contact import Round, ring

@@ -9,10 +9,10 @@ import pytest
 from scipy.linalg import eigh
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import splu
-from tyrecal_solvers.bundled.deck.keywords import COMPLEX_STEP
 from tyrecal_solvers.bundled.modes.harmonics import Vibration
 from tyrecal_solvers.bundled.nonuniform import coupled
 from tyrecal_solvers.bundled.section.point_elements import PointElements
+from tyrecal_solvers.language.text import COMPLEX_STEP
 
 from . import support
 from .conftest import Inflated

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solvers.bundled.deck.keywords import DeckError, read_keywords
 from solvers.bundled.section.embedding import _inverse
 from solvers.bundled.section.mesh import DeckMesh, read_mesh
 from solvers.bundled.section.model import build
 from solvers.bundled.section.parts.cords import LogarithmicCord
 from solvers.bundled.section.parts.elastic import Elastic
 from solvers.bundled.section.shapes import TYPES, solids
+from solvers.language.text import DeckError, read_keywords
 
 HOSTS = {  # two distorted quadrilaterals on top of each other, or the triangles that they are
     "CGAX4": ((1, 2, 4, 3), (3, 4, 6, 5)),
@@ -120,5 +120,5 @@ def test_a_guest_outside_is_refused_beyond_the_tolerance() -> None:
     for options, off in (("", 0.05), (", ABSOLUTE EXTERIOR TOLERANCE=1e-4", reach)):
         with pytest.raises(DeckError, match=r"outside its hosts|in no host element") as error:
             mesh_of("CGAX4", (0.0, 1.0), options, off)
-        assert error.value.line == deck("CGAX4", (0.0, 1.0)).splitlines().index("PLY") + 1
+        assert error.value.place.line == deck("CGAX4", (0.0, 1.0)).splitlines().index("PLY") + 1
     assert mesh_of("CGAX4", (0.0, 1.0), ", ABSOLUTE EXTERIOR TOLERANCE=0.05", 0.05).guests

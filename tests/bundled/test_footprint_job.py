@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled import job
-from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.road import footprint_job
 from tyrecal_solvers.bundled.road.contact_newton import ContactNewton
 from tyrecal_solvers.errors import RunFailed
+from tyrecal_solvers.language.text import DeckError
 
 from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.deck import grammar
-from tyrecal_solvers.bundled.deck.keywords import DeckError, read_keywords
 from tyrecal_solvers.bundled.modes import harmonics
 from tyrecal_solvers.bundled.modes.frequency_dependent import SelfConsistent
 from tyrecal_solvers.bundled.section import model
 from tyrecal_solvers.bundled.section.laws.mooney_rivlin import MooneyRivlin
 from tyrecal_solvers.bundled.section.materials import ModulusTable, read_materials
 from tyrecal_solvers.errors import RunFailed
+from tyrecal_solvers.language.text import DeckError, read_keywords
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question

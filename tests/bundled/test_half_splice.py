@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled import job as jobs
-from tyrecal_solvers.bundled.deck.keywords import read_keywords
 from tyrecal_solvers.bundled.deck.request import Request
 from tyrecal_solvers.bundled.deck.steps import Deck
 from tyrecal_solvers.bundled.job import Job
@@ -23,6 +22,7 @@ from tyrecal_solvers.bundled.nonuniform.splice import (
 from tyrecal_solvers.bundled.section.model import Model
 from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
+from tyrecal_solvers.language.text import read_keywords
 
 from ..effects.support import CASE, decks
 from . import support

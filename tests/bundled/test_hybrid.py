@@ -9,7 +9,6 @@ import pytest
 from scipy.optimize import brentq
 from scipy.sparse.linalg import spsolve
 from tyrecal_solvers.bundled import job as jobs
-from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.deck.request import Request
 from tyrecal_solvers.bundled.deck.steps import Deck, Tangent
 from tyrecal_solvers.bundled.job import Job
@@ -22,6 +21,7 @@ from tyrecal_solvers.bundled.section.model import Model
 from tyrecal_solvers.bundled.section.parts.hybrid import Hybrid
 from tyrecal_solvers.bundled.section.parts.part import ModeShapes, TyrePart
 from tyrecal_solvers.bundled.section.shapes import TYPES
+from tyrecal_solvers.language.text import DeckError
 
 from ..effects.support import CASE, decks
 from . import support

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled.deck.keywords import DataLine
 from tyrecal_solvers.bundled.deck.request import Request
 from tyrecal_solvers.bundled.deck.steps import Deck
 from tyrecal_solvers.bundled.job import Job
 from tyrecal_solvers.bundled.results import StepResult
 from tyrecal_solvers.bundled.section.boundary import rim_freedoms
 from tyrecal_solvers.errors import RunFailed
+from tyrecal_solvers.language.text import WHOLE_DECK, Row
 
 from .job_pairs import FREQUENCY, MASS, PLAIN, STEP, TURNING, run, texts
 
@@ -79,7 +79,7 @@ def test_what_holds_other_nodes_does_not_hold_the_rim() -> None:
     mesh: Any = SimpleNamespace(node_sets={"RIM_REFERENCE": [9], "CROWN": [1, 9], "ONE": [1]})
 
     def free(*rows: str) -> set[int]:
-        held = [DataLine(1, [f.strip() for f in row.split(",")]) for row in rows]
+        held = [Row(WHOLE_DECK, row) for row in rows]
         return rim_freedoms(mesh, SimpleNamespace(held=held), 9)  # type: ignore[arg-type]
 
     assert free("9, 1, 6") == set() and free() == {1, 2, 3, 4, 5, 6}

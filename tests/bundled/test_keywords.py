@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.deck import grammar
-from tyrecal_solvers.bundled.deck.keywords import (
+from tyrecal_solvers.bundled.section import model
+from tyrecal_solvers.language.text import (
     COMPLEX_STEP,
+    WHOLE_DECK,
     DeckError,
-    LineNumber,
+    Place,
     read_keywords,
     seed,
 )
-from tyrecal_solvers.bundled.section import model
 
 from . import support
 
@@ -55,13 +56,13 @@ def test_blocks_lines_and_numbers() -> None:
     """Names and parameters ignore case and spaces, comments and blank lines vanish but count,
     D exponents and blank fields are numbers."""
     one, two = read_keywords("**x\n*node , nset = all\n\n 1, 2.5D-3 ,\n** y\n2,,1e-2\n*End  Step\n")
-    assert (one.name, one.line, one.parameters) == ("NODE", 2, {"NSET": "all"})
+    assert (one.name, one.place.line, one.parameters) == ("NODE", 2, {"NSET": "all"})
     assert one.get("NSET") == "ALL"
-    assert [r.line for r in one.rows] == [4, 6]
+    assert [r.place.line for r in one.rows] == [4, 6]
     assert one.rows[0].number(1) == 2.5e-3
     assert one.rows[0].number(2, 7.0) == 7.0
     assert one.rows[1].number(2) == 0.01
-    assert two.name == "END STEP" and two.rows == []
+    assert two.name == "END STEP" and not two.rows
 
 
 def test_a_refusal_names_the_file_and_the_line() -> None:
@@ -69,15 +70,16 @@ def test_a_refusal_names_the_file_and_the_line() -> None:
     (node,) = read_keywords("*NODE\n1, x\n", "inflate")
     with pytest.raises(DeckError, match=r"^inflate\.inp, line 2: 'x' is not a number$"):
         node.rows[0].number(1)
-    assert str(DeckError(LineNumber(0, "modes"), "why")) == "modes.inp: why"
-    assert str(DeckError(3, "why")) == "deck, line 3: why" and str(DeckError(0, "w")) == "deck: w"
+    assert str(DeckError(Place("modes.inp", 0), "why")) == "modes.inp: why"
+    assert str(DeckError(Place("deck", 3), "why")) == "deck, line 3: why"
+    assert str(DeckError(WHOLE_DECK, "w")) == "deck: w"
 
 
 def test_continuation_lines() -> None:
     """A keyword line that ends in a comma goes on in the next; its line is the first."""
     (element, _) = read_keywords("*ELEMENT, TYPE=CGAX4R,\n  ELSET=RUBBER\n1, 1\n*DENSITY\n")
     assert element.parameters == {"TYPE": "CGAX4R", "ELSET": "RUBBER"}
-    assert element.line == 1 and element.rows[0].line == 3
+    assert element.place.line == 1 and element.rows[0].place.line == 3
 
 
 def test_comment_inside_a_continued_keyword() -> None:
@@ -132,9 +134,9 @@ def test_hourglass_stiffness_is_of_the_section_above_it() -> None:
         ("1100.\n", "1100.\n*STEP, NLGEOM=YES\n*STEP\n", 20, "*STEP inside a step"),
         ("*SURFACE", "*NSET, NSET=A\n1, B\n*SURFACE", 12, "set B is not defined"),
         ("*SURFACE", "*NSET, NSET=A\n1, 9\n*SURFACE", 11, "member 9 of the set"),
-        ("*SURFACE", "*ELSET, ELSET=A, GENERATE\n1, 2\n*SURFACE", 11, "member 2 of the set"),
+        ("*SURFACE", "*ELSET, ELSET=A, GENERATE\n2, 9\n*SURFACE", 12, "lies from 2 to 9"),
         ("RUBBER, S4", "RUBBER, SPOS", 12, "of type CGAX4R has no face SPOS"),
-        ("ELSET=RUBBER, MATERIAL=GUM", "MATERIAL=GUM", 13, "*SOLID SECTION needs ELSET="),
+        ("ELSET=RUBBER, MATERIAL=GUM", "MATERIAL=GUM", 13, "*SOLID SECTION: needs ELSET="),
         ("MATERIAL=GUM\n", "MATERIAL=GUM, CONTROLS=C\n", 13, "section controls C are not"),
         ("*SOLID SECTION, ELSET=RUBBER, MATERIAL=GUM\n", "", 0, "CGAX4R elements have no *SOLID"),
         (
@@ -169,7 +171,7 @@ def test_hourglass_stiffness_is_of_the_section_above_it() -> None:
 def test_refusals_name_the_line(old: str, new: str, line: int, words: str) -> None:
     """What is not honoured or not a deck is refused, with its 1-based line and the word."""
     error = refused(changed(old, new))
-    assert error.line == line
+    assert error.place.line == line
     assert words in str(error)
     assert f"line {line}:" in str(error) or not line
 
@@ -258,7 +260,7 @@ def test_layers_that_are_refused(old: str, new: str, line: int, words: str) -> N
     assert LAYER.count(old) == 1
     error = refused(SQUARE + LAYER.replace(old, new))
     assert words in str(error)
-    assert error.line == line
+    assert error.place.line == line
 
 
 def test_sets_are_numbers_ranges_and_other_sets() -> None:
@@ -327,13 +329,13 @@ def test_seed_turns_a_number_complex() -> None:
     """number = value + i STEP tangent at (line, field), elsewhere real; the deck is unchanged."""
     deck = read_keywords(SQUARE)
     marked = seed(deck, [(18, 0, 3.0), (5, 1, 2.0)])
-    numbers = {r.line: r.number(0) for k in marked if k.name == "DENSITY" for r in k.rows}
+    numbers = {r.place.line: r.value(0) for k in marked if k.name == "DENSITY" for r in k.rows}
     assert numbers == {18: complex(1100.0, 3.0 * COMPLEX_STEP)}
     node = next(k for k in marked if k.name == "NODE").rows
-    assert node[0].number(1) == complex(0.2, 2 * COMPLEX_STEP) and isinstance(
-        node[1].number(1), float
+    assert node[0].value(1) == complex(0.2, 2 * COMPLEX_STEP) and isinstance(
+        node[1].value(1), float
     )
-    assert all(not k.tangents for k in deck)
+    assert not any(row.tangents for k in deck for row in k.rows)
     # the other blocks are the same, with what is remembered with them
     assert [a is b for a, b in zip(deck, marked, strict=True)].count(False) == 2
     m = model.build(marked, None, True)
@@ -345,4 +347,4 @@ def test_seed_refuses_a_line_without_data(line: int) -> None:
     """A sensitivity by a line that holds no data is refused with that line."""
     with pytest.raises(DeckError) as error:
         seed(read_keywords(SQUARE), [(line, 0, 1.0)])
-    assert error.value.line == line
+    assert error.value.place.line == line

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.linalg import qr
 from tyrecal_solvers.bundled.deck import grammar
-from tyrecal_solvers.bundled.deck.keywords import DeckError, read_keywords, seed
 from tyrecal_solvers.bundled.section.laws.hyperelastic import Hyperelastic
 from tyrecal_solvers.bundled.section.materials import read_materials
+from tyrecal_solvers.language.text import DeckError, read_keywords, seed
 
 Array = np.ndarray
 H = 1e-30
@@ -300,7 +300,7 @@ def test_moduli_scale_shear_and_volume_apart(name: str, F: Array) -> None:
 def test_laws_that_are_refused(line: str, data: str, words: str) -> None:
     with pytest.raises(DeckError) as error:
         read(f"*MATERIAL, NAME=GUM\n*HYPERELASTIC, {line}\n{data}\n")
-    assert words in str(error.value) and error.value.line in (2, 3)
+    assert words in str(error.value) and error.value.place.line in (2, 3)
 
 
 @pytest.mark.parametrize("nu", ["0.5", "-1.0"])

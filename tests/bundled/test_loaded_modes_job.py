@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled import job
-from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.modes.harmonics import HarmonicModes, Vibration
 from tyrecal_solvers.bundled.road import footprint_job
 from tyrecal_solvers.bundled.road.loaded_modes import LoadedModes
@@ -18,6 +17,7 @@ from tyrecal_solvers.bundled.section.symmetry import HALF_TURN
 from tyrecal_solvers.bundled.solid3d.circumference import half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
 from tyrecal_solvers.errors import RunFailed
+from tyrecal_solvers.language.text import DeckError
 
 from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import trapezoid
-from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.deck.request import Request
 from tyrecal_solvers.bundled.deck.steps import Deck
 from tyrecal_solvers.bundled.job import Job
 from tyrecal_solvers.bundled.section.model import build
 from tyrecal_solvers.bundled.section.point_elements import read_point_elements
+from tyrecal_solvers.language.text import DeckError
 
 from .job_pairs import MASS, PLAIN, texts
 

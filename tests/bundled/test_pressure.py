@@ -6,7 +6,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.deck.request import Request
 from tyrecal_solvers.bundled.deck.steps import Deck
 from tyrecal_solvers.bundled.job import Job
@@ -14,6 +13,7 @@ from tyrecal_solvers.bundled.section import elements, mechanics
 from tyrecal_solvers.bundled.section.model import Model
 from tyrecal_solvers.bundled.section.parts import pressure
 from tyrecal_solvers.bundled.section.parts.pressure import Pressure
+from tyrecal_solvers.language.text import DeckError
 
 from . import support
 

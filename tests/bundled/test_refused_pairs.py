@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 
 import pytest
-from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.deck.steps import Deck
+from tyrecal_solvers.language.text import DeckError
 
 from .job_pairs import FREQUENCY, MASS, PLAIN, STEP, TURNING, WHEEL, run, texts
 

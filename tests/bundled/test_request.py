@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 from tyrecal_solvers.bundled.__main__ import _words, main
-from tyrecal_solvers.bundled.deck.keywords import DeckError
 from tyrecal_solvers.bundled.deck.request import Request, read_request
 from tyrecal_solvers.errors import Refused, RunFailed
+from tyrecal_solvers.language.text import DeckError, Place
 
 from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
@@ -156,7 +156,7 @@ def test_rows_may_be_of_the_sectors_job(tmp_path: Path) -> None:
     [
         (RunFailed("timed_out", "later\x1b[31m"), 3, "failed: later [31m\n"),
         (RunFailed("unstable", "soft"), 3, "failed: soft\n"),
-        (DeckError(3, "wrong"), 2, "error: deck, line 3: wrong\n"),
+        (DeckError(Place("deck", 3), "wrong"), 2, "error: deck, line 3: wrong\n"),
         (OSError("no\ndisc"), 2, "error: no disc\n"),
     ],
 )

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled.deck import keywords
 from tyrecal_solvers.bundled.modes import harmonics, sensitivity
 from tyrecal_solvers.bundled.section import model
 from tyrecal_solvers.bundled.section.parts.pressure import Pressure
+from tyrecal_solvers.language import text as language
 
 from . import support
 
@@ -108,7 +108,7 @@ def rates(
     fields: sensitivity.ModeShapes | None = None,
 ) -> Array:
     """d lambda by the solver's complex step, for tangents on the deck and on the pressure."""
-    seeded = model.build(keywords.seed(keywords.read_keywords(TYRE.deck), tangents), None, True)
+    seeded = model.build(language.seed(language.read_keywords(TYRE.deck), tangents), None, True)
     loads = [Pressure(seeded.mesh.faces["CAVITY"], pressure)]
     factor = base.vibration.factor(0)
     number = base.vibration.numbering
@@ -149,7 +149,7 @@ def test_against_central_differences(base: Modes, name: str) -> None:
 
 def test_pressure_against_central_differences(base: Modes) -> None:
     """The same by ln p."""
-    got = rates(base, [], complex(PRESSURE, keywords.COMPLEX_STEP * PRESSURE))
+    got = rates(base, [], complex(PRESSURE, language.COMPLEX_STEP * PRESSURE))
     wanted = difference(lambda s: support.hertz(solve(TYRE.deck, PRESSURE * np.exp(s)).eigenvalues))
     agree(hertz_per_unit(got, base.eigenvalues), wanted)
 
@@ -170,7 +170,7 @@ def test_preload_matters(base: Modes) -> None:
     own size: the change of the preload is part of the answer."""
     tangents = VARIABLES["carcass area"].tangents
     whole = rates(base, tangents, PRESSURE)
-    seeded = model.build(keywords.seed(keywords.read_keywords(TYRE.deck), tangents), None, True)
+    seeded = model.build(language.seed(language.read_keywords(TYRE.deck), tangents), None, True)
     loads = support.cavity(seeded, PRESSURE)
     frozen = sensitivity.eigenvalue_rates(
         seeded, base.state, 0 * base.state, loads, fields_of(base), base.eigenvalues
@@ -181,7 +181,7 @@ def test_preload_matters(base: Modes) -> None:
 def test_euler_identity(base: Modes) -> None:
     """lambda is homogeneous of degree 0 in (moduli, 1/D1, pressure, densities) scaled together:
     stiffness and mass grow alike, the shape stays. sum of p d lambda/dp = 0."""
-    total = rates(base, [], complex(PRESSURE, keywords.COMPLEX_STEP * PRESSURE))
+    total = rates(base, [], complex(PRESSURE, language.COMPLEX_STEP * PRESSURE))
     C10, C01, D1 = map(float, LINES[RUBBER[0]].split(","))
     places = [Place(RUBBER, 0, C10), Place(RUBBER, 1, C01), Place(RUBBER, 2, -D1)]
     places += [VARIABLES["rubber density"], VARIABLES["cord density"], VARIABLES["belt modulus"]]
@@ -222,7 +222,7 @@ def test_four_node_elements() -> None:
             ].eigenvalues
 
         tangents = [(place + 1, field, scale)]
-        seeded = model.build(keywords.seed(keywords.read_keywords(tyre.deck), tangents), None, True)
+        seeded = model.build(language.seed(language.read_keywords(tyre.deck), tangents), None, True)
         loads = support.cavity(seeded, PRESSURE)
         factor = vibration.factor(0)
         V = sensitivity.state_rate(seeded, base.state, loads, vibration.numbering, factor)

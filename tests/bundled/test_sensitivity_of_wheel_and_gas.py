@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled.deck import keywords
 from tyrecal_solvers.bundled.modes import sensitivity
 from tyrecal_solvers.bundled.modes.bordered import Bordered
 from tyrecal_solvers.bundled.modes.cavity import GasCavity
@@ -14,6 +13,7 @@ from tyrecal_solvers.bundled.modes.harmonics import Vibration
 from tyrecal_solvers.bundled.modes.wheel import Wheel
 from tyrecal_solvers.bundled.section import model
 from tyrecal_solvers.bundled.section.parts.pressure import Pressure
+from tyrecal_solvers.language import text as language
 
 from . import support
 from .wheel_and_gas import MOTIONS, REFERENCE, STEEL, closed
@@ -45,7 +45,7 @@ class Variable:
 
     def seeded(self) -> model.Model:
         tangents = [(line + 1, field, self.scale) for line, field in self.places]
-        return model.build(keywords.seed(keywords.read_keywords(DECK), tangents), None, True)
+        return model.build(language.seed(language.read_keywords(DECK), tangents), None, True)
 
 
 RIM = [NODES + row for row in TYRE.rim]

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 from tyrecal_solvers.abaqus.check import findings
-from tyrecal_solvers.bundled.deck.keywords import read_keywords
 from tyrecal_solvers.bundled.job import run as solve
+from tyrecal_solvers.language.text import read_keywords
 
 from tyrecal.simulate.doctor.self_check import RECORDED_HZ
 

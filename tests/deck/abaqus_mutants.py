@@ -16,7 +16,7 @@ from functools import cache
 from random import Random
 
 from tyrecal_solvers.abaqus.check import findings
-from tyrecal_solvers.bundled.deck.keywords import DeckError, read_keywords
+from tyrecal_solvers.language.text import DeckError, read_keywords
 
 from ..solvers import decks_3d
 from ..tyre.own_deck_mutants import misspelt

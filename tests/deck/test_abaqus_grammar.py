@@ -7,13 +7,13 @@ import re
 import pytest
 from tyrecal_solvers.abaqus.check import findings
 from tyrecal_solvers.abaqus.grammar import RULES
-from tyrecal_solvers.bundled.deck.keywords import Keyword, read_keywords
+from tyrecal_solvers.language.text import Block, read_keywords
 
 from ..conftest import ROOT
 from . import abaqus_decks, abaqus_mutants
 
 
-def said(keywords: list[Keyword], before: list[Keyword]) -> list[str]:
+def said(keywords: list[Block], before: list[Block]) -> list[str]:
     """Findings in words."""
     return [f"*{found.block.name} {found.words}" for found in findings(keywords, before)]
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tyrecal_solvers.bundled.deck.keywords import DeckError, Keyword, read_keywords
 from tyrecal_solvers.bundled.job import run
+from tyrecal_solvers.language.text import Block, DeckError, read_keywords
 
 from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
@@ -48,7 +48,7 @@ LOADS: dict[str, dict[str, Any]] = {
 }
 
 
-def jobs(values: str, loads: str) -> dict[str, list[Keyword]]:
+def jobs(values: str, loads: str) -> dict[str, list[Block]]:
     case = FOUR_NODES if "hourglass" in values else CASE
     texts = Decks(TyreDesign(with_values(case, VALUES[values])), **LOADS[loads]).texts("abaqus")
     return {name: read_keywords(text, name) for name, text in texts.items()}

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from tyrecal_solvers.bundled import job as bundled
-from tyrecal_solvers.bundled.deck.keywords import Keyword, read_keywords
+from tyrecal_solvers.language.text import Block, read_keywords
 
 FAULT, _, AMOUNT = os.environ.get("STANDIN_FAULT", "").partition(":")
 DENIED = "Abaqus Error: Abaqus/Standard license check out failed: FLEXnet error -4,132."
@@ -125,7 +125,7 @@ def _spoilt(values: list[float]) -> list[float]:
     return [-values[0], *values[1:]] if FAULT == "negative" else values
 
 
-def _crown(section: list[Keyword], nodes: np.ndarray) -> list[int]:
+def _crown(section: list[Block], nodes: np.ndarray) -> list[int]:
     members = [
         int(text)
         for k in section

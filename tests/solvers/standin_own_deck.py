@@ -28,7 +28,7 @@ def main(arguments: list[str]) -> int:
 def _modes() -> None:
     import numpy as np
     from standin_abaqus import _cartesian, dat, fil
-    from tyrecal_solvers.bundled.deck.keywords import read_keywords
+    from tyrecal_solvers.language.text import read_keywords
 
     from tyrecal.simulate.deck.tyre_design import TyreDesign
     from tyrecal.simulate.evaluate.evaluator import Evaluator, Question

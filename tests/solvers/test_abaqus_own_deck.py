@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from tyrecal_solvers.abaqus.check import findings
-from tyrecal_solvers.bundled.deck.keywords import read_keywords
+from tyrecal_solvers.language.text import read_keywords
 
 from tyrecal.simulate.deck.decks import Decks, without_header
 from tyrecal.simulate.deck.tyre_design import OWN_TEXT, TyreDesign

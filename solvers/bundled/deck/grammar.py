@@ -6,7 +6,7 @@ an empty string = the parameter stands without a value).
 
 from __future__ import annotations
 
-from .keywords import DeckError, Keyword
+from ...language.text import Block, DeckError
 
 ParameterValues = tuple[str, ...] | None
 
@@ -119,18 +119,18 @@ MAX_FIELDS = {  # data fields that are honoured; a further one that is not blank
 }
 
 
-def check(keywords: list[Keyword], revolve: bool) -> tuple[list[Keyword], list[list[Keyword]]]:
+def check(keywords: list[Block], revolve: bool) -> tuple[list[Block], list[list[Block]]]:
     """Split a job into its model and its steps, refusing what is not honoured.
 
     Raises DeckError naming the keyword or parameter and its line.
     """
-    model: list[Keyword] = []
-    steps: list[list[Keyword]] = []
+    model: list[Block] = []
+    steps: list[list[Block]] = []
     inside = False
     for keyword in keywords:
         if keyword.name == "STEP":
             if inside:
-                raise DeckError(keyword.line, "*STEP inside a step: *END STEP is missing")
+                raise DeckError(keyword.place, "*STEP inside a step: *END STEP is missing")
             inside = True
             steps.append([])
         allowed = STEP_KEYWORDS if inside else REVOLVE_JOB if revolve else SECTION_JOB
@@ -139,32 +139,28 @@ def check(keywords: list[Keyword], revolve: bool) -> tuple[list[Keyword], list[l
         if keyword.name == "END STEP":
             inside = False
     if inside:
-        raise DeckError(steps[-1][0].line, "*STEP without *END STEP: the deck is cut off")
+        raise DeckError(steps[-1][0].place, "*STEP without *END STEP: the deck is cut off")
     formats = [keyword for keyword in keywords if keyword.name == "FILE FORMAT"]
     if len(formats) > 1:
-        raise DeckError(
-            formats[1].line,
-            f"*FILE FORMAT may stand once in a job, it is given at line {formats[0].line} already",
-        )
+        words = f"*FILE FORMAT may stand once in a job: it is given in {formats[0].place} already"
+        raise DeckError(formats[1].place, words)
     return model, steps
 
 
-def _check_one(
-    keyword: Keyword, allowed: dict[str, dict[str, ParameterValues]], where: str
-) -> None:
+def _check_one(keyword: Block, allowed: dict[str, dict[str, ParameterValues]], where: str) -> None:
     if keyword.name not in allowed:
-        raise DeckError(keyword.line, f"keyword *{keyword.name} is not honoured in {where}")
+        raise DeckError(keyword.place, f"keyword *{keyword.name} is not honoured in {where}")
     for row in keyword.rows if keyword.name in MAX_FIELDS else ():
         extra = [text for text in row.fields[MAX_FIELDS[keyword.name] :] if text]
         if extra:
-            raise DeckError(row.line, f"data '{extra[0]}' of *{keyword.name} is not honoured")
+            raise DeckError(row.place, f"data '{extra[0]}' of *{keyword.name} is not honoured")
     parameters = allowed[keyword.name]
     for name, value in keyword.parameters.items():
         if name not in parameters:
-            raise DeckError(keyword.line, f"parameter {name} of *{keyword.name} is not honoured")
+            raise DeckError(keyword.place, f"parameter {name} of *{keyword.name} is not honoured")
         values = parameters[name]
-        if values is not None and " ".join(value.upper().split()) not in values:
+        if values is not None and value not in values:
             expected = " or ".join(v or "no value" for v in values)
             raise DeckError(
-                keyword.line, f"{name}={value} of *{keyword.name} is not honoured, only {expected}"
+                keyword.place, f"{name}={value} of *{keyword.name} is not honoured, only {expected}"
             )

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import Refused
+from ...language.text import Block, DeckError, read_deck, read_keywords
 from . import grammar
-from .keywords import DeckError, Keyword, read_deck, read_keywords
 from .steps import Tangent
 
 MAX_HARMONIC, MAX_MODES = 999, 999  # harmonic; modes of one
@@ -68,7 +68,7 @@ def _request(content: Any, folder: Path, jobs: Sequence[str]) -> Request:
     return request
 
 
-def read_sector(folder: Path, sector: dict[str, Any]) -> list[Keyword]:
+def read_sector(folder: Path, sector: dict[str, Any]) -> list[Block]:
     """The model blocks of the sector's section job. Raises DeckError, OSError."""
     job = sector["job"]
     text = read_deck(folder / f"{job}.inp")

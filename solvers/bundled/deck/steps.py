@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ...language.text import WHOLE_DECK, Block, DeckError, Row, read_keywords, seed
 from . import grammar
-from .keywords import DataLine, DeckError, Keyword, read_keywords, seed
 
 PROCEDURES = ("STATIC", "FREQUENCY", "COMPLEX FREQUENCY")
 Tangent = tuple[str, int, int, float]  # job, 1-based line, 0-based field, d number / d variable
@@ -18,12 +19,12 @@ class DeckStep:
     """One step with what holds in it; loads and supports carry on from step to step of a job."""
 
     number: int  # in the job, from 1
-    procedure: Keyword  # its keyword of ``PROCEDURES``
+    procedure: Block  # its keyword of ``PROCEDURES``
     pressures: dict[str, complex | float]  # surface to the deck's number, Pa
-    held: list[DataLine]  # rows of *BOUNDARY
+    held: Sequence[Row]  # rows of *BOUNDARY
     long_term: bool  # the static state is relaxed
     revolved: bool  # of the second job, in three dimensions
-    forces: list[DataLine]  # rows of *CLOAD
+    forces: Sequence[Row]  # rows of *CLOAD
     output: str  # the node set of its *NODE FILE, or ""
     centrifugal: dict[str, complex | float]  # element set to Omega^2 (rad2/s2) of *DLOAD's CENTRIF
     spin: dict[str, complex | float]  # element set to Omega (rad/s) of its ROTDYNF
@@ -45,12 +46,12 @@ class Deck:
         self._keywords = {name: read_keywords(texts[name], name) for name in self.jobs}
         for k in [] if oldjob else self._keywords[job]:
             if k.name == "SYMMETRIC MODEL GENERATION":
-                raise DeckError(k.line, "this job revolves a section job: name that with --oldjob")
+                raise DeckError(k.place, "this job revolves a section job: name that with --oldjob")
 
-    def read(self, tangents: list[Tangent]) -> tuple[list[Keyword], list[Keyword], list[DeckStep]]:
+    def read(self, tangents: list[Tangent]) -> tuple[list[Block], list[Block], list[DeckStep]]:
         """Model blocks of the section job and of the one that revolves it (none: empty), and all
         steps, their numbers carrying ``tangents``."""
-        models: list[list[Keyword]] = []
+        models: list[list[Block]] = []
         steps = []
         for place, name in enumerate(self.jobs):
             own = [(line, index, value) for job, line, index, value in tangents if job == name]
@@ -64,11 +65,11 @@ class Deck:
         return models[0], revolve, [step for part in steps for step in part]
 
 
-def _steps(model: list[Keyword], blocks: list[list[Keyword]], revolved: bool) -> list[DeckStep]:
+def _steps(model: list[Block], blocks: list[list[Block]], revolved: bool) -> list[DeckStep]:
     steps: list[DeckStep] = []
-    held = [row for k in model if k.name == "BOUNDARY" for row in k.rows]
+    held: Sequence[Row] = [row for k in model if k.name == "BOUNDARY" for row in k.rows]
     pressures: dict[str, complex | float] = {}
-    forces: list[DataLine] = []
+    forces: Sequence[Row] = []
     turning: dict[str, dict[str, complex | float]] = {"CENTRIF": {}, "ROTDYNF": {}}
     long_term = True
     for number, block in enumerate(blocks, start=1):
@@ -102,78 +103,80 @@ def _steps(model: list[Keyword], blocks: list[list[Keyword]], revolved: bool) ->
     return steps
 
 
-def _pressures(k: Keyword) -> dict[str, complex | float]:
+def _pressures(k: Block) -> dict[str, complex | float]:
     found = {}
     for row in k.rows:
-        if row.text(1).upper() != "P":
-            raise DeckError(row.line, f"load type '{row.text(1)}' is not honoured, only P")
-        found[row.text(0).upper()] = row.number(2)
+        if row.name(1) != "P":
+            raise DeckError(row.place, f"load type '{row.text(1)}' is not honoured, only P")
+        found[row.name(0)] = row.value(2)
     return found
 
 
 def _turning(
-    k: Keyword, before: dict[str, dict[str, complex | float]], revolved: bool
+    k: Block, before: dict[str, dict[str, complex | float]], revolved: bool
 ) -> dict[str, dict[str, complex | float]]:
     """Loads of a tyre that turns about its axle, by kind and element set."""
     found = {kind: dict(sets) for kind, sets in before.items()}
     for row in k.rows:
-        kind = row.text(1).upper()
+        kind = row.name(1)
         if kind not in (found if revolved else ("CENTRIF",)):
-            raise DeckError(row.line, f"load type '{row.text(1)}' of *DLOAD is not honoured here")
-        axis = [row.number(i, 0.0) for i in range(3, 9)]
+            raise DeckError(row.place, f"load type '{row.text(1)}' of *DLOAD is not honoured here")
+        axis = [row.value(i, 0.0) for i in range(3, 9)]
         if axis != ([0.0, 0.0, 0.0, 0.0, 1.0, 0.0] if revolved else [0.0] * 6):
-            raise DeckError(row.line, "the tyre turns about its axle, 0, 0, 0 along 0, 1, 0")
-        found[kind][row.text(0).upper()] = row.number(2)
+            raise DeckError(row.place, "the tyre turns about its axle, 0, 0, 0 along 0, 1, 0")
+        found[kind][row.name(0)] = row.value(2)
     return found
 
 
-def _procedure(block: list[Keyword]) -> Keyword:
+def _procedure(block: list[Block]) -> Block:
     found = [k for k in block if k.name in PROCEDURES]
     if len(found) != 1:
-        raise DeckError(block[0].line, "a step needs one *STATIC, *FREQUENCY or *COMPLEX FREQUENCY")
+        raise DeckError(
+            block[0].place, "a step needs one *STATIC, *FREQUENCY or *COMPLEX FREQUENCY"
+        )
     if found[0].name == "STATIC" and "NLGEOM" not in block[0].parameters:
-        raise DeckError(block[0].line, "a *STATIC step needs NLGEOM=YES")
+        raise DeckError(block[0].place, "a *STATIC step needs NLGEOM=YES")
     if found[0].name == "STATIC" and "PERTURBATION" in block[0].parameters:
-        raise DeckError(block[0].line, "a *STATIC step is no linear PERTURBATION")
+        raise DeckError(block[0].place, "a *STATIC step is no linear PERTURBATION")
     return found[0]
 
 
-def _check_transfer(section: list[Keyword], steps: list[DeckStep], revolve: list[Keyword]) -> None:
+def _check_transfer(section: list[Block], steps: list[DeckStep], revolve: list[Block]) -> None:
     """The revolve job takes over the end of the section job's only step, and holds its rim."""
     blocks = {k.name: k for k in revolve}
     for needed in ("SYMMETRIC MODEL GENERATION", "SYMMETRIC RESULTS TRANSFER"):
         if needed not in blocks:
-            line = revolve[0].line if revolve else 0
-            raise DeckError(line, f"a job that runs on another one needs *{needed}")
+            place = revolve[0].place if revolve else WHOLE_DECK
+            raise DeckError(place, f"a job that runs on another one needs *{needed}")
     generation, transfer = (
         blocks[f"SYMMETRIC {n}"] for n in ("MODEL GENERATION", "RESULTS TRANSFER")
     )
-    segments = [row.real(0) for row in generation.rows[2:]]
+    segments = [row.number(0) for row in generation.rows[2:]]
     if not abs(sum(segments) - 360.0) < 1e-6:
-        raise DeckError(generation.line, "the tyre is revolved by 360 degrees")
-    axis = [generation.rows[0].number(i, 0.0) for i in range(6)]
+        raise DeckError(generation.place, "the tyre is revolved by 360 degrees")
+    axis = [generation.rows[0].value(i, 0.0) for i in range(6)]
     if any(axis[:4]) or axis[5] or not np.real(axis[4]) > 0:
         raise DeckError(
-            generation.line, "the tyre is revolved about the second axis, 0, 0, 0 to 0, 1, 0"
+            generation.place, "the tyre is revolved about the second axis, 0, 0, 0 to 0, 1, 0"
         )
     if len(steps) != 1 or steps[0].procedure.name != "STATIC":
-        raise DeckError(transfer.line, "the first job must have one step, a *STATIC")
+        raise DeckError(transfer.place, "the first job must have one step, a *STATIC")
     increments = _increments(steps[0].procedure)
     if (transfer.need("STEP"), transfer.need("INC")) != ("1", str(increments)):
-        raise DeckError(transfer.line, f"the first job ends with STEP=1, INC={increments}")
+        raise DeckError(transfer.place, f"the first job ends with STEP=1, INC={increments}")
     for k in section:
         restated = (
             r.get("TIE NSET") == k.need("TIE NSET") for r in revolve if r.name == "RIGID BODY"
         )
         if k.name == "RIGID BODY" and not any(restated):
             raise DeckError(
-                transfer.line,
+                transfer.place,
                 f"a revolve drops the *RIGID BODY of {k.need('TIE NSET')}: it must be restated",
             )
 
 
-def _increments(procedure: Keyword) -> int:
+def _increments(procedure: Block) -> int:
     if "DIRECT" not in procedure.parameters:
-        raise DeckError(procedure.line, "the increments must be fixed (DIRECT) for a transfer")
+        raise DeckError(procedure.place, "the increments must be fixed (DIRECT) for a transfer")
     row = procedure.only_row()
-    return int(np.ceil(np.real(row.number(1) / row.number(0)) - 1e-9))
+    return int(np.ceil(np.real(row.value(1) / row.value(0)) - 1e-9))

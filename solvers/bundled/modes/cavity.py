@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from ..deck.keywords import DeckError, Keyword
+from ...language.text import WHOLE_DECK, Block, DeckError
 from ..section import elements
 from ..section.elements import Lines
 from ..section.materials import Scalar, read_materials
@@ -48,16 +48,20 @@ class GasCavity:
     surfaces: list[Lines]
 
 
-def read_cavity(keywords: list[Keyword], mesh: DeckMesh, cavity: Mapping[str, Any]) -> GasCavity:
+def read_cavity(keywords: list[Block], mesh: DeckMesh, cavity: Mapping[str, Any]) -> GasCavity:
     """The gas ``cavity["material"]`` inside ``cavity["surfaces"]``. Raises DeckError."""
     name = str(cavity.get("material", "")).upper()
     material = read_materials(keywords).get(name)
     surfaces = [str(surface).upper() for surface in cavity.get("surfaces", ())]
     if material is None or material.bulk_modulus is None or not np.real(material.density) > 0:
-        raise DeckError(0, f"the cavity's material '{name}' has no *ACOUSTIC MEDIUM and *DENSITY")
+        raise DeckError(
+            WHOLE_DECK, f"the cavity's material '{name}' has no *ACOUSTIC MEDIUM and *DENSITY"
+        )
     missing = [surface for surface in surfaces if surface not in mesh.faces]
     if missing or not surfaces:
-        raise DeckError(0, f"the cavity needs surfaces that are defined, got {missing or 'none'}")
+        raise DeckError(
+            WHOLE_DECK, f"the cavity needs surfaces that are defined, got {missing or 'none'}"
+        )
     return GasCavity(material.density, material.bulk_modulus, [mesh.faces[s] for s in surfaces])
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..deck.keywords import COMPLEX_STEP
+from ...language.text import COMPLEX_STEP
 from ..section import mechanics
 from ..section.kept_fields import Coordinates, Factor
 from ..section.model import Model

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..deck.keywords import DeckError, Keyword
+from ...language.text import WHOLE_DECK, Block, DeckError
 from ..deck.steps import DeckStep
 from ..section.boundary import rim_freedoms
 from ..section.materials import Scalar
@@ -71,7 +71,7 @@ class Wheel:
         return np.array(stiffness), np.array([self.inertia.get(m, 0.0) / circle for m in names])
 
 
-def read_wheel(keywords: list[Keyword], mesh: DeckMesh, step: DeckStep) -> Wheel | None:
+def read_wheel(keywords: list[Block], mesh: DeckMesh, step: DeckStep) -> Wheel | None:
     """The rim that ``step`` releases, with the point elements of the revolve job's model.
 
     None where every rim is held. Raises DeckError.
@@ -83,7 +83,7 @@ def read_wheel(keywords: list[Keyword], mesh: DeckMesh, step: DeckStep) -> Wheel
         free = frozenset(m for m, dofs in FREEDOMS.items() if freedoms.issuperset(dofs))
         if freedoms != {dof for motion in free for dof in FREEDOMS[motion]}:
             raise DeckError(
-                step.procedure.line,
+                step.procedure.place,
                 "the rim's translations 1 and 3, and its rotations 4 and 6, are free together",
             )
         row = mesh.index[reference]
@@ -91,16 +91,16 @@ def read_wheel(keywords: list[Keyword], mesh: DeckMesh, step: DeckStep) -> Wheel
             continue
         if mesh.X[row, 0] != 0.0:
             raise DeckError(
-                step.procedure.line, "the reference point of a rim that moves stands on the axle"
+                step.procedure.place, "the reference point of a rim that moves stands on the axle"
             )
         rim = np.unique([mesh.index[node] for node in tied])
         wheels.append(Wheel(row, rim, free, *_properties(keywords, elements, reference)))
     if len(wheels) > 1:
-        raise DeckError(step.procedure.line, "one rim that moves is honoured")
+        raise DeckError(step.procedure.place, "one rim that moves is honoured")
     return wheels[0] if wheels else None
 
 
-def free_along_load(keywords: list[Keyword], mesh: DeckMesh, step: DeckStep) -> float | None:
+def free_along_load(keywords: list[Block], mesh: DeckMesh, step: DeckStep) -> float | None:
     """Mass, kg, of the wheel whose centre ``step`` releases along the first axis; None: all is
     held. Raises DeckError."""
     elements = _point_elements(keywords, mesh)
@@ -109,7 +109,7 @@ def free_along_load(keywords: list[Keyword], mesh: DeckMesh, step: DeckStep) -> 
         freedoms = rim_freedoms(mesh, step, reference)
         if freedoms - {1}:
             raise DeckError(
-                step.procedure.line,
+                step.procedure.place,
                 f"of a tyre on a road the rim's reference node {reference} is held in 1, 6, or free"
                 " along the load: held in 2, 6",
             )
@@ -119,7 +119,7 @@ def free_along_load(keywords: list[Keyword], mesh: DeckMesh, step: DeckStep) -> 
     return found
 
 
-def _point_elements(keywords: list[Keyword], mesh: DeckMesh) -> dict[str, tuple[str, list[int]]]:
+def _point_elements(keywords: list[Block], mesh: DeckMesh) -> dict[str, tuple[str, list[int]]]:
     """Element set to type and nodes of the job's point elements on a rim's reference node; those
     on the tyre are of the module `point_elements`."""
     sets: dict[str, tuple[str, list[int]]] = {}
@@ -130,13 +130,13 @@ def _point_elements(keywords: list[Keyword], mesh: DeckMesh) -> dict[str, tuple[
             if missing and all(node in mesh.index for node in missing):
                 continue
             if missing:
-                raise DeckError(k.line, f"node {missing[0]} is not the rim's reference node")
+                raise DeckError(k.place, f"node {missing[0]} is not the rim's reference node")
             sets[k.need("ELSET")] = k.need("TYPE"), nodes
     return sets
 
 
 def _properties(
-    keywords: list[Keyword], elements: dict[str, tuple[str, list[int]]], reference: int
+    keywords: list[Block], elements: dict[str, tuple[str, list[int]]], reference: int
 ) -> tuple[dict[str, Scalar], dict[str, Scalar]]:
     """Stiffness and inertia per motion."""
     springs: dict[int, Scalar] = {}
@@ -147,27 +147,31 @@ def _properties(
             continue
         kind, nodes = elements.get(k.need("ELSET"), ("", []))
         if kind != needed[k.name]:
-            raise DeckError(k.line, f"{k.get('ELSET')} is no set of {needed[k.name]} elements")
+            raise DeckError(k.place, f"{k.get('ELSET')} is no set of {needed[k.name]} elements")
         if reference not in nodes:
             continue
         if k.name == "SPRING":
             if len(k.rows) != 2:
-                raise DeckError(k.line, "*SPRING takes two lines: degree of freedom, stiffness")
-            dof, value = k.rows[0].integer(0), k.rows[1].number(0)
+                raise DeckError(k.place, "*SPRING takes two lines: degree of freedom, stiffness")
+            dof, value = k.rows[0].integer(0), k.rows[1].value(0)
             springs[dof] = springs.get(dof, 0.0) + value
         elif k.name == "MASS":
-            inertia["axial"] = inertia["radial"] = k.only_row().number(0)
+            inertia["axial"] = inertia["radial"] = k.only_row().value(0)
         else:
-            across, inertia["spin"], other = (k.only_row().number(i) for i in range(3))
+            across, inertia["spin"], other = (k.only_row().value(i) for i in range(3))
             inertia["tilt"] = across
             if across != other:
-                raise DeckError(k.line, "the rim's inertia is that of a body of revolution")
+                raise DeckError(k.place, "the rim's inertia is that of a body of revolution")
     stiffness: dict[str, Scalar] = {}
     for motion, dofs in FREEDOMS.items():
         values = [springs.pop(dof, 0.0) for dof in dofs]
         if any(value != values[0] for value in values):
-            raise DeckError(0, f"springs on the degrees of freedom {dofs} of the rim must be alike")
+            raise DeckError(
+                WHOLE_DECK, f"springs on the degrees of freedom {dofs} of the rim must be alike"
+            )
         stiffness[motion] = values[0]
     if springs or any(np.real(v) < 0 for v in (*stiffness.values(), *inertia.values())):
-        raise DeckError(0, "springs act on the degrees of freedom 1 to 6 and are not negative")
+        raise DeckError(
+            WHOLE_DECK, "springs act on the degrees of freedom 1 to 6 and are not negative"
+        )
     return stiffness, inertia

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..deck.keywords import COMPLEX_STEP
+from ...language.text import COMPLEX_STEP
 from ..modes.harmonics import HarmonicModes, SeededTyre, Vibration
 from ..section.mechanics import mass_matrices
 from ..section.parts.part import SPIN_AXIS

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import Refused, RunFailed
-from ..deck.keywords import DeckError
+from ...language.text import WHOLE_DECK, DeckError
 from ..modes.harmonics import Vibration, lowest_of_all
 from ..section.band import Numbering
 from ..section.model import Model
@@ -75,10 +75,10 @@ def press(
     rings = by_elements.angles
     around = waves_beyond(data.lengths) if vibrations else by_elements
     if data.tread not in model.mesh.faces:
-        raise DeckError(0, f"surface {data.tread} is not defined in the section's job")
+        raise DeckError(WHOLE_DECK, f"surface {data.tread} is not defined in the section's job")
     if any(isinstance(p, Elastic) and isinstance(p.law, Hourglass) for p in model.parts):
         raise DeckError(
-            0,
+            WHOLE_DECK,
             "CGAX4R cannot be pressed on a road, its hourglass stiffness does not hold short waves"
             " round the circumference: take CGAX8R",
         )
@@ -92,7 +92,7 @@ def press(
         symmetry = HalfTurn(model.mesh, equations.equation < equations.size, around)
         work = ContactNewton(tyre, symmetry, road, start, check, slopes.follow)
     except Refused as error:
-        raise DeckError(0, f"a pressed tyre must be symmetric: {error}") from None
+        raise DeckError(WHOLE_DECK, f"a pressed tyre must be symmetric: {error}") from None
     if begin:
         begin(work, np.array(list(model.mesh.index)))
     footprints: list[dict[str, Any]] = []

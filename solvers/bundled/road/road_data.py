@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..deck.keywords import DeckError, Keyword
+from ...language.text import Block, DeckError
 from ..section.model import Model
 from ..section.parts.part import TyrePart
 
@@ -39,29 +39,29 @@ class ModesAtLoad:
     wheel_kg: float | None = None  # of a wheel that is free along the load
 
 
-def read_road(model: list[Keyword]) -> RoadData | None:
+def read_road(model: list[Block]) -> RoadData | None:
     """The road of a revolve job's model, or None where it has none. Raises DeckError."""
     pairs = [k for k in model if k.name == "CONTACT PAIR"]
     if not pairs:
         return None
     pair = pairs[0]
     if len(pairs) > 1:
-        raise DeckError(pairs[1].line, "one *CONTACT PAIR is honoured, of the tread and the road")
-    tread, surface = (pair.only_row().text(i).upper() for i in (0, 1))
+        raise DeckError(pairs[1].place, "one *CONTACT PAIR is honoured, of the tread and the road")
+    tread, surface = (pair.only_row().name(i) for i in (0, 1))
     bodies = [k for k in model if k.name == "RIGID BODY" and k.get("ANALYTICAL SURFACE") == surface]
     roads = [k for k in model if k.name == "SURFACE" and k.get("NAME") == surface]
     if not bodies or not roads:
-        raise DeckError(pair.line, f"{surface} is no analytical surface of a *RIGID BODY")
+        raise DeckError(pair.place, f"{surface} is no analytical surface of a *RIGID BODY")
     _check_flat(roads[0])
     found = {k.name: k for k in model if k.name in ("SURFACE BEHAVIOR", "FRICTION")}
     if len(found) < 2:
-        raise DeckError(pair.line, "the contact needs a *SURFACE BEHAVIOR and a *FRICTION")
-    stiffness = found["SURFACE BEHAVIOR"].only_row().number(0)
-    friction = found["FRICTION"].only_row().number(0)
+        raise DeckError(pair.place, "the contact needs a *SURFACE BEHAVIOR and a *FRICTION")
+    stiffness = found["SURFACE BEHAVIOR"].only_row().value(0)
+    friction = found["FRICTION"].only_row().value(0)
     slip = float(np.real(found["FRICTION"].number("ELASTIC SLIP") or 0.0))
     if not (np.real(stiffness) > 0 and np.real(friction) >= 0 and slip >= MIN_ELASTIC_SLIP):
         raise DeckError(
-            found["FRICTION"].line,
+            found["FRICTION"].place,
             "the contact's stiffness must be positive, friction not negative, the elastic slip at"
             f" least {MIN_ELASTIC_SLIP:g} m",
         )
@@ -70,38 +70,38 @@ def read_road(model: list[Keyword]) -> RoadData | None:
     )
 
 
-def _check_flat(surface: Keyword) -> None:
+def _check_flat(surface: Block) -> None:
     """A line along the axle, swept along the rolling direction, at one distance from the axle."""
     rows = surface.rows
     if surface.get("TYPE") != "CYLINDER" or len(rows) != 4:
-        raise DeckError(surface.line, "the road is an analytical surface of TYPE=CYLINDER")
-    axes = [rows[0].real(i) for i in range(6)]
-    sweep = [rows[1].real(i) for i in range(3)]
+        raise DeckError(surface.place, "the road is an analytical surface of TYPE=CYLINDER")
+    axes = [rows[0].number(i) for i in range(6)]
+    sweep = [rows[1].number(i) for i in range(3)]
     H = axes[0]
     flat = axes == [H, 0.0, 0.0, H, 1.0, 0.0] and sweep == [H, 0.0, -1.0] and H > 0
-    straight = [rows[2].text(0).upper(), rows[3].text(0).upper()] == ["START", "LINE"]
-    level = not (rows[2].number(2) or rows[3].number(2))
+    straight = [rows[2].name(0), rows[3].name(0)] == ["START", "LINE"]
+    level = not (rows[2].value(2) or rows[3].value(2))
     if not (flat and straight and level):
-        raise DeckError(surface.line, "only a flat road across the first axis is honoured")
+        raise DeckError(surface.place, "only a flat road across the first axis is honoured")
 
 
-def _half_lengths(model: list[Keyword]) -> Array:
+def _half_lengths(model: list[Block]) -> Array:
     """Lengths (rad) of the elements from the road's side to the top."""
     generation = next(k for k in model if k.name == "SYMMETRIC MODEL GENERATION")
     lengths: list[float] = []
     for row in generation.rows[2:]:
         count = row.integer(1)
-        if row.number(2, 1.0) != 1.0:
-            raise DeckError(row.line, "a bias of the elements' lengths is not honoured")
-        lengths += [row.real(0) / count] * count
+        if row.value(2, 1.0) != 1.0:
+            raise DeckError(row.place, "a bias of the elements' lengths is not honoured")
+        lengths += [row.number(0) / count] * count
     half = np.array(lengths[: len(lengths) // 2])
     if len(lengths) % 2 or not np.allclose(half, lengths[: len(half) - 1 : -1]):
         raise DeckError(
-            generation.line, "the elements round a pressed tyre must mirror at 180 degrees"
+            generation.place, "the elements round a pressed tyre must mirror at 180 degrees"
         )
     if len(half) < 2:
         raise DeckError(
-            generation.line, "a pressed tyre needs four elements round its circumference at least"
+            generation.place, "a pressed tyre needs four elements round its circumference at least"
         )
     return np.radians(half)
 

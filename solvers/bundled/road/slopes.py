@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import NoEquilibrium
-from ..deck.keywords import COMPLEX_STEP
+from ...language.text import COMPLEX_STEP
 from ..solid3d.circumference import HalfCircle
 from ..solid3d.revolved import Revolved
 from .contact import Contact, FlatRoad

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..deck.keywords import DataLine, DeckError, Keyword
+from ...language.text import Block, DeckError, Row
 from ..deck.steps import DeckStep
 from .band import Numbering
 from .half_mesh import half_mesh
@@ -48,7 +48,7 @@ def vibrating(model: Model, step: DeckStep) -> Numbering | KeptFields:
     return known
 
 
-def keeps_half_turn(mesh: DeckMesh, section: list[Keyword], steps: list[DeckStep]) -> bool:
+def keeps_half_turn(mesh: DeckMesh, section: list[Block], steps: list[DeckStep]) -> bool:
     """Whether a job is its own half turn: the mesh, the sets that are filled with something, what
     loads and what holds them, all nodes of elements across the middle plane among that. Raises
     DeckError."""
@@ -91,7 +91,7 @@ def check_open_ends(mesh: DeckMesh, step: DeckStep) -> None:
         row = int(np.argmax(loose))
         node = next(number for number, own in mesh.index.items() if own == row)
         raise DeckError(
-            step.procedure.line,
+            step.procedure.place,
             f"the surface under pressure ends at node {node}, which is free along the axle: hold it"
             " there (2), or close it by a surface under the same pressure",
         )
@@ -105,18 +105,18 @@ def _free(mesh: DeckMesh, step: DeckStep) -> Array:
         moves = step.revolved and step.procedure.name == "FREQUENCY"
         if rim_freedoms(mesh, step, reference) and not moves:
             raise DeckError(
-                step.procedure.line,
+                step.procedure.place,
                 f"the rim's reference node {reference} must be held in 1, 6: a wheel moves only"
                 " in the *FREQUENCY step of a revolved tyre",
             )
         free[[mesh.index[n] for n in tied]] = False
     for row in step.held:
-        name = row.text(0).upper()
+        name = row.name(0)
         if any(_names(mesh, row, reference) for reference in mesh.reference_nodes):
             continue
         nodes = mesh.node_sets.get(name) or ([int(name)] if name.isdigit() else [])
         if not nodes or any(n not in mesh.index for n in nodes):
-            raise DeckError(row.line, f"node or node set {name} is not defined")
+            raise DeckError(row.place, f"node or node set {name} is not defined")
         for component in _components(row, step.revolved):
             free[[mesh.index[n] for n in nodes], component] = False
     return free
@@ -132,26 +132,26 @@ def rim_freedoms(mesh: DeckMesh, step: DeckStep, reference: int) -> set[int]:
     return set(range(1, 7)) - held
 
 
-def _names(mesh: DeckMesh, row: DataLine, reference: int) -> bool:
-    name = row.text(0).upper()
+def _names(mesh: DeckMesh, row: Row, reference: int) -> bool:
+    name = row.name(0)
     return name == str(reference) or mesh.node_sets.get(name) == [reference]
 
 
-def _range(row: DataLine) -> tuple[int, int]:
+def _range(row: Row) -> tuple[int, int]:
     first = row.integer(1)
     return first, row.integer(2) if row.text(2) else first
 
 
-def _components(row: DataLine, revolved: bool) -> list[int]:
+def _components(row: Row, revolved: bool) -> list[int]:
     first, last = _range(row)
-    if row.text(3) and row.number(3) != 0.0:
-        raise DeckError(row.line, "only zero displacements are honoured")
+    if row.text(3) and row.value(3) != 0.0:
+        raise DeckError(row.place, "only zero displacements are honoured")
     known = (
         (REVOLVED_DOFS if first == 1 and last >= 3 else REVOLVED_DOF) if revolved else SECTION_DOFS
     )
     chosen = [known[d] for d in range(first, last + 1) if d in known]
     if not chosen:
         raise DeckError(
-            row.line, f"degrees of freedom {first} to {last} of a set cannot be held here"
+            row.place, f"degrees of freedom {first} to {last} of a set cannot be held here"
         )
     return chosen

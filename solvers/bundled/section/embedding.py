@@ -14,7 +14,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..deck.keywords import DataLine, DeckError, Keyword
+from ...language.spelling import named
+from ...language.text import Block, DeckError, Row
 from .shapes import TYPES, ElementType
 
 Array = np.ndarray
@@ -100,7 +101,7 @@ class Embedding:
 
 
 def embedding(
-    keywords: Sequence[Keyword],
+    keywords: Sequence[Block],
     X: Array,
     connectivity: Mapping[str, Array],
     place: Mapping[int, tuple[str, int]],
@@ -127,9 +128,11 @@ def embedding(
         tolerance, roundoff = _tolerance(k, size), k.number("ROUNDOFF TOLERANCE") or ROUNDOFF
         for row in k.rows:
             for name in filter(None, row.fields):
-                for number in _members(k, row, name.upper(), sets):
+                for number in _members(k, row, named(name), sets):
                     if number not in lines:
-                        raise DeckError(row.line, f"element {number} of {name} is no line of cords")
+                        raise DeckError(
+                            row.place, f"element {number} of {name} is no line of cords"
+                        )
                     for n in sorted({*lines[number].tolist()} - rubber - found.of_node.keys()):
                         found.of_node[n] = len(found.guests)
                         guest = _guest(row, X, hosts, n, tolerance, roundoff)
@@ -162,10 +165,10 @@ def _sort(
 
 
 def _members(
-    k: Keyword, row: DataLine | None, name: str, sets: Mapping[str, Sequence[int]]
+    k: Block, row: Row | None, name: str, sets: Mapping[str, Sequence[int]]
 ) -> Sequence[int]:
     if name not in sets:
-        raise DeckError(row.line if row else k.line, f"element set {name} is not defined")
+        raise DeckError(row.place if row else k.place, f"element set {name} is not defined")
     return sets[name]
 
 
@@ -180,7 +183,7 @@ def _mean_size(X: Array, solids: Mapping[str, Array]) -> float:
     return float(np.sqrt(np.concatenate(areas)).mean())
 
 
-def _tolerance(k: Keyword, size: float) -> float:
+def _tolerance(k: Block, size: float) -> float:
     """The smaller one, m, of those that are given."""
     absolute, share = k.number("ABSOLUTE EXTERIOR TOLERANCE"), k.number("EXTERIOR TOLERANCE")
     if absolute and share is None:
@@ -190,12 +193,7 @@ def _tolerance(k: Keyword, size: float) -> float:
 
 
 def _guest(
-    row: DataLine,
-    X: Array,
-    hosts: Mapping[str, Array],
-    node: int,
-    tolerance: float,
-    roundoff: float,
+    row: Row, X: Array, hosts: Mapping[str, Array], node: int, tolerance: float, roundoff: float
 ) -> Guest:
     """The node in the host that it is in or, within the tolerance, nearest to. Raises DeckError."""
     place, all_X = X[node].real, X.real
@@ -215,7 +213,7 @@ def _guest(
     if best is None or nearest > tolerance:
         far = "in no host element" if best is None else f"{nearest:.3g} m outside its hosts"
         raise DeckError(
-            row.line,
+            row.place,
             f"the node at r, z = {place[0]:.6g}, {place[1]:.6g} m is {far}, more than the exterior"
             f" tolerance {tolerance:.3g} m",
         )

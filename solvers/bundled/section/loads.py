@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..deck.keywords import DeckError
+from ...language.text import DeckError
 from ..deck.steps import DeckStep
 from .boundary import check_open_ends
 from .model import Model
@@ -17,7 +17,7 @@ def pressures(model: Model, step: DeckStep) -> list[Pressure]:
     """The pressure on each surface. Raises DeckError."""
     for surface in step.pressures:
         if surface not in model.mesh.edges:
-            raise DeckError(step.procedure.line, f"surface {surface} of the step is not defined")
+            raise DeckError(step.procedure.place, f"surface {surface} of the step is not defined")
     check_open_ends(model.mesh, step)
     return [Pressure(model.mesh.faces[s], value) for s, value in step.pressures.items()]
 
@@ -36,12 +36,12 @@ def spin(model: Model, step: DeckStep) -> complex | float:
 
 def agreed_spin(model: Model, step: DeckStep) -> float:
     """Omega, rad/s, on which the step's loads agree. Raises DeckError."""
-    line, omega = step.procedure.line, float(np.real(spin(model, step)))
+    place, omega = step.procedure.place, float(np.real(spin(model, step)))
     spin2 = float(np.real(_uniform(model, step, step.centrifugal, "CENTRIF")))
     if not omega:
-        raise DeckError(line, "*COMPLEX FREQUENCY is honoured of a turning tyre: no ROTDYNF")
+        raise DeckError(place, "*COMPLEX FREQUENCY is honoured of a turning tyre: no ROTDYNF")
     if not abs(spin2 - omega**2) <= 1e-9 * omega**2:
-        raise DeckError(line, f"CENTRIF {spin2:g} is not the square of ROTDYNF {omega:g}")
+        raise DeckError(place, f"CENTRIF {spin2:g} is not the square of ROTDYNF {omega:g}")
     return omega
 
 
@@ -51,10 +51,10 @@ def _uniform(
     """The magnitude of a load that all of the tyre bears, 0 where there is none."""
     if not sets:
         return 0.0
-    line, elements = step.procedure.line, model.mesh.element_sets
+    place, elements = step.procedure.place, model.mesh.element_sets
     unknown = [name for name in sets if name not in elements]
     if unknown:
-        raise DeckError(line, f"element set {unknown[0]} of the step's *DLOAD is not defined")
+        raise DeckError(place, f"element set {unknown[0]} of the step's *DLOAD is not defined")
     loaded = {number for name in sets for number in elements[name]}
     massive = {
         tuple(row) for p in model.parts if p.mass is not None for row in p.connectivity.tolist()
@@ -62,7 +62,7 @@ def _uniform(
     for number in set(model.mesh.place) - loaded:
         kind, row = model.mesh.place[number]
         if tuple(model.mesh.connectivity[kind][row].tolist()) in massive:
-            raise DeckError(line, f"element {number} has mass, but is left out of the load {load}")
+            raise DeckError(place, f"element {number} has mass, but is left out of the load {load}")
     if len(set(sets.values())) > 1:
-        raise DeckError(line, f"the load {load} must be one for all elements of the tyre")
+        raise DeckError(place, f"the load {load} must be one for all elements of the tyre")
     return next(iter(sets.values()))

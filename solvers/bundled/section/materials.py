@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..deck.keywords import DeckError, Keyword
+from ...language.text import Block, DeckError, Place
 from .laws.data_lines import read_law
 from .laws.hyperelastic import Hyperelastic
 from .laws.linear_elastic import LinearElastic
@@ -48,7 +48,7 @@ class Material:
     """Constants as the deck gives them."""
 
     name: str
-    line: int
+    place: Place
     density: Scalar = 0.0  # kg/m3
     youngs_modulus: Scalar | None = None  # Pa
     poissons_ratio: Scalar = 0.0
@@ -66,11 +66,11 @@ class Material:
             return self.rubber
         if self.tension_only:
             words = f"*NO COMPRESSION of material {self.name} is honoured of cords only"
-            raise DeckError(self.line, words)
+            raise DeckError(self.place, words)
         E, nu = self.youngs_modulus, self.poissons_ratio
         if not -1 < np.real(nu) < 0.5:
             words = f"Poisson's ratio of material {self.name} must lie above -1 and below 0.5"
-            raise DeckError(self.line, words)
+            raise DeckError(self.place, words)
         return LinearElastic(np.asarray(E / (2 + 2 * nu)), np.asarray(E / (3 - 6 * nu)))
 
     def _relaxed(self) -> tuple[Scalar, Scalar]:
@@ -103,7 +103,7 @@ class Material:
         return ratios[0], ratios[1]
 
 
-def read_materials(keywords: list[Keyword]) -> dict[str, Material]:
+def read_materials(keywords: list[Block]) -> dict[str, Material]:
     """All materials by upper-case name. Raises DeckError."""
     materials: dict[str, Material] = {}
     current: Material | None = None
@@ -111,73 +111,73 @@ def read_materials(keywords: list[Keyword]) -> dict[str, Material]:
         if k.name == "MATERIAL":
             name = k.need("NAME")
             if name in materials:
-                raise DeckError(k.line, f"material {name} is defined twice")
-            current = materials[name] = Material(name, k.line)
+                raise DeckError(k.place, f"material {name} is defined twice")
+            current = materials[name] = Material(name, k.place)
         elif k.name in _READERS:
             if current is None:
-                raise DeckError(k.line, f"*{k.name} must follow a *MATERIAL")
+                raise DeckError(k.place, f"*{k.name} must follow a *MATERIAL")
             _READERS[k.name](current, k)
             if current.rubber is not None and current.youngs_modulus is not None:
-                raise DeckError(current.line, f"material {current.name} has two laws")
+                raise DeckError(current.place, f"material {current.name} has two laws")
     return materials
 
 
-def _density(m: Material, k: Keyword) -> None:
+def _density(m: Material, k: Block) -> None:
     m.density = _positive(k, 0, "density")
 
 
-def _elastic(m: Material, k: Keyword) -> None:
+def _elastic(m: Material, k: Block) -> None:
     m.youngs_modulus = _positive(k, 0, "Young's modulus")
-    m.poissons_ratio = k.only_row().number(1, 0.0)
+    m.poissons_ratio = k.only_row().value(1, 0.0)
 
 
-def _hyperelastic(m: Material, k: Keyword) -> None:
+def _hyperelastic(m: Material, k: Block) -> None:
     m.rubber = read_law(k)
     m.instantaneous = k.get("MODULI") == "INSTANTANEOUS"
 
 
-def _viscoelastic(m: Material, k: Keyword) -> None:
+def _viscoelastic(m: Material, k: Block) -> None:
     if "FREQUENCY" in k.parameters:
         m.table = _modulus_table(k)
         return
     for row in k.rows:
         if len(row.fields) > 3 and any(row.fields[3:]):
-            raise DeckError(row.line, "a term of a Prony series is g, k and tau")
-        m.prony.append((row.number(0, 0.0), row.number(1, 0.0), row.number(2)))
+            raise DeckError(row.place, "a term of a Prony series is g, k and tau")
+        m.prony.append((row.value(0, 0.0), row.value(1, 0.0), row.value(2)))
     if any(np.real(x) < 0 for term in m.prony for x in term):
-        raise DeckError(k.line, "g, k and tau of a Prony series must not be negative")
+        raise DeckError(k.place, "g, k and tau of a Prony series must not be negative")
     if any(np.real(r) <= 0 for r in m._relaxed()):
-        raise DeckError(k.line, "the sum of g (and of k) of a Prony series must stay below 1")
+        raise DeckError(k.place, "the sum of g (and of k) of a Prony series must stay below 1")
 
 
-def _modulus_table(k: Keyword) -> ModulusTable:
+def _modulus_table(k: Block) -> ModulusTable:
     """Rows of loss and storage: G''/G0, 1 - G'/G0, K''/K0, 1 - K'/K0, frequency in Hz. A
     vibration without damping has no use for the losses."""
-    frequency = [row.real(4) for row in k.rows]
-    ratios = [1 - row.number(1, 0.0) for row in k.rows]
+    frequency = [row.number(4) for row in k.rows]
+    ratios = [1 - row.value(1, 0.0) for row in k.rows]
     if len(frequency) < 2 or any(b <= a for a, b in pairwise([0.0, *frequency])):
-        raise DeckError(k.line, "a table of moduli has two rows or more, their frequencies rise")
-    if any(np.real(ratio) <= 0 for ratio in ratios) or any(row.number(3, 0.0) for row in k.rows):
-        raise DeckError(k.line, "shear moduli of a table are positive, and the bulk modulus stays")
+        raise DeckError(k.place, "a table of moduli has two rows or more, their frequencies rise")
+    if any(np.real(ratio) <= 0 for ratio in ratios) or any(row.value(3, 0.0) for row in k.rows):
+        raise DeckError(k.place, "shear moduli of a table are positive, and the bulk modulus stays")
     return ModulusTable(tuple(frequency), tuple(ratios))
 
 
-def _positive(k: Keyword, index: int, what: str) -> Scalar:
-    value = k.only_row().number(index)
+def _positive(k: Block, index: int, what: str) -> Scalar:
+    value = k.only_row().value(index)
     if not np.real(value) > 0:
-        raise DeckError(k.line, f"the {what} must be positive, got {np.real(value):g}")
+        raise DeckError(k.place, f"the {what} must be positive, got {np.real(value):g}")
     return value
 
 
-def _no_compression(m: Material, k: Keyword) -> None:
+def _no_compression(m: Material, k: Block) -> None:
     if m.youngs_modulus is None:
-        raise DeckError(k.line, "*NO COMPRESSION must follow an *ELASTIC")
+        raise DeckError(k.place, "*NO COMPRESSION must follow an *ELASTIC")
     if k.rows:
-        raise DeckError(k.rows[0].line, "*NO COMPRESSION has no data")
+        raise DeckError(k.rows[0].place, "*NO COMPRESSION has no data")
     m.tension_only = True
 
 
-def _acoustic(m: Material, k: Keyword) -> None:
+def _acoustic(m: Material, k: Block) -> None:
     m.bulk_modulus = _positive(k, 0, "bulk modulus")
 
 

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from ...errors import Inverted
-from ..deck.keywords import COMPLEX_STEP, DeckError, Keyword
+from ...language.spelling import named
+from ...language.text import COMPLEX_STEP, WHOLE_DECK, Block, DeckError
 from . import elements
 from .embedding import Embedded, Guest, embedding
 from .shapes import TYPES
@@ -55,7 +56,7 @@ class DeckMesh:
         except Inverted as error:
             number = next(e for e, p in self.place.items() if p == (kind, error.element))
             raise DeckError(
-                0,
+                WHOLE_DECK,
                 f"element {number} has no positive area: it folds over or its nodes run clockwise",
             ) from None
 
@@ -78,10 +79,10 @@ _MESHES: OrderedDict[tuple[object, ...], DeckMesh] = OrderedDict()
 _TOPOLOGY = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "RIGID BODY", "EMBEDDED ELEMENT"}
 
 
-def read_mesh(keywords: list[Keyword]) -> DeckMesh:
+def read_mesh(keywords: list[Block]) -> DeckMesh:
     """The mesh of a section job, remembered while its blocks stay the same. Raises DeckError."""
     topology = [k for k in keywords if k.name in _TOPOLOGY]
-    seeded = [k for k in topology if k.tangents]
+    seeded = [k for k in topology if any(row.tangents for row in k.rows)]
     if any(k.name != "NODE" for k in seeded):
         return _mesh(topology)
     key = tuple(k.identity for k in topology)
@@ -95,13 +96,13 @@ def read_mesh(keywords: list[Keyword]) -> DeckMesh:
     return _with_tangents(mesh, seeded) if seeded else mesh
 
 
-def _with_tangents(mesh: DeckMesh, seeded: list[Keyword]) -> DeckMesh:
+def _with_tangents(mesh: DeckMesh, seeded: list[Block]) -> DeckMesh:
     """The mesh with the tangents of its nodes' coordinates: the same elements and sets."""
     moved = [
-        (mesh.index[int(text.partition(",")[0])], place - 1, tangent)
+        (mesh.index[row.integer(0)], place - 1, tangent)
         for k in seeded
-        for line, text in k.lines
-        for place, tangent in k.tangents.get(line, {}).items()
+        for row in k.rows
+        for place, tangent in (row.tangents or {}).items()
         if place in (1, 2)  # R and Z
     ]
     rate = np.zeros_like(mesh.X)
@@ -112,7 +113,7 @@ def _with_tangents(mesh: DeckMesh, seeded: list[Keyword]) -> DeckMesh:
     return replace(mesh, X=X, like=mesh, derived={})
 
 
-def _mesh(keywords: list[Keyword]) -> DeckMesh:
+def _mesh(keywords: list[Block]) -> DeckMesh:
     index: dict[int, int] = {}
     coordinates: list[tuple[complex | float, complex | float]] = []
     node_sets: dict[str, list[int]] = {}
@@ -125,9 +126,9 @@ def _mesh(keywords: list[Keyword]) -> DeckMesh:
             for row in k.rows:
                 number = row.integer(0)
                 if number in index:
-                    raise DeckError(row.line, f"node {number} is defined twice")
+                    raise DeckError(row.place, f"node {number} is defined twice")
                 index[number] = len(coordinates)
-                coordinates.append((row.number(1), row.number(2, 0.0)))
+                coordinates.append((row.value(1), row.value(2, 0.0)))
                 numbers.append(number)
             if k.get("NSET"):
                 node_sets.setdefault(k.get("NSET"), []).extend(numbers)
@@ -150,13 +151,13 @@ def _mesh(keywords: list[Keyword]) -> DeckMesh:
         if k.name == "RIGID BODY":
             reference, tied = int(k.number("REF NODE") or 0), k.need("TIE NSET")
             if reference not in index or tied not in node_sets:
-                raise DeckError(k.line, f"node {reference} or node set {tied} is not defined")
+                raise DeckError(k.place, f"node {reference} or node set {tied} is not defined")
             bodies[reference] = node_sets[tied]
     mesh = DeckMesh(X, index, tables, place, node_sets, element_sets, edges, bodies)
     return _with_embedded(mesh, inside) if inside else mesh
 
 
-def _with_embedded(mesh: DeckMesh, keywords: list[Keyword]) -> DeckMesh:
+def _with_embedded(mesh: DeckMesh, keywords: list[Block]) -> DeckMesh:
     """The mesh without the nodes that move with host elements. Raises DeckError."""
     found = embedding(keywords, mesh.X, mesh.connectivity, mesh.place, mesh.element_sets)
     kept = np.setdiff1d(np.arange(len(mesh.X)), list(found.of_node))
@@ -172,7 +173,7 @@ def _with_embedded(mesh: DeckMesh, keywords: list[Keyword]) -> DeckMesh:
     blocks = {kind: block.renumbered(new) for kind, block in found.blocks.items()}
     for name, rows in mesh.edges.items():
         if (new[rows] < 0).any():
-            raise DeckError(keywords[0].line, f"surface {name} lies on an embedded element")
+            raise DeckError(keywords[0].place, f"surface {name} lies on an embedded element")
     index = {number: int(new[row]) for number, row in mesh.index.items() if new[row] >= 0}
     sets = {name: [n for n in nodes if n in index] for name, nodes in mesh.node_sets.items()}
     return replace(
@@ -190,7 +191,7 @@ def _with_embedded(mesh: DeckMesh, keywords: list[Keyword]) -> DeckMesh:
 
 
 def _elements(
-    k: Keyword,
+    k: Block,
     index: dict[int, int],
     connectivity: dict[str, list[list[int]]],
     place: dict[int, tuple[str, int]],
@@ -199,60 +200,65 @@ def _elements(
     kind = k.need("TYPE")
     if kind not in TYPES:
         raise DeckError(
-            k.line, f"TYPE={kind} of *ELEMENT is not honoured, only {' or '.join(TYPES)}"
+            k.place, f"TYPE={kind} of *ELEMENT is not honoured, only {' or '.join(TYPES)}"
         )
     table, count = connectivity.setdefault(kind, []), TYPES[kind].nodes
     for row in k.rows:
         number, nodes = row.integer(0), [row.integer(i + 1) for i in range(count)]
         if len(row.fields) != count + 1:
-            raise DeckError(row.line, f"a {kind} element has {count} nodes")
+            raise DeckError(row.place, f"a {kind} element has {count} nodes")
         if number in place:
-            raise DeckError(row.line, f"element {number} is defined twice")
+            raise DeckError(row.place, f"element {number} is defined twice")
         missing = [n for n in nodes if n not in index]
         if missing:
-            raise DeckError(row.line, f"node {missing[0]} of element {number} is not defined")
+            raise DeckError(row.place, f"node {missing[0]} of element {number} is not defined")
         place[number] = kind, len(table)
         table.append([index[n] for n in nodes])
         if k.get("ELSET"):
             sets.setdefault(k.get("ELSET"), []).append(number)
 
 
-def _members(k: Keyword, sets: dict[str, list[int]], known: dict) -> list[int]:
+def _members(k: Block, sets: dict[str, list[int]], known: dict) -> list[int]:
     members: list[int] = []
+    in_order = sorted(known) if "GENERATE" in k.parameters else []
     for row in k.rows:
         if "GENERATE" in k.parameters:
             first, last = row.integer(0), row.integer(1)
-            members += range(first, last + 1, row.integer(2) if row.text(2) else 1)
+            numbers = range(first, last + 1, max(row.integer(2, 1), 1))
+            some = [n for n in in_order if n in numbers]  # a range may have gaps
+            if not some:
+                raise DeckError(row.place, f"no member of the set lies from {first} to {last}")
+            members += some
             continue
         for position, text in enumerate(row.fields):
             if not text:
                 continue
             if text.lstrip("-").isdigit():
                 members.append(row.integer(position))
-            elif text.upper() in sets:
-                members += sets[text.upper()]
+            elif named(text) in sets:
+                members += sets[named(text)]
             else:
-                raise DeckError(row.line, f"set {text} is not defined")
+                raise DeckError(row.place, f"set {text} is not defined")
     unknown = [m for m in members if m not in known]
     if unknown:
-        raise DeckError(k.line, f"member {unknown[0]} of the set is not defined")
+        raise DeckError(k.place, f"member {unknown[0]} of the set is not defined")
     return members
 
 
 def _surface(
-    k: Keyword,
+    k: Block,
     connectivity: dict[str, list[list[int]]],
     place: dict[int, tuple[str, int]],
     sets: dict[str, list[int]],
 ) -> Array:
     rows: list[list[int]] = []
     for row in k.rows:
-        name, face = row.text(0).upper(), row.text(1).upper()
+        name, face = row.name(0), row.name(1)
         members = sets.get(name) or ([int(name)] if name.isdigit() else None)
         if members is None:
-            raise DeckError(row.line, f"element set {name} is not defined")
+            raise DeckError(row.place, f"element set {name} is not defined")
         if face not in ("S1", "S2", "S3", "S4", "SPOS"):
-            raise DeckError(row.line, f"face '{face}' is not one of S1, S2, S3, S4, SPOS")
+            raise DeckError(row.place, f"face '{face}' is not one of S1, S2, S3, S4, SPOS")
         for number in members:
             kind, position = place[number]
             order = TYPES[kind].faces
@@ -261,8 +267,8 @@ def _surface(
                 rows.append(connectivity[kind][position][::-1])
                 continue
             if not order or face == "SPOS":
-                raise DeckError(row.line, f"element {number} of type {kind} has no face {face}")
+                raise DeckError(row.place, f"element {number} of type {kind} has no face {face}")
             rows.append([connectivity[kind][position][i] for i in order[int(face[1]) - 1]])
     if len({len(nodes) for nodes in rows}) > 1:
-        raise DeckError(k.line, "a surface with edges of two and of three nodes is not honoured")
+        raise DeckError(k.place, "a surface with edges of two and of three nodes is not honoured")
     return np.array(rows)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from ..deck.keywords import Keyword
+from ...language.text import Block
 from .half_mesh import half_mesh
 from .laws.energy_law import EnergyLaw
 from .materials import ModulusTable, read_materials
@@ -38,7 +38,7 @@ class Model:
 
 
 def build(
-    keywords: list[Keyword],
+    keywords: list[Block],
     dynamic_Hz: float | None,
     long_term: bool,
     own_frequency: bool = False,

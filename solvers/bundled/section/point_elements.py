@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..deck.keywords import COMPLEX_STEP, DeckError, Keyword
+from ...language.text import COMPLEX_STEP, Block, DeckError, Place
 from .mesh import DeckMesh
 
 Array = np.ndarray
@@ -55,7 +55,7 @@ class PointElements:
         return float(np.sinc(n / self.sectors))
 
 
-def read_point_elements(revolve: list[Keyword], mesh: DeckMesh) -> PointElements:
+def read_point_elements(revolve: list[Block], mesh: DeckMesh) -> PointElements:
     """The *MASS and *SPRING elements of a revolve job. Raises DeckError."""
     nodes: dict[str, tuple[str, list[int]]] = {}
     rims: set[str] = set()  # element sets on a rim's reference node are of `wheel`
@@ -67,41 +67,41 @@ def read_point_elements(revolve: list[Keyword], mesh: DeckMesh) -> PointElements
                 rims.add(k.need("ELSET"))
                 continue
             _, members = nodes.setdefault(k.need("ELSET"), (k.need("TYPE"), []))
-            members += [_row(row.integer(1), row.line, mesh) for row in k.rows]
+            members += [_row(row.integer(1), row.place, mesh) for row in k.rows]
         elif k.name in ("MASS", "SPRING") and k.need("ELSET") not in rims:
             kind, members = nodes.get(k.need("ELSET"), ("", []))
             needed = "MASS" if k.name == "MASS" else "SPRING1"
             if kind != needed:
-                raise DeckError(k.line, f"{k.get('ELSET')} is no set of {needed} elements")
+                raise DeckError(k.place, f"{k.get('ELSET')} is no set of {needed} elements")
             value = _positive(k, 0 if k.name == "MASS" else 1)
             if k.name == "MASS":
                 mass[members] += value
             elif (axis := k.rows[0].integer(0)) in COMPONENT_OF_AXIS:
                 stiffness[members, COMPONENT_OF_AXIS[axis]] += value
             else:
-                raise DeckError(k.line, f"a spring acts along 1, 2 or 3, got {axis}")
+                raise DeckError(k.place, f"a spring acts along 1, 2 or 3, got {axis}")
     rows, components = np.nonzero(mass.real + stiffness.real)
     pick = rows, components
     return PointElements(rows, components, mass[pick], stiffness[pick], _sectors(revolve))
 
 
-def _row(number: int, line: int, mesh: DeckMesh) -> int:
+def _row(number: int, place: Place, mesh: DeckMesh) -> int:
     if number not in mesh.index or number in mesh.reference_nodes:
-        raise DeckError(line, f"node {number} is no node of the tyre's section")
+        raise DeckError(place, f"node {number} is no node of the tyre's section")
     return mesh.index[number]
 
 
-def _positive(k: Keyword, line: int) -> complex | float:
+def _positive(k: Block, line: int) -> complex | float:
     if len(k.rows) != line + 1:
-        raise DeckError(k.line, f"*{k.name} takes {line + 1} data line{'s' * line}")
-    value = k.rows[line].number(0)
+        raise DeckError(k.place, f"*{k.name} takes {line + 1} data line{'s' * line}")
+    value = k.rows[line].value(0)
     if not np.real(value) > 0:
-        raise DeckError(k.rows[line].line, f"*{k.name} must be positive, got {np.real(value):g}")
+        raise DeckError(k.rows[line].place, f"*{k.name} must be positive, got {np.real(value):g}")
     return value
 
 
-def _sectors(revolve: list[Keyword]) -> int:
+def _sectors(revolve: list[Block]) -> int:
     for k in revolve:
         if k.name == "SYMMETRIC MODEL GENERATION":
-            return sum(int(np.real(row.number(1, 1.0))) for row in k.rows[2:])
+            return sum(int(np.real(row.value(1, 1.0))) for row in k.rows[2:])
     return 0

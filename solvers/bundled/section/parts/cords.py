@@ -20,7 +20,7 @@ from typing import Self
 
 import numpy as np
 
-from ...deck.keywords import DataLine, DeckError, Keyword
+from ....language.text import Block, DeckError, Row
 from .. import shapes
 from ..elements import Lines
 from ..laws.energy_law import EnergyLaw
@@ -121,13 +121,13 @@ def cord_rows(lines: Lines, cos: Array | float, sin: Array | float) -> Rows:
 def read(job: SectionJob) -> list[TyrePart]:
     """The cords of each element type, of all its rebar layers. Raises DeckError."""
     layers: dict[str, list[_Layer]] = {}
-    surface: Keyword | None = None
+    surface: Block | None = None
     for k in job.keywords:
         if k.name == "SURFACE SECTION":
             surface = k
         elif k.name == "REBAR LAYER":
             if surface is None:
-                raise DeckError(k.line, "*REBAR LAYER must follow a *SURFACE SECTION")
+                raise DeckError(k.place, "*REBAR LAYER must follow a *SURFACE SECTION")
             for kind, rows in job.by_type(surface, shapes.TYPES.keys() - shapes.solids()).items():
                 block = job.mesh.blocks[kind]
                 assert isinstance(block, Lines)
@@ -146,20 +146,20 @@ class _Layer:
     tension_only: bool
 
 
-def _layer(job: SectionJob, k: Keyword, row: DataLine, lines: Lines) -> _Layer:
+def _layer(job: SectionJob, k: Block, row: Row, lines: Lines) -> _Layer:
     """Data line: name, area, spacing, position, material, angle from the meridian (degrees)."""
-    area, spacing = row.number(1), row.number(2)
-    material = job.material(k, row.text(4).upper())
-    if row.number(3, 0.0) != 0.0:
-        raise DeckError(row.line, "the position of a layer in a surface element is 0.0")
+    area, spacing = row.value(1), row.value(2)
+    material = job.material(k, row.name(4))
+    if row.value(3, 0.0) != 0.0:
+        raise DeckError(row.place, "the position of a layer in a surface element is 0.0")
     if material.youngs_modulus is None:
-        raise DeckError(row.line, f"material {material.name} of a rebar layer is not *ELASTIC")
+        raise DeckError(row.place, f"material {material.name} of a rebar layer is not *ELASTIC")
     if material.prony or material.table is not None:
         words = f"material {material.name} of a rebar layer is *VISCOELASTIC: cords do not relax"
-        raise DeckError(row.line, words)
+        raise DeckError(row.place, words)
     if not (np.real(area) > 0 and np.real(spacing) > 0):
-        raise DeckError(row.line, "area and spacing of a layer must be positive")
-    angle = row.number(5, 0.0) * np.pi / 180
+        raise DeckError(row.place, "area and spacing of a layer must be positive")
+    angle = row.value(5, 0.0) * np.pi / 180
     width = spacing * np.ones_like(lines.R)
     if k.get("GEOMETRY") == "ANGULAR":  # spacing in degrees: the cords fan out with the radius
         width = spacing * np.pi / 180 * lines.R

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...deck.keywords import DeckError, Keyword
+from ....language.text import WHOLE_DECK, Block, DeckError
 from .. import shapes
 from ..elements import Solids
 from ..materials import Material
@@ -41,33 +41,33 @@ def read(job: SectionJob) -> list[TyrePart]:
         parts += _rubber(job, kind, own)
     for kind in job.mesh.blocks:
         if kind in shapes.solids() and kind not in sections:
-            raise DeckError(0, f"the {kind} elements have no *SOLID SECTION")
+            raise DeckError(WHOLE_DECK, f"the {kind} elements have no *SOLID SECTION")
     return parts
 
 
 def _sections(job: SectionJob) -> Iterator[tuple[str, _Section]]:
     """Element types and sections of the deck."""
-    keywords: list[Keyword | None] = [None, *job.keywords, None]
+    keywords: list[Block | None] = [None, *job.keywords, None]
     controls = {k.need("NAME") for k in job.keywords if k.name == "SECTION CONTROLS"}
     for before, k, after in zip(keywords, job.keywords, keywords[2:], strict=False):
         if k.name == "SOLID SECTION":
             material = job.material(k, k.need("MATERIAL"))
             if material.law is None:
                 needed = "neither *HYPERELASTIC nor *ELASTIC"
-                raise DeckError(k.line, f"material {material.name} of a solid is {needed}")
+                raise DeckError(k.place, f"material {material.name} of a solid is {needed}")
             control = k.get("CONTROLS")
             if control and control not in controls:
-                raise DeckError(k.line, f"section controls {control} are not defined")
+                raise DeckError(k.place, f"section controls {control} are not defined")
             given = after is not None and after.name == "HOURGLASS STIFFNESS"
-            stiffness = after.only_row().number(0) if after and given else None
+            stiffness = after.only_row().value(0) if after and given else None
             for kind, rows in job.by_type(k, shapes.solids()).items():
                 if material.law.incompressible and not shapes.TYPES[kind].hybrid:
                     words = f"material {material.name} is incompressible (D1 is 0, or not there)"
-                    raise DeckError(k.line, f"{words}: {kind} would lock, {kind}H does not")
+                    raise DeckError(k.place, f"{words}: {kind} would lock, {kind}H does not")
                 yield kind, _Section(rows, material, stiffness)
         elif k.name == "HOURGLASS STIFFNESS" and (before is None or before.name != "SOLID SECTION"):
             raise DeckError(
-                k.line,
+                k.place,
                 "*HOURGLASS STIFFNESS must stand right under the *SOLID SECTION that it is of",
             )
 
@@ -79,10 +79,10 @@ def _rubber(job: SectionJob, kind: str, sections: list[_Section]) -> list[TyrePa
     owner = np.full(len(solids.weights), -1)
     for i, section in enumerate(sections):
         if (owner[section.elements] >= 0).any():
-            raise DeckError(0, f"a {kind} element has two *SOLID SECTION")
+            raise DeckError(WHOLE_DECK, f"a {kind} element has two *SOLID SECTION")
         owner[section.elements] = i
     if (owner < 0).any():
-        raise DeckError(0, f"{(owner < 0).sum()} {kind} elements have no *SOLID SECTION")
+        raise DeckError(WHOLE_DECK, f"{(owner < 0).sum()} {kind} elements have no *SOLID SECTION")
     laws = [type(section.material.law) for section in sections]
     parts: list[TyrePart] = []
     for law in dict.fromkeys(laws):
