@@ -240,10 +240,19 @@ WAYS: dict[str, Callable[[], list[Sets]]] = {
 }
 
 
-def files(folder: Path, way: str) -> list[Path]:
-    """The universal files of one way in ``WAYS``, or of "shapes, 2414"."""
+def files(folder: Path, way: str, points: int = COUNT, binary: int = 1) -> list[Path]:
+    """The universal files of one way in ``WAYS``, or of "shapes, 2414"; with functions of the first
+    ``points`` alone, and as text where ``binary`` is 0."""
     if way == "shapes, 2414":
         path = write(folder / "0.uff", units(), nodes())
         path.write_text(path.read_text() + text_2414(shapes(AXES)))
         return [path]
-    return [write(folder / f"{k}.uff", *sets) for k, sets in enumerate(WAYS[way]())]
+    paths = []
+    for number, sets in enumerate(WAYS[way]()):
+        few = [
+            each | {"binary": binary} if each["type"] == 58 else each
+            for each in sets
+            if not points < min(each.get("rsp_node", 0), each.get("ref_node", 0)) <= COUNT
+        ]
+        paths.append(write(folder / f"{number}.uff", *few))
+    return paths

@@ -3,14 +3,14 @@
     python -m tests.studies.mutated_inputs --count 1000 --seed 1 --output mutated.jsonl
 
 ``count`` inputs of each kind: records of evaluations, cases with their tables, results folders,
-decks, requests to the bundled solver; or, where ``--kind`` names them, fits and footprints of cases
-with one or two extreme numbers that ``validate`` lets pass. Each is drawn from (seed, kind, number)
-alone, so the same command goes on where it was stopped, and ``--kind KIND --only NUMBER`` repeats
-one. Wrong are: an exception that ends in a traceback, an exit code that is not documented, one
-above 0 without a word, a control character on the terminal, more than 10 s of processor time (60 of
-fits and footprints; or 120 s without an end), any file beside the mutated folder that was changed,
-and a result of no tyre (beyond 1 t, below 1 Hz, not finite) without a word of warning. Exit code 1
-where something was wrong.
+decks, requests to the bundled solver, universal files; or, where ``--kind`` names them, fits and
+footprints of cases with one or two extreme numbers that ``validate`` lets pass. Each is drawn from
+(seed, kind, number) alone, so the same command goes on where it was stopped, and ``--kind KIND
+--only NUMBER`` repeats one. Wrong are: an exception that ends in a traceback, an exit code that is
+not documented, one above 0 without a word, a control character on the terminal, more than 10 s of
+processor time (60 of fits and footprints; or 120 s without an end) or, of a universal file, 1 GB of
+memory, any file beside the mutated folder that was changed, and a result of no tyre (beyond 1 t,
+below 1 Hz, not finite) without a word of warning. Exit code 1 where something was wrong.
 """
 
 from __future__ import annotations
@@ -42,10 +42,15 @@ from tyrecal.simulate.evaluate.results import evaluation
 from tyrecal.simulate.evaluate.store import Store
 from tyrecal.simulate.modes.label import paired_labels
 
+from ..measured.ten_modes import files as universal_files
+
 CASES = Path(__file__).parents[2] / "cases"
 CPU_S, WALL_S = 10, 120
 LONG_S = 60  # of processor time: a fit, a footprint
 MEMORY = 4_000_000_000  # bytes of address space
+MEASURED_kB = 1_000_000  # of memory, for a universal file
+WAYS = ("plain", "a frame per node, 18", "a frame per node, 2420", "shapes, 55", "shapes, 2414")
+WAYS += ("components", "hammer", "two references", "mm")
 CODES = {0, 2, 3, 4, 5}
 BATCH = 20  # trials of one forked process
 NUMBERS = ["0", "-1", "1e300", "-1e-300", "1e999", "NaN", ".inf", "9" * 400, "1:30", "0x1F", "1_0"]
@@ -257,6 +262,10 @@ class Kinds:
                 assert run(tyrecal, study[0], case, *study[1:], "--output", folder) == 0
             decks = str(self.base / "decks")
             assert run(tyrecal, "deck", case, "--output", decks) == 0
+        for number, way in enumerate(WAYS):
+            folder = self.base / "universal" / str(number)
+            folder.mkdir(parents=True)
+            universal_files(folder, way, points=8, binary=number % 2)
         (self.base / "records").mkdir()
         record = next((self.base / "folders" / "record").glob("*/*.record"))
         place = self.base / "records" / record.parent.name
@@ -323,6 +332,19 @@ class Kinds:
             return run(tyrecal, "report", str(folder))
         return run(tyrecal, "deck", str(self.base / "cases" / "case.yaml"), "--output", str(folder))
 
+    def universal(self, here: Path, chance: Random) -> int:
+        """A universal file imported, as sets of every kind or with the sensors alone."""
+        (path,) = (self.base / "universal" / str(chance.randrange(len(WAYS)))).iterdir()
+        file = Path(shutil.copy(path, here))
+        change_file(file, self.outside, chance)
+        given = ["--highest-harmonic", "6"] * (chance.random() < 0.7)
+        given += ["--directions", "cylindrical"] * (chance.random() < 0.3)
+        if chance.random() < 0.2:
+            return run(tyrecal, "measured", "sensors", str(file), *given)
+        given += ["--pressure-kPa", "240", "--sigma-percent", "0.3", "--no-pictures"]
+        out = str(here / "measured.csv")
+        return run(tyrecal, "measured", "import", str(file), *given, "--output", out)
+
     def fits(self, here: Path, chance: Random) -> int:
         """A fit with numbers that are valid, but of no tyre."""
         return self._extreme(here, chance, "fit")
@@ -385,7 +407,7 @@ class Kinds:
         }
 
 
-NAMES = ("records", "cases", "folders", "decks", "requests")
+NAMES = ("records", "cases", "folders", "decks", "requests", "universal")
 LONG = ("fits", "footprints")
 
 
@@ -409,6 +431,8 @@ def trial(kinds: Kinds, kind: str, number: int, seed: int) -> dict[str, Any]:
         finally:
             signal.setitimer(signal.ITIMER_PROF, 0)
     said = err.getvalue()
+    if kind == "universal" and resource.getrusage(resource.RUSAGE_SELF).ru_maxrss > MEASURED_kB:
+        fault = fault or "more than 1 GB"
     if not fault and code not in CODES:
         fault = f"code {code}"
     elif not fault and code and not said.strip():

@@ -15,7 +15,7 @@ def kinds(tmp_path_factory: pytest.TempPathFactory) -> Kinds:
     return Kinds(tmp_path_factory.mktemp("mutated") / "inputs")
 
 
-SLOW = {"folders", "records", "requests", "cases"}
+SLOW = {"folders", "records", "requests", "cases", "universal"}
 
 
 @pytest.mark.parametrize(

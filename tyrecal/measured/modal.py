@@ -106,7 +106,8 @@ def read_modal_test(file: Universal, geometry: Geometry, layout: Layout) -> Moda
             modes, test = _from_shapes(file), ModalTest(str(file.path), ())
         else:
             modes, test = _identified(file, layout)
-        labelled, note = _labelled_by_directions(modes, geometry, layout)
+        judged, note = _judges_by_directions(modes, geometry, layout)
+        labelled = [_labelled(*each) for each in judged]
         return replace(
             test, modes=tuple(settled(labelled)), notes=test.notes + (note,) * bool(note)
         )
@@ -149,11 +150,12 @@ def _readings(signals: Sequence[Signal], geometry: Geometry, layout: Layout) -> 
     return judges
 
 
-def _labelled_by_directions(
+def _judges_by_directions(
     modes: Sequence[_Found], geometry: Geometry, layout: Layout
-) -> tuple[list[LabelledMode], str]:
-    """Modes with their labels, by the meaning of the directions that their shapes fit; and a
-    sentence where that is not the format's. Raises InputError where no meaning is clearly right."""
+) -> tuple[list[tuple[MeasuredMode, Labeller, str]], str]:
+    """Modes with the judges of their sensors and their places in the file, by the meaning of the
+    directions that the shapes fit; and a sentence where that is not the format's. Raises InputError
+    where no meaning is clearly right."""
     judges = {s: _readings(s, geometry, layout) for s in {each.signals for each in modes}}
     names = list(next(iter(judges.values())))
     if any(len(set(each.values())) > 1 for each in judges.values()):
@@ -167,8 +169,8 @@ def _labelled_by_directions(
     else:
         chosen = names[0]
     note = f"the shapes fit {chosen} directions clearly better: --directions {chosen} is taken"
-    labelled = [_labelled(each.mode, judges[each.signals][chosen], each.place) for each in modes]
-    return labelled, note if chosen != names[0] else ""
+    judged = [(each.mode, judges[each.signals][chosen], each.place) for each in modes]
+    return judged, note if chosen != names[0] else ""
 
 
 def _meaning(evidence: Mapping[str, float], count: int) -> str:

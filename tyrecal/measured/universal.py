@@ -29,6 +29,7 @@ Signal = tuple[int, int]  # number of a node; direction 1, 2 or 3, negative wher
 Place = tuple[float, float, float]  # m
 
 MAX_BYTES = 1_000_000_000  # response functions of many points are long
+LARGEST_HZ, LARGEST_VALUE = 1e6, 1e30  # of response functions
 DELIMITER = re.compile(rb" {4}-1(?: {74})?(?=[\r\n]|\Z)")  # binary values may stand before it
 NODES, SYSTEMS, SHAPES = (15, 2411), (18, 2420), (55, 2414)
 READ_TYPES = (*NODES, *SYSTEMS, *SHAPES, 58, 82, 164)
@@ -118,6 +119,8 @@ def is_universal(path: Path) -> bool:
 
 def read_universal(path: Path) -> Universal:
     """Raises InputError naming the set and its line; OSError."""
+    if not is_universal(path):
+        raise InputError(f"{path}: no universal file; one begins with a line '    -1'")
     text = read_bytes(path, MAX_BYTES)
     result = Universal(path, {}, [], [])
     sets = [each for each in _sets(path, text) if each.kind not in UNHEEDED]
@@ -130,16 +133,28 @@ def read_universal(path: Path) -> Universal:
     length = _length([each for each in sets if each.kind == 164])
     systems = _systems([each for each in sets if each.kind in SYSTEMS])
     for each in sets:
-        if each.kind in NODES:
-            _add_nodes(result, each, systems, length)
-        elif each.kind == 82:
-            result.lines.append(tuple(int(node) for node in each.content["nodes"]))
-        elif each.kind in SHAPES:
-            _add_shape(result, each)
-        elif each.kind == 58:
-            _add_function(result, each)
+        try:
+            _add(result, each, systems, length)
+        except InputError:
+            raise
+        except (KeyError, IndexError, ValueError, OverflowError):  # pyuff leaves out what it lacks
+            raise InputError(f"{each.place}: cannot be read; it is damaged or cut off") from None
     _unmeasured(result.shapes)
     return result
+
+
+def _add(
+    result: Universal, each: _Set, systems: dict[int, CoordinateSystem], length: float
+) -> None:
+    """Add one data set to what the file holds."""
+    if each.kind in NODES:
+        _add_nodes(result, each, systems, length)
+    elif each.kind == 82:
+        result.lines.append(tuple(int(node) for node in each.content["nodes"]))
+    elif each.kind in SHAPES:
+        _add_shape(result, each)
+    elif each.kind == 58:
+        _add_function(result, each)
 
 
 @dataclass(frozen=True)
@@ -326,6 +341,11 @@ def _add_function(result: Universal, each: _Set) -> None:
         raise InputError(f"{each.place}: {len(values)} values, the set says {count}; it is cut off")
     if not (np.isfinite(f).all() and np.isfinite(values[f > 0]).all()):
         raise InputError(f"{each.place}: a value is not a number")
+    if f[-1] > LARGEST_HZ or np.abs(values[f > 0]).max(initial=0) > LARGEST_VALUE:
+        raise InputError(
+            f"{each.place}: goes to {f[-1]:g} Hz, or a value to {np.abs(values).max():g}; no"
+            " response of a tyre does"
+        )
     if f[0] < 0 or np.any(np.diff(f) <= 0):
         raise InputError(f"{each.place}: frequencies must rise from 0 or more, got {f[0]:g} Hz")
     reference = int(content["ref_node"]), int(content["ref_dir"])
