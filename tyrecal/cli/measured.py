@@ -131,15 +131,18 @@ def import_files(
     """Write the measurements in FILEs to one CSV, which 'tyrecal diagnose --measured' and
     'tyrecal fit --measured' read.
 
-    FILE: a modal table (CSV), or a universal file with mode shapes (data set 55) or
-    frequency-response functions (58) and their geometry (15, 2411). What several files, or lines
-    of a table, measure of one thing are repeats: the value is their mean, sigma that mean's
-    standard deviation. Repeats that differ by more than the file's other repeats stop the
-    import. A shape that the sensors do not determine gets no label, and is left out.
+    FILE: a modal table (CSV), or a universal file with mode shapes (data sets 55, 2414) or
+    frequency-response functions (58) and their geometry (15, 2411, 18, 2420). What several
+    files, or lines of a table, measure of one thing are repeats: the value is their mean, sigma
+    that mean's standard deviation. Repeats that differ by more than the file's other repeats
+    stop the import. If the sensors do not determine a label, the frequency is written without
+    one; 'tyrecal fit' and 'tyrecal measured label' label it by the model. Files that share a
+    reference and hold other channels are parts of one test.
 
     \b
     tyrecal measured import modes.csv --pressure-kPa 240 --sigma-percent 0.3
     tyrecal measured import run1.uff run2.uff --pressure-kPa 240 --directions cylindrical
+    tyrecal measured import geometry.uff part*.uff --pressure-kPa 240 --leave-out 12:3
     tyrecal measured import at_200.csv at_240.csv --output both.csv
     """
     from ..files import write_text
