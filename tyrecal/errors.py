@@ -31,4 +31,11 @@ class TyrecalError(Exception):
 
 
 class InputError(TyrecalError, ValueError):
-    """What was given cannot be used; the sentence says where, and what would be right."""
+    """What was given cannot be used; the sentence says where, and what would be right.
+
+    line: the 1-based line of a table, where the sentence does not name it; else 0.
+    """
+
+    def __init__(self, message: str = "", line: int = 0):
+        super().__init__(message)
+        self.line = line

@@ -96,26 +96,24 @@ def _row(number: int, row: str) -> str:
     return "\n".join([*ROW[:number], row, *ROW[number + 1 :]]) + "\n"
 
 
-table("semicolons", "separated by commas", TABLE.replace(",", ";"))
-table("tabulators", "separated by commas", TABLE.replace(",", "\t"))
 METRES = re.sub(r"(\d+\.\d+)", lambda mm: f"{float(mm[1]) / 1000:.8f}", TABLE)
 table("metres", "must be in mm", METRES)
 table("column_missing", "'ply_z_mm' is missing", TABLE.replace("ply_z_mm", "ply_x_mm", 1))
 table("line_missing", "'ply_r_mm' is missing", TABLE.replace("ply_r_mm", "ply_rmm", 1))
 table("column_twice", "given 2 times", TABLE.replace("station,", "region,", 1))
 table("text_in_table", "must be a number in mm", _row(3, ROW[3].replace("376.24637", "wide")))
-table("nan_in_table", "finite number in mm", _row(3, ROW[3].replace("376.24637", "nan")))
+table("nan_in_table", "must be a number in mm", _row(3, ROW[3].replace("376.24637", "nan")))
 table("rigid_two", "rigid is '2'", _row(3, ROW[3][:-1] + "2"))
 table("off_centre", "z = 0", _row(1, ROW[2]))
 table("gap_in_inner", "every station", _row(3, ROW[3].replace("376.24637", "")))
-table("short_row", "values for 13 columns", _row(3, ROW[3].rpartition(",")[0]))
-table("comma_in_row", "values for 13 columns", _row(3, ROW[3].replace("376.24637", "376,24637")))
+table("short_row", "the headings are 13", _row(3, ROW[3].rpartition(",")[0]))
+table("comma_in_row", "the headings are 13", _row(3, ROW[3].replace("376.24637", "376,24637")))
 table("three_stations", "too few", "\n".join(ROW[:3]))
 table(
     "region_returns", "follow one another", _row(100, ROW[100].replace("upper_sidewall", "crown"))
 )
 table("empty_table", "empty", "")
-table("binary_table", "UTF-8", b"\xff\xfe\x00")
+table("binary_table", "neither text", b"\xff\xfe\x00")
 table("huge_table", "larger than", TABLE + " " * 1_000_000)
 table("not_held", "held by the rim", "\n".join([ROW[0], *(r[:-1] + "0" for r in ROW[1:])]))
 BACK = [

@@ -233,3 +233,88 @@ def test_a_cell_may_have_three_hundred_characters(tmp_path: Path) -> None:
     assert len(read(tmp_path, lines(300))) == 1
     with pytest.raises(InputError, match="line 2: a cell of 301 characters"):
         read(tmp_path, lines(301))
+
+
+SPELLINGS = [  # separator, numbers of a column in text, the last one's value, or None: refused
+    (";", ["79,5", "240"], 240),
+    (";", ["79.5", "102"], 102),
+    (";", ["79,5", "80.25"], 80.25),
+    (";", ["79,500", "80,250"], 80.25),
+    ("\t", ["79.500", "80.250"], 80.25),
+    (",", ["79.500", "80.250"], 80.25),
+    (",", ["79.5", '"80,25"'], 80.25),
+    (",", ["79.5", "7.95e1"], 79.5),
+    (";", ["79,5", "7,95E+01"], 79.5),
+    (";", ["79,5", "0,795e2"], 79.5),
+    (";", ["79,5", "+80"], 80),
+    (";", ["79,5", "80,"], 80),
+    (";", ["79,5", "080"], 80),
+    (";", ["79,5", " 80 "], 80),
+    (";", ["79,5", "80,5\u00a0"], 80.5),
+    (";", ["79,5", "1.020"], None),  # 1020, or 1.02?
+    ("\t", ["79.5", "1,020"], None),
+    (",", ["79.5", '"1,020"'], None),
+    ("\t", ["79,5", "80.2", "80.250"], None),
+    (";", ["79,5", "-80"], None),
+    (";", ["79,5", "\u221280"], None),
+    (";", ["79,5", "80,5,1"], None),
+    (";", ["79,5", "80.5.1"], None),
+    (";", ["79,5", "1_00"], None),
+    (";", ["79,5", "0x50"], None),
+    (";", ["79,5", "80d0"], None),
+    (";", ["79,5", "~80"], None),
+    (";", ["79,5", "80±1"], None),
+    (";", ["79,5", "80/81"], None),
+    (";", ["79,5", "1.23.456"], None),
+    (";", ["79,5", "inf"], None),
+    (";", ["79,5", "1e999"], None),
+    (";", ["79,5", "#WERT!"], None),
+]
+
+
+@pytest.mark.parametrize(("separator", "cells", "value"), SPELLINGS)
+def test_a_number_is_read_rightly_or_refused(
+    tmp_path: Path, separator: str, cells: list[str], value: float | None
+) -> None:
+    head = separator.join(("c", "m", "pressure [kPa]", "f [Hz]"))
+    rows = [separator.join((f"{k + 1}", "0", "240", cell)) for k, cell in enumerate(cells)]
+    text = "\n".join([head, *rows]) + "\n"
+    if value is None:
+        with pytest.raises(InputError, match=f"line {len(cells) + 1}: frequency_Hz is"):
+            read(tmp_path, text)
+    else:
+        assert read(tmp_path, text)[-1].value == pytest.approx(value)
+
+
+@pytest.mark.parametrize(
+    ("loads", "words"),
+    [
+        (["4000"], None),
+        (["4 000"], None),
+        (["4'000"], None),
+        (["4\u202f000"], None),
+        (["4000,0"], None),
+        (["4.000,0"], None),
+        (["2.500,5", "4.000"], None),  # the first shows the mark of thousands
+        (["4.000"], r"line 2: load is '4.000', which can be 4000 or 4, because .* commas"),
+        (["4,000"], r"line 2: the load is 4 N: usual is 100 to 60000 N; did you mean 4 kN"),
+        (["40.00"], r"the load is 40 N"),
+        (["150"], r"contact_area_m2 is 0.01955 under 150 N: at 240 kPa it would carry 4.69e\+03 N"),
+    ],
+)
+def test_thousands_of_a_load(tmp_path: Path, loads: list[str], words: str | None) -> None:
+    rows = "".join(f"{load};195,5;240\n" for load in loads)
+    text = f"load [N];contact area [cm2];pressure [kPa]\n{rows}"
+    if words:
+        with pytest.raises(InputError, match=words):
+            read(tmp_path, text)
+    else:
+        assert read(tmp_path, text)[-1].load_N == 4000
+
+
+def test_empty_columns_hide_no_split_number(tmp_path: Path) -> None:
+    """A decimal comma between commas makes a cell more, which must not pass for an empty one."""
+    assert len(read(tmp_path, PLAIN.replace("\n", ",,\n"))) == 2
+    with pytest.raises(InputError, match="line 3: '1' is in a column without a heading"):
+        read(tmp_path, "c,m,pressure [kPa],f [Hz],\n0,1,240,31.7,\n2,1,240,66,1\n")
+    assert len(read(tmp_path, ",c,m,pressure [kPa],f\n0,2,1,240,66.1\n1,3,1,240,102.7\n")) == 2

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from tyrecal.errors import InputError
 from tyrecal.tyre.section.from_size import build, usual
 from tyrecal.tyre.section.mesh import build_mesh
 from tyrecal.tyre.section.outline import read_outline, section_of_outline
@@ -14,6 +16,7 @@ from tyrecal.tyre.section.section import SectionError, from_gauges, read_section
 from tyrecal.tyre.section.size import parse_size
 
 Array = np.ndarray
+CASES = Path(__file__).parents[2] / "cases"
 SIZE = parse_size("205/60R15")
 GAUGES = usual(SIZE)
 REST = {
@@ -105,17 +108,48 @@ def test_a_ring_of_constant_thickness(tmp_path: Path) -> None:
         (lambda rows: rows[:20], "the inner curve has 0 points"),
         (lambda rows: [rows[0], *rows[6:]], "outer curve must begin at the crown"),
         (lambda rows: [*rows[:3], rows[2], *rows[3:]], "a point twice"),
-        (lambda rows: [*rows[:3], "outer,300", *rows[4:]], "r_mm must"),
+        (lambda rows: [*rows[:3], "outer,300", *rows[4:]], "2 cells, the headings are 3"),
         (lambda rows: [*rows[:3], "outer,300,wide", *rows[4:]], "must be a number"),
         (lambda rows: ["curve,r,z", *rows[1:]], "column 'r_mm' is missing"),
-        (lambda rows: [row.replace(",", ";") for row in rows], "separated by commas"),
     ],
 )
 def test_wrong_outlines(change: object, words: str, tmp_path: Path) -> None:
     path = write_outline(tmp_path / "o.csv", curves())
     path.write_text("\n".join(change(path.read_text().splitlines())) + "\n")  # type: ignore[operator]
-    with pytest.raises(SectionError, match=words):
+    with pytest.raises(InputError, match=words):
         read_outline(path)
+
+
+@pytest.mark.parametrize("read", [read_outline, read_section])
+def test_a_table_may_come_from_any_spreadsheet(read: Any, tmp_path: Path) -> None:
+    """Semicolons, tabs, decimal commas, marks of Unicode, columns that are empty."""
+    name = "205_60r15.csv" if read is read_section else "205_60r15_outline.csv"
+    text = (CASES / name).read_text()
+    wanted = read(CASES / name)
+    (path := tmp_path / "t.csv").touch()
+    german = text.replace(",", ";").replace(".", ",")
+    for content in (
+        german.encode(),
+        german.replace("\n", "\r\n").encode("utf-8-sig"),
+        text.replace(",", "\t").encode("utf-16"),
+        ("sep=;\n" + german).encode(),
+        text.replace(",", " , ").replace("\n", ",,\n").encode(),
+    ):
+        path.write_bytes(content)
+        again = read(path)
+        if read is read_section:
+            assert again == wanted
+        else:
+            assert all(np.array_equal(again[curve], wanted[curve]) for curve in wanted)
+
+
+def test_a_radius_that_can_be_a_thousand_times_as_large_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "o.csv"
+    text = (CASES / "205_60r15_outline.csv").read_text().replace(",", ";")
+    path.write_text(text.replace(".", ",").replace("313,500", "313.500", 1))
+    with pytest.raises(InputError, match=r"which can be 313500 or 313\.5, because") as error:
+        read_outline(path)
+    assert error.value.line == 2
 
 
 @pytest.mark.parametrize(
@@ -157,5 +191,5 @@ def test_wrong_gauge_tables(old: str, new: str, words: str, tmp_path: Path) -> N
     text = build(SIZE, GAUGES).csv()
     assert old in text
     (tmp_path / "s.csv").write_text(text.replace(old, new, 1))
-    with pytest.raises(SectionError, match=words):
+    with pytest.raises(InputError, match=words):
         read_section(tmp_path / "s.csv")

@@ -41,6 +41,7 @@ BRACKETED = re.compile(r"^(.*?)\s*(?:[\[(](.*?)[\])]\s*)?$")  # name [unit]
 ENDING = re.compile(r"^(.+)[\s_](hz|kpa|bar|psi|n|m2|n[\s_]per[\s_]m|kg|kn|percent)$")
 LENGTH_ENDING = re.compile(r"^(.+)[\s_](m|mm|cm|in|inch)$")  # 'mode m' ends in no unit
 TABLES = {"pressure": units.PRESSURE, "load": units.LOAD, **units.QUANTITIES}
+NUMBER_MEANINGS = {*TABLES, "sigma", "value"}  # what numbers with a decimal mark stand in
 LENGTHS = {name for name, table in units.QUANTITIES.items() if table is units.LENGTH}
 
 

@@ -9,6 +9,7 @@ from math import isfinite, nan
 
 from ..simulate.modes.label import Label
 from ..tyre.case.parts import RimSupport
+from ..tyre.number_table import NumberMarks
 from ..tyre.state import RIMS
 from ..units import QUANTITIES
 from .columns import TableColumn
@@ -29,7 +30,7 @@ class Line:
     place: str  # file and line
     cells: Mapping[str, str]  # by meaning
     columns: Mapping[str, TableColumn]
-    comma: bool  # whether it can be a decimal one
+    marks: NumberMarks  # of the file's numbers
     labelled: bool = True  # a frequency needs a label
 
     def cell(self, meaning: str) -> str:
@@ -42,9 +43,9 @@ class Line:
         if not cell and default is not None:
             return default
         try:
-            value = float(cell.replace(",", ".") if self.comma else cell)
-        except ValueError:
-            value = nan
+            value = self.marks.number(cell)
+        except ValueError as error:
+            raise ValueError(f"{meaning} is '{cell}', {error}") from None
         if not isfinite(value):
             raise ValueError(f"{meaning} is '{cell}', must be a number")
         return value * self.columns[meaning].factor

@@ -2,14 +2,11 @@
 
 A table has a line of headings; each says what the column holds, and its unit in brackets or
 after a low line: ``Frequency [Hz]``, ``f (Hz)``, ``Fülldruck [bar]``, ``pressure_kPa``. The
-measurements CSV is such a table, too. Cells are separated by commas, semicolons or tabs; with the
-latter two a decimal comma is read as well.
+measurements CSV is such a table, too. ``tyre.number_table`` reads cells and numbers.
 """
 
 from __future__ import annotations
 
-import csv
-import io
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
@@ -19,13 +16,14 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..files import read_bytes
+from ..tyre.number_table import NumberMarks, cells_under, read_text_table
 from ..tyre.usual import LARGEST_SIGMA
-from .columns import TableColumn, meaning_of, read_columns
+from .columns import NUMBER_MEANINGS, TableColumn, meaning_of, read_columns
 from .formats import other_format
 from .line import Line
 from .measurement import CSV_COLUMNS, RIM_COLUMN, Measurement
 
-MAX_LINES, MAX_CELL = 10_000, 300  # of a file; characters
+MAX_LINES = 10_000  # of a file
 OPENED = re.compile(r"^[\[(]\s*\d+$")  # a label that its comma has parted
 
 
@@ -36,7 +34,7 @@ def read_measurements(path: Path, labelled: bool = True) -> list[Measurement]:
     labelled: every frequency needs a label; else those of the unloaded tyre may have none. Raises
     InputError with every mistake, each with file and line; OSError.
     """
-    lines, comma = _lines(path)
+    lines, separator = _lines(path)
     place, headings = lines[0]
     known = [meaning_of(heading) for heading in headings]
     own = "quantity" in known and {*headings} - {RIM_COLUMN} != {*CSV_COLUMNS}
@@ -47,7 +45,7 @@ def read_measurements(path: Path, labelled: bool = True) -> list[Measurement]:
             " 'tyrecal measured import' makes such a file of other tables"
         )
     columns = read_columns(headings, place, None, labelled=False)
-    found = _measurements(path, lines, columns, comma, 0.0, _sigma_mistake, labelled=False)
+    found = _measurements(path, lines, columns, separator, 0.0, _sigma_mistake, labelled=False)
     if labelled and (lacking := next((each for each in found if each.is_unlabelled), None)):
         raise InputError(
             f"{lacking.place}: the frequency has no label, c and m; --measured of 'tyrecal fit' and"
@@ -63,10 +61,10 @@ def read_table(path: Path, pressure_kPa: float | None = None) -> list[Measuremen
 
     Raises InputError with every mistake, each with file and line; OSError.
     """
-    lines, comma = _lines(path)
+    lines, separator = _lines(path)
     place, headings = lines[0]
     columns = read_columns(headings, place, pressure_kPa)
-    found = _measurements(path, lines, columns, comma, pressure_kPa or 0.0)
+    found = _measurements(path, lines, columns, separator, pressure_kPa or 0.0)
     _refuse(_swapped(found))
     return _runs(found, "run" in columns)
 
@@ -75,7 +73,7 @@ def _measurements(
     path: Path,
     lines: list[tuple[str, list[str]]],
     columns: dict[str, TableColumn],
-    comma: bool,
+    separator: str,
     pressure_kPa: float,
     more: Callable[[Measurement], str | None] = lambda each: None,
     labelled: bool = True,
@@ -87,15 +85,18 @@ def _measurements(
         raise InputError(f"{path}: more than {MAX_LINES} lines")
     measurements: list[Measurement] = []
     mistakes: list[str] = []
-    width = len(lines[0][1])
+    headings = lines[0][1]
+    numbers = [column.index for meaning, column in columns.items() if meaning in NUMBER_MEANINGS]
+    written = [cells[i] for _, cells in lines[1:] for i in numbers if i < len(cells)]
+    marks = NumberMarks.of(written, separator)
     for place, cells in lines[1:]:
         try:
-            if len(cells) != width:
-                parted = any(OPENED.match(cell) for cell in cells)
-                hint = '; write labels in quotes, "[1,1]", or in columns c and m' if parted else ""
-                raise ValueError(f"{len(cells)} cells, the headings are {width}{hint}")
+            if len(cells) != len(headings) and any(OPENED.match(cell) for cell in cells):
+                hint = 'write labels in quotes, "[1,1]", or in columns c and m'
+                raise ValueError(f"{len(cells)} cells, the headings are {len(headings)}; {hint}")
+            cells = cells_under(headings, cells)
             text = {meaning: cells[column.index] for meaning, column in columns.items()}
-            line = Line(place, text, columns, comma, labelled)
+            line = Line(place, text, columns, marks, labelled)
             found = list(line.measurements(pressure_kPa, f"{path}"))
             for each in found:
                 if mistake := each.mistake or more(each):
@@ -113,45 +114,19 @@ def _refuse(mistakes: Iterable[str]) -> None:
         raise InputError(text)
 
 
-def _lines(path: Path) -> tuple[list[tuple[str, list[str]]], bool]:
-    """Lines that are not empty, with their places; whether a comma can be a decimal one."""
-    raw = read_bytes(path)
-    if name := other_format(raw):
+def _lines(path: Path) -> tuple[list[tuple[str, list[str]]], str]:
+    """Lines that are not empty, with their places, the headings first; what separates cells."""
+    if name := other_format(read_bytes(path)):
         raise InputError(
             f"{path}: this is a {name}; tyrecal reads tables (CSV) and universal files with mode"
             " shapes or frequency-response functions: export one of these"
         )
-    if raw[:2] == b"PK":
-        raise InputError(f"{path}: a workbook; save the sheet as CSV")
-    wide = raw[:2] in (b"\xff\xfe", b"\xfe\xff")
     try:
-        text = raw.decode("utf-16" if wide else "utf-8-sig")
-    except UnicodeDecodeError:
-        text = raw.decode("cp1252", errors="replace")
-    if "\0" in text:
-        raise InputError(f"{path}: neither text nor a universal file")
-    first = 0
-    if text.startswith("sep="):  # Excel's own way to name the separator
-        first, text = 1, text.partition("\n")[2]
-    heading = next((line for line in text.splitlines() if line.strip()), "")
-    separator = max(";\t", key=heading.count)
-    if not heading.count(separator):
-        separator = ","
-    rows = csv.reader(io.StringIO(text), delimiter=separator, skipinitialspace=True)
-    found: list[tuple[str, list[str]]] = []
-    try:
-        for row in rows:
-            place = f"{path}, line {first + rows.line_num}"
-            cells = [cell.strip() for cell in row]
-            if (long := max(map(len, cells), default=0)) > MAX_CELL:
-                # patterns tried on it would take for ever
-                raise InputError(f"{place}: a cell of {long} characters")
-            found += [(place, cells)] * any(cells)
-    except csv.Error:
-        raise InputError(f"{path}, line {first + rows.line_num}: not CSV") from None
-    if not found:
-        raise InputError(f"{path}: the file is empty")
-    return found, separator != ","
+        table = read_text_table(path)
+    except InputError as error:
+        line = f", line {error.line}" if error.line else ""
+        raise InputError(f"{path}{line}: {error}") from None
+    return [(f"{path}, line {line}", cells) for line, cells in table.lines], table.separator
 
 
 def _sigma_mistake(each: Measurement) -> str | None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,9 +13,10 @@ from ...errors import InputError
 from ...files import read_bytes
 from ...units import INCH
 from ..load import validate
+from ..number_table import read_named_table
 from ..section.construction import PASSENGER, TRUCK
 from ..section.from_size import BELOW, build, construction, usual
-from ..section.section import Section, SectionError, refuse_separators
+from ..section.section import Section, SectionError
 from ..section.size import TyreSize
 from .case_text import new_case
 from .made_of import MadeOf, constructed, one_rubber
@@ -87,10 +88,11 @@ def from_file(
     """A case with the section in ``file``: a station table, or two curves with a belt of width
     ``belt``, m. Raises InputError, OSError."""
     content = read_bytes(file)  # before others open it: it may be a pipe
-    try:
+    with _place_named(file):
         outline = _is_outline(file)
-        if belt is not None and not outline:
-            raise InputError("--belt-width-mm goes with an outline: a station table has its belts")
+    if belt is not None and not outline:
+        raise InputError("--belt-width-mm goes with an outline: a station table has its belts")
+    with _place_named(file):
         keys = _outline_keys(file, size, belt) if outline else None
         given: dict[str, Any] = (
             {"outline": {"file": file.name, **keys}} if keys else {"stations": file.name}
@@ -108,14 +110,17 @@ def from_file(
             "drawing",
             outline=keys,
         )
-        return Draft(text, file.name, content)
-    except SectionError as error:
+    return Draft(text, file.name, content)
+
+
+@contextmanager
+def _place_named(file: Path) -> Iterator[None]:
+    """Raises InputError with the file, and its line, before the words."""
+    try:
+        yield
+    except InputError as error:
         line = f", line {error.line}" if error.line else ""
         raise InputError(f"{file}{line}: {error}") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{file}: must be text in UTF-8") from None
-    except csv.Error as error:
-        raise InputError(f"{file}: {error}") from None
 
 
 def _made_of(section: Section, size: TyreSize | None) -> MadeOf:
@@ -128,10 +133,7 @@ def _made_of(section: Section, size: TyreSize | None) -> MadeOf:
 
 
 def _is_outline(file: Path) -> bool:
-    with file.open(newline="", encoding="utf-8-sig") as lines:
-        header = next(csv.reader(lines), [])
-    refuse_separators(header)
-    return "curve" in header
+    return "curve" in read_named_table(file).headings
 
 
 def _outline_keys(file: Path, size: TyreSize | None, belt: float | None) -> dict[str, float]:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
+from ...errors import InputError
 from .document import MAX_TABLE_BYTES, Document
 from .mistakes import Keys, Mistake, dotted, shortened
 from .parts import WRONG, SectionSource
@@ -65,7 +64,6 @@ def measured_file(document: Document, data: dict[str, Any], folder: Path) -> Pat
 
 def read_stations(document: Document, data: dict[str, Any], folder: Path) -> Section | None:
     """The section that the case names; None, with the mistakes recorded, where it is wrong."""
-    from ..section.section import SectionError
 
     source = data.get("section")
     source = source if isinstance(source, dict) else {}
@@ -84,16 +82,14 @@ def read_stations(document: Document, data: dict[str, Any], folder: Path) -> Sec
         section = read_section_of(SectionSource.model_validate(given), folder)
     except ValidationError:  # this too
         return None
-    except SectionError as error:
+    except InputError as error:
         message = shortened(str(error), 300)
         if error.line:
             value = document.places.get(keys, (1, name))[1]
             document.mistakes.append(Mistake(str(path), error.line, dotted(keys), value, message))
         else:
             document.add(keys, message)
-    except UnicodeDecodeError:
-        document.add(keys, "the station table must be text in UTF-8")
-    except (ValueError, csv.Error) as error:
+    except ValueError as error:
         document.add(keys, shortened(str(error), 300))
     except OSError as error:
         document.add(keys, f"cannot be read: {error.strerror}")
@@ -111,7 +107,7 @@ def read_section_of(source: SectionSource, folder: Path) -> Section:
         raise ValueError(f"the table of the section is larger than {MAX_TABLE_BYTES} bytes")
     given = source.outline
     if not given:
-        _check_table(path)
+        _check_columns(path)
         section = read_section(path)
         fill_lines(section)
     else:
@@ -130,30 +126,21 @@ def read_section_of(source: SectionSource, folder: Path) -> Section:
     return section
 
 
-def _check_table(path: Path) -> None:
-    """The table is a table: a comma for a decimal point would shift its columns unseen."""
-    from ..section.section import GAUGE, SectionError, gauged_lines, refuse_separators
+def _check_columns(path: Path) -> None:
+    """Raises InputError where a column is not known: a misspelled one would be missed."""
+    from ..number_table import read_named_table
+    from ..section.section import GAUGE, gauged_lines
 
-    with path.open(newline="", encoding="utf-8-sig") as file:
-        rows = csv.reader(file)
-        header = next(rows, [])
-        if not header:
-            raise SectionError("the station table is empty", 1)
-        refuse_separators(header)
-        names = [column[: -len("_r_mm")] for column in header if column[-5:] in ("_r_mm", "_z_mm")]
-        known = ["region", "rigid", *(f"{name}_{axis}_mm" for name in names for axis in "rz")]
-        known += [f"{name}{GAUGE}" for name in gauged_lines(header)]
-        for column in known:
-            if column not in header:
-                raise SectionError(f"column '{shortened(column)}' is missing", 1)
-        for column, count in Counter(header).items():
-            if count > 1:
-                raise SectionError(f"column '{shortened(column)}' is given {count} times", 1)
-            if column not in [*known, "station"]:
-                raise SectionError(f"column '{shortened(column)}' is not known", 1)
-        for row in rows:
-            if row and len(row) != len(header):
-                raise SectionError(f"{len(row)} values for {len(header)} columns", rows.line_num)
+    header = read_named_table(path).headings
+    names = [column[: -len("_r_mm")] for column in header if column[-5:] in ("_r_mm", "_z_mm")]
+    known = ["region", "rigid", *(f"{name}_{axis}_mm" for name in names for axis in "rz")]
+    known += [f"{name}{GAUGE}" for name in gauged_lines(header)]
+    for column in known:
+        if column not in header:
+            raise InputError(f"column '{shortened(column)}' is missing", 1)
+    for column in header:
+        if column not in [*known, "station"]:
+            raise InputError(f"column '{shortened(column)}' is not known", 1)
 
 
 def _check_section(section: Section) -> None:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from ..number_table import read_named_table
 from .curve import length_along
-from .section import Section, SectionError, millimetres, refuse_separators
+from .section import Section, SectionError
 
 Array = np.ndarray
 STATIONS = {"crown": 16, "shoulder": 4, "upper_sidewall": 16, "lower_sidewall": 16, "bead": 4}
@@ -26,24 +26,20 @@ def read_outline(path: Path) -> dict[str, Array]:
     Raises SectionError, OSError.
     """
     curves: dict[str, list[list[float]]] = {"outer": [], "inner": []}
-    with path.open(newline="", encoding="utf-8-sig") as file:
-        reader = csv.DictReader(file)
-        refuse_separators(reader.fieldnames or [])
-        for column in ("curve", "r_mm", "z_mm"):
-            if column not in (reader.fieldnames or []):
-                raise SectionError(f"column '{column}' is missing", 1)
-        for row in reader:
-            if row["curve"] not in curves:
-                raise SectionError(
-                    f"curve is '{row['curve']}', must be outer or inner", reader.line_num
-                )
-            point = [millimetres(row, axis, reader.line_num) for axis in ("r_mm", "z_mm")]
-            if not np.isfinite(point).all() or point[0] <= 0 or point[1] < 0:
-                raise SectionError(
-                    "r_mm must be greater than 0 and z_mm at least 0, as in half a section",
-                    reader.line_num,
-                )
-            curves[row["curve"]].append(point)
+    table = read_named_table(path)
+    for column in ("curve", "r_mm", "z_mm"):
+        if column not in table.headings:
+            raise SectionError(f"column '{column}' is missing", 1)
+    for row in table.rows:
+        curve = row.cells["curve"]
+        if curve not in curves:
+            raise SectionError(f"curve is '{curve}', must be outer or inner", row.line)
+        r, z = row.millimetres("r_mm"), row.millimetres("z_mm")
+        if not (r > 0 and z >= 0):
+            raise SectionError(
+                "r_mm must be greater than 0 and z_mm at least 0, as in half a section", row.line
+            )
+        curves[curve].append([r, z])
     return {name: _from_crown(name, np.array(points)) for name, points in curves.items()}
 
 

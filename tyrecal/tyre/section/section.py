@@ -8,7 +8,6 @@ Gauges: the thickness between two lines of the section, scaled region by region.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -17,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError
+from ..number_table import read_named_table
 from .spline import CubicSpline
 
 Array = np.ndarray
@@ -27,10 +27,6 @@ GaugeFactor = tuple[tuple[str, ...], tuple[str, str], float]  # regions, (line, 
 
 class SectionError(InputError):
     """A station table that is not a section; ``line`` is the 1-based line of the file or 0."""
-
-    def __init__(self, message: str, line: int = 0):
-        super().__init__(message)
-        self.line = line
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,59 +63,50 @@ def read_section(path: Path) -> Section:
     Columns of lines stand from the inner surface to the outer; <line>_gauge_mm, its distance from
     the one line that has points, takes the place of a line's two. Raises SectionError, OSError.
     """
-    with path.open(newline="", encoding="utf-8-sig") as file:
-        reader = csv.DictReader(file)
-        header = reader.fieldnames or []
-        gauged = gauged_lines(header)
-        names = tuple(h.rsplit("_", 2)[0] for h in header if h.endswith(("_r_mm", GAUGE)))
-        drawn = [n for n in names if n not in gauged]
-        for needed in ["region", "rigid", *(f"{n}_z_mm" for n in drawn)]:
-            if needed not in header:
-                raise SectionError(f"column '{needed}' is missing", 1)
-        if gauged and len(drawn) != 1:
-            raise SectionError(
-                "gauges are distances from one line, of which _r_mm and _z_mm must be given,"
-                f" got {', '.join(drawn) or 'none'}",
-                1,
-            )
-        if len(names) < 2:
-            raise SectionError(
-                f"at least an inner and an outer line are needed, got {', '.join(names) or 'none'}",
-                1,
-            )
-        columns = [
-            (f"{n}{GAUGE}",) * 2 if n in gauged else (f"{n}_r_mm", f"{n}_z_mm") for n in names
-        ]
-        points, labels, rigid = [], [], []
-        for row in reader:
-            columns = [
-                (f"{n}{GAUGE}",) * 2 if n in gauged else (f"{n}_r_mm", f"{n}_z_mm") for n in names
-            ]
-            points.append(
-                [[millimetres(row, c, reader.line_num) for c in pair] for pair in columns]
-            )
-            labels.append(row["region"])
-            if row["rigid"] not in ("0", "1"):
-                raise SectionError(f"rigid is '{row['rigid']}', must be 0 or 1", reader.line_num)
-            rigid.append(row["rigid"] == "1")
+    table = read_named_table(path)
+    header = table.headings
+    gauged = gauged_lines(header)
+    names = tuple(h.rsplit("_", 2)[0] for h in header if h.endswith(("_r_mm", GAUGE)))
+    drawn = [n for n in names if n not in gauged]
+    for needed in ["region", "rigid", *(f"{n}_z_mm" for n in drawn)]:
+        if needed not in header:
+            raise SectionError(f"column '{needed}' is missing", 1)
+    if gauged and len(drawn) != 1:
+        raise SectionError(
+            "gauges are distances from one line, of which _r_mm and _z_mm must be given,"
+            f" got {', '.join(drawn) or 'none'}",
+            1,
+        )
+    if len(names) < 2:
+        raise SectionError(
+            f"at least an inner and an outer line are needed, got {', '.join(names) or 'none'}", 1
+        )
+    columns = [(f"{n}{GAUGE}",) * 2 if n in gauged else (f"{n}_r_mm", f"{n}_z_mm") for n in names]
+    points = [[[row.millimetres(c) for c in pair] for pair in columns] for row in table.rows]
+    labels = [row.cells["region"] for row in table.rows]
+    for row in table.rows:
+        if row.cells["rigid"] not in ("0", "1"):
+            raise SectionError(f"rigid is '{row.cells['rigid']}', must be 0 or 1", row.line)
+    rigid = [row.cells["rigid"] == "1" for row in table.rows]
     if len(points) < 3:
         raise SectionError(f"{len(points)} stations are too few, at least 3 are needed")
-    table = np.array(points).swapaxes(0, 1) * 1e-3
+    lines = np.array(points).swapaxes(0, 1) * 1e-3
     if gauged:
         line = names.index(drawn[0])
-        gauges = np.where(np.arange(len(names)) < line, -1.0, 1.0)[:, None] * table[..., 0]
+        gauges = np.where(np.arange(len(names)) < line, -1.0, 1.0)[:, None] * lines[..., 0]
         gauges[line] = 0.0
-        table = from_gauges(table[line], gauges)
+        lines = from_gauges(lines[line], gauges)
     for end in (0, -1):
-        missing = np.flatnonzero(np.isnan(table[end]).any(1))
+        missing = np.flatnonzero(np.isnan(lines[end]).any(1))
         if len(missing):
             raise SectionError(
-                f"line '{names[end]}' must be given at every station", int(missing[0]) + 2
+                f"line '{names[end]}' must be given at every station", table.rows[missing[0]].line
             )
-    if abs(table[0, 0, 1]) > 1e-9:
-        raise SectionError("the first station must lie on the centre plane, z = 0", 2)
+    if abs(lines[0, 0, 1]) > 1e-9:
+        first = table.rows[0].line
+        raise SectionError("the first station must lie on the centre plane, z = 0", first)
     regions = regions_of(labels, rigid)
-    return Section(names, table, regions, np.array(rigid))
+    return Section(names, lines, regions, np.array(rigid))
 
 
 def regions_of(labels: list[str], rigid: list[bool]) -> tuple[tuple[str, int], ...]:
@@ -158,26 +145,6 @@ def from_gauges(line: Array, gauges: Array) -> Array:
     normal = np.stack([tangent[:, 1], -tangent[:, 0]], -1) / np.hypot(*tangent.T)[:, None]
     points: Array = line + gauges[..., None] * normal
     return points
-
-
-def refuse_separators(header: Sequence[str]) -> None:
-    """Raises SectionError where columns are not separated by commas, as some spreadsheets do."""
-    if len(header) == 1 and (";" in header[0] or "\t" in header[0]):
-        raise SectionError("columns must be separated by commas, and numbers have points", 1)
-
-
-def millimetres(row: dict[str, str], column: str, line: int) -> float:
-    """The number in a column, NaN where it is empty. Raises SectionError."""
-    text = (row[column] or "").strip()
-    if not text:
-        return float("nan")
-    try:
-        value = float(text)
-    except ValueError:
-        raise SectionError(f"{column} is '{text}', must be a number in mm", line) from None
-    if not np.isfinite(value):
-        raise SectionError(f"{column} is '{text}', must be a finite number in mm", line)
-    return value
 
 
 @lru_cache(maxsize=32)
