@@ -87,7 +87,7 @@ def test_two_references_and_geometry_of_its_own(tmp_path: Path) -> None:
     assert {row.label: row.value for row in found.rows} == pytest.approx(MODES, rel=1e-3)
     assert len(found.runs) == 2 and found.notes == [f"{files[0]}: not used: coherence (2 times)"]
     assert all(run.explained > 0.99 for run in found.runs)
-    assert all(mode["confidence"] > 0.99 for mode in result(found)["modes"])
+    assert all(mode["confidence"] > 0.97 for mode in result(found)["modes"])
     with pytest.raises(InputError, match="node 1 has no coordinates"):
         gather(files, 240.0, LAYOUT)
 

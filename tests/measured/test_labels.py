@@ -10,18 +10,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tyrecal.measured.covariance import half_widths
 from tyrecal.measured.labels import Judged, Labeller
-from tyrecal.measured.modal import LabelledMode, _labelled, settled
+from tyrecal.measured.modal import LabelledMode, _labelled, label_in_turn, settled
 from tyrecal.measured.sensors import MeasuredMode, Sensors, real_part
 from tyrecal.simulate.modes.label import Label
 
 from ..chance import Chance, generator
-from .tyres import HIGHEST, layout, measured, modes, noted
+from .tyres import HIGHEST, layout, measured, modes, noted, shape_of
 
 pytestmark = pytest.mark.numbers
 
 MIN_LABEL_PROBABILITY = 0.9  # a label is told from this probability on
-SAME_PARITY, OTHER_PARITY, SIDEWALL = 0.03, 0.01, 0.5  # energies beside the label's own, of 1
+SAME_PARITY, OTHER_PARITY, SIDEWALL = 0.08, 0.01, 0.5  # mean squares, of the label's own
 
 
 def ring(count: int, across: tuple[float, ...] = (0.0,), directions: str = "rtz") -> Sensors:
@@ -124,14 +125,15 @@ def test_even_spacing_aliases_and_says_so(c: int) -> None:
 def test_what_cannot_be_in_the_band_aliases_nothing(c: int) -> None:
     sensors = ring(8, across=(-0.06, 0.06))
     judged = Labeller(sensors, 3).judge(waves(sensors, c))
-    assert judged.label == Label(c, 0) and judged.confidence > 0.99
+    assert judged.label == Label(c, 0) and judged.confidence > 0.97
 
 
 @pytest.mark.parametrize("m", range(4))
-def test_motions_that_are_not_the_labels_are_smaller_still_of_the_other_parity(m: int) -> None:
-    """Of [2,m], on sensors that determine all motions: the energies of the belt's polynomials
+def test_motions_that_are_not_the_labels_are_small_and_smaller_of_the_other_parity(m: int) -> None:
+    """Of [2,m], on sensors that determine all motions: the variances of the belt's polynomials
     r P_k, theta P_k, z P_k-1, and of the sidewalls' over their height, alike on both sides (even
-    m: r and theta; odd m: z) or opposite."""
+    m: r and theta; odd m: z) or opposite. Own motions, others of the parity, and those of the
+    other parity have mean squares of 1, 0.08 and 0.01 on the sensors."""
     tread = ring(9, across=tuple(np.linspace(-0.09, 0.09, 7)))
     rows = [
         (R, 2 * np.pi * a / 9, z, d)
@@ -145,41 +147,39 @@ def test_motions_that_are_not_the_labels_are_smaller_still_of_the_other_parity(m
         np.vstack([tread.points, walls]),
         np.vstack([tread.directions, np.eye(3)[[row[3] for row in rows]]]),
     )
-    labeller = Labeller(sensors, 3)
+    labeller = Labeller(sensors, 3, half_width=0.09)
     R, angle, Z = sensors.points.T
     belt = R > 0.35
     motions = [(k, k + (d == 2), d) for d in range(3) for k in range(4) if k + (d == 2) < 4]
     across = np.polynomial.legendre.legvander(np.where(belt, Z, 0) / 0.09, 3) * belt[:, None]
     up = np.polynomial.legendre.legvander((R - 0.24) / (0.39 - 0.24) * 2 - 1, 2) * ~belt[:, None]
     sides = [(j, side, d) for d in range(3) for side in (0, 1) for j in range(3)]
-    wave = np.cos(2 * angle)
-    terms = [across[:, k] * wave * sensors.directions[:, d] for k, _, d in motions]
-    terms += [
-        up[:, j] * np.sign(Z) ** side * wave * sensors.directions[:, d] for j, side, d in sides
-    ]
-    inverse = np.linalg.pinv(np.transpose(terms))
+    motion = [across[:, k] * sensors.directions[:, d] for k, _, d in motions]
+    motion += [up[:, j] * np.sign(Z) ** side * sensors.directions[:, d] for j, side, d in sides]
+    kind = ["own" if k == m else "other" if (k - m) % 2 else "same" for _, k, _ in motions]
+    kind += ["other" if (side + m + (d == 2)) % 2 else "own" for _, side, d in sides]
+    size = np.array([1.0] * len(motions) + [SIDEWALL] * len(sides))
+    square = size * np.mean(np.square(motion), axis=1)
+    whole = {each: sum(square[i] for i, k in enumerate(kind) if k == each) for each in set(kind)}
+    share = {"own": 1.0, "same": SAME_PARITY, "other": OTHER_PARITY}
+    wanted = size * [share[k] / whole[k] for k in kind]
+    inverse = np.linalg.pinv(np.transpose(motion) * np.cos(2 * angle)[:, None])
     S = labeller.covariance[labeller.labels.index(Label(2, m))]
-    energy = np.diag(inverse @ S @ inverse.T) / (
-        [2 * k + 1 for k, *_ in motions] + [1] * len(sides)
+    found = np.diag(inverse @ S @ inverse.T)
+    assert found / found[kind.index("own")] == pytest.approx(
+        wanted / wanted[kind.index("own")], rel=0.1
     )
-    shares = [
-        1.0 if order == m else OTHER_PARITY if (order - m) % 2 else SAME_PARITY
-        for _, order, _ in motions
-    ]
-    shares += [
-        SIDEWALL * (OTHER_PARITY if (side + m + (d == 2)) % 2 else 1) for _, side, d in sides
-    ]
-    assert energy / energy[shares.index(1.0)] == pytest.approx(shares, rel=0.1)
 
 
 @pytest.mark.slow
 def test_layouts_know_beforehand_what_they_cannot_tell() -> None:
-    told = Labeller(ring(8, across=(-0.06, 0.06)), 8).told_apart()
-    assert Label(5, 0) in told[Label(3, 0)] and Label(3, 0) in told[Label(5, 0)]
-    assert Label(2, 0) not in told[Label(3, 0)]
-    centre = Labeller(ring(17, directions="r"), 6).told_apart()
-    assert Label(2, 2) in centre[Label(2, 0)]  # r P0 and r P2 on the middle line
-    both = Labeller(ring(17, across=(-0.07, 0.0, 0.07)), 6).told_apart()
+    alike = Labeller(ring(8, across=(-0.06, 0.06)), 8).looks_like()
+    assert alike[Label(3, 0)][0] == Label(5, 0) and alike[Label(5, 0)][0] == Label(3, 0)
+    assert Label(2, 0) not in alike[Label(3, 0)]
+    centre = Labeller(ring(17, directions="r"), 6).looks_like()
+    assert Label(2, 0) in centre[Label(2, 2)]  # r P0 and r P2 on the middle line
+    assert centre[Label(2, 1)]  # it is not seen there
+    both = Labeller(ring(17, across=(-0.07, 0.0, 0.07)), 6).looks_like()
     assert not both[Label(2, 0)] and not both[Label(2, 1)]
 
 
@@ -257,8 +257,7 @@ def test_doublets_have_two_members_and_overtones_no_label() -> None:
 
 
 def test_another_number_of_waves_holds_a_thousandth() -> None:
-    """Of radial sensors on the middle line, which see r P0 and half of r P2 (energies 1 and 5):
-    [2,0] beside a wave of c = 3, of which the mean over c = 0 to 6 has a seventh."""
+    """[2,0] on radial sensors: a wave of c = 3 has a seventh of the mean over c = 0 to 6."""
     sensors = ring(17, directions="r")
     labeller = Labeller(sensors, 6)
     S = labeller.covariance[labeller.labels.index(Label(2, 0))]
@@ -267,8 +266,8 @@ def test_another_number_of_waves_holds_a_thousandth() -> None:
     for c in (2, 3):
         wave = np.cos(c * sensors.points[:, 1])
         energy[c] = wave @ S @ wave
-    other = 0.001 * (1 + 1 / 4) / 7
-    assert energy[3] / energy[2] == pytest.approx(other / (1 + 0.03 * 5 / 4 + other), rel=1e-6)
+    other = 0.001 / 7
+    assert energy[3] / energy[2] == pytest.approx(other / (1 + other), rel=1e-6)
 
 
 def test_probabilities_are_those_of_normal_signals_of_any_size() -> None:
@@ -280,19 +279,32 @@ def test_probabilities_are_those_of_normal_signals_of_any_size() -> None:
     for S in labeller.covariance:
         each = []
         for nu in (1e-4, 1e-3, 1e-2, 5e-2, 0.2):
-            whole = S + nu * np.eye(k)
-            square = u @ np.linalg.solve(whole, u)
-            each.append(-np.linalg.slogdet(whole)[1] / 2 - k / 2 * np.log(square))
+            noisy = S + nu * np.eye(k)
+            square = u @ np.linalg.solve(noisy, u)
+            each.append(-np.linalg.slogdet(noisy)[1] / 2 - k / 2 * np.log(square))
         ln.append(np.logaddexp.reduce(each))
-    p = np.exp(np.array(ln) - max(ln))
-    wanted = dict(zip(labeller.labels, p / p.sum(), strict=True))
+    bends = [x.m > 1 or x == Label(0, 1) for x in labeller.labels]
+    p = np.exp(np.array(ln) - max(ln)) * np.where(bends, 0.02, 1.0)
+    p /= p.sum()
+    first = int(np.argmax(p))
+    whole = [S + 0.02 * np.eye(k) for S in labeller.covariance]
+    own = whole[first]
+    odds = [
+        (np.trace(np.linalg.solve(S, own)) - k) / 2
+        + (np.linalg.slogdet(S)[1] - np.linalg.slogdet(own)[1]) / 2
+        for S in whole
+    ]
+    alike = np.array(odds) < 5
+    assert [x for x, is_alike in zip(labeller.labels, alike, strict=True) if is_alike] == [
+        Label(2, 0),
+        Label(2, 2),
+    ]
+    p[alike] = p[alike].sum() * np.where(bends, 0.02, 1.0)[alike] / 1.02
     found = labeller.judge(u).probabilities
-    assert found == pytest.approx(wanted, abs=1e-9) and list(found.values())[1] > 1e-6
-    i, j = 3, 8
-    Si, Sj = (labeller.covariance[n] + 0.01 * np.eye(k) for n in (i, j))
-    change = np.linalg.slogdet(Sj)[1] - np.linalg.slogdet(Si)[1]
-    odds = (np.trace(np.linalg.inv(Sj) @ Si) - k + change) / 2
-    assert labeller.odds(i, j) == pytest.approx(odds)
+    assert found == pytest.approx(dict(zip(labeller.labels, p, strict=True)), abs=1e-9)
+    assert list(found.values())[1] > 1e-6
+    above = labeller.judge(u, [Label(2, 0)]).probabilities
+    assert above[Label(2, 2)] == above[Label(2, 0)] > 0.4
 
 
 @pytest.mark.parametrize("size", [1e-40, 1e40])
@@ -315,7 +327,7 @@ def belt_and_walls() -> Sensors:
 def told_of(amplitude: np.ndarray) -> LabelledMode:
     """What is told of a shape that the labels are sure of."""
     sensors = belt_and_walls()
-    sure = SimpleNamespace(sensors=sensors, judge=lambda shape: Judged(Label(2, 0), {}, ""))
+    sure = SimpleNamespace(sensors=sensors, judge=lambda shape, below: Judged(Label(2, 0), {}, ""))
     return _labelled(MeasuredMode(66.0, amplitude), sure, "a.uff")  # type: ignore[arg-type]
 
 
@@ -345,3 +357,55 @@ def test_a_complex_shape_has_no_label(collinear: float, label: bool) -> None:
     assert told.collinearity == pytest.approx(collinear)
     assert (told.judged.label is not None) == label
     assert label or "collinearity 0.49" in told.judged.why
+
+
+@pytest.mark.parametrize(("rings", "directions"), [((-0.085, 0.085), "rtz"), ((0.0,), "rtz")])
+def test_alike_orders_share_their_probability_and_the_lower_comes_first(
+    rings: tuple[float, ...], directions: str
+) -> None:
+    """Rings where r P0 and r P2 cannot be distinguished: a clean wave alone in a file is [2,0],
+    with the prior's odds; clearly above a [2,0] it is either, and gets no label."""
+    sensors = ring(16, across=rings, directions=directions)
+    labeller = Labeller(sensors, 6)
+    u = waves(sensors, 2)
+    alone = labeller.judge(u)
+    assert alone.label == Label(2, 0)
+    assert alone.probabilities[Label(2, 2)] == pytest.approx(0.02 / 1.02, abs=0.002)
+    modes = [(MeasuredMode(hertz, u), labeller, "") for hertz in (240.0, 80.0, 80.4)]
+    found = [(t.mode.frequency_Hz, t.judged.label, t.member) for t in label_in_turn(modes)]
+    assert found == [(80.0, Label(2, 0), "1"), (80.4, Label(2, 0), "2"), (240.0, None, "")]
+
+
+def test_a_belt_is_as_wide_as_known_or_as_tyres_are() -> None:
+    sensors = ring(9, across=(-0.05, 0.05))
+    widths = half_widths(sensors)
+    R = sensors.points[:, 0].max()
+    assert widths.min() > 0.18 * R and widths.max() < 0.40 * R
+    assert widths.mean() == pytest.approx(0.29 * R)
+    assert half_widths(sensors, 0.09) == pytest.approx([0.09])
+    assert half_widths(ring(9, across=(0.1,)), 0.09) == pytest.approx([0.1])  # none beyond the belt
+    assert half_widths(ring(9, across=(0.1,))).min() > 0.1
+
+
+@pytest.mark.parametrize("rings", [(-0.95, 0.95), (0.0,), (-0.5, 0.5), (-0.9, 0.0, 0.9)])
+def test_usual_rings_of_triaxial_sensors_give_no_wrong_label(rings: tuple[float, ...]) -> None:
+    """The tool's own shapes without noise at shares of the tread's half width: where two rings or
+    more are on the belt all are right."""
+    points = shape_of(modes()[0]).points
+    R, Z = points.T
+    width = np.abs(Z[0.95 * R.max() < R]).max()
+    nodes = [int(np.argmax(R - 5 * abs(Z - z * width))) for z in rings]
+    rows = [(i, 2 * np.pi * k / 16, d) for i in nodes for k in range(16) for d in range(3)]
+    where = np.array([(R[i], turn, Z[i]) for i, turn, _ in rows])
+    sensors = Sensors(where, np.eye(3)[[d for *_, d in rows]])
+    at = np.array([i for i, *_ in rows])
+    labeller = Labeller(sensors, HIGHEST)
+    rng = generator("rings")
+    every = [
+        (MeasuredMode(mode.frequency_Hz, measured(mode, sensors, at, rng, 0.0)), labeller, "")
+        for mode in sorted(modes(), key=lambda mode: mode.frequency_Hz)
+    ]
+    labels = [t.judged.label for t in label_in_turn(every)]
+    true = [mode.label for mode in sorted(modes(), key=lambda mode: mode.frequency_Hz)]
+    assert all(label in (None, own) for label, own in zip(labels, true, strict=True))
+    assert len(rings) == 1 or labels == true

@@ -39,7 +39,7 @@ def modes() -> tuple[Mode, ...]:
     return tuple(m for m in found if m.label.m < 2)
 
 
-def _shape(mode: Mode) -> HarmonicShape:
+def shape_of(mode: Mode) -> HarmonicShape:
     assert isinstance(mode.raw.shape, HarmonicShape)
     return mode.raw.shape
 
@@ -50,7 +50,7 @@ def layout(
     """Sensors at random on the tread and both sidewalls, round the tyre but unevenly, some
     directions missing; and the nodes that they sit at. Where the sensors are noted to stand is
     some millimetres off."""
-    points = _shape(modes()[0]).points
+    points = shape_of(modes()[0]).points
     R, Z = points.T
     nodes = [int(np.argmax(R - 5 * abs(Z - z))) for z in rng.uniform(-0.075, 0.075, tread)]
     nodes += [
@@ -78,7 +78,7 @@ def measured(
 ) -> Array:
     """Complex amplitude of one member of the mode at the sensors, turned by any angle round the
     tyre and any phase; 3 % error of gain, and noise relative to the root mean square."""
-    shape = _shape(mode)
+    shape = shape_of(mode)
     turn = np.exp(1j * (shape.n * sensors.points[:, 1] + (rng.uniform(0, 7) if shape.n else 0)))
     u = np.sum((shape.amplitude[nodes] * turn[:, None]).real * sensors.directions, axis=1)
     size = noise * np.sqrt(np.mean(u**2))

@@ -203,7 +203,7 @@ def sensors(
     (test,), notes = arrange([read_universal(file)], leave_out)
     for note in notes:
         terminal.note(note)
-    told = sensors_in(test, layout).told_apart()
+    told = sensors_in(test, layout).looks_like()
     if terminal.as_json:
         told_apart = [
             {**label_entry(label), "told": not alike, "looks_like": [str(x) for x in alike]}

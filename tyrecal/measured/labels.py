@@ -1,49 +1,44 @@
 """Labels [c, m] of measured shapes: the probability of each label on the sensors at hand.
 
-A label says which motions are large: on the belt those of its order (``modes.label``: r P_m,
-theta P_m, z P_m-1, cosines and sines of c Theta), on the sidewalls those that are symmetric about
-the middle plane for even m, antisymmetric for odd m. The others are small, not absent. So the
-signals u (k,) of a mode are normal about 0,
+The signals u (k,) of a mode are normal about 0,
 
-    u ~ N(0, s^2 (S + nu I)),    S = B diag(v) B^T,
+    u ~ N(0, s^2 (S + nu I)),
 
-B (k, terms): the motions at the sensors in their directions, v: their variances under the label,
-nu: noise, over a grid, s: any size, p(s) ~ 1/s:
+S (k, k): the covariance of a label (``covariance``), nu: noise, over a grid, s: any size,
+p(s) ~ 1/s:
 
     ln p(u | label, nu) = -1/2 ln|S + nu I| - k/2 ln(u^T (S + nu I)^-1 u) + constant
 
-and labels are judged by their shares of the sum of p(u | label). Two labels whose S are alike on
-these sensors share the probability between them, whatever was measured: aliasing needs no rule.
+A label's probability is its share of the sum of prior p(u | label). The prior knows one thing
+about tyres: [c,m+2] is above [c,m], so a file in which [c,m] was not found below is hardly of
+[c,m+2]. Labels that these sensors cannot distinguish share their probability by their priors
+alone: how clean a shape looks says nothing about its order there.
+
+``modal`` judges the shapes of a file with it, lowest frequency first. `Labeller.looks_like` draws
+shapes and judges them the same way, so it says what an import will do.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.polynomial.legendre import legvander
 
-from ..simulate.modes.label import (
-    AXIAL_COLUMN,
-    BELT,
-    COLUMNS,
-    DEGREE,
-    HIGHEST_HARMONIC,
-    PARITY,
-    Label,
-)
+from ..simulate.modes.label import AXIAL_COLUMN, BELT, HIGHEST_HARMONIC, Label
+from .covariance import HALF_WIDTHS, LEAST_SEEN, label_covariances
 from .sensors import Sensors
 
 Array = np.ndarray
 
-MIN_LABEL_PROBABILITY = 0.9  # probability that a label needs to be told
-MIN_LN_ODDS = 4.0  # expected logarithm of the odds below which sensors cannot tell two labels apart
-SAME_PARITY, OTHER_PARITY = 0.03, 0.01  # variance of motions that are not the label's, of 1
-OTHER_WAVES = 0.001  # likewise, of motions with another c: tyres are not uniform
-SIDEWALL = 0.5  # variance of the sidewalls' motion; belts stand out, but sidewalls bulge
+MIN_LABEL_PROBABILITY = 0.9  # probability from which a label is given
+MIN_LN_ODDS = 5.0  # expected logarithm of the odds below which sensors cannot tell two labels apart
+ODDS_NOISE = 0.02  # noise at which it is expected
 NOISE_VARIANCES = (1e-4, 1e-3, 1e-2, 5e-2, 0.2)  # variance, of the mean signal's
-MIN_HALF_WIDTH = 0.2  # a belt's half width is at least this share of its radius
-HEIGHTS = 2  # highest polynomial over a sidewall's height
+WITHOUT_LOWER = 0.02  # prior of [c,m+2] without [c,m] below it, of 1
+SHAPES_DRAWN, DRAWN_NOISE = 64, 0.01  # shapes drawn of each label, and their noise
+MIN_LABELLED = 0.9  # share of a label's shapes that get it, for the sensors to tell it
+MIN_TAKEN = 0.03  # mean probability that a rival takes, to be named
 
 
 @dataclass(frozen=True)
@@ -64,61 +59,83 @@ class Labeller:
     """Judges shapes on one layout of sensors.
 
     highest: the largest c that is possible in the measured band; fewer leave less to confuse.
+    half_width: of the belt (m), None where it is not known.
     """
 
-    def __init__(self, sensors: Sensors, highest: int = HIGHEST_HARMONIC):
+    def __init__(
+        self, sensors: Sensors, highest: int = HIGHEST_HARMONIC, half_width: float | None = None
+    ):
         self.sensors = sensors
-        basis = [_motions(sensors, c) for c in range(highest + 1)]
-        others = sum(B @ B.T for B in basis) / len(basis)
-        self.labels, self.covariance = [], []
-        for c, B in enumerate(basis):
-            for column in range(5 if c == 0 else 4):
-                v = np.tile(_variances(c, column), 1 if c == 0 else 2)
-                S = (B * v) @ B.T + OTHER_WAVES * others
-                self.labels.append(_label(c, column))
-                self.covariance.append(S / np.trace(S) * len(S))
+        every = label_covariances(sensors, highest, half_width)
+        self.labels = [_label(c, column) for c, column, *_ in every]
+        self.covariance = [S for *_, S, _ in every]
+        self.is_seen = np.array([seen >= LEAST_SEEN for *_, seen in every])
         self._spectra = [np.linalg.eigh(S) for S in self.covariance]
+        is_alike = self._odds() < MIN_LN_ODDS
+        self._groups = [np.flatnonzero(row) for row in is_alike]  # each label, and its rivals
 
-    def judge(self, shape: Array) -> Judged:
-        """The label of a real shape (k,), a signal each, with its probability."""
-        evidence = np.array(
-            [self._evidence(values, vectors.T @ shape) for values, vectors in self._spectra]
-        )
-        p = np.exp(evidence - evidence.max())
-        p /= p.sum()
+    def judge(self, shape: Array, below: Collection[Label] = ()) -> Judged:
+        """The label of a real shape (k,), a signal each, with its probability.
+
+        below: labels found in the same file at lower frequencies.
+        """
+        p = self._probabilities(shape[:, None], below)[:, 0]
         order = np.argsort(-p, kind="stable")
+        first = order[0]
         probabilities = {self.labels[i]: float(p[i]) for i in order}
-        if p[order[0]] >= MIN_LABEL_PROBABILITY:
-            return Judged(self.labels[order[0]], probabilities)
-        return Judged(None, probabilities, self._why(p, order))
+        if p[first] < MIN_LABEL_PROBABILITY:
+            return Judged(None, probabilities, self._why(p, order))
+        if not self.is_seen[first]:
+            why = f"the sensors hardly see {self.labels[first].said}: {_missing(self.sensors)}"
+            return Judged(None, probabilities, why)
+        return Judged(self.labels[first], probabilities)
 
-    def _evidence(self, values: Array, parts: Array) -> float:
-        """ln of the mean over nu of p(u | label, nu). values (k,), parts (k,): of S, of u."""
-        v = np.maximum(values, 0.0) + np.array(NOISE_VARIANCES)[:, None]
-        square = np.sum(parts**2 / v, axis=1)
-        each = -0.5 * np.log(v).sum(1) - 0.5 * len(parts) * np.log(np.maximum(square, 1e-300))
-        return float(np.logaddexp.reduce(each))
+    def _probabilities(self, shapes: Array, below: Collection[Label] = ()) -> Array:
+        """Of each label (labels, n), of shapes (k, n)."""
+        evidence = np.array([_evidence(*spectrum, shapes) for spectrum in self._spectra])
+        prior = self._prior(below)
+        p = np.exp(evidence - evidence.max(0)) * prior[:, None]
+        p /= p.sum(0)
+        for n, first in enumerate(np.argmax(p, axis=0)):
+            group = self._groups[first]
+            p[group, n] = p[group, n].sum() * prior[group] / prior[group].sum()
+        return p
 
     def ln_evidence(self, shape: Array) -> float:
         """ln of the mean probability density of a real shape (k,) over all labels, but for a
         constant: comparable between readings of one shape's directions."""
-        each = [self._evidence(values, vectors.T @ shape) for values, vectors in self._spectra]
+        each = [_evidence(*spectrum, shape[:, None])[0] for spectrum in self._spectra]
         return float(np.logaddexp.reduce(each) - np.log(len(each)))
 
-    def odds(self, i: int, j: int, nu: float = 1e-2) -> float:
-        """Expected ln of the odds of label i against j on its own shapes, at noise nu:
-        (tr(Sj^-1 Si) - k + ln|Sj| - ln|Si|) / 2."""
-        k = len(self.covariance[i])
-        Si, Sj = (self.covariance[n] + nu * np.eye(k) for n in (i, j))
-        change = np.linalg.slogdet(Sj)[1] - np.linalg.slogdet(Si)[1]
-        return float(np.trace(np.linalg.solve(Sj, Si)) - k + change) / 2
+    def _prior(self, below: Collection[Label]) -> Array:
+        lower = [_lower(label) for label in self.labels]
+        return np.array([1.0 if own in (None, *below) else WITHOUT_LOWER for own in lower])
 
-    def told_apart(self) -> dict[Label, list[Label]]:
-        """Of each label the other ones that these sensors cannot tell from it, whatever noise."""
-        every = range(len(self.labels))
-        odds = [[self.odds(i, j) if i != j else np.inf for j in every] for i in every]
-        alike = np.minimum(odds, np.transpose(odds)) < MIN_LN_ODDS
-        return {self.labels[i]: [self.labels[j] for j in np.flatnonzero(alike[i])] for i in every}
+    def _odds(self) -> Array:
+        """Expected ln of the odds of label i against j on i's own shapes, (i, j):
+        (tr(Sj^-1 Si) - k + ln|Sj| - ln|Si|) / 2."""
+        k = len(self.sensors.points)
+        S = np.array(self.covariance) + ODDS_NOISE * np.eye(k)
+        size = np.linalg.slogdet(S)[1]
+        trace = S.reshape(len(S), -1) @ np.linalg.inv(S).reshape(len(S), -1).T
+        return np.asarray(trace - k + size - size[:, None]) / 2
+
+    def looks_like(self) -> dict[Label, list[Label]]:
+        """Of each label the other ones that its shapes look like on these sensors, the likeliest
+        first; none where at least `MIN_LABELLED` of the shapes drawn of it get it."""
+        k, random = len(self.sensors.points), np.random.default_rng(0)
+        result: dict[Label, list[Label]] = {}
+        for i, (values, vectors) in enumerate(self._spectra):
+            parts = random.standard_normal((k, SHAPES_DRAWN))
+            size = np.sqrt(np.maximum(values, 0.0) + DRAWN_NOISE)
+            p = self._probabilities(vectors @ (size[:, None] * parts))
+            rivals = p.mean(1)
+            rivals[i] = 0.0
+            order = [int(j) for j in np.argsort(-rivals) if rivals[j] > MIN_TAKEN]
+            is_told = self.is_seen[i] and np.mean(p[i] >= MIN_LABEL_PROBABILITY) >= MIN_LABELLED
+            order = order or [int(np.argmax(rivals))]
+            result[self.labels[i]] = [] if is_told else [self.labels[j] for j in order]
+        return result
 
     def _why(self, p: Array, order: Array) -> str:
         """Why no label is likely: c is open, or its order m. p: probabilities, order: sorted."""
@@ -128,7 +145,7 @@ class Labeller:
         open_waves = len(others) and p[c == c[first]].sum() < MIN_LABEL_PROBABILITY
         second = others[0] if open_waves else order[1]
         a, b = self.labels[first], self.labels[second]
-        if min(self.odds(first, second), self.odds(second, first)) >= MIN_LN_ODDS:
+        if second not in self._groups[first] and first not in self._groups[second]:
             return f"the shape is between {a.said} and {b.said}: noise, or two modes mixed"
         if a.c != b.c:
             angles = np.round(np.degrees(self.sensors.points[:, 1])) % 360
@@ -140,10 +157,28 @@ class Labeller:
         return f"sensors let {a.said} and {b.said} look alike: {_missing(self.sensors)}"
 
 
+def _evidence(values: Array, vectors: Array, shapes: Array) -> Array:
+    """ln of the mean over nu of p(u | label, nu), (n,), of shapes (k, n). values (k,), vectors
+    (k, k): of S."""
+    v = np.maximum(values, 0.0) + np.array(NOISE_VARIANCES)[:, None]
+    square = np.maximum((1 / v) @ (vectors.T @ shapes) ** 2, 1e-300)
+    each = -0.5 * np.log(v).sum(1)[:, None] - 0.5 * len(values) * np.log(square)
+    return np.asarray(np.logaddexp.reduce(each))
+
+
 def _label(c: int, column: int) -> Label:
     if c == 0 and column in (0, AXIAL_COLUMN):
         return Label(0, 0, "axial" if column == AXIAL_COLUMN else "torsional")
     return Label(c, column)
+
+
+def _lower(label: Label) -> Label | None:
+    """The mode of the same c and parity that every tyre has below one that bends the belt."""
+    if label.m < 2 and not (label.c == 0 and label.m == 1):
+        return None
+    if label.c == 0:
+        return Label(0, 0, "axial" if label.m % 2 else "torsional")
+    return Label(label.c, label.m - 2)
 
 
 def _missing(sensors: Sensors) -> str:
@@ -155,40 +190,6 @@ def _missing(sensors: Sensors) -> str:
     lacking = [name for name, seen in zip(names, measured, strict=True) if not seen]
     if lacking:
         return f"nothing {' or '.join(lacking)} was measured on the tread"
-    if np.ptp(Z[belt]) < MIN_HALF_WIDTH * R.max():
+    if np.ptp(Z[belt]) < HALF_WIDTHS[0] * R.max():
         return "they do not stand on both edges of the tread"
     return "there are too few on the tread"
-
-
-def _motions(sensors: Sensors, c: int) -> Array:
-    """B (k, terms): belt polynomials, then sidewall ones, by component; cosines, then sines."""
-    R, angle, Z = sensors.points.T
-    belt = R / R.max() > BELT
-    half_width = max(np.abs(Z[belt]).max(), MIN_HALF_WIDTH * R.max())
-    across = legvander(np.clip(Z / half_width, -1, 1), DEGREE) * belt[:, None]
-    height = (R - R.min()) / (np.ptp(R) or 1.0) * 2 - 1
-    up = legvander(height, HEIGHTS) * ~belt[:, None]
-    side = np.hstack([up, up * np.sign(Z)[:, None]])  # alike on both sides, then opposite
-    motions = [part * sensors.directions[:, [k]] for part in (across, side) for k in range(3)]
-    B = np.hstack(motions)
-    if c == 0:
-        return B
-    turn = c * angle[:, None]
-    return np.hstack([B * np.cos(turn), B * np.sin(turn)])
-
-
-def _variances(c: int, column: int) -> Array:
-    """v (terms,) of `_motions`, under the label of ``column``."""
-    columns = COLUMNS[c == 0]  # (3, DEGREE + 1, 5)
-    small = [SAME_PARITY if PARITY[n] == PARITY[column] else OTHER_PARITY for n in range(5)]
-    share = np.array(small)
-    share[column] = 1.0
-    belt = (columns @ share) * (2 * np.arange(DEGREE + 1) + 1)  # energy a^2 / (2 k + 1)
-    even = PARITY[column] == 0
-    sides = []
-    for k in range(3):
-        alike = even == (k < 2)  # r, theta even in Z and z odd: symmetric about the middle plane
-        main, rest = SIDEWALL, SIDEWALL * OTHER_PARITY
-        for value in (main, rest) if alike else (rest, main):
-            sides += [value] * (HEIGHTS + 1)
-    return np.concatenate([belt.ravel(), sides])

@@ -3,7 +3,7 @@ frequency-response functions."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import compress
@@ -103,14 +103,12 @@ def read_modal_test(file: Universal, geometry: Geometry, layout: Layout) -> Moda
     """
     with _naming(file):
         if file.shapes:
-            modes, test = _from_shapes(file), ModalTest(str(file.path), ())
+            identified, test = _from_shapes(file), ModalTest(str(file.path), ())
         else:
-            modes, test = _identified(file, layout)
-        judged, note = _judges_by_directions(modes, geometry, layout)
-        labelled = [_labelled(*each) for each in judged]
-        return replace(
-            test, modes=tuple(settled(labelled)), notes=test.notes + (note,) * bool(note)
-        )
+            identified, test = _identified(file, layout)
+        judged, note = _judges_by_directions(identified, geometry, layout)
+        modes = tuple(label_in_turn(judged))
+        return replace(test, modes=modes, notes=test.notes + (note,) * bool(note))
 
 
 def sensors_in(file: Universal, layout: Layout) -> Labeller:
@@ -122,8 +120,8 @@ def sensors_in(file: Universal, layout: Layout) -> Labeller:
         if not signals:
             raise InputError("nothing was measured in it")
         first, *others = _readings(signals, Geometry(file.nodes, file.axes), layout).values()
-        apart = first.told_apart()
-        if any(each is not first and each.told_apart() != apart for each in others):
+        apart = first.looks_like()
+        if any(each is not first and each.looks_like() != apart for each in others):
             raise InputError(f"the file does not say what its directions are; {_ASK}")
         return first
 
@@ -301,9 +299,27 @@ def _by_reference(functions: Sequence[Function]) -> dict[Signal, dict[Signal, Fu
     return {reference: {s: row[s] for s in sorted(row)} for reference, row in table.items()}
 
 
-def _labelled(mode: MeasuredMode, labeller: Labeller, place: str) -> LabelledMode:
+def label_in_turn(identified: Sequence[tuple[MeasuredMode, Labeller, str]]) -> list[LabelledMode]:
+    """The modes of a run with their labels, lowest frequency first: each is judged by its shape
+    and by what was found clearly below it.
+
+    identified: of each mode the judge of its sensors, and its place in the file."""
+    modes: list[LabelledMode] = []
+    lowest: dict[Label, float] = {}  # Hz
+    for mode, labeller, place in sorted(identified, key=lambda each: each[0].frequency_Hz):
+        limit = mode.frequency_Hz / (1 + MAX_DOUBLET_SPLIT)
+        below = [label for label, hertz in lowest.items() if hertz < limit]
+        modes.append(_labelled(mode, labeller, place, below))
+        if label := modes[-1].judged.label:
+            lowest.setdefault(label, mode.frequency_Hz)
+    return settled(modes)
+
+
+def _labelled(
+    mode: MeasuredMode, labeller: Labeller, place: str, below: Collection[Label] = ()
+) -> LabelledMode:
     shape, collinearity = _unit(mode)
-    judged = labeller.judge(shape)
+    judged = labeller.judge(shape, below)
     R = labeller.sensors.points[:, 0]
     belt = R / R.max() > BELT
     part = np.mean(shape[belt] ** 2) / (np.mean(shape**2) or 1.0)

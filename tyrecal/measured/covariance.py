@@ -1,0 +1,111 @@
+"""Covariance of the signals of a mode under each label [c, m], on one layout of sensors.
+
+A label says which motions are large: on the belt those of its order (``modes.label``: r P_m,
+theta P_m, z P_m-1, cosines and sines of c Theta), on the sidewalls those that are symmetric about
+the middle plane for even m, antisymmetric for odd m. The others are small, not absent:
+
+    S = own / |own| + a same / |same| + b other / |other| + w all / |all|
+
+a, b, w: SAME_PARITY, OTHER_PARITY, OTHER_WAVES. own, same, other (k, k): covariances of unit
+motions of the label's order, of the other orders of its parity, and of the other parity; all: of
+every c; |A|: the mean of the diagonal. So no order has cleaner shapes than another. A belt's half
+width is known from a case, or not: then S is the mean over HALF_WIDTHS of the radius.
+
+``labels`` judges with these covariances; they say nothing about frequencies.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.polynomial.legendre import legvander
+
+from ..simulate.modes.label import BELT, COLUMNS, DEGREE, PARITY
+from .sensors import Sensors
+
+Array = np.ndarray
+
+SAME_PARITY, OTHER_PARITY = 0.08, 0.01  # variance of motions that are not the label's, of 1
+OTHER_WAVES = 0.001  # likewise, of motions with another c: tyres are not uniform
+SIDEWALL = 0.5  # variance of the sidewalls' motion; belts stand out, but sidewalls bulge
+HALF_WIDTHS = (0.18, 0.40)  # of a belt's half width over its radius: motorcycles' tyres have others
+WIDTHS = 6  # half widths averaged over
+WIDER = 1.05  # a belt reaches beyond its outermost sensor by up to this factor, at least
+HEIGHTS = 2  # highest polynomial over a sidewall's height
+LEAST_SEEN = 0.1  # share of all motions' mean square from which sensors see a label's own motions
+
+
+def label_covariances(
+    sensors: Sensors, highest: int, half_width: float | None = None
+) -> list[tuple[int, int, Array, float]]:
+    """(c, column, S (k, k) of unit mean diagonal, share of all motions' mean square that the
+    label's own have on these sensors) for each label with up to ``highest`` waves.
+
+    half_width: of the belt (m); None: not known. Columns as in ``modes.label``.
+    """
+    widths = half_widths(sensors, half_width)
+    bases = [[_motions(sensors, c, width) for width in widths] for c in range(highest + 1)]
+    every = _unit(sum(B @ B.T for basis in bases for B in basis))
+    result = []
+    for c, basis in enumerate(bases):
+        for column in range(5 if c == 0 else 4):
+            own, same, other = (
+                sum((B * v) @ B.T for B in basis) / len(basis) for v in _variances(c, column)
+            )
+            whole = np.trace(own + same + other)
+            least = LEAST_SEEN * whole
+            S = _unit(own, least) + SAME_PARITY * _unit(same, least)
+            S = _unit(S + OTHER_PARITY * _unit(other, least)) + OTHER_WAVES * every
+            seen = float(np.trace(own) / whole) if whole else 0.0
+            result.append((c, column, _unit(S), seen))
+    return result
+
+
+def half_widths(sensors: Sensors, known: float | None = None) -> Array:
+    """Half widths (m) that the belt may have, each as likely: the one known, or `WIDTHS` between
+    those of narrow and wide tyres, none narrower than the sensors on the belt."""
+    R, _, Z = sensors.points.T
+    outermost = float(np.abs(Z[R / R.max() > BELT]).max())
+    if known is not None:
+        return np.array([max(known, outermost)])
+    narrow, wide = (share * R.max() for share in HALF_WIDTHS)
+    low, high = max(narrow, outermost), max(wide, WIDER * outermost)
+    return low + (high - low) * (np.arange(WIDTHS) + 0.5) / WIDTHS
+
+
+def _unit(S: Array, least: float = 1e-300) -> Array:
+    """S of unit mean diagonal, or less where its trace is below ``least``."""
+    return S * (len(S) / max(np.trace(S), least))
+
+
+def _motions(sensors: Sensors, c: int, half_width: float) -> Array:
+    """B (k, terms): belt polynomials, then sidewall ones, by component; cosines, then sines."""
+    R, angle, Z = sensors.points.T
+    belt = R / R.max() > BELT
+    across = legvander(np.clip(Z / half_width, -1, 1), DEGREE) * belt[:, None]
+    height = (R - R.min()) / (np.ptp(R) or 1.0) * 2 - 1
+    up = legvander(height, HEIGHTS) * ~belt[:, None]
+    side = np.hstack([up, up * np.sign(Z)[:, None]])  # alike on both sides, then opposite
+    motions = [part * sensors.directions[:, [k]] for part in (across, side) for k in range(3)]
+    B = np.hstack(motions)
+    if c == 0:
+        return B
+    turn = c * angle[:, None]
+    return np.hstack([B * np.cos(turn), B * np.sin(turn)])
+
+
+def _variances(c: int, column: int) -> tuple[Array, Array, Array]:
+    """Variances (terms,) of `_motions`: own, other orders of its parity, the other parity."""
+    orders = np.arange(5)
+    is_same = np.array(PARITY) == PARITY[column]
+    own, same, other = (
+        (COLUMNS[c == 0] @ chosen.astype(float)).ravel()
+        for chosen in (orders == column, is_same & (orders != column), ~is_same)
+    )
+    even = PARITY[column] == 0
+    # r and theta even in Z, z odd: symmetric about the middle plane; alike on both sides, opposite
+    alike = np.array([even == (k < 2) for k in range(3)])
+    main = SIDEWALL * np.repeat(np.column_stack([alike, ~alike]).ravel(), HEIGHTS + 1)
+    none = np.zeros_like(main)
+    parts = ((own, main), (same, none), (other, SIDEWALL - main))
+    repeat = 1 if c == 0 else 2
+    return tuple(np.tile(np.concatenate(part), repeat) for part in parts)  # type: ignore[return-value]
