@@ -1,19 +1,19 @@
-"""Whether keywords stand as `grammar` has them: what ABAQUS would refuse of a deck, and what is not
-known to the grammar."""
+"""Whether keywords are as their records in the table say: what ABAQUS would refuse of a deck by its
+manual, and what is not checked."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Protocol
 
 from ..language.element_types import NODES_AND_SECTION
 from ..language.rule import Rule
 from ..language.spelling import named
 from ..language.step_rules import STEP_PROCEDURES
-from .grammar import RULES, UNJUDGED
+from ..language.table import RULES
+from ..language.text import Block, Row
 
 LONGEST = {"number": 20, "integer": 10, "name": 80}  # characters of a field
 FORM = {
@@ -28,34 +28,10 @@ HOLDS_LAYERS_IN_3D = re.compile(r"(SF)?M(3D|CL)|S\d")
 GENERATORS = {"NGEN", "NFILL", "NCOPY", "ELGEN", "ELCOPY", "SYMMETRIC MODEL GENERATION"}
 
 
-class Row(Protocol):
-    """A data line."""
-
-    @property
-    def fields(self) -> Sequence[str]:
-        """Between the commas."""
-
-
-class Block(Protocol):
-    """A keyword."""
-
-    @property
-    def name(self) -> str:
-        """In upper case, single blanks."""
-
-    @property
-    def parameters(self) -> Mapping[str, str]:
-        """By upper-case name."""
-
-    @property
-    def rows(self) -> Sequence[Row]:
-        """Its data lines."""
-
-
 @dataclass(frozen=True)
 class Finding:
     """What is wrong with a keyword or one of its data lines; sure: ABAQUS refuses it by its
-    manual, else the grammar does not know it, or the manual does not say what happens."""
+    manual, else the table has no rule for it, or the manual does not say what happens."""
 
     block: Block
     row: Row | None
@@ -84,7 +60,8 @@ def findings(blocks: Sequence[Block], before: Sequence[Block] = ()) -> list[Find
     names.bare.clear()
     found = [*_order(blocks, before)]
     for block in blocks:
-        if rule := RULES.get(block.name):
+        rule = RULES.get(block.name)
+        if rule and rule.is_judged:
             found += _parameters(block, rule, names)
             found += _data(block, rule, names)
     if not any(
@@ -106,11 +83,11 @@ def _order(blocks: Sequence[Block], before: Sequence[Block]) -> Iterator[Finding
     for block in blocks:
         name, inside = block.name, opened[-1].name if opened else ""
         rule = RULES.get(name)
-        levels = rule.level if rule else UNJUDGED.get(name, "")
+        levels = rule.level if rule else ""
         level = "step" if inside == "STEP" else "part" if inside or not parts else "model"
         here = {level, "model"} if not parts and not inside else {level}
         if not levels:
-            yield Finding(block, None, "is not known to the grammar", sure=False)
+            yield Finding(block, None, "is not checked: the table has no rule for it", sure=False)
         elif not here & set(levels.split()):
             where = {"step": "a step", "part": "a part or assembly", "model": "the model"}[level]
             yield Finding(block, None, f"does not belong in {where}")
@@ -142,7 +119,7 @@ def _order(blocks: Sequence[Block], before: Sequence[Block]) -> Iterator[Finding
             else:
                 opened.pop()
         guessed = not levels or (guessed and bool(rule and rule.under))
-        if levels and not (rule and rule.under) and name not in UNJUDGED:
+        if rule and rule.is_judged and not rule.under:
             parent = block
         seen.add(name)
     for block in opened:
@@ -152,7 +129,9 @@ def _order(blocks: Sequence[Block], before: Sequence[Block]) -> Iterator[Finding
 def _parameters(block: Block, rule: Rule, names: _Names) -> Iterator[Finding]:
     for name, value in block.parameters.items():
         if name not in rule.parameters:
-            yield Finding(block, None, f"its {name} is not known to the grammar", sure=False)
+            yield Finding(
+                block, None, f"its {name} is not checked: the table does not have it", sure=False
+            )
             continue
         wanted = rule.parameters[name]
         if wanted.islower():
@@ -170,12 +149,14 @@ def _parameters(block: Block, rule: Rule, names: _Names) -> Iterator[Finding]:
 
 def _data(block: Block, rule: Rule, names: _Names) -> Iterator[Finding]:
     """Data lines: their number, then each field."""
-    given = [f"{key}={value.upper()}" for key, value in block.parameters.items()]
-    variant = next((v for k, v in rule.variants.items() if k in (*block.parameters, *given)), None)
-    forms = rule.fields if variant is None else variant
+    forms = rule.forms(block.parameters)
+    if not forms and rule.fields:  # a variant whose data the table does not know
+        return
     lines = (forms,) if isinstance(forms, str) else forms
     least, most = max(rule.rows[0], len(lines) if len(lines) > 1 else 0), rule.rows[1]
-    least = 0 if "OP=NEW" in given else least  # which takes all that there were away
+    least = (
+        0 if block.parameters.get("OP") == "NEW" else least
+    )  # which takes all that there were away
     if not least <= len(block.rows) <= most:
         bounds = f"{least}" if least == most else f"{least} to {most}" if most < 9 else f"{least}"
         few = "at least " if len(block.rows) < least and most > 9 else ""
@@ -226,7 +207,9 @@ def _value(
 def _elements(block: Block, names: _Names) -> Iterator[Finding]:
     kind = named(block.parameters.get("TYPE", ""))
     if kind not in NODES_AND_SECTION:
-        yield Finding(block, None, f"TYPE={kind} is not known to the grammar", sure=False)
+        yield Finding(
+            block, None, f"TYPE={kind} is not checked: the table does not have it", sure=False
+        )
         return
     count, section = NODES_AND_SECTION[kind]
     for row in block.rows:

@@ -2,37 +2,85 @@
 
 from __future__ import annotations
 
+from .laws import LAW_CONSTANTS, LAWS_NOT_READ
 from .rule import ANY_ROWS, MANY, NO_ROWS, ONE_ROW, Rule
 
 OF_MATERIAL = ("MATERIAL",)
 OF_SECTION = ("SOLID SECTION", "MEMBRANE SECTION", "SHELL SECTION")
 HOLDS_REBAR = ("SURFACE SECTION", "MEMBRANE SECTION", "SHELL SECTION")
-HYPERELASTIC_LAWS = (
-    *("NEO HOOKE", "MOONEY-RIVLIN", "POLYNOMIAL", "REDUCED POLYNOMIAL", "YEOH"),
-    *("ARRUDA-BOYCE", "OGDEN", "VAN DER WAALS", "MARLOW", "USER"),
-)
+NO_GENERATION = "it generates no mesh"
+NO_PARTS = "it has no parts and instances"
+NO_REBAR = "it has no rebar: cords are solids of a stiff direction there"
+NO_HOURGLASS = "its hourglass control has no stiffness to set"
+HYPERELASTIC_LAWS = (*LAW_CONSTANTS, *LAWS_NOT_READ)
 
 MODEL_RULES: dict[str, Rule] = {
-    "HEADING": Rule("model", fields="text...", rows=ANY_ROWS, once="job"),
-    "PREPRINT": Rule(
-        "model", "ECHO=YES|NO|; MODEL=YES|NO|; HISTORY=YES|NO|; CONTACT=YES|NO|", rows=NO_ROWS
+    "HEADING": Rule(
+        "model",
+        fields="text...",
+        rows=ANY_ROWS,
+        once="job",
+        honoured={"section|revolve": ""},
+        is_output=True,
     ),
-    "PART": Rule("model", "NAME=+part", rows=NO_ROWS, needs=("NAME",)),
-    "END PART": Rule("part", rows=NO_ROWS),
-    "ASSEMBLY": Rule("model", "NAME=name", rows=NO_ROWS, needs=("NAME",), once="job"),
-    "END ASSEMBLY": Rule("part", rows=NO_ROWS),
+    "PREPRINT": Rule(
+        "model",
+        "ECHO=YES|NO|; MODEL=YES|NO|; HISTORY=YES|NO|; CONTACT=YES|NO|",
+        rows=NO_ROWS,
+        is_output=True,
+    ),
+    "PART": Rule(
+        "model",
+        "NAME=+part",
+        rows=NO_ROWS,
+        needs=("NAME",),
+        honoured={"deck": "NAME"},
+        calculix=NO_PARTS,
+    ),
+    "END PART": Rule("part", rows=NO_ROWS, honoured={"deck": ""}),
+    "ASSEMBLY": Rule(
+        "model",
+        "NAME=name",
+        rows=NO_ROWS,
+        needs=("NAME",),
+        once="job",
+        honoured={"deck": "~NAME"},
+        calculix=NO_PARTS,
+    ),
+    "END ASSEMBLY": Rule("part", rows=NO_ROWS, honoured={"deck": ""}),
     "INSTANCE": Rule(
         "part",
         "NAME=name; PART=part; NSET=+nset; ELSET=+elset; INSTANCE=name; LIBRARY=name",
         "number...",
         rows=ANY_ROWS,
         needs=("NAME", "PART"),
+        honoured={"deck": "NAME; PART; NSET; ELSET"},
+        calculix=NO_PARTS,
     ),
-    "END INSTANCE": Rule("part", rows=NO_ROWS),
-    "NODE": Rule("part", "NSET=+nset; SYSTEM=R|C|S", "integer 6*number?"),
-    "SYSTEM": Rule("part", fields="6*number?", rows=(0, 2)),
-    "NGEN": Rule("part", "NSET=+nset; LINE=C|P", "2*integer integer? integer? 6*number?"),
-    "NFILL": Rule("part", "NSET=+nset; BIAS=number", "2*nset integer integer?"),
+    "END INSTANCE": Rule("part", rows=NO_ROWS, honoured={"deck": ""}),
+    "NODE": Rule(
+        "part",
+        "NSET=+nset; SYSTEM=R|C|S",
+        "integer 6*number?",
+        honoured={"deck": "NSET; SYSTEM=R", "section|revolve": "NSET"},
+    ),
+    "SYSTEM": Rule(
+        "part", fields="6*number?", rows=(0, 2), honoured={"deck": ""}, calculix=NO_GENERATION
+    ),
+    "NGEN": Rule(
+        "part",
+        "NSET=+nset; LINE=C|P",
+        "2*integer integer? integer? 6*number?",
+        honoured={"deck": "NSET; LINE=C"},
+        calculix=NO_GENERATION,
+    ),
+    "NFILL": Rule(
+        "part",
+        "NSET=+nset; BIAS=number",
+        "2*nset integer integer?",
+        honoured={"deck": "NSET; BIAS"},
+        calculix=NO_GENERATION,
+    ),
     "NCOPY": Rule(
         "part",
         (
@@ -43,6 +91,8 @@ MODEL_RULES: dict[str, Rule] = {
         rows=ANY_ROWS,
         needs=("CHANGE NUMBER", "OLD SET"),
         alone=("SHIFT", "REFLECT", "POLE"),
+        honoured={"deck": "CHANGE NUMBER; OLD SET; NEW SET; SHIFT; REFLECT=LINE; MULTIPLE"},
+        calculix=NO_GENERATION,
     ),
     "NSET": Rule(
         "part model",
@@ -51,14 +101,32 @@ MODEL_RULES: dict[str, Rule] = {
         rows=ANY_ROWS,
         needs=("NSET",),
         variants={"GENERATE": "2*integer integer?"},
+        honoured={
+            "deck": "NSET; GENERATE; UNSORTED; ~INTERNAL; INSTANCE; ELSET",
+            "section": "NSET; GENERATE",
+        },
     ),
-    "ELEMENT": Rule("part", "TYPE=name; ELSET=+elset", "integer node...", needs=("TYPE",)),
-    "ELGEN": Rule("part", "ELSET=+elset", "2*integer 7*integer?"),
+    "ELEMENT": Rule(
+        "part",
+        "TYPE=name; ELSET=+elset",
+        "integer node...",
+        needs=("TYPE",),
+        honoured={"deck|section": "TYPE; ELSET", "revolve": "TYPE=SPRING1|MASS|ROTARYI; ELSET"},
+    ),
+    "ELGEN": Rule(
+        "part",
+        "ELSET=+elset",
+        "2*integer 7*integer?",
+        honoured={"deck": "ELSET"},
+        calculix=NO_GENERATION,
+    ),
     "ELCOPY": Rule(
         "part",
         "ELEMENT SHIFT=integer; OLD SET=elset; NEW SET=+elset; SHIFT NODES=integer; REFLECT",
         rows=NO_ROWS,
         needs=("ELEMENT SHIFT", "OLD SET", "SHIFT NODES"),
+        honoured={"deck": "ELEMENT SHIFT; OLD SET; NEW SET; SHIFT NODES; REFLECT"},
+        calculix=NO_GENERATION,
     ),
     "ELSET": Rule(
         "part model",
@@ -67,6 +135,10 @@ MODEL_RULES: dict[str, Rule] = {
         rows=ANY_ROWS,
         needs=("ELSET",),
         variants={"GENERATE": "2*integer integer?"},
+        honoured={
+            "deck": "ELSET; GENERATE; ~UNSORTED; ~INTERNAL; INSTANCE",
+            "section": "ELSET; GENERATE",
+        },
     ),
     "SURFACE": Rule(
         "part",
@@ -79,19 +151,47 @@ MODEL_RULES: dict[str, Rule] = {
             "TYPE=NODE": "node number?",
             "TYPE=CYLINDER": ("6*number", "3*number", "name 2*number", "name 4*number?"),
         },
+        honoured={
+            "deck": "NAME; TYPE=ELEMENT|NODE; ~INTERNAL",
+            "section": "NAME; TYPE=ELEMENT",
+            "revolve": "NAME; TYPE=CYLINDER",
+        },
     ),
     "ORIENTATION": Rule(
-        "part", "NAME=+orientation; DEFINITION=name; SYSTEM=name", "number...", needs=("NAME",)
+        "part",
+        "NAME=+orientation; DEFINITION=name; SYSTEM=name",
+        "number...",
+        needs=("NAME",),
+        honoured={"deck": "~NAME; ~SYSTEM; ~DEFINITION"},
     ),
-    "TRANSFORM": Rule("part", "NSET=nset; TYPE=R|C|S", "6*number?", rows=ONE_ROW, needs=("NSET",)),
+    "TRANSFORM": Rule(
+        "part",
+        "NSET=nset; TYPE=R|C|S",
+        "6*number?",
+        rows=ONE_ROW,
+        needs=("NSET",),
+        instead="give degrees of freedom in r, z and twist",
+    ),
     "SOLID SECTION": Rule(
         "part",
         "ELSET=elset; MATERIAL=material; CONTROLS=controls; ORIENTATION=orientation; COMPOSITE",
         "number?",
         rows=(0, 1),
         needs=("ELSET", "MATERIAL|COMPOSITE"),
+        honoured={
+            "deck": "ELSET; MATERIAL; CONTROLS; ~ORIENTATION",
+            "section": "ELSET; MATERIAL; CONTROLS",
+        },
     ),
-    "HOURGLASS STIFFNESS": Rule("part", fields="4*number?", rows=ONE_ROW, under=OF_SECTION),
+    "HOURGLASS STIFFNESS": Rule(
+        "part",
+        fields="4*number?",
+        rows=ONE_ROW,
+        under=OF_SECTION,
+        honoured={"deck|section": ""},
+        data="stiffness:stress",
+        calculix=NO_HOURGLASS,
+    ),
     "SECTION CONTROLS": Rule(
         "part model",
         (
@@ -101,8 +201,17 @@ MODEL_RULES: dict[str, Rule] = {
         "number...",
         rows=(0, 1),
         needs=("NAME",),
+        honoured={"deck|section": "NAME; HOURGLASS=STIFFNESS"},
+        calculix=NO_HOURGLASS,
     ),
-    "SURFACE SECTION": Rule("part", "ELSET=elset; DENSITY=number", rows=NO_ROWS, needs=("ELSET",)),
+    "SURFACE SECTION": Rule(
+        "part",
+        "ELSET=elset; DENSITY=number",
+        rows=NO_ROWS,
+        needs=("ELSET",),
+        honoured={"deck|section": "ELSET"},
+        calculix=NO_REBAR,
+    ),
     "MEMBRANE SECTION": Rule(
         "part",
         (
@@ -113,6 +222,7 @@ MODEL_RULES: dict[str, Rule] = {
         rows=(0, 1),
         needs=("ELSET", "MATERIAL"),
         alone=("NODAL THICKNESS", "MEMBRANE THICKNESS"),
+        instead="use SFMGAX elements with a *SURFACE SECTION and *REBAR LAYER",
     ),
     "SHELL SECTION": Rule(
         "part",
@@ -125,12 +235,16 @@ MODEL_RULES: dict[str, Rule] = {
         rows=ANY_ROWS,
         needs=("ELSET", "MATERIAL|COMPOSITE"),
         variants={"COMPOSITE": "number? integer? name any..."},
+        instead="use SFMGAX elements with a *SURFACE SECTION and *REBAR LAYER",
     ),
     "REBAR LAYER": Rule(
         "part",
         "GEOMETRY=CONSTANT|ANGULAR|LIFT EQUATION; ORIENTATION=orientation",
         "name 3*number? material number? integer? 2*number?",
         under=HOLDS_REBAR,
+        honoured={"deck|section": "GEOMETRY=CONSTANT|ANGULAR"},
+        data="_name, area:area, spacing:length, _position=0, _material, angle=0",
+        calculix=NO_REBAR,
     ),
     "RIGID BODY": Rule(
         "part",
@@ -141,6 +255,11 @@ MODEL_RULES: dict[str, Rule] = {
         "number?",
         rows=ANY_ROWS,
         needs=("REF NODE", "TIE NSET|PIN NSET|ELSET|ANALYTICAL SURFACE"),
+        honoured={
+            "deck": "REF NODE; TIE NSET; ELSET",
+            "section": "REF NODE; TIE NSET",
+            "revolve": "REF NODE; TIE NSET; ANALYTICAL SURFACE",
+        },
     ),
     "EMBEDDED ELEMENT": Rule(
         "part",
@@ -149,6 +268,11 @@ MODEL_RULES: dict[str, Rule] = {
             "ABSOLUTE EXTERIOR TOLERANCE=number"
         ),
         "element 15*element?",
+        honoured={
+            "deck|section": "HOST ELSET; ROUNDOFF TOLERANCE; EXTERIOR TOLERANCE; "
+            "ABSOLUTE EXTERIOR TOLERANCE"
+        },
+        calculix="it embeds no elements",
     ),
     "TIE": Rule(
         "part",
@@ -158,18 +282,46 @@ MODEL_RULES: dict[str, Rule] = {
         ),
         "2*surface",
         needs=("NAME",),
+        honoured={"deck": "~NAME; ADJUST=YES|NO; ~TYPE; POSITION TOLERANCE"},
     ),
-    "MASS": Rule("part", "ELSET=elset", "number", rows=ONE_ROW, needs=("ELSET",)),
-    "ROTARY INERTIA": Rule("part", "ELSET=elset", "6*number?", rows=ONE_ROW, needs=("ELSET",)),
+    "MASS": Rule(
+        "part",
+        "ELSET=elset",
+        "number",
+        rows=ONE_ROW,
+        needs=("ELSET",),
+        honoured={"revolve": "ELSET"},
+        data="mass",
+    ),
+    "ROTARY INERTIA": Rule(
+        "part",
+        "ELSET=elset",
+        "6*number?",
+        rows=ONE_ROW,
+        needs=("ELSET",),
+        honoured={"revolve": "ELSET"},
+        data="I11, I22, I33",
+    ),
     "SPRING": Rule(
         "part",
         "ELSET=elset; ORIENTATION=orientation",
         ("integer? integer?", "number number?"),
         rows=(2, MANY),
         needs=("ELSET",),
+        honoured={"revolve": "ELSET"},
+        data="stiffness",
     ),
-    "MATERIAL": Rule("model", "NAME=+material", rows=NO_ROWS, needs=("NAME",)),
-    "DENSITY": Rule("model", fields="number number?", under=OF_MATERIAL, once="parent"),
+    "MATERIAL": Rule(
+        "model", "NAME=+material", rows=NO_ROWS, needs=("NAME",), honoured={"deck|section": "NAME"}
+    ),
+    "DENSITY": Rule(
+        "model",
+        fields="number number?",
+        under=OF_MATERIAL,
+        once="parent",
+        honoured={"deck|section": ""},
+        data="density:density",
+    ),
     "ELASTIC": Rule(
         "model",
         (
@@ -181,29 +333,64 @@ MODEL_RULES: dict[str, Rule] = {
         under=OF_MATERIAL,
         once="parent",
         variants={"TYPE": "number..."},
+        honoured={"deck|section": "TYPE=ISOTROPIC; MODULI=LONG TERM"},
+        data={"TYPE=ISOTROPIC": "E:stress, nu=0", "TYPE": "", "": "E:stress, nu=0"},
     ),
-    "NO COMPRESSION": Rule("model", rows=NO_ROWS, under=OF_MATERIAL, once="parent"),
+    "NO COMPRESSION": Rule(
+        "model",
+        rows=NO_ROWS,
+        under=OF_MATERIAL,
+        once="parent",
+        honoured={"deck|section": ""},
+        calculix="its elastic law bears compression, and it passes over the keyword",
+    ),
     "HYPERELASTIC": Rule(
         "model",
         (
-            "NEO HOOKE; MOONEY-RIVLIN; POLYNOMIAL; REDUCED POLYNOMIAL; YEOH; ARRUDA-BOYCE; "
-            "OGDEN; VAN DER WAALS; MARLOW; USER; N=1|2|3|4|5|6; MODULI=LONG TERM|INSTANTANEOUS"
+            f"{'; '.join(HYPERELASTIC_LAWS)}; N=1|2|3|4|5|6; MODULI=LONG TERM|INSTANTANEOUS; "
+            "TEST DATA INPUT; POISSON=number; BETA=any; PROPERTIES=integer; TYPE=any; "
+            "DEPENDENCIES=integer"
         ),
         "8*number?",
         alone=HYPERELASTIC_LAWS,
         under=OF_MATERIAL,
         once="parent",
+        variants=dict.fromkeys(("TEST DATA INPUT", *LAWS_NOT_READ), ""),
+        honoured={"deck|section": f"{'; '.join(LAW_CONSTANTS)}; N; MODULI"},
+        instead="give the constants of a law that fits the same tests",
     ),
     "VISCOELASTIC": Rule(
         "model",
-        "TIME=PRONY; FREQUENCY=TABULAR|FORMULA|PRONY",
+        (
+            "TIME=PRONY|RELAXATION TEST DATA|CREEP TEST DATA|FREQUENCY DATA|USER; "
+            "FREQUENCY=TABULAR|FORMULA|PRONY|CREEP TEST DATA|RELAXATION TEST DATA|USER; "
+            "TYPE=any; PRELOAD=any; NONLINEAR; ERRTOL=number; NMAX=integer"
+        ),
         "5*number?",
-        needs=("TIME|FREQUENCY",),
+        needs=("TIME|FREQUENCY|NONLINEAR",),
         under=OF_MATERIAL,
         once="parent",
-        variants={"TIME=PRONY": "2*number? number", "FREQUENCY=TABULAR": "4*number? number"},
+        variants={
+            "TIME=PRONY": "2*number? number",
+            "FREQUENCY=TABULAR": "4*number? number",
+            **dict.fromkeys(("TIME", "FREQUENCY", "NONLINEAR"), ""),
+        },
+        honoured={"deck|section": "TIME=PRONY; FREQUENCY=TABULAR"},
+        data={
+            "TIME=PRONY": "g=0, k=0, tau",
+            "FREQUENCY=TABULAR": "shear loss=0, shear storage=0, bulk loss=0, "
+            "bulk storage=0, frequency",
+        },
+        calculix="its hyperelastic rubber does not relax",
     ),
-    "ACOUSTIC MEDIUM": Rule("model", "BULK MODULUS", "number 2*number?", under=OF_MATERIAL),
+    "ACOUSTIC MEDIUM": Rule(
+        "model",
+        "BULK MODULUS",
+        "number 2*number?",
+        under=OF_MATERIAL,
+        honoured={"section": "BULK MODULUS"},
+        data="bulk modulus:stress",
+    ),
     "FLUID BEHAVIOR": Rule("model", "NAME=+fluid; USER", rows=NO_ROWS, needs=("NAME",)),
     "FLUID CAVITY": Rule(
         "part model",
@@ -216,6 +403,7 @@ MODEL_RULES: dict[str, Rule] = {
         rows=ANY_ROWS,
         needs=("NAME", "REF NODE", "BEHAVIOR|MIXTURE", "SURFACE|ADDED VOLUME"),
         alone=("BEHAVIOR", "MIXTURE"),
+        instead="load the surface by *DSLOAD, and set cavity.share in the case",
     ),
     "AMPLITUDE": Rule(
         "model",
@@ -226,9 +414,15 @@ MODEL_RULES: dict[str, Rule] = {
         ),
         "number...",
         needs=("NAME",),
+        honoured={"deck": "NAME; DEFINITION=TABULAR; TIME=STEP TIME"},
     ),
     "SURFACE INTERACTION": Rule(
-        "part model", "NAME=+interaction", "number?", rows=(0, 1), needs=("NAME",)
+        "part model",
+        "NAME=+interaction",
+        "number?",
+        rows=(0, 1),
+        needs=("NAME",),
+        honoured={"revolve": "NAME"},
     ),
     "SURFACE BEHAVIOR": Rule(
         "part model",
@@ -242,6 +436,8 @@ MODEL_RULES: dict[str, Rule] = {
         under=("SURFACE INTERACTION",),
         once="parent",
         variants={"PRESSURE-OVERCLOSURE=LINEAR": "number"},
+        honoured={"revolve": "PRESSURE-OVERCLOSURE=LINEAR"},
+        data="slope",
     ),
     "FRICTION": Rule(
         "part model",
@@ -251,6 +447,8 @@ MODEL_RULES: dict[str, Rule] = {
         alone=("ELASTIC SLIP", "SLIP TOLERANCE", "ROUGH", "LAGRANGE"),
         under=("SURFACE INTERACTION",),
         once="parent",
+        honoured={"revolve": "ELASTIC SLIP"},
+        data="coefficient",
     ),
     "CONTACT PAIR": Rule(
         "model",
@@ -260,6 +458,9 @@ MODEL_RULES: dict[str, Rule] = {
         ),
         "surface surface?",
         needs=("INTERACTION",),
+        honoured={"revolve": "INTERACTION; TYPE=SURFACE TO SURFACE"},
+        data="slave, master",
+        instead="share the bead's nodes with the rim, or *TIE it: a fixed bead is honoured",
     ),
     "SYMMETRIC MODEL GENERATION": Rule(
         "model",
@@ -276,6 +477,8 @@ MODEL_RULES: dict[str, Rule] = {
             "REFLECT=LINE": "6*number",
             "REFLECT=PLANE": ("6*number", "3*number"),
         },
+        honoured={"deck": "REFLECT=LINE", "revolve": "REVOLVE"},
+        calculix="it reflects and revolves nothing",
     ),
     "SYMMETRIC RESULTS TRANSFER": Rule(
         "model",
@@ -283,5 +486,6 @@ MODEL_RULES: dict[str, Rule] = {
         rows=NO_ROWS,
         after=("SYMMETRIC MODEL GENERATION",),
         once="job",
+        honoured={"revolve": "STEP; INC"},
     ),
 }

@@ -13,22 +13,41 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
+from typing import NamedTuple, TypeVar
 
 MANY = 10**9
+Choice = TypeVar("Choice")
+QUIET = "~"  # before an option that is honoured as it changes no answer, as a step's name
 NO_ROWS, ONE_ROW, ANY_ROWS = (0, 0), (1, 1), (0, MANY)
 Fields = str | tuple[str, ...]  # of every line, or of the first lines and then of all others
 
 
+class Field(NamedTuple):
+    """A data field: its name, the kind of its unit ("" for none), its default."""
+
+    name: str
+    unit: str = ""
+    default: float | None = None
+
+
 @dataclass(frozen=True)
 class Rule:
-    """Of one keyword.
+    """The record of one keyword: the manual's rule, and who honours what of it.
 
     options: its parameters; needs: of each, split at |, one must be given; alone: those that
     exclude each other; under: keywords of which it is an option; after: of which one must stand
     before it, or in the job that it goes on from; within: procedures of the steps that it belongs
     to; once: in the ``job``, the ``step`` or its ``parent``; rows: how few and how many data lines;
-    variants: their fields where a parameter is given that changes them.
+    variants: their fields where a parameter is given that changes them ("": any or none).
+
+    honoured: by place ("deck", "deck step": a user's section; "section", "revolve", "step": the
+    bundled solver's jobs), the options that are honoured there; a value after = is the only one.
+    data: names of the data fields that are honoured, as "E:stress, nu=0", by parameter if they
+    differ; one that begins with _ is no number that may be set. is_output: asks for output or says
+    how to iterate, so that it changes no answer. is_judged: False if its parameters and data are
+    not checked. instead: what a user may do if it is not honoured. calculix: why CalculiX has
+    nothing for it.
     """
 
     level: str
@@ -42,9 +61,59 @@ class Rule:
     within: tuple[str, ...] = ()
     once: str = ""
     variants: Mapping[str, Fields] = field(default_factory=dict)
+    honoured: Mapping[str, str] = field(default_factory=dict)
+    data: str | Mapping[str, str] = ""
+    is_output: bool = False
+    is_judged: bool = True
+    instead: str = ""
+    calculix: str = ""
 
     @cached_property
     def parameters(self) -> dict[str, str]:
         """What each may be: words in capitals, split at |, or a kind."""
         pairs = (option.partition("=") for option in self.options.split("; ") if option)
         return {name: value for name, _, value in pairs}
+
+    @cached_property
+    def options_at(self) -> dict[str, dict[str, tuple[str, ...] | None]]:
+        """By place: the options that are honoured, and the values of each, None for any."""
+        return {
+            place: {
+                name.removeprefix(QUIET): tuple(values.split("|")) if equals else self._words(name)
+                for name, equals, values in (o.partition("=") for o in text.split("; ") if o)
+            }
+            for places, text in self.honoured.items()
+            for place in places.split("|")
+        }
+
+    def _words(self, name: str) -> tuple[str, ...] | None:
+        words = self.parameters[name.removeprefix(QUIET)]
+        return None if words.islower() else tuple(words.split("|"))
+
+    def forms(self, parameters: Mapping[str, str]) -> Fields:
+        """The form of the data lines with these parameters."""
+        return _variant(self.variants, parameters, self.fields)
+
+    def fields_of(self, parameters: Mapping[str, str]) -> list[Field]:
+        """The named data fields with these parameters."""
+        if isinstance(self.data, str):
+            return _fields(self.data)
+        return _fields(_variant(self.data, parameters, ""))
+
+
+def _variant(
+    variants: Mapping[str, Choice], parameters: Mapping[str, str], default: Choice
+) -> Choice:
+    """The first variant whose parameter, or parameter=value, is given; "" is given always."""
+    given = {"", *parameters, *(f"{key}={value}" for key, value in parameters.items())}
+    return next((each for key, each in variants.items() if key in given), default)
+
+
+@cache
+def _fields(text: str) -> list[Field]:
+    fields = []
+    for each in text.split(", ") if text else ():
+        name, equals, default = each.partition("=")
+        name, _, unit = name.partition(":")
+        fields.append(Field(name, unit, float(default) if equals else None))
+    return fields

@@ -1,9 +1,16 @@
-"""The table of keywords: one record each, of the model and of steps."""
+"""The table of keywords: one record each, which all readers and checks go by."""
 
 from __future__ import annotations
 
 from .model_rules import MODEL_RULES
+from .other_keywords import OTHER_KEYWORDS
 from .rule import Rule
 from .step_rules import STEP_RULES
 
-RULES: dict[str, Rule] = {**MODEL_RULES, **STEP_RULES}
+RULES: dict[str, Rule] = {**MODEL_RULES, **STEP_RULES, **OTHER_KEYWORDS}
+OUTPUT_KEYWORDS = frozenset(name for name, rule in RULES.items() if rule.is_output)
+MATERIAL_OPTIONS = frozenset(
+    name
+    for name, rule in RULES.items()
+    if rule.under == ("MATERIAL",) and "deck" in rule.options_at
+)

@@ -160,7 +160,7 @@ def test_hourglass_stiffness_is_of_the_section_above_it() -> None:
         ),
         ("*MATERIAL, NAME=GUM\n", "", 14, "*HYPERELASTIC must follow a *MATERIAL"),
         ("1100.\n", "1100.\n*MATERIAL, NAME=GUM\n", 19, "material GUM is defined twice"),
-        ("MOONEY-RIVLIN\n", "MOONEY-RIVLIN, MODULI=FAST\n", 15, "MODULI=FAST of *HYPERELASTIC"),
+        ("MOONEY-RIVLIN\n", "MOONEY-RIVLIN, MODULI=FAST\n", 15, "MODULI=FAST is not honoured"),
         ("5.085D-8\n", "5.085D-8\n1E6, 0., 1.\n", 15, "takes one data line, got 2"),
         ("1E6, 0., 5.085D-8", "1E6", 13, "incompressible"),
         ("1100.\n", "1100.\n*VISCOELASTIC, TIME=PRONY\n-0.1, 0., 0.1\n", 19, "not be negative"),
@@ -245,7 +245,7 @@ def test_a_layer_fans_out_with_the_radius() -> None:
         ("4E-7", "0.0", 23, "area and spacing of a layer must be positive"),
         ("1E-3", "-1E-3", 23, "area and spacing of a layer must be positive"),
         ("*ELASTIC", "*NO COMPRESSION\n*ELASTIC", 25, "*NO COMPRESSION must follow an *ELASTIC"),
-        ("0.3\n", "0.3\n*NO COMPRESSION\n1.\n", 28, "*NO COMPRESSION has no data"),
+        ("0.3\n", "0.3\n*NO COMPRESSION\n1.\n", 28, "takes no data lines"),
         ("CORD, 90.0", "GUM, 90.0", 23, "material GUM of a rebar layer is not *ELASTIC"),
         ("CORD, 90.0", "GLUE, 90.0", 22, "material GLUE is not defined"),
         ("0.3\n", "0.3\n*VISCOELASTIC, TIME=PRONY\n.1, 0., 1.\n", 23, "cords do not relax"),
@@ -280,9 +280,9 @@ def test_sets_are_numbers_ranges_and_other_sets() -> None:
 DATA = {  # keyword: where it stands, and a line of all data that are honoured
     "DENSITY": ("section", "1100."),
     "ELASTIC": ("section", "1E9, 0.3"),
-    "HYPERELASTIC": ("section", "1E6, 2., 0., 1., 0., 1., 5E-8, 0."),
     "ACOUSTIC MEDIUM": ("section", "4.8E5"),
-    "VISCOELASTIC": ("section", "0.1, 0.1, 0.1, 0.1, 20."),
+    "VISCOELASTIC, FREQUENCY=TABULAR": ("section", "0.1, 0.1, 0.1, 0.1, 20."),
+    "VISCOELASTIC, TIME=PRONY": ("section", "0.1, 0.1, 0.1"),
     "HOURGLASS STIFFNESS": ("section", "1."),
     "REBAR LAYER": ("section", "PLY, 4E-7, 1E-3, 0., CORD, 90."),
     "SPRING": ("revolve", "1E6"),
@@ -295,13 +295,13 @@ DATA = {  # keyword: where it stands, and a line of all data that are honoured
     "DSLOAD": ("step", "CAVITY, P, 240E3"),
     "DLOAD": ("step", "ALL, CENTRIF, 1., 0., 0., 0., 0., 1., 0."),
     "CLOAD": ("step", "9, 1, -4000."),
-    "STATIC": ("step", "0.1, 1."),
+    "STATIC": ("step", "0.1, 1., 1E-5, 1."),
     "FREQUENCY": ("step", "20, 1., 200., -10."),
     "COMPLEX FREQUENCY": ("step", "20"),
 }
 
 
-@pytest.mark.parametrize("name", grammar.MAX_FIELDS)
+@pytest.mark.parametrize("name", DATA)
 def test_a_datum_that_is_not_honoured_is_refused(name: str) -> None:
     """ABAQUS would heed one more on the line: temperature, amplitude, a limit. A blank is none."""
     where, data = DATA[name]
@@ -314,7 +314,7 @@ def test_a_datum_that_is_not_honoured_is_refused(name: str) -> None:
 
     check(data)
     check(f"{data}, ,")
-    with pytest.raises(DeckError, match=f"data '7.' of \\*{name} is not honoured"):
+    with pytest.raises(DeckError, match=r"data '7.' is not honoured"):
         check(f"{data}, 7.")
 
 

@@ -2,7 +2,7 @@
 one thing that its manual asks.
 
 python -m tests.deck.abaqus_mutants [--count N] [--seed S]: how many of each kind the grammar of
-`solvers/abaqus/grammar.py` catches. The kinds are of texts, and know nothing of the grammar.
+`solvers/language/table.py` catches. The kinds are of texts, and know nothing of the grammar.
 """
 
 from __future__ import annotations

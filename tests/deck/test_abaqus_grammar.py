@@ -6,7 +6,7 @@ import re
 
 import pytest
 from tyrecal_solvers.abaqus.check import findings
-from tyrecal_solvers.abaqus.grammar import RULES
+from tyrecal_solvers.language.table import RULES
 from tyrecal_solvers.language.text import Block, read_keywords
 
 from ..conftest import ROOT

@@ -235,7 +235,7 @@ def test_turning_decks_that_are_refused(tmp_path, old: str, new: str, words: str
         ("*MASS, ELSET=POINT_MASS", "*MASS, ELSET=NOTHING", "NOTHING is no set of MASS elements"),
         ("*SPRING, ELSET=ROAD_RADIAL\n1\n", "*SPRING, ELSET=ROAD_RADIAL\n4\n", "1, 2 or 3, got 4"),
         ("*SPRING, ELSET=ROAD_RADIAL\n1\n", "*SPRING, ELSET=ROAD_RADIAL\n", "takes 2 data lines"),
-        ("TYPE=MASS", "TYPE=MASSES", "TYPE=MASSES of \\*ELEMENT is not honoured"),
+        ("TYPE=MASS", "TYPE=MASSES", "ELEMENT: TYPE=MASSES is not honoured"),
     ],
 )
 def test_attached_decks_that_are_refused(tmp_path, old: str, new: str, words: str) -> None:

@@ -160,7 +160,7 @@ def _say_what_solvers_take(
     for sentence in asked["refuses"]:
         terminal.error(f"ABAQUS refuses by its manual: {sentence}")
     for sentence in asked["unknown"][:MOST_SAID]:
-        terminal.warn(f"ABAQUS may not take it: {sentence}")
+        terminal.warn(f"not sure for ABAQUS: {sentence}")
     if more := len(asked["unknown"][MOST_SAID:]):
         terminal.warn(f"... and {more} more")
     for sentence in lacking:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection
 
 from ..case import LoadedCase
 from ..own_deck.flat import Flat
-from ..own_deck.numbers import DIMENSIONS, OF_COMPLIANCE, OF_STRESS, moduli
+from ..own_deck.numbers import moduli, modulus_sign
 from ..own_deck.text import OwnDeckError
 from .edit import changed, with_part
 
@@ -18,9 +18,9 @@ def stiffer(factor: float, bulk: bool) -> Change:
     """Shear constants times a factor; with ``bulk`` its modulus too."""
 
     def change(field: str, number: float) -> float:
-        if DIMENSIONS.get(field) == OF_STRESS:
-            return factor * number
-        return number / factor if bulk and DIMENSIONS.get(field) == OF_COMPLIANCE else number
+        if modulus_sign(field) < 0:
+            return number / factor if bulk else number
+        return factor * number if modulus_sign(field) else number
 
     return change
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from .flat_mesh import FlatMesh, flat_mesh
-from .grammar import MATERIAL, Sorted
+from .grammar import Sorted
 from .model import Assigned, Model
-from .numbers import DIMENSIONS, named_fields, written
-from .text import Block, Place, Row
+from .numbers import written
+from .text import DIMENSIONS, MATERIAL_OPTIONS, Block, Place, Row, fields_of, placed_fields
 
 SECTION_OPTIONS = ("HOURGLASS STIFFNESS", "REBAR LAYER")
 
@@ -87,7 +87,7 @@ def flatten(found: Sorted, model: Model, length: float, mass: float) -> Flat:
         if section.block.rows:
             raise section.block.refused("takes no data", section.block.rows[0])
         if not options[section.block]:
-            raise section.block.refused("without *REBAR LAYER it holds nothing: delete it")
+            raise section.block.refused("has no *REBAR LAYER under it: give its cords")
         for option in options[section.block]:
             plies += _layers(write, section, k, option, blocks, used, mesh, length)
     for block in found.model:
@@ -134,15 +134,15 @@ class _Writer:
         self.lines.append(text)
         self.origins.append(place)
 
-    def scale(self, name: str) -> float:
-        """Of a field of this name, to SI units."""
-        L, M, _ = DIMENSIONS.get(name, (0, 0, 0))
+    def scale(self, unit: str) -> float:
+        """The factor to SI units on a field of a kind of unit."""
+        L, M, _ = DIMENSIONS.get(unit, (0, 0, 0))
         return self.length**L * self.mass**M
 
     def block(self, block: Block, head: str, angular: bool = False) -> None:
         """A keyword line, and the block's data."""
         self.line(head, block.place)
-        scales = {(i, j): self.scale(name) for name, i, j in named_fields(block)}
+        scales = {(i, j): self.scale(field.unit) for field, i, j in placed_fields(block)}
         for i, row in enumerate(block.rows):
             fields = list(row.fields)
             for j, text in enumerate(fields):
@@ -179,10 +179,10 @@ def _materials(blocks: Sequence[Block]) -> dict[str, list[Block]]:
             if block.rows:
                 raise block.refused("takes no data")
             current = found[name] = [block]
-        elif block.name in MATERIAL:
+        elif block.name in MATERIAL_OPTIONS:
             if any(each.name == block.name for each in current):
                 raise block.refused(f"stands twice under {current[0].get('NAME')}")
-            list(named_fields(block))
+            fields_of(block)
             current.append(block)
     return found
 

@@ -1,145 +1,13 @@
-"""What is honoured of a user's deck, what is passed over because it only asks for output, and what
-stands where. All else would change the answer, and is refused.
+"""The blocks of a user's deck by what they are: the model, the step that inflates, what only asks
+for output. What would change the answer and is not honoured is refused.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 
-from .text import NO_ROWS, RULES, Block
-
-Values = tuple[str, ...] | None  # that a parameter may have; None: any, "": without one
-
-MESH: dict[str, dict[str, Values]] = {
-    "NODE": {"NSET": None, "SYSTEM": ("R",)},
-    "SYSTEM": {},
-    "NGEN": {"NSET": None, "LINE": ("C",)},
-    "NFILL": {"NSET": None, "BIAS": None},
-    "NCOPY": {
-        "CHANGE NUMBER": None,
-        "OLD SET": None,
-        "NEW SET": None,
-        "SHIFT": ("",),
-        "REFLECT": ("LINE",),
-        "MULTIPLE": None,
-    },
-    "NSET": {
-        "NSET": None,
-        "GENERATE": ("",),
-        "UNSORTED": ("",),
-        "INTERNAL": ("",),
-        "INSTANCE": None,
-        "ELSET": None,
-    },
-    "ELEMENT": {"TYPE": None, "ELSET": None},
-    "ELGEN": {"ELSET": None},
-    "ELCOPY": {
-        "ELEMENT SHIFT": None,
-        "OLD SET": None,
-        "NEW SET": None,
-        "SHIFT NODES": None,
-        "REFLECT": ("",),
-    },
-    "ELSET": {
-        "ELSET": None,
-        "GENERATE": ("",),
-        "UNSORTED": ("",),
-        "INTERNAL": ("",),
-        "INSTANCE": None,
-    },
-    "SURFACE": {"NAME": None, "TYPE": ("ELEMENT", "NODE"), "INTERNAL": ("",)},
-    "SOLID SECTION": {"ELSET": None, "MATERIAL": None, "CONTROLS": None, "ORIENTATION": None},
-    "HOURGLASS STIFFNESS": {},
-    "SURFACE SECTION": {"ELSET": None},
-    "REBAR LAYER": {"GEOMETRY": ("CONSTANT", "ANGULAR")},
-    "RIGID BODY": {"REF NODE": None, "TIE NSET": None, "ELSET": None},
-    "EMBEDDED ELEMENT": {
-        "HOST ELSET": None,
-        "ROUNDOFF TOLERANCE": None,
-        "EXTERIOR TOLERANCE": None,
-        "ABSOLUTE EXTERIOR TOLERANCE": None,
-    },
-    "TIE": {"NAME": None, "ADJUST": ("YES", "NO"), "TYPE": None, "POSITION TOLERANCE": None},
-    "ORIENTATION": {"NAME": None, "SYSTEM": None, "DEFINITION": None},
-}
-MATERIAL: dict[str, dict[str, Values]] = {
-    "DENSITY": {},
-    "ELASTIC": {"TYPE": ("ISOTROPIC",), "MODULI": ("LONG TERM",)},
-    "HYPERELASTIC": {
-        "NEO HOOKE": ("",),
-        "MOONEY-RIVLIN": ("",),
-        "REDUCED POLYNOMIAL": ("",),
-        "YEOH": ("",),
-        "POLYNOMIAL": ("",),
-        "ARRUDA-BOYCE": ("",),
-        "OGDEN": ("",),
-        "N": ("1", "2", "3", "4", "5", "6"),
-        "MODULI": ("LONG TERM", "INSTANTANEOUS"),
-    },
-    "NO COMPRESSION": {},
-    "VISCOELASTIC": {"TIME": ("PRONY",), "FREQUENCY": ("TABULAR",)},
-}
-MODEL_LEVEL: dict[str, dict[str, Values]] = {
-    "PARAMETER": {},
-    "PART": {"NAME": None},
-    "END PART": {},
-    "ASSEMBLY": {"NAME": None},
-    "END ASSEMBLY": {},
-    "INSTANCE": {"NAME": None, "PART": None, "NSET": None, "ELSET": None},
-    "END INSTANCE": {},
-    "SECTION CONTROLS": {"NAME": None, "HOURGLASS": ("STIFFNESS",)},
-    "MATERIAL": {"NAME": None},
-    "BOUNDARY": {"OP": ("MOD", "NEW")},
-    "AMPLITUDE": {"NAME": None, "DEFINITION": ("TABULAR",), "TIME": ("STEP TIME",)},
-    "SYMMETRIC MODEL GENERATION": {"REFLECT": ("LINE",)},
-}
-STEP_LEVEL: dict[str, dict[str, Values]] = {
-    "STEP": {
-        "NAME": None,
-        "NLGEOM": ("YES", ""),
-        "INC": None,
-        "EXTRAPOLATION": ("LINEAR", "PARABOLIC", "NO"),
-        "UNSYMM": ("YES", "NO"),
-        "CONVERT SDI": ("YES", "NO"),
-    },
-    "STATIC": {"LONG TERM": ("",), "DIRECT": ("",)},
-    "BOUNDARY": {"OP": ("MOD", "NEW"), "AMPLITUDE": None},
-    "DSLOAD": {"OP": ("MOD", "NEW"), "AMPLITUDE": None},
-    "DLOAD": {"OP": ("MOD", "NEW"), "AMPLITUDE": None},
-    "END STEP": {},
-}
-# that ask for output or a listing, or only say how to iterate: they are taken in any level
-NO_EFFECT = {
-    *("HEADING", "PREPRINT", "RESTART", "OUTPUT", "NODE OUTPUT", "ELEMENT OUTPUT", "MONITOR"),
-    *("CONTACT OUTPUT", "ENERGY OUTPUT", "MODAL OUTPUT", "NODE PRINT", "EL PRINT", "NODE FILE"),
-    *("EL FILE", "ENERGY PRINT", "ENERGY FILE", "CONTACT PRINT", "CONTACT FILE", "MODAL FILE"),
-    *("MODAL PRINT", "FILE FORMAT", "FILE OUTPUT", "PRINT", "SECTION PRINT", "SECTION FILE"),
-    *("INTEGRATED OUTPUT", "INTEGRATED OUTPUT SECTION", "FILTER", "TIME POINTS", "CONTROLS"),
-    *("SOLVER CONTROLS", "DIAGNOSTICS", "DAMPING", "CONDUCTIVITY", "SPECIFIC HEAT"),
-}
-INSTEAD = {  # what would do in place of keywords that are often met
-    "HYSTERESIS": "delete it: the long-term state and its small vibrations do not have it",
-    "CONTACT PAIR": "share the bead's nodes with the rim, or *TIE it: a fixed bead is honoured",
-    "CONTACT": "share the bead's nodes with the rim, or *TIE it: a fixed bead is honoured",
-    "MEMBRANE SECTION": "use SFMGAX elements with a *SURFACE SECTION and *REBAR LAYER",
-    "REBAR": "use SFMGAX elements with a *SURFACE SECTION and *REBAR LAYER",
-    "SHELL SECTION": "use SFMGAX elements with a *SURFACE SECTION and *REBAR LAYER",
-    "TRANSFORM": "give degrees of freedom in r, z and twist",
-    "MPC": "share nodes, or *TIE surfaces of the same nodes",
-    "EQUATION": "share nodes, or *TIE surfaces of the same nodes",
-    "EXPANSION": "delete it: no temperature changes here",
-    "TEMPERATURE": "give each material the constants of its temperature",
-    "INITIAL CONDITIONS": "delete it: the tyre starts at rest, without stress",
-    "CLOAD": "delete it: only the inflation pressure acts",
-    "FLUID CAVITY": "load the surface by *DSLOAD, and set cavity.share in the case",
-    "PRE-TENSION SECTION": "delete it, or model the bead with its final stress-free shape",
-    "DESIGN PARAMETER": "give each number a mark {{ name }}, or use *PARAMETER",
-    "MAP SOLUTION": "begin with the section's own inflation",
-    "USER MATERIAL": "write a *HYPERELASTIC that fits the same tests",
-    "UEL PROPERTY": "use the elements that the manual has",
-}
+from .text import MATERIAL_OPTIONS, OUTPUT_KEYWORDS, RULES, Block, check_honoured
 
 
 @dataclass
@@ -176,16 +44,16 @@ def sort(blocks: Sequence[Block]) -> Sorted:
                     _step(step, found)
                 step, after_a_step = None, True
             continue
-        if name in NO_EFFECT:
+        if name in OUTPUT_KEYWORDS:
             found.passed.append(block)
             continue
-        if name in ("END STEP", *STEP_LEVEL) and name != "BOUNDARY":
+        if name in RULES and [*RULES[name].options_at] == ["deck step"]:
             raise block.refused("stands outside a step")
         if after_a_step:
             raise block.refused("stands after a step: the model's keywords stand before *STEP")
-        _check(block, {**MESH, **MATERIAL, **MODEL_LEVEL}, "the model")
+        check_honoured(block, "deck")
         found.model.append(block)
-        if name in MATERIAL:
+        if name in MATERIAL_OPTIONS:
             if over is None or over.name != "MATERIAL":
                 raise block.refused("must follow a *MATERIAL")
         elif name == "REBAR LAYER":
@@ -210,7 +78,7 @@ def sort(blocks: Sequence[Block]) -> Sorted:
         inside = part or assembly
         if inside and name in ("MATERIAL", "PARAMETER", "AMPLITUDE", "BOUNDARY"):
             raise block.refused("belongs to the model, outside *PART and *ASSEMBLY")
-        if name in MATERIAL and inside:
+        if name in MATERIAL_OPTIONS and inside:
             raise block.refused("belongs to the model, outside *PART and *ASSEMBLY")
     if step is not None:
         raise step[0].refused("has no *END STEP: the deck is cut off")
@@ -227,10 +95,10 @@ def _step(step: list[Block], found: Sorted) -> None:
     """A step up to the first that inflates, which is it or only holds nodes."""
     kept = []
     for block in step:
-        if block.name in NO_EFFECT:
+        if block.name in OUTPUT_KEYWORDS:
             found.passed.append(block)
         else:
-            _check(block, STEP_LEVEL, "a step")
+            check_honoured(block, "deck step")
             kept.append(block)
     held = [block for block in kept if block.name == "BOUNDARY"]
     if new := [block for block in held if block.get("OP") == "NEW"]:
@@ -246,26 +114,3 @@ def _step(step: list[Block], found: Sorted) -> None:
         found.inflation = kept
         return
     found.model.extend(held)  # what an earlier step holds, stays held
-
-
-def _check(block: Block, known: dict[str, dict[str, Values]], where: str) -> None:
-    if block.name not in known:
-        close = get_close_matches(block.name, [*known, *NO_EFFECT], 1, 0.8)
-        hint = INSTEAD.get(block.name) or (f"did you mean *{close[0]}?" if close else "")
-        hint = hint or "delete it where it changes nothing"
-        raise block.refused(f"is not honoured in {where}; {hint}")
-    rule = RULES.get(block.name)
-    if block.rows and rule and rule.rows == NO_ROWS:
-        raise block.refused("takes no data lines", block.rows[0])
-    parameters = known[block.name]
-    for name, value in block.parameters.items():
-        if name not in parameters:
-            close = get_close_matches(name, parameters, 1)
-            hint = f"; did you mean {close[0]}?" if close else ""
-            raise block.refused(f"the parameter {name} is not honoured{hint}")
-        values = parameters[name]
-        if values is not None and value not in values:
-            expected = " or ".join(v or "no value" for v in values)
-            raise block.refused(f"{name}={value} is not honoured, only {expected}")
-        if values is None and not value:
-            raise block.refused(f"{name} needs a value")

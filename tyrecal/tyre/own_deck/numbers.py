@@ -10,89 +10,15 @@ import ast
 import math
 import operator
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from .text import Block, Row, named
+from .text import MATERIAL_OPTIONS, Block, Row, named, placed_fields
 
 DECK_MARK = re.compile(r"\{\{\s*([A-Za-z][A-Za-z0-9_\-]*)\s*\}\}")
 PARAMETER = re.compile(r"<\s*(\w+)\s*>")
-LAYER = ("", "area", "spacing", "", "", "angle")  # the data fields of *REBAR LAYER
-LAW_CONSTANTS: dict[
-    str, Callable[[int], list[str]]
-] = {  # the constants of *HYPERELASTIC, of order N
-    "NEO HOOKE": lambda N: ["C10", "D1"],
-    "MOONEY-RIVLIN": lambda N: ["C10", "C01", "D1"],
-    "YEOH": lambda N: [*_each("C{}0", 3), *_each("D{}", 3)],
-    "REDUCED POLYNOMIAL": lambda N: [*_each("C{}0", N), *_each("D{}", N)],
-    "POLYNOMIAL": lambda N: [
-        *(f"C{total - j}{j}" for total in range(1, N + 1) for j in range(total + 1)),
-        *_each("D{}", N),
-    ],
-    "ARRUDA-BOYCE": lambda N: ["mu", "lambda_m", "D1"],
-    "OGDEN": lambda N: [
-        *(name for i in range(1, N + 1) for name in (f"mu{i}", f"alpha{i}")),
-        *_each("D{}", N),
-    ],
-}
-FIELDS = {
-    "DENSITY": ["density"],
-    "ELASTIC": ["E", "nu"],
-    "PRONY": ["g", "k", "tau"],
-    "TABULAR": ["shear loss", "shear storage", "bulk loss", "bulk storage", "frequency"],
-    "HOURGLASS STIFFNESS": ["stiffness"],
-}
-# L, M, T exponents of the unit of a field, by its name; those not here have none
-OF_STRESS, OF_COMPLIANCE = (-1, 1, -2), (1, -1, 2)
-DIMENSIONS: dict[str, tuple[int, int, int]] = {
-    **dict.fromkeys(("E", "stiffness", "mu", "pressure"), OF_STRESS),
-    **dict.fromkeys(("D1", "D2", "D3", "D4", "D5", "D6"), OF_COMPLIANCE),
-    **dict.fromkeys((f"mu{i}" for i in range(1, 7)), OF_STRESS),
-    **dict.fromkeys((f"C{i}{j}" for i in range(7) for j in range(7)), OF_STRESS),
-    "density": (-3, 1, 0),
-    "area": (2, 0, 0),
-    "spacing": (1, 0, 0),
-    "length": (1, 0, 0),
-}
+IN_PATHS = {*MATERIAL_OPTIONS, "REBAR LAYER"}  # blocks whose numbers have paths
 Numbers = Mapping[str, float]
-
-
-def _each(form: str, count: int) -> list[str]:
-    return [form.format(i) for i in range(1, count + 1)]
-
-
-def field_names(block: Block) -> list[str]:
-    """Names of the data fields of a material's option; of one over several lines, of all."""
-    if block.name == "HYPERELASTIC":
-        laws = [law for law in LAW_CONSTANTS if law in block.parameters]
-        if len(laws) > 1:
-            raise block.refused(f"{laws[0]} and {laws[1]} are two laws")
-        order = int(block.parameters.get("N", "1"))
-        return LAW_CONSTANTS[laws[0] if laws else "POLYNOMIAL"](order)
-    if block.name == "ELASTIC" and block.get("TYPE", "ISOTROPIC") != "ISOTROPIC":
-        return []
-    if block.name == "VISCOELASTIC":
-        return FIELDS["PRONY" if "TIME" in block.parameters else "TABULAR"]
-    return FIELDS.get(block.name, [])
-
-
-def named_fields(block: Block) -> Iterator[tuple[str, int, int]]:
-    """Name, row and field of the numbers of a material's option or a rebar layer."""
-    if block.name == "REBAR LAYER":
-        for i, row in enumerate(block.rows):
-            yield from ((name, i, j) for j, name in enumerate(LAYER) if name and row.text(j))
-        return
-    names = field_names(block)
-    if block.name == "HYPERELASTIC":  # eight constants a line
-        for k, name in enumerate(names):
-            i, j = divmod(k, 8)
-            if i < len(block.rows) and block.rows[i].text(j):
-                yield name, i, j
-        return
-    for i, row in enumerate(block.rows):
-        for j, name in enumerate(names):
-            if row.text(j):
-                yield name, i, j
 
 
 def paths(blocks: Sequence[Block]) -> dict[str, tuple[int, int, int]]:
@@ -113,7 +39,7 @@ def paths(blocks: Sequence[Block]) -> dict[str, tuple[int, int, int]]:
                 if plain_number(value):
                     found[f"parameter / {name}"] = place, i, -1
             continue
-        for name, i, j in named_fields(block):
+        for (name, *_), i, j in placed_fields(block) if block.name in IN_PATHS else ():
             row = block.rows[i]
             if not plain_number(row.text(j)):
                 continue
@@ -121,8 +47,6 @@ def paths(blocks: Sequence[Block]) -> dict[str, tuple[int, int, int]]:
                 own = row.name(0)
                 path = f"rebar {own} / {name}"
                 path = section + path if layers.count(own) > 1 else path
-            elif block.name == "HOURGLASS STIFFNESS":
-                continue
             else:
                 line = (
                     f"row {i + 1} / "
@@ -137,10 +61,16 @@ def paths(blocks: Sequence[Block]) -> dict[str, tuple[int, int, int]]:
 
 def moduli(numbers: Iterable[str], material: str) -> dict[str, int]:
     """Paths of a material's moduli, -1 where it is their reciprocal."""
-    signs = {OF_STRESS: 1, OF_COMPLIANCE: -1}
     own = (path for path in numbers if path.startswith(f"material {material} / "))
-    kinds = {path: DIMENSIONS.get(path.rpartition(" / ")[2]) for path in own}
-    return {path: signs[kind] for path, kind in kinds.items() if kind in signs}
+    signs = {path: modulus_sign(path.rpartition(" / ")[2]) for path in own}
+    return {path: sign for path, sign in signs.items() if sign}
+
+
+def modulus_sign(name: str) -> int:
+    """1 for a field that is a modulus, -1 for the reciprocal of one, 0 for any other."""
+    if re.fullmatch(r"D[1-6]", name):
+        return -1
+    return int(bool(re.fullmatch(r"E|stiffness|mu\d?|C\d\d", name)))
 
 
 def assigned(row: Row) -> tuple[str, str]:

@@ -13,16 +13,18 @@ from typing import Any, Literal
 from . import numbers as numbers_of
 from .flat import SECTION_OPTIONS, Flat, flatten
 from .gauge import Gauges, thickened
-from .grammar import MESH, NO_EFFECT, Sorted, sort
+from .grammar import Sorted, sort
 from .model import Model, build
-from .text import Block, OwnDeckError, Place, read_blocks
+from .text import OUTPUT_KEYWORDS, RULES, Block, OwnDeckError, Place, read_blocks
 
 Units = Literal["m", "mm"]
 UNIT_LENGTH = {"m": 1.0, "mm": 1e-3}  # of a unit of length, m
 UNIT_MASS = {"m": 1.0, "mm": 1e3}  # of a unit of mass, kg: mm, t, s, MPa
 DENSITIES = {"m": (300.0, 2e4), "mm": (3e-10, 2e-8)}  # of tyres' materials
-TOPOLOGY = {"PART", "END PART", "INSTANCE", "END INSTANCE", "ASSEMBLY", "END ASSEMBLY"}
-TOPOLOGY |= {"SYMMETRIC MODEL GENERATION", "BOUNDARY", "DSLOAD", "DLOAD", *MESH}
+TOPOLOGY = {"PART", "ASSEMBLY", "SYMMETRIC MODEL GENERATION", "BOUNDARY", "DSLOAD", "DLOAD"}
+TOPOLOGY |= {
+    name for name, rule in RULES.items() if rule.is_judged and "part" in rule.level.split()
+}
 TOPOLOGY -= {*SECTION_OPTIONS}
 
 
@@ -73,7 +75,7 @@ class OwnDeck:
                 for i, row in enumerate(block.rows)
                 for j, text in enumerate(row.fields)
             ]
-            if block.name not in NO_EFFECT:
+            if block.name not in OUTPUT_KEYWORDS:
                 said.append((block.name, sorted(block.parameters.items()), fields))
         return sha256(json.dumps([self.units, said]).encode()).hexdigest()
 

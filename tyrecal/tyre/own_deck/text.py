@@ -6,19 +6,36 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # mypy knows the folder by its own name
-    from solvers.language.rule import NO_ROWS
+    from solvers.language.fields import DIMENSIONS, fields_of, placed_fields
+    from solvers.language.honour import check_honoured
     from solvers.language.spelling import named
-    from solvers.language.table import RULES
+    from solvers.language.table import MATERIAL_OPTIONS, OUTPUT_KEYWORDS, RULES
     from solvers.language.text import Block, Place, Reader, Row, names_of
 else:
-    from tyrecal_solvers.language.rule import NO_ROWS
+    from tyrecal_solvers.language.fields import DIMENSIONS, fields_of, placed_fields
+    from tyrecal_solvers.language.honour import check_honoured
     from tyrecal_solvers.language.spelling import named
-    from tyrecal_solvers.language.table import RULES
+    from tyrecal_solvers.language.table import MATERIAL_OPTIONS, OUTPUT_KEYWORDS, RULES
     from tyrecal_solvers.language.text import Block, Place, Reader, Row, names_of
 
 from ...errors import InputError
 
-__all__ = ["NO_ROWS", "RULES", "Block", "OwnDeckError", "Place", "Row", "named", "names_of"]
+__all__ = [
+    "DIMENSIONS",
+    "MATERIAL_OPTIONS",
+    "OUTPUT_KEYWORDS",
+    "RULES",
+    "Block",
+    "OwnDeckError",
+    "Place",
+    "Row",
+    "check_honoured",
+    "fields_of",
+    "named",
+    "names_of",
+    "placed_fields",
+    "read_blocks",
+]
 MAX_OWN_BYTES = 50_000_000  # of a deck and all that it includes
 
 

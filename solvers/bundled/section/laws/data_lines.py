@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ....language.fields import constants_of, law_of
+from ....language.laws import HIGHEST_ORDER, LAW_CONSTANTS, OF_ORDER_N, ON_A_LINE
 from ....language.text import Block, DeckError
 from .arruda_boyce import ArrudaBoyce
 from .hyperelastic import Hyperelastic
@@ -16,36 +18,36 @@ from .polynomial import Polynomial
 from .reduced_polynomial import ReducedPolynomial
 
 Scalar = complex | float
-ON_A_LINE = 8
-LAWS: dict[tuple[str, str], tuple[type[Hyperelastic], str]] = {  # by the parameters' law and N
-    ("NEO HOOKE", ""): (MooneyRivlin, "C10 D1"),
-    ("MOONEY-RIVLIN", ""): (MooneyRivlin, "C10 C01 D1"),
-    ("POLYNOMIAL", "1"): (MooneyRivlin, "C10 C01 D1"),
-    ("POLYNOMIAL", "2"): (Polynomial, "C10 C01 C20 C11 C02 D1 D2"),
-    ("REDUCED POLYNOMIAL", "1"): (MooneyRivlin, "C10 D1"),
-    ("REDUCED POLYNOMIAL", "2"): (ReducedPolynomial, "C10 C20 D1 D2"),
-    ("REDUCED POLYNOMIAL", "3"): (ReducedPolynomial, "C10 C20 C30 D1 D2 D3"),
-    ("YEOH", ""): (ReducedPolynomial, "C10 C20 C30 D1 D2 D3"),
-    ("ARRUDA-BOYCE", ""): (ArrudaBoyce, "mu lambda_m D1"),
-    ("OGDEN", "1"): (Ogden, "mu1 alpha1 D1"),
-    ("OGDEN", "2"): (Ogden, "mu1 alpha1 mu2 alpha2 D1 D2"),
-    ("OGDEN", "3"): (Ogden, "mu1 alpha1 mu2 alpha2 mu3 alpha3 D1 D2 D3"),
-}
-LAW_NAMES = {name for name, _ in LAWS}
+LAW_CLASSES: tuple[type[Hyperelastic], ...] = (  # the first that has all constants of a law
+    MooneyRivlin,
+    ReducedPolynomial,
+    Polynomial,
+    ArrudaBoyce,
+    Ogden,
+)
+
+
+def kind_of(law: str, order: int) -> type[Hyperelastic] | None:
+    """The class that has all constants of a law of an order."""
+    constants = set(LAW_CONSTANTS[law](order))
+    for kind in LAW_CLASSES:
+        bulk = (name.removeprefix("inverse_") for name in kind.bulk_moduli)
+        if constants <= {*kind.shear_moduli, *bulk, *kind.numbers}:
+            return kind
+    return None
 
 
 def read_law(k: Block) -> Hyperelastic:
     """The law of one ``*HYPERELASTIC``, its constants single numbers. Raises DeckError."""
-    named = [name for name in k.parameters if name in LAW_NAMES] or ["POLYNOMIAL"]
-    if len(named) > 1:
-        raise DeckError(k.place, f"{named[0]} and {named[1]} are two laws")
-    orders = [N for name, N in LAWS if name == named[0]]
-    order = k.get("N") or ("1" if "1" in orders else "")
-    if order not in orders:
-        right = f"only N={' or '.join(orders)}" if orders[0] else "which has no N"
-        raise DeckError(k.place, f"N={order} of {named[0]} is not honoured, {right}")
-    law, layout = LAWS[named[0], order]
-    given = dict(zip(layout.split(), _numbers(k, layout.split()), strict=True))
+    name, order = law_of(k)
+    if "N" in k.parameters and name not in OF_ORDER_N:
+        raise DeckError(k.place, f"N={order} of {name} is not honoured, which has no N")
+    law = kind_of(name, order)
+    if law is None:
+        right = " or ".join(str(n) for n in range(1, HIGHEST_ORDER) if kind_of(name, n))
+        raise DeckError(k.place, f"N={order} of {name} is not honoured, only N={right}")
+    names = constants_of(k)
+    given = dict(zip(names, _numbers(k, names), strict=True))
     if any(np.real(value) < 0 for name, value in given.items() if name[0] == "D"):
         raise DeckError(k.rows[-1].place, "D must not be negative; 0 is incompressible")
     if not np.real(given["D1"]) and any(v for name, v in given.items() if name[0] == "D"):
@@ -53,8 +55,8 @@ def read_law(k: Block) -> Hyperelastic:
     if any(not np.real(given[name]) for name in law.numbers if name in given):
         raise DeckError(k.rows[0].place, "an exponent, or a locking stretch, must not be 0")
     given |= {f"inverse_{name}": 1 / D if D else 0.0 for name, D in given.items() if name[0] == "D"}
-    names = (*law.shear_moduli, *law.bulk_moduli, *law.numbers)
-    constants: dict[str, Any] = {name: np.asarray(given.get(name, 0.0)) for name in names}
+    own = (*law.shear_moduli, *law.bulk_moduli, *law.numbers)
+    constants: dict[str, Any] = {name: np.asarray(given.get(name, 0.0)) for name in own}
     found = law(**constants)
     if not np.real(found.shear_modulus) > 0:
         raise DeckError(k.rows[0].place, "the shear modulus of small strains must be positive")

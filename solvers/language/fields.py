@@ -1,0 +1,72 @@
+"""Data fields of a keyword by name, with units and defaults, as its record has them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from .laws import HIGHEST_ORDER, LAW_CONSTANTS, LAWS_NOT_READ, ON_A_LINE
+from .rule import Field
+from .table import RULES
+from .text import Block
+
+# L, M, T exponents of units of fields; constants of laws by their first letters
+Dimension = tuple[int, int, int]
+OF_STRESS: Dimension = (-1, 1, -2)
+OF_COMPLIANCE: Dimension = (1, -1, 2)
+DIMENSIONS: dict[str, Dimension] = {
+    "stress": OF_STRESS,
+    "compliance": OF_COMPLIANCE,
+    "density": (-3, 1, 0),
+    "area": (2, 0, 0),
+    "length": (1, 0, 0),
+}
+
+
+def law_of(block: Block) -> tuple[str, int]:
+    """Name and order of a *HYPERELASTIC's law. Raises the error of its place for two laws."""
+    given = [law for law in LAW_CONSTANTS if law in block.parameters] or ["POLYNOMIAL"]
+    if len(given) > 1:
+        raise block.refused(f"{given[0]} and {given[1]} are two laws")
+    order = block.parameters.get("N", "1")
+    if order not in map(str, range(1, HIGHEST_ORDER + 1)):
+        raise block.refused(f"N={order} is no order from 1 to {HIGHEST_ORDER}")
+    return given[0], int(order)
+
+
+def constants_of(block: Block) -> list[str]:
+    """Names of the constants of a *HYPERELASTIC in their order; none if they are not on its lines.
+
+    Raises the error of its place.
+    """
+    if {"TEST DATA INPUT", *LAWS_NOT_READ} & block.parameters.keys():
+        return []
+    law, order = law_of(block)
+    return LAW_CONSTANTS[law](order)
+
+
+def _constant(name: str) -> Field:
+    unit = {"C": "stress", "m": "stress", "D": "compliance"}.get(name[0], "")
+    return Field(name, unit, 0.0)
+
+
+def fields_of(block: Block) -> list[Field]:
+    """The named data fields of each line of a block; of *HYPERELASTIC, of all lines together."""
+    if block.name == "HYPERELASTIC":
+        return [_constant(name) for name in constants_of(block)]
+    rule = RULES.get(block.name)
+    return rule.fields_of(block.parameters) if rule else []
+
+
+def placed_fields(block: Block) -> Iterator[tuple[Field, int, int]]:
+    """Each named number that a block gives: field, row and place in the row."""
+    fields: Sequence[Field] = fields_of(block)
+    if block.name == "HYPERELASTIC":
+        for k, field in enumerate(fields):
+            i, j = divmod(k, ON_A_LINE)
+            if i < len(block.rows) and block.rows[i].text(j):
+                yield field, i, j
+        return
+    for i, row in enumerate(block.rows):
+        for j, field in enumerate(fields):
+            if row.text(j) and not field.name.startswith("_"):
+                yield field, i, j

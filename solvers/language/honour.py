@@ -1,0 +1,47 @@
+"""Whether a block is honoured where it stands: its keyword, parameters, values and data."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+
+from .rule import NO_ROWS
+from .table import OUTPUT_KEYWORDS, RULES
+from .text import Block
+
+PLACES = {
+    "deck": "the model",
+    "section": "the model",
+    "revolve": "the model",
+    "deck step": "a step",
+    "step": "a step",
+}
+
+
+def check_honoured(block: Block, place: str) -> None:
+    """Raises the error of the block's place, with what is not honoured of it and what would be.
+
+    place: one of `PLACES`.
+    """
+    rule = RULES.get(block.name)
+    options = rule.options_at.get(place) if rule else None
+    if rule is None or options is None:
+        known = [name for name, each in RULES.items() if place in each.options_at]
+        close = get_close_matches(block.name, [*known, *OUTPUT_KEYWORDS], 1, 0.8)
+        hint = (rule and rule.instead) or (f"did you mean *{close[0]}?" if close else "")
+        raise block.refused(f"is not honoured in {PLACES[place]}" + (f"; {hint}" if hint else ""))
+    for name, value in block.parameters.items():
+        if name not in options:
+            close = get_close_matches(name, options, 1)
+            hint = f"; did you mean {close[0]}?" if close else ""
+            raise block.refused(f"the parameter {name} is not honoured{hint}")
+        values = options[name]
+        if values is not None and value not in values:
+            right = " or ".join(each or "no value" for each in values)
+            raise block.refused(f"{name}={value} is not honoured, only {right}")
+    if block.rows and rule.rows == NO_ROWS and rule.is_judged:
+        raise block.refused("takes no data lines", block.rows[0])
+    most = len(rule.fields_of(block.parameters))
+    for row in block.rows if most else ():
+        extra = [text for text in row.fields[most:] if text]
+        if extra:
+            raise block.refused(f"data '{extra[0]}' is not honoured", row)
