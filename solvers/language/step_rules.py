@@ -27,7 +27,7 @@ STEP_RULES: dict[str, Rule] = {
         "model step",
         "OP=MOD|NEW; AMPLITUDE=amplitude; TYPE=DISPLACEMENT|VELOCITY|ACCELERATION; FIXED",
         "node freedom integer? number?",
-        honoured={"deck|step": "OP", "deck step": "OP; AMPLITUDE", "section|revolve": ""},
+        honoured={"step": "OP", "deck step": "OP; AMPLITUDE", "deck|section|revolve": ""},
         data="node, first, last, value=0",
     ),
     "STEP": Rule(
@@ -86,14 +86,14 @@ STEP_RULES: dict[str, Rule] = {
         "step",
         "OP=MOD|NEW; AMPLITUDE=amplitude; FOLLOWER=YES|NO|; CONSTANT RESULTANT=YES|NO|",
         "surface name 7*number?",
-        honoured={"deck step": "OP; AMPLITUDE", "step": "OP=MOD"},
+        honoured={"deck step": "~OP; AMPLITUDE", "step": "OP=MOD"},
         data="surface, load, pressure",
     ),
     "DLOAD": Rule(
         "step",
         "OP=MOD|NEW; AMPLITUDE=amplitude",
         "element name 7*number?",
-        honoured={"deck step": "OP; AMPLITUDE", "step": "OP=MOD"},
+        honoured={"deck step": "~OP; AMPLITUDE", "step": "OP=MOD"},
         data="elements, load, size, x=0, y=0, z=0, along x=0, along y=0, along z=0",
     ),
     "CLOAD": Rule(
