@@ -14,7 +14,7 @@ from tyrecal.errors import InputError
 from tyrecal.measured.arrangement import arrange
 from tyrecal.measured.gather import Gathered, gather
 from tyrecal.measured.modal import Layout
-from tyrecal.measured.universal import read_universal
+from tyrecal.measured.universal import Function, Universal, read_universal
 
 from .ten_modes import (
     AXES,
@@ -41,7 +41,7 @@ LAYOUT = Layout(highest=8, band=(30.0, 170.0))
 QUICK = {"a frame per node, 18", "components", "shapes, 55", "hammer", "runs", "a broken cable"}
 NOTES = {
     "components": "left out, not on the tyre: 48 functions of component hub",
-    "hammer": "the impacts were moved over 48 channels past 1 fixed",
+    "hammer": "0.uff: the impacts were moved over 48 channels; by reciprocity",
     "runs": "one test in 4 files with a common reference: 1.uff, 2.uff, 3.uff, 4.uff",
     "a broken cable": "left out, mostly noise: channel 5:2",
     "no motion": "left out, no motion along a direction 1, 2 or 3: channel 500:4, 501:0",
@@ -169,6 +169,42 @@ def test_channels_can_be_taken_away(tmp_path: Path) -> None:
     gone = np.isnan(test.shapes[0].values)
     assert gone[4].tolist() == [False, True, False] and gone[6].all()
     assert gone[np.delete(np.arange(16), [4, 6])].sum() == np.isnan(shaped.shapes[0].values).sum()
+
+
+def test_a_hammer_that_was_moved_is_noticed_over_all_files() -> None:
+    """Three fixed channels and one impact a file; of a shaker's and a hammer's test each by its
+    own."""
+    H = np.ones(len(F), complex)
+    fixed = [[Function(F, H, None, (3, k), (i, 1), "") for k in (1, 2, 3)] for i in range(101, 111)]
+    one = [Universal(Path(f"{i}.uff"), {}, [], each) for i, each in enumerate(fixed)]
+    (test,), notes = arrange(one)
+    assert {each.response[0] for each in test.functions} == set(range(101, 111))
+    assert len(test.functions) == 30 and notes[0].startswith("0.uff, 1.uff, 2.uff, ")
+    shaker = Universal(
+        Path("s"), {}, [], [Function(F, H, None, (i, 1), (9, 1), "") for i in range(9)]
+    )
+    hammer = Universal(
+        Path("h"), {}, [], [Function(F, H, None, (3, 1), (i, 2), "") for i in range(8)]
+    )
+    tests, (note,) = arrange([shaker, hammer])
+    assert [{each.response[1] for each in test.functions} for test in tests] == [{1}, {2}]
+    assert note.startswith("h: the impacts were moved over 8 channels")
+
+
+def test_functions_come_in_one_unit_or_are_refused() -> None:
+    """Those that state g beside those in m/s^2; a unit that is not known is refused."""
+    units_of = lambda *words: [
+        Function(F, np.ones(len(F), complex), None, (k, 1), (9, 1), f"p{k}", unit=word)
+        for k, word in enumerate(words)
+    ]
+    values = lambda *words: [
+        each.values[0].real
+        for each in arrange([Universal(Path("f"), {}, [], units_of(*words))]).tests[0].functions
+    ]
+    assert values("m/s^2", "g", "mm/s2/n", "g/lbf") == pytest.approx([1, 9.80665, 1e-3, 2.2046226])
+    assert values("furlong", "furlong", "") == [1, 1, 1]
+    with pytest.raises(InputError, match="p1: states the unit 'furlong', and other functions"):
+        values("g", "furlong")
 
 
 def test_repeats_of_a_test_in_parts_stay_repeats(tmp_path: Path) -> None:

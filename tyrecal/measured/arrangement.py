@@ -22,6 +22,14 @@ from ..errors import InputError
 from .universal import Function, MeasuredShape, Universal, channel_name
 
 TYRE_NAMES = re.compile(r"tyre|tire|reifen|pneu|tread", re.IGNORECASE)  # in a component's name
+UNITS = {  # of functions, as they state it without brackets and blanks, in SI
+    f"{motion}{force}": a / b
+    for motion, a in (
+        *(("m/s^2", 1.0), ("m/s2", 1.0), ("m/s**2", 1.0), ("mm/s^2", 1e-3), ("mm/s2", 1e-3)),
+        *(("g", 9.80665), ("m/s", 1.0), ("mm/s", 1e-3), ("m", 1.0), ("mm", 1e-3)),
+    )
+    for force, b in (("", 1.0), ("/n", 1.0), ("/kn", 1e3), ("/lbf", 4.4482216))
+}
 SAME_CHANNELS = 0.5  # share of a file's channels that another has, from which on they are repeats
 
 
@@ -39,19 +47,37 @@ def arrange(files: Sequence[Universal], leave_out: Sequence[str] = ()) -> Arrang
     leave_out: channels to drop, NODE, NODE:DIRECTION or COMPONENT, or COMPONENT before either.
     Raises InputError where one of them is no channel, or components count the same nodes.
     """
-    files, notes = _without(files, leave_out), list[str]()
-    everything = [each for file in files for each in file.functions]
-    moved = {_response(each) for each in everything}, {_reference(each) for each in everything}
-    if len(moved[1]) > len(moved[0]):
-        files = [replace(f, functions=[_exchange(each) for each in f.functions]) for f in files]
-        notes.append(
-            f"the impacts were moved over {len(moved[1])} channels past {len(moved[0])} fixed:"
-            " by reciprocity they are the shapes' points"
-        )
+    files = _without(files, leave_out)
+    files, moved = _with_moved_responses(files)
     files, more = _motions(files)
     files, others = _of_the_tyre(files)
+    files = _in_one_unit(files)
     tests, joined = _join(files)
-    return Arranged(tests, [*notes, *more, *others, *joined])
+    return Arranged(tests, [*moved, *more, *others, *joined])
+
+
+def _with_moved_responses(files: Sequence[Universal]) -> tuple[list[Universal], list[str]]:
+    """Files whose responses are on the side that was moved over the tyre: that with more channels,
+    in all files together if it has more than twice as many, else in each file."""
+
+    def excess(functions: Sequence[Function]) -> float:
+        """Channels of the references over those of the responses."""
+        sides = {_reference(each) for each in functions}, {_response(each) for each in functions}
+        return len(sides[0]) / max(len(sides[1]), 1)
+
+    together = excess([each for file in files for each in file.functions])
+    clear = not 0.5 <= together <= 2
+    result, moved = list(files), list[Universal]()
+    for k, file in enumerate(files):
+        if (together if clear else excess(file.functions)) > 1:
+            result[k] = replace(file, functions=[_exchange(each) for each in file.functions])
+            moved.append(result[k])
+    count = len({_response(each) for file in moved for each in file.functions})
+    words = (
+        f"the impacts were moved over {count} channels; by reciprocity they are the shapes' points"
+    )
+    names = ", ".join(file.path.name for file in moved)
+    return result, [f"{names}: {words}"] if moved else []
 
 
 def _response(each: Function) -> tuple[str, int, int]:
@@ -167,6 +193,26 @@ def _of_the_tyre(files: Sequence[Universal]) -> tuple[list[Universal], list[str]
 
 def _first(files: Sequence[Universal], part: str) -> Function:
     return next(e for file in files for e in file.functions if e.response_part == part)
+
+
+def _in_one_unit(files: Sequence[Universal]) -> list[Universal]:
+    """Files whose functions are in the unit of the first one, where they state different ones.
+    Raises InputError where a unit among them is not known."""
+    every = [each for file in files for each in file.functions]
+    units = {each.unit for each in every if each.unit}
+    if len(units) < 2:
+        return list(files)
+
+    def scaled(each: Function) -> Function:
+        if (size := UNITS.get(each.unit)) is None:
+            stated = f"states the unit '{each.unit}'" if each.unit else "states no unit"
+            known = ", ".join(UNITS)
+            raise InputError(
+                f"{each.place}: {stated}, and other functions another one; must be one of {known}"
+            )
+        return replace(each, values=each.values * size)
+
+    return [replace(file, functions=[scaled(each) for each in file.functions]) for file in files]
 
 
 def _channels(file: Universal) -> dict[tuple[object, object], Function]:

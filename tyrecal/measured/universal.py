@@ -92,6 +92,7 @@ class Function:
     place: str
     response_part: str = ""  # component that the response is on, "" where it has no name
     reference_part: str = ""
+    unit: str = ""  # of the values, in small letters without blanks and brackets; "": not stated
 
 
 @dataclass(frozen=True)
@@ -348,14 +349,27 @@ def _add_function(result: Universal, each: _Set) -> None:
         )
     if f[0] < 0 or np.any(np.diff(f) <= 0):
         raise InputError(f"{each.place}: frequencies must rise from 0 or more, got {f[0]:g} Hz")
-    reference = int(content["ref_node"]), int(content["ref_dir"])
-    parts = (_part(content[f"{name}_ent_name"]) for name in ("rsp", "ref"))
-    form = MOTION_FORMS.get(above)
-    result.functions.append(Function(f, values, form, response, reference, each.place, *parts))
+    stated = [
+        _stated(content.get(f"{name}_axis_units_lab", "")) for name in ("ordinate", "orddenom")
+    ]
+    unit = "/".join(re.sub(r"[\s()\[\]]", "", word).lower() for word in stated if word)
+    result.functions.append(
+        Function(
+            f,
+            values,
+            MOTION_FORMS.get(above),
+            response,
+            (int(content["ref_node"]), int(content["ref_dir"])),
+            each.place,
+            _stated(content["rsp_ent_name"]),
+            _stated(content["ref_ent_name"]),
+            unit,
+        )
+    )
 
 
-def _part(name: str) -> str:
-    """The name of a component; "" where none is given."""
+def _stated(name: str) -> str:
+    """The name of a component or unit; "" where none is given."""
     return "" if name.strip().upper() in ("NONE", "NULL") else name.strip()
 
 
