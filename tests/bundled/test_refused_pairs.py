@@ -122,7 +122,7 @@ LAW = "*VISCOELASTIC, FREQUENCY=TABULAR\n"
             f"{LAW}0., 0.3, 0., 0.1, 1.\n0., 0.2, 0., 0., 10.\n",
             "the bulk modulus stays",
         ),
-        ("0.3, 0, 0.1\n", "0.3, 0, 0.1, 0.2\n", "a term of a Prony series is g, k and tau"),
+        ("0.3, 0, 0.1\n", "0.3, 0, 0.1, 0.2\n", "data '0.2' is not honoured"),
     ],
 )
 def test_what_a_transfer_or_a_table_may_not_be(old: str, new: str, words: str) -> None:

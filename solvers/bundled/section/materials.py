@@ -141,8 +141,6 @@ def _viscoelastic(m: Material, k: Block) -> None:
         m.table = _modulus_table(k)
         return
     for row in k.rows:
-        if len(row.fields) > 3 and any(row.fields[3:]):
-            raise DeckError(row.place, "a term of a Prony series is g, k and tau")
         m.prony.append((row.value(0, 0.0), row.value(1, 0.0), row.value(2)))
     if any(np.real(x) < 0 for term in m.prony for x in term):
         raise DeckError(k.place, "g, k and tau of a Prony series must not be negative")

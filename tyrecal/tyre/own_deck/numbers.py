@@ -155,6 +155,8 @@ def _parameter(block: Block, parameters: Mapping[str, Any], name: str) -> str:
     raise block.refused(f"the parameter <{name}> is not defined above")
 
 
+LARGEST = 1e300  # result of an expression
+LARGEST_BASE = 1e30  # of a power
 OPERATORS: dict[type, Callable[..., Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -173,7 +175,7 @@ EXPRESSION_FUNCTIONS = {
 def parameters(block: Block, known: dict[str, Any]) -> None:
     """Add the parameters that a *PARAMETER defines: NAME = expression, of those above too."""
     for row in block.rows:
-        text = ",".join(row.fields)
+        text = ",".join(row.fields)[:60]
         name, expression = assigned(row)
         if not (name or expression):
             continue
@@ -205,9 +207,12 @@ def _evaluate(node: ast.AST, known: Mapping[str, Any]) -> Any:
         whole = isinstance(left, int) and isinstance(right, int)
         if isinstance(node.op, ast.Div) and whole and left % right:
             raise ValueError(f"{left}/{right} of whole numbers: write {left}./{right}")
-        if isinstance(node.op, ast.Pow) and abs(right) > 100:
-            raise ValueError("a power above 100")
-        return OPERATORS[type(node.op)](left, right)
+        if isinstance(node.op, ast.Pow) and (abs(right) > 100 or abs(left) > LARGEST_BASE):
+            raise ValueError("a power above 100, or of a large number")
+        value = OPERATORS[type(node.op)](left, right)
+        if abs(value) > LARGEST:
+            raise ValueError(f"a number above {LARGEST:g}")
+        return value
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
         function = EXPRESSION_FUNCTIONS.get(node.func.id)
         if function and not node.keywords:
