@@ -182,7 +182,10 @@ def test_sensors_are_judged_before_a_test(
 ) -> None:
     assert run("measured", "sensors", str(SHAPES), *TEST, "--json") == 0
     told = json.loads(capsys.readouterr().out)
-    assert len(told) == 5 + 4 * 8 and all(entry["told"] for entry in told)
+    assert len(told) == 5 + 4 * 8
+    assert all(entry["told"] for entry in told if entry["m"] == 0)
+    looks_like = {(entry["c"], entry["m"]): entry["looks_like"] for entry in told}
+    assert looks_like[1, 2][0] == "[1,0]"  # no two of the tread's sensors share an angle
     even = {
         **geometry(),
         "x": 0.39 * np.cos(np.arange(8) * np.pi / 4),

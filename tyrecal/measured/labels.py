@@ -122,13 +122,16 @@ class Labeller:
 
     def looks_like(self) -> dict[Label, list[Label]]:
         """Of each label the other ones that its shapes look like on these sensors, the likeliest
-        first; none where at least `MIN_LABELLED` of the shapes drawn of it get it."""
+        first; none where at least `MIN_LABELLED` of the shapes drawn of it get it, in a file in
+        which the mode that has to be below it was found."""
         k, random = len(self.sensors.points), np.random.default_rng(0)
         result: dict[Label, list[Label]] = {}
         for i, (values, vectors) in enumerate(self._spectra):
             parts = random.standard_normal((k, SHAPES_DRAWN))
             size = np.sqrt(np.maximum(values, 0.0) + DRAWN_NOISE)
-            p = self._probabilities(vectors @ (size[:, None] * parts))
+            lower = _lower(self.labels[i])
+            below = [lower] if lower else []
+            p = self._probabilities(vectors @ (size[:, None] * parts), below)
             rivals = p.mean(1)
             rivals[i] = 0.0
             order = [int(j) for j in np.argsort(-rivals) if rivals[j] > MIN_TAKEN]
