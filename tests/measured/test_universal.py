@@ -114,6 +114,15 @@ def test_functions_come_back(tmp_path: Path, binary: int, double: bool, spacing:
     assert (found.response, found.reference, found.form) == ((1, 3), (9, -1), "accelerance")
 
 
+def test_functions_state_their_unit(tmp_path: Path) -> None:
+    path = write(tmp_path / "f.uff", function(some(80)[:, 0], np.arange(80.0)))
+    lines = path.read_text().splitlines(keepends=True)
+    for number, unit in ((10, "(m/s^2)"), (11, "N")):
+        lines[number] = f"{lines[number][:46]}{unit:20}\n"
+    path.write_text("".join(lines))
+    assert [each.unit for each in read_universal(path).functions] == ["m/s^2/n"]
+
+
 def test_shapes_come_back_and_what_is_0_in_all_was_not_measured(tmp_path: Path) -> None:
     one, two = some(8, 1), some(8, 2)
     one[3, 1] = two[3, 1] = 0

@@ -16,6 +16,7 @@ from tyrecal.measured.gather import Gathered, gather
 from tyrecal.measured.modal import Layout
 from tyrecal.measured.universal import Function, Universal, read_universal
 
+from ..chance import generator
 from .ten_modes import (
     AXES,
     MODES,
@@ -189,6 +190,27 @@ def test_a_hammer_that_was_moved_is_noticed_over_all_files() -> None:
     tests, (note,) = arrange([shaker, hammer])
     assert [{each.response[1] for each in test.functions} for test in tests] == [{1}, {2}]
     assert note.startswith("h: the impacts were moved over 8 channels")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [4.0, 1e4])
+def test_a_channel_that_spoils_the_rest_is_named(tmp_path: Path, size: float) -> None:
+    """A drift in channel 5:2, which is no noise from line to line: a little, and so much that no
+    mode can be found."""
+    H = along_xyz().copy()
+    steps = generator("drift").standard_normal((2, len(F)))
+    drift = np.cumsum(np.convolve(steps[0] + 1j * steps[1], np.ones(9) / 9, "same"))
+    H[4, 1] += size * np.abs(H).max() / np.abs(drift).max() * drift
+    path = write(tmp_path / "f.uff", nodes(), *functions(H))
+    try:
+        result = gather([path], 240.0, LAYOUT, assumed=0.002)
+    except InputError as error:
+        assert "channel 5:2 is " in str(error) and str(error).endswith("try --leave-out 5:2")
+    else:
+        assert any("the rest is channel 5:2: try --leave-out 5:2" in note for note in result.notes)
+    right = gather([path], 240.0, LAYOUT, assumed=0.002, leave_out=["5:2"])
+    assert {row.label: row.value for row in right.rows} == pytest.approx(MODES, rel=1e-3)
+    assert not right.notes
 
 
 def test_functions_come_in_one_unit_or_are_refused() -> None:

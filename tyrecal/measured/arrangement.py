@@ -22,7 +22,7 @@ from ..errors import InputError
 from .universal import Function, MeasuredShape, Universal, channel_name
 
 TYRE_NAMES = re.compile(r"tyre|tire|reifen|pneu|tread", re.IGNORECASE)  # in a component's name
-UNITS = {  # of functions, as they state it without brackets and blanks, in SI
+FUNCTION_UNITS = {  # of functions, as they state it without brackets and blanks, in SI
     f"{motion}{force}": a / b
     for motion, a in (
         *(("m/s^2", 1.0), ("m/s2", 1.0), ("m/s**2", 1.0), ("mm/s^2", 1e-3), ("mm/s2", 1e-3)),
@@ -204,9 +204,9 @@ def _in_one_unit(files: Sequence[Universal]) -> list[Universal]:
         return list(files)
 
     def scaled(each: Function) -> Function:
-        if (size := UNITS.get(each.unit)) is None:
+        if (size := FUNCTION_UNITS.get(each.unit)) is None:
             stated = f"states the unit '{each.unit}'" if each.unit else "states no unit"
-            known = ", ".join(UNITS)
+            known = ", ".join(FUNCTION_UNITS)
             raise InputError(
                 f"{each.place}: {stated}, and other functions another one; must be one of {known}"
             )

@@ -72,9 +72,11 @@ def gather(
         runs.append(run)
         notes += [f"{test.path}: {note}" for note in run.notes]
         if run.explained < MIN_EXPLAINED:
+            advice = "one may be missing: look at the picture, try a narrower --band"
+            if channel := run.least_explained:
+                advice = f"most of the rest is channel {channel}: try --leave-out {channel}"
             notes.append(
-                f"{test.path}: the modes make {run.explained:.0%} of the functions; one may be"
-                " missing: look at the picture, try a narrower --band"
+                f"{test.path}: the modes make {run.explained:.0%} of the functions; {advice}"
             )
         values += measurements_of(run, pressure_kPa)
     labelled = one_for_both([each for each in values if not each.is_unlabelled])

@@ -26,6 +26,7 @@ MIN_COLLINEARITY = 0.5  # modal phase collinearity below which a shape has no re
 # ln of the odds from which on one meaning of the directions is clearly the better: of all modes
 # together, and of one mode in the mean
 LN_ODDS_OF_DIRECTIONS, LN_ODDS_OF_DIRECTIONS_PER_MODE = 10.0, 1.0
+FAR_LARGER = 10.0  # times the others' median size, of a suspected channel
 MAX_NOISE = 0.5  # share of noise in a bad channel's mean square
 
 
@@ -76,6 +77,7 @@ class ModalTest:
     frequency_Hz: Array | None = None  # (n,)
     functions: Array | None = None  # (k, n) from which the modes were identified
     fitted: Array | None = None  # (k, n) what the modes make, NaN outside the band
+    channels: tuple[str, ...] = ()  # (k,) names
     notes: tuple[str, ...] = ()  # what a user has to know
 
     @property
@@ -85,6 +87,14 @@ class ModalTest:
             return 1.0
         rest = np.nansum(np.abs(self.functions - self.fitted) ** 2)
         return float(1 - rest / np.sum(np.abs(self.functions[np.isfinite(self.fitted)]) ** 2))
+
+    @property
+    def least_explained(self) -> str:
+        """The channel that has more than half of what the modes do not make, "" if none has."""
+        if self.functions is None or self.fitted is None or not self.channels:
+            return ""
+        rest = np.nansum(np.abs(self.functions - self.fitted) ** 2, axis=1)
+        return self.channels[int(np.argmax(rest))] if rest.max() > rest.sum() / 2 else ""
 
 
 @dataclass(frozen=True)
@@ -241,7 +251,13 @@ def _identified(file: Universal, layout: Layout) -> tuple[list[_Found], ModalTes
     table = _by_reference(functions)
     values = np.vstack([[each.values for each in row.values()] for row in table.values()])
     points = np.array([node for row in table.values() for node, _ in row])
-    identified = identify(Responses(f, values, form, points), *band)
+    names = [
+        channel_name(e.response, e.response_part) for row in table.values() for e in row.values()
+    ]
+    try:
+        identified = identify(Responses(f, values, form, points), *band)
+    except InputError as error:
+        raise InputError(f"{error}{_largest(names, values[:, _within(f, band)])}") from None
     f, values = f[f > 0], values[:, f > 0]
     modes = []
     for mode in identified.modes:
@@ -251,7 +267,16 @@ def _identified(file: Universal, layout: Layout) -> tuple[list[_Found], ModalTes
         moved = replace(mode, amplitude=parts[strongest])
         modes.append(_Found(moved, signals, str(file.path)))
     name = str(file.path)
-    return modes, ModalTest(name, (), f, values, identified.fitted, tuple(notes))
+    return modes, ModalTest(name, (), f, values, identified.fitted, tuple(names), tuple(notes))
+
+
+def _largest(names: Sequence[str], values: Array) -> str:
+    """A hint at the channel that is far larger than the others, "" if none is."""
+    sizes = np.sqrt(np.mean(np.abs(values) ** 2, axis=1))
+    name, ratio = names[int(np.argmax(sizes))], sizes.max() / np.median(sizes)
+    if ratio < FAR_LARGER:
+        return ""
+    return f"; channel {name} is {ratio:.0f} times as large as the others, try --leave-out {name}"
 
 
 def _without_bad_channels(
