@@ -88,6 +88,7 @@ def command(
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --jobs 2
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --scheduler tcp://10.0.0.1:8786
     """
+    from ..measured.sense import doubts_of_file
     from ..report.table import fit_doubts, fit_verdict, shown, tyre_doubts
     from ..simulate.evaluate.cluster import reached
     from ..simulate.program import join_command
@@ -103,6 +104,9 @@ def command(
         arguments.refuse_unknown("--fix", name, values, "variable")
     fixed = {name: values[name] for name in fix}
     calibration = FitStudy(loaded, study.evaluator(loaded), measured, fixed)
+    if file := measured or loaded.measured:
+        for doubt in doubts_of_file(file):
+            terminal.warn(doubt)
     evaluator = calibration.evaluator
     if calibration.evaluates_one_by_one and starts == 1:
         why = f"a fit from one start asks solver '{evaluator.solver.name}' for one design at a time"

@@ -135,9 +135,10 @@ def import_files(
     frequency-response functions (58) and their geometry (15, 2411, 18, 2420). What several
     files, or lines of a table, measure of one thing are repeats: the value is their mean, sigma
     that mean's standard deviation. Repeats that differ by more than the file's other repeats
-    stop the import. If the sensors do not determine a label, the frequency is written without
-    one; 'tyrecal fit' and 'tyrecal measured label' label it by the model. Files that share a
-    reference and hold other channels are parts of one test.
+    stop the import. Frequencies that fall with pressure, labels that look exchanged and single
+    values far from a smooth curve are reported. If the sensors do not determine a label, the
+    frequency is written without one; 'tyrecal fit' and 'tyrecal measured label' label it by the
+    model. Files that share a reference and hold other channels are parts of one test.
 
     \b
     tyrecal measured import modes.csv --pressure-kPa 240 --sigma-percent 0.3
@@ -164,6 +165,8 @@ def import_files(
         draw_measured(output.with_suffix(".png"), found.runs)
     for note in found.notes:
         terminal.note(note)
+    for doubt in found.doubts:
+        terminal.warn(doubt)
     terminal.result(result(found))
     if found.runs:
         from ..report.measured import measured_table

@@ -14,6 +14,7 @@ from .arrangement import arrange
 from .measurement import Measurement
 from .modal import Geometry, LabelledMode, Layout, ModalTest, measurements_of, read_modal_test
 from .repeats import FLOOR, combined, one_for_both
+from .sense import doubts
 from .slips import contradictions
 from .tables import read_table
 from .universal import Place, Universal, is_universal, read_universal
@@ -30,6 +31,7 @@ class Gathered:
     rows: list[Measurement]  # one value each with its sigma
     runs: list[ModalTest]  # of the universal files
     notes: list[str]  # what a user has to know
+    doubts: list[str]  # about the sense of the rows
 
 
 def gather(
@@ -98,7 +100,7 @@ def gather(
             f" without a label{f' ({why})' * bool(why)}; 'tyrecal fit' and 'tyrecal measured label'"
             " label them by the model"
         )
-    return Gathered(rows + without_label, runs, notes)
+    return Gathered(rows + without_label, runs, notes, doubts(rows))
 
 
 def _without_labels(

@@ -1,0 +1,164 @@
+"""Sense of measured frequencies before any fit: exchanged pressures or labels, single slips.
+
+Frequencies of tyres follow a pattern: they rise with pressure, all by nearly the same share, and
+with the waves c along a smooth curve for each m. As a normal distribution of ln f:
+
+    ln f = a + ln F(label) + o_m + g ln(c / 2) + t_label + (s + s_label) ln(p / mean p) + noise
+
+F are the rounded frequencies of two passenger tyres; a is free, the others have the standard
+deviations below. A doubt is a change of the data, two pressures or two labels exchanged or one
+value left out, that makes them far more probable. These are questions to the user: nothing is
+changed here. `measured import` and `fit` report them; the pattern must never enter a fit.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from ..simulate.modes.label import Label
+from .measurement import Measurement
+from .tables import read_measurements
+
+Array = np.ndarray
+USUAL_HZ = {  # by m, from c = 1
+    0: (67, 90, 110, 131, 153, 174, 193, 212, 229),
+    1: (45, 78, 118, 148, 168, 186, 202, 216, 231),
+}
+ZERO_HZ = {"axial": 37, "torsional": 44}
+FREE_HZ = {(0, "axial"): 45, (0, "torsional"): 74, (1, 0): 81, (1, 1): 73}  # c, kind or m
+SCALE_SD, OFFSET_SD, GROWTH_SD = 2.0, 0.06, 0.08  # of a, o_m, g
+SHAPE_SD = {0: 0.12, 1: 0.05}  # of t_label by c
+SHAPE_SD_ELSE, SHAPE_SD_FREE = 0.02, 0.2  # with more waves; on a free rim with fewer
+RISE, RISE_SD, OWN_RISE_SD = 0.33, 0.08, 0.05  # of s and s_label
+LEAST_NOISE = 0.003
+EXCHANGED, OFF = 16.0, 25.0  # chi-squared that a doubt takes away
+MOST_DOUBTS = 5
+
+
+def doubts_of_file(path: Path) -> list[str]:
+    """`doubts` about a measurements CSV. Raises InputError, OSError."""
+    return doubts(read_measurements(path, labelled=False))
+
+
+def doubts(rows: Sequence[Measurement]) -> list[str]:
+    """Sentences, each with file and line, about frequencies of the unloaded tyre that are far more
+    probable with pressures or labels exchanged, or without one of them."""
+    groups: dict[object, list[Measurement]] = defaultdict(list)
+    for row in rows:
+        if row.quantity == "frequency_Hz" and not row.load_N and _usual(row):
+            groups[row.rim].append(row)
+    return [doubt for group in groups.values() for doubt in _of_one_rim(group)]
+
+
+def _of_one_rim(rows: list[Measurement]) -> Iterator[str]:
+    rows = list(rows)
+    for _ in range(min(MOST_DOUBTS, len(rows) - 1)):
+        weight, deviation = _pattern(rows)
+        base = deviation @ weight @ deviation
+
+        def gain(order: Sequence[int]) -> float:
+            """Chi-squared that values in another order take away."""
+            moved = deviation + np.log([rows[i].value for i in order])  # noqa: B023
+            moved -= np.log([row.value for row in rows])  # noqa: B023
+            return float(base - moved @ weight @ moved)  # noqa: B023
+
+        best = max(_exchanges(rows, gain), key=lambda each: each[0], default=(0.0, [], ""))
+        weighted = weight @ deviation
+        single = weighted**2 / np.diag(weight)
+        worst = int(np.argmax(single))
+        if best[0] > EXCHANGED and best[0] > single[worst]:
+            yield best[2]
+            values = [row.value for row in rows]
+            rows = [replace(row, value=values[i]) for row, i in zip(rows, best[1], strict=True)]
+        elif single[worst] > OFF and len(rows) > 3:
+            row = rows.pop(worst)
+            smooth = row.value * np.exp(-weighted[worst] / weight[worst, worst])
+            yield (
+                f"{row.place}: {row.name} is {row.value:.4g} Hz at {row.pressure_kPa:g} kPa, where"
+                f" a smooth curve through the other frequencies has {smooth:.3g} Hz: is it a slip,"
+                " or another mode?"
+            )
+        else:
+            return
+
+
+def _exchanges(
+    rows: list[Measurement], gain: Callable[[Sequence[int]], float]
+) -> Iterator[tuple[float, list[int], str]]:
+    """Gain, order of the values and question, of all that can be exchanged."""
+    at = {(row.label, row.member, row.pressure_kPa): i for i, row in enumerate(rows)}
+    pressures = sorted({row.pressure_kPa for row in rows})
+    names = sorted({(row.label, row.member) for row in rows}, key=str)
+
+    def exchanged(pairs: Sequence[tuple[int, int]]) -> list[int]:
+        order = list(range(len(rows)))
+        for i, j in pairs:
+            order[i], order[j] = j, i
+        return order
+
+    for p, q in combinations(pressures, 2):
+        pairs = [(at[*n, p], at[*n, q]) for n in names if (*n, p) in at and (*n, q) in at]
+        if pairs:
+            order = exchanged(pairs)
+            i, j = pairs[0]
+            yield (
+                gain(order),
+                order,
+                f"{rows[i].place}, {rows[j].place}: frequencies do not rise with pressure as those"
+                f" of tyres do: are {p:g} and {q:g} kPa exchanged?",
+            )
+    for one, other in combinations(names, 2):
+        both = [
+            (at[*one, p], at[*other, p]) for p in pressures if {(*one, p), (*other, p)} <= {*at}
+        ]
+        for pairs in [[pair] for pair in both] + [both] * (len(both) > 1):
+            order = exchanged(pairs)
+            i, j = pairs[0]
+            yield (
+                gain(order),
+                order,
+                f"{rows[i].place}, {rows[j].place}: {rows[i].name} is {rows[i].value:.4g} Hz and"
+                f" {rows[j].name} {rows[j].value:.4g} Hz at {rows[i].pressure_kPa:g} kPa, which"
+                " does not go with the other frequencies: are the two labels exchanged?",
+            )
+
+
+def _usual(row: Measurement) -> float:
+    """F of a label, Hz; 0 where no pattern is known."""
+    label = row.label or Label(0, 9)
+    low = FREE_HZ.get((label.c, label.kind or label.m)) if row.rim == "free" else None
+    if label.kind:
+        return low or ZERO_HZ[label.kind]
+    known = USUAL_HZ.get(label.m, ())
+    return low or (known[label.c - 1] if 0 < label.c <= len(known) else 0)
+
+
+def _pattern(rows: Sequence[Measurement]) -> tuple[Array, Array]:
+    """The inverse covariance of ln f by the pattern, and the deviations from its mean."""
+    labels = [row.label or Label(0, 9) for row in rows]
+    y = np.log([row.value / _usual(row) for row in rows])
+    p = np.log([row.pressure_kPa for row in rows])
+    p -= p.mean()
+    c = np.array([label.c for label in labels])
+    m = np.array([label.m for label in labels])
+    free = np.array([row.rim == "free" for row in rows])
+    shape = np.array([SHAPE_SD.get(each, SHAPE_SD_ELSE) for each in c])
+    shape[free & (c < 2)] = SHAPE_SD_FREE
+    growth = GROWTH_SD * np.log(np.maximum(c, 2) / 2)
+    same = np.array([[a == b for b in labels] for a in labels])
+    noise = np.array([np.hypot(np.nan_to_num(row.sigma / row.value), LEAST_NOISE) for row in rows])
+    covariance = (
+        SCALE_SD**2
+        + OFFSET_SD**2 * (m[:, None] == m)
+        + np.outer(growth, growth)
+        + same * np.outer(shape, shape)
+        + (RISE_SD**2 + OWN_RISE_SD**2 * same) * np.outer(p, p)
+        + np.diag(noise**2)
+    )
+    return np.linalg.inv(covariance), y - RISE * p
