@@ -143,13 +143,14 @@ MODEL_RULES: dict[str, Rule] = {
     "SURFACE": Rule(
         "part",
         "NAME=+surface; INTERNAL; TYPE=ELEMENT|NODE|CYLINDER|REVOLUTION|SEGMENTS",
-        "name? name?",
+        "element? name?",
         rows=ANY_ROWS,
         needs=("NAME",),
         variants={
             "TYPE=ELEMENT": "element? name?",
             "TYPE=NODE": "node number?",
             "TYPE=CYLINDER": ("6*number", "3*number", "name 2*number", "name 4*number?"),
+            "TYPE": "name? name?",
         },
         honoured={
             "deck": "NAME; TYPE=ELEMENT|NODE; ~INTERNAL",
