@@ -11,6 +11,7 @@ from .text import Block, Row
 
 Point = tuple[float, float]
 CORNERS_OF = {3: 3, 4: 4, 6: 3, 8: 4}  # of solids by their number of nodes
+FARTHEST = 1e9  # coordinate, in any unit
 MOST = 200_000  # nodes or elements that a deck generates
 SOLID, PLY, RIGID = "CGAX", "SFMGAX", "RAX"
 
@@ -98,6 +99,8 @@ class Scope:
             raise block.refused(f"node {number} is defined twice, at two places", row)
         if len(self.nodes) > MOST:
             raise block.refused(f"there are more than {MOST} nodes", row)
+        if not max(map(abs, point)) < FARTHEST:
+            raise block.refused(f"node {number} lies at {point}: no tyre is so large", row)
         self.nodes[number] = point
 
     def make(self, block: Block, row: Row, number: int, kind: str, nodes: tuple[int, ...]) -> None:
