@@ -155,7 +155,7 @@ def _parameter(block: Block, parameters: Mapping[str, Any], name: str) -> str:
     raise block.refused(f"the parameter <{name}> is not defined above")
 
 
-LARGEST = 1e300  # result of an expression
+LARGEST_RESULT = 1e300  # result of an expression
 LARGEST_BASE = 1e30  # of a power
 OPERATORS: dict[type, Callable[..., Any]] = {
     ast.Add: operator.add,
@@ -210,8 +210,8 @@ def _evaluate(node: ast.AST, known: Mapping[str, Any]) -> Any:
         if isinstance(node.op, ast.Pow) and (abs(right) > 100 or abs(left) > LARGEST_BASE):
             raise ValueError("a power above 100, or of a large number")
         value = OPERATORS[type(node.op)](left, right)
-        if abs(value) > LARGEST:
-            raise ValueError(f"a number above {LARGEST:g}")
+        if abs(value) > LARGEST_RESULT:
+            raise ValueError(f"a number above {LARGEST_RESULT:g}")
         return value
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
         function = EXPRESSION_FUNCTIONS.get(node.func.id)
