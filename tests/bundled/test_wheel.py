@@ -10,6 +10,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import jv, jvp, yv, yvp
 from tyrecal_solvers.bundled.modes import harmonics
+from tyrecal_solvers.bundled.modes.bordered import apply
 from tyrecal_solvers.bundled.modes.cavity import coupling
 from tyrecal_solvers.bundled.modes.wheel import Wheel
 from tyrecal_solvers.bundled.section import mechanics
@@ -32,6 +33,21 @@ def test_a_free_tyre_on_its_wheel_moves_rigidly(z: float, quadratic: bool) -> No
     for n in (0, 1):
         values = tyre.vibration(tyre.wheel(), shift=SHIFT).modes(n, 3).eigenvalues
         assert abs(values[:2]).max() < 3e-11 * values[2]
+
+
+def test_a_type_of_element_may_have_none_at_the_rim() -> None:
+    """The image of the rim's motions is that of each element's matrix on its own nodes."""
+    random = np.random.default_rng(1)
+    quads, triangles = np.array([[0, 1, 2, 3], [2, 3, 4, 5]]), np.array([[5, 6, 7]])
+    matrices = [
+        random.normal(size=(len(c), 3 * c.shape[1], 3 * c.shape[1])) for c in (quads, triangles)
+    ]
+    fields = np.zeros((8, 3, 2))
+    fields[:2] = random.normal(size=(2, 3, 2))
+    image = np.zeros_like(fields)
+    image[quads[0]] = (matrices[0][0] @ fields[quads[0]].reshape(12, 2)).reshape(4, 3, 2)
+    computed = apply(zip((quads, triangles), matrices, strict=True), fields)
+    assert computed == pytest.approx(image, rel=1e-14)
 
 
 def test_the_pressure_on_the_well_is_part_of_it() -> None:

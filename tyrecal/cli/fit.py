@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -12,6 +13,12 @@ from . import arguments, complete, options
 from .main import EXIT_FIT
 from .parameters import OneOf, Place, Whole, option
 from .terminal import Progress, Terminal
+
+if TYPE_CHECKING:
+    from ..simulate.evaluate.evaluator import Evaluator
+    from ..studies.fit.calibrate import Fit
+    from ..tyre.case import LoadedCase
+    from .output import Run
 
 
 @click.command()
@@ -143,24 +150,18 @@ def command(
         terminal.note(f"{calibration.measured or case}: not used: {each}")
     for warning in (*tyre_doubts(result), *fit_doubts(result)):
         terminal.warn(warning)
-    if pictures or study.report:
-        from ..report.shape_data import tyre_data
-        from ..simulate.evaluate.evaluator import Question
-        from ..tyre.values import with_values
-
-        state = next(iter(fit.fitted.states))
-        values = state.design(loaded, fit.fitted.values)
-        modes = sorted(fit.fitted.modes.values(), key=lambda mode: mode.frequency_Hz)
-        evaluation = evaluator.evaluate(Question(values))
-        shapes = tyre_data(with_values(loaded, values), evaluation, modes)
-        run.write_json("fit_shapes.json", shapes)
-    if pictures:
-        from ..report.pictures import draw_fit
-
-        draw_fit(run.new, loaded, values, evaluation, modes, fit.history, fit.found)
     good = fit.found.is_good
     earlier = not good and has_good(run.folder / "fit.json")
-    run.finish(aside=NOT_CONVERGED if earlier else "")
+    finish = partial(run.finish, aside=NOT_CONVERGED if earlier else "")
+    try:
+        if pictures or study.report:
+            _write_shapes(run, loaded, evaluator, fit, pictures)
+    except OSError:  # the disk is full: an earlier fit stays
+        raise
+    except Exception:  # a picture that fails does not lose the fit
+        finish()
+        raise
+    finish()
     if earlier:
         terminal.warn(f"the fit in '{run.folder}' had converged: it stays")
     study.finish(run)
@@ -171,6 +172,26 @@ def command(
     if good and not loaded.case.deck and read_targets(loaded):
         terminal.say(f"next: {next_} says what the model lacks")
     return 0 if good else EXIT_FIT
+
+
+def _write_shapes(
+    run: Run, loaded: LoadedCase, evaluator: Evaluator, fit: Fit, pictures: bool
+) -> None:
+    """Write the fitted tyre's mode shapes, and the pictures of the fit."""
+    from ..report.shape_data import tyre_data
+    from ..simulate.evaluate.evaluator import Question
+    from ..tyre.values import with_values
+
+    state = next(iter(fit.fitted.states))
+    values = state.design(loaded, fit.fitted.values)
+    modes = sorted(fit.fitted.modes.values(), key=lambda mode: mode.frequency_Hz)
+    evaluation = evaluator.evaluate(Question(values))
+    shapes = tyre_data(with_values(loaded, values), evaluation, modes)
+    run.write_json("fit_shapes.json", shapes)
+    if pictures:
+        from ..report.pictures import draw_fit
+
+        draw_fit(run.new, loaded, values, evaluation, modes, fit.history, fit.found)
 
 
 class _Points:

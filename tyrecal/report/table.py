@@ -126,6 +126,8 @@ def fit_doubts(result: Mapping[str, Any]) -> list[str]:
     if failed := result["failed_evaluations"]:
         designs = "1 design" if failed == 1 else f"{failed} designs"
         doubts.append(f"{designs} could not be evaluated; the search stepped back")
+    if error := result.get("next_states_error"):
+        doubts.append(f"which state to measure next could not be evaluated: {error}")
     if result["label_margin"] < 0.3:
         doubts.append(
             f"a mode is hard to name (margin {result['label_margin']:.2f} of 1): two modes have"

@@ -145,6 +145,7 @@ def apply(parts: OfElements, fields: Array) -> Array:
     for connectivity, matrices in parts:
         near = touched[connectivity].any(1)
         c = connectivity[near]
-        local = matrices[near] @ fields[c].reshape(len(c), 3 * c.shape[1], -1)
-        np.add.at(image, c, local.reshape(*c.shape, 3, -1))
+        columns = fields.shape[2]  # -1 would be ambiguous if no element of a type is near
+        local = matrices[near] @ fields[c].reshape(len(c), 3 * c.shape[1], columns)
+        np.add.at(image, c, local.reshape(*c.shape, 3, columns))
     return image

@@ -178,6 +178,7 @@ class FitResult(Result):
     mass: FittedFootprint | None = None
     states: list[FittedState] = Field(default=[])  # of a fit over several
     next_states: list[FittedState] = Field(default=[])  # the most telling first
+    next_states_error: str = ""  # why they could not be evaluated
     labels: Labels | None = None  # of frequencies that came without
     noise_Hz: float | None = None  # standard deviation of a frequency
     correlations: dict[str, dict[str, float | None]]
@@ -478,13 +479,17 @@ def _states(problem: Problem, point: Point, known: FitUncertainty) -> dict[str, 
         }
         for each in state_reports(problem, point, known)
     ]
+    try:
+        proposals = next_states(problem, point, known)
+    except Exception as error:  # the fit has ended: what only comes after it must not lose it
+        return {"states": measured, "next_states_error": f"{type(error).__name__}: {error}"}
     more = [
         {
             **plain(problem, each.state),
             "standard_errors_with": each.standard_errors_with,
             "ratio": each.ratio,
         }
-        for each in next_states(problem, point, known)
+        for each in proposals
     ]
     return {"states": measured, "next_states": more}
 
