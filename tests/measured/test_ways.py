@@ -22,8 +22,10 @@ from .ten_modes import (
     MODES,
     NUMBERS,
     POINTS,
+    THETA,
     WAYS,
     F,
+    Z,
     accelerances,
     along_xyz,
     files,
@@ -148,6 +150,15 @@ def test_a_type_that_may_change_places_is_refused_and_elements_are_not(tmp_path:
                 InputError, match=rf"\(type {kind}, line \d+\): tyrecal does not read"
             ):
                 gather([path], 240.0, LAYOUT)
+
+
+def test_one_geometry_in_two_kinds_of_nodes(tmp_path: Path) -> None:
+    """With the six digits of the older one, and its places in a cylindrical system."""
+    places = np.column_stack([np.full(16, 0.33), np.degrees(THETA), Z])
+    turned = nodes(15, 11, places=places) | {"def_cs": np.full(16, 11)}
+    file = read_universal(write(tmp_path / "f.uff", systems_18(1), nodes(), turned))
+    assert np.array([file.nodes[n] for n in NUMBERS]) == pytest.approx(POINTS, abs=1e-5)
+    assert np.array([file.axes[n] for n in NUMBERS]) == pytest.approx(AXES, abs=1e-4)
 
 
 def test_channels_can_be_taken_away(tmp_path: Path) -> None:

@@ -17,9 +17,8 @@ from .repeats import FLOOR, combined, one_for_both
 from .sense import doubts
 from .slips import contradictions
 from .tables import read_table
-from .universal import Place, Universal, is_universal, read_universal
+from .universal import Place, Universal, is_same_place, is_universal, read_universal
 
-SAME_PLACE_m = 1e-6  # m
 SAME_UNLABELLED = 0.01  # relative, of repeats without a label
 MIN_EXPLAINED = 0.98  # of the functions' mean square; less, and modes are missing
 
@@ -125,8 +124,7 @@ def all_nodes(files: Sequence[Universal]) -> dict[int, Place]:
     nodes: dict[int, Place] = {}
     for file in files:
         for number, place in file.nodes.items():
-            known = nodes.setdefault(number, place)
-            if max(abs(a - b) for a, b in zip(known, place, strict=True)) > SAME_PLACE_m:
+            if not is_same_place(nodes.setdefault(number, place), place):
                 raise InputError(
                     f"{file.path}: node {number} stands elsewhere than in the files before"
                 )

@@ -29,6 +29,7 @@ Signal = tuple[int, int]  # number of a node; direction 1, 2 or 3, negative wher
 Place = tuple[float, float, float]  # m
 
 MAX_BYTES = 1_000_000_000  # response functions of many points are long
+SAME_PLACE_m = 1e-5  # m
 LARGEST_HZ, LARGEST_VALUE = 1e6, 1e30  # of response functions
 DELIMITER = re.compile(rb" {4}-1(?: {74})?(?=[\r\n]|\Z)")  # binary values may stand before it
 NODES, SYSTEMS, SHAPES = (15, 2411), (18, 2420), (55, 2414)
@@ -250,12 +251,17 @@ def _add_nodes(
         if own["place"] in systems:
             place = systems[own["place"]].place(coordinates)
         x, y, z = (float(value) for value in place / length)
-        if result.nodes.setdefault(node, (x, y, z)) != (x, y, z):
+        if not is_same_place(result.nodes.setdefault(node, (x, y, z)), (x, y, z)):
             raise InputError(f"{each.place}: node {node} is given twice, at different places")
         if own["directions"] in systems:
             axes = systems[own["directions"]].directions(place)
             if not np.allclose(axes, np.eye(3), atol=1e-6):
                 result.axes[node] = axes
+
+
+def is_same_place(one: Place, other: Place) -> bool:
+    """Whether two places of a node are one; data set 15 has six digits only."""
+    return max(abs(a - b) for a, b in zip(one, other, strict=True)) <= SAME_PLACE_m
 
 
 def _add_shape(result: Universal, each: _Set) -> None:
