@@ -4,6 +4,7 @@ right, or one sentence says what is missing."""
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -150,6 +151,17 @@ def test_a_type_that_may_change_places_is_refused_and_elements_are_not(tmp_path:
                 InputError, match=rf"\(type {kind}, line \d+\): tyrecal does not read"
             ):
                 gather([path], 240.0, LAYOUT)
+
+
+@pytest.mark.slow
+def test_directions_that_the_shapes_contradict_are_doubted(tmp_path: Path) -> None:
+    path = write(tmp_path / "f.uff", units(), nodes(), *functions(along_xyz()))
+    for given, doubted in (("cartesian", False), ("cylindrical", True)):
+        layout = replace(LAYOUT, directions=given)
+        note = [
+            n for n in gather([path], 240.0, layout).notes if "is given, but the shapes fit" in n
+        ]
+        assert bool(note) == doubted
 
 
 def test_one_geometry_in_two_kinds_of_nodes(tmp_path: Path) -> None:

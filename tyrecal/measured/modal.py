@@ -131,6 +131,7 @@ def sensors_in(file: Universal, layout: Layout) -> Labeller:
             raise InputError("nothing was measured in it")
         first, *others = _readings(signals, Geometry(file.nodes, file.axes), layout).values()
         apart = first.looks_like()
+        others = [] if layout.directions else others
         if any(each is not first and each.looks_like() != apart for each in others):
             raise InputError(f"the file does not say what its directions are; {_ASK}")
         return first
@@ -140,12 +141,11 @@ _ASK = "give --directions cartesian (along x, y, z) or cylindrical (radial, tang
 
 
 def _readings(signals: Sequence[Signal], geometry: Geometry, layout: Layout) -> dict[str, Labeller]:
-    """Judges of the signals by what the directions can mean, the file's own statement first. Where
-    two meanings put the sensors in the same directions, one judge has both."""
-    if layout.directions:
-        names = [layout.directions]
-    else:
-        names = ["stated", "cartesian"] if geometry.axes else ["cartesian", "cylindrical"]
+    """Judges of the signals by what the directions can mean: first what the user says, or else the
+    file or the format. Where two meanings put the sensors in the same directions, one judge has
+    both."""
+    names = ["stated", "cartesian"] if geometry.axes else ["cartesian", "cylindrical"]
+    names = list(dict.fromkeys([layout.directions or names[0], *names]))
     judges: dict[str, Labeller] = {}
     for name in names:
         axes = geometry.axes if name == "stated" else {}
@@ -166,40 +166,39 @@ def _judges_by_directions(
     where no meaning is clearly right."""
     judges = {s: _readings(s, geometry, layout) for s in {each.signals for each in modes}}
     names = list(next(iter(judges.values())))
+    chosen, note = names[0], ""
     if any(len(set(each.values())) > 1 for each in judges.values()):
-        chosen = _meaning(
-            {
-                n: sum(judges[e.signals][n].ln_evidence(_unit(e.mode)[0]) for e in modes)
-                for n in names
-            },
-            len(modes),
-        )
-    else:
-        chosen = names[0]
-    note = f"the shapes fit {chosen} directions clearly better: --directions {chosen} is taken"
-    judged = [(each.mode, judges[each.signals][chosen], each.place) for each in modes]
-    return judged, note if chosen != names[0] else ""
+        shapes = [(judges[each.signals], _unit(each.mode)[0]) for each in modes]
+        evidence = {n: sum(judge[n].ln_evidence(u) for judge, u in shapes) for n in names}
+        chosen, note = _meaning(evidence, len(modes), layout.directions)
+    return [(each.mode, judges[each.signals][chosen], each.place) for each in modes], note
 
 
-def _meaning(evidence: Mapping[str, float], count: int) -> str:
-    """The meaning of the directions with the most evidence (ln of the probability of ``count``
-    shapes), the first of two the file's own statement or the format's. Raises InputError."""
-    first, other = evidence
-    lead = evidence[other] - evidence[first]
+def _meaning(evidence: Mapping[str, float], count: int, given: str) -> tuple[str, str]:
+    """The meaning of the directions, and a sentence where that is not the format's or not what the
+    shapes fit. evidence: by meaning, ln of the probability of ``count`` shapes, first that of
+    ``given``, or else of the file or the format. Raises InputError where none is clearly right."""
+    first, *others = evidence
+    best = max(others, key=lambda name: evidence[name])
+    lead = evidence[best] - evidence[first]
     clear = abs(lead) > max(LN_ODDS_OF_DIRECTIONS, LN_ODDS_OF_DIRECTIONS_PER_MODE * count)
+    better = f"the shapes fit {best} directions clearly better"
+    if given:
+        words = f"--directions {given} is given, but {better}: the labels may be wrong"
+        return given, words if clear and lead > 0 else ""
     if first == "stated":
-        if lead > 0 and clear:
+        if clear and lead > 0:
             raise InputError(
                 "the shapes do not fit the directions of the file's coordinate systems, but those"
                 " along x, y, z; give --directions stated or cartesian"
             )
-        return first
+        return first, ""
     if not clear:
         raise InputError(
             "the shapes do not tell whether directions 1, 2, 3 are along x, y, z or radial,"
             f" tangential, axial; {_ASK}"
         )
-    return other if lead > 0 else first
+    return (best, f"{better}: --directions {best} is taken") if lead > 0 else (first, "")
 
 
 @contextmanager
