@@ -11,6 +11,7 @@ from tyrecal.simulate.deck.own import asked_by_abaqus
 from tyrecal.tyre.own_deck.own_deck import read_own_deck
 from tyrecal.tyre.own_deck.text import OwnDeckError
 
+from ..studies import spellings
 from . import own_decks
 
 # (text of the plain deck, the same in another legal spelling)
@@ -100,3 +101,7 @@ def test_sets_of_an_instance(tmp_path: Path) -> None:
     (tmp_path / "tyre.inp").write_text(text)
     sets = read_own_deck(tmp_path / "tyre.inp").flat({}).model.node_sets
     assert len(sets["WHOLE"]) == len(own_decks.Tyre().nodes)
+
+
+def test_spellings_drawn_from_the_rules_are_the_same_tyre(request: pytest.FixtureRequest) -> None:
+    assert not spellings.draw(5, request.config.getoption("--seed"))
