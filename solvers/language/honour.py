@@ -32,8 +32,9 @@ def check_honoured(block: Block, place: str) -> None:
     for name, value in block.parameters.items():
         if name not in options:
             close = get_close_matches(name, options, 1)
-            hint = f"; did you mean {close[0]}?" if close else ""
-            raise block.refused(f"the parameter {name} is not honoured{hint}")
+            hint = f"did you mean {close[0]}?" if close else rule.instead
+            words = f"the parameter {name} is not honoured" + (f"; {hint}" if hint else "")
+            raise block.refused(words)
         values = options[name]
         if values is not None and value not in values:
             right = " or ".join(each or "no value" for each in values)
