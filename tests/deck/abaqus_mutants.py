@@ -230,7 +230,7 @@ def field_too_many(lines: list[str], random: Random) -> list[str]:
 
 
 def field_missing(lines: list[str], random: Random) -> list[str]:
-    k = data(lines, ("ELEMENT", "NODE,", "CLOAD", "BOUNDARY", "DSLOAD", "DENSITY"), random)
+    k = data(lines, ("ELEMENT", "CLOAD", "BOUNDARY", "DSLOAD", "DENSITY"), random)
     fields = lines[k].split(",")
     fields[random.randrange(min(len(fields), 2))] = " "
     return [*lines[:k], ",".join(fields), *lines[k + 1 :]]

@@ -57,12 +57,13 @@ def lines_with(text: str, pattern: str) -> list[int]:
 
 
 def misspelt(word: str, random: Random) -> str:
-    """With a letter gone, doubled or exchanged."""
+    """With a letter gone, doubled or exchanged; no beginning of the word, which is legal."""
     letters = [k for k, c in enumerate(word) if c.isalpha() and c not in "qQ"]
     k = random.choice(letters[1:] or letters)
-    return random.choice(
+    wrong = random.choice(
         (word[:k] + word[k + 1 :], word[:k] + word[k] + word[k:], word[:k] + "q" + word[k + 1 :])
     )
+    return f"q{word}" if word.startswith(wrong) else wrong
 
 
 def in_line(text: str, k: int, change: Callable[[str], str]) -> str:
