@@ -199,6 +199,45 @@ def test_sensors_are_judged_before_a_test(
     assert "[5,0]" in alike[3, 0] and "[3,0]" in alike[5, 0]
 
 
+def test_shapes_are_labelled_by_a_case(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The shapes at 200 kPa by the case at other values: each label is that of the true mode, and
+    labelled.csv holds the measured frequencies."""
+    code = run(
+        "measured",
+        "label",
+        str(CASES / "p235_75r17.yaml"),
+        str(SHAPES),
+        *TEST,
+        "--set",
+        "pressure_kPa=200",
+        "--mesh",
+        "coarse",
+        "--sigma-percent",
+        "0.2",
+        "--output",
+        str(tmp_path / "labelled"),
+        "--json",
+    )
+    result = json.loads(capsys.readouterr().out)
+    assert code == 0 and result["provenance"]["measured_sha256"]
+    right = truth(200.0)
+    for each in result["labels"]["frequencies"]:
+        label = Label(each["c"], each["m"], each["kind"])
+        assert each["frequency_Hz"] == pytest.approx(right[label], rel=0.005)
+        assert each["expected_Hz"] == pytest.approx(right[label], rel=0.03)
+        assert each["probability"] > 0.99
+    rows = read_measurements(tmp_path / "labelled" / "labelled.csv")
+    assert {row.label for row in rows} == set(right)
+
+
+def test_options_of_universal_files_are_refused_with_a_table(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    case = str(CASES / "p235_75r17.yaml")
+    assert run("measured", "label", case, str(TABLE), "--directions", "cylindrical") == 2
+    assert "280kPa_table.csv is a table, no universal file" in capsys.readouterr().err
+
+
 def mode_in_plane(c: int = 2) -> np.ndarray:
     """(8, 3), cylindrical, at the angles of test_universal."""
     turn = c * ANGLES

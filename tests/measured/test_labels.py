@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tyrecal.measured.covariance import half_widths
+from tyrecal.measured.covariance import half_widths, label_covariances
 from tyrecal.measured.labels import Judged, Labeller
 from tyrecal.measured.modal import LabelledMode, _labelled, label_in_turn, settled
 from tyrecal.measured.sensors import MeasuredMode, Sensors, real_part
@@ -147,7 +147,7 @@ def test_motions_that_are_not_the_labels_are_small_and_smaller_of_the_other_pari
         np.vstack([tread.points, walls]),
         np.vstack([tread.directions, np.eye(3)[[row[3] for row in rows]]]),
     )
-    labeller = Labeller(sensors, 3, half_width=0.09)
+    every = {(c, order): S for c, order, S, _ in label_covariances(sensors, 3, half_width=0.09)}
     R, angle, Z = sensors.points.T
     belt = R > 0.35
     motions = [(k, k + (d == 2), d) for d in range(3) for k in range(4) if k + (d == 2) < 4]
@@ -164,7 +164,7 @@ def test_motions_that_are_not_the_labels_are_small_and_smaller_of_the_other_pari
     share = {"own": 1.0, "same": SAME_PARITY, "other": OTHER_PARITY}
     wanted = size * [share[k] / whole[k] for k in kind]
     inverse = np.linalg.pinv(np.transpose(motion) * np.cos(2 * angle)[:, None])
-    S = labeller.covariance[labeller.labels.index(Label(2, m))]
+    S = every[2, m]
     found = np.diag(inverse @ S @ inverse.T)
     assert found / found[kind.index("own")] == pytest.approx(
         wanted / wanted[kind.index("own")], rel=0.1
@@ -327,7 +327,9 @@ def belt_and_walls() -> Sensors:
 def told_of(amplitude: np.ndarray) -> LabelledMode:
     """What is told of a shape that the labels are sure of."""
     sensors = belt_and_walls()
-    sure = SimpleNamespace(sensors=sensors, judge=lambda shape, below: Judged(Label(2, 0), {}, ""))
+    sure = SimpleNamespace(
+        sensors=sensors, judge=lambda shape, below, hertz: Judged(Label(2, 0), {}, "")
+    )
     return _labelled(MeasuredMode(66.0, amplitude), sure, "a.uff")  # type: ignore[arg-type]
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from . import arguments, options
 from .parameters import Number, NumberWithin, OneOf, Place, Whole, option
@@ -13,6 +14,8 @@ from .terminal import Terminal
 
 if TYPE_CHECKING:
     from ..measured.modal import Layout
+    from ..studies.labels import LabelsResult
+    from .output import Run
 
 files = click.argument(
     "files", nargs=-1, required=True, metavar="FILE...", type=Place(exists=True, folder=False)
@@ -49,6 +52,22 @@ highest = option(
     help="The most waves round the circumference that a mode of the band can have (default: 12).",
 )
 
+band = option(
+    "--band", metavar="F1,F2", help="Look for modes between these frequencies, Hz (default: all)."
+)
+assumed = option(
+    "--sigma-percent",
+    "assumed",
+    type=NumberWithin(0, 20, min_open=True),
+    metavar="P",
+    help="Standard deviation of one run that states none, in per cent.",
+)
+response = option(
+    "--response",
+    type=OneOf(["receptance", "mobility", "accelerance"]),
+    help="What functions are that do not say it.",
+)
+
 
 @click.group()
 def command() -> None:
@@ -79,16 +98,7 @@ def command() -> None:
     metavar="P",
     help="Inflation pressure of files that do not say it.",
 )
-@option(
-    "--band", metavar="F1,F2", help="Look for modes between these frequencies, Hz (default: all)."
-)
-@option(
-    "--sigma-percent",
-    "assumed",
-    type=NumberWithin(0, 20, min_open=True),
-    metavar="P",
-    help="Standard deviation of one run that states none, in per cent.",
-)
+@options.every(band, assumed)
 @option(
     "--floor-percent",
     "floor",
@@ -98,12 +108,7 @@ def command() -> None:
     metavar="P",
     help="No sigma below this, in per cent: what repeats do not show.",
 )
-@options.every(axle, centre, directions, highest, leave_out)
-@option(
-    "--response",
-    type=OneOf(["receptance", "mobility", "accelerance"]),
-    help="What functions are that do not say it.",
-)
+@options.every(axle, centre, directions, highest, leave_out, response)
 @option(
     "--keep-going",
     is_flag=True,
@@ -152,10 +157,7 @@ def import_files(
 
     if output.resolve() in [path.resolve() for path in files]:
         raise click.UsageError(f"--output {output}: is one of the files to read")
-    limits = _numbers("--band", band, 2) if band else None
-    if limits and not 0 <= limits[0] < limits[1]:
-        raise click.UsageError(f"--band {band}: must rise from 0 or more")
-    layout = _layout(axle, centre, directions, highest, limits, response or "")
+    layout = _layout(axle, centre, directions, highest, band, response or "")
     sigmas = floor / 100, (assumed or 0.0) / 100
     found = gather(files, pressure_kPa, layout, *sigmas, leave_out, keep_going)
     write_text(output, measurements_csv(found.rows))
@@ -224,13 +226,35 @@ def sensors(
 @options.every(
     options.assignments,
     options.fitted("Expect the variables where this fit of CASE has them, as sure as it is."),
+    axle,
+    centre,
+    directions,
+    highest,
+    band,
+    response,
+    assumed,
 )
 @options.study
 def label_file(
-    case: Path, file: Path, assignments: tuple[str, ...], fitted: Path | None, study: options.Study
+    case: Path,
+    file: Path,
+    assignments: tuple[str, ...],
+    fitted: Path | None,
+    axle: str | None,
+    centre: str,
+    directions: str | None,
+    highest: int | None,
+    band: str | None,
+    response: str | None,
+    assumed: float | None,
+    study: options.Study,
 ) -> int:
-    """Tell which mode each frequency without a label (c and m) is, in the measurements CSV FILE, by
-    CASE, and how probable it is.
+    """Tell which mode each frequency in FILE is, by CASE, and how probable it is.
+
+    FILE: a measurements CSV whose frequencies have no label (c and m), or a universal file as for
+    'tyrecal measured import', measured at the case's pressure. The shapes of a universal file are
+    compared with those of the case. The case's frequencies are expected to be right within 15 % (a
+    standard deviation). Where neither decides, a mode gets no label.
 
     Writes labels.json, labels.csv, and labelled.csv: the measurements with the likeliest labels,
     those left out that are no mode of the tyre. The variables are expected about their start
@@ -239,16 +263,21 @@ def label_file(
     \b
     tyrecal measured label cases/p235_75r17.yaml unlabelled.csv
     tyrecal measured label cases/205_60r15.yaml cases/205_60r15_vervoort.csv --fitted fit.json
+    tyrecal measured label cases/p235_75r17.yaml run1.uff --set pressure_kPa=200
     """
     from ..files import read_json
     from ..measured.measurement import measurements_csv
     from ..measured.tables import read_measurements
-    from ..report.table import shown
+    from ..measured.universal import is_universal
     from ..studies.fit.result import FitResult
     from ..studies.labelling.label import fitted_prior, label
     from ..studies.labelling.result import labels_result
 
-    loaded, _ = study.load(case, assignments)
+    loaded, values = study.load(case, assignments)
+    if is_universal(file):
+        layout = _layout(axle, centre, directions, highest, band, response or "")
+        return _label_shapes(loaded, values, file, fitted, layout, (assumed or 0.0) / 100, study)
+    _refuse_universal_options(file)
     readings = read_measurements(file, labelled=False)
     if not any(each.is_unlabelled for each in readings):
         raise click.UsageError(f"{file}: every frequency has a label")
@@ -263,16 +292,65 @@ def label_file(
     told = label(loaded, evaluator, readings, prior, fixed=fixed, jobs=study.jobs)
     found = run.write(labels_result(loaded, told))
     run.write_text("labelled.csv", measurements_csv(told.readings))
+    _print_labels(found, run, study)
+    return 0
+
+
+def _label_shapes(
+    loaded: Any,
+    values: dict[str, float],
+    file: Path,
+    fitted: Path | None,
+    layout: Layout,
+    assumed: float,
+    study: options.Study,
+) -> int:
+    """`label_file` of a universal file."""
+    from dataclasses import replace
+
+    from ..measured.case_modes import evaluate_case_modes
+    from ..measured.gather import gather
+    from ..measured.measurement import measurements_csv
+    from ..studies.labelling.result import shape_labels_result
+
+    if fitted:
+        values = arguments.fitted_values(fitted, loaded, study.terminal)
+    evaluator = study.evaluator(loaded)
+    run = study.run(loaded, "measured label", evaluator, "labels", measured=[file])
+    case_modes = evaluate_case_modes(loaded, evaluator, values, layout.highest)
+    pressure_kPa = loaded.case.pressure_kPa
+    gathered = gather([file], pressure_kPa, replace(layout, case=case_modes), assumed=assumed)
+    state = gathered.rows[0].state.of(loaded).told(loaded)
+    for note in gathered.notes:
+        study.terminal.note(note)
+    labels = run.write(shape_labels_result(gathered.runs[0], case_modes, state))
+    run.write_text("labelled.csv", measurements_csv(gathered.rows))
+    _print_labels(labels, run, study)
+    return 0
+
+
+def _refuse_universal_options(file: Path) -> None:
+    """Raises click.UsageError where an option was given that counts for universal files alone."""
+    context = click.get_current_context()
+    names = ("axle", "centre", "directions", "highest", "band", "response", "assumed")
+    for parameter in context.command.params:
+        source = context.get_parameter_source(parameter.name or "")
+        if parameter.name in names and source is ParameterSource.COMMANDLINE:
+            raise click.UsageError(f"{parameter.opts[0]}: {file} is a table, no universal file")
+
+
+def _print_labels(labels: LabelsResult, run: Run, study: options.Study) -> None:
+    from ..report.table import shown
+
     run.finish()
     terminal = study.terminal
-    terminal.result(found.content())
-    for table in found.tables():
+    terminal.result(labels.content())
+    for table in labels.tables():
         terminal.show(shown(table))
-    terminal.say("\n".join(found.sentences()))
-    for doubt in found.doubts():
+    terminal.say("\n".join(labels.sentences()))
+    for doubt in labels.doubts():
         terminal.warn(doubt)
     study.finish(run)
-    return 0
 
 
 def _layout(
@@ -280,15 +358,19 @@ def _layout(
     centre: str,
     directions: str | None,
     highest: int | None,
-    band: Any = None,
+    band: str | None = None,
     response: str = "",
 ) -> Layout:
     from ..measured.modal import Layout
     from ..simulate.modes.label import HIGHEST_HARMONIC
 
     x, y, z = _numbers("--centre", centre, 3)
+    limits = _numbers("--band", band, 2) if band else None
+    if limits and not 0 <= limits[0] < limits[1]:
+        raise click.UsageError(f"--band {band}: must rise from 0 or more")
     most = HIGHEST_HARMONIC if highest is None else highest
-    return Layout(axle or "", (x, y, z), directions or "", most, band, response)
+    within = (limits[0], limits[1]) if limits else None
+    return Layout(axle or "", (x, y, z), directions or "", most, within, response)
 
 
 def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:

@@ -12,7 +12,8 @@ p(s) ~ 1/s:
 A label's probability is its share of the sum of prior p(u | label). The prior knows one thing
 about tyres: [c,m+2] is above [c,m], so a file in which [c,m] was not found below is hardly of
 [c,m+2]. Labels that these sensors cannot distinguish share their probability by their priors
-alone: how clean a shape looks says nothing about its order there.
+alone: how clean a shape looks says nothing about its order there. Where a case is given, its shapes
+are in the covariances and its frequencies in the prior (``case_modes``).
 
 ``modal`` judges the shapes of a file with it, lowest frequency first. `Labeller.looks_like` draws
 shapes and judges them the same way, so it says what an import will do.
@@ -26,6 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..simulate.modes.label import AXIAL_COLUMN, BELT, HIGHEST_HARMONIC, Label
+from .case_modes import CaseModes
 from .covariance import HALF_WIDTHS, LEAST_SEEN, label_covariances
 from .sensors import Sensors
 
@@ -59,27 +61,35 @@ class Labeller:
     """Judges shapes on one layout of sensors.
 
     highest: the largest c that is possible in the measured band; fewer leave less to confuse.
-    half_width: of the belt (m), None where it is not known.
+    case: whose belt, shapes and frequencies count, too.
+
+    Raises InputError where a sensor is not on the case's tyre.
     """
 
     def __init__(
-        self, sensors: Sensors, highest: int = HIGHEST_HARMONIC, half_width: float | None = None
+        self, sensors: Sensors, highest: int = HIGHEST_HARMONIC, case: CaseModes | None = None
     ):
-        self.sensors = sensors
-        every = label_covariances(sensors, highest, half_width)
+        self.sensors, self.case = sensors, case
+        every = label_covariances(sensors, highest, case.half_width if case else None)
         self.labels = [_label(c, column) for c, column, *_ in every]
         self.covariance = [S for *_, S, _ in every]
+        if case:
+            pairs = zip(self.labels, self.covariance, strict=True)
+            self.covariance = [case.covariance(label, sensors, S) for label, S in pairs]
         self.is_seen = np.array([seen >= LEAST_SEEN for *_, seen in every])
         self._spectra = [np.linalg.eigh(S) for S in self.covariance]
         is_alike = self._odds() < MIN_LN_ODDS
         self._groups = [np.flatnonzero(row) for row in is_alike]  # each label, and its rivals
 
-    def judge(self, shape: Array, below: Collection[Label] = ()) -> Judged:
+    def judge(
+        self, shape: Array, below: Collection[Label] = (), frequency_Hz: float | None = None
+    ) -> Judged:
         """The label of a real shape (k,), a signal each, with its probability.
 
-        below: labels found in the same file at lower frequencies.
+        below: labels found in the same file at lower frequencies; frequency_Hz: counts where there
+        is a case.
         """
-        p = self._probabilities(shape[:, None], below)[:, 0]
+        p = self._probabilities(shape[:, None], below, frequency_Hz)[:, 0]
         order = np.argsort(-p, kind="stable")
         first = order[0]
         probabilities = {self.labels[i]: float(p[i]) for i in order}
@@ -90,10 +100,14 @@ class Labeller:
             return Judged(None, probabilities, why)
         return Judged(self.labels[first], probabilities)
 
-    def _probabilities(self, shapes: Array, below: Collection[Label] = ()) -> Array:
+    def _probabilities(
+        self, shapes: Array, below: Collection[Label] = (), frequency_Hz: float | None = None
+    ) -> Array:
         """Of each label (labels, n), of shapes (k, n)."""
         evidence = np.array([_evidence(*spectrum, shapes) for spectrum in self._spectra])
         prior = self._prior(below)
+        if self.case and frequency_Hz:
+            prior *= [self.case.likelihood(label, frequency_Hz) for label in self.labels]
         p = np.exp(evidence - evidence.max(0)) * prior[:, None]
         p /= p.sum(0)
         for n, first in enumerate(np.argmax(p, axis=0)):

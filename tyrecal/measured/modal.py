@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..simulate.modes.label import BELT, HIGHEST_HARMONIC, TAKES_PART, Label
+from .case_modes import CaseModes
 from .geometry import sensors_of
 from .identify import FORMS, Responses, identify
 from .labels import Judged, Labeller
@@ -45,6 +46,7 @@ class Layout:
     highest: int = HIGHEST_HARMONIC  # the largest c that is possible
     band: tuple[float, float] | None = None  # Hz; None: all
     form: str = ""  # of functions that do not say theirs
+    case: CaseModes | None = None  # by which shapes and frequencies are judged, too
 
 
 @dataclass(frozen=True)
@@ -154,7 +156,7 @@ def _readings(signals: Sequence[Signal], geometry: Geometry, layout: Layout) -> 
         known = [
             j for j in judges.values() if np.allclose(j.sensors.directions, sensors.directions)
         ]
-        judges[name] = known[0] if known else Labeller(sensors, layout.highest)
+        judges[name] = known[0] if known else Labeller(sensors, layout.highest, layout.case)
     return judges
 
 
@@ -343,7 +345,7 @@ def _labelled(
     mode: MeasuredMode, labeller: Labeller, place: str, below: Collection[Label] = ()
 ) -> LabelledMode:
     shape, collinearity = _unit(mode)
-    judged = labeller.judge(shape, below)
+    judged = labeller.judge(shape, below, mode.frequency_Hz)
     R = labeller.sensors.points[:, 0]
     belt = R / R.max() > BELT
     part = np.mean(shape[belt] ** 2) / (np.mean(shape**2) or 1.0)

@@ -35,7 +35,7 @@ class LabelledFrequency(LabelProbability):
     that it is this frequency's; the ``rivals``' too."""
 
     frequency_Hz: PositiveNumber
-    sigma_Hz: PositiveNumber
+    sigma_Hz: PositiveNumber | None  # of a shape that states none
     pressure_kPa: float
     rim: str
     expected_Hz: float | None = None  # of the mode, where the variables are expected

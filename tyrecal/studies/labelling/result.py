@@ -7,8 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ...measured.case_modes import CaseModes
+from ...measured.modal import ModalTest
 from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase
+from ...tyre.state import TyreState
 from ..labels import (
     FOREIGN_WORDS,
     LEAST_RIVAL,
@@ -75,6 +78,44 @@ def labels_told(case: LoadedCase, told: Labelled) -> Labels:
 def labels_result(case: LoadedCase, told: Labelled) -> LabelsResult:
     """As a result of its own."""
     return LabelsResult.model_validate({"format": 1, "labels": labels_told(case, told)})
+
+
+def shape_labels_result(run: ModalTest, case_modes: CaseModes, state: TyreState) -> LabelsResult:
+    """The labels that shapes of a universal file, measured in a state, got by a case's modes."""
+    frequencies = []
+    for each in run.modes:
+        label, likely = each.judged.label, each.judged.probabilities
+        rivals = [(own, p) for own, p in likely.items() if own != label and p >= LEAST_RIVAL]
+        sigma = each.mode.sigma_Hz
+        frequencies.append(
+            LabelledFrequency(
+                **_entry(label),
+                probability=likely[label] if label else 1 - sum(p for _, p in rivals),
+                frequency_Hz=each.mode.frequency_Hz,
+                sigma_Hz=sigma if sigma > 0 else None,
+                pressure_kPa=state.pressure_kPa or 0.0,
+                rim=state.rim or "",
+                expected_Hz=case_modes.expected_Hz(label),
+                rivals=[
+                    LabelProbability(**_entry(own), probability=p)
+                    for own, p in rivals[:MOST_RIVALS]
+                ],
+            )
+        )
+    pairs = [(f.frequency_Hz, f.expected_Hz) for f in frequencies if f.expected_Hz]
+    off = np.log([measured / expected for measured, expected in pairs])
+    together = Labeling(
+        labels=[each.said for each in frequencies],
+        probability=float(np.prod([each.probability for each in frequencies if each.label])),
+    )
+    labels = Labels(
+        frequencies=frequencies,
+        labelings=[together],
+        model_off_percent=100 * float(np.sqrt(np.mean(off**2))) if len(off) else 0.0,
+        expansions=1,
+        settled=True,
+    )
+    return LabelsResult.model_validate({"format": 1, "labels": labels})
 
 
 def _entry(label: Label | None) -> dict[str, Any]:
