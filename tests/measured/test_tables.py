@@ -175,7 +175,7 @@ def test_sigma_is_that_of_its_unit_or_of_all_in_percent(tmp_path: Path) -> None:
         (PLAIN.split("\n")[0], "there is no measurement in it"),
         (PLAIN + "2,0,,240\n", "line 4: 4 cells, the headings are 5$"),
         ("mode,f [Hz],p [kPa]\n[1,1],37.8,240\n", r'line 2: 4 cells, .* quotes, "\[1,1\]", or in'),
-        ("mode,f [Hz],p [kPa]\nR1,37.8,240\n", r"label is 'R1', must be like \[2,1\], or \[0,0\]"),
+        ("mode,f [Hz],p [kPa]\nB1,37.8,240\n", r"label is 'B1', must be like \[2,1\], or \[0,0\]"),
         (PLAIN + "2,0,,240,\n", "line 4: nothing was measured"),
         (PLAIN + "2,0,,240,79.5x\n", "line 4: frequency_Hz is '79.5x', must be a number"),
         (PLAIN + "2,0,,240,-79.5\n", "line 4: frequency_Hz is -79.5, must be greater than 0"),
@@ -318,3 +318,62 @@ def test_empty_columns_hide_no_split_number(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="line 3: '1' is in a column without a heading"):
         read(tmp_path, "c,m,pressure [kPa],f [Hz],\n0,1,240,31.7,\n2,1,240,66,1\n")
     assert len(read(tmp_path, ",c,m,pressure [kPa],f\n0,2,1,240,66.1\n1,3,1,240,102.7\n")) == 2
+
+
+GAPPED = [
+    "Test; hammer\n2024-05-03;\n\nMode;p;f\n;[bar];[Hz]\n[2,1];2,4;66,1\n[3,1];2,4;n.a.\n",
+    "Mode;p / bar;f in Hz\n[2,1];2,4;66,1\n",
+    "Mode;p;f;;\n;bar;Hz;;\n[2,1];2,4;66,1;;\n",
+    "Mode;Druck;Frequenz\n[2,1];2,4 bar;66,1 Hz\n[3,1];2,4 bar;-\n",
+    "Mode;Druck [bar];Frequenz [Hz]\n[2,1];2,4 bar;66,1 Hz\n",
+    "Modus;Druck;Frequenz;Streuung [%]\n1. Biegung aus der Ebene;240 kPa;66,1;n.a.\n",
+    "label,pressure kPa,f,kind\n2/1,240,66.1,n/a\n",
+]
+
+
+@pytest.mark.parametrize("text", GAPPED)
+def test_titles_units_and_gaps(tmp_path: Path, text: str) -> None:
+    (value,) = read(tmp_path, text)
+    assert (value.label, value.value) == (Label(2, 1), pytest.approx(66.1))
+    assert value.pressure_kPa == pytest.approx(240)
+
+
+@pytest.mark.parametrize(
+    "heading", ["sigma %", "sigma [%]", "Streuung [%]", "Streuung/%", "\u03c3 in %"]
+)
+def test_scatter_in_per_cent(tmp_path: Path, heading: str) -> None:
+    (value,) = read(tmp_path, f"label;p [kPa];f;{heading}\n[2,1];240;66;0,5\n")
+    assert value.sigma == pytest.approx(0.33)
+
+
+def test_units_that_differ_from_cell_to_cell_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="line 1: 'p' has no unit"):
+        read(tmp_path, "label;p;f\n[2,1];2,4 bar;66\n[3,1];240 kPa;102\n")
+    with pytest.raises(InputError, match=r"line 2: pressure is '240 kPa', must be a number"):
+        read(tmp_path, "label;p [bar];f\n[2,1];240 kPa;66\n")
+
+
+def test_a_workbook_is_read_as_its_sheet(tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    sheet = book.active
+    for row in (
+        ["Modal test"],
+        [],
+        ["label", "pressure [bar]", "f [Hz]", "sigma"],
+        ["[2,1]", 2.4, 66, 0.005],
+        ["[3,1]", 2.4, "102,7", 0.005],
+    ):
+        sheet.append(row)
+    for cell in sheet["D"][3:]:
+        cell.number_format = "0.0%"
+    book.create_sheet("empty")
+    book.save(tmp_path / "t.xlsx")
+    values = read_table(tmp_path / "t.xlsx")
+    assert [each.value for each in values] == pytest.approx([66, 102.7])
+    assert [each.sigma for each in values] == pytest.approx([0.33, 0.5135])
+    assert values[1].place.endswith("t.xlsx, line 5")
+    book["empty"].append(["more"])
+    book.save(tmp_path / "t.xlsx")
+    with pytest.raises(InputError, match="one sheet must hold data, got Sheet, empty: save one"):
+        read_table(tmp_path / "t.xlsx")

@@ -20,7 +20,8 @@ HEADINGS = {
     "vertical_stiffness_N_per_m": "vertical_stiffness radial_stiffness stiffness kz"
     " vertikalsteifigkeit federrate",
     "mass_kg": "mass tyre_mass tire_mass weight masse gewicht",
-    "label": "label mode mode_shape shape form eigenform modenform",
+    "label": "label mode mode_shape mode_name modus modo moda shape form eigenform modenform"
+    " bezeichnung",
     "c": "c n circumferential circumferential_order circumferential_harmonic waves harmonic"
     " wave_number umfangsordnung",
     "m": "m meridional meridional_order lateral_order querordnung",
@@ -30,7 +31,7 @@ HEADINGS = {
     " luftdruck pression",
     "load": "load vertical_load wheel_load fz last radlast charge",
     "sigma": "sigma std stdev stddev sd std_dev standard_deviation uncertainty unsicherheit"
-    " standardabweichung",
+    " standardabweichung scatter streuung \u03c3",
     "rim": "rim wheel support felge rad",
     "run": "run repeat repetition test messung wiederholung",
     "quantity": "quantity",
@@ -38,7 +39,9 @@ HEADINGS = {
 }
 MEANING = {name: meaning for meaning, names in HEADINGS.items() for name in names.split()}
 BRACKETED = re.compile(r"^(.*?)\s*(?:[\[(](.*?)[\])]\s*)?$")  # name [unit]
-ENDING = re.compile(r"^(.+)[\s_](hz|kpa|bar|psi|n|m2|n[\s_]per[\s_]m|kg|kn|percent)$")
+ENDING = re.compile(
+    r"^(.+?)(?:\s*/\s*|\s+in\s+|[\s_]|(?=%))(%|hz|kpa|bar|psi|n|m2|n[\s_]per[\s_]m|kg|kn|percent)$"
+)
 LENGTH_ENDING = re.compile(r"^(.+)[\s_](m|mm|cm|in|inch)$")  # 'mode m' ends in no unit
 TABLES = {"pressure": units.PRESSURE, "load": units.LOAD, **units.QUANTITIES}
 NUMBER_MEANINGS = {*TABLES, "sigma", "value"}  # what numbers with a decimal mark stand in
@@ -58,6 +61,17 @@ class TableColumn:
 def meaning_of(heading: str) -> str | None:
     """What a column holds; None of damping, remarks and the like."""
     return MEANING.get(_heading(heading)[0])
+
+
+def unit_of(heading: str) -> str:
+    """The unit in a heading, as it is compared; empty where there is none."""
+    return _heading(heading)[1]
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is one of the units that tables have, or no dimension: '-' and '1'."""
+    known = {units.plain(name) for table in TABLES.values() for name in table}
+    return units.plain(text) in known | {"%", "-", "1"}
 
 
 def read_columns(

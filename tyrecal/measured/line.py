@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import isfinite, nan
 
 from ..simulate.modes.label import Label
+from ..simulate.settings import settings
 from ..tyre.case.parts import RimSupport
 from ..tyre.number_table import NumberMarks
 from ..tyre.state import RIMS
 from ..units import QUANTITIES
 from .columns import TableColumn
 from .measurement import AS_CASE, Measurement
+from .mode_names import label_parts
 
-LABEL = re.compile(r"^[\[(]?\s*(\d+)\s*[,;/ ]\s*(\d+)\s*[\])]?\s*(.*)$")
 MAX_ORDERS = {"c": 20, "m": 3}
 KIND_WORDS = {"": None, "axial": "axial", "lateral": "axial"}
 KIND_WORDS |= dict.fromkeys(("torsional", "torsion", "rotational"), "torsional")
@@ -84,7 +84,9 @@ class Line:
         if not self.cell("value"):
             if found := [quantity for quantity in QUANTITIES if self.cell(quantity)]:
                 return found
-            raise ValueError("nothing was measured: the cell of the value is empty")
+            raise ValueError(
+                "nothing was measured: the cell of the value is empty; write n.a. if that is meant"
+            )
         quantity = self.cell("quantity")
         if quantity not in QUANTITIES:
             raise ValueError(f"quantity is '{quantity}', must be one of {', '.join(QUANTITIES)}")
@@ -110,13 +112,14 @@ class Line:
         if not self.labelled and not any(map(self.cell, ("label", "c", "m", "kind", "member"))):
             return None
         if self.cell("label") and "c" not in self.cells:  # beside c and m it is the mode's number
-            match = LABEL.match(self.cell("label"))
-            if not match:
+            parts = label_parts(self.cell("label"), settings().mode_names)
+            if not parts:
                 raise ValueError(
                     f"label is '{self.cell('label')}', must be like [2,1], or [0,0] lateral or"
-                    " torsional"
+                    " torsional, vertical, '2nd in-plane bending'; the settings file may add others"
+                    " under mode_names"
                 )
-            c, m, kind = match[1], match[2], kind or match[3]
+            c, m, kind = *parts[:2], kind or parts[2]
         for name, cell in (("c", c), ("m", m)):
             if not (cell.isdecimal() and int(cell) <= MAX_ORDERS[name]):
                 raise ValueError(

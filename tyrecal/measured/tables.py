@@ -18,12 +18,16 @@ from ..errors import InputError
 from ..files import read_bytes
 from ..tyre.number_table import NumberMarks, cells_under, read_text_table
 from ..tyre.usual import LARGEST_SIGMA
-from .columns import NUMBER_MEANINGS, TableColumn, meaning_of, read_columns
+from ..units import QUANTITIES
+from .columns import NUMBER_MEANINGS, TableColumn, is_unit, meaning_of, read_columns, unit_of
 from .formats import other_format
 from .line import Line
 from .measurement import CSV_COLUMNS, RIM_COLUMN, Measurement
 
 MAX_LINES = 10_000  # of a file
+MAX_TITLES = 20  # lines in which the headings are looked for
+WITH_UNIT = re.compile(r"([+-]?[\d.,' ]*\d[.,]?(?:[eE][+-]?\d+)?)\s*([^\d\s.,].*)")
+GAPS = {"n.a.", "na", "n/a", "n. a.", "#n/a", "#nv", "k.a.", "n.d.", "nd", "-", "--", "\u2013"}
 OPENED = re.compile(r"^[\[(]\s*\d+$")  # a label that its comma has parted
 
 
@@ -96,6 +100,11 @@ def _measurements(
                 raise ValueError(f"{len(cells)} cells, the headings are {len(headings)}; {hint}")
             cells = cells_under(headings, cells)
             text = {meaning: cells[column.index] for meaning, column in columns.items()}
+            if any(is_gap(text.get(name, "")) for name in ("value", *QUANTITIES)) and not any(
+                text.get(name) and not is_gap(text[name]) for name in ("value", *QUANTITIES)
+            ):
+                continue  # not measured, as the line says
+            text = {meaning: "" if is_gap(cell) else cell for meaning, cell in text.items()}
             line = Line(place, text, columns, marks, labelled)
             found = list(line.measurements(pressure_kPa, f"{path}"))
             for each in found:
@@ -126,7 +135,49 @@ def _lines(path: Path) -> tuple[list[tuple[str, list[str]]], str]:
     except InputError as error:
         line = f", line {error.line}" if error.line else ""
         raise InputError(f"{path}{line}: {error}") from None
-    return [(f"{path}, line {line}", cells) for line, cells in table.lines], table.separator
+    lines = _with_one_heading(table.lines)
+    return [(f"{path}, line {line}", cells) for line, cells in lines], table.separator
+
+
+def _with_one_heading(lines: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
+    """The lines from that of the headings on, without titles above it, and with the units of a
+    second line of headings, or of all cells of a column, in the headings."""
+    known = [sum(meaning_of(cell) is not None for cell in cells) for _, cells in lines[:MAX_TITLES]]
+    start = next((i for i, count in enumerate(known) if count > 1), 0)
+    (line, headings), rows = lines[start], lines[start + 1 :]
+    headings = list(headings)
+    second = rows[0][1] if rows else []
+    if any(second) and all(not cell or is_unit(cell.strip("[]()")) for cell in second):
+        for i, cell in enumerate(second[: len(headings)]):
+            if cell:
+                headings[i] += f" [{cell.strip('[]()')}]"
+        del rows[0]
+    rows = [(number, list(cells)) for number, cells in rows]
+    for i, heading in enumerate(headings):
+        if meaning_of(heading) in NUMBER_MEANINGS:
+            _move_unit(headings, [cells for _, cells in rows if i < len(cells)], i)
+    return [(line, headings), *rows]
+
+
+def _move_unit(headings: list[str], rows: list[list[str]], column: int) -> None:
+    """Move a unit that all cells of a column have to its heading, where that has none or the
+    same."""
+    filled = [cells for cells in rows if cells[column] and not is_gap(cells[column])]
+    matches = [WITH_UNIT.fullmatch(cells[column]) for cells in filled]
+    units = {match[2] if match else "" for match in matches}
+    if len(units) != 1 or not is_unit(unit := units.pop()):
+        return
+    stated = unit_of(headings[column])
+    if stated and stated != unit_of(f"x [{unit}]"):
+        return
+    headings[column] += "" if stated else f" [{unit}]"
+    for cells, match in zip(filled, matches, strict=True):
+        cells[column] = match[1] if match else ""
+
+
+def is_gap(cell: str) -> bool:
+    """Whether a cell says that nothing was measured."""
+    return cell.lower() in GAPS
 
 
 def _sigma_mistake(each: Measurement) -> str | None:

@@ -52,7 +52,7 @@ def typed(path: Path, kind: type[SettingsModel]) -> SettingsModel:
 
 def settings() -> Any:
     """The user's settings: ``commands`` {solver: words}; ``jobs``, ``solver``, ``output``, None
-    where they are not set. Raises InputError."""
+    where they are not set; ``mode_names`` {a laboratory's name: label}. Raises InputError."""
     path = place()
     if path is None or (SETTINGS_VARIABLE not in os.environ and not path.exists()):
         return _read(None, 0.0)
@@ -72,6 +72,7 @@ def _read(path: Path | None, changed: float) -> Any:
         jobs: Annotated[int, Field(ge=1, le=256)] | None = None
         solver: Name | None = None
         output: str | None = None
+        mode_names: dict[str, str] = Field(default_factory=dict)
 
     found = typed(path, Settings) if path else Settings()
     for solver, command in found.commands.items():

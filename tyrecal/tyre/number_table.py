@@ -15,12 +15,17 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from math import inf, nan
 from pathlib import Path
+from typing import Any
+from zipfile import ZipFile
 
 from ..errors import InputError
 from ..files import read_bytes
 
+MAX_SHEET_ROWS = 10_002  # of a workbook's sheet
+MAX_WORKBOOK_BYTES = 100_000_000  # unpacked
 MAX_CELL = 300  # characters: patterns tried on more would take for ever
 SEPARATORS = ("\t", ";", ",")
 GROUP_SPACES = " \u00a0\u2009\u202f'\u2019"  # between thousands
@@ -39,14 +44,21 @@ class TextTable:
 
 def read_text_table(path: Path) -> TextTable:
     """The cells of a file. Raises InputError, OSError."""
-    text = _text(read_bytes(path))
+    raw = read_bytes(path)
+    if raw[:2] == b"PK":
+        return _checked(TextTable(",", _workbook_lines(raw)))
+    text = _text(raw)
     first = 0
     separators: Sequence[str] = SEPARATORS
     if text.startswith("sep="):  # Excel's own way to name the separator
         named, _, text = text.partition("\n")
         first, separators = 1, [named[4:5] or ","]
     tables = [TextTable(each, _lines(text, each, first)) for each in separators]
-    table = max(tables, key=_regularity)  # of equals the first
+    return _checked(max(tables, key=_regularity))  # of equals the first
+
+
+def _checked(table: TextTable) -> TextTable:
+    """The same. Raises InputError where it is empty or a cell is too long."""
     if not table.lines:
         raise InputError("the file is empty", 1)
     for line, cells in table.lines:
@@ -56,8 +68,6 @@ def read_text_table(path: Path) -> TextTable:
 
 
 def _text(raw: bytes) -> str:
-    if raw[:2] == b"PK":
-        raise InputError("this is a workbook: save the sheet as CSV")
     wide = raw[:2] in (b"\xff\xfe", b"\xfe\xff")
     try:
         text = raw.decode("utf-16" if wide else "utf-8-sig")
@@ -68,6 +78,44 @@ def _text(raw: bytes) -> str:
     if "\0" in text:
         raise InputError("neither text nor a universal file")
     return text
+
+
+def _workbook_lines(raw: bytes) -> list[tuple[int, list[str]]]:
+    """Rows of the one sheet of a workbook that holds anything."""
+    try:
+        from openpyxl import load_workbook
+    except ImportError:
+        raise InputError(
+            "this is a workbook: save the sheet as CSV, or pip install 'tyrecal[excel]'"
+        ) from None
+    try:
+        with ZipFile(io.BytesIO(raw)) as parts:
+            if sum(part.file_size for part in parts.infolist()) > MAX_WORKBOOK_BYTES:
+                raise InputError("the workbook is too large: save the sheet as CSV")
+        book = load_workbook(io.BytesIO(raw), read_only=True, data_only=True)
+        sheets = {}
+        for sheet in book.worksheets:
+            sheet.reset_dimensions()
+            rows = islice(sheet.iter_rows(), MAX_SHEET_ROWS)
+            texts = [[_cell_text(cell) for cell in row] for row in rows]
+            if lines := [(i, cells) for i, cells in enumerate(texts, start=1) if any(cells)]:
+                sheets[sheet.title] = lines
+    except InputError:
+        raise
+    except Exception as error:  # openpyxl lets those of zip, XML and its own through
+        words = f"not a workbook that can be read ({str(error)[:80]}): save the sheet as CSV"
+        raise InputError(words) from None
+    if len(sheets) != 1:
+        names = ", ".join(sheets) or "none"
+        raise InputError(f"one sheet must hold data, got {names}: save one as CSV")
+    return next(iter(sheets.values()))
+
+
+def _cell_text(cell: Any) -> str:
+    """A cell of a workbook as a file of text has it; 0.005 that is shown as 0.5 % is '0.5 %'."""
+    if isinstance(cell.value, float | int) and str(cell.number_format).endswith("%"):
+        return f"{100 * cell.value:.12g} %"
+    return "" if cell.value is None else str(cell.value).strip()
 
 
 def _lines(text: str, separator: str, first: int) -> list[tuple[int, list[str]]]:
