@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 
 from tyrecal.errors import InputError
+from tyrecal.measured.gather import gather
 from tyrecal.measured.measurement import Measurement, measurements_csv
 from tyrecal.measured.repeats import combined
-from tyrecal.measured.tables import read_table
+from tyrecal.measured.tables import read_measurements, read_table
 from tyrecal.simulate.modes.label import Label
 
 AXIAL = Label(0, 0, "axial")
@@ -167,7 +168,6 @@ def test_sigma_is_that_of_its_unit_or_of_all_in_percent(tmp_path: Path) -> None:
         ("", "the file is empty"),
         (b"PK\x03\x04 a workbook", "save the sheet as CSV"),
         ("a,b\n1,2\n", "line 1: no column holds a frequency"),
-        ("f [Hz],pressure [bar]\n66,2.4\n", "line 1: frequencies need the columns c and m"),
         ("c,m,f\n2,1,66\n", "line 1: no column holds the pressure; give --pressure-kPa"),
         ("c,m,f,pressure\n2,1,66,2.4\n", r"line 1: 'pressure' has no unit; write it as"),
         ("c,m,f [V],pressure [bar]\n2,1,66,2.4\n", r"line 1: 'f \[V\]': the unit must be one"),
@@ -377,3 +377,19 @@ def test_a_workbook_is_read_as_its_sheet(tmp_path: Path) -> None:
     book.save(tmp_path / "t.xlsx")
     with pytest.raises(InputError, match="one sheet must hold data, got Sheet, empty: save one"):
         read_table(tmp_path / "t.xlsx")
+
+
+def test_a_list_without_labels_is_imported_as_one(tmp_path: Path) -> None:
+    text = "f [Hz];sigma [Hz];pressure [bar]\n66,1;0,3;2,4\n31,7;0,3;2,4\n31,7;0,3;2,0\n"
+    (tmp_path / "t.csv").write_text(text)
+    gathered = gather([tmp_path / "t.csv"])
+    rows = [(row.label, row.pressure_kPa, row.value, row.sigma) for row in gathered.rows]
+    assert rows == [(None, 200, 31.7, 0.3), (None, 240, 31.7, 0.3), (None, 240, 66.1, 0.3)]
+    (tmp_path / "again.csv").write_text(measurements_csv(gathered.rows))
+    again = read_measurements(tmp_path / "again.csv", labelled=False)
+    assert [each.value for each in again] == [31.7, 31.7, 66.1]
+    with pytest.raises(InputError, match="line 2: frequencies without labels were measured before"):
+        gather([tmp_path / "t.csv", tmp_path / "again.csv"])
+    with pytest.raises(InputError, match="line 2: nothing tells how far frequency_Hz may be off"):
+        (tmp_path / "t.csv").write_text("f [Hz],pressure [kPa]\n66.1,240\n")
+        gather([tmp_path / "t.csv"])

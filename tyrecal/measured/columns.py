@@ -75,7 +75,7 @@ def is_unit(text: str) -> bool:
 
 
 def read_columns(
-    headings: Sequence[str], place: str, pressure_kPa: float | None, labelled: bool = True
+    headings: Sequence[str], place: str, pressure_kPa: float | None
 ) -> dict[str, TableColumn]:
     """Columns by meaning, of those that have one; ``pressure_kPa``: where none says it.
 
@@ -99,9 +99,6 @@ def read_columns(
             f"{place}: no column holds a frequency; headings must be like"
             " 'c; m; pressure [bar]; frequency [Hz]'"
         )
-    told = "label" in held or {"c", "m"} <= held
-    if labelled and "frequency_Hz" in held and not told:
-        raise InputError(f"{place}: frequencies need the columns c and m, or a column label")
     if "pressure" not in held and pressure_kPa is None and held & {"frequency_Hz", "quantity"}:
         raise InputError(f"{place}: no column holds the pressure; give --pressure-kPa")
     return columns

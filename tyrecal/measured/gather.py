@@ -10,6 +10,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..simulate.modes.label import Label
+from ..tyre.state import TyreState
 from .arrangement import arrange
 from .measurement import Measurement
 from .modal import Geometry, LabelledMode, Layout, ModalTest, measurements_of, read_modal_test
@@ -57,6 +58,7 @@ def gather(
     geometry = Geometry(all_nodes(universal), axes)
     tables = [path for path in paths if path not in [file.path for file in universal]]
     values = [row for path in tables for row in read_table(path, pressure_kPa)]
+    _refuse_unlabelled_repeats(values)
     runs: list[ModalTest] = []
     notes = [
         f"{file.path}: not used: {what}" + f" ({count} times)" * (count > 1)
@@ -117,6 +119,20 @@ def _without_labels(
             groups.append([each])
     usual = max((row.sigma / row.value for row in labelled if row.label), default=0.0)
     return [row for group in groups for row in combined(group, floor, assumed or usual)]
+
+
+def _refuse_unlabelled_repeats(values: Sequence[Measurement]) -> None:
+    """Raises InputError where frequencies without labels come from several runs: nothing says
+    which of them repeat each other."""
+    runs: dict[TyreState, Measurement] = {}
+    for each in values:
+        if each.is_unlabelled:
+            first = runs.setdefault(each.state, each)
+            if first.run != each.run:
+                raise InputError(
+                    f"{each.place}: frequencies without labels were measured before, in"
+                    f" {first.place}: import one run, or give labels (c and m)"
+                )
 
 
 def all_nodes(files: Sequence[Universal]) -> dict[int, Place]:

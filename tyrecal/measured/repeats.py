@@ -21,7 +21,7 @@ import numpy as np
 from ..errors import InputError
 from ..simulate.modes.label import Label
 from ..tyre.usual import LARGEST_SIGMA
-from .measurement import Measurement, MeasurementKey
+from .measurement import Measurement
 
 FLOOR = 0.001  # of the value
 PRIOR_REPEATS = 4.0  # repeats that the scatter of all values is worth for that of one value
@@ -36,10 +36,11 @@ def combined(
     Raises InputError where neither repeats nor anything else tell a standard deviation, or
     it is so large that no fit would read it.
     """
-    groups: dict[MeasurementKey, list[Measurement]] = {}
+    groups: dict[object, list[Measurement]] = {}
     for each in one_for_both(values):
-        groups.setdefault(each.key, []).append(each)
-    pooled = {q: _pooled(groups, q) for q in {key[0] for key in groups}}
+        own_place = each.place if each.is_unlabelled else ""  # it is no repeat of any other
+        groups.setdefault((each.key, own_place), []).append(each)
+    pooled = {q: _pooled(groups, q) for q in {runs[0].quantity for runs in groups.values()}}
     rows = []
     for runs in groups.values():
         x = np.array([each.value for each in runs])
@@ -65,11 +66,11 @@ def combined(
     return sorted(rows, key=_order)
 
 
-def _pooled(groups: dict[MeasurementKey, list[Measurement]], quantity: str) -> float | None:
+def _pooled(groups: dict[object, list[Measurement]], quantity: str) -> float | None:
     """Relative variance of one run, over all that was repeated; None where nothing was."""
     total, freedom = 0.0, 0
-    for key, runs in groups.items():
-        if key[0] == quantity and len(runs) > 1:
+    for runs in groups.values():
+        if runs[0].quantity == quantity and len(runs) > 1:
             x = np.array([each.value for each in runs])
             total += float(np.sum((x / x.mean() - 1) ** 2))
             freedom += len(x) - 1
@@ -99,6 +100,6 @@ def one_for_both(values: Sequence[Measurement]) -> list[Measurement]:
 
 def _order(row: Measurement) -> tuple[object, ...]:
     label = row.label or Label(99, 0)
-    mode = (label.c, label.m, label.kind or "", row.member)
+    mode = (label.c, label.m, label.kind or "", row.member, 0.0 if row.label else row.value)
     state = (row.pressure_kPa, row.load_N, row.rim or "")
     return (row.quantity != "frequency_Hz", row.quantity, *state, *mode)

@@ -66,6 +66,7 @@ def _run(each: Measurement) -> str:
 
 def contradictions(values: Sequence[Measurement]) -> list[Contradiction]:
     """Every run that differs from its label's other runs by more than the file's repeats do."""
+    values = [each for each in values if not each.is_unlabelled]
     quantities = dict.fromkeys(each.quantity for each in values)
     return [
         contradiction

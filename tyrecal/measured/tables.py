@@ -48,7 +48,7 @@ def read_measurements(path: Path, labelled: bool = True) -> list[Measurement]:
             " not the case's, or like label,frequency_Hz,sigma_Hz,pressure_kPa,load_N,rim;"
             " 'tyrecal measured import' makes such a file of other tables"
         )
-    columns = read_columns(headings, place, None, labelled=False)
+    columns = read_columns(headings, place, None)
     found = _measurements(path, lines, columns, separator, 0.0, _sigma_mistake, labelled=False)
     if labelled and (lacking := next((each for each in found if each.is_unlabelled), None)):
         raise InputError(
@@ -61,16 +61,18 @@ def read_measurements(path: Path, labelled: bool = True) -> list[Measurement]:
 
 def read_table(path: Path, pressure_kPa: float | None = None) -> list[Measurement]:
     """A modal table; ``pressure_kPa`` where it has no column for it. Lines that measure the same
-    are runs of their own.
+    are runs of their own; each frequency without a label is a mode that has none yet.
 
     Raises InputError with every mistake, each with file and line; OSError.
     """
     lines, separator = _lines(path)
     place, headings = lines[0]
     columns = read_columns(headings, place, pressure_kPa)
-    found = _measurements(path, lines, columns, separator, pressure_kPa or 0.0)
+    found = _measurements(path, lines, columns, separator, pressure_kPa or 0.0, labelled=False)
     _refuse(_swapped(found))
-    return _runs(found, "run" in columns)
+    unlabelled = [each for each in found if each.is_unlabelled]
+    named = [each for each in found if not each.is_unlabelled]
+    return [*_runs(named, "run" in columns), *unlabelled]
 
 
 def _measurements(
