@@ -1,6 +1,6 @@
 """Labels of modes measured on rings of sensors: how many are given, and how many are wrong?
 
-    python -m tests.studies.rings [modes] [seed] [edge of the band in Hz]
+    python -m tests.studies.rings [modes] [seed] [edge of the band in Hz] [--case]
 
 Each test is one tyre of three (`TYRES`), with its modes up to an edge of the band drawn between
 110 and 170 Hz (or the one given), from the tool's own exact shapes. One, two or three rings are at
@@ -9,6 +9,9 @@ Each test is one tyre of three (`TYRES`), with its modes up to an edge of the ba
 that is noted. Noise is 2 to 10 % of a mode's root mean square signal. Labels are those that
 `measured import` gives without a case, with the band's highest harmonic and one more. "can tell":
 labels that `measured sensors` says these sensors can tell.
+
+With --case labels are those of `measured label CASE FILE`, and the measured tyre is one of
+`OTHER_DESIGNS` with variables off the case's by a factor of 1.65 (a standard deviation).
 """
 
 from __future__ import annotations
@@ -29,6 +32,7 @@ import numpy as np
 
 from tests.cli.test_cli import run
 from tests.conftest import CASES
+from tyrecal.measured.case_modes import CaseModes
 from tyrecal.measured.labels import Labeller
 from tyrecal.measured.modal import label_in_turn
 from tyrecal.measured.sensors import MeasuredMode, Sensors
@@ -47,6 +51,7 @@ GROUPS = tuple((count, name) for count in RINGS for name in DIRECTIONS)
 BAND_EDGE, NOISE, ANGLES = (110.0, 170.0), (0.02, 0.10), (8, 24)
 TREAD = 0.95  # of the largest radius, from which the tread's width is counted
 OFF_m = 0.002
+OTHER_DESIGNS = 6  # of each tyre
 
 
 @dataclass(frozen=True)
@@ -60,8 +65,8 @@ class RingTest:
 
 
 @cache
-def tyre_modes(name: str) -> tuple[Mode, ...]:
-    """By rising frequency, up to c = 10."""
+def tyre_modes(name: str, design: int = 0) -> tuple[Mode, ...]:
+    """By rising frequency, up to c = 10; design: 0, as the case has it, or another."""
     with TemporaryDirectory() as folder:
         path = CASES / name if name.endswith(".yaml") else Path(folder) / "tyre.yaml"
         if not path.exists() and run(
@@ -69,8 +74,10 @@ def tyre_modes(name: str) -> tuple[Mode, ...]:
         ):
             raise RuntimeError(f"init {name} failed")
         case = with_values(load_case(path), {"analysis.highest_harmonic": 10})
-    starts = {key: v.start for key, v in case.case.variables.items()}
-    return tuple(labelled(Evaluator(TyreDesign(case)).evaluate(Question(starts, (), 4))))
+    random = np.random.default_rng(design)
+    off = lambda: np.clip(0.5 * random.standard_normal(), -0.9, 0.9) if design else 0.0
+    values = {key: float(v.start * np.exp(off())) for key, v in case.case.variables.items()}
+    return tuple(labelled(Evaluator(TyreDesign(case)).evaluate(Question(values, (), 4))))
 
 
 def draw_test(
@@ -107,9 +114,11 @@ def draw_test(
     return RingTest(chosen, Sensors(points + off, along), signals, highest)
 
 
-def labels_given(test: RingTest) -> Iterator[tuple[Label, Label | None, bool]]:
+def labels_given(
+    test: RingTest, case: CaseModes | None = None
+) -> Iterator[tuple[Label, Label | None, bool]]:
     """Each mode's label, the label given, and whether the sensors can tell it."""
-    labeller = Labeller(test.sensors, test.highest)
+    labeller = Labeller(test.sensors, test.highest, case)
     alike = labeller.looks_like()
     measured = [
         (MeasuredMode(mode.frequency_Hz, u), labeller, "")
@@ -119,7 +128,7 @@ def labels_given(test: RingTest) -> Iterator[tuple[Label, Label | None, bool]]:
         yield mode.label, given.judged.label, not alike[mode.label]
 
 
-def main(count: int = 5000, seed: int = 1, edge_Hz: int = 0) -> None:
+def main(count: int = 5000, seed: int = 1, edge_Hz: int = 0, with_case: bool = False) -> None:
     """Print a line for each number of rings and set of directions, and each wrong label."""
     random = np.random.default_rng(seed)
     tallies = {group: Counter[str]() for group in GROUPS}
@@ -127,10 +136,12 @@ def main(count: int = 5000, seed: int = 1, edge_Hz: int = 0) -> None:
     while sum(each["modes"] for each in tallies.values()) < count:
         rings, name = group = GROUPS[number % len(GROUPS)]
         number += 1
-        modes = tyre_modes(TYRES[random.integers(len(TYRES))])
+        tyre = TYRES[random.integers(len(TYRES))]
+        case = CaseModes(tyre_modes(tyre)) if with_case else None
+        modes = tyre_modes(tyre, int(random.integers(1, OTHER_DESIGNS + 1)) if with_case else 0)
         edge = (edge_Hz, edge_Hz) if edge_Hz else BAND_EDGE
         test = draw_test(modes, rings, DIRECTIONS[name], random, edge)
-        for true, given, can_tell in labels_given(test):
+        for true, given, can_tell in labels_given(test, case):
             is_given, is_wrong = given is not None, given not in (None, true)
             tallies[group].update(
                 modes=1, given=is_given, wrong=is_wrong, can=can_tell, both=can_tell and is_given
@@ -147,4 +158,5 @@ def main(count: int = 5000, seed: int = 1, edge_Hz: int = 0) -> None:
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:4]))
+    numbers = [int(word) for word in sys.argv[1:] if word != "--case"]
+    main(*numbers, with_case="--case" in sys.argv)  # type: ignore[misc]

@@ -43,20 +43,20 @@ def label_covariances(
     half_width: of the belt (m); None: not known. Columns as in ``modes.label``.
     """
     widths = half_widths(sensors, half_width)
-    bases = [[_motions(sensors, c, width) for width in widths] for c in range(highest + 1)]
-    every = _unit(sum(B @ B.T for basis in bases for B in basis))
+    bases = [
+        np.hstack([_motions(sensors, c, width) for width in widths]) for c in range(highest + 1)
+    ]
+    every = _unit(sum(B @ B.T for B in bases))
     result = []
-    for c, basis in enumerate(bases):
+    for c, B in enumerate(bases):
+        square = np.mean(B**2, axis=0)
         for column in range(5 if c == 0 else 4):
-            own, same, other = (
-                sum((B * v) @ B.T for B in basis) / len(basis) for v in _variances(c, column)
-            )
-            whole = np.trace(own + same + other)
-            least = LEAST_SEEN * whole
-            S = _unit(own, least) + SAME_PARITY * _unit(same, least)
-            S = _unit(S + OTHER_PARITY * _unit(other, least)) + OTHER_WAVES * every
-            seen = float(np.trace(own) / whole) if whole else 0.0
-            result.append((c, column, _unit(S), seen))
+            variances = [np.tile(v, len(widths)) for v in _variances(c, column)]
+            seen = np.array([v @ square for v in variances])
+            shares = (1.0, SAME_PARITY, OTHER_PARITY) / np.maximum(seen, LEAST_SEEN * seen.sum())
+            v = shares @ variances
+            S = _unit((B * v) @ B.T) + OTHER_WAVES * every
+            result.append((c, column, _unit(S), float(seen[0] / seen.sum())))
     return result
 
 
@@ -72,9 +72,9 @@ def half_widths(sensors: Sensors, known: float | None = None) -> Array:
     return low + (high - low) * (np.arange(WIDTHS) + 0.5) / WIDTHS
 
 
-def _unit(S: Array, least: float = 1e-300) -> Array:
-    """S of unit mean diagonal, or less where its trace is below ``least``."""
-    return S * (len(S) / max(np.trace(S), least))
+def _unit(S: Array) -> Array:
+    """S with a unit mean diagonal."""
+    return S * (len(S) / max(np.trace(S), 1e-300))
 
 
 def _motions(sensors: Sensors, c: int, half_width: float) -> Array:

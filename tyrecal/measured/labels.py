@@ -129,10 +129,14 @@ class Labeller:
         """Expected ln of the odds of label i against j on i's own shapes, (i, j):
         (tr(Sj^-1 Si) - k + ln|Sj| - ln|Si|) / 2."""
         k = len(self.sensors.points)
-        S = np.array(self.covariance) + ODDS_NOISE * np.eye(k)
-        size = np.linalg.slogdet(S)[1]
-        trace = S.reshape(len(S), -1) @ np.linalg.inv(S).reshape(len(S), -1).T
-        return np.asarray(trace - k + size - size[:, None]) / 2
+        noise = ODDS_NOISE * np.eye(k)
+        odds = np.zeros((len(self.labels), len(self.labels)))
+        sizes = np.array([np.log(np.maximum(v, 0.0) + ODDS_NOISE).sum() for v, _ in self._spectra])
+        for j, rival in enumerate(self.covariance):
+            inverse = np.linalg.inv(rival + noise)
+            trace = [np.vdot(inverse, S) + ODDS_NOISE * np.trace(inverse) for S in self.covariance]
+            odds[:, j] = (np.array(trace) - k + sizes[j] - sizes) / 2
+        return odds
 
     def looks_like(self) -> dict[Label, list[Label]]:
         """Of each label the other ones that its shapes look like on these sensors, the likeliest
