@@ -105,7 +105,7 @@ def test_every_requirement_states_its_lowest_version() -> None:
 
 def test_developers_have_every_extra() -> None:
     extras = PROJECT["optional-dependencies"]
-    assert {"cluster", "sample", "dev"} == set(extras)
+    assert {"cluster", "sample", "excel", "dev"} == set(extras)
     assert {*extras["cluster"], *extras["sample"]} <= set(extras["dev"])
 
 
