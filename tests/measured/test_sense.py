@@ -37,7 +37,7 @@ def measured(*pressures: float) -> list[Measurement]:
         for p in pressures
         for rise, (label, hertz) in zip(RISES, AT_200_kPa.items(), strict=True)
     ]
-    return [Measurement(*row, place=f"t.csv, line {i + 2}") for i, row in enumerate(rows)]  # type: ignore[arg-type]
+    return [Measurement(*row, place=f"t.csv, line {i + 2}") for i, row in enumerate(rows)]
 
 
 def relabelled(rows: list[Measurement], one: Label, other: Label, at: float) -> list[Measurement]:

@@ -86,7 +86,8 @@ def _workbook_lines(raw: bytes) -> list[tuple[int, list[str]]]:
         from openpyxl import load_workbook
     except ImportError:
         raise InputError(
-            "this is a workbook: save the sheet as CSV, or pip install '.[excel]' in a clone of tyrecal"
+            "this is a workbook: save the sheet as CSV, or run pip install '.[excel]' in a clone of"
+            " tyrecal"
         ) from None
     try:
         with ZipFile(io.BytesIO(raw)) as parts:
