@@ -50,6 +50,13 @@ class DeckError(Refused):
 WHOLE_DECK = Place("deck", 0)
 
 
+def _plain(text: str) -> str:
+    """The text of a number. Raises ValueError for digits that Python reads and ABAQUS does not."""
+    if "_" in text or not text.isascii():
+        raise ValueError
+    return text
+
+
 @dataclass(frozen=True, eq=False)
 class Row:
     """A data line, including the lines that continue it.
@@ -80,9 +87,9 @@ class Row:
         if not text and default is not None:
             return default
         try:
-            value = float(text.replace("D", "E").replace("d", "e"))
+            value = float(_plain(text).replace("D", "E").replace("d", "e"))
         except ValueError:
-            what = f"'{text}' is not a number" if text else f"number {index + 1} is missing"
+            what = f"'{text[:40]}' is not a number" if text else f"number {index + 1} is missing"
             raise self.place.error(what) from None
         if value - value != 0.0:
             raise self.place.error(f"'{text}' is not a finite number")
@@ -101,7 +108,7 @@ class Row:
         if not text and default is not None:
             return default
         try:
-            return int(text)
+            return int(_plain(text))
         except ValueError:
             what = f"'{text[:40]}' is no whole number" if text else f"number {index + 1} is missing"
             raise self.place.error(what) from None

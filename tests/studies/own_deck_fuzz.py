@@ -136,7 +136,7 @@ KINDS: tuple[Callable[[str, Random], str], ...] = (numbers, option, lines_moved,
 
 
 def judged(path: Path) -> str:
-    """What becomes of a deck: refused, read, or what went wrong."""
+    """How a deck ends: refused, read, or what went wrong."""
     try:
         deck = read_own_deck(path, "m")
         blocks = deck.with_numbers({})
@@ -169,15 +169,15 @@ def apart(path: Path) -> tuple[str, float]:
         os._exit(0)
     os.close(there)
     with os.fdopen(here, "rb") as stream:
-        said = stream.read().decode()
+        words = stream.read().decode()
     _, status = os.waitpid(child, 0)
     ended = "too slow" if os.WIFSIGNALED(status) else "ended without a word"
-    return said or ended, time.monotonic() - start
+    return words or ended, time.monotonic() - start
 
 
 def draw(count: int, seed: int) -> list[tuple[str, str, float, str]]:
     """Kind, judgement, seconds and text of each mutant."""
-    random, found = Random(seed), list[tuple[str, str, float, str]]()
+    random, mutants = Random(seed), list[tuple[str, str, float, str]]()
     texts = [style() for style in (own_decks.plain, *own_decks.STYLES.values())]
     with TemporaryDirectory() as folder:
         path = Path(folder) / "tyre.inp"
@@ -185,21 +185,21 @@ def draw(count: int, seed: int) -> list[tuple[str, str, float, str]]:
             kind = random.choice(KINDS)
             text = kind(random.choice(texts), random)
             path.write_text(text, encoding="utf-8")
-            found.append((kind.__name__, *apart(path), text))
-    return found
+            mutants.append((kind.__name__, *apart(path), text))
+    return mutants
 
 
 def sizes() -> list[str]:
-    """What becomes of the plain deck with each of `HUGE`."""
+    """How the plain deck ends with each of `HUGE`."""
     text = own_decks.plain()
     at = text.index("*RIGID BODY")
     with TemporaryDirectory() as folder:
         path = Path(folder) / "tyre.inp"
-        found = []
+        mutants = []
         for more in HUGE:
             path.write_text(f"{text[:at]}{more}\n{text[at:]}", encoding="utf-8")
-            found.append(apart(path)[0])
-    return found
+            mutants.append(apart(path)[0])
+    return mutants
 
 
 def main() -> None:
@@ -208,11 +208,11 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--keep", type=Path)
     given = parser.parse_args()
-    found = draw(given.count, given.seed)
-    for (kind, how), many in sorted(Counter((kind, how) for kind, how, *_ in found).items()):
+    mutants = draw(given.count, given.seed)
+    for (kind, how), many in sorted(Counter((kind, how) for kind, how, *_ in mutants).items()):
         print(f"{many:6} {kind:12} {how}")
-    print(f"slowest {max(seconds for _, _, seconds, _ in found):.2f} s")
-    for n, (kind, how, _, text) in enumerate(found):
+    print(f"slowest {max(seconds for _, _, seconds, _ in mutants):.2f} s")
+    for n, (kind, how, _, text) in enumerate(mutants):
         if given.keep and how not in ("refused", "read"):
             (given.keep / f"{n}_{kind}.inp").write_text(text)
 

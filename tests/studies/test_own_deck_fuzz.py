@@ -8,8 +8,8 @@ from . import own_deck_fuzz
 
 
 def test_no_damaged_deck_ends_in_a_traceback(request: pytest.FixtureRequest) -> None:
-    found = own_deck_fuzz.draw(30, request.config.getoption("--seed"))
-    assert not [(kind, how) for kind, how, *_ in found if how not in ("refused", "read")]
+    mutants = own_deck_fuzz.draw(30, request.config.getoption("--seed"))
+    assert not [(kind, how) for kind, how, *_ in mutants if how not in ("refused", "read")]
 
 
 def test_sizes_beyond_a_machine_are_refused() -> None:

@@ -60,8 +60,8 @@ def test_a_legal_spelling_is_the_same_deck(
 ) -> None:
     text = own_decks.plain()
     assert full in text
-    found = flat_text(tmp_path, text.replace(full, short))
-    assert found.replace(", TYPE=ISOTROPIC", "").replace("0.3, , 1.D-1, ", "0.3, 0.0, 0.1") == (
+    flat = flat_text(tmp_path, text.replace(full, short))
+    assert flat.replace(", TYPE=ISOTROPIC", "").replace("0.3, , 1.D-1, ", "0.3, 0.0, 0.1") == (
         plain_flat
     )
 
@@ -75,6 +75,7 @@ def test_a_legal_spelling_is_the_same_deck(
         ("*END STEP\n", "*END STEP\n*NSET, NSET=X\n1001\n", "stands after a step"),
         ("*END STEP\n", "*END STEP\n1., 2.\n", "takes no data lines"),
         ("*END STEP\n", "*END STEP\n*STEP\n", "no \\*END STEP"),
+        ("1100.0", "1_100.0", "'1_100.0' is not a number"),
         ("LINER, S4", "LINER, S4" + 9999 * " ,", "more than 4096 characters"),
         ("*ELSET, ELSET=LINER\n", "*ELSET, ELSET=LINER, GEN\n1000000000, 2000000000\n", "no elem"),
     ],

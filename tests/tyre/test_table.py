@@ -138,7 +138,7 @@ EXTRA = {
 @cache
 def decks() -> list[tuple[str, OwnDeck]]:
     """All decks with what they describe, in their units."""
-    found = []
+    all_decks = []
     styles = {"plain": own_decks.plain, **own_decks.STYLES, "inner": own_decks.inner_ply}
     texts = {**{name: style() for name, style in styles.items()}, **EXTRA}
     with TemporaryDirectory() as folder:
@@ -146,8 +146,8 @@ def decks() -> list[tuple[str, OwnDeck]]:
             path = Path(folder) / "tyre.inp"
             path.write_text(text)
             deck = read_own_deck(path, "mm" if name == "millimetres" else "m")
-            found.append((described(deck), deck))
-    return found
+            all_decks.append((described(deck), deck))
+    return all_decks
 
 
 def described(deck: OwnDeck) -> str:
@@ -173,7 +173,7 @@ def others(block: Block, option: str) -> Iterator[dict[str, str]]:
 
 def admitted() -> list[tuple[str, str, str]]:
     """Place, keyword and option ("" for the keyword itself) of all that is honoured of a deck."""
-    found = []
+    options_honoured = []
     for name, rule in RULES.items():
         for places, options in rule.honoured.items():
             for place in places.split("|"):
@@ -181,8 +181,8 @@ def admitted() -> list[tuple[str, str, str]]:
                     each = [o.partition("=")[0] for o in options.split("; ") if o]
                     loud = [option for option in each if option[0] != QUIET]
                     if loud or not each:
-                        found += [(place, name, option) for option in ("", *loud)]
-    return found
+                        options_honoured += [(place, name, option) for option in ("", *loud)]
+    return options_honoured
 
 
 @pytest.mark.parametrize(("place", "name", "option"), sorted(set(admitted())))
