@@ -28,7 +28,7 @@ from tyrecal.tyre.own_deck.text import OwnDeckError
 from ..tyre import own_decks
 
 LONGEST_S, MOST_BYTES = 10, 1 << 30
-NUMBERS = (
+NUMBERS: tuple[str, ...] = (
     "0",
     "-1",
     "1e9",

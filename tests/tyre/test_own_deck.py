@@ -209,6 +209,22 @@ def test_a_seat_far_from_the_rim_is_refused(tmp_path: Path) -> None:
             read_own_deck(path).flat({})
 
 
+@pytest.mark.parametrize("held", ["MIDDLE, YSYMM\n", "MIDDLE, 2\n", "MIDDLE, 2\nMIDDLE, 5\n", ""])
+def test_half_a_tyre_is_named_with_the_lines_that_make_it_whole(held: str, tmp_path: Path) -> None:
+    """Whatever its middle is held in; with the lines it is the whole one."""
+    path, text = tmp_path / "tyre.inp", own_decks.half()
+    path.write_text(text)
+    whole = read_own_deck(path).flat({}).text
+    lines = re.findall(r"\*SYMMETRIC.*\n.*\n", text)[0]
+    bare = text.replace(lines, "").replace("MIDDLE, YSYMM\n", held)
+    path.write_text(bare)
+    with pytest.raises(OwnDeckError) as error:
+        read_own_deck(path).flat({})
+    added = "\n".join(re.findall(r"'(.+?)'", error.value.message)) + "\n"
+    path.write_text(bare.replace("*STEP", f"{added}*STEP", 1))
+    assert read_own_deck(path).flat({}).text == whole
+
+
 def test_what_a_step_releases_is_free(tmp_path: Path) -> None:
     """By OP=NEW, in the step that inflates or in one before."""
     text = own_decks.plain()

@@ -14,6 +14,8 @@ from .surfaces import is_rigid, surface_nodes
 from .text import Block, Row
 
 MERGED = 1e-6  # of the section's size: nodes closer than this are one where they are tied
+# at the middle of a half: u_z and twist change their sign from one half to the other
+HELD_BY_SYMMETRY = {2, 4, 5, 6}
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,14 +178,14 @@ class Constraints:
             if {1, 2} <= freedoms and (5 in freedoms or n in self.rim):
                 self.rim[n] = None
             elif n in self.rim or (
-                freedoms <= {2, 4, 6} and self.made.reflect and self.on_plane(point)
+                freedoms <= HELD_BY_SYMMETRY and self.made.reflect and self.on_plane(point)
             ):
                 continue
             else:
                 block, row = self._where(n, blocks)
                 hint = (
-                    "a half is made whole by *SYMMETRIC MODEL GENERATION, REFLECT=LINE"
-                    if freedoms <= {2, 4, 6}
+                    f"a half is made whole by {lines_of_the_other_half(point[1])}"
+                    if freedoms <= HELD_BY_SYMMETRY
                     else "a rim holds 1, 2 and 5 (ENCASTRE)"
                 )
                 raise block.refused(f"node {n} is held in {sorted(freedoms)} only: {hint}", row)
@@ -200,6 +202,14 @@ class Constraints:
         assert self.made.reflect
         r, z = mirror_of(self.made.reflect)(point)
         return max(abs(r - point[0]), abs(z - point[1])) <= self.near
+
+
+def lines_of_the_other_half(z: float) -> str:
+    """The lines that make a half whole that ends at z, in words."""
+    return (
+        "the lines '*SYMMETRIC MODEL GENERATION, REFLECT=LINE' and"
+        f" '0., {z + 0.0:g}, 0., 1., {z + 0.0:g}, 0.' before *STEP"
+    )
 
 
 def _freedoms(block: Block, row: Row) -> set[int]:

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from .assembly import Assembly, collect
-from .constraints import Constraints, Embedded
+from .constraints import Constraints, Embedded, lines_of_the_other_half
 from .grammar import Sorted
 from .scope import Element, Point, corner_areas, faces_of, mirror_of, reflected
 from .surfaces import Face, boundary_of, surface_faces
 from .text import Block, Row
+
+AT_CROWN = 0.9  # of the largest radius: a cut that reaches it goes through the crown
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +82,8 @@ class _Builder:
         }
         boundary = boundary_of(self.root)
         self._check_areas(used)
+        if not self.made.reflect:
+            self._check_whole(boundary)
         cavity = self._on_solids(pressed, boundary)
         reference = self.tied.reference or (0, (0.0, 0.0))
         rubber = {n for e in self.root.elements.values() if e.is_solid for n in e.nodes}
@@ -156,6 +160,23 @@ class _Builder:
                 order = "its nodes run clockwise" if (area < 0).all() else "it folds over"
                 what = "it reaches beyond the axle" if beyond else order
                 raise element.block.refused(f"element {number}: {what}", element.row)
+
+    def _check_whole(self, boundary: Sequence[Face]) -> None:
+        """The section does not end in a cut through the crown, as half a tyre does."""
+        points = self.root.nodes
+        solid = {n for e in self.root.elements.values() if e.is_solid for n in e.nodes}
+        crown = max(points[n][0] for n in solid)
+        for z in (min(points[n][1] for n in solid), max(points[n][1] for n in solid)):
+            cut = [
+                f for f in boundary if all(abs(points[n][1] - z) <= self.tied.near for n in f[2])
+            ]
+            if cut and max(points[n][0] for _, _, nodes in cut for n in nodes) > AT_CROWN * crown:
+                element = self.root.elements[cut[0][0]]
+                raise element.block.refused(
+                    f"element {cut[0][0]}: the section ends in a cut through the crown at z ="
+                    f" {z + 0.0:g}, it is half a tyre; add {lines_of_the_other_half(z)}",
+                    element.row,
+                )
 
     def _pressure(self) -> tuple[list[Face], str, tuple[tuple[Block, Row, int], ...]]:
         """Faces under the step's pressure, and where its value stands."""
