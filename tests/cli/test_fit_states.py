@@ -124,3 +124,21 @@ def test_the_same_mode_twice_in_one_state_is_a_mistake(
     assert run("validate", str(edited(tmp_path, twice + twice + other))) == 2
     told = capsys.readouterr()
     assert "the mode [2,0] is a target already in this state" in told.out + told.err
+
+
+def test_a_fit_reports_exchanged_pressures_before_it_begins(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Frequencies that are lower at 280 than at 200 kPa; --dry-run ends before the fit."""
+    rows = [
+        f"{c},{m},{kPa},{hertz * rise:.2f},0.2"
+        for kPa, rise in ((200, 1.08), (280, 1.0))
+        for c, m, hertz in ((1, 0, 71.0), (2, 0, 89.0), (2, 1, 79.0), (3, 0, 106.0), (4, 0, 125.0))
+    ]
+    table = tmp_path / "exchanged.csv"
+    table.write_text("\n".join(["c,m,pressure_kPa,frequency_Hz,sigma_Hz", *rows, ""]))
+    case = str(CASES / "p235_75r17.yaml")
+    assert run("fit", case, "--mesh", "coarse", "--measured", str(table), "--dry-run") == 0
+    words = capsys.readouterr().err
+    assert "exchanged.csv, line" in words and "exchanged" in words.replace("exchanged.csv", "")
+    assert "200" in words and "280" in words

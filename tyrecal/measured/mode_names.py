@@ -16,7 +16,7 @@ from ..simulate.modes.label import KNOWN, ORDINALS
 
 BRACKETED_LABEL = re.compile(r"^[\[(]?\s*(\d+)\s*[,;/ ]\s*(\d+)\s*[\])]?\s*(.*)$")
 LETTERED = re.compile(r"^c\s*=?\s*(\d+)\s*[,;/]?\s*m\s*=?\s*(\d+)$", re.IGNORECASE)
-DOUBLET = re.compile(r"\s*[x\u00d7]\s*2$")
+DOUBLET = re.compile(r"\s*\(?[x\u00d7]\s*2\)?$")
 NOISE_WORDS = {
     *("mode", "modes", "mod", "modus", "modo", "moda", "eigenform", "eigenmode", "shape", "forma"),
     *("forme", "de", "di", "del", "der", "des", "von", "of", "the", "tyre", "tire", "belt"),
