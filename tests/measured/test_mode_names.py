@@ -57,7 +57,6 @@ NAMES = {
         "Giermode",
         "mode de lacet",
         "modo di imbardata",
-        "[1,1] pitch",
         *("yaw-camber", "pitch / yaw-camber", "L1", "camber", "Sturz", "[1,1] x2", "carrossage"),
         *("campanatura", "guiñada", "yaw", "imbardata", "lacet"),
     ],

@@ -19,6 +19,8 @@ import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
+from resource import RUSAGE_SELF, getrusage
+from time import perf_counter
 
 import numpy as np
 
@@ -55,6 +57,7 @@ WORDS = [
     "9" * 400,
 ]
 WORDS += ["[", ";", ",", "\t", "n.a.", "Hz", "79,5 Hz", "label", "\ufeff", "1.2.3", "PK\x03\x04"]
+LONGEST_s, MOST_BYTES = 10.0, 1e9
 Random = np.random.Generator
 
 
@@ -185,8 +188,9 @@ def sense(count: int, seed: int, tyres: int) -> dict[str, int]:
 
 
 def mutants(count: int, seed: int) -> dict[str, int]:
-    """Counts of mutated tables: read, refused, and anything else."""
-    tally = {"read": 0, "refused": 0, "faults": 0}
+    """Counts of mutated tables: read, refused, and anything else, as which a table counts, too,
+    that takes more than `LONGEST_s` or brings the process to `MOST_BYTES`."""
+    tally, before = {"read": 0, "refused": 0, "faults": 0}, _peak()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "t.csv"
         for k in range(count):
@@ -203,6 +207,7 @@ def mutants(count: int, seed: int) -> dict[str, int]:
                 else:
                     content[i:i] = content[: int(random.integers(1, 60))]
             path.write_bytes(content)
+            start = perf_counter()
             try:
                 gather([path], 240.0, assumed=0.005, keep_going=bool(random.integers(2)))
                 tally["read"] += 1
@@ -212,7 +217,14 @@ def mutants(count: int, seed: int) -> dict[str, int]:
             except Exception as error:
                 tally["faults"] += 1
                 print(f"mutant {k}: {type(error).__name__}: {error}", file=sys.stderr)
+            tally["faults"] += perf_counter() - start > LONGEST_s
+    tally["faults"] += _peak() > max(before, MOST_BYTES)
     return tally
+
+
+def _peak() -> float:
+    """The most memory that this process has had, bytes."""
+    return 1024.0 * getrusage(RUSAGE_SELF).ru_maxrss
 
 
 def main(arguments: list[str] | None = None) -> int:
