@@ -114,6 +114,7 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
     from ..tyre.own_deck.found import contents, words
     from ..tyre.own_deck.own_deck import read_own_deck
     from ..tyre.own_deck.text import OwnDeckError
+    from ..tyre.usual_deck import deck_slips
 
     numbers: Mapping[str, float] = {}
     gauges: Gauges = ()
@@ -143,6 +144,8 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
         terminal.error(f"not honoured: {error}")
     else:
         found, numbers = contents(deck, flat), {**deck.numbers, **numbers}
+        for slip in deck_slips(deck, numbers):
+            terminal.warn(str(slip))
         result |= {"mass_kg": mass_kg, **found, "numbers": numbers}
         for sentence in words(found, mass_kg):
             terminal.say(sentence)
@@ -160,7 +163,7 @@ def _say_what_solvers_take(
     for sentence in asked["refuses"]:
         terminal.error(f"ABAQUS refuses by its manual: {sentence}")
     for sentence in asked["unknown"][:MOST_SAID]:
-        terminal.warn(f"not sure for ABAQUS: {sentence}")
+        terminal.warn(f"not checked for ABAQUS: {sentence}")
     if more := len(asked["unknown"][MOST_SAID:]):
         terminal.warn(f"... and {more} more")
     for sentence in lacking:

@@ -143,7 +143,7 @@ def command(
         elif crown_set:
             raise click.UsageError("--crown-set is of decks in three dimensions")
         else:
-            _from_deck(read, words, pressure_kPa, output, pictures, force, terminal)
+            _from_deck(read, words, pressure_kPa, output, pictures, force, allow_unusual, terminal)
         return 0
     given = {"crown": crown_mm, "sidewall": sidewall_mm, "bead": bead_mm, "belt": belt_width_mm}
     lengths = {key: 1e-3 * value for key, value in given.items() if value is not None}
@@ -230,6 +230,7 @@ def _from_deck(
     output: Path | None,
     pictures: bool,
     force: bool,
+    allow_unusual: bool,
     terminal: Terminal,
 ) -> None:
     """Write the case of a deck beside it, say what is in the deck, and draw it."""
@@ -238,6 +239,7 @@ def _from_deck(
     from ..tyre.case.own_case import own_case
     from ..tyre.load import load_case
     from ..tyre.own_deck.found import contents, words
+    from ..tyre.usual_deck import deck_slips
 
     if deck.marks:
         name, block = next(iter(deck.marks.items()))
@@ -246,6 +248,8 @@ def _from_deck(
             " numbers, then put marks in their place"
         )
     flat = deck.flat({})
+    if not allow_unusual and (slips := list(deck_slips(deck, deck.numbers))):
+        raise InputError("\n".join(map(str, slips)))
     text = own_case(deck, flat, size, pressure_kPa)
     target, picture = _beside(deck.path, output, pictures, force)
     mass_kg = trial(flat)

@@ -18,7 +18,7 @@ from .case.document import Document, read_document
 from .case.loaded import LoadedCase
 from .case.mistakes import CaseError, Keys, Mistake, dotted
 from .case.schema import Case, cannot_fit
-from .case.shape import disagreements, explain, without
+from .case.shape import disagreements, explain, table, without
 from .case.stations import check_templates, measured_file, read_stations
 from .effects import EffectRefused
 from .own_deck.own_deck import OwnDeck
@@ -26,6 +26,7 @@ from .own_deck.own_decks import OwnDecks
 from .resolve import resolved
 from .state import TyreState
 from .usual import unusual
+from .usual_deck import deck_slips
 
 TYRE_KEYS = {"section", "deck", "materials"}  # keys, one of which every case has
 
@@ -98,6 +99,13 @@ def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mist
         document.add(("section", form), message)
     if not allow_unusual:
         _add(document, unusual(data, section))
+        if isinstance(deck, OwnDeck):
+            stated = table(table(file_data, "deck"), "numbers")
+            for slip in deck_slips(deck, data["deck"]["numbers"]):
+                if slip.key in stated:
+                    document.add(("deck", "numbers", slip.key), slip.message)
+                else:
+                    document.mistakes.append(slip)
     if case is None or not (section or isinstance(deck, OwnDecks)) or document.mistakes:
         return None, sorted(document.mistakes, key=lambda m: (m.file != str(path), m.line))
     own = {"decks": deck} if isinstance(deck, OwnDecks) else {"deck": deck}

@@ -22,6 +22,7 @@ from .plugins import IDS
 from .resolve import resolved
 from .state import with_states_kept
 from .usual import refusal
+from .usual_deck import unusual_numbers
 
 MOST_MEANT = 3  # paths that are offered for a name that is none
 # numbers that stand alone: no other part of the case, and no mesh, depends on their values
@@ -102,8 +103,14 @@ def overridden(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
 def unusual_value(loaded: LoadedCase, name: str, value: float) -> str | None:
     """Why no user states ``value`` of a variable, or of the number at a dotted path: what is usual,
     what was probably meant; None where it is usual. Raises ValueError for an unknown name."""
+    paths = paths_of(loaded, name)
     data = loaded.case.plain()
-    found = (refusal(data, loaded.drawn, keys, value) for keys in _keys(loaded, name))
+    found = [refusal(data, loaded.drawn, keys, value) for keys in _keys(loaded, name)]
+    if loaded.deck:
+        names = [path.removeprefix("deck.numbers.") for path in paths]
+        found += [
+            message for _, message in unusual_numbers(loaded.deck, dict.fromkeys(names, value))
+        ]
     return next((message for message in found if message), None)
 
 

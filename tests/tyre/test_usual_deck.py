@@ -1,0 +1,81 @@
+"""Slips of units in a user's deck are refused at every door, with what was meant."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tyrecal.tyre.load import load_case, validate
+from tyrecal.tyre.own_deck.own_deck import read_own_deck
+from tyrecal.tyre.usual_deck import deck_slips, unusual_numbers, usual_numbers
+from tyrecal.tyre.values import unusual_value
+
+from ..cli.test_cli import run
+from .own_decks import STYLES as OTHER_STYLES
+from .own_decks import plain
+
+STYLES = {"plain": plain, **OTHER_STYLES}
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_no_number_of_a_deck_as_it_is_is_unusual(style: str, tmp_path: Path) -> None:
+    path = tmp_path / "tyre.inp"
+    path.write_text(STYLES[style]())
+    deck = read_own_deck(path)
+    assert list(deck_slips(deck, deck.numbers)) == []
+
+
+@pytest.mark.parametrize(
+    ("style", "path", "value", "meant"),
+    [
+        ("plain", "material CORD / ELASTIC / E", 1e4, "10000 MPa, 1e+10 Pa"),
+        ("plain", "material RUBBER / HYPERELASTIC / C10", 0.8, "0.8 MPa, 8e+05 Pa"),
+        ("plain", "material RUBBER / HYPERELASTIC / D1", 0.05, "0.05 1/MPa, 5e-08 1/Pa"),
+        ("plain", "material RUBBER / DENSITY / density", 1.1, "1.1 g/cm3, 1100 kg/m3"),
+        ("plain", "rebar BELT_1 / spacing", 1.16, "1.16 mm, 0.00116 m"),
+        ("plain", "rebar BELT_1 / area", 0.21, "0.21 mm2, 2.1e-07 m2"),
+        ("millimetres", "material CORD / ELASTIC / E", 1e10, "1e+10 Pa, 1e+04 MPa"),
+        ("millimetres", "material CORD / DENSITY / density", 1500.0, "1500 kg/m3, 1.5e-09 t/mm3"),
+        ("millimetres", "rebar BELT_1 / spacing", 0.00116, "0.00116 m, 1.16 mm"),
+    ],
+)
+def test_a_slip_is_refused_with_what_was_meant(
+    style: str, path: str, value: float, meant: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "tyre.inp"
+    file.write_text(STYLES[style]())
+    deck = read_own_deck(file)
+    assert path in usual_numbers(deck), sorted(deck.numbers)
+    ((_, message),) = unusual_numbers(deck, {path: value})
+    assert f"did you mean {meant}" in message
+
+
+def test_every_door_refuses_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """`init`, a command on a case whose deck was changed since, and --set; not with the option."""
+    good, bad = tmp_path / "good.inp", tmp_path / "bad.inp"
+    text = STYLES["plain"]()
+    good.write_text(text)
+    bad.write_text(text.replace("10000000000.0, 0.3", "10000, 0.3"))
+    assert good.read_text() != bad.read_text()
+    assert run("init", "--deck", str(bad), "--no-pictures") == 2
+    assert "bad.inp, line" in capsys.readouterr().err and not (tmp_path / "bad.yaml").exists()
+    assert run("init", "--deck", str(bad), "--no-pictures", "--allow-unusual") == 0
+    assert run("init", "--deck", str(good), "--no-pictures") == 0
+    case = load_case(tmp_path / "good.yaml")
+    assert "did you mean 10000 MPa" in (
+        unusual_value(case, "material CORD / ELASTIC / E", 1e4) or ""
+    )
+    good.write_text(bad.read_text())
+    (mistake,) = validate(tmp_path / "good.yaml")
+    assert mistake.file.endswith("good.inp") and mistake.line > 0
+    assert validate(tmp_path / "good.yaml", allow_unusual=True) == []
+
+
+def test_a_tyre_of_metres_is_refused(tmp_path: Path) -> None:
+    """A deck in millimetres that is read in metres has a radius of hundreds of metres."""
+    file = tmp_path / "tyre.inp"
+    file.write_text(STYLES["millimetres"]())
+    deck = read_own_deck(file, "m")
+    first = next(iter(deck_slips(deck, deck.numbers)))
+    assert "radius of the outermost node is 337 m" in first.message
