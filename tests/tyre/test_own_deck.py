@@ -18,6 +18,7 @@ from tyrecal.tyre.case.identity import tyre_sha256
 from tyrecal.tyre.case.own_case import own_case
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.own_deck.flat import Flat
+from tyrecal.tyre.own_deck.found import contents
 from tyrecal.tyre.own_deck.own_deck import OwnDeck, Units, read_own_deck
 from tyrecal.tyre.own_deck.own_text import own_texts
 from tyrecal.tyre.own_deck.text import OwnDeckError
@@ -391,3 +392,36 @@ def test_an_effect_that_knows_no_part_is_refused_by_name(
 ) -> None:
     with pytest.raises(ValueError, match=words):
         resolved(with_values(with_parts(tmp_path, **parts), {"effects.tread_density": 0.1}))
+
+
+@pytest.mark.parametrize(
+    ("pressures", "used"), [((1e5, 2e5), 1), ((2e5, 2e4, 2e5), 2), ((2e5, 2e5), 0), ((2e5, 1e5), 0)]
+)
+def test_the_step_that_inflates_is_the_last_that_raises_the_pressure(
+    pressures: tuple[float, ...], used: int, tmp_path: Path
+) -> None:
+    """Seated at a lower pressure, or deflated in between: the flat deck is that of one step."""
+    steps = [
+        own_decks.STEP.replace("INFLATE", f"S{k}").replace("2.0E+05", f"{p}")
+        for k, p in enumerate(pressures)
+    ]
+    path = tmp_path / "tyre.inp"
+    path.write_text(own_decks.plain(step="".join(steps)))
+    deck = read_own_deck(path)
+    flat = deck.flat({})
+    assert flat.pressure_Pa == pytest.approx(pressures[used])
+    assert contents(deck, flat)["inflation_step"] == f"S{used}"
+    alone = tmp_path / "alone.inp"
+    alone.write_text(own_decks.plain(step=steps[used]))
+    assert flat.text == read_own_deck(alone).flat({}).text
+
+
+def test_a_later_load_on_another_surface_is_no_inflation(tmp_path: Path) -> None:
+    """Nor is what follows it."""
+    road = own_decks.STEP.replace("INFLATE", "ROAD").replace(
+        "CAVITY, P, 2.0E+05", "TREAD, P, 9.0E+05"
+    )
+    path = tmp_path / "tyre.inp"
+    path.write_text(own_decks.plain(step=own_decks.STEP + road + own_decks.STEP))
+    deck = read_own_deck(path)
+    assert contents(deck, deck.flat({}))["later_steps"] == ["ROAD", "INFLATE"]

@@ -41,6 +41,7 @@ def contents(deck: OwnDeck, flat: Flat) -> dict[str, Any]:
         "rim": {"nodes": len(mesh.rim), "radius_m": float(held[:, 0].max())},
         "cavity": {"surface": model.cavity_name, "faces": len(mesh.cavity)},
         "pressure_kPa": flat.pressure_Pa / 1e3,
+        "inflation_step": step_name(flat.found.inflation[0].parameters.get("NAME", "")),
         "static_moduli": "long_term" if flat.long_term else "instantaneous",
         "crown": {
             "nodes": len(crown),
@@ -95,7 +96,8 @@ def words(found: dict[str, Any], mass_kg: float) -> Iterator[str]:
     yield f"rim: holds {rim['nodes']} nodes, up to r = {1e3 * rim['radius_m']:.1f} mm"
     yield (
         f"cavity: surface {found['cavity']['surface']}, {found['cavity']['faces']} faces,"
-        f" {found['pressure_kPa']:g} kPa, {found['static_moduli'].replace('_', ' ')} moduli"
+        f" {found['pressure_kPa']:g} kPa by the step {found['inflation_step']},"
+        f" {found['static_moduli'].replace('_', ' ')} moduli"
     )
     yield (
         f"crown: {crown['nodes']} nodes of the outer surface, {2e3 * crown['half_width_m']:.1f} mm"

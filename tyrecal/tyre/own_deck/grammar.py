@@ -7,7 +7,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from .numbers import plain_number
 from .text import MATERIAL_OPTIONS, OUTPUT_KEYWORDS, RULES, Block, check_honoured
+
+LOADS = ("DSLOAD", "DLOAD")
 
 
 @dataclass
@@ -18,11 +21,13 @@ class Sorted:
     inflation: list[Block] = field(default_factory=list)  # of the step that inflates
     passed: list[Block] = field(default_factory=list)  # over, as they change nothing
     later: list[Block] = field(default_factory=list)  # *STEP of those after it
+    is_nonlinear: bool = False  # NLGEOM, which stays on in later steps
 
 
 def sort(blocks: Sequence[Block]) -> Sorted:
     """Blocks checked and sorted. Raises OwnDeckError for what is not honoured."""
     found = Sorted()
+    steps: list[list[Block]] = []
     step: list[Block] | None = None
     part = assembly = instance = False
     after_a_step = False
@@ -30,8 +35,6 @@ def sort(blocks: Sequence[Block]) -> Sorted:
     for block in blocks:
         name = block.name
         if step is None and name == "STEP":
-            if found.inflation:
-                found.later.append(block)
             if part or assembly or instance:
                 raise block.refused("stands inside a *PART or *ASSEMBLY that does not end")
             step = []
@@ -40,8 +43,7 @@ def sort(blocks: Sequence[Block]) -> Sorted:
                 raise block.refused("stands inside a step: *END STEP is missing")
             step.append(block)
             if name == "END STEP":
-                if not found.inflation:
-                    _step(step, found)
+                steps.append(step)
                 step, after_a_step = None, True
             continue
         if name in OUTPUT_KEYWORDS:
@@ -84,15 +86,49 @@ def sort(blocks: Sequence[Block]) -> Sorted:
         raise step[0].refused("has no *END STEP: the deck is cut off")
     if part or assembly or instance:
         raise blocks[-1].refused("is the last, but a *PART, *ASSEMBLY or *INSTANCE has no end")
-    if not found.inflation:
+    inflating = _last_that_raises_the_pressure(steps)
+    for k, each in enumerate(steps[: len(steps) if inflating is None else inflating + 1]):
+        _step(each, found, is_inflation=k == inflating)
+    if inflating is None:
         raise blocks[-1].refused(
             "no *STATIC step of the deck inflates: one needs *DSLOAD or *DLOAD with a pressure"
         )
+    found.later = [each[0] for each in steps[inflating + 1 :]]
     return found
 
 
-def _step(step: list[Block], found: Sorted) -> None:
-    """A step up to the first that inflates, which is it or only holds nodes."""
+def _last_that_raises_the_pressure(steps: Sequence[Sequence[Block]]) -> int | None:
+    """Place of the step that inflates; None if there is none. Equilibrium depends on the last
+    pressure alone, so steps that seat the beads at a lower one count no more. Steps that load other
+    surfaces, or by a mark, come after the inflation."""
+    chosen: int | None = None
+    before: dict[tuple[str, str], float] | None = None
+    for place, step in enumerate(steps):
+        loads = [block for block in step if block.name in LOADS]
+        if not loads:
+            continue
+        now = _pressures(loads)
+        if chosen is None:
+            chosen, before = place, now
+        elif now and before and now.keys() == before.keys():
+            if max(now.values()) > max(before.values()):
+                chosen = place
+            before = now
+        else:
+            break
+    return chosen
+
+
+def _pressures(loads: Sequence[Block]) -> dict[tuple[str, str], float] | None:
+    """Pressures of a step by surface and kind of load; None if one is no plain number."""
+    rows = [row for block in loads for row in block.rows]
+    if not rows or not all(plain_number(row.text(2)) for row in rows):
+        return None
+    return {(row.name(0), row.name(1)): row.number(2) for row in rows}
+
+
+def _step(step: list[Block], found: Sorted, is_inflation: bool) -> None:
+    """A step up to the one that inflates: of those before it, what they hold stays held."""
     kept = []
     for block in step:
         if block.name in OUTPUT_KEYWORDS:
@@ -108,9 +144,10 @@ def _step(step: list[Block], found: Sorted) -> None:
     procedures = [block for block in kept if block.name == "STATIC"]
     if len(procedures) != 1:
         raise step[0].refused("needs one *STATIC")
-    if any(block.name in ("DSLOAD", "DLOAD") for block in kept):
-        if "NLGEOM" not in step[0].parameters:
-            raise step[0].refused("inflates: it needs NLGEOM=YES")
-        found.inflation = kept
+    found.is_nonlinear |= "NLGEOM" in step[0].parameters
+    if not is_inflation:
+        found.model.extend(held)
         return
-    found.model.extend(held)  # what an earlier step holds, stays held
+    if not found.is_nonlinear:
+        raise step[0].refused("inflates: it needs NLGEOM=YES")
+    found.inflation = kept
