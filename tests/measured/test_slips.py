@@ -54,7 +54,9 @@ def test_two_runs_that_differ_stop_the_import(tmp_path: Path) -> None:
     gathered = gather([path], keep_going=True)
     rows = [(str(row.label), row.value, round(row.sigma, 3)) for row in gathered.rows]
     assert rows == [("[2,0]", 79.55, 0.141), ("[4,0]", pytest.approx(115.85), 0.141)]
-    assert gathered.notes == [f"left out: {error.value}"]
+    (note,) = gathered.notes
+    assert note.startswith("left out (both): ") and "--keep-going" not in note
+    assert note.removeprefix("left out (both): ") in str(error.value)
 
 
 def test_files_that_contradict_each_other_stop_the_import(tmp_path: Path) -> None:

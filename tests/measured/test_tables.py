@@ -393,3 +393,82 @@ def test_a_list_without_labels_is_imported_as_one(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="line 2: nothing tells how far frequency_Hz may be off"):
         (tmp_path / "t.csv").write_text("f [Hz],pressure [kPa]\n66.1,240\n")
         gather([tmp_path / "t.csv"])
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "sigma"),
+    [
+        ("label;f [rad/s];sigma;p [bar]\n[2,0];499,5;1,3;2,4\n", 499.5 / (2 * pi), 1.3 / (2 * pi)),
+        ("vertical stiffness [N/mm];sigma;load [N];p [kPa]\n215;4;4000;240\n", 2.15e5, 4e3),
+        ("mass [lb];sigma\n28;0.2\n", 28 * 0.45359237, 0.2 * 0.45359237),
+    ],
+)
+def test_a_sigma_without_a_unit_has_that_of_its_value(
+    text: str, value: float, sigma: float, tmp_path: Path
+) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text(text)
+    (row,) = read_table(path)
+    assert (row.value, row.sigma) == pytest.approx((value, sigma), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (
+            "label;f [Hz];p [bar];static load [N]\n[2,0];79,5;2,4;4000\n",
+            "'static load [N]' has a unit of load",
+        ),
+        (
+            "label;member;f [Hz];p [bar];load_lbf\n[2,0];symmetric;79,5;2,4;900\n",
+            r"load is 900|the load is|usual",
+        ),
+        (
+            "Radlast [N];4000\nlabel;f [Hz];sigma [Hz]\n[2,0];79,5;0,4\n",
+            "'Radlast .N.' above the headings",
+        ),
+        (
+            "quantity;value [rad/s];c;m;p [kPa]\nfrequency_Hz;499.5;2;0;240\n",
+            "in the unit of their quantity",
+        ),
+        (
+            "label;c;m;f [Hz];p [bar]\n[3,0];2;0;79,5;2,4\n",
+            r"label is '\[3,0\]', but c is 2 and m is 0",
+        ),
+        ("label;kind;f [Hz];p [bar]\n[0,0] torsional;lateral;79,5;2,4\n", "but kind is 'lateral'"),
+    ],
+)
+def test_what_contradicts_or_hides_a_state_is_refused(
+    text: str, words: str, tmp_path: Path
+) -> None:
+    """A loaded mode is never read as unloaded."""
+    path = tmp_path / "t.csv"
+    path.write_text(text)
+    if "load_lbf" in text:
+        (row,) = read_table(path)
+        assert row.load_N == pytest.approx(900 * 4.4482216)
+        return
+    with pytest.raises(InputError, match=words.replace("[N]", ".N.")):
+        read_table(path, 240.0)
+
+
+def test_merged_cells_of_a_workbook_hold_what_they_show(tmp_path: Path) -> None:
+    """A run's name over two rows; rows that end before the last column."""
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    sheet = book.active
+    for row in (
+        ["run", "label", "f [Hz]", "pressure [bar]", "remark"],
+        ["A", "[2,0]", 87.8, 2.4, "first"],
+        [None, "[3,0]", 105.3, 2.4],
+        ["B", "[2,0]", 87.9, 2.4],
+        [None, "[3,0]", 105.4, 2.4],
+    ):
+        sheet.append(row)
+    sheet.merge_cells("A2:A3")
+    sheet.merge_cells("A4:A5")
+    path = tmp_path / "t.xlsx"
+    book.save(path)
+    rows = read_table(path)
+    assert [row.run.rpartition(" ")[2] for row in rows] == ["A", "A", "B", "B"]
+    assert not any(row.member for row in rows)

@@ -40,7 +40,7 @@ HEADINGS = {
 MEANING = {name: meaning for meaning, names in HEADINGS.items() for name in names.split()}
 BRACKETED = re.compile(r"^(.*?)\s*(?:[\[(](.*?)[\])]\s*)?$")  # name [unit]
 ENDING = re.compile(
-    r"^(.+?)(?:\s*/\s*|\s+in\s+|[\s_]|(?=%))(%|hz|kpa|bar|psi|n|m2|n[\s_]per[\s_]m|kg|kn|percent)$"
+    r"^(.+?)(?:\s*/\s*|\s+in\s+|[\s_]|(?=%))(%|hz|kpa|bar|psi|n|m2|n[\s_]per[\s_]m|kg|kn|lbf|kgf|dan|percent)$"
 )
 LENGTH_ENDING = re.compile(r"^(.+)[\s_](m|mm|cm|in|inch)$")  # 'mode m' ends in no unit
 TABLES = {"pressure": units.PRESSURE, "load": units.LOAD, **units.QUANTITIES}
@@ -86,6 +86,7 @@ def read_columns(
         name, unit = _heading(heading)
         meaning = MEANING.get(name)
         if meaning is None:
+            _refuse_state(heading, unit, place)
             continue  # damping, remarks and the like
         if meaning in columns:
             raise InputError(f"{place}: two columns are the {meaning}; rename one")
@@ -102,6 +103,17 @@ def read_columns(
     if "pressure" not in held and pressure_kPa is None and held & {"frequency_Hz", "quantity"}:
         raise InputError(f"{place}: no column holds the pressure; give --pressure-kPa")
     return columns
+
+
+def _refuse_state(heading: str, unit: str, place: str) -> None:
+    """Raises InputError for a heading that is not known but has the unit of a load or a pressure:
+    what was measured at a load must not be read as unloaded."""
+    for meaning, table in (("load", units.LOAD), ("pressure", units.PRESSURE)):
+        if unit and units.factor(table, unit):
+            raise InputError(
+                f"{place}: '{heading}' has a unit of {meaning}, but its name is not known: call the"
+                f" column '{meaning} [{next(iter(table))}]', or take it away if it is none"
+            )
 
 
 def _column(index: int, heading: str, meaning: str, unit: str) -> TableColumn:
@@ -122,6 +134,8 @@ def _column(index: int, heading: str, meaning: str, unit: str) -> TableColumn:
         if not factors:
             raise ValueError(": unknown unit")
         return TableColumn(index, next(iter(factors.values())), of=tuple(factors))
+    if meaning == "value" and unit:
+        raise ValueError(": values are in the unit of their quantity, as Hz of frequency_Hz")
     return TableColumn(index, percent=unit == "%")
 
 

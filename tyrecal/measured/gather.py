@@ -81,13 +81,17 @@ def gather(
             notes.append(
                 f"{test.path}: the modes make {run.explained:.0%} of the functions; {advice}"
             )
-        values += measurements_of(run, pressure_kPa)
+        measured_here = measurements_of(run, pressure_kPa)
+        for each in measured_here:
+            if mistake := each.mistake:
+                raise InputError(f"{each.place}: {mistake}")
+        values += measured_here
     labelled = one_for_both([each for each in values if not each.is_unlabelled])
     slips = contradictions(labelled)
     if slips and not keep_going:
         raise InputError("\n".join(map(str, slips)))
     left_out = {id(each) for slip in slips for each in slip.left_out}
-    notes += [f"left out: {each}" for each in slips]
+    notes += [f"left out{' (both)' * (len(s.left_out) > 1)}: {s.words}" for s in slips]
     kept = [each for each in labelled if id(each) not in left_out]
     if labelled and not kept:
         raise InputError(f"{paths[0]}: all repeats contradict each other, none is left")

@@ -74,6 +74,8 @@ class Line:
             own = self.number("sigma") if sigma and (not sigma.of or quantity in sigma.of) else nan
             if sigma and sigma.percent:
                 own *= 0.01 * value
+            elif sigma and not sigma.of:  # in the unit of the value
+                own *= self.columns["value" if self.cell("value") else quantity].factor
             at, rim = pressure, self._rim()
             if quantity == "mass_kg":
                 at, rim = 0.0, None
@@ -111,8 +113,12 @@ class Line:
         c, m, kind = self.cell("c"), self.cell("m"), self.cell("kind")
         if not self.labelled and not any(map(self.cell, ("label", "c", "m", "kind", "member"))):
             return None
+        parts = label_parts(self.cell("label"), settings().mode_names) or ()
+        if parts and c and m and (c, m) != parts[:2]:
+            raise ValueError(f"label is '{self.cell('label')}', but c is {c} and m is {m}")
+        if parts and kind and parts[2] and KIND_WORDS.get(kind) != KIND_WORDS.get(parts[2]):
+            raise ValueError(f"label is '{self.cell('label')}', but kind is '{kind}'")
         if self.cell("label") and "c" not in self.cells:  # beside c and m it is the mode's number
-            parts = label_parts(self.cell("label"), settings().mode_names)
             if not parts:
                 raise ValueError(
                     f"label is '{self.cell('label')}', must be like [2,1], or [0,0] lateral or"

@@ -46,6 +46,14 @@ class Contradiction:
         return (self.slip,) if len(self.others) > 1 else (self.slip, *self.others)
 
     def __str__(self) -> str:
+        return (
+            f"{self.words}. Is it a slip, or another mode? Correct it, or leave it out with"
+            " --keep-going"
+        )
+
+    @property
+    def words(self) -> str:
+        """The runs that contradict each other, and by how much."""
         slip, others = self.slip, self.others
         mean = float(np.mean([each.value for each in others]))
         which = f"{mean:.6g}" if len(others) == 1 else f"{mean:.6g}, the mean of the others,"
@@ -53,8 +61,7 @@ class Contradiction:
         scatter = f", other repeats by {self.usual:.2g} %" if self.usual else ""
         return (
             f"{slip.place}: {slip.name} is {slip.value:.6g}{_run(slip)}, but {which} in {places};"
-            f" they differ by {100 * abs(slip.value / mean - 1):.2g} %{scatter}. Is it a slip, or"
-            " another mode? Correct it, or leave it out with --keep-going"
+            f" they differ by {100 * abs(slip.value / mean - 1):.2g} %{scatter}"
         )
 
 

@@ -134,10 +134,10 @@ def _lines(path: Path) -> tuple[list[tuple[str, list[str]]], str]:
         )
     try:
         table = read_text_table(path)
+        lines = _with_one_heading(table.lines)
     except InputError as error:
         line = f", line {error.line}" if error.line else ""
         raise InputError(f"{path}{line}: {error}") from None
-    lines = _with_one_heading(table.lines)
     return [(f"{path}, line {line}", cells) for line, cells in lines], table.separator
 
 
@@ -146,6 +146,9 @@ def _with_one_heading(lines: list[tuple[int, list[str]]]) -> list[tuple[int, lis
     second line of headings, or of all cells of a column, in the headings."""
     known = [sum(meaning_of(cell) is not None for cell in cells) for _, cells in lines[:MAX_TITLES]]
     start = next((i for i, count in enumerate(known) if count > 1), 0)
+    for line, cells in lines[:start]:
+        if meaning_of(cells[0]) in ("load", "pressure", "rim") and any(cells[1:]):
+            raise InputError(f"'{cells[0]}' above the headings is not read: make it a column", line)
     (line, headings), rows = lines[start], lines[start + 1 :]
     headings = list(headings)
     second = rows[0][1] if rows else []

@@ -342,6 +342,9 @@ def _add_function(result: Universal, each: _Set) -> None:
         over = "" if below in NOT_STATED else f" over {words[1]}"
         result.skipped[f"{words[0]}{over}, channel {channel_name(response)}"] += 1
         return
+    axis = _stated(content.get("abscissa_axis_units_lab", ""))
+    if re.search(r"rad|rpm|khz|min", axis, re.IGNORECASE):
+        raise InputError(f"{each.place}: its frequencies are in {axis}, must be in Hz")
     f, values = np.asarray(content["x"], float), np.asarray(content["data"], complex)
     if len(f) != content["num_pts"] or len(values) != len(f) or not len(f):
         count = content["num_pts"]

@@ -25,7 +25,7 @@ from ..errors import InputError
 from ..files import read_bytes
 
 MAX_SHEET_ROWS = 10_002  # of a workbook's sheet
-MAX_WORKBOOK_BYTES = 100_000_000  # unpacked
+MAX_WORKBOOK_BYTES = 20_000_000  # unpacked
 MAX_CELL = 300  # characters: patterns tried on more would take for ever
 SEPARATORS = ("\t", ";", ",")
 GROUP_SPACES = " \u00a0\u2009\u202f'\u2019"  # between thousands
@@ -93,12 +93,16 @@ def _workbook_lines(raw: bytes) -> list[tuple[int, list[str]]]:
         with ZipFile(io.BytesIO(raw)) as parts:
             if sum(part.file_size for part in parts.infolist()) > MAX_WORKBOOK_BYTES:
                 raise InputError("the workbook is too large: save the sheet as CSV")
-        book = load_workbook(io.BytesIO(raw), read_only=True, data_only=True)
+        book = load_workbook(io.BytesIO(raw), data_only=True)
         sheets = {}
         for sheet in book.worksheets:
-            sheet.reset_dimensions()
-            rows = islice(sheet.iter_rows(), MAX_SHEET_ROWS)
+            rows = islice(sheet.iter_rows(), MAX_SHEET_ROWS)  # each as wide as the sheet
             texts = [[_cell_text(cell) for cell in row] for row in rows]
+            for area in sheet.merged_cells.ranges:  # each of its cells holds what the first shows
+                for row in texts[area.min_row - 1 : area.max_row]:
+                    width = area.max_col - area.min_col + 1
+                    first = texts[area.min_row - 1][area.min_col - 1]
+                    row[area.min_col - 1 : area.max_col] = [first] * width
             if lines := [(i, cells) for i, cells in enumerate(texts, start=1) if any(cells)]:
                 sheets[sheet.title] = lines
     except InputError:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...measured.case_modes import CaseModes
-from ...measured.modal import ModalTest
 from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase
 from ...tyre.state import TyreState
@@ -23,6 +21,10 @@ from ..labels import (
     LabelsResult,
 )
 from .label import Labelled
+
+if TYPE_CHECKING:
+    from ...measured.case_modes import CaseModes
+    from ...measured.modal import ModalTest
 
 
 def labels_told(case: LoadedCase, told: Labelled) -> Labels:
