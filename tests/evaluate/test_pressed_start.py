@@ -15,6 +15,7 @@ from tyrecal_solvers.bundled.road.contact_newton import FirstGuess
 from tyrecal_solvers.errors import Indefinite, Refused
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate import executor as executor_module
 from tyrecal.simulate.evaluate.evaluator import Evaluator, PressQuestion
 from tyrecal.simulate.evaluate.pressed import Pressed
 from tyrecal.simulate.evaluate.store import Store
@@ -116,18 +117,24 @@ def test_the_order_of_the_questions_does_not_matter(case: LoadedCase, tmp_path: 
 
 @pytest.mark.slow
 def test_states_that_run_side_by_side_give_the_same_bytes(case: LoadedCase) -> None:
-    """Stiffnesses at two pressures, each with its sensitivities, as a fit asks for them."""
+    """Stiffnesses at two pressures of three designs, each of which begins at the one before it, as
+    a fit asks for them; the workers stay for the next design."""
     start = start_values(case)
+    designs = [{**start, "A_carcass": share * start["A_carcass"]} for share in (1.0, 1.2, 1.3)]
     targets = [
         ValueTarget("vertical_stiffness_N_per_m", 2e5, 1e3, 1.0, TyreState(kPa, LOADS[0]))
         for kPa in (220.0, 250.0)
     ]
-    one, two = (
-        press_with_slopes(case, evaluator, targets, start, ["A_carcass"], start, jobs)
-        for jobs, evaluator in ((1, Evaluator(TyreDesign(case))), (2, Evaluator(TyreDesign(case))))
-    )
-    assert one[0].tobytes() == two[0].tobytes() and one[1].tobytes() == two[1].tobytes()
-    assert np.all(one[0] > 0) and np.all(one[1] > 0)
+    answers = []
+    for jobs in (1, 2):
+        evaluator = Evaluator(TyreDesign(case))
+        workers = set()
+        for values, base in zip(designs, [start, *designs], strict=False):
+            answers.append(press_with_slopes(case, evaluator, targets, values, [], base, jobs)[0])
+            workers |= {id(pool) for pool in executor_module._idle.values()}
+        assert evaluator.counts.runs == 6 and len(workers) == jobs - 1
+    assert all(np.all(answer > 0) for answer in answers)
+    assert [a.tobytes() for a in answers[:3]] == [a.tobytes() for a in answers[3:]]
 
 
 @pytest.mark.slow

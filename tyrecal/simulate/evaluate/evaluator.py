@@ -335,7 +335,10 @@ class Evaluator:
                     continue
                 found, counts = answer
                 self.counts.add(counts)
+                if isinstance(found, Pressed) and asked[place].base:
+                    self._remember(self._with(asked[place].values), found)
                 yield found
+            next(answers, None)  # to their end: workers of a loop that is cut off are ended
 
     def _press_bases(self, asked: Sequence[PressQuestion]) -> dict[int, Any]:
         """Press the designs from which others begin, in this process, before the workers each do.
