@@ -105,3 +105,11 @@ def test_an_import_reports_doubts_and_keeps_the_data(tmp_path: Path) -> None:
     assert len(gathered.rows) == 9
     (doubt,) = gathered.doubts
     assert doubt.startswith(f"{path}, line ") and doubts_of_file(path) == [doubt]
+
+
+def test_a_label_with_many_waves_below_one_with_few_is_reported() -> None:
+    """[12,0] in the place of [4,0]: two points of the test were exchanged."""
+    rows = measured(200)
+    rows[-1] = replace(rows[-1], label=Label(12, 0))
+    (doubt,) = doubts(rows)
+    assert "[12,0] is 115.9 Hz" in doubt and "slip, or another mode" in doubt

@@ -11,7 +11,7 @@ import pytest
 from tyrecal.errors import InputError
 from tyrecal.measured.gather import gather
 from tyrecal.measured.measurement import Measurement
-from tyrecal.measured.slips import contradictions
+from tyrecal.measured.slips import common_shifts, contradictions
 from tyrecal.simulate.modes.label import Label
 
 pytestmark = pytest.mark.numbers
@@ -116,3 +116,11 @@ def test_a_slip_is_found_among_many_repeats_and_changes_no_other_sigma() -> None
         wrong = clean.copy()
         wrong[i, j] *= 1.01 if (i + j) % 2 else 0.99
         assert lines(repeated(*map(tuple, wrong))) == [str(10 * (i + 1) + j)]
+
+
+def test_runs_that_all_differ_by_the_same_share_are_reported() -> None:
+    """Two runs 3.4 % apart in every label, as at two pressures; not where one alone differs."""
+    pairs = [(f * 1.034 * (1 + e), f) for f, e in ((84.8, 1e-3), (101.7, -1e-3), (41.3, 5e-4))]
+    (words,) = common_shifts(repeated(*pairs))
+    assert "all 3 frequencies are 3.4% above those of" in words and "pressure" in words
+    assert common_shifts(repeated((84.8, 84.9), (101.7, 101.5), (41.3, 43.0))) == []

@@ -472,3 +472,14 @@ def test_merged_cells_of_a_workbook_hold_what_they_show(tmp_path: Path) -> None:
     rows = read_table(path)
     assert [row.run.rpartition(" ")[2] for row in rows] == ["A", "A", "B", "B"]
     assert not any(row.member for row in rows)
+
+
+def test_the_lower_of_a_pair_is_its_first_member_in_every_run(tmp_path: Path) -> None:
+    """Whatever the order of the lines, so that the split is not averaged away."""
+    path = tmp_path / "t.csv"
+    rows = [(1, "[2,0]", 87.8), (1, "[3,0]", 105.3), (1, "[3,0]", 106.1)]
+    rows += [(2, "[2,0]", 87.9), (2, "[3,0]", 106.2), (2, "[3,0]", 105.4)]
+    text = "\n".join(f"{run};{label};{str(f).replace('.', ',')};240" for run, label, f in rows)
+    path.write_text("run;label;f [Hz];p [kPa]\n" + text + "\n")
+    pairs = {(row.member, row.value) for row in read_table(path) if row.label == Label(3, 0)}
+    assert pairs == {("1", 105.3), ("2", 106.1), ("1", 105.4), ("2", 106.2)}

@@ -16,7 +16,7 @@ from .measurement import Measurement
 from .modal import Geometry, LabelledMode, Layout, ModalTest, measurements_of, read_modal_test
 from .repeats import FLOOR, combined, one_for_both
 from .sense import doubts
-from .slips import contradictions
+from .slips import common_shifts, contradictions
 from .tables import read_table
 from .universal import Place, Universal, is_same_place, is_universal, read_universal
 
@@ -105,7 +105,7 @@ def gather(
             f" without a label{f' ({why})' * bool(why)}; 'tyrecal fit' and 'tyrecal measured label'"
             " label them by the model"
         )
-    return Gathered(rows + without_label, runs, notes, doubts(rows))
+    return Gathered(rows + without_label, runs, notes, [*common_shifts(kept), *doubts(rows)])
 
 
 def _without_labels(

@@ -136,7 +136,10 @@ def _usual(row: Measurement) -> float:
     if label.kind:
         return low or ZERO_HZ[label.kind]
     known = USUAL_HZ.get(label.m, ())
-    return low or (known[label.c - 1] if 0 < label.c <= len(known) else 0)
+    if not known or not label.c:
+        return low or 0
+    beyond = max(0, label.c - len(known))  # where the tyres' own modes end, on a straight line
+    return low or known[label.c - 1 - beyond] + beyond * (known[-1] - known[-2])
 
 
 def _pattern(rows: Sequence[Measurement]) -> tuple[Array, Array]:

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -27,6 +28,7 @@ FEW_REPEATS = (
 )
 LARGEST_STEP = {"frequency_Hz": 0.05, "mass_kg": 0.05}  # relative, between repeats of such a file
 LARGEST_STEP_ELSE = 0.25
+LEAST_COMMON, LEAST_SHIFT = 3, 0.02  # labels of two runs, and their mean ln ratio
 MOST_SLIPS = 12  # slips that are looked for
 USUAL_STEPS = [digit * 10.0**power for power in range(2, -8, -1) for digit in (5, 2.5, 2, 1.25, 1)]
 SMALLEST_SCATTER = 1e-4  # of the value: what no two set-ups of a test go below
@@ -80,6 +82,30 @@ def contradictions(values: Sequence[Measurement]) -> list[Contradiction]:
         for quantity in quantities
         for contradiction in _of_quantity([each for each in values if each.quantity == quantity])
     ]
+
+
+def common_shifts(values: Sequence[Measurement]) -> list[str]:
+    """Sentences about two runs whose frequencies all differ by nearly the same share, as those of
+    another pressure do. Such a difference is no slip of one label."""
+    runs: dict[str, dict[object, Measurement]] = {}
+    for each in values:
+        if each.quantity == "frequency_Hz":
+            runs.setdefault(each.run, {})[each.key] = each
+    sentences = []
+    for (_, one), (_, other) in combinations(runs.items(), 2):
+        common = [key for key in one if key in other]
+        if len(common) < LEAST_COMMON:
+            continue
+        shifts = np.log([one[key].value / other[key].value for key in common])
+        mean, scatter = float(shifts.mean()), float(shifts.std(ddof=1))
+        if abs(mean) > LEAST_SHIFT and abs(mean) > 4 * scatter:
+            first, second = one[common[0]], other[common[0]]
+            sentences.append(
+                f"{first.place}{_run(first)}: all {len(common)} frequencies are"
+                f" {abs(np.expm1(mean)):.1%} {'above' if mean > 0 else 'below'} those of"
+                f" {second.place}{_run(second)}: was the pressure the same?"
+            )
+    return sentences
 
 
 def _of_quantity(values: list[Measurement]) -> list[Contradiction]:

@@ -254,13 +254,18 @@ def _runs(values: list[Measurement], named: bool) -> list[Measurement]:
             f"{doubled.place}: {doubled.name} stands twice; repeats, or the two of a doublet?"
             " Say it in a column run or member"
         )
+    if members:  # the lower one is 1, whatever the order of the lines
+        ranks: Counter[tuple[str, object]] = Counter()
+        member: dict[int, str] = {}
+        for value in sorted(values, key=lambda each: each.value):
+            at = value.run, value.key
+            ranks[at] += 1
+            member[id(value)] = str(ranks[at]) if times[at] == 2 else value.member
+        return [replace(value, member=member[id(value)]) for value in values]
     seen: Counter[tuple[str, object]] = Counter()
     result = []
     for value in values:
         at = value.run, value.key
         seen[at] += 1
-        if not members:
-            result.append(replace(value, run=f"{value.run} {seen[at]}"))
-        else:
-            result.append(replace(value, member=str(seen[at])) if times[at] == 2 else value)
+        result.append(replace(value, run=f"{value.run} {seen[at]}"))
     return result
