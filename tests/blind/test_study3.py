@@ -411,9 +411,17 @@ def test_recorded_trials_are_those_that_were_sealed(group: Path) -> None:
 
 @pytest.mark.slow
 def test_the_tables_on_record_are_what_the_scorer_says(tmp_path: Path) -> None:
+    """Of every third series; `python -m tests.blind.study3 result` gives them all."""
+    series = sorted({group.series for group in GROUPS})[::3]
+    names = {group.name for group in GROUPS if group.series in series}
     for group in ON_RECORD:
-        unpacked(group, tmp_path / "all" / group.name, tmp_path / "all-truth" / group.name)
-    assert result(tmp_path / "all") + "\n" == (RECORDED / "RESULT.md").read_text(encoding="utf-8")
+        if group.name in names:
+            unpacked(group, tmp_path / "all" / group.name, tmp_path / "all-truth" / group.name)
+    recorded = (RECORDED / "RESULT.md").read_text(encoding="utf-8")
+    _, *sections = result(tmp_path / "all").split("\n## ")
+    assert len(sections) == len(series) > 3
+    for part in sections:
+        assert "\n## " + part.rstrip() in recorded
 
 
 @pytest.mark.slow
