@@ -411,7 +411,7 @@ def test_recorded_trials_are_those_that_were_sealed(group: Path) -> None:
 
 @pytest.mark.slow
 def test_the_tables_on_record_are_what_the_scorer_says(tmp_path: Path) -> None:
-    """Of every third series; `python -m tests.blind.study3 score` gives them all."""
+    """The tables of every third series; `python -m tests.blind.study3 score` gives them all."""
     series = sorted({group.series for group in GROUPS})[::3]
     names = {group.name for group in GROUPS if group.series in series}
     for group in ON_RECORD:
