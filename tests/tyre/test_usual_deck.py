@@ -79,3 +79,12 @@ def test_a_tyre_of_metres_is_refused(tmp_path: Path) -> None:
     deck = read_own_deck(file, "m")
     first = next(iter(deck_slips(deck, deck.numbers)))
     assert "radius of the outermost node is 337 m" in first.message
+
+
+def test_an_angular_spacing_is_in_degrees_whatever_its_path(tmp_path: Path) -> None:
+    """Also where two sections have a layer of one name, so that paths begin with the section."""
+    file = tmp_path / "tyre.inp"
+    text = plain().replace("BELT_1,", "BELT,").replace("BELT_2,", "BELT,")
+    file.write_text(text.replace("*REBAR LAYER", "*REBAR LAYER, GEOMETRY=ANGULAR"))
+    ranges = usual_numbers(read_own_deck(file))
+    assert {each.unit for path, each in ranges.items() if path.endswith("spacing")} == {"degrees"}

@@ -46,15 +46,16 @@ def usual_numbers(deck: OwnDeck) -> dict[str, Usual]:
     cords, angular = _cords(deck), _angular(deck)
     ranges = {}
     for path in deck.numbers:
-        first, *_, last = (word.strip() for word in path.split("/"))
+        *_, owner, last = words = [word.strip() for word in path.split("/")]
+        first = words[0]
         field = re.sub(r"^material .*? / ", "", path)
         field = re.sub(r" / row \d+ / ", " / ", field)
         usual = OF_FIELD.get(field if first.startswith("material ") else last)
         if field == "ELASTIC / E" and first.removeprefix("material ") in cords:
             usual = CORD_MODULUS
-        if last == "spacing" and first.removeprefix("rebar ") in angular:
+        if last == "spacing" and owner.removeprefix("rebar ") in angular:
             usual = ANGULAR_SPACING
-        if usual and (first.startswith(("material ", "rebar ")) or " / rebar " in path):
+        if usual and (first.startswith("material ") or owner.startswith("rebar ")):
             ranges[path] = _in_units(usual) if deck.units == "mm" else usual
     return ranges
 
