@@ -145,7 +145,7 @@ def command(
             terminal.show(shown(table))
     else:
         terminal.show(shown(*tables))
-    terminal.say("\n".join(fit_verdict(result)))
+    terminal.say("\n".join([*fit_verdict(result), *fit.found.sentences()]))
     for each in fit.left_out:
         terminal.note(f"{calibration.measured or case}: not used: {each}")
     for warning in (*tyre_doubts(result), *fit_doubts(result)):

@@ -111,7 +111,7 @@ def _variable(fit: FitResult, name: str) -> str:
     known = fit.variables.get(name)
     if known is None:
         return NOTHING
-    error = known.error_percent
+    error = known.percent(known.standard_error_total or known.standard_error)
     spread = f" ±{NB}{error}{NB}%" if error else ""
     return f"{known.value:.4g}{spread}{', at bound' if known.at_bound else ''}"
 

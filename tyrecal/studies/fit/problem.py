@@ -33,6 +33,7 @@ from .targets import Target, ValueTarget, read_mass_targets, read_road_targets, 
 from .variable import read_variable
 
 Array = np.ndarray
+BOUND_MARGIN = 1e-6  # of a scaled variable
 
 
 @dataclass(frozen=True)
@@ -125,6 +126,10 @@ class Problem:
     def start(self) -> Array:
         """Coordinates of the case's start values."""
         return np.array([v.scaled(v.start) for v in self.variables])
+
+    def is_free(self, x: Array) -> Array:
+        """Whether each variable (v,) is at no bound at coordinates x."""
+        return np.minimum(x - self.lower, self.upper - x) >= BOUND_MARGIN
 
     def values(self, x: Array) -> dict[str, float]:
         """Values of all variables, fixed ones included, at coordinates x."""

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
+from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.modes.label import Label
 from ...tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ...tyre.state import AS_THE_CASE
@@ -31,9 +32,10 @@ from .problem import Point, Problem
 from .search import projected_gradient
 from .states import next_states, plain, state_reports
 from .targets import objective_unit
+from .total_error import TotalError, total_error
 from .uncertainty import FitUncertainty, uncertainty
 
-MIN_STEP = 1e-6  # of a scaled variable, below which the fit did not move, or is at a bound
+MIN_STEP = 1e-6  # of a scaled variable, below which the fit did not move
 NEAR_BEST_HZ = 0.05  # of the objective: the fit could have ended there
 ROAD_QUANTITIES = {  # targets that are no modes
     **{
@@ -64,15 +66,16 @@ class FittedVariable(ResultPart):
     value: float
     lower: float
     upper: float
-    standard_error: float | None  # None: the data do not tell
+    standard_error: float | None  # by the scatter of the measurement; None: not determined
+    standard_error_total: float | None = None  # by all that is uncertain; None: not known
+    variance_by_cause: dict[str, float] = Field(default={})  # shares of the total's, 1 together
     at_bound: bool
 
-    @property
-    def error_percent(self) -> str | None:
-        """Two digits, and never 1.9e+02."""
-        if self.standard_error is None or not self.value:
+    def percent(self, error: float | None) -> str | None:
+        """A standard error in per cent of the value: two digits, and never 1.9e+02."""
+        if error is None or not self.value:
             return None
-        percent = abs(100 * self.standard_error / self.value)
+        percent = abs(100 * error / self.value)
         return f"{percent:.0f}" if percent >= 10 else f"{percent:.2g}"
 
 
@@ -181,6 +184,8 @@ class FitResult(Result):
     next_states_error: str = ""  # why they could not be evaluated
     labels: Labels | None = None  # of frequencies that came without
     noise_Hz: float | None = None  # standard deviation of a frequency
+    chi2_per_dof: float | None = None  # by all that is uncertain; None: no scatter is stated
+    total_error_unknown: str = ""  # why no variable has a total standard error
     correlations: dict[str, dict[str, float | None]]
     singular_values: list[float]
     starts: list[dict[str, Any]]
@@ -227,9 +232,30 @@ class FitResult(Result):
         return [
             self._side_by_side() if self.states else self._every_target(),
             self._variables(),
-            Table((), [["objective", words, *objective, "", ""]]),
+            Table((), [["objective", words, *objective, "", "", ""]]),
             *self._states(),
             *([self.labels.table()] if self.labels else []),
+        ]
+
+    def sentences(self) -> list[str]:
+        """How far the standard errors hold."""
+        if self.total_error_unknown:
+            return [
+                "The standard errors hold only the scatter of the measurement. A total is not"
+                f" known: {self.total_error_unknown}."
+            ]
+        shares: dict[str, list[float]] = {}
+        for each in self.variables.values():
+            for cause, share in each.variance_by_cause.items():
+                shares.setdefault(cause, []).append(share)
+        if not shares:
+            return []
+        cause, share = max(((c, float(np.mean(s))) for c, s in shares.items()), key=lambda x: x[1])
+        return [
+            "'std. err.' is the total by which a variable may be off: measurement, section,"
+            " material laws and uncalibrated constants. 'scatter' is the share of the measurement"
+            " alone: how far a repeated test would move it.",
+            f"The largest part of the total is: {cause}, {share:.0%} of the variance on average.",
         ]
 
     def numbers(self) -> list[Table]:
@@ -302,25 +328,25 @@ class FitResult(Result):
         return tables
 
     def _percent(self, name: str, error: float | None) -> str | None:
-        """A standard error of a variable, as `FittedVariable.error_percent` has it."""
-        known = self.variables[name].model_copy(update={"standard_error": error})
-        return known.error_percent
+        """A standard error of a variable, as `FittedVariable.percent` has it."""
+        return self.variables[name].percent(error)
 
     def _variables(self) -> Table:
         heads = [Column("variable", ""), Column("", "")]
-        heads += map(Column, ("initial", "fitted", "bounds", "std. err. %"))
+        heads += map(Column, ("initial", "fitted", "bounds", "std. err. %", "scatter %"))
         rows: list[list[Any]] = [
             [
                 name,
                 "at bound" if each.at_bound else "",
                 *map(RESULT_DIGITS.cell, (each.initial, each.value)),
                 f"{each.lower:g}..{each.upper:g}",
-                each.error_percent,
+                each.percent(each.standard_error_total),
+                each.percent(each.standard_error),
             ]
             for name, each in self.variables.items()
         ]
         rows += [
-            [name, "held", *map(RESULT_DIGITS.cell, (value, value)), None, None]
+            [name, "held", *map(RESULT_DIGITS.cell, (value, value)), None, None, None]
             for name, value in self.fixed.items()
         ]
         return Table(heads, rows)
@@ -340,6 +366,7 @@ def fit_result(
     point = best.point
     objectives = [row["objective_Hz"] for row in history]
     known = uncertainty(problem, point)
+    total = _total_error(problem, point, known)
     names = [v.name for v in problem.variables]
     several = {t.state.unloaded for t in problem.measured} != {AS_THE_CASE}
     several = several or any(t.member for t in problem.road)
@@ -367,13 +394,18 @@ def fit_result(
         "message": best.message,
         "projected_gradient_norm": projected_gradient(problem, point),
         "label_margin": point.clarity,
-        "variables": _variables(problem, initial, point, known),
+        "variables": _variables(problem, initial, point, known, total),
         "fixed": dict(problem.fixed),
         "modes": _modes(problem, initial, point, several),
         **({"footprint": pressed} if pressed else {}),
         **({"mass": mass[0]} if mass else {}),
         **(_states(problem, point, known) if several else {}),
         "noise_Hz": known.noise_Hz,
+        **(
+            {"total_error_unknown": total}
+            if isinstance(total, str)
+            else {"chi2_per_dof": total.chi2_per_dof}
+        ),
         "correlations": {
             a: {b: _finite(known.correlations[i, j]) for j, b in enumerate(names)}
             for i, a in enumerate(names)
@@ -395,19 +427,35 @@ def fit_result(
     return FitResult.model_validate(content)
 
 
+def _total_error(problem: Problem, point: Point, known: FitUncertainty) -> TotalError | str:
+    """The total uncertainty of the variables, or why it is not known."""
+    try:
+        return total_error(problem, point, known)
+    except Exception as error:  # the fit has ended: what only comes after it must not lose it
+        if isinstance(error, (ValueError, EvaluationFailed)):
+            return str(error)
+        return f"{type(error).__name__}: {error}"
+
+
 def _variables(
-    problem: Problem, initial: Point, point: Point, known: FitUncertainty
+    problem: Problem,
+    initial: Point,
+    point: Point,
+    known: FitUncertainty,
+    total: TotalError | str,
 ) -> dict[str, FittedVariable]:
     variables = {}
+    is_free = problem.is_free(point.x)
     for i, v in enumerate(problem.variables):
-        room = point.x[i] - problem.lower[i], problem.upper[i] - point.x[i]
+        more = total.of_variable(i) if isinstance(total, TotalError) else {}
         variables[v.name] = FittedVariable(
             initial=initial.values[v.name],
             value=point.values[v.name],
             lower=problem.case.case.variables[v.name].lower,
             upper=problem.case.case.variables[v.name].upper,
             standard_error=known.standard_errors[i],
-            at_bound=bool(min(room) < MIN_STEP),
+            **more,
+            at_bound=not is_free[i],
         )
     return variables
 

@@ -1,4 +1,5 @@
-"""What the data determine: standard errors, correlations and singular values at the optimum."""
+"""What the scatter of the data leaves open: standard errors, correlations and singular values at the
+optimum. What else is uncertain is in `total_error`."""
 
 from __future__ import annotations
 
@@ -18,13 +19,14 @@ class FitUncertainty:
     in the objective's unit, largest first: a small one is a combination that the data do not see;
     noise_Hz: the standard deviation of a frequency behind the errors, None where there is no
     frequency that counts, or it cannot be known; sigma: of each target in its unit, NaN where it
-    does not count or cannot be known."""
+    does not count or cannot be known; is_determined (v,): whether the data determine a variable."""
 
     standard_errors: list[float | None]
     correlations: Array
     singular_values: Array
     noise_Hz: float | None
     sigma: Array
+    is_determined: Array
 
 
 def uncertainty(problem: Problem, point: Point) -> FitUncertainty:
@@ -54,16 +56,22 @@ def uncertainty(problem: Problem, point: Point) -> FitUncertainty:
     every = np.full(len(problem.scale), np.nan)
     every[counts] = sigma
     return FitUncertainty(
-        errors, correlations, values, noise if np.isfinite(noise) else None, every
+        errors, correlations, values, noise if np.isfinite(noise) else None, every, seen
     )
 
 
 def fit_covariance(J: Array, root: Array, sigma: Array) -> tuple[Array, Array]:
     """Covariance (v, v) of the coordinates by rows of the weighted Jacobian, W^(1/2) and sigma of
     targets, see `uncertainty`; which variables the data see (v,)."""
-    inverse, seen = _inverse(J.T @ J)
-    response = inverse @ (J * root[:, None]).T
+    response, seen = fit_response(J, root)
     return (response * sigma**2) @ response.T, seen
+
+
+def fit_response(J: Array, root: Array) -> tuple[Array, Array]:
+    """B = (J^T J)^-1 J^T W^(1/2) (v, n): d x / d q of the fitted coordinates by the targets; which
+    variables the data determine (v,)."""
+    inverse, seen = _inverse(J.T @ J)
+    return inverse @ (J * root[:, None]).T, seen
 
 
 def standard_errors(

@@ -1,0 +1,144 @@
+"""Standard errors of a fit that hold for the tyre, not for its measurement alone.
+
+    cov x = B Q Sigma Q B^T,  B = (J^T J)^-1 J^T W^(1/2),  Q = diag(q)        (`uncertainty`)
+    Sigma = Sigma_rep + Sigma_form + sum_k s_k^2 g_k g_k^T                    (diagnose/covariance)
+    chi^2 = r^T (S^-1 - S^-1 J_f (J_f^T S^-1 J_f)^-1 J_f^T S^-1) r,           S = Sigma
+
+q: fitted values, Sigma: covariance of ln q, as `diagnose` and `sample` have it, J_f: d ln q / d x of
+the variables that are at no bound, r: ln measured - ln fitted. chi^2 does not depend on the weights
+of the fit. If chi^2 exceeds its degrees of freedom, cov x is multiplied by their ratio.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...simulate.evaluate.failure import EvaluationFailed
+from ...tyre.case import LoadedCase
+from ..diagnose.covariance import covariance, model_form
+from ..diagnose.model import Answer, Query
+from ..diagnose.observations import Observable, Observations
+from ..diagnose.tyre_model import TyreModel
+from ..diagnose.uncertainties import Source, sources
+from .problem import Point, Problem
+from .targets import Target
+from .uncertainty import FitUncertainty, fit_response, standard_errors
+from .variable import read_variable
+
+Array = np.ndarray
+OF_MEASUREMENT, OF_MODEL, OF_SECTION = "measurement", "material laws and mesh", "section"
+LEAST_SHARE = 0.01  # of the variance, below which a cause is not listed
+
+
+@dataclass(frozen=True)
+class TotalError:
+    """standard_errors: by variable, in its own unit, None if the data do not determine it; shares:
+    of their variance (v,) by cause, the largest first; chi2, freedom: see the module, None if no
+    target states its standard deviation."""
+
+    standard_errors: list[float | None]
+    shares: dict[str, Array]
+    chi2: float | None
+    freedom: int
+
+    @property
+    def chi2_per_dof(self) -> float | None:
+        """chi^2 over its degrees of freedom."""
+        return None if self.chi2 is None else self.chi2 / self.freedom
+
+    def of_variable(self, place: int) -> dict[str, Any]:
+        """The fields of a variable in fit.json."""
+        shares = {cause: float(share[place]) for cause, share in self.shares.items()}
+        return {
+            "standard_error_total": self.standard_errors[place],
+            "variance_by_cause": {k: v for k, v in shares.items() if v >= LEAST_SHARE},
+        }
+
+
+def total_error(problem: Problem, point: Point, scatter: FitUncertainty) -> TotalError:
+    """The whole uncertainty of the fitted variables at ``point``.
+
+    scatter: that of the measurement alone. One more design is evaluated in every state. Raises
+    DeckRefused if the solver has no exact sensitivities; EvaluationFailed; ValueError with the
+    reason if targets are on the road or their standard deviation is unknown.
+    """
+    if problem.road:
+        raise ValueError("the sensitivities of targets on the road are not known to all constants")
+    counts = problem.scale > 0
+    sigma, J = scatter.sigma[counts], point.jacobian[counts]
+    if not np.isfinite(sigma).all():
+        raise ValueError("the standard deviation of the measured values is not known")
+    measured = [each for each, used in zip(problem.measured, counts, strict=True) if used]
+    wanted = np.array([t.frequency_Hz if isinstance(t, Target) else t.value for t in measured])
+    fitted = wanted + (point.residuals / problem.scale)[counts]
+    rows = tuple(_row(problem.case, each) for each in measured)
+    known, _ = sources(problem.case)
+    by_constants, laws = _constants(problem, point, rows, known)
+    none = np.full(len(rows), np.nan)
+    observed = Observations(rows, np.log(wanted), sigma / wanted, 0.0, none, none)
+    whole = covariance(observed, by_constants, laws)
+
+    response = fit_response(J, problem.scale[counts])[0] * fitted  # d x / d ln q
+    free = problem.is_free(point.x)
+    chi2, freedom = None, len(rows) - int(free.sum())
+    if all(t.sigma_Hz if isinstance(t, Target) else t.sigma for t in measured) and freedom > 0:
+        slopes = (J / (problem.scale[counts] * fitted)[:, None])[:, free]
+        chi2 = _chi2(np.log(wanted / fitted), slopes, whole)
+    spread = response @ whole @ response.T * max(1.0, (chi2 or 0.0) / max(freedom, 1))
+    errors = standard_errors(problem, point, spread, scatter.is_determined)
+    parts = _parts(response, sigma / wanted, model_form(rows, laws), by_constants, known)
+    return TotalError(errors, parts, chi2, freedom)
+
+
+def _row(case: LoadedCase, target: object) -> Observable:
+    if not isinstance(target, Target):
+        return Observable("mass_kg", None, 0.0)
+    pressure = target.state.told(case).pressure_kPa or 0.0
+    return Observable("frequency_Hz", target.label, pressure, rim=target.state.rim)
+
+
+def _constants(
+    problem: Problem, point: Point, rows: Sequence[Observable], known: list[Source]
+) -> tuple[Array, float]:
+    """Change of ln q (n, k) by one standard deviation of each source of error; the standard
+    deviation of each part of what material laws do."""
+    distinct = list(dict.fromkeys(row.row for row in rows))
+    model = TyreModel(problem.case, problem.evaluator, distinct, known, {}, problem.jobs)
+    own = (read_variable(problem.case, name) for name in model.variables)
+    x = np.array([each.scaled(point.values[each.name]) for each in own])
+    (answer,) = model.answers([Query(x, constants=True)])
+    if not isinstance(answer, Answer):
+        raise answer if isinstance(answer, EvaluationFailed) else ValueError(str(answer))
+    assert answer.constants is not None
+    places = [distinct.index(row.row) for row in rows]
+    return answer.constants[places], model.material_laws
+
+
+def _chi2(r: Array, J: Array, sigma: Array) -> float:
+    """chi^2 of residuals r (n,) of ln q that the variables J (n, v) cannot absorb."""
+    white = np.linalg.inv(np.linalg.cholesky(sigma))
+    left = white @ r
+    absorbed, *_ = np.linalg.lstsq(white @ J, left, rcond=None)
+    return float(((left - white @ J @ absorbed) ** 2).sum())
+
+
+def _parts(
+    response: Array, scatter: Array, form: Array, by_constants: Array, known: Sequence[Source]
+) -> dict[str, Array]:
+    """Shares (v,) of the variance by cause: the section as one, every other constant by its name."""
+    moved = (response @ by_constants) ** 2
+    parts = {
+        OF_MEASUREMENT: response**2 @ scatter**2,
+        OF_MODEL: np.einsum("vi,ij,vj->v", response, form, response),
+    }
+    for k, source in enumerate(known):
+        cause = OF_SECTION if source.field else source.name.replace("_", " ")
+        parts[cause] = parts.get(cause, 0.0) + moved[:, k]
+    whole = np.sum([*parts.values()], 0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        shares = {cause: part / whole for cause, part in parts.items()}
+    return dict(sorted(shares.items(), key=lambda item: -float(np.nanmean(item[1]))))
