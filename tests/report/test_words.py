@@ -58,13 +58,21 @@ def test_whether_starts_agree(starts: list[dict[str, Any]], words: str) -> None:
     assert fit_verdict(fit(starts=starts))[-1].startswith(words)
 
 
-@pytest.mark.parametrize(("objective", "words"), [(1.0, "is 1:"), (22.157, "is 491:")])
-def test_sigmas_are_judged_per_degree_of_freedom(objective: float, words: str) -> None:
-    """Three frequencies, two variables: one degree of freedom."""
-    told = fit_verdict(fit(objective_unit="sigma", objective_Hz=objective))
-    assert f"chi2 per degree of freedom {words}" in told[-1]
-    full = fit(objective_unit="sigma", variables={name: {"value": 0.0} for name in "ABC"})
-    assert not any("chi2" in each for each in fit_verdict(full))
+def test_a_fit_is_judged_by_chi2_per_degree_of_freedom() -> None:
+    """The first line has the verdict, a warning the likeliest reason; nothing is judged without
+    standard deviations."""
+    assert not any("chi2" in each for each in fit_verdict(fit()))
+    good = fit(verdict="fits", chi2_per_dof=1.0, reason=None)
+    assert fit_verdict(good)[0].startswith("Converged") and not fit_doubts(good)
+    assert "chi2 per degree of freedom is 1:" in fit_verdict(good)[-1]
+    bad = fit(verdict="does_not_fit", chi2_per_dof=491.0, reason=None)
+    assert fit_verdict(bad)[0] == "Does not fit at 240 kPa, 12.40 kg."
+    (doubt,) = fit_doubts(bad)
+    assert "DOES NOT FIT: chi2 per degree of freedom is 491" in doubt
+    reason = {"kind": "value", "words": "line 2: did you mean 31.7 Hz?", "chi2_per_dof": 1.25}
+    (doubt,) = fit_doubts({**bad, "reason": reason})
+    assert "reason: line 2: did you mean 31.7 Hz? (chi2 per degree of freedom would be 1.2" in doubt
+    assert fit_doubts({**good, "reason": reason}) == [doubt.rpartition("reason: ")[2]]
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,7 @@ from ..studies import modes as evaluated
 from ..studies import pressure_result
 from ..studies.fit.calibrate import history_csv
 from ..studies.fit.study import FitStudy
+from ..studies.fit.verdict import DOES_NOT_FIT, does_not_fit_words
 from ..studies.fitted import NOT_CONVERGED
 from ..studies.result import Failed, Result, ResultPart
 from ..studies.sample import study as sampling
@@ -86,6 +87,9 @@ def fit(state: Studied) -> StudyOutcome:
     for each in found.footprint:
         numbers[f"fitted_{each.quantity} {each.state}"] = each.fitted
     files = found.texts() | {"fit_history.csv": history_csv(fitted.history)}
+    if found.verdict == DOES_NOT_FIT and found.chi2_per_dof:
+        words = does_not_fit_words(found.chi2_per_dof, found.reason)
+        return StudyOutcome("failed", DOES_NOT_FIT, words, numbers, files)
     if found.is_good:
         return StudyOutcome(quantities=numbers, files=files)
     words = found.message if found.moved else "the fit did not move"

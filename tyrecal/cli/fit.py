@@ -83,9 +83,10 @@ def command(
     """Calibrate the variables of CASE to its targets: frequencies, and contact areas, lengths,
     widths and vertical stiffnesses on the road.
 
-    Writes fit.json, fit.csv, fit_history.csv and pictures. --set NAME=VALUE on a variable changes
-    where the fit starts. --pressure-kPa and --set rim.free=true choose the targets that were
-    measured so.
+    Writes fit.json, fit.csv, fit_history.csv and pictures. If the model does not fit (chi2 per
+    degree of freedom above 5), a warning gives the likeliest reason. --set NAME=VALUE on a variable
+    changes where the fit starts. --pressure-kPa and --set rim.free=true choose the targets that
+    were measured so.
 
     \b
     tyrecal fit cases/p235_75r17.yaml
@@ -111,9 +112,10 @@ def command(
         arguments.refuse_unknown("--fix", name, values, "variable")
     fixed = {name: values[name] for name in fix}
     calibration = FitStudy(loaded, study.evaluator(loaded), measured, fixed)
-    if file := measured or loaded.measured:
-        for doubt in doubts_of_file(file):
-            terminal.warn(doubt)
+    file = measured or loaded.measured
+    questions = doubts_of_file(file) if file else []
+    for doubt in questions:
+        terminal.warn(doubt)
     evaluator = calibration.evaluator
     if calibration.evaluates_one_by_one and starts == 1:
         why = f"a fit from one start asks solver '{evaluator.solver.name}' for one design at a time"
@@ -149,7 +151,8 @@ def command(
     for each in fit.left_out:
         terminal.note(f"{calibration.measured or case}: not used: {each}")
     for warning in (*tyre_doubts(result), *fit_doubts(result)):
-        terminal.warn(warning)
+        if warning not in questions:
+            terminal.warn(warning)
     good = fit.found.is_good
     earlier = not good and has_good(run.folder / "fit.json")
     finish = partial(run.finish, aside=NOT_CONVERGED if earlier else "")
@@ -169,7 +172,7 @@ def command(
     if measured or not loaded.measured:
         words += ["--measured", str(measured or "FILE")]
     next_ = join_command(words)
-    if good and not loaded.case.deck and read_targets(loaded):
+    if good and not fit.found.reason and not loaded.case.deck and read_targets(loaded):
         terminal.say(f"next: {next_} says what the model lacks")
     return 0 if good else EXIT_FIT
 

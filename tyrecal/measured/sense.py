@@ -68,7 +68,7 @@ def _of_one_rim(rows: list[Measurement]) -> Iterator[str]:
             moved -= np.log([row.value for row in rows])  # noqa: B023
             return float(base - moved @ weight @ moved)  # noqa: B023
 
-        best = max(_exchanges(rows, gain), key=lambda each: each[0], default=(0.0, [], ""))
+        best = likeliest_exchange(rows, gain)
         weighted = weight @ deviation
         single = weighted**2 / np.diag(weight)
         worst = int(np.argmax(single))
@@ -86,6 +86,14 @@ def _of_one_rim(rows: list[Measurement]) -> Iterator[str]:
             )
         else:
             return
+
+
+def likeliest_exchange(
+    rows: list[Measurement], gain: Callable[[Sequence[int]], float]
+) -> tuple[float, list[int], str]:
+    """The exchange of two pressures or labels, among frequencies of one rim, with most
+    ``gain``, a function of the order of the values: gain, order, question; "": there is none."""
+    return max(_exchanges(rows, gain), key=lambda each: each[0], default=(0.0, [], ""))
 
 
 def _exchanges(

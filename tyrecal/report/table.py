@@ -10,6 +10,7 @@ from rich import table as rich
 from rich.text import Text
 
 from ..simulate.modes.label import Label
+from ..studies.fit.verdict import DOES_NOT_FIT, MOST_CHI2_PER_DOF, FitReason, does_not_fit_words
 from ..studies.labels import Labels
 from ..studies.result import Cell, Column, Deviation, Table, state_words
 from ..tyre.usual import USUAL_MEASUREMENTS
@@ -40,25 +41,29 @@ def nearness(modes: Sequence[Mapping[str, Any]]) -> str:
 
 def fit_verdict(result: Mapping[str, Any]) -> list[str]:
     """What the content of fit.json amounts to, in sentences; doubts aside, see `fit_doubts`."""
-    ended = "Converged" if result["converged"] else "Ended"
     states = result.get("states", ())
     count = "one state" if len(states) == 1 else f"{len(states)} states"
     where = f"in {count}" if states else f"at {result['pressure_kPa']:g} kPa"
-    words = [f"{ended} {where}, {result['mass_kg']:.2f} kg."]
+    words = [f"{ended_words(result)} {where}, {result['mass_kg']:.2f} kg."]
     if result["modes"]:
         words.append(f"{nearness(result['modes'])}.")
-    freedom = sum(mode["multiplicity"] for mode in result["modes"])
-    freedom += len(result.get("footprint", ())) + ("mass" in result) - len(result["variables"])
-    if result["objective_unit"] == "sigma" and freedom > 0:
+    if (per_dof := result.get("chi2_per_dof")) is not None:
         words.append(
-            f"chi2 per degree of freedom is {result['objective_Hz'] ** 2 / freedom:.3g}: about 1"
-            " where the targets' sigmas explain what is left."
+            f"chi2 per degree of freedom is {per_dof:.3g}: about 1 if the stated uncertainty"
+            f" explains what is left, above {MOST_CHI2_PER_DOF:g} the model does not fit."
         )
     if len(result["starts"]) > 1:
         words.append(_starts(result))
     if labels := result.get("labels"):
         words += [f"{each[0].upper()}{each[1:]}." for each in Labels(**labels).sentences()]
     return words
+
+
+def ended_words(result: Mapping[str, Any]) -> str:
+    """How a fit ended: converged, and whether the model fits."""
+    if result.get("verdict") == DOES_NOT_FIT:
+        return "Does not fit"
+    return "Converged" if result["converged"] else "Ended"
 
 
 def _starts(result: Mapping[str, Any]) -> str:
@@ -133,8 +138,13 @@ def fit_doubts(result: Mapping[str, Any]) -> list[str]:
             f"a mode is hard to name (margin {result['label_margin']:.2f} of 1): two modes have"
             " met; look at their pictures"
         )
+    reason = FitReason.model_validate(result["reason"]) if result.get("reason") else None
+    if result.get("verdict") == DOES_NOT_FIT:
+        doubts.insert(0, does_not_fit_words(result["chi2_per_dof"], reason))
+    elif reason:
+        doubts.append(reason.sentence)
     far = [mode for mode in result["modes"] if abs(mode["deviation_percent"] or 0) > MAX_OFF]
-    if 2 * len(far) > len(result["modes"]):
+    if not reason and 2 * len(far) > len(result["modes"]):
         doubts.append(
             f"most modes are still more than {MAX_OFF:g} % off: are the targets in Hz, with the"
             " right labels, at this pressure?"

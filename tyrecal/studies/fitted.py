@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from ..errors import InputError
 from ..files import read_json
@@ -14,7 +14,7 @@ from ..tyre.case.identity import is_of_tyre, tyre_sha256
 from ..tyre.state import pressure_name
 from ..tyre.values import with_values
 
-NOT_CONVERGED = "not_converged"  # folder of a fit that may not take a better one's place
+NOT_CONVERGED: Final = "not_converged"  # folder of a fit that may not take a better one's place
 
 
 def read_fitted(path: Path, case: LoadedCase) -> tuple[dict[str, float], list[str]]:

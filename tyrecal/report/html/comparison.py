@@ -65,6 +65,7 @@ def _whole(fits: Sequence[FitResult | None]) -> Iterator[Row]:
     yield Row("objective", "initial", _cells(fits, lambda fit: _objective(fit, "initial_")))
     yield Row("objective", "fitted", _cells(fits, _objective))
     yield Row("worst mode", "", _cells(fits, _worst))
+    yield Row("verdict", "chi2 per degree of freedom", _cells(fits, _fit_verdict))
     yield Row("converged", "design points", _cells(fits, _end))
     yield Row("pressure", "", _cells(fits, _pressures))
     yield Row("mass", "tyre without rim", _cells(fits, lambda fit: f"{fit.mass_kg:.2f} kg"))
@@ -81,6 +82,11 @@ def _cells(contents: Sequence[Content | None], tell: Callable[[Content], str]) -
 
 def _objective(fit: FitResult, when: str = "") -> str:
     return f"{getattr(fit, f'{when}objective_Hz'):.2f} {UNITS.get(fit.objective_unit, '')}".strip()
+
+
+def _fit_verdict(fit: FitResult) -> str:
+    words = fit.verdict.replace("_", " ")
+    return words if fit.chi2_per_dof is None else f"{words}, {fit.chi2_per_dof:.3g}"
 
 
 def _end(fit: FitResult) -> str:

@@ -12,7 +12,7 @@ from ...studies.fit.result import FitResult
 from ...studies.modes import ModesResult
 from ...studies.result import Result
 from ...units import said
-from ..table import nearness
+from ..table import ended_words, nearness
 
 VERDICT_WORDS = {
     "named": "Named",
@@ -34,19 +34,28 @@ def fit_words(fit: FitResult) -> list[str]:
     """How the fit went, how near it came, where the variables went."""
     unit = fit.objective_unit if fit.objective_unit == "Hz" else "(deviations in sigmas)"
     equation = "equation (1), " if fit.objective_unit == "Hz" else ""
-    end = "converged" if fit.converged else "did not converge"
     moves = ", ".join(
         f"{name} from {v.initial:.4g} to {v.value:.4g}"
         + (f" ({100 * (v.value / v.initial - 1):+.0f} %)" if v.initial else "")
         for name, v in fit.variables.items()
     )
     words = [
+        f"{ended_words(fit.content())}{_chi2(fit)}.",
         f"The objective ({equation}{fit.method}) went from {fit.initial_objective_Hz:.2f} to"
-        f" {fit.objective_Hz:.2f} {unit} in {fit.evaluations} design points; the fit {end}."
+        f" {fit.objective_Hz:.2f} {unit} in {fit.evaluations} design points.",
     ]
+    if fit.reason:
+        words.append(sentence(f"likeliest reason: {fit.reason.sentence}"))
     if fit.modes:
         words.append(f"{nearness(fit.model_dump()['modes'])}.")
     return [*words, f"{moves}."]
+
+
+def _chi2(fit: FitResult) -> str:
+    """chi2 per degree of freedom, where it is known."""
+    if fit.chi2_per_dof is None:
+        return ""
+    return f" (chi2 per degree of freedom {fit.chi2_per_dof:.3g})"
 
 
 def modes_words(modes: ModesResult) -> list[str]:

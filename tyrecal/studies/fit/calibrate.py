@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from ...errors import InputError
+from ...measured.measurement import Measurement
 from ...simulate.evaluate.evaluator import Counts, Evaluator
 from ...simulate.evaluate.executor import executor, in_order
 from ...simulate.evaluate.failure import EvaluationFailed
@@ -18,9 +19,11 @@ from ...tyre.state import pressure_name
 from ..far_off import far_off
 from ..result import csv_text
 from . import gauss_newton, slsqp
+from .judge import measured_rows
 from .problem import Point, Problem
 from .result import FitResult, StartReport, fit_result
 from .search import AT_CROSSING, CONVERGED, Descend, is_converged, minimise
+from .verdict import FIT_VERDICT_WORDS
 
 Array = np.ndarray
 METHODS: dict[str, Descend] = {"slsqp": slsqp.descend, "gauss-newton": gauss_newton.descend}
@@ -45,7 +48,7 @@ class Fit:
 
     def __repr__(self) -> str:
         result, before, after = self.found, self.initial.objective, self.fitted.objective
-        ended = "converged" if result.converged else "not converged"
+        ended = FIT_VERDICT_WORDS[result.verdict]
         values = ", ".join(f"{name}={each.value:.4g}" for name, each in result.variables.items())
         return f"Fit({ended}, {before:.4g} to {after:.4g} {result.objective_unit}: {values})"
 
@@ -65,13 +68,15 @@ def calibrate(
     jobs: int = 1,
     notify: FitNotify | None = None,
     finished: Callable[[int, int], None] = lambda done, starts: None,
+    readings: Sequence[Measurement] = (),
 ) -> Fit:
     """Fit the case's free variables to its targets.
 
     starts: the case's own start and ``starts - 1`` drawn uniformly in the scaled box; drawn
     starts that cannot be evaluated are counted and replaced. jobs: processes for the drawn starts,
     and for the neighbours of a point of the first one, where the solver gives no slopes. notify is
-    told of every design here, finished of every start. Raises what `check` does; EvaluationFailed
+    told of every design here, finished of every start; readings: lines of the file that the targets
+    are from. Raises what `check` does; EvaluationFailed
     when the case's own start cannot be evaluated; InputError where a target is far off it.
     """
     problem = Problem(case, evaluator, fixed, notify, jobs)
@@ -79,7 +84,7 @@ def calibrate(
     initial = problem.evaluate(problem.start())
     if not np.isfinite(initial.objective):
         raise InputError("the targets' weights and standard deviations leave no finite objective")
-    _refuse_far_off(problem, initial)
+    _refuse_far_off(problem, initial, readings)
     reports = [_run(problem, problem.start(), method)]
     replaced = 0
     if starts > 1:
@@ -88,7 +93,7 @@ def calibrate(
     best = min(reports, key=lambda r: r.point.objective)
     history = _joined([r.history for r in reports])
     return Fit(
-        fit_result(problem, initial, best, reports, history, replaced, method),
+        fit_result(problem, initial, best, reports, history, replaced, method, readings),
         history,
         initial,
         best.point,
@@ -121,14 +126,13 @@ def check(problem: Problem) -> None:
             problem.evaluator.refuse_lacking(problem.evaluator.design.at(own))
 
 
-def _refuse_far_off(problem: Problem, initial: Point) -> None:
+def _refuse_far_off(problem: Problem, initial: Point, readings: Sequence[Measurement]) -> None:
     """Raises InputError for a target that is not even near the model's start."""
-    source = problem.case.case.targets.source
-    where = f"{problem.case.path}: targets" + (f" of {source}" if source else "")
-    for target in problem.targets:
+    rows = measured_rows(problem, readings)
+    for target, row in zip(problem.targets, rows, strict=False):
         mode = initial.states[target.state][target.label]
-        if words := far_off(str(target.label), target.frequency_Hz, mode.frequency_Hz):
-            raise InputError(f"{where}: {words}")
+        if words := far_off(row.name, target.frequency_Hz, mode.frequency_Hz):
+            raise InputError(f"{row.place}: {words}")
 
 
 def _run(problem: Problem, start: Array, method: str) -> StartReport:

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
+from ...measured.measurement import Measurement
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.modes.label import Label
 from ...tyre.footprint_quantities import FOOTPRINT_QUANTITIES
@@ -28,12 +29,14 @@ from ..result import (
     in_lines,
     state_words,
 )
+from .judge import judge
 from .problem import Point, Problem
 from .search import projected_gradient
 from .states import next_states, plain, state_reports
 from .targets import objective_unit
 from .total_error import TotalError, total_error
 from .uncertainty import FitUncertainty, uncertainty
+from .verdict import NOT_JUDGED, FitReason, FitVerdict
 
 MIN_STEP = 1e-6  # of a scaled variable, below which the fit did not move
 NEAR_BEST_HZ = 0.05  # of the objective: the fit could have ended there
@@ -171,6 +174,9 @@ class FitResult(Result):
     failed_evaluations: int
     converged: bool
     moved: bool
+    verdict: FitVerdict = NOT_JUDGED  # as a file of an earlier version is
+    chi2_per_dof: float | None = None  # by all that is uncertain; None: see `verdict`
+    reason: FitReason | None = None  # the likeliest, why values are off
     message: str
     projected_gradient_norm: float
     label_margin: float  # least clarity of a label
@@ -184,7 +190,6 @@ class FitResult(Result):
     next_states_error: str = ""  # why they could not be evaluated
     labels: Labels | None = None  # of frequencies that came without
     noise_Hz: float | None = None  # standard deviation of a frequency
-    chi2_per_dof: float | None = None  # by all that is uncertain; None: no scatter is stated
     total_error_unknown: str = ""  # why no variable has a total standard error
     correlations: dict[str, dict[str, float | None]]
     singular_values: list[float]
@@ -360,19 +365,24 @@ def fit_result(
     history: Sequence[dict[str, Any]],
     replaced: int,
     method: str,
+    readings: Sequence[Measurement] = (),
 ) -> FitResult:
     """The result of a fit whose ``best`` start is one of ``reports``; ``replaced``: drawn starts
-    that could not be evaluated."""
+    that could not be evaluated; ``readings``: lines of the file that the targets are from."""
     point = best.point
     objectives = [row["objective_Hz"] for row in history]
     known = uncertainty(problem, point)
-    total = _total_error(problem, point, known)
     names = [v.name for v in problem.variables]
     several = {t.state.unloaded for t in problem.measured} != {AS_THE_CASE}
     several = several or any(t.member for t in problem.road)
     others = _others(problem, initial, point, several)
     pressed = [each for each in others if each.quantity != "mass_kg"]
     mass = [each for each in others if each.quantity == "mass_kg"]
+    moved = float(abs(point.x - initial.x).max()) > MIN_STEP
+    total = _total_error(problem, point, known)
+    good = best.converged and moved
+    covariance = None if isinstance(total, str) else total.of_values
+    judged = judge(problem, point, known, covariance, good, readings)
     content = {
         "format": 1,
         "method": method,
@@ -390,22 +400,21 @@ def fit_result(
         "gradient_evaluations": sum(f is not None for f in objectives),
         "failed_evaluations": sum(f is None for f in objectives),
         "converged": best.converged,
-        "moved": float(abs(point.x - initial.x).max()) > MIN_STEP,
+        "moved": moved,
+        "verdict": judged.verdict,
+        "chi2_per_dof": judged.chi2_per_dof,
+        "reason": judged.reason,
         "message": best.message,
         "projected_gradient_norm": projected_gradient(problem, point),
         "label_margin": point.clarity,
-        "variables": _variables(problem, initial, point, known, total),
+        "variables": _variables(problem, initial, point, known, total, judged.chi2_per_dof),
         "fixed": dict(problem.fixed),
         "modes": _modes(problem, initial, point, several),
         **({"footprint": pressed} if pressed else {}),
         **({"mass": mass[0]} if mass else {}),
         **(_states(problem, point, known) if several else {}),
         "noise_Hz": known.noise_Hz,
-        **(
-            {"total_error_unknown": total}
-            if isinstance(total, str)
-            else {"chi2_per_dof": total.chi2_per_dof}
-        ),
+        **({"total_error_unknown": total} if isinstance(total, str) else {}),
         "correlations": {
             a: {b: _finite(known.correlations[i, j]) for j, b in enumerate(names)}
             for i, a in enumerate(names)
@@ -443,18 +452,19 @@ def _variables(
     point: Point,
     known: FitUncertainty,
     total: TotalError | str,
+    chi2_per_dof: float | None,
 ) -> dict[str, FittedVariable]:
     variables = {}
+    more = {} if isinstance(total, str) else total.by_variable(problem, point, chi2_per_dof)
     is_free = problem.is_free(point.x)
     for i, v in enumerate(problem.variables):
-        more = total.of_variable(i) if isinstance(total, TotalError) else {}
         variables[v.name] = FittedVariable(
             initial=initial.values[v.name],
             value=point.values[v.name],
             lower=problem.case.case.variables[v.name].lower,
             upper=problem.case.case.variables[v.name].upper,
             standard_error=known.standard_errors[i],
-            **more,
+            **more.get(v.name, {}),
             at_bound=not is_free[i],
         )
     return variables

@@ -133,10 +133,11 @@ def _others(problem: Problem) -> list[TyreState]:
         for p in pressures
         if USUAL["pressure_kPa"].holds(p) and TyreState(p, 0.0, rim) not in told
     ]
-    return [state.of(problem.case) for state in wanted if _possible(problem, state)]
+    return [state.of(problem.case) for state in wanted if is_possible(problem, state)]
 
 
-def _possible(problem: Problem, state: TyreState) -> bool:
+def is_possible(problem: Problem, state: TyreState) -> bool:
+    """Whether the case can be in a state, and the solver express it."""
     try:
         own = state.numbers(problem.case)
         design = problem.evaluator.design.at(own)

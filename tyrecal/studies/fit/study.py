@@ -48,6 +48,7 @@ class FitStudy:
         file = self.measured
         self.readings = readings_of(self._plain, file, labelled=False) if file else []
         self.needs_labels = any(each.is_unlabelled for each in self.readings)
+        self.used: Sequence[Measurement] = ()  # readings that are targets
         self.case, self.left_out = self._plain, list[str]()
         if not self.needs_labels:
             self._set_targets(self.readings)
@@ -56,6 +57,7 @@ class FitStudy:
     def _set_targets(self, readings: Sequence[Measurement]) -> None:
         """Those of the case, or ``readings`` of the measured file that have labels. Raises
         InputError."""
+        self.used = readings
         if self.measured:
             self.case, self.left_out = with_measured(self._plain, self.measured, readings)
         else:
@@ -118,7 +120,16 @@ class FitStudy:
 
         def calibrated() -> Fit:
             return calibrate(
-                self.case, self.evaluator, method, self.fixed, starts, seed, jobs, notify, finished
+                self.case,
+                self.evaluator,
+                method,
+                self.fixed,
+                starts,
+                seed,
+                jobs,
+                notify,
+                finished,
+                self.used,
             )
 
         fit = self._fit_with_labels(calibrated, jobs) if self.needs_labels else calibrated()

@@ -2,11 +2,9 @@
 
     cov x = B Q Sigma Q B^T,  B = (J^T J)^-1 J^T W^(1/2),  Q = diag(q)        (`uncertainty`)
     Sigma = Sigma_rep + Sigma_form + sum_k s_k^2 g_k g_k^T                    (diagnose/covariance)
-    chi^2 = r^T (S^-1 - S^-1 J_f (J_f^T S^-1 J_f)^-1 J_f^T S^-1) r,           S = Sigma
 
-q: fitted values, Sigma: covariance of ln q, as `diagnose` and `sample` have it, J_f: d ln q / d x of
-the variables that are at no bound, r: ln measured - ln fitted. chi^2 does not depend on the weights
-of the fit. If chi^2 exceeds its degrees of freedom, cov x is multiplied by their ratio.
+q: fitted values; Sigma: covariance of ln q, as `diagnose` and `sample` have it. If chi^2 by Sigma
+exceeds its degrees of freedom (`verdict`), cov x is multiplied by their ratio.
 """
 
 from __future__ import annotations
@@ -36,26 +34,31 @@ LEAST_SHARE = 0.01  # of the variance, below which a cause is not listed
 
 @dataclass(frozen=True)
 class TotalError:
-    """standard_errors: by variable, in its own unit, None if the data do not determine it; shares:
-    of their variance (v,) by cause, the largest first; chi2, freedom: see the module, None if no
-    target states its standard deviation."""
+    """of_values (n, n): covariance of ln q of the targets that count; of_coordinates (v, v): of the
+    fitted coordinates, not scaled by chi^2; shares: of their variances (v,) by cause, the largest
+    first; is_determined (v,): whether the data determine a variable."""
 
-    standard_errors: list[float | None]
+    of_values: Array
+    of_coordinates: Array
     shares: dict[str, Array]
-    chi2: float | None
-    freedom: int
+    is_determined: Array
 
-    @property
-    def chi2_per_dof(self) -> float | None:
-        """chi^2 over its degrees of freedom."""
-        return None if self.chi2 is None else self.chi2 / self.freedom
-
-    def of_variable(self, place: int) -> dict[str, Any]:
-        """The fields of a variable in fit.json."""
-        shares = {cause: float(share[place]) for cause, share in self.shares.items()}
+    def by_variable(
+        self, problem: Problem, point: Point, chi2_per_dof: float | None
+    ) -> dict[str, dict[str, Any]]:
+        """What fit.json says of the total by variable; standard errors in each one's unit."""
+        spread = self.of_coordinates * max(1.0, chi2_per_dof or 0.0)
+        errors = standard_errors(problem, point, spread, self.is_determined)
         return {
-            "standard_error_total": self.standard_errors[place],
-            "variance_by_cause": {k: v for k, v in shares.items() if v >= LEAST_SHARE},
+            v.name: {
+                "standard_error_total": errors[i],
+                "variance_by_cause": {
+                    cause: float(share[i])
+                    for cause, share in self.shares.items()
+                    if share[i] >= LEAST_SHARE
+                },
+            }
+            for i, v in enumerate(problem.variables)
         }
 
 
@@ -67,7 +70,7 @@ def total_error(problem: Problem, point: Point, scatter: FitUncertainty) -> Tota
     reason if targets are on the road or their standard deviation is unknown.
     """
     if problem.road:
-        raise ValueError("the sensitivities of targets on the road are not known to all constants")
+        raise ValueError("it is not computed for targets on the road")
     counts = problem.scale > 0
     sigma, J = scatter.sigma[counts], point.jacobian[counts]
     if not np.isfinite(sigma).all():
@@ -81,17 +84,10 @@ def total_error(problem: Problem, point: Point, scatter: FitUncertainty) -> Tota
     none = np.full(len(rows), np.nan)
     observed = Observations(rows, np.log(wanted), sigma / wanted, 0.0, none, none)
     whole = covariance(observed, by_constants, laws)
-
-    response = fit_response(J, problem.scale[counts])[0] * fitted  # d x / d ln q
-    free = problem.is_free(point.x)
-    chi2, freedom = None, len(rows) - int(free.sum())
-    if all(t.sigma_Hz if isinstance(t, Target) else t.sigma for t in measured) and freedom > 0:
-        slopes = (J / (problem.scale[counts] * fitted)[:, None])[:, free]
-        chi2 = _chi2(np.log(wanted / fitted), slopes, whole)
-    spread = response @ whole @ response.T * max(1.0, (chi2 or 0.0) / max(freedom, 1))
-    errors = standard_errors(problem, point, spread, scatter.is_determined)
+    response, is_determined = fit_response(J, problem.scale[counts])
+    response = response * fitted  # d x / d ln q
     parts = _parts(response, sigma / wanted, model_form(rows, laws), by_constants, known)
-    return TotalError(errors, parts, chi2, freedom)
+    return TotalError(whole, response @ whole @ response.T, parts, is_determined)
 
 
 def _row(case: LoadedCase, target: object) -> Observable:
@@ -116,14 +112,6 @@ def _constants(
     assert answer.constants is not None
     places = [distinct.index(row.row) for row in rows]
     return answer.constants[places], model.material_laws
-
-
-def _chi2(r: Array, J: Array, sigma: Array) -> float:
-    """chi^2 of residuals r (n,) of ln q that the variables J (n, v) cannot absorb."""
-    white = np.linalg.inv(np.linalg.cholesky(sigma))
-    left = white @ r
-    absorbed, *_ = np.linalg.lstsq(white @ J, left, rcond=None)
-    return float(((left - white @ J @ absorbed) ** 2).sum())
 
 
 def _parts(

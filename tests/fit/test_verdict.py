@@ -1,0 +1,159 @@
+"""The verdict of a fit and the likeliest reason, on small linear models with a known slip."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tyrecal.measured.measurement import Measurement
+from tyrecal.simulate.modes.label import Label
+from tyrecal.studies.fit.verdict import (
+    Remainder,
+    Shift,
+    fit_verdict,
+    likeliest_reason,
+    likely_value,
+)
+
+pytestmark = pytest.mark.numbers
+
+Array = np.ndarray
+SIGMA = 0.003
+LABELS = [Label(0, 0, "axial"), Label(0, 0, "torsional")]
+LABELS += [Label(c, m) for c in (1, 2, 3, 4) for m in (0, 1)]
+HERTZ = np.array([31.7, 35.0, 58.5, 37.8, 79.5, 66.1, 97.6, 102.7, 115.9, 131.2])
+J = np.array(  # by two variables, each in a line
+    [
+        [0.10, 0.30, 0.20, 0.15, 0.30, 0.10, 0.25, 0.05, 0.20, 0.04],
+        [0.50, 0.20, 0.30, 0.10, 0.10, 0.20, 0.05, 0.25, 0.02, 0.30],
+    ]
+).T
+PRESSURES = (200.0, 250.0)
+
+
+def remainder(values: Array, model: Array, J: Array, pressures: Sequence[float]) -> Remainder:
+    """All modes at each pressure in turn, a line of a file each."""
+    rows = [
+        Measurement("frequency_Hz", label, "", p, 0.0, float(f), SIGMA * f, "", f"t.csv, line {k}")
+        for k, (label, p, f) in enumerate(
+            zip(LABELS * len(pressures), np.repeat(pressures, len(LABELS)), values, strict=True), 2
+        )
+    ]
+    return Remainder(rows, np.log(values / model), np.eye(len(rows)) * SIGMA**2, J)
+
+
+def two_pressures(values: Array) -> Remainder:
+    """The model is right but for its two variables."""
+    return remainder(
+        values, model_Hz() * np.exp(np.vstack([J, J]) @ [0.02, -0.01]), np.vstack([J, J]), PRESSURES
+    )
+
+
+def model_Hz() -> Array:
+    rise = 0.3 + 0.1 * np.sin(np.arange(len(LABELS)))
+    return np.concatenate([HERTZ * (p / 200) ** rise for p in PRESSURES])
+
+
+def noisy(seed: int = 1) -> Array:
+    noise = np.random.default_rng(seed).standard_normal(2 * len(LABELS))
+    return model_Hz() * np.exp(SIGMA * noise)
+
+
+def test_chi2_is_that_of_the_best_design() -> None:
+    """Whatever design the residuals are about; one value less for each variable."""
+    left = two_pressures(noisy())
+    d, both = np.log(noisy() / model_Hz()), np.vstack([J, J])
+    best = d - both @ np.linalg.lstsq(both, d, None)[0]
+    assert left.freedom == 18
+    assert left.chi2_per_dof == pytest.approx(best @ best / SIGMA**2 / 18)
+    assert likeliest_reason(left) is None
+    assert replace(left, is_stated=False).chi2_per_dof is None
+    alone = Remainder(left.rows[:2], left.deviation[:2], np.eye(2), J[:2])
+    assert alone.chi2_per_dof is None and likeliest_reason(alone) is None
+
+
+@pytest.mark.parametrize(
+    ("good", "per_dof", "verdict"),
+    [
+        (True, 5.0, "fits"),
+        (True, 5.01, "does_not_fit"),
+        (True, None, "not_judged"),
+        (False, 5.01, "not_converged"),
+    ],
+)
+def test_the_verdict(good: bool, per_dof: float | None, verdict: str) -> None:
+    assert fit_verdict(good, per_dof) == verdict
+
+
+@pytest.mark.parametrize(("i", "value"), [(6, 79.6), (6, 99.7), (0, 37.1), (3, 78.3), (16, 94.3)])
+def test_a_slip_is_named_with_its_line_and_what_would_be_left(i: int, value: float) -> None:
+    """The file's line, the value, and chi2 per degree of freedom of a fit without the value."""
+    values = noisy()
+    values[i] = value
+    reason = likeliest_reason(two_pressures(values))
+    assert reason and reason.kind == "value"
+    assert reason.words.startswith(f"t.csv, line {i + 2}: {LABELS[i % 10].said} is {value:g} Hz at")
+    rest, both = np.arange(20) != i, np.vstack([J, J])
+    d = np.log(values / model_Hz())[rest]
+    best = d - both[rest] @ np.linalg.lstsq(both[rest], d, None)[0]
+    assert reason.chi2_per_dof == pytest.approx(best @ best / SIGMA**2 / 17)
+    unstated = replace(two_pressures(values), is_stated=False)
+    again = likeliest_reason(unstated)
+    assert again and again.words == reason.words and again.chi2_per_dof is None
+
+
+@pytest.mark.parametrize(
+    ("value", "model", "meant"),
+    [
+        (317.0, 31.9, 31.7),
+        (3.17, 31.9, 31.7),
+        (79.6, 97.0, 97.6),
+        (97.6, 97.0, None),
+        (93.4, 97.0, None),
+        (100.0, 10.1, 10.0),
+    ],
+)
+def test_the_likely_value(value: float, model: float, meant: float | None) -> None:
+    found = likely_value(value, model, 0.015)
+    assert found == (meant if meant is None else pytest.approx(meant))
+
+
+def test_exchanged_pressures_and_labels_are_named() -> None:
+    values = noisy()
+    pressures = likeliest_reason(two_pressures(np.roll(values, 10)))
+    assert pressures and pressures.kind == "exchanged"
+    assert "are 200 and 250 kPa exchanged?" in pressures.words
+    swapped = values.copy()
+    swapped[[2, 5]] = values[[5, 2]]
+    labels = likeliest_reason(two_pressures(swapped))
+    assert labels and labels.kind == "exchanged"
+    assert labels.words.startswith("t.csv, line 4, t.csv, line 7: ")
+    assert labels.words.endswith("are the two labels exchanged?")
+    assert labels.chi2_per_dof is not None and labels.chi2_per_dof < 2
+
+
+def test_another_state_is_named_where_it_takes_half_of_chi2_away() -> None:
+    """A shift of unknown amount has its likeliest one, a known shift is taken as it is."""
+    steep, values = np.r_[np.zeros(10), 0.3 + 0.1 * np.cos(np.arange(10))], noisy()
+    words = lambda a: f"{250 * np.exp(a[0]):.0f} kPa?"
+    shift = Shift("pressure", steep[:, None], np.zeros(20), words)
+    left = two_pressures(values * np.exp(-0.15 * steep))
+    reason = likeliest_reason(left, [shift])
+    assert reason and reason.kind == "pressure"
+    assert float(reason.words.split()[0]) == pytest.approx(250 * np.exp(-0.15), abs=3)
+    known = Shift("rim", np.empty((20, 0)), -0.15 * steep, lambda _: "rim?")
+    other = likeliest_reason(left, [known])
+    assert other and other.words == "rim?"
+    assert other.chi2_per_dof == pytest.approx(two_pressures(values).chi2_per_dof)
+    assert likeliest_reason(two_pressures(values), [shift, known]) is None
+
+
+def test_what_the_model_cannot_follow_has_no_reason() -> None:
+    """All modes off by more than their scatter, none by more than the others."""
+    signs = np.resize([1, -1, 1, -1, -1, 1], 20)
+    left = two_pressures(model_Hz() * np.exp(0.012 * signs))
+    assert left.chi2_per_dof is not None and left.chi2_per_dof > 5
+    assert likeliest_reason(left) is None

@@ -1,0 +1,115 @@
+"""A finished fit judged: its verdict, chi2 per degree of freedom, and the likeliest reason."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...measured.measurement import Measurement
+from ...simulate.evaluate.failure import DeckRefused
+from ...simulate.modes.label import Label
+from .alternatives import other_states
+from .problem import Point, Problem
+from .targets import Target, ValueTarget
+from .uncertainty import FitUncertainty
+from .verdict import DOES_NOT_FIT, FitReason, FitVerdict, Remainder, fit_verdict, likeliest_reason
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """See `verdict`; chi2_per_dof: None if nothing states a scatter, or the covariance of the model
+    is not known."""
+
+    verdict: FitVerdict
+    chi2_per_dof: float | None
+    reason: FitReason | None
+
+
+def judge(
+    problem: Problem,
+    point: Point,
+    known: FitUncertainty,
+    covariance: Array | None,
+    is_good: bool,
+    readings: Sequence[Measurement] = (),
+) -> Judgement:
+    """The fit that ended at ``point``.
+
+    covariance: of ln of all values that count (`TotalError`), None if that is not known; is_good:
+    it converged and moved; readings: lines of the file that its targets are from. Other states are
+    evaluated if the model does not fit.
+    """
+    rows, keep, is_stated = measured_rows(problem, readings), problem.scale > 0, False
+    stated = np.array([bool(_sigma(t)) for t in problem.measured])
+    counted = keep
+    if (keep & stated).any():
+        keep, is_stated = keep & stated, covariance is not None
+    if not (np.isfinite(known.sigma[keep]) & (known.sigma[keep] > 0)).all():
+        return Judgement(fit_verdict(is_good, None), None, None)
+    values = np.array([row.value for row in rows])[keep]
+    model = values + point.residuals[keep] / problem.scale[keep]
+    slopes = point.jacobian[keep][:, problem.is_free(point.x)] / problem.scale[keep][:, None] / model[:, None]
+    if covariance is None:
+        of_values = np.diag((known.sigma[keep] / values) ** 2)
+    else:
+        of_values = covariance[np.ix_(keep[counted], keep[counted])]
+    left = Remainder(
+        [row for row, kept in zip(rows, keep, strict=True) if kept],
+        np.log(values / model),
+        of_values,
+        slopes,
+        is_stated,
+    )
+    verdict = fit_verdict(is_good, left.chi2_per_dof)
+    shifts = []
+    if verdict == DOES_NOT_FIT:
+        try:
+            shifts = other_states(problem, point, keep)
+        except DeckRefused:
+            shifts = []
+    return Judgement(verdict, left.chi2_per_dof, likeliest_reason(left, shifts))
+
+
+def measured_rows(problem: Problem, readings: Sequence[Measurement] = ()) -> list[Measurement]:
+    """The targets (n,) as they were measured, with their states, and file and line of the first
+    reading of each; without readings the case file."""
+    case, places = problem.case, dict[tuple[object, ...], str]()
+    for each in readings:
+        key = (each.quantity, each.label, each.load_N and each.member, each.state.of(case))
+        places.setdefault(key, each.place)
+    rows = []
+    for target in problem.measured:
+        quantity = "frequency_Hz" if isinstance(target, Target) else target.quantity
+        label, member = _label(target)
+        state = target.state.told(case)
+        is_mass = quantity == "mass_kg"
+        key = (quantity, label, state.load_N and member, target.state)
+        rows.append(
+            Measurement(
+                quantity,
+                label,
+                member,
+                0.0 if is_mass else state.pressure_kPa or 0.0,
+                state.load_N,
+                target.frequency_Hz if isinstance(target, Target) else target.value,
+                _sigma(target) or np.nan,
+                place=places.get(key, str(case.path)),
+                rim=None if is_mass else state.rim,
+            )
+        )
+    return rows
+
+
+def _sigma(target: Target | ValueTarget) -> float | None:
+    return target.sigma_Hz if isinstance(target, Target) else target.sigma
+
+
+def _label(target: Target | ValueTarget) -> tuple[Label | None, str]:
+    """The label of a frequency, and its symmetry under load."""
+    if isinstance(target, Target):
+        return target.label, ""
+    return (target.member.label, target.member.symmetry) if target.member else (None, "")
