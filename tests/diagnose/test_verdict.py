@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import chi2
 
 from tyrecal.studies.diagnose.evidence import Fitted, Hypothesis
-from tyrecal.studies.diagnose.verdict import decide
+from tyrecal.studies.diagnose.verdict import decide, no_gap_words
 
 pytestmark = pytest.mark.numbers
 
@@ -80,3 +80,9 @@ def test_no_more_data_than_variables_tell_nothing() -> None:
         assert (one.kind, two.kind) == ("undecided", "named") and "so few data" in one.words
     empty = decide([], {"none": 0.9, "outside": 0.1}, 20, 3)
     assert empty.kind == "no_gap" and empty.check == 1.0
+
+
+def test_no_gap_is_said_only_of_a_likely_absence() -> None:
+    """Below 0.9 no effect is excluded, and the probability stands in the words."""
+    assert no_gap_words(0.9) == "no gap is seen"
+    assert no_gap_words(0.33) == "not seen, not excluded: no effect 0.33"

@@ -12,7 +12,7 @@ from ..studies.diagnose.gap import OWN_RIM
 from ..studies.diagnose.several import PRIOR_NONE, present
 from ..studies.diagnose.study import DiagnosedCase
 from ..studies.diagnose.under_load import LoadedRow
-from ..studies.diagnose.verdict import NAMED, NO_GAP, UNDECIDED
+from ..studies.diagnose.verdict import NAMED, NO_GAP, UNDECIDED, no_gap_words
 from ..tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ..units import in_engineers_units, said
 from .table import map_resolution
@@ -83,7 +83,9 @@ def _headline(study: DiagnosedCase) -> str:
         return f"Named: {_title(study, v.key)}" + (f", and perhaps {others}" if others else "")
     if v.kind == UNDECIDED:
         return "Undecided"
-    return "No gap is seen" if v.kind == NO_GAP else "Outside the catalogue"
+    if v.kind == NO_GAP:
+        return no_gap_words(study.diagnosis.probabilities[NONE]).capitalize()
+    return "Outside the catalogue"
 
 
 def _answer(study: DiagnosedCase) -> Iterator[str]:
@@ -157,6 +159,11 @@ def _robust(d: Diagnosis) -> str:
     words = {NO_GAP: "no effect", OUTSIDE: "something outside"}
     of = words.get(d.verdict.kind, f"`{key}`")
     between = f"the probability of {of} lies between {found.low:.2f} and {found.high:.2f}"
+    if found.robust and d.exchanged:
+        return (
+            "The verdict rests on labels that were exchanged here: correct the file before it is"
+            f" used; {between}."
+        )
     if found.robust:
         labels = " and under every likely labeling," if len(d.readings) > 1 else ""
         return (
@@ -327,7 +334,9 @@ def _which(study: DiagnosedCase) -> Iterator[str]:
             f"The case has {', '.join(held)} already: sizes count that in, the smallest that would"
             " be seen is a change from it."
         )
-    blind = [id for id, e in d.separability.smallest.items() if e is None]
+    likeliest = set((d.verdict.key or d.verdict.best or "").split("+"))
+    unseen = [id for id, e in d.separability.smallest.items() if e is None]
+    blind = [id for id in unseen if id not in likeliest]
     sizes = [
         f"`{id}` {in_engineers_units(abs(e), d.problem.spans[id].unit, 2)}"
         for id, e in d.separability.smallest.items()
@@ -338,6 +347,12 @@ def _which(study: DiagnosedCase) -> Iterator[str]:
     if blind:
         names = ", ".join(f"`{id}`" for id in blind)
         yield f"Not to be seen with these data at any size in its range: {names}."
+    for id in unseen:
+        if id in likeliest:
+            yield (
+                f"`{id}` is the likeliest effect, but these data cannot show it (lambda below 10 at"
+                " every size in its range): its probability is mostly that of the assumptions."
+            )
 
 
 def _ranged(q: Mapping[str, Any]) -> str:

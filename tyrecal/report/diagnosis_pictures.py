@@ -15,6 +15,7 @@ from ..studies.diagnose.evidence import NONE, OUTSIDE
 from ..studies.diagnose.gap import family
 from ..studies.diagnose.observations import Observable
 from ..studies.diagnose.several import before
+from ..studies.diagnose.verdict import no_gap_words
 from .figure import COLOURS, GREY, headline, in_house_style, new_figure
 from .section import draw_section_map
 from .shape_data import DiagnosisSection
@@ -26,7 +27,6 @@ MIN_SHOWN_PROBABILITY = 0.005  # of one that is shown
 PROBABILITY_TITLES = {
     "named": "What explains the gap",
     "undecided": "Undecided: how likely each explanation is",
-    "no_gap": "No gap is seen: how likely each effect is",
     "outside": "Outside the catalogue: how likely each explanation is",
 }
 MAX_LETTERS = 24  # letters of a bar's name in a line
@@ -128,7 +128,9 @@ def draw_probabilities(d: Diagnosis) -> Figure:
     axes.set_yticks(place, [fill(_short(d, h.key), 2 * MAX_LETTERS) for h in order])
     axes.set_xlim(0, max(1.0, 1.1 * max(p)))
     axes.set_xlabel("probability")
-    axes.set_title(PROBABILITY_TITLES[d.verdict.kind], loc="left")
+    title = PROBABILITY_TITLES.get(d.verdict.kind)
+    none = no_gap_words(d.probabilities[NONE]).capitalize()
+    axes.set_title(title or f"{none}; how likely each effect is", loc="left")
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower right", frameon=False)
     return figure
 

@@ -11,7 +11,7 @@ from ...studies.diagnose.result import DiagnosisResult
 from ...studies.fit.result import ROAD_QUANTITIES, FitResult, FittedMode
 from ..table import CLOSE, FAR, MINUS
 from .results import Results
-from .summary import VERDICT_WORDS
+from .summary import verdict_words
 
 Content = TypeVar("Content")
 NOTHING, NB = "–", "\N{NO-BREAK SPACE}"
@@ -72,7 +72,7 @@ def _whole(fits: Sequence[FitResult | None]) -> Iterator[Row]:
 
 
 def _verdicts(diagnoses: Sequence[DiagnosisResult | None]) -> Iterator[Row]:
-    yield Row("verdict", "", _cells(diagnoses, lambda d: VERDICT_WORDS[d.verdict]))
+    yield Row("verdict", "", _cells(diagnoses, verdict_words))
     yield Row("likeliest", "probability", _cells(diagnoses, _likeliest))
 
 

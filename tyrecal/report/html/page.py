@@ -39,7 +39,7 @@ from .comparison import comparison
 from .markdown import html
 from .results import Results, read_results
 from .shapes import packed
-from .summary import VERDICT_WORDS, sentence, summary
+from .summary import sentence, summary, verdict_words
 
 MAX_PAGE_BYTES = 5_000_000
 MARK = '<meta name="generator" content="tyrecal report">'
@@ -259,7 +259,7 @@ def _diagnosis(found: Results, draw: Draw) -> dict[str, Any]:
     percent = np.array([[each.percent, each.sigma_percent] for _, each in known]).T / 100
     return {
         "of": d,
-        "verdict": VERDICT_WORDS[d.verdict],
+        "verdict": verdict_words(d),
         "likeliest": [
             (key, p)
             for key, p in list(d.probabilities.items())[:MAX_SHOWN]

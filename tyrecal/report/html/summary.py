@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from ...studies.diagnose.evidence import NONE
 from ...studies.diagnose.result import DiagnosisResult
 from ...studies.diagnose.several import present
+from ...studies.diagnose.verdict import no_gap_words
 from ...studies.effects import EffectResult, Effects
 from ...studies.fit.result import FitResult
 from ...studies.modes import ModesResult
@@ -14,12 +16,7 @@ from ...studies.result import Result
 from ...units import said
 from ..table import ended_words, nearness
 
-VERDICT_WORDS = {
-    "named": "Named",
-    "undecided": "Undecided",
-    "no_gap": "No gap is seen",
-    "outside": "Outside the catalogue",
-}
+VERDICT_WORDS = {"named": "Named", "undecided": "Undecided", "outside": "Outside the catalogue"}
 
 
 def summary(found: Result) -> list[str]:
@@ -74,13 +71,15 @@ def modes_words(modes: ModesResult) -> list[str]:
 def diagnosis_words(found: DiagnosisResult) -> list[str]:
     """Verdict, size, how far the error shrinks, what next."""
     gap = found.verdict != "no_gap"
-    words = [sentence(VERDICT_WORDS[found.verdict] + (f": {found.words}" if gap else ""))]
+    words = [sentence(verdict_words(found) + (f": {found.words}" if gap else ""))]
     if found.effect:
         words[0] += f" Probability {present(found.probabilities, found.effect.split('+')):.2f}."
     if found.robust:
         least, most = found.robust.range
         words.append(
-            f"Robust: {least:.2f} to {most:.2f} with other priors and standard deviations."
+            "It rests on labels that were exchanged: correct the file first."
+            if found.exchanged_labels
+            else f"Robust: {least:.2f} to {most:.2f} with other priors and standard deviations."
             if found.robust.robust
             else sentence(f"It hangs on {found.robust.hangs_on[0]}")
         )
@@ -99,6 +98,13 @@ def diagnosis_words(found: DiagnosisResult) -> list[str]:
     if found.next_measurements:
         words.append(f"Next: {found.next_measurements[0].what}.")
     return words
+
+
+def verdict_words(found: DiagnosisResult) -> str:
+    """The verdict of a diagnosis in a few words."""
+    if found.verdict == "no_gap":
+        return no_gap_words(found.probabilities[NONE]).capitalize()
+    return VERDICT_WORDS[found.verdict]
 
 
 def effect_words(effect: EffectResult) -> str:

@@ -85,9 +85,14 @@ def decide(
         words = f"there is a gap; {nearest}; likelier is that {by_key[OUTSIDE].words}"
         return verdict(OUTSIDE, words)
     if order[0] == NONE and none > before(hypotheses).get(NONE, PRIOR_NONE):
-        return verdict(NO_GAP, "no gap is seen")
+        return verdict(NO_GAP, no_gap_words(none))
     gap = "there is a gap" if none < RULED_OUT else "there may be a gap"
     return verdict(UNDECIDED, f"{gap}, its cause is undecided")
+
+
+def no_gap_words(none: float) -> str:
+    """That no gap is seen, by the probability of no effect: below `SET` none is excluded either."""
+    return "no gap is seen" if none >= SET else f"not seen, not excluded: no effect {none:.2f}"
 
 
 def holds(key: str, ids: str) -> bool:
