@@ -52,7 +52,11 @@ def judge(
         return Judgement(fit_verdict(is_good, None), None, None)
     values = np.array([row.value for row in rows])[keep]
     model = values + point.residuals[keep] / problem.scale[keep]
-    slopes = point.jacobian[keep][:, problem.is_free(point.x)] / problem.scale[keep][:, None] / model[:, None]
+    slopes = (
+        point.jacobian[keep][:, problem.is_free(point.x)]
+        / problem.scale[keep][:, None]
+        / model[:, None]
+    )
     if covariance is None:
         of_values = np.diag((known.sigma[keep] / values) ** 2)
     else:

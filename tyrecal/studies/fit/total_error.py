@@ -117,7 +117,7 @@ def _constants(
 def _parts(
     response: Array, scatter: Array, form: Array, by_constants: Array, known: Sequence[Source]
 ) -> dict[str, Array]:
-    """Shares (v,) of the variance by cause: the section as one, every other constant by its name."""
+    """Shares (v,) of the variance by cause: the section is one, each constant its own."""
     moved = (response @ by_constants) ** 2
     parts = {
         OF_MEASUREMENT: response**2 @ scatter**2,

@@ -1,5 +1,6 @@
-"""What the scatter of the data leaves open: standard errors, correlations and singular values at the
-optimum. What else is uncertain is in `total_error`."""
+"""Standard errors, correlations and singular values at the optimum, by the scatter of the data.
+
+`total_error` adds what else is uncertain."""
 
 from __future__ import annotations
 
