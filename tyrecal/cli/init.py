@@ -59,6 +59,13 @@ def _length(flag: str, text: str, unit: str = "mm") -> Any:
     type=OneOf(["m", "mm"]),
     help="Of the deck: m, kg, s, Pa, or mm, t, s, MPa (default: told by its densities).",
 )
+@option(
+    "--set",
+    "assigned",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Number of a mark {{ NAME }} of the deck, in the deck's units; repeatable.",
+)
 @_length("crown", "Thickness at the crown, grooves spread over the tread.")
 @_length("sidewall", "Thickness at the widest point.")
 @_length("bead", "Thickness at the rim's flange.")
@@ -87,6 +94,7 @@ def command(
     deck_files: tuple[Path, ...],
     crown_set: str | None,
     units: Literal["m", "mm"] | None,
+    assigned: tuple[str, ...],
     crown_mm: float | None,
     sidewall_mm: float | None,
     bead_mm: float | None,
@@ -110,6 +118,7 @@ def command(
     tyrecal init P235/75R17 --section my_stations.csv --output my_tyre.yaml
     tyrecal init 205/60R15 --section my_outline.csv --belt-width-mm 160 --output my_outline.yaml
     tyrecal init --deck my_tyre.inp
+    tyrecal init --deck my_marked_tyre.inp --set A_belt=0.21
     tyrecal init --deck inflate.inp --deck modes.inp --crown-set TREAD_LINE
     """
     from ..tyre.case.new_case import from_file, from_size
@@ -123,8 +132,9 @@ def command(
         raise click.UsageError(
             "give a SIZE, as in 'tyrecal init 205/60R15', --section FILE or --deck FILE.inp"
         )
-    if (units or crown_set) and not deck_files:
-        raise click.UsageError(f"--{'units' if units else 'crown-set'} goes with --deck")
+    for flag, of_decks in (("units", units), ("crown-set", crown_set), ("set", assigned)):
+        if of_decks and not deck_files:
+            raise click.UsageError(f"--{flag} goes with --deck")
     usual = {**GAUGES, "pressure_kPa": USUAL["pressure_kPa"]}
     stated = click.get_current_context().params
     for name, each in [] if allow_unusual else usual.items():
@@ -139,11 +149,15 @@ def command(
         read = read_own_deck(deck_files[0], units)
         if len(deck_files) > 1 or stands_in_space(read):
             decks = read_own_decks(deck_files, read.units, crown_set or "CROWN")
-            _from_decks(decks, words, pressure_kPa, output, force, terminal)
+            numbers = _numbers_of_marks(decks, assigned)
+            _from_decks(decks, numbers, words, pressure_kPa, output, force, terminal)
         elif crown_set:
             raise click.UsageError("--crown-set is of decks in three dimensions")
         else:
-            _from_deck(read, words, pressure_kPa, output, pictures, force, allow_unusual, terminal)
+            numbers = _numbers_of_marks(read, assigned)
+            _from_deck(
+                read, numbers, words, pressure_kPa, output, pictures, force, allow_unusual, terminal
+            )
         return 0
     given = {"crown": crown_mm, "sidewall": sidewall_mm, "bead": bead_mm, "belt": belt_width_mm}
     lengths = {key: 1e-3 * value for key, value in given.items() if value is not None}
@@ -223,8 +237,30 @@ def lengths_given(stated: dict[str, Any]) -> bool:
     return any(stated[name] is not None for name in stated if name.endswith(("_mm", "_in")))
 
 
+def _numbers_of_marks(deck: OwnDeck | OwnDecks, assigned: tuple[str, ...]) -> dict[str, float]:
+    """Numbers of marks by --set. Raises InputError, UsageError for those that are missing."""
+    from ..tyre.case import parse_assignment
+    from ..tyre.own_deck.own_decks import PRESSURE_MARK, OwnDecks
+
+    try:
+        given = dict(parse_assignment(text) for text in assigned)
+    except ValueError as error:
+        raise click.UsageError(f"--set: {error}") from None
+    for name in given.keys() - deck.marks.keys():
+        known = ", ".join(deck.marks) or "none"
+        raise click.UsageError(f"--set {name}: the deck has no mark of this name, but {known}")
+    pressure = {PRESSURE_MARK} if isinstance(deck, OwnDecks) else set()
+    lacking = [name for name in deck.marks if name not in {*given, *pressure}]
+    if lacking:
+        places = ", ".join(f"{{{{ {name} }}}} ({deck.marks[name].place})" for name in lacking)
+        example = " ".join(f"--set {name}=VALUE" for name in lacking)
+        raise InputError(f"marks without a number: {places}; give each: {example}")
+    return given
+
+
 def _from_deck(
     deck: OwnDeck,
+    numbers: dict[str, float],
     size: str,
     pressure_kPa: float | None,
     output: Path | None,
@@ -241,16 +277,10 @@ def _from_deck(
     from ..tyre.own_deck.found import contents, words
     from ..tyre.usual_deck import deck_slips
 
-    if deck.marks:
-        name, block = next(iter(deck.marks.items()))
-        raise block.refused(
-            f"the mark {{{{ {name} }}}} has no number yet: make the case from the deck with plain"
-            " numbers, then put marks in their place"
-        )
-    flat = deck.flat({})
-    if not allow_unusual and (slips := list(deck_slips(deck, deck.numbers))):
+    flat = deck.flat(numbers)
+    if not allow_unusual and (slips := list(deck_slips(deck, {**deck.numbers, **numbers}))):
         raise InputError("\n".join(map(str, slips)))
-    text = own_case(deck, flat, size, pressure_kPa)
+    text = own_case(deck, flat, size, pressure_kPa, numbers)
     target, picture = _beside(deck.path, output, pictures, force)
     mass_kg = trial(flat)
     with whole(target) as partial:
@@ -267,6 +297,7 @@ def _from_deck(
 
 def _from_decks(
     decks: OwnDecks,
+    numbers: dict[str, float],
     size: str,
     pressure_kPa: float | None,
     output: Path | None,
@@ -279,7 +310,7 @@ def _from_decks(
     from ..tyre.load import load_case
     from .deck import known_of_decks
 
-    text = own_decks_case(decks, size, pressure_kPa)
+    text = own_decks_case(decks, size, pressure_kPa, numbers)
     target, _ = _beside(decks.path, output, False, force)
     with whole(target) as partial:
         partial.write_text(text, encoding="utf-8")

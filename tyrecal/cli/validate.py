@@ -31,6 +31,7 @@ def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
     """
     from ..measured.load import judged
     from ..tyre.case import overruled
+    from ..tyre.case.case_text import flow_lines
     from ..tyre.case.slack_hint import slack_cord_hint
 
     loaded, mistakes = judged(case, allow_unusual)
@@ -55,6 +56,8 @@ def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
     for sentence in overruled(loaded):
         terminal.warn(sentence)
     terminal.say(f"{case}: no mistakes")
+    if loaded.assumed:
+        terminal.note(f"lines that it leaves out:\n{flow_lines(loaded.assumed)}")
     if not (loaded.case.targets.weights or loaded.measured):
         terminal.note("it has no targets: 'tyrecal fit' needs some, or --measured FILE")
     if "road" in loaded.file_data and (hint := slack_cord_hint(loaded)):

@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from .case.checks import folds, problems
-from .case.deck_file import read_deck_of, section_of
+from .case.deck_file import completed, lines_of_the_deck, read_deck_of, section_of
 from .case.document import Document, read_document
 from .case.loaded import LoadedCase
 from .case.mistakes import CaseError, Keys, Mistake, dotted
@@ -79,20 +79,23 @@ def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mist
         document.refuse(1, f"holds no tyre: write a case with {how}")
         return None, document.mistakes[-1:]
     file_data = deepcopy(data)
-    before = len(document.mistakes)
-    deck = read_deck_of(document, data, path.parent)
-    if len(document.mistakes) > before:  # its numbers, which all else names, are not known
-        return None, document.mistakes
+    deck, is_known = read_deck_of(document, data, path.parent)
+    assumed: dict[str, Any] = {}
+    if table(data, "deck"):
+        lines = lines_of_the_deck(deck, data)
+        completed(data, lines)
+        assumed = completed(file_data, lines)
     case = _typed(document, data)
     _add(document, disagreements(data))
     section = None
     if isinstance(deck, OwnDeck):
         section = section_of(deck, data)
-    elif deck is None:
+    elif not table(data, "deck"):
         section = read_stations(document, data, path.parent)
     check_templates(document, data, path.parent)
     measured = measured_file(document, data, path.parent)
-    _add(document, problems(data, section))
+    if is_known:  # the numbers that all else names
+        _add(document, problems(data, section))
     meshable = not (deck or any(m.key.startswith(("mesh", "section")) for m in document.mistakes))
     if section and meshable and (message := folds(data, section)):
         form = "outline" if data["section"].get("outline") else "stations"
@@ -109,7 +112,9 @@ def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mist
     if case is None or not (section or isinstance(deck, OwnDecks)) or document.mistakes:
         return None, sorted(document.mistakes, key=lambda m: (m.file != str(path), m.line))
     own = {"decks": deck} if isinstance(deck, OwnDecks) else {"deck": deck}
-    loaded = LoadedCase(case, path, section, path.parent, file_data, measured=measured, **own)
+    loaded = LoadedCase(
+        case, path, section, path.parent, file_data, measured=measured, assumed=assumed, **own
+    )
     try:
         resolved(loaded)
     except EffectRefused as error:

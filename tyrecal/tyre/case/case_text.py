@@ -96,6 +96,17 @@ def _short(value: float) -> str:
     return f"{digits}{'0' if digits.endswith('.') else ''}e{int(power):+d}"
 
 
+def flow_lines(data: Mapping[str, Any]) -> str:
+    """Keys with their values, texts, numbers or tables, as lines of YAML."""
+
+    def flow(value: Any) -> str:
+        if isinstance(value, Mapping):
+            return "{" + ", ".join(f"{key}: {flow(each)}" for key, each in value.items()) + "}"
+        return plain_text(value) if isinstance(value, str) else f"{value:.13g}"
+
+    return "\n".join(f"{key}: {flow(value)}" for key, value in data.items())
+
+
 def _level(section: Section, level: str) -> dict[str, Any]:
     """Elements of about the same length, at least one a region; rows thinner towards the road."""
     middle = section.points[0]

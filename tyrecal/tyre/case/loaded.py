@@ -24,13 +24,14 @@ class LoadedCase:
     path: Path  # of the case file
     drawn: Section | None  # None: the tyre stands in decks in three dimensions
     folder: Path  # to which the case's own paths are relative
-    file_data: dict[str, Any]  # as the file has it, whatever is set later
+    file_data: dict[str, Any]  # the file with what its deck adds, whatever is set later
     # set by the user since, by name or path, for results to say
     overrides: Mapping[str, float] = field(default_factory=dict)
     as_read: LoadedCase | None = None  # before any number was set; None: none was
     deck: OwnDeck | None = None  # that the section is of, where the case names one
     decks: OwnDecks | None = None  # in three dimensions, in place of a section
     measured: Path | None = None  # the file that its targets stand in, where it names one
+    assumed: Mapping[str, Any] = field(default_factory=dict)  # keys that its deck adds to the file
 
     def __repr__(self) -> str:
         case, given = self.case, (f", {name}={value:g}" for name, value in self.overrides.items())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 from ...errors import InputError
@@ -13,26 +14,39 @@ from ..own_deck.own_decks import OwnDecks
 from ..templates import environment, render
 from .case_text import plain_text
 
+NO_NUMBERS: Mapping[str, float] = MappingProxyType({})
 RANGE = 5.0  # a variable's bounds over its start, and under it
 
 
-def own_case(deck: OwnDeck, flat: Flat, size: str, pressure_kPa: float | None) -> str:
+def own_case(
+    deck: OwnDeck,
+    flat: Flat,
+    size: str,
+    pressure_kPa: float | None,
+    numbers: Mapping[str, float] = NO_NUMBERS,
+) -> str:
     """YAML of a case whose deck is ``deck``: what a fit most often changes is a variable, the
-    layers' areas and the rubbers' first constants."""
+    marks, the layers' areas and the rubbers' first constants. numbers: of the marks."""
     r, z = flat.mesh.reference
     return _text(
         [deck],
         deck.numbers,
+        numbers,
         size,
         flat.pressure_Pa / 1e3 if pressure_kPa is None else pressure_kPa,
         _variables(deck.numbers, {ply.name: ply.material for ply in flat.plies}, flat.materials),
-        static_moduli="long_term" if flat.long_term else "instantaneous",
+        static_moduli=flat.static_moduli,
         r=r,
         z=z,
     )
 
 
-def own_decks_case(decks: OwnDecks, size: str, pressure_kPa: float | None) -> str:
+def own_decks_case(
+    decks: OwnDecks,
+    size: str,
+    pressure_kPa: float | None,
+    numbers: Mapping[str, float] = NO_NUMBERS,
+) -> str:
     """The same of decks in three dimensions. Raises InputError where they do not tell the crown or
     the pressure."""
     if decks.crown.rpartition(".")[2] not in decks.node_sets:
@@ -41,7 +55,7 @@ def own_decks_case(decks: OwnDecks, size: str, pressure_kPa: float | None) -> st
             f"the decks have no node set {decks.crown}: name that of the crown's centre line by"
             f" --crown-set; they have {known or 'none'}"
         )
-    decks.check({})
+    decks.check(numbers)
     if pressure_kPa is None and not decks.pressures:
         raise InputError("the decks have a mark in place of the pressure: give --pressure-kPa")
     blocks = decks.blocks
@@ -50,6 +64,7 @@ def own_decks_case(decks: OwnDecks, size: str, pressure_kPa: float | None) -> st
     return _text(
         decks.decks,
         decks.numbers,
+        numbers,
         size,
         decks.pressure_Pa / 1e3 if pressure_kPa is None else pressure_kPa,
         _variables(decks.numbers, layers, materials),
@@ -60,6 +75,7 @@ def own_decks_case(decks: OwnDecks, size: str, pressure_kPa: float | None) -> st
 def _text(
     decks: Sequence[OwnDeck],
     numbers: Mapping[str, float],
+    marked: Mapping[str, float],
     size: str,
     pressure_kPa: float,
     variables: Mapping[str, Sequence[str]],
@@ -67,6 +83,8 @@ def _text(
 ) -> str:
     env = environment("case", None)
     env.filters["text"] = plain_text
+    all_numbers = {**numbers, **{f"deck.numbers.{name}": x for name, x in marked.items()}}
+    of_marks = {name: [f"deck.numbers.{name}"] for name, x in marked.items() if x > 0}
     names: dict[str, Any] = {
         "files": [deck.path.name for deck in decks],
         "decks": "crown" in more,
@@ -74,15 +92,16 @@ def _text(
         "name": decks[-1].path.stem,
         "size": size,
         "pressure_kPa": pressure_kPa,
+        "numbers": marked,
         "variables": [
             {
                 "name": name,
                 "sets": paths,
-                "start": numbers[paths[0]],
-                "lower": numbers[paths[0]] / RANGE,
-                "upper": numbers[paths[0]] * RANGE,
+                "start": all_numbers[paths[0]],
+                "lower": all_numbers[paths[0]] / RANGE,
+                "upper": all_numbers[paths[0]] * RANGE,
             }
-            for name, paths in variables.items()
+            for name, paths in {**of_marks, **variables}.items()
         ],
         **more,
     }

@@ -56,6 +56,11 @@ class Flat:
         return [f"{word}_{k + 1}" for word, n in words for k in range(n)]
 
     @property
+    def static_moduli(self) -> str:
+        """Moduli of the step that inflates, as a case names them."""
+        return "long_term" if self.long_term else "instantaneous"
+
+    @property
     def text(self) -> str:
         """The lines."""
         return "\n".join(self.lines)

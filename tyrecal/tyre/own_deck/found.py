@@ -42,7 +42,7 @@ def contents(deck: OwnDeck, flat: Flat) -> dict[str, Any]:
         "cavity": {"surface": model.cavity_name, "faces": len(mesh.cavity)},
         "pressure_kPa": flat.pressure_Pa / 1e3,
         "inflation_step": step_name(flat.found.inflation[0].parameters.get("NAME", "")),
-        "static_moduli": "long_term" if flat.long_term else "instantaneous",
+        "static_moduli": flat.static_moduli,
         "crown": {
             "nodes": len(crown),
             "radius_m": float(crown[:, 0].max()),
