@@ -214,8 +214,9 @@ def test_what_is_wrong_is_said_by_file_line_and_key(
     text = TEXTS[file].replace(old, new)
     case = case_of(tmp_path, **{job: text})
     assert run("validate", str(case), "--json") == 2
-    (mistake,) = json.loads(capsys.readouterr().out)
-    assert re.search(words, mistake["message"])
+    mistakes = json.loads(capsys.readouterr().out)
+    (mistake,) = (each for each in mistakes if re.search(words, each["message"]))
+    assert len(mistakes) == 1 or new == "{{ C11 }}"  # where C10 is no mark any longer
     assert Path(mistake["file"]).name == file
     line = line_of(text, place)
     assert mistake["line"] in ((line, line - 1) if job == "inflate" else (line,))

@@ -59,9 +59,10 @@ def read_deck_of(
         pressure = {PRESSURE_MARK} if isinstance(deck, OwnDecks) else set()
         lacking = [name for name in deck.marks if name not in {*given, *pressure}]
         for name in lacking:
-            where = deck.marks[name].place
-            message = f"must be given: {where} has the mark {{{{ {name} }}}}"
-            document.add(("deck", "numbers", name), message)
+            file, line = deck.marks[name].place
+            message = f"the mark {name} has no number: give it in deck.numbers"
+            mistake = Mistake(str(paths[0].parent / file), line, "", f"{{{{ {name} }}}}", message)
+            document.mistakes.append(mistake)
         if lacking:
             pass
         elif isinstance(deck, OwnDeck):
