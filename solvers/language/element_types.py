@@ -26,7 +26,8 @@ TYPES_BY_SECTION: dict[str, dict[int, str]] = {
         9: "SFMCL9",
     },
     "MEMBRANE SECTION": {
-        3: "M3D3",
+        2: "MGAX1",
+        3: "M3D3 MGAX2",
         4: "M3D4 M3D4R",
         6: "M3D6 MCL6",
         8: "M3D8 M3D8R",

@@ -223,7 +223,9 @@ MODEL_RULES: dict[str, Rule] = {
         rows=(0, 1),
         needs=("ELSET", "MATERIAL"),
         alone=("NODAL THICKNESS", "MEMBRANE THICKNESS"),
-        instead="use SFMGAX elements with a *SURFACE SECTION and *REBAR LAYER",
+        honoured={"deck": "ELSET; MATERIAL; POISSON=0.5", "section": "ELSET; MATERIAL"},
+        data="thickness:length",
+        calculix=NO_REBAR,
     ),
     "SHELL SECTION": Rule(
         "part",
@@ -245,6 +247,21 @@ MODEL_RULES: dict[str, Rule] = {
         under=HOLDS_REBAR,
         honoured={"deck|section": "GEOMETRY=CONSTANT|ANGULAR"},
         data="_name, area:area, spacing:length, _position=0, _material, angle=0",
+        calculix=NO_REBAR,
+    ),
+    "REBAR": Rule(
+        "part",
+        (
+            "ELEMENT=BEAM|SHELL|AXISHELL|MEMBRANE|AXIMEMBRANE|CONTINUUM; MATERIAL=material; "
+            "NAME=name; GEOMETRY=ISOPARAMETRIC|SKEW; ISODIRECTION=integer; "
+            "ORIENTATION=orientation; SINGLE"
+        ),
+        "element any...",
+        needs=("ELEMENT", "MATERIAL"),
+        variants={"ELEMENT=AXIMEMBRANE": "element number 3*number?"},
+        honoured={"deck": "ELEMENT=AXIMEMBRANE; MATERIAL; NAME; ~GEOMETRY"},
+        data="_elements, area:area, spacing:length=1, angle=0, radius:length=0",
+        instead="lay cords in MGAX elements, or in SFMGAX with *REBAR LAYER",
         calculix=NO_REBAR,
     ),
     "RIGID BODY": Rule(

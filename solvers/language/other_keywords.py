@@ -55,11 +55,6 @@ OTHER_KEYWORDS: dict[str, Rule] = {
         "model", "HYSTERESIS", instead="give the moduli of slow loading, and *VISCOELASTIC"
     ),
     **_unjudged("model", "USER MATERIAL", instead="write a *HYPERELASTIC that fits the same tests"),
-    **_unjudged(
-        "model part",
-        "REBAR",
-        instead="use SFMGAX elements with a *SURFACE SECTION and *REBAR LAYER",
-    ),
     **_unjudged("model part", "UEL PROPERTY", instead="use the elements that the manual has"),
     **_unjudged(
         "model part step",

@@ -83,7 +83,9 @@ def deck_slips(deck: OwnDeck, numbers: Mapping[str, float]) -> Iterator[Mistake]
 def _cords(deck: OwnDeck) -> set[str]:
     """Materials of the deck's layers of rebar."""
     rows = (row for block in deck.blocks if block.name == "REBAR LAYER" for row in block.rows)
-    return {row.name(4) for row in rows}
+    return {row.name(4) for row in rows} | {
+        block.get("MATERIAL") for block in deck.blocks if block.name == "REBAR"
+    }
 
 
 def _angular(deck: OwnDeck) -> set[str]:

@@ -13,6 +13,7 @@ from .mesh import DeckMesh
 from .model import Model
 from .symmetry import MirrorHalf
 
+FILLED = ("SOLID SECTION", "SURFACE SECTION", "MEMBRANE SECTION")
 Array = np.ndarray
 SECTION_DOFS = {1: 0, 2: 2, 5: 1}  # ABAQUS's r, z, twist to our components r, theta, z
 REVOLVED_DOF = {2: 2}  # the axle is the revolved model's second axis
@@ -55,7 +56,7 @@ def keeps_half_turn(mesh: DeckMesh, section: list[Block], steps: list[DeckStep])
     half = half_mesh(mesh)
     if half is None or not isinstance(half.symmetry, MirrorHalf):
         return False
-    filled = {k.need("ELSET") for k in section if k.name in ("SOLID SECTION", "SURFACE SECTION")}
+    filled = {k.need("ELSET") for k in section if k.name in FILLED}
     filled |= {name for step in steps for name in (*step.centrifugal, *step.spin)}
     loaded = {name for step in steps for name in step.pressures}
     if not (filled <= half.element_sets.keys() and loaded <= half.edges.keys()):

@@ -10,11 +10,11 @@ from .half_mesh import half_mesh
 from .laws.energy_law import EnergyLaw
 from .materials import ModulusTable, read_materials
 from .mesh import DeckMesh, read_mesh
-from .parts import cords, rubber
+from .parts import cords, membrane, rubber
 from .parts.elastic import Elastic
 from .parts.part import SectionJob, TyrePart
 
-READERS = (rubber.read, cords.read)
+READERS = (rubber.read, membrane.read, cords.read)
 
 
 @dataclass

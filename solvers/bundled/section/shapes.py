@@ -151,7 +151,10 @@ TYPES = {
     "CGAX3H": ElementType(3, partial(triangle, 3), 1, 7, FACES_TRIANGLE, 1, True),
     "SFMGAX2": ElementType(3, partial(line, 3)),
     "SFMGAX1": ElementType(2, partial(line, 2)),
+    "MGAX2": ElementType(3, partial(line, 3)),
+    "MGAX1": ElementType(2, partial(line, 2)),
 }
+MEMBRANES = ("MGAX1", "MGAX2")
 
 
 def solids() -> list[str]:

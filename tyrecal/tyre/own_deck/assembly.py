@@ -17,6 +17,7 @@ class Assembly:
     root: Scope = field(default_factory=Scope)
     sections: list[tuple[Block, str]] = field(default_factory=list)  # with names' prefix
     surfaces: dict[str, tuple[Block, str]] = field(default_factory=dict)
+    rebars: list[tuple[Block, str]] = field(default_factory=list)
     rules: list[tuple[Block, str]] = field(default_factory=list)  # rigid bodies, ties, embedded
     held: list[Block] = field(default_factory=list)
     reflect: Block | None = None
@@ -129,8 +130,10 @@ def _other(made: Assembly, block: Block, prefix: str, parts: dict[str, Part]) ->
                 sets.setdefault(own, []).append((block, of))
                 return
         raise block.refused(f"the instance {block.get('INSTANCE')} is not defined above")
-    if name in ("SOLID SECTION", "SURFACE SECTION"):
+    if name in ("SOLID SECTION", "SURFACE SECTION", "MEMBRANE SECTION"):
         made.sections.append((block, prefix))
+    elif name == "REBAR":
+        made.rebars.append((block, prefix))
     elif name == "SURFACE":
         if prefix + block.need("NAME") in made.surfaces:
             raise block.refused(f"the surface {block.get('NAME')} is defined twice")

@@ -128,7 +128,7 @@ class Constraints:
                 members = self.root.elements_in(prefix + name.strip('"').upper(), block, row)
                 wrong = [n for n in members if not self.root.elements[n].is_ply]
                 if wrong:
-                    raise block.refused(f"element {wrong[0]} of {name} is no SFMGAX", row)
+                    raise block.refused(f"element {wrong[0]} of {name} is no SFMGAX or MGAX", row)
                 own = dict.fromkeys(n for e in members for n in self.root.elements[e].nodes)
                 own = dict.fromkeys(own.keys() - set(rubber))
                 self.guests |= self._merge(list(own), rubber).keys()

@@ -88,12 +88,18 @@ def flatten(found: Sorted, model: Model, length: float, mass: float) -> Flat:
         if any(row.text(0) for row in section.block.rows[1:]):
             raise section.block.refused("takes no more than one data line", section.block.rows[1])
     for k, section in enumerate(model.plies, start=1):
-        write.line(f"*SURFACE SECTION, ELSET=PLY_{k}", section.block.place)
-        if section.block.rows:
+        is_membrane = section.block.name == "MEMBRANE SECTION"
+        if is_membrane:
+            name = _used(section.block, section.block.need("MATERIAL"), blocks, used)
+            write.block(section.block, f"*MEMBRANE SECTION, ELSET=PLY_{k}, MATERIAL={name}")
+        else:
+            write.line(f"*SURFACE SECTION, ELSET=PLY_{k}", section.block.place)
+        if section.block.rows and not is_membrane:
             raise section.block.refused("takes no data", section.block.rows[0])
-        if not options[section.block]:
+        if not options[section.block] and not is_membrane:
             raise section.block.refused("has no *REBAR LAYER under it: give its cords")
-        for option in options[section.block]:
+        rebars = [_layer_of(block, row) for block, row in section.rebars]
+        for option in [*options[section.block], *rebars]:
             plies += _layers(write, section, k, option, blocks, used, mesh, length)
     for block in found.model:
         if block.name == "SECTION CONTROLS":
@@ -164,7 +170,7 @@ def _options(blocks: Sequence[Block]) -> dict[Block, list[Block]]:
     found: dict[Block, list[Block]] = {}
     section: Block | None = None
     for block in blocks:
-        if block.name in ("SOLID SECTION", "SURFACE SECTION"):
+        if block.name in ("SOLID SECTION", "SURFACE SECTION", "MEMBRANE SECTION"):
             section = block
             found[section] = []
         elif section and block.name in SECTION_OPTIONS:
@@ -251,6 +257,20 @@ def _layers(
     head = "*REBAR LAYER" + (", GEOMETRY=ANGULAR" if angular else "")
     write.block(Block(option.name, option.place, option.parameters, tuple(rows)), head, angular)
     return found
+
+
+def _layer_of(block: Block, row: Row) -> Block:
+    """A line of *REBAR as a *REBAR LAYER. A spacing that is measured at a radius grows in
+    proportion to the radius, unless the cords lie round the tyre: it is an angle."""
+    angle, radius, spacing = row.number(3, 0.0), row.number(4, 0.0), row.text(2, "1.")
+    is_fanned = radius != 0 and abs(angle) % 180 != 90
+    if is_fanned:
+        spacing = written(float(np.degrees(row.number(2, 1.0) / radius)))
+    name = re.sub(r"\W", "_", block.get("NAME")) or "LAYER"
+    material = block.parameters.get("MATERIAL", "")
+    fields = [name, row.text(1), spacing, "0.", material, row.text(3, "0.")]
+    parameters = {"GEOMETRY": "ANGULAR"} if is_fanned else {}
+    return Block("REBAR LAYER", block.place, parameters, (Row(row.place, ",".join(fields)),))
 
 
 def _check_amplitudes(found: Sorted, static: Block) -> None:

@@ -218,8 +218,8 @@ def _element(scope: Scope, block: Block) -> None:
     count = nodes_of(kind)
     if count is None:
         raise block.refused(
-            f"TYPE={kind} is no element of a revolved tyre: CGAX for rubber, SFMGAX for plies, RAX2"
-            " for a rim; decks in three dimensions stand in deck.decks of a case"
+            f"TYPE={kind} is no element of a revolved tyre: CGAX for rubber, SFMGAX or MGAX"
+            " for plies, RAX2 for a rim; decks in three dimensions stand in deck.decks of a case"
         )
     numbers = []
     for row in block.rows:

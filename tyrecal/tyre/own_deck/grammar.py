@@ -59,8 +59,8 @@ def sort(blocks: Sequence[Block]) -> Sorted:
             if over is None or over.name != "MATERIAL":
                 raise block.refused("must follow a *MATERIAL")
         elif name == "REBAR LAYER":
-            if over is None or over.name != "SURFACE SECTION":
-                raise block.refused("must follow a *SURFACE SECTION")
+            if over is None or over.name not in ("SURFACE SECTION", "MEMBRANE SECTION"):
+                raise block.refused("must follow a *SURFACE SECTION or *MEMBRANE SECTION")
         elif name == "HOURGLASS STIFFNESS":
             if over is None or over.name != "SOLID SECTION":
                 raise block.refused("must stand right under the *SOLID SECTION that it is of")

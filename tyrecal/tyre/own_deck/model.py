@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from .constraints import Constraints, Embedded, lines_of_the_other_half
 from .grammar import Sorted
 from .scope import Element, Point, corner_areas, faces_of, mirror_of, reflected
 from .surfaces import Face, boundary_of, surface_faces
-from .text import Block, Row
+from .text import NODES_AND_SECTION, Block, Row
 
 AT_CROWN = 0.9  # of the largest radius: a cut that reaches it goes through the crown
 
@@ -24,6 +24,7 @@ class Assigned:
     block: Block
     name: str  # of the element set
     elements: tuple[int, ...]
+    rebars: tuple[tuple[Block, Row], ...] = ()  # of a membrane, the same in all of its elements
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +125,7 @@ class _Builder:
             solid = block.name == "SOLID SECTION"
             for n in elements:
                 element = self.root.elements[n]
-                if not (element.is_solid if solid else element.is_ply):
+                if NODES_AND_SECTION[element.kind][1] != block.name:
                     raise block.refused(f"element {n} of {name} is a {element.kind}")
                 if n in owner:
                     before = owner[n].place
@@ -135,9 +136,26 @@ class _Builder:
             (solids if solid else plies).append(Assigned(block, name, tuple(elements)))
         for n, element in self.root.elements.items():
             if n not in owner and not element.kind.startswith("RAX"):
-                need = "*SOLID SECTION" if element.is_solid else "*SURFACE SECTION"
-                raise element.block.refused(f"element {n} has no {need}", element.row)
-        return tuple(solids), tuple(plies)
+                need = NODES_AND_SECTION[element.kind][1]
+                raise element.block.refused(f"element {n} has no *{need}", element.row)
+        return tuple(solids), tuple(self._with_rebars(plies))
+
+    def _with_rebars(self, plies: Sequence[Assigned]) -> Iterator[Assigned]:
+        """Plies, membranes split into elements with the same lines of *REBAR."""
+        lines: dict[int, list[tuple[Block, Row]]] = {}
+        for block, prefix in self.made.rebars:
+            for row in block.rows:
+                for n in self.root.elements_in(prefix + row.name(0), block, row):
+                    if not self.root.elements[n].kind.startswith("MGAX"):
+                        kind = self.root.elements[n].kind
+                        raise block.refused(f"element {n} is a {kind}, no membrane", row)
+                    lines.setdefault(n, []).append((block, row))
+        for ply in plies:
+            alike: dict[tuple[tuple[Block, Row], ...], list[int]] = {}
+            for n in ply.elements:
+                alike.setdefault(tuple(lines.get(n, ())), []).append(n)
+            for rebars, elements in alike.items():
+                yield replace(ply, elements=tuple(elements), rebars=rebars)
 
     def _all_sets(self) -> dict[str, tuple[int, ...]]:
         """Every set is resolved, used or not: one that dangles is a mistake."""
@@ -266,8 +284,8 @@ class _Builder:
             root.elements[number + further] = Element(
                 element.kind, reflected(element, nodes), element.block, element.row
             )
-        both = lambda each: Assigned(
-            each.block, each.name, each.elements + tuple(n + further for n in each.elements)
+        both = lambda each: replace(
+            each, elements=each.elements + tuple(n + further for n in each.elements)
         )
         for n, face, nodes in pressed:
             turned = tuple(image[self.tied.same.get(m, m)] for m in nodes)[::-1]

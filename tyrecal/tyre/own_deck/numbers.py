@@ -17,7 +17,7 @@ from .text import MATERIAL_OPTIONS, Block, Row, named, placed_fields
 
 DECK_MARK = re.compile(r"\{\{\s*([A-Za-z][A-Za-z0-9_\-]*)\s*\}\}")
 PARAMETER = re.compile(r"<\s*(\w+)\s*>")
-IN_PATHS = {*MATERIAL_OPTIONS, "REBAR LAYER"}  # blocks whose numbers have paths
+IN_PATHS = {*MATERIAL_OPTIONS, "REBAR LAYER", "REBAR"}  # blocks whose numbers have paths
 Numbers = Mapping[str, float]
 
 
@@ -26,12 +26,13 @@ def paths(blocks: Sequence[Block]) -> dict[str, tuple[int, int, int]]:
     found: dict[str, tuple[int, int, int]] = {}
     material, section = "", ""
     layers = [row.name(0) for b in blocks if b.name == "REBAR LAYER" for row in b.rows]
+    rebars = [b.get("NAME") for b in blocks if b.name == "REBAR" for _ in b.rows]
     for place, block in enumerate(blocks):
         if block.name == "STEP":
             break
         if block.name == "MATERIAL":
             material = f"material {block.get('NAME')}"
-        elif block.name == "SURFACE SECTION":
+        elif block.name in ("SURFACE SECTION", "MEMBRANE SECTION"):
             section = f"section {block.get('ELSET')} / "
         elif block.name == "PARAMETER":
             for i, row in enumerate(block.rows):
@@ -47,6 +48,9 @@ def paths(blocks: Sequence[Block]) -> dict[str, tuple[int, int, int]]:
                 own = row.name(0)
                 path = f"rebar {own} / {name}"
                 path = section + path if layers.count(own) > 1 else path
+            elif block.name == "REBAR":
+                own, many = block.get("NAME"), rebars.count(block.get("NAME")) > 1
+                path = f"rebar {own} {row.name(0)} / {name}" if many else f"rebar {own} / {name}"
             else:
                 line = (
                     f"row {i + 1} / "

@@ -6,12 +6,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # mypy knows the folder by its own name
+    from solvers.language.element_types import NODES_AND_SECTION
     from solvers.language.fields import DIMENSIONS, fields_of, placed_fields
     from solvers.language.honour import check_honoured
     from solvers.language.spelling import named
     from solvers.language.table import MATERIAL_OPTIONS, OUTPUT_KEYWORDS, RULES
     from solvers.language.text import Block, Place, Reader, Row, names_of
 else:
+    from tyrecal_solvers.language.element_types import NODES_AND_SECTION
     from tyrecal_solvers.language.fields import DIMENSIONS, fields_of, placed_fields
     from tyrecal_solvers.language.honour import check_honoured
     from tyrecal_solvers.language.spelling import named
@@ -23,6 +25,7 @@ from ...errors import InputError
 __all__ = [
     "DIMENSIONS",
     "MATERIAL_OPTIONS",
+    "NODES_AND_SECTION",
     "OUTPUT_KEYWORDS",
     "RULES",
     "Block",

@@ -123,7 +123,7 @@ def read(job: SectionJob) -> list[TyrePart]:
     layers: dict[str, list[_Layer]] = {}
     surface: Block | None = None
     for k in job.keywords:
-        if k.name == "SURFACE SECTION":
+        if k.name in ("SURFACE SECTION", "MEMBRANE SECTION"):
             surface = k
         elif k.name == "REBAR LAYER":
             if surface is None:
