@@ -17,7 +17,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="bundled", description=__doc__)
     parser.add_argument("job", type=Path, help="the deck, with or without .inp")
     parser.add_argument("--oldjob", type=Path, help="name of the section job that it revolves")
-    parser.add_argument("--time-limit", type=float, default=float("inf"), metavar="SECONDS")
+    parser.add_argument(
+        "--time-limit",
+        type=float,
+        default=float("inf"),
+        metavar="SECONDS",
+        help="processor time after which the run is ended",
+    )
     options = parser.parse_args(arguments)
     job, oldjob = (
         given.with_suffix("") if given and given.suffix == ".inp" else given

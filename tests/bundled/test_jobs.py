@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from tyrecal_solvers.bundled import job as job_module
 from tyrecal_solvers.bundled.deck.request import Request
 from tyrecal_solvers.bundled.deck.steps import Deck
 from tyrecal_solvers.bundled.job import Job
@@ -88,14 +88,24 @@ def test_what_holds_other_nodes_does_not_hold_the_rim() -> None:
 
 
 def test_a_job_without_a_frequency_step_ends_with_its_static_state() -> None:
-    """And one whose time has passed does not begin."""
     text = texts(PLAIN)["inflate"]
     (found,) = Job(Deck({"inflate": text}, "inflate", None), Request()).run()
     assert (found.step, found.pressure_Pa, found.modes) == (1, 160000.0, [])
     assert 1e-4 < abs(found.U).max() < 0.02 and found.factorisations > 1
-    late = Job(Deck({"inflate": text}, "inflate", None), Request(), time.monotonic() - 1e-3)
-    with pytest.raises(RunFailed, match="the time limit passed"):
-        late.run()
+
+
+def test_the_time_limit_counts_processor_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run that waits for a busy machine goes on; one that computes for longer is ended."""
+    text, used = texts(PLAIN)["inflate"], [0.0]
+    clock = SimpleNamespace(thread_time=lambda: used[0])  # no other clock may be read
+    monkeypatch.setattr(job_module, "time", clock)
+    analysis = Job(Deck({"inflate": text}, "inflate", None), Request(), time_limit_s=2.0)
+    used[0] = 1.9
+    assert analysis.run()
+    used[0] = 2.1
+    with pytest.raises(RunFailed, match="time limit of 2 s of processor time") as failure:
+        analysis.run()
+    assert failure.value.cause == "timed_out"
 
 
 @pytest.mark.parametrize("effects", [PLAIN, TURNING], ids=["plain", "turning"])

@@ -99,7 +99,10 @@ def _numbers(values: Mapping[str, Any], key: str) -> list[float]:
 
 
 class SolverChoice(Part):
-    """Which solver runs, how long one run (of footprints: a load) may take, its own options."""
+    """Which solver runs, how long one run (of footprints: a load) may take, its own options.
+
+    The bundled solver's limit is processor time; a program's, time by the clock.
+    """
 
     name: Name
     time_limit_s: Positive
