@@ -65,8 +65,8 @@ class StandIn:
             ],
             "gradients": {"C10": [1e-300], "A_belt": [0.1 + 0.2]},
             "nodes": nodes,
-            "points": np.asfortranarray(np.full((3, 2), 1 / 7)),
-            "displacement": np.zeros((3, 3)),
+            "points": np.asfortranarray(np.arange(6).reshape(3, 2) / 7),
+            "displacement": np.full((3, 3), 1e-3),
         }
 
 

@@ -25,7 +25,7 @@ from tyrecal.simulate.evaluate.failure import EvaluationFailed, SolverUnavailabl
 from tyrecal.simulate.evaluate.folders import drop_unfinished
 from tyrecal.simulate.evaluate.pressed import pressed
 from tyrecal.simulate.evaluate.record import Damaged
-from tyrecal.simulate.evaluate.recorded import check
+from tyrecal.simulate.evaluate.recorded import check, contradiction
 from tyrecal.simulate.evaluate.sources import sources
 from tyrecal.simulate.evaluate.store import Store
 
@@ -190,7 +190,7 @@ def road(*footprints: dict[str, Any], **changes: Any) -> dict[str, Any]:
         "pressure_Pa": 240e3,
         "mass_kg": 12.0,
         "nodes": np.arange(3),
-        "points": np.ones((3, 2)),
+        "points": np.arange(6.0).reshape(3, 2),
         "angles": np.arange(4.0),
         "free_radius_m": 0.3,
         "footprints": list(footprints),
@@ -248,11 +248,12 @@ PLAIN: dict[str, tuple[Edit, str]] = {
     "in three dimensions": (lambda a: solid(a), ""),
     "in three, of other nodes": (lambda a: solid(a, nodes=np.arange(7)), ""),
     "in three, not measured all over": (
-        lambda a: solid(a, displacement=np.full((3, 3), np.nan)),
+        lambda a: solid(a, displacement=np.diag([np.nan, 1.0, np.nan])),
         "",
     ),
-    "in four": (lambda a: solid(a, points=np.ones((3, 4))), "do not go together"),
-    "on a line": (lambda a: solid(a, points=np.ones((3, 1))), "do not go together"),
+    "a shape of zeros": (lambda a: solid(a, displacement=np.zeros((3, 3))), "0 at all points"),
+    "in four": (lambda a: solid(a, points=np.arange(12.0).reshape(3, 4)), "do not go together"),
+    "on a line": (lambda a: solid(a, points=np.arange(3.0)[:, None]), "do not go together"),
     "a section of other nodes": (lambda a: a.update(nodes=np.arange(7)), "do not go together"),
     "nodes in fractions": (lambda a: a.update(nodes=np.arange(3.0)), "not such a number"),
     "no inflation": (lambda a: a.update(displacement=np.zeros((0, 3))), ""),
@@ -264,7 +265,9 @@ PLAIN: dict[str, tuple[Edit, str]] = {
 def solid(answer: dict[str, Any], displacement: Any = None, **more: Any) -> None:
     shape = np.ones((3, 3)) if displacement is None else displacement
     told = {"frequency_Hz": 50.0, "multiplicity": 1, "displacement": shape}
-    answer.update({"modes": [told], "points": np.ones((3, 3)), "gradients": {}, **more})
+    answer.update(
+        {"modes": [told], "points": np.arange(9.0).reshape(3, 3), "gradients": {}, **more}
+    )
 
 
 @pytest.mark.parametrize("kind", PLAIN)
@@ -277,6 +280,73 @@ def test_what_a_record_of_modes_may_hold(kind: str, tmp_path: Path) -> None:
             check({"answer": answer})
     else:
         check({"answer": answer})
+
+
+LIES: dict[str, tuple[Edit, str]] = {
+    "a state of zeros": (lambda a: a.update(displacement=np.zeros((3, 3))), "without pressure"),
+    "a section of zeros": (lambda a: a.update(points=np.zeros((3, 2))), "do not span a section"),
+    "a shape of zeros": (
+        lambda a: a["modes"][0].update(amplitude=np.zeros((3, 3))),
+        "modes.0: a mode's shape is 0 at all points",
+    ),
+    "beyond all tyres": (lambda a: a["modes"][0].update(frequency_Hz=1e6), "at most 100000"),
+    "next to nothing": (lambda a: a["modes"][0].update(frequency_Hz=1e-4), "above 0.001"),
+    "no modes": (lambda a: a.update(modes=[], gradients={}), "at least 1"),
+    "another pressure": (lambda a: a.update(pressure_Pa=2.3e5), "of 230 kPa, 240 kPa were asked"),
+    "another harmonic": (
+        lambda a: a["modes"][0].update(n=5),
+        "a mode of harmonic 5, the highest asked for is 4",
+    ),
+    "too many of one": (
+        lambda a: a.update(modes=3 * a["modes"], gradients={}),
+        "3 modes of harmonic 2, 2 were asked for",
+    ),
+    "too many": (
+        lambda a: solid(a, modes=21 * [{"frequency_Hz": 9.0, "multiplicity": 1, **MOVED}]),
+        "21 modes, 20 at most were asked for",
+    ),
+    "no answer": (lambda a: a.clear(), "pressure_Pa: Field required"),
+}
+MOVED = {"displacement": np.ones((3, 3))}
+
+
+@pytest.mark.parametrize("kind", LIES)
+def test_a_solvers_lie_is_a_failure_with_its_reason(kind: str, tmp_path: Path) -> None:
+    """And nothing of it is recorded."""
+    edit, words = LIES[kind]
+
+    class Liar(StandIn):
+        def read(self, folder: Path) -> dict[str, Any]:
+            answer = super().read(folder)
+            edit(answer)
+            return answer
+
+    with pytest.raises(EvaluationFailed, match=words) as failure:
+        ask(evaluator(tmp_path, Liar()))
+    assert failure.value.cause == "no_results"
+    assert "the answer of solver 'stand-in' is not used" in failure.value.words
+    assert not list((tmp_path / "record").glob("*/*.record"))
+
+
+@pytest.mark.parametrize(
+    ("deck", "words"),
+    [
+        ("*NODE, NSET=TYRE\n7, 0.3, -0.1\n8, 0.3, 0.1\n*ELEMENT\n7, 8\n*NODE\n9, 0, 0\n", ""),
+        ("*node\n7, 0.3, 0.0, -0.1\n8, 0.3, 0.0, 0.1\n", ""),  # of a sector, at the angle 0
+        ("*NODE\n7, 0.30002, -0.1\n8, 0.3, 0.1\n", ""),  # six digits
+        ("*NODE\n7, 0.3, -0.1\n9, 0.3, 0.1\n*NODE FILE\nU\n", "node 8 is not in the deck"),
+        ("*NODE\n7, 0.3, -0.1\n8, 0.31, 0.1\n", "node 8 is not where the deck has it"),
+        ("*NODE\n7, 0.3, -0.1\n*NGEN\n7, 8, 1\n", ""),
+        ("*NODE PRINT\nU\n", ""),
+    ],
+)
+def test_the_nodes_of_an_answer_are_those_of_the_deck(
+    deck: str, words: str, tmp_path: Path
+) -> None:
+    (tmp_path / "section.inp").write_text(deck)
+    answer = {"nodes": np.array([7, 8]), "points": np.array([[0.3, -0.1], [0.3, 0.1]])}
+    decks = SimpleNamespace(design=SimpleNamespace(pressure_kPa=240.0), request={})
+    assert contradiction({**answer, "pressure_Pa": 2.4e5}, decks, tmp_path) == words  # type: ignore
 
 
 PRESSED: dict[str, tuple[dict[str, Any], str]] = {

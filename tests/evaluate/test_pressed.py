@@ -65,14 +65,17 @@ def test_time_that_ran_out_is_not_on_record(tmp_path: Path) -> None:
     ("change", "words"),
     [
         (lambda answer: answer["footprints"].pop(), "footprints at"),
-        (lambda answer: answer["footprints"].clear(), "footprints at"),
-        (lambda answer: answer.update(footprints=[], failure="no load"), "footprints at"),
+        (lambda answer: answer["footprints"].clear(), "at least 1 item"),
+        (lambda answer: answer.update(footprints=[], failure="no load"), "at least 1 item"),
         (lambda answer: answer["footprints"].reverse(), "footprints at"),
         (lambda answer: answer.update(failure="no more"), "footprints at"),
         (lambda answer: answer["footprints"][0].update(road_N=400.0), "bears 400 N of 500 N"),
         (lambda answer: answer["footprints"][0].update(road_N=494.0), "bears 494 N of 500 N"),
         (lambda answer: answer["footprints"][1].update(road_N=4045.0), "bears 4045 N of 4000"),
-        (lambda answer: answer["footprints"][0].update(road_N=float("nan")), "bears nan N"),
+        (
+            lambda answer: answer["footprints"][0].update(road_N=float("nan")),
+            "road_N: holds a number that is not finite",
+        ),
     ],
 )
 def test_answers_that_are_not_whole(change: Any, words: str, tmp_path: Path) -> None:

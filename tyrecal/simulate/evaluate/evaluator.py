@@ -6,7 +6,6 @@ import contextlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from math import isclose
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -19,6 +18,8 @@ from . import folders
 from .executor import executor, in_order
 from .failure import DeckRefused, EvaluationFailed
 from .pressed import Pressed, pressed
+from .record import Damaged
+from .recorded import check, contradiction
 from .results import Evaluation, evaluation
 from .solver import Solver, find_solver, refuse_missing_program
 from .store import Store, key_of
@@ -246,13 +247,14 @@ class Evaluator:
             solver.write(decks, folder)
             if self.store:
                 key = key_of(folder, solver)
-            answer = self._recall(key, decks.design.pressure_kPa)
+            answer = self._recall(key, decks, folder)
             if answer is not None:
                 result = typed(answer, None)
             else:
                 limit_s = decks.design.solver.time_limit_s * max(1, len(decks.loads_N))
                 limit_s *= MODES_ON_TOP if decks.loaded_modes else 1
                 answer = self._run(folder, limit_s)
+                self._refuse_wrong(answer, decks, folder)
                 words = answer.get("failure", "")
                 kept = self._kept(folder, words) if words else None
                 result = typed(answer, kept)
@@ -370,15 +372,28 @@ class Evaluator:
         other.design, other.counts, other.on_progress = design, self.counts, self.on_progress
         return other
 
-    def _recall(self, key: str, pressure_kPa: float) -> dict[str, Any] | None:
+    def _refuse_wrong(self, answer: Any, decks: Decks, folder: Path) -> None:
+        """Raises EvaluationFailed for a solver's answer that is none to ``decks``."""
+        whole = answer
+        if isinstance(answer, dict):  # one that ended early at a load for any cause is believed
+            whole = {key: value for key, value in answer.items() if key != "cause"}
+        try:
+            check({"answer": whole})
+            wrong = contradiction(answer, decks, folder)
+        except Damaged as error:
+            wrong = str(error)
+        if wrong:
+            words = f"the answer of solver '{self.solver.name}' is not used: {wrong}"
+            raise EvaluationFailed("no_results", words)
+
+    def _recall(self, key: str, decks: Decks, folder: Path) -> dict[str, Any] | None:
         content = self.store.read(key) if self.store else None
         if not self.store or content is None:
             return None
         if "answer" in content:
             answer: dict[str, Any] = content["answer"]
-            found_kPa = answer["pressure_Pa"] / 1e3
-            if not isclose(found_kPa, pressure_kPa, rel_tol=1e-6, abs_tol=1e-9):
-                self.store.set_aside(self.store.path(key), f"it is of {found_kPa:g} kPa")
+            if wrong := contradiction(answer, decks, folder):
+                self.store.set_aside(self.store.path(key), wrong)
                 return None
             self.counts.recorded += 1
             return answer

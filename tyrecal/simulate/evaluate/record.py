@@ -17,6 +17,8 @@ import numpy as np
 from ...errors import InputError
 
 ARRAY = "__array__"
+LONGEST_TEXT = 2_000_000  # bytes of JSON: a hundred times what an answer's longest one has
+MOST_ARRAYS = 5000
 DIGEST = 65  # bytes of the first line: 64 hexadecimal digits and its end
 
 
@@ -29,11 +31,14 @@ def pack(key: str, about: dict[str, Any], content: Any) -> bytes:
     numbers, None and arrays, all kept to the last bit (tuples become lists, arrays of no dimension
     numbers). ``about``: plain JSON, for whoever lists records.
 
-    Raises TypeError for anything else, ValueError for a number that is not finite.
+    Raises TypeError for anything else, ValueError for a number that is not finite or more text or
+    arrays than `unpack` reads.
     """
     arrays: list[np.ndarray] = []  # one that stands in several places is kept once
     told = {"key": key, "about": about, "content": _plain(content, arrays)}
     line = json.dumps(told, allow_nan=False) + "\n"
+    if len(line) > LONGEST_TEXT or len(arrays) > MOST_ARRAYS:
+        raise ValueError(f"an answer of {len(line)} bytes and {len(arrays)} arrays is too large")
     stored = io.BytesIO()
     if arrays:
         np.savez(stored, *arrays)
@@ -48,6 +53,8 @@ def unpack(data: bytes, key: str) -> tuple[dict[str, Any], Any]:
         raise Damaged("its checksum does not match")
     try:
         line, _, stored = body.partition(b"\n")
+        if len(line) > LONGEST_TEXT:
+            raise Damaged(f"its text is longer than {LONGEST_TEXT / 1e6:g} MB")
         told = json.loads(line, parse_constant=_not_finite)
         about, content = told["about"], _filled(told["content"], _arrays(stored))
     except Damaged:
@@ -72,6 +79,8 @@ def _arrays(stored: bytes) -> dict[str, np.ndarray]:
         return found
     with ZipFile(io.BytesIO(stored)) as archive:
         members = archive.infolist()
+        if len(members) > MOST_ARRAYS:
+            raise Damaged(f"it has more than {MOST_ARRAYS} arrays")
         packed = any(each.compress_type != ZIP_STORED for each in members)
         if packed or sum(each.file_size for each in members) > len(stored):
             raise Damaged("its arrays are larger than the file")

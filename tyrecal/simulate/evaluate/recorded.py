@@ -1,33 +1,56 @@
-"""What a record may hold: a solver's answer, or a failure. Checked before it is believed."""
+"""What an answer may be: of a solver's run or of a record. Checked before it is believed.
+
+`check` judges an answer or a recorded failure by itself, `contradiction` an answer by what was
+asked. `Evaluator` makes a typed failure of a run's wrong answer, and sets a wrong record aside.
+"""
 
 from __future__ import annotations
 
+import re
+from collections import Counter
+from collections.abc import Mapping
+from math import isclose
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from ..deck.decks import Decks
 from .record import Damaged
 
 REAL = "fiu"  # NumPy's letters for kinds of number
+FEWEST_BYTES = 4  # of a number with decimals: half precision has three digits
+LEAST_HZ, MOST_HZ = 1e-3, 1e5  # of a tyre's vibrations, and far beyond
+SAME_PLACE = 1e-4  # of the largest coordinate: solvers write six digits
+NODE_BLOCK = re.compile(
+    r"^\*NODE *(?:,[^\n]*)?\n((?:[^*\n][^\n]*\n)+)", re.MULTILINE | re.IGNORECASE
+)
+GENERATED = re.compile(
+    r"^\*(?:NGEN|NFILL|NCOPY|NMAP|SYSTEM|INCLUDE)\b", re.MULTILINE | re.IGNORECASE
+)
 
 
 def _shaped(
-    kinds: str, *shape: int | None, least: float = -np.inf, nan: bool = False
+    kinds: str, *shape: int | None, least: float = -np.inf, most: float = np.inf, nan: bool = False
 ) -> AfterValidator:
     """A number, or an array or list of them, of ``shape`` (None: any length), finite unless
-    ``nan``, above ``least``."""
+    ``nan``, above ``least``, at most ``most``."""
 
     def check(value: Any) -> Any:
         array = np.asarray(value)
         if array.dtype.kind not in kinds or array.ndim != len(shape):
             raise ValueError("is not such a number or array")
+        if array.dtype.kind in "fc" and array.dtype.itemsize < FEWEST_BYTES:
+            raise ValueError("has half precision only")
         if not all(n in (None, m) for n, m in zip(shape, array.shape, strict=True)):
             raise ValueError(f"has the shape {array.shape}")
         if not (nan or np.isfinite(array).all()):
             raise ValueError("holds a number that is not finite")
         if least > -np.inf and not (array > least).all():
             raise ValueError(f"must be above {least:g}")
+        if most < np.inf and not (array <= most).all():
+            raise ValueError(f"must be at most {most:g}")
         return value
 
     return AfterValidator(check)
@@ -35,6 +58,9 @@ def _shaped(
 
 Finite = Annotated[Any, _shaped(REAL)]
 PositiveFinite = Annotated[Any, _shaped(REAL, least=0.0)]
+Hertz = Annotated[Any, _shaped(REAL, least=LEAST_HZ, most=MOST_HZ)]
+HertzPair = Annotated[Any, _shaped(REAL, 2, least=LEAST_HZ, most=MOST_HZ)]
+HertzArray = Annotated[Any, _shaped(REAL, None, least=LEAST_HZ, most=MOST_HZ)]
 Points = Annotated[Any, _shaped(REAL, None, 3)]
 Triple = Annotated[Any, _shaped(REAL, None)]
 FiniteArray = Annotated[Any, _shaped("iu", None)]
@@ -54,18 +80,25 @@ class _Failure(_Part):
 class _Mode(_Part):
     """As `Solver.read` gives it: on the section (n, amplitude) or in three dimensions."""
 
-    frequency_Hz: PositiveFinite
-    multiplicity: Annotated[Any, _shaped("iu", least=0)]
+    frequency_Hz: Hertz
+    multiplicity: Annotated[Any, _shaped("iu", least=0, most=2)]
     n: Annotated[Any, _shaped("iu", least=-1)] = 0
     amplitude: Annotated[Any, _shaped("c" + REAL, None, 3)] = None
     displacement: Annotated[Any, _shaped(REAL, None, 3, nan=True)] = None
-    members: Annotated[Any, _shaped(REAL, 2, least=0.0)] | None = None
+    members: HertzPair | None = None
 
     @property
     def points(self) -> int:
         """Number of points that the shape is known at."""
         shape = self.displacement if self.amplitude is None else self.amplitude
         return -1 if shape is None else len(shape)
+
+    @model_validator(mode="after")
+    def _moves(self) -> Self:
+        shape = self.displacement if self.amplitude is None else self.amplitude
+        if shape is not None and not np.nan_to_num(shape).any():
+            raise ValueError("a mode's shape is 0 at all points")
+        return self
 
 
 class _Tyre(_Part):
@@ -74,9 +107,16 @@ class _Tyre(_Part):
     nodes: FiniteArray
     points: Annotated[Any, _shaped(REAL, None, None)]
 
+    @model_validator(mode="after")
+    def _span_a_section(self) -> Self:
+        points = np.asarray(self.points)
+        if not len(points) or not np.ptp(points, axis=0)[[0, -1]].all():
+            raise ValueError("points do not span a section")
+        return self
+
 
 class _Modes(_Tyre):
-    modes: list[_Mode]
+    modes: Annotated[list[_Mode], Field(min_length=1)]
     gradients: dict[str, Triple]
     displacement: Points
     mass_gradients: dict[str, Finite] = Field(default_factory=dict)
@@ -91,6 +131,8 @@ class _Modes(_Tyre):
             raise ValueError("nodes and points do not go together")
         if len(self.displacement) not in (0, count):
             raise ValueError("the inflation has not as many points as there are")
+        if self.pressure_Pa > 0 and len(self.displacement) and not np.any(self.displacement):
+            raise ValueError("the inflated tyre is where it was without pressure")
         if any(len(slopes) != len(self.modes) for slopes in self.gradients.values()):
             raise ValueError("not every mode has a slope")
         return self
@@ -116,13 +158,13 @@ class _Footprint(_Part):
     contact_area_m2: PositiveFinite | None = None
     contact_length_m: PositiveFinite | None = None
     contact_width_m: PositiveFinite | None = None
-    mode_frequency_Hz: Triple | None = None
+    mode_frequency_Hz: HertzArray | None = None
     mode_node: FiniteArray | None = None
     mode_shape: Annotated[Any, _shaped(REAL, None, None, None, 3)] | None = None
     mode_traction_N: Triple | None = None
-    sliding_frequency_Hz: Triple | None = None
+    sliding_frequency_Hz: HertzArray | None = None
     sliding_shape: Annotated[Any, _shaped(REAL, None, None, None, 3)] | None = None
-    cavity_Hz: Annotated[Any, _shaped(REAL, 2, least=0.0)] | None = None
+    cavity_Hz: HertzPair | None = None
     slopes: dict[str, dict[str, Finite]] = Field(default_factory=dict)
 
 
@@ -134,7 +176,7 @@ class _Pressed(_Tyre):
     angles: Triple
     free_radius_m: PositiveFinite
     footprints: Annotated[list[_Footprint], Field(min_length=1)]
-    cavity_Hz: PositiveFinite | None = None
+    cavity_Hz: Hertz | None = None
     failure: Annotated[str, Field(max_length=100_000)]
     cause: Literal["no_equilibrium", "unstable"] = "no_equilibrium"
 
@@ -180,3 +222,50 @@ def check(content: Any) -> None:
         raise Damaged(f"{place}: {first['msg'].removeprefix('Value error, ')}") from None
     except (TypeError, ValueError) as error:  # NumPy's of what it cannot make an array of
         raise Damaged(str(error)) from None
+
+
+def contradiction(answer: Mapping[str, Any], decks: Decks, folder: Path) -> str:
+    """Why an answer that passed `check` is none to ``decks``, whose files are in ``folder``: its
+    pressure, its harmonics, how many modes it has, its nodes. "" where nothing is wrong."""
+    asked_kPa, request = decks.design.pressure_kPa, decks.request
+    pressure_kPa = answer["pressure_Pa"] / 1e3
+    if not isclose(pressure_kPa, asked_kPa, rel_tol=1e-6, abs_tol=1e-9):
+        return f"it is of {pressure_kPa:g} kPa, {asked_kPa:g} kPa were asked for"
+    if "modes" in answer and "highest_harmonic" in request:
+        highest, each = request["highest_harmonic"], request["modes_per_harmonic"]
+        most = 2 * each * (highest + 1)  # of a solver that gives the two of a pair apart
+        if len(answer["modes"]) > most:
+            return f"it has {len(answer['modes'])} modes, {most} at most were asked for"
+        counts = Counter(int(mode["n"]) for mode in answer["modes"] if "amplitude" in mode)
+        for n, count in sorted(counts.items()):
+            if n > highest:
+                return f"it has a mode of harmonic {n}, the highest asked for is {highest}"
+            if count > each:
+                return f"it has {count} modes of harmonic {n}, {each} were asked for"
+    return _other_nodes(answer, folder)
+
+
+def _other_nodes(answer: Mapping[str, Any], folder: Path) -> str:
+    """Why the nodes of an answer on the section are not those of the decks; "" where they are, or
+    where a deck leaves its nodes to the solver to generate."""
+    numbers, points = np.asarray(answer["nodes"]), np.asarray(answer["points"])
+    if len(numbers) != len(points) or points.shape[1] != 2:
+        return ""
+    texts = [path.read_text(encoding="utf-8") for path in sorted(folder.glob("*.inp"))]
+    rows = [
+        line.split(",")
+        for text in texts
+        for block in NODE_BLOCK.findall(text)
+        for line in block.splitlines()
+    ]
+    if not rows or any(map(GENERATED.search, texts)):
+        return ""
+    # R and Z: of a section, and at the angle 0 of a sector in three dimensions, x and z
+    places = {int(row[0]): (float(row[1]), float(row[-1])) for row in rows}
+    unknown = [int(number) for number in numbers if int(number) not in places]
+    if unknown:
+        return f"node {unknown[0]} is not in the deck"
+    off = abs(np.array([places[int(number)] for number in numbers]) - points).max(1)
+    if off.max() > SAME_PLACE * abs(points).max():
+        return f"node {numbers[off.argmax()]} is not where the deck has it"
+    return ""
