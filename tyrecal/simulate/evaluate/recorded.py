@@ -22,7 +22,7 @@ from .record import Damaged
 REAL = "fiu"  # NumPy's letters for kinds of number
 FEWEST_BYTES = 4  # of a number with decimals: half precision has three digits
 LEAST_HZ, MOST_HZ = 1e-3, 1e5  # of a tyre's vibrations, and far beyond
-SAME_PLACE = 1e-4  # of the largest coordinate: solvers write six digits
+NODE_TOLERANCE = 1e-4  # of the largest coordinate: solvers write six digits
 NODE_BLOCK = re.compile(
     r"^\*NODE *(?:,[^\n]*)?\n((?:[^*\n][^\n]*\n)+)", re.MULTILINE | re.IGNORECASE
 )
@@ -266,6 +266,6 @@ def _other_nodes(answer: Mapping[str, Any], folder: Path) -> str:
     if unknown:
         return f"node {unknown[0]} is not in the deck"
     off = abs(np.array([places[int(number)] for number in numbers]) - points).max(1)
-    if off.max() > SAME_PLACE * abs(points).max():
+    if off.max() > NODE_TOLERANCE * abs(points).max():
         return f"node {numbers[off.argmax()]} is not where the deck has it"
     return ""
