@@ -88,7 +88,7 @@ def test_draws_are_worth_as_many_as_their_autocorrelation_says() -> None:
     apart = max(1, int(tau / 2))
     assert len(found.thinned) == -(-found.draws.shape[0] // apart) * found.draws.shape[1]
     assert found.dropped + len(found.draws) == 400 and 20 < found.dropped < 100
-    assert not drawn(posterior(WIDE), BOUNDS, 2000, 3).chains.enough
+    assert drawn(posterior(WIDE), BOUNDS, 2000, 3).chains.enough  # more are drawn by itself
 
 
 def test_more_draws_have_more_walkers_until_their_steps_tell_tau() -> None:

@@ -167,7 +167,8 @@ def test_the_result_says_what_the_draws_are() -> None:
 def test_doubts_of_a_result() -> None:
     sample = sampled(3000)
     at_edge = np.array([[2e-3, 0.0], [0.0, 1e-3]])
-    poor = replace(sample.drawn, at_edge=at_edge, stopped="why")
+    short = replace(sample.drawn.chains, draws=sample.drawn.chains.draws[:9])
+    poor = replace(sample.drawn, at_edge=at_edge, stopped="why", chains=short)
     words = " ".join(result(replace(sample, drawn=poor, rough=0.3), 0).doubts())
     assert "0.3 % of the draws lie at the edge of the box, which could not grow: why" in words
     assert "steps are fewer than 20 autocorrelation times" in words and "--draws" in words

@@ -24,7 +24,8 @@ from .parameters import Number, Place, Whole, option
     default=100_000,
     metavar="N",
     show_default=True,
-    help="Draws in all.",
+    help="Draws in all; more are drawn, up to 20 times as many, until 20 autocorrelation times are"
+    " reached.",
 )
 @option(
     "--seed",

@@ -27,6 +27,7 @@ STEPS = 400  # that as many walkers as that leave of the draws
 ENOUGH = 20  # tau, of steps
 WARM_UP = 5  # tau, of steps that are dropped
 WINDOW = 5  # tau: beyond, what is seen of rho is noise
+MOST_TIMES = 20  # times the steps that were first wanted: chains that need more stop and say so
 SPARE_STEPS = 1.5  # of draws that would be enough: a short chain's tau is too small
 TRIES = 100  # of walkers to begin within the box
 MISSING = (
@@ -90,8 +91,9 @@ def needs_emcee() -> None:
 def walk(
     density: Callable[[Array], Array], start: Array, covariance: Array, count: int, seed: int
 ) -> Chains:
-    """About ``count`` draws in all; walkers begin about the rows of ``start`` (s, v) with a
-    ``covariance`` (v, v). Raises InputError where emcee is not installed."""
+    """About ``count`` draws in all, and up to `MOST_TIMES` as many until they are `Chains.enough`;
+    walkers begin about the rows of ``start`` (s, v) with a ``covariance`` (v, v). Raises InputError
+    where emcee is not installed."""
     needs_emcee()
     import emcee
 
@@ -133,7 +135,19 @@ def walk(
     # its own looks at every value by itself, which takes longer than the density
     sampler.compute_log_prob = lambda x: (density(x), None)
     state = np.random.RandomState(seed % 2**32).get_state()
-    sampler.run_mcmc(emcee.State(begin, random_state=state), max(2, ceil(count / number)))
+    steps = max(2, ceil(count / number))
+    most = MOST_TIMES * steps
+    sampler.run_mcmc(emcee.State(begin, random_state=state), steps)
+    while not (chains := _chains_of(sampler)).enough and steps < most:
+        wanted = ceil(SPARE_STEPS * (WARM_UP + ENOUGH) * chains.tau.max())
+        more = min(max(wanted - steps, steps // 2), most - steps)
+        sampler.run_mcmc(None, more)  # from where the walkers are
+        steps += more
+    return chains
+
+
+def _chains_of(sampler: Any) -> Chains:
+    """All steps of a sampler but those that still depend on where the walkers began."""
     draws = sampler.get_chain()
     dropped = min(ceil(WARM_UP * autocorrelation_time(draws).max()), len(draws) // 2)
     draws = draws[dropped:]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import ceil
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -218,7 +219,7 @@ class SampleResult(Result):
             tau = max(c.autocorrelation.values())
             found.append(
                 f"{c.steps} steps are fewer than {ENOUGH} autocorrelation times of {tau:.1f}: give"
-                f" --draws {enough_draws(tau):.2g} or more"
+                f" --draws {ceil(enough_draws(tau) / 1e4) * 10_000} or more"
             )
         if self.emulator.share_of_sigma > ROUGH:
             found.append(
