@@ -23,6 +23,7 @@ from .errors import TyrecalError
 
 MAX_FILE_BYTES = 50_000_000  # bytes of a file that is read whole; ours are a hundredth of it
 NOFOLLOW = getattr(os, "O_NOFOLLOW", 0)  # Windows has none: there `refuse_link` is all
+PICTURE_FORMATS = ("png", "svg", "pdf")
 
 
 def _tyre(study: str, overview: str) -> tuple[str, ...]:
@@ -89,7 +90,13 @@ def results(folder: Path, study: str) -> list[Path]:
     """Files in ``folder`` that are results of ``study``."""
     stem = study.replace("-", "_")  # of a study from outside
     patterns = RESULTS.get(study, (f"{stem}.*", f"{stem}_*"))
-    return [file for pattern in patterns for file in folder.glob(pattern)]
+    pictures = [
+        pattern.removesuffix("png") + kind
+        for pattern in patterns
+        if pattern.endswith(".png")
+        for kind in PICTURE_FORMATS[1:]
+    ]
+    return [file for pattern in (*patterns, *pictures) for file in folder.glob(pattern)]
 
 
 def read_runs(folder: Path) -> dict[str, dict[str, Any]]:

@@ -25,7 +25,7 @@ from ..diagnose.test_calibrated import exact
 from ..diagnose.test_diagnosis import diagnosed
 from ..diagnose.toy import Toy
 
-NUMBER = "0123456789.\N{MINUS SIGN} "
+NUMBER = "0123456789.+\N{MINUS SIGN} "
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def words(figure: Figure) -> str:
 def test_residuals(found: Diagnosis, tmp_path: Path) -> None:
     figure = drawn(found, tmp_path)[0]
     panels = figure.axes
-    assert [axes.get_title("left") for axes in panels] == ["[0,0]", "in-plane", "lateral"]
+    assert [axes.get_title("left") for axes in panels] == ["[0,0]", "in-plane", "out-of-plane"]
     shown = [bar.lines[0].get_ydata() for axes in panels for bar in axes.containers]
     assert sorted(np.concatenate(shown)) == pytest.approx(sorted(100 * found.gap.residuals))
     assert len(shown) == 3 * 3  # pressures
@@ -123,7 +123,7 @@ def test_what_the_rim_lets_go_of_a_bead_is_drawn_as_the_bead() -> None:
 
 
 def test_section_map(tmp_path: Path) -> None:
-    """The part that explains most is the warmest, and its row stands in the table."""
+    """The part that explains most is the warmest, and has the longest bar."""
     places = (
         PartChange("upper sidewall", 9.0, 20.0, 21.4, 8.0, 4.9, ("carcass cords",)),
         PartChange("tread", -3.0, 20.0, -0.2, 10.0, -0.01, ()),
@@ -131,13 +131,52 @@ def test_section_map(tmp_path: Path) -> None:
     case = load_case(CASES / "p235_75r17.yaml")
     figure = draw_section_map(parts_data(case, [place.region for place in places]), places, 1)
     save(figure, tmp_path / "section.png")
-    told = words(figure)
-    assert "+21 ± 8" in told and "\N{MINUS SIGN}3 ± 20" in told and "+4.9" in told
-    assert "+0 ± 10" in told and "-0" not in told  # no negative nothing
-    assert "upper sidewall looks like carcass cords" in told and "ln evidence" in told
+    text = words(figure)
+    assert "ln evidence" in text and "independent combination of parts" in text
+    section, bars = figure.axes
+    numbers = {label.get_text().strip() for label in bars.texts}
+    assert numbers == {"+4.9", "+0.0"}  # no negative nothing
+    names = [label.get_text() for label in bars.get_yticklabels()]
+    lengths = [bar.get_width() for bar in bars.patches]
+    assert dict(zip(names, lengths, strict=True)) == {"upper sidewall": 4.9, "tread": -0.01}
+    low, high = bars.get_ylim()
+    assert low > high  # the first part is at the top
     colours = {
         tuple(c.get_facecolor()[0].round(3))
-        for c in figure.axes[0].collections
+        for c in section.collections
         if isinstance(c, PolyCollection)
     }
     assert tuple(np.round(EVIDENCE_COLOURS(4.9 / 5), 3)) in colours and len(colours) == 2
+
+
+def test_section_map_of_many_parts_is_readable_and_as_wide_as_its_picture(tmp_path: Path) -> None:
+    """A tyre by `init` has 21 parts with long names: no text is cut or printed over another."""
+    case = load_case(CASES / "205_60r15.yaml")
+    regions = [f"lower sidewall, rim_strip_{k}" for k in range(20)] + ["crown, belt_skim"]
+    places = [PartChange(r, 9.0, 20.0, 1.0, 8.0, 4.2 - 0.2 * k, ()) for k, r in enumerate(regions)]
+    figure = draw_section_map(parts_data(case, regions), places, 0)
+    save(figure, tmp_path / "section.png")
+    section, bars = figure.axes
+    assert "12 likeliest of 21 parts" in words(figure) and len(bars.patches) == 12
+    z = np.concatenate([p.vertices[:, 0] for c in section.collections for p in c.get_paths()])
+    ends = section.transData.transform([(z.min(), 0.0), (z.max(), 0.0)])[:, 0]
+    assert np.ptp(ends) > 0.6 * figure.bbox.width
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [0, 2])
+def test_the_limit_of_a_named_effect_is_no_text_on_a_bar(
+    found: Diagnosis, count: int, tmp_path: Path
+) -> None:
+    """With one bar its words stood on the bar: they are in the legend."""
+    few = tuple(h for h in found.hypotheses if h.key in ("none", "outside", "e0")[-1 - count :])
+    d = replace(found, hypotheses=few)
+    figure = pictures.draw_probabilities(d)
+    save(figure, tmp_path / "bars.png")
+    (axes,), (legend,) = figure.axes, figure.legends
+    assert "named from here on" in " ".join(text.get_text() for text in legend.get_texts())
+    assert {text.get_text() for text in axes.texts} == {
+        f"{d.probabilities[h.key]:.2f}" for h in few
+    }
+    (line,) = (each for each in axes.lines if each.get_linestyle() == ":")
+    assert list(line.get_xdata()) == [0.7, 0.7]

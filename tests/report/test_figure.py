@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
+import pytest
 from matplotlib.figure import Figure
 
-from tyrecal.report.figure import COLOURS, GREY, in_house_style, new_figure, svg
+from tyrecal.files import PICTURE_FORMATS
+from tyrecal.report.figure import COLOURS, GREY, in_house_style, new_figure, save, svg
 
 NAME = "$x$ & <sons>"
 
@@ -35,3 +38,32 @@ def test_words_are_text_and_colours_the_page_s() -> None:
     assert text.count("$x$ &amp; &lt;sons&gt;") == 2  # one of them for who does not see it
     assert "var(--s1)" in text and "var(--edge)" in text and "var(--panel)" in text
     assert not re.search(r"#[0-9a-f]{6}|https?:|data:|<style|\d\.\d{3}", text)
+
+
+@in_house_style
+def over_decades() -> Figure:
+    figure = new_figure(3.0, 2.0)
+    axes = figure.add_subplot()
+    axes.loglog([1, 1000], [1e-6, 0.5])
+    axes.set_title(NAME)
+    return figure
+
+
+@pytest.mark.parametrize("kind", PICTURE_FORMATS)
+def test_formats(kind: str, tmp_path: Path) -> None:
+    """Each is of its kind and the same again; numbers of decades are no mathematical markup."""
+    contents = []
+    for name in ("a", "b"):
+        figure, path = over_decades(), tmp_path / f"{name}.{kind}"
+        save(figure, path)
+        contents.append(path.read_bytes())
+    start = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[kind]
+    assert contents[0].startswith(start) and contents[0] == contents[1]
+    figure.canvas.draw()
+    (axes,) = figure.axes
+    labels = [label.get_text() for label in (*axes.get_xticklabels(), *axes.get_yticklabels())]
+    assert {"10", "100", "0.1"} <= {*labels} and not any("$" in text for text in labels)
+    if kind == "svg":
+        text = contents[0].decode()
+        assert ">0.01<" in text and "mathdefault" not in text
+    assert "mathdefault" not in svg(over_decades(), "", "a")

@@ -43,6 +43,7 @@ def every_text_readable(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
         drawn.clear()
         draw_figure(canvas)
         said.extend(each.get_text() for each in drawn)
+        assert not any("\\math" in words for words in said)
         check(canvas.figure, list(drawn))
 
     monkeypatch.setattr(Text, "draw", text)

@@ -83,7 +83,7 @@ def draw_residuals(
             )
             if after is not None:
                 panel.plot(at, 100 * after[chosen], "o", mfc="white", mec=colour, ms=5, zorder=3)
-        panel.set_title(name, loc="left")
+        panel.set_title("out-of-plane" if name == "lateral" else name, loc="left")
         kinds = name == "[0,0]"
         if kinds:
             panel.set_xticks([0, 1], ["lateral", "torsional"])
@@ -123,15 +123,16 @@ def draw_probabilities(d: Diagnosis) -> Figure:
     axes.plot(prior, place, "|", color="black", ms=13, mew=1.5, label="before the data")
     for y, value, least in zip(place, p, prior, strict=True):
         axes.text(max(value, least) + 0.01, y, f"{value:.2f}", va="center", fontsize=8)
-    axes.axvline(0.7, color=GREY, lw=0.8, ls=":")
-    axes.text(0.71, -0.45, "named from here on,\nalone or summed", fontsize=8, color="0.3")
+    axes.axvline(0.7, color=GREY, lw=0.8, ls=":", label="named from here on, alone or summed")
     axes.set_yticks(place, [fill(_short(d, h.key), 2 * MAX_LETTERS) for h in order])
     axes.set_xlim(0, max(1.0, 1.1 * max(p)))
     axes.set_xlabel("probability")
     title = PROBABILITY_TITLES.get(d.verdict.kind)
     none = no_gap_words(d.probabilities[NONE]).capitalize()
     axes.set_title(title or f"{none}; how likely each effect is", loc="left")
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower right", frameon=False)
+    figure.legend(
+        *axes.get_legend_handles_labels(), loc="outside lower right", ncols=2, frameon=False
+    )
     return figure
 
 

@@ -1,4 +1,4 @@
-"""What all pictures share: canvas, type, colours; and how they are written, PNG or SVG."""
+"""What all pictures share: canvas, type, colours; and how they are written: PNG, SVG or PDF."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from markupsafe import Markup
 from matplotlib import colormaps, rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatter
 from PIL import Image
 
 from ..files import whole
@@ -43,6 +44,8 @@ in_house_style = rc_context(
         "font.sans-serif": ["DejaVu Sans", "Verdana"],
         "font.monospace": ["DejaVu Sans Mono"],
         "svg.fonttype": "none",
+        "svg.hashsalt": "tyrecal",  # the same figure gives the same ids
+        "pdf.fonttype": 42,
         "text.parse_math": False,  # a name may have a $
     }
 )
@@ -67,8 +70,37 @@ def headline(figure: Figure, words: str) -> None:
             return
 
 
+class PlainLogFormatter(LogFormatter):
+    """Numbers of a logarithmic axis as 0.1, 10 and 1e-05, at the ticks that Matplotlib labels: its
+    own formatter writes mathematical markup, which pictures do not parse."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return f"{x:g}" if super().__call__(x, pos) else ""
+
+
+def use_plain_numbers(figure: Figure) -> None:
+    """Replace the formatters of logarithmic axes by `PlainLogFormatter`."""
+    for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
+        major, minor = axis.get_major_formatter(), axis.get_minor_formatter()
+        if isinstance(major, LogFormatter):
+            axis.set_major_formatter(PlainLogFormatter(labelOnlyBase=major.labelOnlyBase))
+        if isinstance(minor, LogFormatter):
+            axis.set_minor_formatter(PlainLogFormatter(labelOnlyBase=minor.labelOnlyBase))
+
+
+@in_house_style
 def save(figure: Figure, path: Path) -> None:
-    """Write a PNG of 256 colours: a third of the size, and no difference to see."""
+    """Write a picture in the format of the suffix of ``path``, one of `files.PICTURE_FORMATS`.
+
+    A PNG has 256 colours: a third of the size, and no difference to see.
+    """
+    use_plain_numbers(figure)
+    kind = path.suffix[1:]
+    if kind != "png":
+        undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
+        with whole(path) as partial:
+            figure.savefig(partial, format=kind, metadata=undated[kind])
+        return
     canvas = figure.canvas
     assert isinstance(canvas, FigureCanvasAgg)
     canvas.draw()
@@ -82,6 +114,7 @@ def save(figure: Figure, path: Path) -> None:
 def svg(figure: Figure, words: str, key: str) -> Markup:
     """The figure as part of a page, told in ``words`` to who does not see it. The same figure gives
     the same text; ``key``: what its ids begin with, another one for each figure of a page."""
+    use_plain_numbers(figure)
     file = io.StringIO()
     nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))
     figure.savefig(file, format="svg", transparent=True, metadata=nothing)

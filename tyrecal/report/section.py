@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -30,11 +29,10 @@ AXES_WIDTH, LINE_HEIGHT, REST = (
     1.05,
 )  # inches: of the drawing, of a line of text, of all else
 DETAIL = 4.0  # magnification of the belt's edge
-# of 40 steps: a colour bar of 50 or more would be a bitmap
-EVIDENCE_COLOURS = LinearSegmentedColormap.from_list(
-    "evidence", ["#EDEDED", "#F5C98A", "#D55E00"], 40
-)
+EVIDENCE_COLOURS = LinearSegmentedColormap.from_list("evidence", ["#EDEDED", "#F5C98A", "#D55E00"])
 FULL_COLOUR = 5.0  # ln evidence
+MAP_WIDTH = 7.4  # inches: of the map of parts
+MAX_BARS = 12  # parts with a bar
 AXIS_LABELS = {"xlabel": "z along the axle, mm", "ylabel": "r from the axle, mm"}
 
 
@@ -145,15 +143,13 @@ def _inner_crown(around: Array) -> float:
 def draw_section_map(
     parts: DiagnosisSection, places: Sequence[PartChange], effective_rank: int | None = None
 ) -> Figure:
-    """Parts of the section, coloured by the evidence for a change of them alone; with an
-    ``effective_rank`` a table of them beside, and what the data see."""
+    """Parts of the section, coloured by the evidence for a change of them alone; below, that
+    evidence as bars, the largest first; with an ``effective_rank`` what the data see."""
     by_name: dict[str, PartChange] = {}
     for place in places:  # of several rubbers in a region the likelier one
         by_name.setdefault(place.region.split(",")[0], place)
-    table = effective_rank is not None
-    figure = new_figure(10.0 if table else 6.0, 5.2)
-    widths = [5, 4] if table else [1]
-    axes, *beside = figure.subplots(1, len(widths), squeeze=False, width_ratios=widths)[0]
+    figure = new_figure(MAP_WIDTH, 8.0)
+    axes, bars = figure.subplots(2, 1)
     axes.set(aspect="equal", **AXIS_LABELS)
     for name, cells in parts.areas.items():
         look: dict[str, Any] = {"fc": _colour(by_name.get(name)), "ec": "0.7", "lw": 0.3}
@@ -163,29 +159,32 @@ def draw_section_map(
         axes.add_collection(LineCollection(lines, color=colour, lw=2.2, zorder=2))
         axes.add_collection(LineCollection(lines, color="0.3", lw=0.5, zorder=3))
     axes.autoscale_view()
-    if effective_rank is not None:
-        _write_table(beside[0], places, effective_rank)
-    headline(figure, "One part changed alone: how well it explains what calibration leaves")
-    scale = ScalarMappable(Normalize(0, FULL_COLOUR), EVIDENCE_COLOURS)
-    bar = figure.colorbar(scale, ax=axes, orientation="horizontal", shrink=0.6, extend="max")
-    bar.set_label("ln evidence against no change")
+    _draw_bars(bars, places)
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    heights = 0.5 + 0.85 * MAP_WIDTH * (high - low) / (right - left), 0.8 + 0.23 * len(bars.patches)
+    axes.get_gridspec().set_height_ratios(heights)
+    figure.set_figheight(sum(heights) + 0.9)
+    words = "One part changed alone: how well it explains what calibration leaves."
+    rank_words = "" if effective_rank is None else map_resolution(effective_rank)
+    headline(figure, f"{words} {rank_words}".rstrip())
     return figure
 
 
-def _write_table(axes: Axes, places: Sequence[PartChange], effective_rank: int) -> None:
-    """Parts as lines of text, and what can be told from them."""
-    axes.axis("off")
-    table = [f"{'part':22s}   stiffness, %     mass, %   ln evidence"]
-    table += [
-        f"{p.region[:22]:22s}   {_spread(p.stiffness_percent, p.stiffness_sigma)}"
-        f"   {_spread(p.mass_percent, p.mass_sigma)}   {_signed(p.evidence, 1):>8s}"
-        for p in places
-    ]
-    same = [f"{p.region} looks like {', '.join(p.same_as)}" for p in places if p.same_as]
-    words = [fill(map_resolution(effective_rank), 62), *same]
-    small: dict[str, Any] = {"transform": axes.transAxes, "fontsize": 7.5}
-    axes.text(0.0, 0.98, "\n".join(table), va="top", family="monospace", **small)
-    axes.text(0.0, 0.02, "\n".join(words), va="bottom", color="0.3", **small)
+def _draw_bars(axes: Axes, places: Sequence[PartChange]) -> None:
+    """The evidence of the `MAX_BARS` likeliest parts in the colours of the map, with numbers."""
+    shown = places[:MAX_BARS]
+    rows, evidence = range(len(shown)), [place.evidence for place in shown]
+    axes.barh(rows, evidence, color=[_colour(p) for p in shown], ec="0.7", lw=0.3)
+    for row, value in zip(rows, evidence, strict=True):
+        axes.text(max(value, 0.0), row, f" {_signed(value, 1)}", va="center", fontsize=8)
+    axes.axvline(0, color=GREY, lw=0.8)
+    axes.set_yticks(rows, [place.region.replace("_", " ") for place in shown])
+    axes.set_xlim(min(0.0, 1.2 * min(evidence)), max(1.0, 1.12 * max(evidence)))
+    axes.set_xlabel("ln evidence: the part changed, over no change")
+    axes.invert_yaxis()
+    if len(places) > len(shown):
+        title = f"the {len(shown)} likeliest of {len(places)} parts"
+        axes.set_title(title, loc="left", fontsize=9, color="0.3")
 
 
 def _colour(place: PartChange | None) -> tuple[float, ...]:
@@ -198,10 +197,6 @@ def _signed(value: float, digits: int) -> str:
     """With a sign, a true minus, and no -0."""
     text = f"{round(value, digits) + 0.0:+.{digits}f}"
     return text.replace("-", MINUS)
-
-
-def _spread(percent: float, sigma: float) -> str:
-    return f"{_signed(percent, 0):>5s} ± {sigma:<4.0f}"
 
 
 def _points(flat: Sequence[float]) -> Array:
