@@ -149,3 +149,37 @@ def test_store_and_no_store_exclude_each_other(
     monkeypatch.setenv("TYRECAL_STORE", "there")
     assert run("modes", "none.yaml", "--no-store") == 2
     assert "no such file" in capsys.readouterr().err
+
+
+def test_every_command_that_draws_offers_the_formats() -> None:
+    """The same commands have --pictures and --figure-format."""
+    from tyrecal.cli.main import cli
+
+    def names(group: click.Group, flag: str) -> set[str]:
+        context, offering = click.Context(group), set()
+        for name in group.list_commands(context):
+            each = group.get_command(context, name)
+            assert each is not None
+            offering |= names(each, flag) if isinstance(each, click.Group) else set()
+            offering |= {name} if any(flag in option.opts for option in each.params) else set()
+        return offering
+
+    drawing = names(cli, "--pictures")
+    assert {"fit", "modes", "diagnose", "init", "import"} <= drawing
+    assert drawing == names(cli, "--figure-format")
+
+
+def test_a_picture_in_another_format(tmp_path: Path) -> None:
+    target = tmp_path / "t.yaml"
+    assert run("init", "205/60R15", "--output", str(target), "--figure-format", "svg") == 0
+    assert {path.suffix for path in tmp_path.iterdir()} == {".yaml", ".csv", ".svg"}
+    assert "carcass" in target.with_suffix(".svg").read_text()
+
+
+def test_pictures_of_an_earlier_format_are_set_aside(tmp_path: Path) -> None:
+    from tyrecal.files import results
+
+    for name in ("convergence.svg", "fit_section.pdf", "fit_mode_1_0.svg", "footprint.svg"):
+        (tmp_path / name).touch()
+    stale = {path.name for path in results(tmp_path, "fit")}
+    assert stale == {"convergence.svg", "fit_section.pdf", "fit_mode_1_0.svg"}

@@ -82,6 +82,7 @@ file = Place(exists=True, folder=False)
     help="Write a case with the effect in it, and do nothing else; repeatable.",
 )
 @option("--pictures/--no-pictures", default=True, help="Draw what was found.")
+@options.figure_format
 @options.study
 def command(
     case: Path,
@@ -173,10 +174,9 @@ def command(
     run.write_text("diagnosis.md", words)
     if pictures:
         from ..report.diagnosis_pictures import draw_diagnosis
-        from ..report.figure import save
 
-        for name, figure in draw_diagnosis(found.diagnosis, parts).items():
-            save(figure, run.new / f"diagnosis_{name}.png")
+        figures = draw_diagnosis(found.diagnosis, parts)
+        run.write_figures({f"diagnosis_{name}": figure for name, figure in figures.items()})
     run.finish()
     terminal.result(told.content())
     terminal.say(words)

@@ -38,6 +38,7 @@ from .parameters import Number, Place, option
 @option("--pictures/--no-pictures", default=True, help="Draw each signature.")
 @options.assignments
 @options.jobs
+@options.figure_format
 @options.study_one_by_one
 def command(
     name: str | None,

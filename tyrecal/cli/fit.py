@@ -65,6 +65,7 @@ if TYPE_CHECKING:
 @option("--pictures/--no-pictures", default=True, help="Draw convergence, section, modes.")
 @options.dry_run
 @options.scheduler
+@options.figure_format
 @options.study
 def command(
     case: Path,
@@ -194,7 +195,8 @@ def _write_shapes(
     if pictures:
         from ..report.pictures import draw_fit
 
-        draw_fit(run.new, loaded, values, evaluation, modes, fit.history, fit.found)
+        kind = run.figure_format
+        draw_fit(run.new, loaded, values, evaluation, modes, fit.history, fit.found, kind)
 
 
 class _Points:

@@ -26,6 +26,7 @@ DESIGNS = ("initial", "fitted")
 )
 @option("--pictures/--no-pictures", default=True, help="Draw the patches; write VTU.")
 @options.dry_run
+@options.figure_format
 @options.study
 def command(
     case: Path | None,

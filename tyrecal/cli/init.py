@@ -87,6 +87,7 @@ def _length(flag: str, text: str, unit: str = "mm") -> Any:
 @option("--force", is_flag=True, help="Write over files that exist.")
 @options.allow_unusual
 @option("--pictures/--no-pictures", default=True, help="Draw the section.")
+@options.figure_format
 @options.talking
 def command(
     size: str | None,
@@ -105,6 +106,7 @@ def command(
     force: bool,
     allow_unusual: bool,
     pictures: bool,
+    figure_format: str,
     terminal: Terminal,
 ) -> int:
     """Write the case of a tyre: from its SIZE code, or with a section of its own.
@@ -141,6 +143,7 @@ def command(
         if stated[name] is not None and (message := each.refusal(stated[name])):
             option = name.replace("_", "-")
             raise click.UsageError(f"--{option} {stated[name]:g}: {message}{ALL_THE_SAME}")
+    suffix = f".{figure_format}" if pictures else ""
     tyre = parse_size(size) if size is not None else None
     if deck_files:
         if file or lengths_given(stated):
@@ -156,7 +159,7 @@ def command(
         else:
             numbers = _numbers_of_marks(read, assigned)
             _from_deck(
-                read, numbers, words, pressure_kPa, output, pictures, force, allow_unusual, terminal
+                read, numbers, words, pressure_kPa, output, suffix, force, allow_unusual, terminal
             )
         return 0
     given = {"crown": crown_mm, "sidewall": sidewall_mm, "bead": bead_mm, "belt": belt_width_mm}
@@ -175,7 +178,7 @@ def command(
         assert tyre is not None
         draft = from_size(tyre, lengths, pressure_kPa, target.stem)
     draft.check(allow_unusual)
-    _write(draft, file, target, target.with_suffix(".png") if pictures else None, force, terminal)
+    _write(draft, file, target, target.with_suffix(suffix) if suffix else None, force, terminal)
     return 0
 
 
@@ -264,12 +267,13 @@ def _from_deck(
     size: str,
     pressure_kPa: float | None,
     output: Path | None,
-    pictures: bool,
+    suffix: str,
     force: bool,
     allow_unusual: bool,
     terminal: Terminal,
 ) -> None:
-    """Write the case of a deck beside it, say what is in the deck, and draw it."""
+    """Write the case of a deck beside it, say what is in the deck, and draw it; ``suffix``: of the
+    picture, "" for none."""
     from ..files import whole
     from ..simulate.deck.own import trial
     from ..tyre.case.own_case import own_case
@@ -281,7 +285,7 @@ def _from_deck(
     if not allow_unusual and (slips := list(deck_slips(deck, {**deck.numbers, **numbers}))):
         raise InputError("\n".join(map(str, slips)))
     text = own_case(deck, flat, size, pressure_kPa, numbers)
-    target, picture = _beside(deck.path, output, pictures, force)
+    target, picture = _beside(deck.path, output, suffix, force)
     mass_kg = trial(flat)
     with whole(target) as partial:
         partial.write_text(text, encoding="utf-8")
@@ -319,14 +323,12 @@ def _from_decks(
     terminal.say(f"next: {_modes(target)} --solver abaqus")
 
 
-def _beside(
-    file: Path, output: Path | None, pictures: bool, force: bool
-) -> tuple[Path, Path | None]:
+def _beside(file: Path, output: Path | None, suffix: str, force: bool) -> tuple[Path, Path | None]:
     """Where the case of a deck goes, and its picture. Raises InputError, UsageError."""
     target = output or file.with_suffix(".yaml")
     if target.resolve().parent != file.resolve().parent:
         raise click.UsageError(f"--output '{target}': the case stands in its deck's folder")
-    picture = target.with_suffix(".png") if pictures else None
+    picture = target.with_suffix(suffix) if suffix else None
     for path in [target, *([picture] if picture else [])]:
         if path.exists() and not force:
             raise InputError(f"'{path}' exists already; give --force to write over it")

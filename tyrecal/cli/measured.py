@@ -115,6 +115,7 @@ def command() -> None:
     help="Leave out repeats that contradict each other, and list them, instead of stopping.",
 )
 @option("--pictures/--no-pictures", default=True, help="Draw functions and shapes beside the CSV.")
+@options.figure_format
 @options.talking
 def import_files(
     files: tuple[Path, ...],
@@ -131,6 +132,7 @@ def import_files(
     response: str | None,
     keep_going: bool,
     pictures: bool,
+    figure_format: str,
     terminal: Terminal,
 ) -> int:
     """Write the measurements in FILEs to one CSV, which 'tyrecal diagnose --measured' and
@@ -164,7 +166,7 @@ def import_files(
     if pictures and found.runs:
         from ..report.measured import draw_measured
 
-        draw_measured(output.with_suffix(".png"), found.runs)
+        draw_measured(output.with_suffix(f".{figure_format}"), found.runs)
     for note in found.notes:
         terminal.note(note)
     for doubt in found.doubts:

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     " over the load (default: yes).",
 )
 @options.dry_run
+@options.figure_format
 @options.study
 def command(
     case: Path,
@@ -111,7 +112,7 @@ def command(
     if pictures:
         from ..report.pictures import draw_evaluation
 
-        draw_evaluation(run.new, "modes", loaded, evaluation, modes)
+        draw_evaluation(run.new, "modes", loaded, evaluation, modes, run.figure_format)
     run.finish()
     from ..report.table import shown, tyre_doubts
 

@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from ..files import PICTURE_FORMATS
 from . import arguments, complete
 from .parameters import Number, OneOf, Place, Whole, option
 from .terminal import SOLVERS, Terminal
@@ -203,6 +204,13 @@ report = option(
     is_flag=True,
     help="Write report.html, a page of all that the folder of results holds.",
 )
+figure_format = option(
+    "--figure-format",
+    type=OneOf(PICTURE_FORMATS),
+    default="png",
+    show_default=True,
+    help="Format of the pictures.",
+)
 TALK = (as_json, quiet, verbose)
 ONE_BY_ONE = (mesh, solver, solver_command, output, store, no_store, allow_unusual, *TALK)
 STUDY = (jobs, *ONE_BY_ONE[:-3], report, *TALK)
@@ -255,6 +263,7 @@ class Study:
     allow_unusual: bool
     jobs: int = 1
     report: bool = False
+    figure_format: str = "png"
 
     def load(
         self, path: Path, assigned: tuple[str, ...] = (), pressure_kPa: float | None = None
@@ -293,6 +302,7 @@ class Study:
 
         block = provenance(loaded, evaluator.solver, measured, **state)
         run = Run(loaded.path, self.output, command, evaluator.solver, study, block, loaded)
+        run.figure_format = self.figure_format
         evaluator.folder, evaluator.keep = run.runs, self.terminal.verbose
         evaluator.store = run.open_store(self.store, self.no_store)
         run.counts = counts = evaluator.counts

@@ -138,6 +138,7 @@ class Run:
         self.study, self.provenance, self.loaded = study or command, provenance, loaded
         self.folder = self.placed = output or root() / case.stem
         self.started = datetime.now(UTC).isoformat(timespec="seconds")
+        self.figure_format = "png"
         self._clock, self._finished = time.monotonic(), False
         self.store: Store | None = None
         self.counts: Counts | None = None
@@ -180,12 +181,16 @@ class Run:
         found = found.stamped(self.provenance or {})
         for name, text in found.texts().items():
             self.write_text(name, text)
+        self.write_figures(figures or {})
+        return found
+
+    def write_figures(self, figures: Mapping[str, Figure]) -> None:
+        """Write figures by name, as files of the run's format."""
         if figures:
             from ..report.figure import save
 
             for name, figure in figures.items():
-                save(figure, self.new / f"{name}.png")
-        return found
+                save(figure, self.new / f"{name}.{self.figure_format}")
 
     def write_json(self, name: str, content: Any) -> Any:
         """Write a result file with its provenance; returns what stands in it."""

@@ -45,6 +45,7 @@ from .parameters import Number, Place, Whole, option
     " the case's).",
 )
 @option("--pictures/--no-pictures", default=True, help="Draw the corner picture.")
+@options.figure_format
 @options.study
 def command(
     case: Path,
@@ -100,11 +101,9 @@ def command(
         sample = run(loaded, evaluator, readings, draws, seed, at_kPa, study.jobs, bar.begin)
     found = output.write(result(sample, seed))
     if pictures:
-        from ..report.figure import save
         from ..report.sample import figures
 
-        for name, figure in figures(found).items():
-            save(figure, output.new / f"{name}.png")
+        output.write_figures(figures(found))
     output.write_text("sample_draws.csv", draws_csv(sample))
     output.finish()
     terminal.result(found.content())

@@ -18,6 +18,7 @@ from .taken import taken
 @options.pressures
 @options.fitted("Sweep the design that 'tyrecal fit' found for this case, too.")
 @option("--pictures/--no-pictures", default=True, help="Draw frequencies over pressure.")
+@options.figure_format
 @options.study
 def command(
     case: Path | None,

@@ -22,10 +22,15 @@ from .vtu import write_vtu
 
 
 def draw_evaluation(
-    folder: Path, study: str, case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode]
+    folder: Path,
+    study: str,
+    case: LoadedCase,
+    evaluation: Evaluation,
+    modes: Sequence[Mode],
+    kind: str = "png",
 ) -> None:
-    """STUDY_section.png, all modes (at most nine of them) in modes.png or STUDY_modes.png and, per
-    mode, STUDY_mode_C_M[_KIND].png and .vtu.
+    """STUDY_section, all modes (at most nine of them) in modes or STUDY_modes and, per mode,
+    STUDY_mode_C_M[_KIND], in a format ``kind`` of `files.PICTURE_FORMATS`; each mode as VTU too.
 
     Only modes known on the whole section are drawn: a 3-D solver gives them on the crown alone.
     Of a tyre without a section nothing is.
@@ -36,13 +41,13 @@ def draw_evaluation(
     moved, modes = placed(evaluation, modes, mesh)
     section = section_data(case, mesh, moved)
     figure = draw_section(section, case.case.name, evaluation.pressure_kPa)
-    save(figure, folder / f"{study}_section.png")
+    save(figure, folder / f"{study}_section.{kind}")
     if modes:
-        overview = "modes.png" if study == "modes" else f"{study}_modes.png"
+        overview = f"modes.{kind}" if study == "modes" else f"{study}_modes.{kind}"
         draw_modes_overview(folder / overview, modes, mesh)
     for mode in modes:
         stem = folder / f"{study}_{file_name(mode.label)}"
-        draw_mode(stem.with_suffix(".png"), mode, mesh)
+        draw_mode(stem.with_suffix(f".{kind}"), mode, mesh)
         write_vtu(stem.with_suffix(".vtu"), mode, mesh)
 
 
@@ -54,13 +59,14 @@ def draw_fit(
     modes: Sequence[Mode],
     history: Sequence[Mapping[str, Any]],
     fit: FitResult,
+    kind: str = "png",
 ) -> None:
-    """The pictures of the fitted design, convergence.png and, over several states,
-    fit_states.png."""
-    draw_evaluation(folder, "fit", with_values(case, values), evaluation, modes)
-    save(draw_convergence(history, fit.objective_unit), folder / "convergence.png")
+    """The pictures of the fitted design, of the convergence and, over several states, fit_states;
+    ``kind``: their format."""
+    draw_evaluation(folder, "fit", with_values(case, values), evaluation, modes, kind)
+    save(draw_convergence(history, fit.objective_unit), folder / f"convergence.{kind}")
     if fit.states and fit.modes:
-        save(draw_states(fit), folder / "fit_states.png")
+        save(draw_states(fit), folder / f"fit_states.{kind}")
 
 
 def file_name(label: Label) -> str:

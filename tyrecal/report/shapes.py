@@ -73,6 +73,7 @@ class _Sheet:
 
     def add(self, collection: Collection) -> None:
         collection.set_transform(self.figure.dpi_scale_trans)
+        collection.set_rasterized(isinstance(collection, TriMesh))  # of SVG and PDF: small files
         self.figure.add_artist(collection)
 
     def text(self, x: float, y: float, words: str, **look: Any) -> None:
