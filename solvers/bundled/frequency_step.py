@@ -30,6 +30,7 @@ from .section.mechanics import total_mass
 from .section.mesh import read_mesh
 from .section.model import Model, build
 from .section.point_elements import PointElements, read_point_elements
+from .section.stability import stable_factor
 
 Array = np.ndarray
 Models = Callable[[float | None, bool, bool], Model]
@@ -96,6 +97,7 @@ class FrequencyStep:
             lowest_Hz=self.row.number(1, 0.0),
         )
         self.factor = self.vibration.factor(0)
+        self.newton = self._static_factor()
 
     def modes(self) -> list[HarmonicModes]:
         """By harmonic."""
@@ -131,27 +133,22 @@ class FrequencyStep:
         n, shapes, owner, eigenvalues = (np.concatenate(x) for x in zip(*forms, strict=True))
         before = np.cumsum([0, *(len(values) for *_, values in forms[:-1])])
         owner += np.repeat(before, [len(own) for _, _, own, _ in forms])
-        fields, newton = ModeShapes(n, shapes, owner), self._newton()
-        found = {
-            v: self._rates(rows, newton, modes, fields, eigenvalues) for v, rows in asked.items()
-        }
+        fields = ModeShapes(n, shapes, owner)
+        found = {v: self._rates(rows, modes, fields, eigenvalues) for v, rows in asked.items()}
         return {v: rates for v, (rates, _) in found.items()}, {
             v: mass for v, (_, mass) in found.items()
         }
 
-    def _newton(self) -> Factor:
-        """The factor of Newton's tangent at the inflated state."""
-        factor = self.factor
+    def _static_factor(self) -> Factor:
+        """`stable_factor` of the inflated tyre, or that of its vibration if it is the same."""
         if self.dynamic_Hz is not None or self.vibration.shift:
             still = _model(self.tyre, self.step, None, False)
-            acting = loads(still, self.step)
-            factor = Vibration(still, self.tyre.U, acting, self.equations, 0.0).factor(0)
-        return factor.tyre if isinstance(factor, Bordered) else factor
+            return stable_factor(still, self.tyre.U, loads(still, self.step), self.equations)
+        return self.factor.tyre if isinstance(self.factor, Bordered) else self.factor
 
     def _rates(
         self,
         tangents: list[Tangent],
-        newton: Factor,
         modes: list[HarmonicModes],
         fields: ModeShapes,
         eigenvalues: Array,
@@ -162,7 +159,7 @@ class FrequencyStep:
         seeded = replace(self.tyre, section=section, revolve=revolve, models=models)
         step, U, own = steps[self.place], seeded.U, seeded.request.own_frequency
         still = moving = _model(seeded, step, None, False)
-        V = state_rate(still, U, loads(still, step), self.equations, newton)
+        V = state_rate(still, U, loads(still, step), self.equations, self.newton)
         if self.dynamic_Hz is not None or own:
             moving = _model(seeded, step, self.dynamic_Hz, own)
         wheel, air = seeded.wheel_and_cavity(moving, step)

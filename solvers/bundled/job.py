@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -12,7 +14,7 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from ..errors import RunFailed
-from ..language.text import COMPLEX_STEP, Block, DeckError, Row, read_deck
+from ..language.text import COMPLEX_STEP, Block, DeckError, read_deck
 from .deck.request import Request, read_request, read_sector
 from .deck.start import PressedStart, read_pressed_start, read_start
 from .deck.steps import Deck, DeckStep
@@ -25,12 +27,13 @@ from .results import StepResult, write
 from .road.road_data import ROAD_NUMBERS, InflatedTangent, ModesAtLoad, RoadData, read_road
 from .section import mechanics
 from .section.band import Numbering
-from .section.boundary import keeps_half_turn, numbering
+from .section.boundary import keeps_half_turn, numbering, vibrating
 from .section.inflation import equilibrium
 from .section.loads import loads, pressures
 from .section.mesh import DeckMesh, read_mesh
 from .section.model import Model, build
 from .section.parts.pressure import Pressure
+from .section.stability import slower, stable_factor
 
 
 def run(folder: Path, job: str, oldjob: str | None, time_limit_s: float = float("inf")) -> None:
@@ -86,11 +89,14 @@ class Job:
         section, revolve, self.steps = deck.read([])
         self.time_limit_s, self.began_s = time_limit_s, time.thread_time()
         self.road = read_road(revolve)
-        mesh, half = read_mesh(section), False
-        if self.road is None:
-            filled = [section, list(sector)] if sector else [section]
-            half = all(keeps_half_turn(read_mesh(each), each, self.steps) for each in filled)
-        models = cache(partial(build, section, half=half))
+        mesh = read_mesh(section)
+        filled = [section, list(sector)] if sector else [section]
+        symmetric = [self._off_road(s) for s in self.steps if not (self.road and s.forces)]
+        half = all(keeps_half_turn(read_mesh(each), each, symmetric) for each in filled)
+        self.inflating = cache(partial(build, section, half=half))
+        models = self.inflating
+        if half and self.road:  # a tyre on the road is whole
+            half, models = False, cache(partial(build, section))
         self.model = models(None, True, False)
         U = np.zeros((len(mesh.X), 3))
         check = self._check_time
@@ -104,12 +110,16 @@ class Job:
         """Results of every frequency step, or of the last static one where there is none."""
         results: list[StepResult] = []
         for place, step in enumerate(self.steps):
-            if step.procedure.name == "STATIC":
-                self._static(step)
-            else:
-                work = FrequencyStep(self.tyre, place, step)
-                modes = work.modes()
-                results.append(self._result(step, modes, *work.rates(modes)))
+            with self._slower(step):
+                if step.procedure.name == "STATIC":
+                    self._static(step)
+                else:
+                    work = FrequencyStep(self.tyre, place, step)
+                    modes = work.modes()
+                    results.append(self._result(step, modes, *work.rates(modes)))
+        if not results:
+            with self._slower(self.steps[-1]):
+                self._judge(self.steps[-1])
         return results or [self._result(self.steps[-1], [], {}, {})]
 
     def press(self, start: PressedStart | None = None) -> dict[str, Any]:
@@ -129,10 +139,12 @@ class Job:
                 continue
             if step.procedure.name != "STATIC":
                 raise DeckError(step.procedure.place, "a turning tyre on a road is not honoured")
-            step.held = self._off_road(step)
+            step.held = self._off_road(step).held
             if not step.forces:
                 self._static(step)
                 continue
+            if not wanted:
+                self._judge(step)
             row = step.forces[-1]
             if row.text(0) != self.road.node or row.integer(1) != 1:
                 raise DeckError(row.place, "the force on the road is along the first axis")
@@ -175,14 +187,14 @@ class Job:
         other = Job(Deck(jobs, job, oldjob), Request())
         assert other.road is not None
         for step in other.steps:
-            step.held = other._off_road(step)
+            step.held = other._off_road(step).held
         _, model, _, acting = other._on_road()
         return model, acting, other.road
 
-    def _off_road(self, step: DeckStep) -> list[Row]:
-        """What a step holds but the road."""
-        assert self.road is not None
-        return [row for row in step.held if row.text(0) != self.road.node]
+    def _off_road(self, step: DeckStep) -> DeckStep:
+        """A step that holds all that it did but the road."""
+        node = self.road.node if self.road else None
+        return replace(step, held=[row for row in step.held if row.text(0) != node])
 
     def _inflated_tangents(
         self, model: Model, equations: Numbering, acting: list[Pressure], place: int
@@ -196,7 +208,7 @@ class Job:
         for variable, rows in asked.items():
             section, revolve, steps = self.tyre.deck.read(rows)
             step, road = steps[place], read_road(revolve)
-            step.held = self._off_road(step)
+            step.held = self._off_road(step).held
             seeded = build(section, None, step.long_term)
             loads, rate = pressures(seeded, step), lambda number: np.imag(number) / COMPLEX_STEP
             U = state_rate(seeded, self.tyre.U, loads, equations, newton)
@@ -243,7 +255,7 @@ class Job:
 
     def _static(self, step: DeckStep) -> None:
         self._check_time()
-        model = self.tyre.models(None, step.long_term, False)
+        model = self.inflating(None, step.long_term, False)
         acting, equations = loads(model, step), numbering(model, step)
         guess, self.guess = self.guess, None  # of the first step
         U, factorisations = equilibrium(
@@ -251,6 +263,21 @@ class Job:
         )
         self.tyre.U = model.mesh.symmetry.field(U)
         self.factorisations += factorisations
+
+    def _judge(self, step: DeckStep) -> None:
+        """Raises RunFailed (``unstable``) unless the inflated tyre is stable."""
+        model = self.inflating(None, step.long_term, False)
+        stable_factor(model, self.tyre.U, loads(model, step), vibrating(model, step))
+
+    @contextmanager
+    def _slower(self, step: DeckStep) -> Iterator[None]:
+        """Adds the highest stable speed to the failure of a tyre that turns."""
+        try:
+            yield
+        except RunFailed as failure:
+            model = self.inflating(None, step.long_term, False)
+            acting, own = loads(model, step), (numbering(model, step), vibrating(model, step))
+            raise slower(failure, model, self.tyre.U, acting, *own, self._check_time) from None
 
     def _result(
         self,

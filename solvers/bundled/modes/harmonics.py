@@ -13,12 +13,13 @@ from typing import Protocol
 
 import numpy as np
 
-from ...errors import Indefinite, RunFailed
+from ...errors import Indefinite
 from ..section import mechanics
 from ..section.kept_fields import Coordinates, Factor
 from ..section.model import Model
 from ..section.parts.part import TyrePart, of_each_component
 from ..section.point_elements import PointElements
+from ..section.stability import unstable
 from . import bordered, lanczos
 from .bordered import Border, Bordered
 from .cavity import Coupling, GasCavity, coupling
@@ -173,11 +174,7 @@ class Vibration:
             tyre, border = self.numbering.factor(band), self._border(n)
             return Bordered(tyre, border, self.shift) if border else tyre
         except Indefinite:
-            raise RunFailed(
-                "unstable",
-                f"the inflated tyre is not stable: its stiffness for {n} waves round the"
-                " circumference is not positive definite",
-            ) from None
+            raise unstable(self._model, self._U, n) from None
 
     @property
     def plain(self) -> bool:

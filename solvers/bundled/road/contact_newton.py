@@ -8,12 +8,13 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import attrgetter
 
 import numpy as np
 from scipy.sparse import csr_matrix
 
 from ...errors import Indefinite, Inverted, NoEquilibrium
-from ..section.parts.cords import CordsAtStations
+from ..section.parts.cords import NOT_COMPRESSED, CordsAtStations
 from ..solid3d.gmres import gmres
 from ..solid3d.revolved import Revolved
 from .contact import Bound, Contact, FlatRoad
@@ -162,18 +163,14 @@ class ContactNewton:
     def _buckling(self) -> str:
         """The cords that are compressed most at the last state, in words; "": none by much."""
         parts = [part for part in self.tyre.parts if isinstance(part, CordsAtStations)]
-        strain, layer, nodes = min(
+        lowest = min(
             (part.most_compressed() for part in parts),
-            key=lambda place: place[0],
-            default=(0.0, "", np.zeros(0, int)),
+            key=attrgetter("strain"),
+            default=NOT_COMPRESSED,
         )
-        if strain > -BUCKLING_STRAIN:
+        if lowest.strain > -BUCKLING_STRAIN:
             return ""
-        r, z = self.tyre.model.mesh.X[nodes].real.mean(0)
-        return (
-            f"the cords of layer {layer} buckle, compressed by {-100 * strain:.2g} % at"
-            f" r, z = {r:.3f}, {z:.3f} m"
-        )
+        return lowest.in_words(self.tyre.model.mesh.X)
 
     def depth(self) -> str:
         """In words, how far down the last load reached has pressed the tyre; "" before any."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from operator import methodcaller
+from operator import attrgetter, methodcaller
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from . import mechanics
 from .band import Cholesky, Numbering
 from .laws.hyperelastic import Hyperelastic
 from .model import Model
+from .parts.cords import NOT_COMPRESSED, Cords
 from .parts.elastic import Elastic
 from .parts.part import TyrePart
 from .parts.pressure import Pressure
@@ -27,6 +28,7 @@ STIFFENING = 8.0  # multiple of the rubber's stiffness that inflates without tro
 SECTION_RADIUS = 0.3  # meridional radius of curvature over the section's height, for the start
 EASED = 300.0  # bulk over shear modulus of rubber that inflates in few iterations
 MIN_INERTIA, MAX_INERTIA = 4e5, 4e15  # of the inertia that holds back a wrinkling path, rad2/s2
+COMPRESSED = -1e-6  # logarithmic strain of cords beyond round-off
 TENSION_FACTOR = 0.05  # factor on the artificial tension from one iteration to the next
 
 
@@ -82,6 +84,18 @@ def stopped(reached: float, pressure: float, why: str) -> NoEquilibrium:
     """No stable equilibrium beyond ``reached`` times the load that was asked for."""
     full, found = pressure / 1e3, reached * pressure / 1e3
     return NoEquilibrium(f"inflation stopped at {found:.4g} of {full:.4g} kPa: {why}")
+
+
+def buckled_cords(model: Model, U: Array) -> str:
+    """The cords that bear compression and are compressed most at U (n, 3), in words; "" if none is
+    compressed."""
+    parts = [part for part in model.parts if isinstance(part, Cords)]
+    lowest = min(
+        (part.most_compressed(U) for part in parts),
+        key=attrgetter("strain"),
+        default=NOT_COMPRESSED,
+    )
+    return lowest.in_words(model.mesh.X) if lowest.strain < COMPRESSED else ""
 
 
 class _Solver:
@@ -145,7 +159,8 @@ def _by_pressure(solve: _Solver, start: Array, check: Callable[[], None]) -> Arr
         if further is None:
             step /= 2
             if step < MIN_PRESSURE_STEP:
-                raise stopped(reached, solve.full, solve.why)
+                cords = buckled_cords(solve.model, U)
+                raise stopped(reached, solve.full, f"{solve.why}; {cords}" if cords else solve.why)
         else:
             U, reached = further, target
             step *= 2

@@ -81,8 +81,8 @@ class Design(Protocol):
         """A solver's refusal of its texts in words for who made it."""
 
     @property
-    def advice_on_road(self) -> str:
-        """A sentence that helps where the tyre cannot be pressed; "": nothing is known."""
+    def advice_on_buckling(self) -> str:
+        """A sentence that helps if the tyre finds no stable equilibrium; "": nothing is known."""
 
     def texts(self, dialect: str, request: Mapping[str, Any]) -> dict[str, str]:
         """File name to text, without the header. Raises TemplateFailed."""

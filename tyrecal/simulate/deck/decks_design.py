@@ -84,7 +84,7 @@ class DecksDesign:
         return refusal
 
     @property
-    def advice_on_road(self) -> str:
+    def advice_on_buckling(self) -> str:
         """None: these decks are not pressed."""
         return ""
 

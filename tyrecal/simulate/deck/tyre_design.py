@@ -152,7 +152,7 @@ class TyreDesign:
         return explained(self.tyre, refusal, HEADER_LINES)
 
     @property
-    def advice_on_road(self) -> str:
+    def advice_on_buckling(self) -> str:
         """The lines that let thin cords go slack, where they bear compression."""
         return slack_cord_hint(self.case)
 

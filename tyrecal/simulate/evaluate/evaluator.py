@@ -116,7 +116,10 @@ class Evaluator:
         design = self._with(question.values)
         start = self._start_of(design)
         decks = Decks(design, question.gradients, question.modes_per_harmonic, start=start)
-        found = self._ask(decks, lambda answer, kept: evaluation(answer))
+        try:
+            found = self._ask(decks, lambda answer, kept: evaluation(answer))
+        except EvaluationFailed as failure:
+            raise _advised(failure, design) from None
         if design.is_nominal and (nominal := design.nominal):
             self.shapes.setdefault(_key(nominal), _shape(found))
         return found
@@ -436,10 +439,10 @@ def _key(design: Design) -> DesignKey:
 
 
 def _advised(failure: EvaluationFailed, design: Design) -> EvaluationFailed:
-    """A failure on the road, with what may help."""
-    if "no equilibrium" not in failure.words or not design.advice_on_road:
+    """The failure of a tyre that finds no stable equilibrium, with what may help."""
+    if failure.cause not in SETTLED or not design.advice_on_buckling:
         return failure
-    words = f"{failure.words}; {design.advice_on_road}"
+    words = f"{failure.words}; {design.advice_on_buckling}"
     return EvaluationFailed(failure.cause, words, failure.folder)
 
 

@@ -1,7 +1,8 @@
-"""A hint for cases whose thin cords bear compression: these buckle in the model when pressed.
+"""A hint for cases whose thin cords bear compression: these may buckle in the model.
 
-`validate` prints it for a case that states loads on a road, and a footprint that fails may end with
-it. The shipped cases state none: their cords bear compression as in the papers they are from.
+`validate` prints it for a case that states loads on a road, and the failure of a tyre without a
+stable equilibrium ends with it. The shipped cases state no loads: their cords bear compression as
+in the papers they are from.
 """
 
 from __future__ import annotations
@@ -44,8 +45,8 @@ def slack_cord_hint(case: LoadedCase) -> str:
     if not slack:
         return ""
     return (
-        f"cords of {', '.join(slack)} bear compression and may buckle when the tyre is pressed on a"
-        f" road; let them go slack: {''.join(copied)}{', '.join(lines)}"
+        f"cords of {', '.join(slack)} bear compression and may buckle; let them go slack:"
+        f" {''.join(copied)}{', '.join(lines)}"
     )
 
 

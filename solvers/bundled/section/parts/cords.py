@@ -16,7 +16,7 @@ with x = (ln(lambda) + w) / 2w. Outside, W is that of a slack cord or, less a co
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -82,6 +82,10 @@ class Cords(Elastic):
     def at_stations(self, nodes: int) -> CordsAtStations:
         return CordsAtStations(self, nodes)
 
+    def most_compressed(self, U: Array) -> CompressedCords:
+        """The lowest strain of cords that bear compression, at displacements U (n, 3)."""
+        return _most_compressed(self.law, self.at(U), self.layers, self.connectivity)
+
 
 class CordsAtStations(ElasticAtStations):
     """Cords at every station, which can tell where they are compressed most."""
@@ -90,14 +94,39 @@ class CordsAtStations(ElasticAtStations):
         super().__init__(part, nodes)
         self._layers = part.layers
 
-    def most_compressed(self) -> tuple[float, str, Array]:
-        """The lowest logarithmic strain of cords that bear compression, the layer that it is in,
-        and the nodes of its element."""
-        assert isinstance(self.law, LogarithmicCord)
-        bear = np.asarray(self.law.compressed) > 0
-        strain = np.where(bear, np.log(stretch(self.z)), 0.0)
-        element = int(strain.reshape(self.e, -1).min(1).argmin())
-        return float(strain.min()), self._layers[element], self.connectivity[element]
+    def most_compressed(self) -> CompressedCords:
+        """The lowest strain of cords that bear compression."""
+        return _most_compressed(self.law, self.z, self._layers, self.connectivity)
+
+
+class CompressedCords(NamedTuple):
+    """The lowest logarithmic strain, the layer that it is in, and the nodes of its element."""
+
+    strain: float
+    layer: str
+    nodes: Array
+
+    def in_words(self, X: Array) -> str:
+        """That they buckle, and where; X (n, 2): R, Z of all nodes, m."""
+        r, z = X[self.nodes].real.mean(0)
+        return (
+            f"the cords of layer {self.layer} buckle, compressed by {-100 * self.strain:.2g} % at"
+            f" r, z = {r:.3f}, {z:.3f} m"
+        )
+
+
+NOT_COMPRESSED = CompressedCords(0.0, "", np.zeros(0, int))
+
+
+def _most_compressed(
+    law: EnergyLaw, z: Array, layers: tuple[str, ...], connectivity: Array
+) -> CompressedCords:
+    """Of cords with the vectors z (p, 3), all points of an element in a row."""
+    assert isinstance(law, LogarithmicCord)
+    bear = np.asarray(law.compressed) > 0
+    strain = np.where(bear, np.log(stretch(z)), 0.0)
+    element = int(strain.reshape(len(layers), -1).min(1).argmin())
+    return CompressedCords(float(strain.min()), layers[element], connectivity[element])
 
 
 def stretch(q: Array) -> Array:

@@ -1,0 +1,93 @@
+"""Whether an inflated tyre is stable: one judgement for modes, sensitivities and the road.
+
+A tyre is stable if its static tangent stiffness without waves round the circumference, K(0), is
+positive definite. Everything that needs an inflated tyre calls `stable_factor` first, so that no
+command computes a tyre that another one refuses. What makes a tyre unstable is compressed cords: in
+the model they have no bending stiffness, and buckle in short waves along the section, so that K(0)
+and K(n) of moderate n lose their positive definiteness together.
+
+A tyre that turns is judged in the frame that turns with it, with K(0) - Omega^2 M in the wheel's
+plane. Gyroscopic forces could hold an indefinite one without damping, but not with the damping of
+rubber, which turns along (theorem of Kelvin, Tait and Chetaev). So the criterion is the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from math import sqrt
+
+import numpy as np
+
+from ...errors import Indefinite, RunFailed
+from . import mechanics
+from .band import Numbering
+from .inflation import buckled_cords, equilibrium
+from .kept_fields import Coordinates, Factor
+from .model import Model
+from .parts.part import TyrePart
+from .parts.spin import Spin
+
+Array = np.ndarray
+SPEED_TOL = 0.005  # of the stated speed, to which the highest stable one is bisected
+
+
+def stable_factor(
+    model: Model, U: Array, loads: Sequence[TyrePart], equations: Coordinates
+) -> Factor:
+    """Factor of the static tangent stiffness K(0) at the inflated state U (n, 3).
+
+    ``equations``: of all vibrations without waves round the circumference, not only those of the
+    state's own symmetry. Raises RunFailed (``unstable``).
+    """
+    stiffness = mechanics.tangents(model, U, loads, harmonics=False)[0]
+    try:
+        return equations.factor(equations.assemble(stiffness))
+    except Indefinite:
+        raise unstable(model, U) from None
+
+
+def unstable(model: Model, U: Array, n: int = 0) -> RunFailed:
+    """The failure of an inflated tyre with an indefinite K(n), and the cords that cause it."""
+    cause = buckled_cords(model, U) or (
+        f"its stiffness for {n} waves round the circumference is not positive definite; no cords"
+        " are compressed: a higher pressure or stiffer rubber may hold it"
+    )
+    return RunFailed("unstable", f"the inflated tyre is not stable: {cause}")
+
+
+def slower(
+    failure: RunFailed,
+    model: Model,
+    U: Array,
+    loads: Sequence[TyrePart],
+    state: Numbering,
+    vibrations: Coordinates,
+    check: Callable[[], None],
+) -> RunFailed:
+    """The failure of a tyre that turns, with the highest speed at which it is stable.
+
+    U (n, 3): a state to start from; ``state``, ``vibrations``: equations of the inflated state and
+    of its vibrations.
+    """
+    spins = [load for load in loads if isinstance(load, Spin)]
+    if not spins or failure.cause not in ("unstable", "no_equilibrium"):
+        return failure
+    full, low, high = sqrt(float(np.real(spins[0].spin2))), 0.0, 1.0
+    while high - low > SPEED_TOL:
+        check()
+        share = (low + high) / 2
+        acting = [
+            replace(load, spin2=share**2 * load.spin2) if isinstance(load, Spin) else load
+            for load in loads
+        ]
+        try:
+            slow, _ = equilibrium(model, state, acting, U, check)
+            stable_factor(model, model.mesh.symmetry.field(slow), acting, vibrations)
+            low = share
+        except RunFailed as slower_failure:
+            if slower_failure.cause not in ("unstable", "no_equilibrium"):
+                raise
+            high = share
+    words = f"it is stable up to {low * full:.4g} rad/s" if low else "it is unstable at any speed"
+    return RunFailed(failure.cause, f"at {full:.4g} rad/s {failure}; {words}")
