@@ -223,7 +223,7 @@ MODEL_RULES: dict[str, Rule] = {
         rows=(0, 1),
         needs=("ELSET", "MATERIAL"),
         alone=("NODAL THICKNESS", "MEMBRANE THICKNESS"),
-        honoured={"deck": "ELSET; MATERIAL; POISSON=0.5", "section": "ELSET; MATERIAL"},
+        honoured={"deck": "ELSET; MATERIAL; ~POISSON=0.5", "section": "ELSET; MATERIAL"},
         data="thickness:length",
         calculix=NO_REBAR,
     ),

@@ -76,7 +76,7 @@ def test_a_tyre_that_turns_is_told_its_highest_stable_speed() -> None:
         except RunFailed as failed:
             words[spin] = str(failed)
     assert words[174.0] == ""
-    assert words[177.5].startswith("at 177.5 rad/s the inflated tyre is not stable: the cords")
+    assert words[177.5].startswith("at 177.5 rad/s the inflated tyre is not stable: its stiffness")
     assert 174.0 < float(words[200.0].split("stable up to ")[1].split()[0]) < 177.5
 
 

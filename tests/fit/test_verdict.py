@@ -117,8 +117,8 @@ def test_a_slip_is_named_with_its_line_and_what_would_be_left(i: int, value: flo
     ],
 )
 def test_the_likely_value(value: float, model: float, meant: float | None) -> None:
-    found = likely_value(value, model, 0.015)
-    assert found == (meant if meant is None else pytest.approx(meant))
+    likely = likely_value(value, model, 0.015)
+    assert likely == (meant if meant is None else pytest.approx(meant))
 
 
 def test_exchanged_pressures_and_labels_are_named() -> None:

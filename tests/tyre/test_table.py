@@ -20,6 +20,7 @@ from tyrecal.tyre.own_deck.own_deck import OwnDeck, read_own_deck
 from tyrecal.tyre.own_deck.text import Block, OwnDeckError
 
 from . import own_decks
+from .test_membranes import maker
 
 
 def changed(*edits: tuple[str, str]) -> str:
@@ -40,6 +41,7 @@ def law(words: str, data: str) -> str:
 
 
 EXTRA = {
+    "membranes": maker(),
     "amplitude": changed(
         (
             "*STEP",

@@ -315,7 +315,7 @@ def _from_decks(
     from .deck import known_of_decks
 
     text = own_decks_case(decks, size, pressure_kPa, numbers)
-    target, _ = _beside(decks.path, output, False, force)
+    target, _ = _beside(decks.path, output, "", force)
     with whole(target) as partial:
         partial.write_text(text, encoding="utf-8")
     loaded = load_case(target, allow_unusual=True)

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from ...errors import Indefinite, Inverted, NoEquilibrium
+from ..section.inflation import BUCKLING_STRAIN
 from ..section.parts.cords import NOT_COMPRESSED, CordsAtStations
 from ..solid3d.gmres import gmres
 from ..solid3d.revolved import Revolved
@@ -29,7 +30,6 @@ MAX_NEWTON = 40  # Newton iterations a load
 # GMRES iterations of a step, after which the preconditioner is formed anew
 MAX_GMRES_BEFORE_NEW_FACTOR = 25
 MAX_GMRES = 60
-BUCKLING_STRAIN = 1e-3  # logarithmic, from which on compressed cords are named as the cause
 NEAR_LOAD = 2.0  # of a load, up to which Coulomb's friction is tried at once
 SAME_SHARE = 0.02  # of a load, up to which a first guess counts as one at this load
 SAME_FACTOR = 1.1  # of a load, up to which its preconditioner is worth keeping

@@ -28,7 +28,7 @@ STIFFENING = 8.0  # multiple of the rubber's stiffness that inflates without tro
 SECTION_RADIUS = 0.3  # meridional radius of curvature over the section's height, for the start
 EASED = 300.0  # bulk over shear modulus of rubber that inflates in few iterations
 MIN_INERTIA, MAX_INERTIA = 4e5, 4e15  # of the inertia that holds back a wrinkling path, rad2/s2
-COMPRESSED = -1e-6  # logarithmic strain of cords beyond round-off
+BUCKLING_STRAIN = 1e-3  # logarithmic, from which on compressed cords are named as the cause
 TENSION_FACTOR = 0.05  # factor on the artificial tension from one iteration to the next
 
 
@@ -88,14 +88,14 @@ def stopped(reached: float, pressure: float, why: str) -> NoEquilibrium:
 
 def buckled_cords(model: Model, U: Array) -> str:
     """The cords that bear compression and are compressed most at U (n, 3), in words; "" if none is
-    compressed."""
+    compressed enough to buckle."""
     parts = [part for part in model.parts if isinstance(part, Cords)]
     lowest = min(
         (part.most_compressed(U) for part in parts),
         key=attrgetter("strain"),
         default=NOT_COMPRESSED,
     )
-    return lowest.in_words(model.mesh.X) if lowest.strain < COMPRESSED else ""
+    return lowest.in_words(model.mesh.X) if lowest.strain < -BUCKLING_STRAIN else ""
 
 
 class _Solver:

@@ -2,9 +2,9 @@
 
 A tyre is stable if its static tangent stiffness without waves round the circumference, K(0), is
 positive definite. Everything that needs an inflated tyre calls `stable_factor` first, so that no
-command computes a tyre that another one refuses. What makes a tyre unstable is compressed cords: in
-the model they have no bending stiffness, and buckle in short waves along the section, so that K(0)
-and K(n) of moderate n lose their positive definiteness together.
+command computes a tyre that another one refuses. The usual cause is compressed cords: in the
+model they have no bending stiffness, and buckle in short waves along the section. `modes` judges
+K(n) at the modulus of the vibration as well.
 
 A tyre that turns is judged in the frame that turns with it, with K(0) - Omega^2 M in the wheel's
 plane. Gyroscopic forces could hold an indefinite one without damping, but not with the damping of
@@ -48,12 +48,13 @@ def stable_factor(
 
 
 def unstable(model: Model, U: Array, n: int = 0) -> RunFailed:
-    """The failure of an inflated tyre with an indefinite K(n), and the cords that cause it."""
-    cause = buckled_cords(model, U) or (
-        f"its stiffness for {n} waves round the circumference is not positive definite; no cords"
-        " are compressed: a higher pressure or stiffer rubber may hold it"
+    """The failure of an inflated tyre with an indefinite K(n), with the cords that may cause it."""
+    words = (
+        f"the inflated tyre is not stable: its stiffness for {n} waves round the circumference is"
+        " not positive definite"
     )
-    return RunFailed("unstable", f"the inflated tyre is not stable: {cause}")
+    cords = buckled_cords(model, U)
+    return RunFailed("unstable", f"{words}; {cords}" if cords else words)
 
 
 def slower(

@@ -440,7 +440,8 @@ def _key(design: Design) -> DesignKey:
 
 def _advised(failure: EvaluationFailed, design: Design) -> EvaluationFailed:
     """The failure of a tyre that finds no stable equilibrium, with what may help."""
-    if failure.cause not in SETTLED or not design.advice_on_buckling:
+    is_buckling = any(words in failure.words for words in ("no equilibrium", "buckle"))
+    if not is_buckling or not design.advice_on_buckling:
         return failure
     words = f"{failure.words}; {design.advice_on_buckling}"
     return EvaluationFailed(failure.cause, words, failure.folder)

@@ -28,7 +28,7 @@ from .uncertainty import FitUncertainty, fit_response, standard_errors
 from .variable import read_variable
 
 Array = np.ndarray
-OF_MEASUREMENT, OF_MODEL, OF_SECTION = "measurement", "material laws and mesh", "section"
+BY_MEASUREMENT, BY_MODEL, BY_SECTION = "measurement", "material laws and mesh", "section"
 LEAST_SHARE = 0.01  # of the variance, below which a cause is not listed
 
 
@@ -120,11 +120,11 @@ def _parts(
     """Shares (v,) of the variance by cause: the section is one, each constant its own."""
     moved = (response @ by_constants) ** 2
     parts = {
-        OF_MEASUREMENT: response**2 @ scatter**2,
-        OF_MODEL: np.einsum("vi,ij,vj->v", response, form, response),
+        BY_MEASUREMENT: response**2 @ scatter**2,
+        BY_MODEL: np.einsum("vi,ij,vj->v", response, form, response),
     }
     for k, source in enumerate(known):
-        cause = OF_SECTION if source.field else source.name.replace("_", " ")
+        cause = BY_SECTION if source.field else source.name.replace("_", " ")
         parts[cause] = parts.get(cause, 0.0) + moved[:, k]
     whole = np.sum([*parts.values()], 0)
     with np.errstate(invalid="ignore", divide="ignore"):
