@@ -1,0 +1,111 @@
+"""The total standard error of a fitted variable: by its formula, and by fits to other tyres."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tyrecal
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.modes.find import Found, find_modes
+from tyrecal.studies.fit.calibrate import calibrate
+from tyrecal.studies.fit.problem import Problem
+from tyrecal.studies.fit.targets import read_targets
+from tyrecal.studies.fit.total_error import BY_SECTION, TotalError, total_error
+from tyrecal.studies.fit.uncertainty import uncertainty
+from tyrecal.tyre.case import LoadedCase, start_values
+from tyrecal.tyre.case.schema import Uncertainty
+from tyrecal.tyre.effects.edit import changed, with_part
+
+from ..conftest import CASES
+from .known_truth import CASE, evaluator
+
+DENSITY, ANGLE = "materials.rubber.density_kg_per_m3", "rebar_layers.belt_1.angle_deg"
+SIGMA = 1e-3  # relative
+
+
+def coarse(known_from: str, stated: dict[str, Uncertainty]) -> LoadedCase:
+    """The paper's tyre, coarse, at which its own frequencies are the targets."""
+    case = tyrecal.load_case(CASES / "p235_75r17.yaml", mesh="coarse")
+    section = with_part(case.case.section, known_from=known_from)
+    case = changed(case, section=section, uncertainties=stated)
+    hertz = frequencies(case, {})
+    modes = [
+        t.model_copy(update={"frequency_Hz": f, "sigma_Hz": SIGMA * f})
+        for t, f in zip(case.case.targets.modes, hertz, strict=True)
+    ]
+    return changed(case, targets=case.case.targets.model_copy(update={"modes": modes}))
+
+
+def frequencies(case: LoadedCase, numbers: dict[str, float]) -> np.ndarray:
+    """Hz of the target modes at the start values with other numbers of the case."""
+    labels = [t.label for t in read_targets(case)]
+    question = Question({**start_values(case), **numbers})
+    ((_, answer),) = find_modes(Evaluator(TyreDesign(case)), [question], lambda *_: labels, 1)
+    assert isinstance(answer, Found)
+    return np.array([answer.wanted[label].frequency_Hz for label in labels])
+
+
+def total_of(case: LoadedCase) -> tuple[Problem, np.ndarray, TotalError]:
+    """The problem, scatter (v, v) of its coordinates, and the total error at the start."""
+    problem = Problem(case, Evaluator(TyreDesign(case)))
+    point = problem.evaluate(problem.start())
+    known = uncertainty(problem, point)
+    J = point.jacobian
+    return problem, np.linalg.inv(J.T @ J), total_error(problem, point, known)
+
+
+@pytest.mark.slow
+def test_a_constant_moves_the_variables_as_a_fit_to_another_tyre() -> None:
+    """The belt's angle by one standard deviation: a step of the fit to that tyre's frequencies."""
+    angle = Uncertainty(sets=[ANGLE], absolute=0.1)
+    case = coarse("exact", {"angle": angle})
+    problem, _, total = total_of(case)
+    plain = problem.evaluate(problem.start())
+    own = case.case.rebar_layers["belt_1"].angle_deg
+    other = frequencies(case, {ANGLE: own + 0.1})
+    J, scale = plain.jacobian, problem.scale
+    wanted = np.array([t.frequency_Hz for t in problem.targets])
+    step = np.linalg.lstsq(J, scale * (other - wanted), rcond=None)[0]
+    share = total.shares["angle"] * np.diag(total.of_coordinates)
+    np.testing.assert_allclose(np.sqrt(share), abs(step), rtol=0.02)
+
+
+@pytest.mark.slow
+def test_the_parts_are_the_whole() -> None:
+    """Shares add to 1; a section by its size code adds more than one that is measured."""
+    totals = {}
+    for origin in ("measured", "size_code"):
+        case = coarse(origin, {"density": Uncertainty(sets=[DENSITY], percent=1.5)})
+        problem, scatter, total = total_of(case)
+        np.testing.assert_allclose(np.sum([*total.shares.values()], 0), 1.0)
+        weights = [t.multiplicity for t in problem.targets]
+        assert weights != [1] * len(weights)  # so the scatter is no (J^T J)^-1
+        totals[origin] = np.diag(total.of_coordinates)
+        assert (totals[origin] > 0.5 * np.diag(scatter)).all()
+    assert (totals["size_code"] > 4 * totals["measured"]).all()
+    assert next(iter(total.shares)) == BY_SECTION
+
+
+def test_chi2_above_its_freedom_scales_the_total() -> None:
+    case = coarse("exact", {"density": Uncertainty(sets=[DENSITY], percent=1.5)})
+    problem, _, total = total_of(case)
+    point = problem.evaluate(problem.start())
+    errors = [
+        total.by_variable(problem, point, chi2)["C10"]["standard_error_total"]
+        for chi2 in (None, 0.5, 4.0)
+    ]
+    assert errors[:2] == [errors[0]] * 2
+    assert errors[2] == pytest.approx(2 * errors[0])
+
+
+def test_why_it_is_not_known() -> None:
+    """A solver without exact sensitivities: the reason is in the result, and no number."""
+    fit = calibrate(CASE, evaluator())  # type: ignore[arg-type]
+    result = fit.result
+    assert all(
+        v["standard_error_total"] is None for v in fit.found.model_dump()["variables"].values()
+    )
+    assert result["total_error_unknown"]
+    assert "not known" in fit.found.sentences()[0]
