@@ -59,7 +59,7 @@ def test_what_it_writes(
     out, drawn = tmp_path / "out", []
     monkeypatch.setattr(pictures, "draw_fit", lambda *arguments: drawn.append(arguments))
     assert run("fit", case, "--output", str(out)) == 0
-    *_, history, fit = drawn[0]
+    *_, history, fit, _ = drawn[0]
     save(draw_convergence(history, fit.objective_unit), out / "convergence.png")
     assert fit.objective_unit == "sigma" and (out / "convergence.png").stat().st_size > 10_000
     printed, result = capsys.readouterr().out, found(out)
