@@ -6,17 +6,20 @@ import shutil
 import subprocess
 import sys
 from dataclasses import replace
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tyrecal.errors import InputError
 from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.studies.diagnose.study import spans_of
 from tyrecal.studies.fit.calibrate import calibrate
+from tyrecal.tyre import effects
 from tyrecal.tyre.case import CaseError
 from tyrecal.tyre.effects import IDS, Effect, catalogue
 from tyrecal.tyre.load import load_case
@@ -253,3 +256,16 @@ assert made[0] == made[1] != resolved(case).case
         [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
+
+
+def test_an_effect_that_cannot_be_loaded_is_named_and_left_out(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    broken = EntryPoint("broken", "no_such_package:EFFECT", "tyrecal.effects")
+    monkeypatch.setattr(effects, "ADDED", {"broken": broken})
+    monkeypatch.setattr(effects, "IDS", (*effects.IDS, "broken"))
+    others = effects.catalogue.__wrapped__()
+    assert list(others) == [id for id in effects.IDS if id != "broken"]
+    assert "effect 'broken' of 'no_such_package:EFFECT' cannot be loaded" in caplog.text
+    with pytest.raises(InputError, match="'broken'"):
+        others["broken"]

@@ -76,7 +76,7 @@ def command(
     for stated in [] if case else options.given():
         raise click.UsageError(f"{stated} needs a --case")
     solvers = installed()
-    chosen = [name] if name else IDS
+    chosen = [name] if name else list(catalogue())
     if not case:
         entries = [CatalogueEntry.of(catalogue()[id], solvers) for id in chosen]
         terminal.result([each.model_dump(exclude_unset=True) for each in entries])
