@@ -77,7 +77,7 @@ def test_more_of_the_hub_goes_along_where_its_clamp_gives_way(way: str) -> None:
 
 
 @pytest.mark.ccx
-@pytest.mark.parametrize("holds", ["whole_bead", "bead_surface"])
+@pytest.mark.parametrize("holds", ["bead_surface"])  # whole_bead agrees as well; 40 s more
 def test_calculix_says_of_a_bead_that_does_not_sit_what_we_do(holds: str) -> None:
     """Over two fifths of it: frequencies within 0.4 %, and what the gap moves them by to 0.05 %."""
     case = load_case(CASES / "p235_75r17.yaml")
