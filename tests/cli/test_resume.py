@@ -96,9 +96,10 @@ def test_two_at_once_with_one_store(undisturbed: Path, tmp_path: Path) -> None:
             undisturbed / "fit.json"
         ).read_bytes()
         assert not (tmp_path / name / "record").exists()
-    asked = len(list((undisturbed / "record").glob("*/*.record")))
-    assert asked > json.loads((undisturbed / "fit.json").read_text())["evaluations"]
-    assert len(list((tmp_path / "gemeinsamer Speicher").glob("*/*.record"))) == asked
+    stored = set((tmp_path / "gemeinsamer Speicher").glob("*/*.record"))
+    assert len(stored) > json.loads((undisturbed / "fit.json").read_text())["evaluations"]
+    assert subprocess.run([*COMMAND, str(tmp_path / "alone"), *store], check=False).returncode == 0
+    assert set((tmp_path / "gemeinsamer Speicher").glob("*/*.record")) == stored
 
 
 def test_the_lock_of_a_dead_process_holds_nobody(tmp_path: Path) -> None:
