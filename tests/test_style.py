@@ -18,7 +18,7 @@ DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 VAGUE_NAMES = {"found", "told", "asked", "said"}
 # Counts may only fall: whoever rewords one of these places lowers its number here.
 VAGUE_DOCSTRINGS_LEFT = 516
-VAGUE_LOCALS_LEFT = 1179
+VAGUE_LOCALS_LEFT = 1178
 HOOKS = YAML(typ="safe").load(ROOT / ".pre-commit-config.yaml")["repos"][0]["hooks"]
 
 
