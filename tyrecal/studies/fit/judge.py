@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...measured.measurement import Measurement
-from ...simulate.evaluate.failure import DeckRefused
 from ...simulate.modes.label import Label
 from .alternatives import other_states
 from .problem import Point, Problem
@@ -73,7 +72,7 @@ def judge(
     if verdict == DOES_NOT_FIT:
         try:
             shifts = other_states(problem, point, keep)
-        except DeckRefused:
+        except Exception:  # the fit has ended: what only comes after it must not lose it
             shifts = []
     return Judgement(verdict, left.chi2_per_dof, likeliest_reason(left, shifts))
 

@@ -38,7 +38,7 @@ NOT_JUDGED: Final = "not_judged"
 FIT_VERDICT_WORDS: Final[dict[FitVerdict, str]] = {
     FITS: "fits",
     DOES_NOT_FIT: "does not fit",
-    NOT_JUDGED: "converged, no standard deviations to judge it by",
+    NOT_JUDGED: "converged, not judged",
     NOT_CONVERGED: "not converged",
 }
 MOST_CHI2_PER_DOF = 5.0  # of a model that fits
