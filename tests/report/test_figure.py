@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
+from PIL import Image
 
 from tyrecal.files import PICTURE_FORMATS
+from tyrecal.report.drawn import read_drawn_numbers
 from tyrecal.report.figure import COLOURS, GREY, in_house_style, new_figure, save, svg
 
 NAME = "$x$ & <sons>"
@@ -67,3 +69,18 @@ def test_formats(kind: str, tmp_path: Path) -> None:
         text = contents[0].decode()
         assert ">0.01<" in text and "mathdefault" not in text
     assert "mathdefault" not in svg(over_decades(), "", "a")
+
+
+def test_a_picture_keeps_the_numbers_that_it_draws(tmp_path: Path) -> None:
+    """Count, least, greatest, mean and root mean square of x and y; areas by their corners."""
+    save(drawn(), tmp_path / "a.png")
+    _, panel = read_drawn_numbers(tmp_path / "a.png")
+    assert panel["words"] == [NAME]
+    x, y, *_ = panel["numbers"]
+    assert x == [3, 0.0, 2.0, 1.0, pytest.approx((5 / 3) ** 0.5, rel=1e-5)]
+    assert y == [3, 3.0, 4.0, pytest.approx(10 / 3, rel=1e-5), pytest.approx((34 / 3) ** 0.5)]
+    corners = [part[:3] for part in panel["numbers"][2:]]
+    assert [7, 0.0, 1.0] in corners or [8, 0.0, 1.0] in corners
+    Image.new("RGB", (2, 2)).save(tmp_path / "plain.png")
+    with pytest.raises(ValueError, match="no numbers"):
+        read_drawn_numbers(tmp_path / "plain.png")
