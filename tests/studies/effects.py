@@ -1,4 +1,4 @@
-"""Signatures of all effects on a fitted tyre, as the tables of tests/benchmarks/EFFECTS.md.
+"""Signatures of all effects on a fitted tyre, as the tables of tests/benchmarks/records/EFFECTS.md.
 
 python -m tests.studies.effects cases/p235_75r17.yaml p235_75r17/fit.json
 """

@@ -37,7 +37,7 @@ Array = np.ndarray
 LABELS = [Label(0, 0, "axial"), Label(0, 0, "torsional")]
 LABELS += [Label(c, m) for c in range(1, 7) for m in (0, 1)]
 FITTED = {"A_belt": 2.543e-7, "A_carcass": 6.198e-8, "C10": 6.526e5}
-FLOOR = 0.1  # per cent: what two solvers differ by on one mesh (tests/benchmarks/CALCULIX.md)
+FLOOR = 0.1  # per cent: difference of two solvers on one mesh (tests/benchmarks/CALCULIX.md)
 
 
 def variants(case: LoadedCase) -> dict[str, LoadedCase]:
