@@ -276,7 +276,7 @@ def test_the_guide_says_what_is_assumed() -> None:
     assumed = Assumed()
     laws = [100 * effect.law for effect in catalogue().values()]
     assert f"may be off by {min(laws):g} to {max(laws):g} % of its own shift" in guide
-    _, _, integrated = guide.partition("What else there is to some is integrated over")
+    _, _, integrated = guide.partition("Uncertain details of some effects are marginalised")
     integrated, _, _ = integrated.partition("\n\n")
     for effect in catalogue().values():
         assert (effect.beside is not None) == (f"`{effect.id}`" in integrated)
