@@ -62,8 +62,8 @@ def command(
     case's uncertainties, and predict frequencies, with 90 % intervals.
 
     Writes sample.json, sample.csv (frequencies), sample_draws.csv and a corner picture. The model
-    is an emulator of some 40 evaluations, whose error is stated. Needs the package emcee: run
-    pip install '.[sample]' in a clone of tyrecal.
+    is an emulator of 60 to 100 evaluations as a rule; its error is reported. Needs the package
+    emcee: run pip install '.[sample]' in a clone of tyrecal.
 
     \b
     tyrecal sample cases/p235_75r17.yaml --measured cases/p235_75r17_wheeler.csv
