@@ -13,14 +13,15 @@ from ..language.rule import Rule
 from ..language.spelling import named
 from ..language.step_rules import STEP_PROCEDURES
 from ..language.table import RULES
-from ..language.text import Block, Row
+from ..language.text import Block, Row, is_label
 
-LONGEST = {"number": 20, "integer": 10, "name": 80}  # characters of a field
+LONGEST = {"number": 20, "integer": 10, "label": 10, "name": 80}  # characters of a field
 FORM = {
-    "number": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([EeDd][+-]?\d+)?"),
-    "integer": re.compile(r"[+-]?\d+"),
+    "number": re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([EeDd][+-]?[0-9]+)?"),
+    "integer": re.compile(r"[+-]?[0-9]+"),
+    "label": re.compile(r"\+?0*[1-9][0-9]{0,8}"),
     "name": re.compile(r".+"),
-    "freedom": re.compile(r"\d+|ENCASTRE|PINNED|[XYZ]A?SYMM", re.IGNORECASE),
+    "freedom": re.compile(r"[0-9]+|ENCASTRE|PINNED|[XYZ]A?SYMM", re.IGNORECASE),
 }
 NUMBERED = {"node": "nset", "element": "elset"}  # kinds of fields that are numbers, or sets of them
 BEGIN_END = {"PART": "END PART", "ASSEMBLY": "END ASSEMBLY", "INSTANCE": "END INSTANCE"}
@@ -194,7 +195,7 @@ def _value(
     elif kind in NUMBERED or kind not in FORM:
         names.used.append((kind, named(text), block, row))
     form = kind if kind in FORM else "name"
-    if kind in NUMBERED and text.strip().isdigit():
+    if kind in NUMBERED and is_label(text.strip()):
         form = "integer"
     if not FORM[form].fullmatch(text.strip()):
         what = "is missing" if not text.strip() else f"is no {form}"

@@ -61,7 +61,7 @@ MODEL_RULES: dict[str, Rule] = {
     "NODE": Rule(
         "part",
         "NSET=+nset; SYSTEM=R|C|S",
-        "integer 6*number?",
+        "label 6*number?",
         honoured={"deck": "NSET; SYSTEM=R", "section|revolve": "NSET"},
     ),
     "SYSTEM": Rule(
@@ -109,7 +109,7 @@ MODEL_RULES: dict[str, Rule] = {
     "ELEMENT": Rule(
         "part",
         "TYPE=name; ELSET=+elset",
-        "integer node...",
+        "label node...",
         needs=("TYPE",),
         honoured={"deck|section": "TYPE; ELSET", "revolve": "TYPE=SPRING1|MASS|ROTARYI; ELSET"},
     ),

@@ -17,6 +17,7 @@ from .element_types import NODES_AND_SECTION
 from .spelling import full_keyword, full_parameters, named
 
 MOST_BYTES = 100_000_000  # of a deck and all that it includes
+MOST_KEYWORDS = 20_000  # of a deck and all that it includes; tyres have hundreds
 MOST_CHARACTERS = 4096  # with those that continue it; ABAQUS reads 256 of each
 DEEPEST_INCLUDE = 5  # files that include others
 COMPLEX_STEP = 1e-30  # so small that its square vanishes against every real part
@@ -50,11 +51,24 @@ class DeckError(Refused):
 WHOLE_DECK = Place("deck", 0)
 
 
+LARGEST_LABEL = 999_999_999  # number of a node or element, by the manual
+
+
 def _plain(text: str) -> str:
     """The text of a number. Raises ValueError for digits that Python reads and ABAQUS does not."""
     if "_" in text or not text.isascii():
         raise ValueError
     return text
+
+
+def number_from(text: str) -> float:
+    """The number that a field states, its exponent with E or D. Raises ValueError."""
+    return float(_plain(text).replace("D", "E").replace("d", "e"))
+
+
+def is_label(text: str) -> bool:
+    """Whether a field is the number of a node or element, not the name of a set."""
+    return text.isascii() and text.isdigit()
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +101,7 @@ class Row:
         if not text and default is not None:
             return default
         try:
-            value = float(_plain(text).replace("D", "E").replace("d", "e"))
+            value = number_from(text)
         except ValueError:
             what = f"'{text[:40]}' is not a number" if text else f"number {index + 1} is missing"
             raise self.place.error(what) from None
@@ -187,6 +201,8 @@ class Reader:
                     raise start.error(f"data '{line[:40]}' before the first keyword")
                 self._rows.append(Row(start, line))
                 continue
+            if len(self.blocks) == MOST_KEYWORDS:
+                raise start.error(f"decks of more than {MOST_KEYWORDS} keywords are not read")
             block = self._keyword(start, line)
             if only_data:
                 raise block.refused("stands in a file of data lines")

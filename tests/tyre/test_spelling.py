@@ -78,6 +78,10 @@ def test_a_legal_spelling_is_the_same_deck(
         ("1100.0", "1_100.0", "'1_100.0' is not a number"),
         ("LINER, S4", "LINER, S4" + 9999 * " ,", "more than 4096 characters"),
         ("*ELSET, ELSET=LINER\n", "*ELSET, ELSET=LINER, GEN\n1000000000, 2000000000\n", "no elem"),
+        ("*NODE, NSET=ALL\n", "*NODE, NSET=ALL\n-5, 0.3, 0.0\n", "node -5: numbers go from 1"),
+        ("*ELSET, ELSET=LINER\n", "*ELSET, ELSET=X\n²\n*ELSET, ELSET=LINER\n", "set ² is not"),
+        ("*MATERIAL", "*PARAMETER\nA = " + 4000 * "-" + "1\n*MATERIAL", "nested too deep"),
+        ("*ELSET, ELSET=LINER\n", 20_000 * "*ELSET, ELSET=X\n1\n", "20000 keywords"),
     ],
 )
 def test_what_no_rule_allows_is_refused(old: str, new: str, words: str, tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...language.text import Block, DeckError, Row
+from ...language.text import Block, DeckError, Row, is_label
 from ..deck.steps import DeckStep
 from .band import Numbering
 from .half_mesh import half_mesh
@@ -115,7 +115,7 @@ def _free(mesh: DeckMesh, step: DeckStep) -> Array:
         name = row.name(0)
         if any(_names(mesh, row, reference) for reference in mesh.reference_nodes):
             continue
-        nodes = mesh.node_sets.get(name) or ([int(name)] if name.isdigit() else [])
+        nodes = mesh.node_sets.get(name) or ([int(name)] if is_label(name) else [])
         if not nodes or any(n not in mesh.index for n in nodes):
             raise DeckError(row.place, f"node or node set {name} is not defined")
         for component in _components(row, step.revolved):

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...errors import Inverted
 from ...language.spelling import named
-from ...language.text import COMPLEX_STEP, WHOLE_DECK, Block, DeckError
+from ...language.text import COMPLEX_STEP, WHOLE_DECK, Block, DeckError, is_label
 from . import elements
 from .embedding import Embedded, Guest, embedding
 from .shapes import TYPES
@@ -233,7 +233,7 @@ def _members(k: Block, sets: dict[str, list[int]], known: dict) -> list[int]:
         for position, text in enumerate(row.fields):
             if not text:
                 continue
-            if text.lstrip("-").isdigit():
+            if is_label(text):
                 members.append(row.integer(position))
             elif named(text) in sets:
                 members += sets[named(text)]
@@ -254,7 +254,7 @@ def _surface(
     rows: list[list[int]] = []
     for row in k.rows:
         name, face = row.name(0), row.name(1)
-        members = sets.get(name) or ([int(name)] if name.isdigit() else None)
+        members = sets.get(name) or ([int(name)] if is_label(name) else None)
         if members is None:
             raise DeckError(row.place, f"element set {name} is not defined")
         if face not in ("S1", "S2", "S3", "S4", "SPOS"):

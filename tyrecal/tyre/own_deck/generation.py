@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from .scope import MOST, Point, Scope, mirror_of, nodes_of, reflected
-from .text import Block, Row, named
+from .text import Block, Row, is_label, named
 
 
 def read(scope: Scope, block: Block) -> None:
@@ -202,7 +202,7 @@ def _listed(scope: Scope, block: Block, members: Callable, known: dict) -> list[
         else:
             some = []
             for text in filter(None, row.fields):
-                if text.isdigit():
+                if is_label(text):
                     some.append(int(text))
                 else:
                     some += members(named(text), block, row)

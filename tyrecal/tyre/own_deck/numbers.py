@@ -13,7 +13,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from .text import MATERIAL_OPTIONS, Block, Row, named, placed_fields
+from .text import MATERIAL_OPTIONS, Block, Row, named, number_from, placed_fields
 
 DECK_MARK = re.compile(r"\{\{\s*([A-Za-z][A-Za-z0-9_\-]*)\s*\}\}")
 PARAMETER = re.compile(r"<\s*(\w+)\s*>")
@@ -86,15 +86,10 @@ def assigned(row: Row) -> tuple[str, str]:
 def plain_number(text: str) -> bool:
     """Whether a field is a finite number as it stands."""
     try:
-        value = float(text.replace("D", "E").replace("d", "e"))
+        value = number_from(text)
     except ValueError:
         return False
     return math.isfinite(value)
-
-
-def plain(text: str) -> float:
-    """A field as a number."""
-    return float(text.replace("D", "E").replace("d", "e"))
 
 
 def marks(blocks: Sequence[Block]) -> dict[str, Block]:
@@ -189,6 +184,8 @@ def parameters(block: Block, known: dict[str, Any]) -> None:
             value = _evaluate(ast.parse(expression, mode="eval").body, known)
         except ZeroDivisionError:
             raise block.refused(f"'{text}' divides by 0", row) from None
+        except (RecursionError, MemoryError):
+            raise block.refused(f"'{text}' is nested too deep", row) from None
         except (ValueError, SyntaxError, KeyError, TypeError, OverflowError) as error:
             raise block.refused(f"'{text}' is not honoured: {error}", row) from None
         known[name] = value

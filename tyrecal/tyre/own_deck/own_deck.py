@@ -15,7 +15,7 @@ from .flat import SECTION_OPTIONS, Flat, flatten
 from .gauge import Gauges, thickened
 from .grammar import Sorted, sort
 from .model import Model, build
-from .text import OUTPUT_KEYWORDS, RULES, Block, OwnDeckError, Place, read_blocks
+from .text import OUTPUT_KEYWORDS, RULES, Block, OwnDeckError, Place, number_from, read_blocks
 
 Units = Literal["m", "mm"]
 UNIT_LENGTH = {"m": 1.0, "mm": 1e-3}  # of a unit of length, m
@@ -61,7 +61,7 @@ class OwnDeck:
         for path, (place, i, j) in self.places.items():
             row = self.blocks[place].rows[i]
             text = numbers_of.assigned(row)[1] if j < 0 else row.text(j)
-            found[path] = numbers_of.plain(text)
+            found[path] = number_from(text)
         return found
 
     @cached_property

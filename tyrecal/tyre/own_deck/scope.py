@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .text import Block, Row
+from .text import LARGEST_LABEL, Block, Row, is_label
 
 Point = tuple[float, float]
 CORNERS_OF = {3: 3, 4: 4, 6: 3, 8: 4}  # of solids by their number of nodes
@@ -68,7 +68,7 @@ class Scope:
     def _members(
         self, name: str, sets: dict, known: dict, what: str, block: Block, row: Row | None
     ) -> list[int]:
-        if name.isdigit() and int(name) in known:
+        if is_label(name) and int(name) in known:
             return [int(name)]
         if name not in sets:
             raise block.refused(f"{what} set {name} is not defined", row)
@@ -94,6 +94,7 @@ class Scope:
 
     def place(self, block: Block, row: Row | None, number: int, point: Point) -> None:
         """A new node."""
+        _check_label("node", number, block, row)
         old = self.nodes.get(number)
         if old is not None and max(abs(old[0] - point[0]), abs(old[1] - point[1])) > 0:
             raise block.refused(f"node {number} is defined twice, at two places", row)
@@ -105,6 +106,7 @@ class Scope:
 
     def make(self, block: Block, row: Row, number: int, kind: str, nodes: tuple[int, ...]) -> None:
         """A new element."""
+        _check_label("element", number, block, row)
         if number in self.elements:
             raise block.refused(f"element {number} is defined twice", row)
         missing = [n for n in nodes if n not in self.nodes]
@@ -115,6 +117,12 @@ class Scope:
         if len(self.elements) > MOST:
             raise block.refused(f"there are more than {MOST} elements", row)
         self.elements[number] = Element(kind, nodes, block, row)
+
+
+def _check_label(what: str, number: int, block: Block, row: Row | None) -> None:
+    """Raises OwnDeckError for a number that no node or element can have."""
+    if not 1 <= number <= LARGEST_LABEL:
+        raise block.refused(f"{what} {number}: numbers go from 1 to {LARGEST_LABEL}", row)
 
 
 def mirror_of(block: Block) -> Callable[[Point], Point]:

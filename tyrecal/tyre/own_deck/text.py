@@ -11,19 +11,38 @@ if TYPE_CHECKING:  # mypy knows the folder by its own name
     from solvers.language.honour import check_honoured
     from solvers.language.spelling import named
     from solvers.language.table import MATERIAL_OPTIONS, OUTPUT_KEYWORDS, RULES
-    from solvers.language.text import Block, Place, Reader, Row, names_of
+    from solvers.language.text import (
+        LARGEST_LABEL,
+        Block,
+        Place,
+        Reader,
+        Row,
+        is_label,
+        names_of,
+        number_from,
+    )
 else:
     from tyrecal_solvers.language.element_types import NODES_AND_SECTION
     from tyrecal_solvers.language.fields import DIMENSIONS, fields_of, placed_fields
     from tyrecal_solvers.language.honour import check_honoured
     from tyrecal_solvers.language.spelling import named
     from tyrecal_solvers.language.table import MATERIAL_OPTIONS, OUTPUT_KEYWORDS, RULES
-    from tyrecal_solvers.language.text import Block, Place, Reader, Row, names_of
+    from tyrecal_solvers.language.text import (
+        LARGEST_LABEL,
+        Block,
+        Place,
+        Reader,
+        Row,
+        is_label,
+        names_of,
+        number_from,
+    )
 
 from ...errors import InputError
 
 __all__ = [
     "DIMENSIONS",
+    "LARGEST_LABEL",
     "MATERIAL_OPTIONS",
     "NODES_AND_SECTION",
     "OUTPUT_KEYWORDS",
@@ -34,8 +53,10 @@ __all__ = [
     "Row",
     "check_honoured",
     "fields_of",
+    "is_label",
     "named",
     "names_of",
+    "number_from",
     "placed_fields",
     "read_blocks",
 ]
