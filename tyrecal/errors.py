@@ -18,7 +18,7 @@
 The solvers, which know nothing of the tool, have six of their own, drawn in `solvers/errors.py`:
 an adapter names them, and here they become DeckRefused and EvaluationFailed. What is in neither
 and comes out of a command is a fault of the tool's, and has a traceback; what the system refuses,
-as a full disc, is an OSError and ends with 2.
+as a full disk, is an OSError or a MemoryError and ends with 2.
 """
 
 from __future__ import annotations

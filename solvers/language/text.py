@@ -300,10 +300,9 @@ def read_deck(path: Path) -> str:
     too large; OSError."""
     if path.exists() and not path.is_file():
         raise DeckError(WHOLE_DECK, f"{path.name} is not a regular file")
-    with path.open("rb") as file:
-        content = file.read(MOST_BYTES + 1)
-    if len(content) > MOST_BYTES:
+    if path.stat().st_size > MOST_BYTES:
         raise DeckError(WHOLE_DECK, f"{path.name} is larger than {MOST_BYTES / 1e6:g} MB")
+    content = path.read_bytes()
     try:
         return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError:

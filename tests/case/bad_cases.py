@@ -41,6 +41,7 @@ edit("negative_pressure", "pressure_kPa", "at least 0", PRESSURE, "pressure_kPa:
 edit("format", "format", "at most 1", "format: 1", "format: 2")
 edit("format_true", "format", "whole number", "format: 1", "format: true")
 edit("line_break_in_name", "size", "line breaks", "size: P235/75R17", 'size: "a\\n*STEP"')
+edit("name_from_right_to_left", "name", "marks of direction", "name: ", 'name: "\u202ex" # ')
 edit("keyword_as_name", "name", "must not begin with *", "name: ", 'name: "*INCLUDE, INPUT=x" # ')
 # materials
 edit("negative_density", f"{RUBBER}.density_kg_per_m3", "greater than 0", "1100.0", "-1100.0")

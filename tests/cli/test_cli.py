@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
 
+from tyrecal import studies
 from tyrecal.cli.main import main
 
 from ..conftest import CASES
@@ -398,3 +400,34 @@ def test_a_gauge_is_a_number_like_any_other(
     modes = [(m.frequency_Hz, g) for m, g in zip(answer.modes, answer.gradients[name], strict=True)]
     slope = min(modes, key=lambda mode: abs(mode[0] - axial[0]))[1]
     assert slope == pytest.approx((axial[1] - axial[2]) / 0.02, rel=1e-3)
+
+
+def test_a_broken_command_or_study_of_a_package_costs_no_other(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    broken = EntryPoint("weigh", "no_such_package:command", "tyrecal.commands")
+    monkeypatch.setattr("tyrecal.cli.main._outside", lambda: {"weigh": broken})
+    assert run("--help") == 0
+    printed = capsys.readouterr()
+    assert "weigh" not in printed.out and "Calibrate the case's variables" in printed.out
+    assert "command 'weigh' of 'no_such_package:command' cannot be loaded" in printed.err
+    assert run("weigh") == 2
+    assert "install a newer version of the package" in capsys.readouterr().err
+    monkeypatch.setattr(studies, "entry_points", lambda group: [broken])
+    assert list(studies.result_types()) == list(studies.RESULT_TYPES)
+    assert "study 'weigh'" in caplog.text
+
+
+@pytest.mark.parametrize("failure", [MemoryError(), OSError(12, "Cannot allocate memory")])
+def test_too_little_memory_is_one_sentence(
+    failure: Exception, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(path: Path, allow_unusual: bool) -> None:
+        raise failure
+
+    monkeypatch.setattr("tyrecal.measured.load.judged", fail)
+    assert run("validate", CASE) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("error: ") and "memory" in line

@@ -288,6 +288,20 @@ def test_completion(
     assert all(item.startswith("plain,") for item in items)
 
 
+def test_names_that_a_shell_would_run_are_not_offered(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Those of a stranger's case, which nobody has judged yet."""
+    case = tmp_path / "odd.yaml"
+    case.write_text(Path(CASE).read_text().replace("  A_belt:", '  "$(touch x)":'))
+    monkeypatch.setenv("_TYRECAL_COMPLETE", "bash_complete")
+    monkeypatch.setenv("COMP_WORDS", f"tyrecal modes {case} --set ")
+    monkeypatch.setenv("COMP_CWORD", "4")
+    run()
+    offered = capsys.readouterr().out
+    assert "plain,A_carcass=" in offered and "touch" not in offered
+
+
 def test_the_scripts_of_the_shells(capsys: pytest.CaptureFixture[str]) -> None:
     for shell, mark in (("bash", "complete -o"), ("zsh", "compdef"), ("fish", "complete --no")):
         assert run("completion", shell) == 0

@@ -262,10 +262,12 @@ def test_an_effect_that_cannot_be_loaded_is_named_and_left_out(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     broken = EntryPoint("broken", "no_such_package:EFFECT", "tyrecal.effects")
-    monkeypatch.setattr(effects, "ADDED", {"broken": broken})
-    monkeypatch.setattr(effects, "IDS", (*effects.IDS, "broken"))
+    odd = EntryPoint("odd", "tyrecal.version:__version__", "tyrecal.effects")
+    monkeypatch.setattr(effects, "ADDED", {"broken": broken, "odd": odd})
+    monkeypatch.setattr(effects, "IDS", (*effects.IDS, "broken", "odd"))
     others = effects.catalogue.__wrapped__()
-    assert list(others) == [id for id in effects.IDS if id != "broken"]
+    assert list(others) == [id for id in effects.IDS if id not in ("broken", "odd")]
     assert "effect 'broken' of 'no_such_package:EFFECT' cannot be loaded" in caplog.text
+    assert "effect 'odd' of 'tyrecal.version:__version__' cannot be loaded" in caplog.text
     with pytest.raises(InputError, match="'broken'"):
         others["broken"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from click.shell_completion import CompletionItem, split_arg_string
 Items = list[CompletionItem]
 SUFFIXES = (".yaml", ".yml")
 MAX_CASES = 200  # case files; a folder with more has the shell's own completion
+PLAIN = re.compile(r"[A-Za-z0-9_.\-]+=?")  # all that a shell takes as it stands
 MAX_DEPTH = 3  # folders below the one typed in which cases are looked for
 
 
@@ -70,7 +72,11 @@ def assignments(ctx: click.Context, param: click.Parameter, incomplete: str) -> 
 def _starting(names: Iterable[str], incomplete: str) -> Items:
     if incomplete.endswith("="):  # a number follows
         return []
-    return [CompletionItem(name) for name in sorted(names) if name.startswith(incomplete)]
+    return [
+        CompletionItem(name)
+        for name in sorted(names)
+        if name.startswith(incomplete) and PLAIN.fullmatch(name)
+    ]
 
 
 def _yaml(folder: Path, depth: int) -> Iterator[Path]:

@@ -43,6 +43,7 @@ COMMANDS = {  # name: one line of help, so that the overview imports no command
     "doctor": "Check the installation: packages, solvers, machine, a known tyre.",
     "completion": "Print what makes a shell complete commands, cases and names.",
 }
+NO_MEMORY = "there is not enough memory: use fewer --jobs, a coarser --mesh or another machine"
 EXIT_INPUT, EXIT_SOLVER, EXIT_FIT, EXIT_BATCH = 2, 3, 4, 5
 EXIT_CODES = {
     0: "done",
@@ -72,16 +73,35 @@ def _outside() -> dict[str, EntryPoint]:
     return {entry.name: entry for entry in entry_points(group="tyrecal.commands")}
 
 
+def _load(entry: EntryPoint) -> click.Command:
+    """A command from outside. Raises InputError."""
+    from ..tyre.plugins import load_plugin
+
+    command: click.Command = load_plugin(entry, "command")
+    return command
+
+
+def _outside_commands() -> dict[str, click.Command]:
+    """The commands from outside; one that cannot be loaded is named and left out."""
+    commands = {}
+    for name, entry in _outside().items():
+        try:
+            commands[name] = _load(entry)
+        except InputError as broken:
+            error(str(broken))
+    return commands
+
+
 class Commands(click.Group):
     """The commands, each imported when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return [*COMMANDS, *_outside()]
+        return [*COMMANDS, *_outside_commands()]
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         if name not in COMMANDS:
             entry = _outside().get(name)
-            return entry.load() if entry else None
+            return _load(entry) if entry else None
         command: click.Command = import_module(f"tyrecal.cli.{name.replace('-', '_')}").command
         return command
 
@@ -114,7 +134,9 @@ class Commands(click.Group):
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
-            outside = {n: e.load().get_short_help_str(90) for n, e in _outside().items()}
+            outside = {
+                name: each.get_short_help_str(90) for name, each in _outside_commands().items()
+            }
             formatter.write_dl(list({**COMMANDS, **outside}.items()))
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -195,6 +217,8 @@ def main(arguments: list[str] | None = None) -> None:
         if code is None:
             raise
         words = os_words(failure) if isinstance(failure, OSError) else str(failure)
+        if isinstance(failure, MemoryError):
+            words = NO_MEMORY
         for line in words.splitlines():
             error(line)
         sys.exit(code)
@@ -216,4 +240,4 @@ def _exit_code(failure: Exception) -> int | None:
     """Exit code of a failure that is somebody's, None for a bug of ours."""
     if isinstance(failure, TyrecalError):
         return failure.exit_code
-    return EXIT_INPUT if isinstance(failure, OSError) else None
+    return EXIT_INPUT if isinstance(failure, OSError | MemoryError) else None

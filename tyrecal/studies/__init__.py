@@ -4,12 +4,17 @@ one of ``tyrecal.commands``."""
 
 from __future__ import annotations
 
+import logging
 from importlib import import_module
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any
 
+from ..errors import InputError
+
 if TYPE_CHECKING:
     from .result import Result
+
+log = logging.getLogger("tyrecal")
 
 STUDY_GROUP = "tyrecal.studies"
 RESULT_TYPES = {  # in the order of a page
@@ -26,9 +31,17 @@ RESULT_TYPES = {  # in the order of a page
 
 
 def result_types() -> dict[str, type[Result]]:
-    """By the name of the study, those from outside last."""
-    outside = {entry.name: entry.value for entry in entry_points(group=STUDY_GROUP)}
-    return {name: named(place) for name, place in {**RESULT_TYPES, **outside}.items()}
+    """By the name of the study, those from outside last; one that cannot be loaded is named and
+    left out."""
+    from ..tyre.plugins import load_plugin
+
+    types = {name: named(place) for name, place in RESULT_TYPES.items()}
+    for entry in entry_points(group=STUDY_GROUP):
+        try:
+            types[entry.name] = load_plugin(entry, "study")
+        except InputError as error:
+            log.warning("%s", error)
+    return types
 
 
 def named(place: str) -> Any:

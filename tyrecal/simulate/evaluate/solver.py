@@ -9,6 +9,7 @@ from typing import Any, Protocol
 
 from ...errors import InputError
 from ...tyre.case.mistakes import suggestion
+from ...tyre.plugins import load_plugin
 from ..program import resolve_program, why_missing
 from ..settings import command_of
 from .failure import SolverUnavailable
@@ -69,7 +70,7 @@ def find_solver(name: str, command: Sequence[str] = ()) -> Solver:
     entries = {entry.name: entry for entry in entry_points(group=GROUP)}
     if name not in entries:
         raise InputError(f"solver '{name}' is not installed{suggestion(name, sorted(entries))}")
-    solver: Solver = entries[name].load()()
+    solver: Solver = load_plugin(entries[name], "solver", lambda solver: solver())
     if hasattr(solver, "command"):
         solver.command = resolve_program(command or command_of(name)[0] or solver.command)
     elif command:
@@ -118,7 +119,7 @@ def _described(entry: EntryPoint) -> dict[str, Any]:
         "command_from": None,
     }
     try:
-        solver: Any = entry.load()()
+        solver: Any = load_plugin(entry, "solver", lambda solver: solver())
         if hasattr(solver, "command"):
             command, origin = command_of(entry.name)
             solver.command = resolve_program(command or solver.command)

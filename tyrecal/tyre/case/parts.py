@@ -38,7 +38,10 @@ Frequency = Annotated[Positive, Field(ge=1e-3, le=1e5)]  # Hz
 Degrees = Annotated[float, Field(ge=-180, le=180)]
 # names end in decks, paths of keys and file names: one word of plain letters is safe in all
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_\-]*$", max_length=60)]
-Text = Annotated[str, StringConstraints(pattern=r"^[^\x00-\x1f\x7f]*$", max_length=300)]
+# Besides control characters, the marks that turn the direction of text: they make a name look like
+# another one.
+NOT_IN_TEXT = r"\x00-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069"
+Text = Annotated[str, StringConstraints(pattern=rf"^[^{NOT_IN_TEXT}]*$", max_length=300)]
 Disagreement = tuple[str, str]
 """A key of a part, and what would be right there."""
 WRONG = object()

@@ -45,7 +45,7 @@ MESSAGES = {
     "disagree": "{message}",
 }
 NAME = "must be one word of letters, digits, - and _, a letter first"
-ONE_LINE = "must be text without line breaks or control characters"
+ONE_LINE = "must be text without line breaks, control characters or marks of direction"
 
 
 def explain(

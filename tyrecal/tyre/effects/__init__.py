@@ -7,7 +7,7 @@ from functools import cache
 from importlib import import_module
 
 from ...errors import InputError
-from ..plugins import ADDED, IDS, OWN
+from ..plugins import ADDED, IDS, OWN, load_plugin
 from .effect import Effect, EffectRefused
 
 __all__ = ["IDS", "Effect", "EffectRefused", "catalogue"]
@@ -20,7 +20,7 @@ class Catalogue(dict[str, Effect]):
 
     def __missing__(self, id: str) -> Effect:
         if id in ADDED:
-            raise InputError(_unusable(id))
+            return _load(id)
         raise KeyError(id)
 
 
@@ -35,13 +35,19 @@ def catalogue() -> Catalogue:
     effects = Catalogue((effect.id, effect) for effect in own)
     for id in sorted(ADDED):
         try:
-            effects[id] = ADDED[id].load()
-        except Exception as error:  # a stranger's code may raise anything
-            log.warning("%s (%s: %s)", _unusable(id), type(error).__name__, error)
+            effects[id] = _load(id)
+        except InputError as error:
+            log.warning("%s", error)
     return Catalogue((id, effects[id]) for id in IDS if id in effects)
 
 
-def _unusable(id: str) -> str:
-    package = ADDED[id].dist
-    name = f"package '{package.name}'" if package else f"'{ADDED[id].value}'"
-    return f"effect '{id}' of {name} cannot be loaded and is left out: install a newer one"
+def _load(id: str) -> Effect:
+    """The effect of an installed package. Raises InputError."""
+    effect: Effect = load_plugin(ADDED[id], "effect", _checked)
+    return effect
+
+
+def _checked(effect: Effect) -> Effect:
+    if not isinstance(effect, Effect):
+        raise TypeError(f"it is a {type(effect).__name__}, no Effect")
+    return effect
