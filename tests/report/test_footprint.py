@@ -13,7 +13,7 @@ from PIL import Image
 from rich.console import Console
 
 from tyrecal.report.figure import save
-from tyrecal.report.footprint import draw_curves, draw_footprint
+from tyrecal.report.footprint import draw_curves, draw_footprint, draw_patches
 from tyrecal.report.shape_data import patches_data
 from tyrecal.report.table import shown
 from tyrecal.report.vtu import write_pressed, write_pressed_vtu
@@ -77,6 +77,20 @@ def test_every_load_of_every_design_in_one_scale(
     with Image.open(tmp_path / "footprint_initial.png") as image:
         assert image.format == "PNG" and max(image.size) < 2000
         assert 0.05 < (np.asarray(image.convert("L")) < 245).mean() < 0.5
+
+
+def test_a_patch_is_drawn_as_long_and_wide_as_its_table_says(designs: dict[str, Pressed]) -> None:
+    rows = result(designs).rows[:3]
+    patches = patches_data("", designs, BOTH).patches[:3]
+    figure = draw_patches(patches, 500.0)
+    for axes, row in zip(figure.axes, rows, strict=False):
+        bands, edge = axes.collections[0], axes.patches[0].get_path()
+        extents = 1e3 * np.array([row.width_m, row.length_m])
+        assert np.ptp(edge.vertices, axis=0) == pytest.approx(extents, abs=0.02)
+        clip = bands.get_clip_path().get_fully_transformed_path()
+        assert axes.transData.transform_path(edge).vertices == pytest.approx(clip.vertices)
+        dots = axes.lines[0].get_xydata()
+        assert len(dots) and edge.contains_points(dots).all()
 
 
 def test_area_and_deflection_of_both_designs(designs: dict[str, Pressed], tmp_path: Path) -> None:

@@ -71,6 +71,18 @@ def test_extents_end_half_way_to_the_next_node() -> None:
     assert everywhere.length_m == 8.0 and everywhere.width_m == 7.0
 
 
+def test_the_edge_is_where_the_depth_of_elements_is_zero() -> None:
+    """Parabolas on elements of three nodes: exact for a paraboloid, whatever the mesh is."""
+    steps = np.array([-0.2, -0.15, -0.1, -0.02, 0.06, 0.13, 0.2])
+    along, across = np.meshgrid(steps, 0.6 * steps, indexing="ij")
+    depth = 1e-3 * (1 - (along / 0.12) ** 2 - (across / 0.07) ** 2)
+    (edge,) = Patch(along, across, 0.0 * along, depth > 0, depth, True).edges()
+    assert np.hypot(edge[:, 0] / 0.07, edge[:, 1] / 0.12) == pytest.approx(1.0, abs=0.01)
+    (edge,) = Patch(along, across, 0.0 * along, depth > 0).edges()  # half-way between nodes
+    patch = Patch(along, across, 0.0 * along, depth > 0)
+    assert np.ptp(edge, axis=0) == pytest.approx([patch.width_m, patch.length_m])
+
+
 def test_both_designs_and_what_they_say() -> None:
     designs = {"initial": START, "fitted": {"A_belt": 0.5 * BELT}}
     names: list[str] = []
@@ -167,6 +179,9 @@ def test_the_bundled_solvers_own_footprints(tmp_path: Path) -> None:
         turned = sorted(zip(-footprint.along_m, -footprint.across_m, pressure, strict=True))
         same = sorted(zip(footprint.along_m, footprint.across_m, pressure, strict=True))
         np.testing.assert_allclose(turned, same, rtol=1e-5, atol=1e-9)
+        (edge,) = patch.edges()
+        row = footprint_row(pressed, footprint, mesh)
+        assert np.ptp(edge, axis=0) == pytest.approx([row["width_m"], row["length_m"]], rel=0.02)
         slip = np.linalg.norm(footprint.traction_Pa, axis=1)
         assert (slip <= 0.5 * pressure * (1 + 1e-6)).all()
     first, second = (footprint_row(pressed, each, mesh) for each in pressed.footprints)

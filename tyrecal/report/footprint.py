@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from contourpy import contour_generator
 from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
 from matplotlib.ticker import MaxNLocator
 
 from ..studies.footprint import FootprintRow
@@ -17,7 +18,6 @@ from .shape_data import PatchData
 MAX_BANDS = 12  # of colour
 MAX_COLUMNS = 4
 MARGIN = 10.0  # mm round the largest patch
-TRACE = 1e-6  # of the highest pressure, where the lowest band begins
 DESIGN_STYLES: dict[str, dict[str, Any]] = {
     "initial": {"ls": (0, (4, 2)), "marker": "o", "mfc": "white"},
     "fitted": {"ls": "-", "marker": "s"},
@@ -44,22 +44,27 @@ def draw_footprint(rows: Sequence[FootprintRow], patches: Sequence[PatchData]) -
 def draw_patches(patches: Sequence[PatchData], highest_kPa: float) -> Figure:
     """One design's contact pressure, a patch a load, all at one scale, rolling direction upwards.
 
-    highest_kPa: upper end of the colours; dots: nodes that touch.
+    highest_kPa: upper end of the colours; dots: nodes that touch. The colours end at the patch's
+    edge, so that a patch is drawn as long and as wide as its table says.
     """
-    width, length = 2 * (np.max([_halves(patch) for patch in patches], axis=0) + MARGIN)
+    edges = [patch_edge(patch) for patch in patches]
+    halves = np.max([np.abs(edge.vertices).max(axis=0) for edge in edges], axis=0)
+    width, length = 2 * (halves + MARGIN)
     columns = min(MAX_COLUMNS, len(patches))
     lines = -(-len(patches) // columns)
     inch = min(2.4, 9.0 / columns) / width
     figure = new_figure(1.4 + columns * (inch * width + 0.25), 0.9 + lines * (inch * length + 0.35))
     grid = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
-    levels = np.array(MaxNLocator(MAX_BANDS).tick_values(0.0, highest_kPa))
-    levels[0] = TRACE * levels[-1]  # where nothing touches stays white
+    levels = MaxNLocator(MAX_BANDS).tick_values(0.0, highest_kPa)
     for axes in grid.flat[len(patches) :]:
         axes.set_axis_off()
-    for axes, patch in zip(grid.flat, patches, strict=False):
+    for axes, patch, edge in zip(grid.flat, patches, edges, strict=False):
         x, y, p = np.array([patch.across_mm, patch.along_mm, patch.pressure_kPa])
         bands = axes.contourf(x, y, p, levels, cmap=COLOUR_MAP)
-        axes.plot(x[p > 0], y[p > 0], ".", color="k", ms=1.2, alpha=0.5)
+        bands.set_clip_path(edge, axes.transData)
+        axes.add_patch(PathPatch(edge, fc="none", ec=GREY, lw=0.6))
+        inside = edge.contains_points(np.column_stack([x.ravel(), y.ravel()])).reshape(x.shape)
+        axes.plot(x[inside], y[inside], ".", color="k", ms=1.2, alpha=0.5)
         axes.set_title(f"{patch.load_N:g} N", loc="left", fontsize=9)
         axes.set(xlim=(-width / 2, width / 2), ylim=(-length / 2, length / 2), aspect="equal")
     for axes in grid.flat[max(0, len(patches) - columns) : len(patches)]:  # the lowest of a column
@@ -79,12 +84,9 @@ def draw_patches(patches: Sequence[PatchData], highest_kPa: float) -> Figure:
     return figure
 
 
-def _halves(patch: PatchData) -> np.ndarray:
-    """Half the width and half the length, mm, as far as the lowest band goes."""
-    x, y, p = np.array([patch.across_mm, patch.along_mm, patch.pressure_kPa])
-    contours: Any = contour_generator(x, y, p)
-    line = np.concatenate(contours.lines(TRACE * p.max()))
-    return np.asarray(abs(line).max(0))
+def patch_edge(patch: PatchData) -> Path:
+    """The closed lines round what touches, across and along in mm."""
+    return Path.make_compound_path(*(Path(np.reshape(line, (-1, 2))) for line in patch.edge_mm))
 
 
 @in_house_style

@@ -31,13 +31,15 @@ TOLERANCE_HZ = 1e-6  # of a table's frequencies against the shapes'
 
 
 class PatchData(ResultPart):
-    """Contact pressure on lines of nodes, (ring along, node across)."""
+    """Contact pressure on lines of nodes, (ring along, node across), and the patch's edge as closed
+    lines, points across and along in turn."""
 
     design: str
     load_N: float
     across_mm: list[list[float]]
     along_mm: list[list[float]]
     pressure_kPa: list[list[float]]
+    edge_mm: list[Flat]
 
 
 class Patches(Result):
@@ -298,6 +300,7 @@ def patches_data(
                     across_mm=_rounded(1e3 * patch.across[near], 3),
                     along_mm=_rounded(1e3 * patch.along[near], 3),
                     pressure_kPa=_rounded(1e-3 * patch.pressure[near], 3),
+                    edge_mm=[_rounded(1e3 * line.ravel(), 2) for line in patch.edges()],
                 )
             )
     return Patches(format=1, case=name, patches=patches)

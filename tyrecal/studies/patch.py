@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from contourpy import contour_generator
 
 from ..simulate.evaluate.pressed import Footprint, Pressed
 from ..tyre.section.mesh import SectionMesh
 
 Array = np.ndarray
+FINE_STEPS = 8  # of an element of three nodes, between which its depth is a parabola
 
 
 @dataclass(frozen=True)
@@ -17,13 +21,18 @@ class Patch:
     """The outer surface seen from the road, (ring, node across): rings in the direction of rolling
     with the patch's middle amid them, nodes from -z to +z.
 
-    along, across: m in the road's plane; pressure: Pa, 0 where it does not touch; touches: bool.
+    along, across: m in the road's plane; pressure: Pa, 0 where it does not touch; touches: bool;
+    depth: m, of nodes below the road, of a solver that places the patch's edge between nodes, else
+    None; midside: whether every second node across is the middle of an element, as every second
+    ring is.
     """
 
     along: Array
     across: Array
     pressure: Array
     touches: Array
+    depth: Array | None = None
+    midside: bool = False
 
     @property
     def length_m(self) -> float:
@@ -35,6 +44,17 @@ class Patch:
         """Extent across, likewise."""
         return _extent(self.across.T, self.touches.T)
 
+    def edges(self) -> list[Array]:
+        """The patch's edge as closed lines (points, 2), across and along in m: where the depth is
+        0, or half-way between nodes that touch and the next."""
+        touching = [self.across, self.along, np.where(self.touches, 1.0, -1.0)]
+        if self.depth is None:
+            return _zero_lines(touching)
+        fields = [_refined(field) for field in (self.across, self.along, self.depth)]
+        if self.midside:
+            fields = [_refined(field.T).T for field in fields]
+        return _zero_lines(fields) or _zero_lines(touching)
+
 
 def patch_of(pressed: Pressed, footprint: Footprint, mesh: SectionMesh) -> Patch:
     """The patch at one load on the section's mesh."""
@@ -45,11 +65,20 @@ def patch_of(pressed: Pressed, footprint: Footprint, mesh: SectionMesh) -> Patch
     angle = pressed.angles[:, None]
     u_r, u_theta, u_z = np.moveaxis(footprint.displacement[:, line], -1, 0)
     along = np.sin(angle) * (R + u_r) + np.cos(angle) * u_theta
+    down = np.cos(angle) * (R + u_r) - np.sin(angle) * u_theta
     pressure = np.zeros((len(pressed.angles), len(pressed.nodes)))
     touches = np.zeros(pressure.shape, bool)
     rows = [row[int(node)] for node in footprint.node]
     pressure[footprint.ring, rows], touches[footprint.ring, rows] = footprint.pressure_Pa, True
-    return Patch(along[order], (Z + u_z)[order], pressure[:, line][order], touches[:, line][order])
+    depth = (down - (pressed.free_radius_m - footprint.deflection_m))[order]
+    return Patch(
+        along[order],
+        (Z + u_z)[order],
+        pressure[:, line][order],
+        touches[:, line][order],
+        None if footprint.contact_length_m is None else depth,
+        mesh.quadratic,
+    )
 
 
 def _extent(place: Array, touches: Array) -> float:
@@ -57,3 +86,17 @@ def _extent(place: Array, touches: Array) -> float:
     between = (place[:-1] + place[1:]) / 2
     below, above = np.concatenate([place[:1], between]), np.concatenate([between, place[-1:]])
     return float(above[touches].max() - below[touches].min())
+
+
+def _refined(field: Array) -> Array:
+    """A field (ring, ...) on `FINE_STEPS` steps of each three rings, as a parabola through them."""
+    xi = np.linspace(-1.0, 1.0, FINE_STEPS, endpoint=False)[:, None]
+    a, b, c = (each[:, None] for each in (field[:-2:2], field[1:-1:2], field[2::2]))
+    within = b + xi * (c - a) / 2 + xi**2 * (a - 2 * b + c) / 2
+    return np.concatenate([within.reshape(-1, field.shape[1]), field[-1:]])
+
+
+def _zero_lines(fields: Sequence[Array]) -> list[Array]:
+    """Lines (points, 2), in the first two of three fields, where the last is 0."""
+    contours: Any = contour_generator(*fields)
+    return [np.asarray(line) for line in contours.lines(0.0)]

@@ -103,10 +103,13 @@ def patches(name: str) -> dict[str, Any]:
         for load in (1000.0, 4000.0):
             size = (load / 4000) ** (1 / 3)
             p = 500 * np.sqrt(np.maximum(0, 1 - (x / 50 / size) ** 2 - (y / 80 / size) ** 2))
+            turn = np.linspace(0, 2 * np.pi, 61)
+            edge = size * np.column_stack([50 * np.cos(turn), 80 * np.sin(turn)])
             entries.append(
                 {
                     "design": design,
                     "load_N": load,
+                    "edge_mm": [edge.ravel().tolist()],
                     "across_mm": x.tolist(),
                     "along_mm": y.tolist(),
                     "pressure_kPa": p.tolist(),

@@ -313,6 +313,7 @@ def test_a_number_that_cannot_be(copy: Path, file: str, old: str, new: str) -> N
         ("modes_shapes.json", ("modes", 0, "displacement", 0)),
         ("footprint_patches.json", ("patches", 0, "across_mm", 0)),
         ("footprint_patches.json", ("patches", 1, "pressure_kPa")),
+        ("footprint_patches.json", ("patches", 1, "edge_mm", 0)),
         ("diagnosis_section.json", ("areas", "crown", 0)),
     ],
 )
