@@ -22,8 +22,8 @@ from matplotlib.patches import Patch
 from matplotlib.text import Text
 from PIL import Image
 
-KEY = "tyrecal: drawn numbers"  # of the PNG's text
-DIGITS = 6
+PNG_KEY = "tyrecal: drawn numbers"  # of the PNG's text
+DRAWN_DIGITS = 6
 
 
 class Panel(TypedDict):
@@ -37,7 +37,7 @@ def drawn_numbers(figure: Figure) -> list[Panel]:
     """What the figure's own texts and each of its panels say: ``words`` and ``numbers``.
 
     numbers: for every line, area, cloud of points and coloured field the count of its values, their
-    least, greatest, mean and root mean square to `DIGITS` significant digits, in units of the axes.
+    least, greatest, mean and root mean square to `DRAWN_DIGITS` significant digits, in units of the axes.
     Ticks are left out: they follow from the rest and from the version of Matplotlib.
     """
     return [{"words": _words(figure.texts), "numbers": []}, *map(_panel, figure.axes)]
@@ -59,7 +59,7 @@ def _words(texts: Iterable[Text]) -> list[str]:
 def read_drawn_numbers(path: Path) -> list[Panel]:
     """`drawn_numbers` of a PNG that `figure.save` wrote. Raises ValueError if it has none."""
     with Image.open(path) as image:
-        text = image.info.get(KEY)
+        text = image.info.get(PNG_KEY)
     if not text:
         raise ValueError(f"{path}: no numbers are kept in this picture")
     panels: list[Panel] = json.loads(text)
@@ -86,4 +86,4 @@ def _moments(values: np.ndarray) -> list[float]:
     if not known.size:
         return [0]
     moments = known.min(), known.max(), known.mean(), np.sqrt(np.mean(known**2))
-    return [known.size, *(float(f"{each:.{DIGITS}g}") for each in moments)]
+    return [known.size, *(float(f"{each:.{DRAWN_DIGITS}g}") for each in moments)]

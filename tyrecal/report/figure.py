@@ -111,7 +111,7 @@ def save(figure: Figure, path: Path) -> None:
     image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
     small = image.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     kept = PngInfo()
-    kept.add_itxt(drawn.KEY, json.dumps(drawn.drawn_numbers(figure)), zip=True)
+    kept.add_itxt(drawn.PNG_KEY, json.dumps(drawn.drawn_numbers(figure)), zip=True)
     with whole(path) as partial:
         small.save(partial, "PNG", compress_level=COMPRESSION, pnginfo=kept)
 
