@@ -14,7 +14,8 @@ from tyrecal.studies.blind.protocol import read_protocol
 from tyrecal.studies.blind.score import Scored, score
 from tyrecal.studies.blind.tables import page, summary
 
-from ..studies.blind_least_squares import STUDIES, errors, unpacked
+from ..studies.blind_least_squares import errors
+from .archive import ARCHIVE, STUDIES, unpack
 
 LEAST_SQUARES = {  # errors held out without and with the effect, %, shrinkage, by chance
     "blind_study_1": (1.70, 0.47, 0.74, 0.68),
@@ -23,18 +24,18 @@ LEAST_SQUARES = {  # errors held out without and with the effect, %, shrinkage, 
 }
 
 
-@pytest.fixture(scope="module", params=STUDIES, ids=[study.name for study in STUDIES])
-def study(request: pytest.FixtureRequest) -> Path:
-    """Its folder."""
-    folder: Path = request.param
-    return folder
+@pytest.fixture(scope="module", params=STUDIES)
+def study(request: pytest.FixtureRequest) -> str:
+    """Its name."""
+    name: str = request.param
+    return name
 
 
 @pytest.fixture(scope="module")
-def trials(study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def trials(study: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The study as it lay before the answerer, then with answers; the truth beside it."""
     folder = tmp_path_factory.mktemp("study") / "trials"
-    unpacked(study, folder)
+    unpack(study, folder)
     return folder
 
 
@@ -45,13 +46,13 @@ def scored(trials: Path) -> list[Scored]:
 
 @pytest.mark.slow
 def test_calibrated_as_usual_the_error_shrinks_too(
-    study: Path, trials: Path, scored: list[Scored]
+    study: str, trials: Path, scored: list[Scored]
 ) -> None:
     by_kind = errors(trials, scored)
     before, after = 100 * np.median(by_kind["effect"], 0)
     shrinks, chance = (1 - by_kind[kind][:, 1] / by_kind[kind][:, 0] for kind in ("effect", "none"))
     got = before, after, np.median(shrinks), np.quantile(chance, 0.95)
-    assert got == pytest.approx(LEAST_SQUARES[study.name], abs=0.006)
+    assert got == pytest.approx(LEAST_SQUARES[study], abs=0.006)
 
 
 def alike(computed: Any, stated: Any, where: str = "") -> None:
@@ -71,12 +72,12 @@ def alike(computed: Any, stated: Any, where: str = "") -> None:
 
 
 @pytest.mark.slow
-def test_the_study_says_what_is_on_record(study: Path, trials: Path, scored: list[Scored]) -> None:
+def test_the_study_says_what_is_on_record(study: str, trials: Path, scored: list[Scored]) -> None:
     figures = summary(scored)
     words = page(figures, read_protocol(trials).maker)
     figures.pop("misses")
-    alike(figures, json.loads((study / "score.json").read_text()))
-    recorded = (study / "RESULT.md").read_text()
+    alike(figures, json.loads((ARCHIVE / f"{study}.json").read_text()))
+    recorded = (ARCHIVE / f"{study}.md").read_text()
     assert words.splitlines()[:12] == recorded.splitlines()[:12]
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import lzma
-import tarfile
 from collections.abc import Iterator
 from dataclasses import replace
 from hashlib import sha256
@@ -35,14 +33,14 @@ from tyrecal.tyre.load import load_case
 from tyrecal.tyre.values import with_values
 
 from ..chance import Chance, generator
-from ..studies.blind_least_squares import SAFE, unpacked
 from ..studies.judge import tyre_told
 from ..studies.judge_section import LINES
 from ..studies.judge_section import section as stations_section
 from ..studies.test_fenics import installed
+from .archive import ARCHIVE, seals, unpack
 from .study3 import make as making
 from .study3.__main__ import result
-from .study3.cases import GROUPS, LABELS, RECORDED, SIZES, SURFACE_HELD, Group, written
+from .study3.cases import GROUPS, LABELS, SIZES, SURFACE_HELD, Group, written
 from .study3.draw import evident, foreseen, known_laws, one_drawn
 from .study3.kinds import EFFECTS_OF, further
 from .study3.laws import EVIDENT, bead_seat
@@ -53,7 +51,6 @@ from .study3.tyre import Mesh, Tyre, on_springs, problem, tyre_of
 Array = np.ndarray
 ROOT = Path(__file__).parents[2]
 ALIKE = {"harmonics": [0, 1, 2, 3, 4], "modes": 3, "degree": 3}
-ON_RECORD = sorted(each for each in RECORDED.iterdir() if each.is_dir())
 
 
 @pytest.fixture(scope="module")
@@ -228,12 +225,10 @@ def test_effects_of_a_band_are_those_of_which_the_ruler_foresees_as_much(chance:
     False failures: 1e-7."""
     group = next(group for group in GROUPS if group.name == "205_60r15_own")
     with TemporaryDirectory() as place:
-        with tarfile.open(RECORDED / group.name / "trials.tar.xz") as archive:
-            archive.extractall(place, **SAFE)
-        folder = Path(place)
+        folder = Path(place) / "trials"
+        unpack(group.name, folder)
         case = load_case(folder / "case" / f"{group.name}.yaml", allow_unusual=True)
-        ruler = read_ruler(folder, labels_of(case))
-    rules = read_protocol(RECORDED / group.name)
+        ruler, rules = read_ruler(folder, labels_of(case)), read_protocol(folder)
     lam: dict[str, list[float]] = {}
     of_one = {"one": 40, "one_faint": 10, "one_weak": 10, "one_strong": 20}
     for kind, count in {**of_one, "two_strong": 10, "three_strong": 5}.items():
@@ -254,8 +249,8 @@ def test_what_is_evident_outside_the_catalogue_moves_as_much_as_one_effect(tmp_p
     """By the recorded ruler, the first mode 10 % lower at all pressures is evident, 0.1 % lower is
     not; sizes are the far ends of their ranges."""
     group = next(group for group in GROUPS if group.name == "205_60r15_own")
-    unpacked(RECORDED / group.name, tmp_path / "trials")
-    case, rules = case_of(tmp_path / "trials"), read_protocol(RECORDED / group.name)
+    unpack(group.name, tmp_path / "trials")
+    case, rules = case_of(tmp_path / "trials"), read_protocol(tmp_path / "trials")
     ruler = read_ruler(tmp_path / "trials", labels_of(case))
     drawn = one_drawn(rules, case, group, "outside_strong", generator("evident"), None)
     (law,) = (EVIDENT[id] for id in drawn.effects)
@@ -398,14 +393,13 @@ def test_the_mass_is_that_of_the_section_s_own_integral(tmp_path: Path, fenics: 
     assert fenics.ask(request)["mass_kg"] == pytest.approx(whole, rel=2e-4)
 
 
-@pytest.mark.parametrize("group", ON_RECORD, ids=lambda group: group.name)
-def test_recorded_trials_are_those_that_were_sealed(group: Path) -> None:
+@pytest.mark.parametrize("name", seals())
+def test_recorded_trials_are_those_that_were_sealed(name: str, tmp_path: Path) -> None:
     """The truth has its hash, and a trial for each file that is answered."""
-    truth = lzma.decompress((group / "truth.json.xz").read_bytes())
-    assert sha256(truth).hexdigest() == read_json(group / SEAL)["sha256"]
-    with tarfile.open(group / "trials.tar.xz") as archive:
-        files = {Path(name) for name in archive.getnames() if name.endswith(".csv")}
-    trials = {path.stem for path in files if path.parent.name == "trials"}
+    unpack(name, tmp_path / "trials", tmp_path / "truth")
+    truth = (tmp_path / "truth" / TRUTH).read_bytes()
+    assert sha256(truth).hexdigest() == read_json(tmp_path / "trials" / SEAL)["sha256"]
+    trials = {path.stem for path in (tmp_path / "trials" / "trials").glob("*.csv")}
     assert trials == {trial["id"] for trial in json.loads(truth)["trials"]}
 
 
@@ -414,10 +408,9 @@ def test_the_tables_on_record_are_what_the_scorer_says(tmp_path: Path) -> None:
     """The tables of every third series; `python -m tests.blind.study3 score` gives them all."""
     series = sorted({group.series for group in GROUPS})[::3]
     names = {group.name for group in GROUPS if group.series in series}
-    for group in ON_RECORD:
-        if group.name in names:
-            unpacked(group, tmp_path / "all" / group.name, tmp_path / "all-truth" / group.name)
-    recorded = (RECORDED / "RESULT.md").read_text(encoding="utf-8")
+    for name in names & seals().keys():
+        unpack(name, tmp_path / "all" / name, tmp_path / "all-truth" / name)
+    recorded = (ARCHIVE / "study_3.md").read_text(encoding="utf-8")
     _, *sections = result(tmp_path / "all").split("\n## ")
     assert len(sections) == len(series) > 3
     for part in sections:
@@ -432,7 +425,7 @@ def test_an_answer_on_record_is_given_again(tmp_path: Path) -> None:
     which together have less than 1e-4, takes five times as long.
     """
     folder = tmp_path / "trials"
-    unpacked(RECORDED / "175_70r13_own_17", folder)
+    unpack("175_70r13_own_17", folder)
     first, *others = sorted((folder / "answers").glob("*.json"))
     recorded = {first.name: read_json(first)["diagnosis"]}
     for path in others:

@@ -14,8 +14,8 @@ from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.blind.ruler import Difficulty, Ruler
 from tyrecal.studies.diagnose.several import priors
 
-from ..studies.blind_least_squares import unpacked
-from .study3.cases import RECORDED, Group
+from .archive import unpack
+from .study3.cases import Group
 from .study3.kinds import weighed_again
 from .study3.rises import risen
 from .study3.score import Scored, foretold
@@ -191,7 +191,7 @@ def test_makers_and_catalogue_mean_the_same_by_a_spring(tmp_path: Path) -> None:
     """Calibration and constants leave nothing of one spring's shift that the other spring does not
     leave; the table gives the number of springs."""
     group = Group("205/60R15", True, 15)
-    unpacked(RECORDED / group.name, tmp_path / "trials", tmp_path / "truth")
+    unpack(group.name, tmp_path / "trials", tmp_path / "truth")
     by_effect = unlike(tmp_path / "trials", tmp_path / "truth")
     springs = [
         each for id, several in by_effect.items() if id.startswith("spindle") for each in several

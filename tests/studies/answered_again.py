@@ -33,8 +33,8 @@ from tyrecal.studies.blind.seal import ANSWERS, check_answers
 from tyrecal.studies.blind.tables import summary
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE
 
+from ..blind.archive import STUDIES, unpack
 from ..blind.study3.kinds import further
-from .blind_least_squares import STUDIES, unpacked
 
 ORIGINS = "exact", "drawing"
 STATED = "section:\n", "section:\n  known_from: {}\n"
@@ -57,13 +57,13 @@ def weighed(answers: Path) -> list[str]:
     return sorted(keys - {NONE, OUTSIDE})
 
 
-def answered(study: Path, folder: Path, origin: str, jobs: int, every: int) -> str:
+def answered(study: str, folder: Path, origin: str, jobs: int, every: int) -> str:
     """Answer what has no answer yet, of ``every`` so many trials by name one; the hash of all."""
-    trials = folder / study.name / origin / "trials"
+    trials = folder / study / origin / "trials"
     marked = trials / "weighed.json"
     if not marked.exists():
         trials.parent.mkdir(parents=True, exist_ok=True)
-        unpacked(study, trials)
+        unpack(study, trials)
         marked.write_text(json.dumps(weighed(trials / "answers")))
         for path in (trials / "answers").glob("*.json"):
             path.unlink()
@@ -82,11 +82,11 @@ def answered(study: Path, folder: Path, origin: str, jobs: int, every: int) -> s
     return answer(trials, emulate(model), rows_of(case, protocol), jobs, on_progress, more)
 
 
-def compared(study: Path, folder: Path) -> dict[str, list[Scored]]:
+def compared(study: str, folder: Path) -> dict[str, list[Scored]]:
     """The answers on record and those of each origin, of the trials that all of these have."""
     recorded = folder / "recorded" / "trials"
     if not recorded.exists():
-        unpacked(study, recorded)
+        unpack(study, recorded)
     sealed = recorded.with_name("trials-truth")
     by_origin = {"recorded": score(recorded, sealed)}
     for origin in ORIGINS:
@@ -119,17 +119,16 @@ def _share(rate: dict[str, Any]) -> str:
 
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path))
-@click.argument("study", type=click.Choice([study.name for study in STUDIES]))
+@click.argument("study", type=click.Choice(STUDIES))
 @click.argument("origin", type=click.Choice(ORIGINS), required=False)
 @click.option("--jobs", default=1)
 @click.option("--every", default=1)
 def main(folder: Path, study: str, origin: str | None, jobs: int, every: int) -> None:
     """Answer, or tell the figures of what is answered beside those on record."""
-    own = next(each for each in STUDIES if each.name == study)
     if origin:
-        print(answered(own, folder, origin, jobs, every))
+        print(answered(study, folder, origin, jobs, every))
         return
-    by_origin = compared(own, folder / study)
+    by_origin = compared(study, folder / study)
     columns = {name: dict(figures(summary(trials))) for name, trials in by_origin.items()}
     print(f"| {study} | {' | '.join(columns)} |\n{'|---' * (1 + len(columns))}|")
     for row in columns["recorded"]:

@@ -11,8 +11,6 @@ exchanged labels are left out, an ordinary calibration would be misled by them.
 from __future__ import annotations
 
 import json
-import lzma
-import tarfile
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -29,26 +27,10 @@ from tyrecal.studies.blind.score import Scored, case_of, labels_of, means, score
 from tyrecal.studies.blind.seal import open_truth
 from tyrecal.studies.blind.tables import DETECTED
 
+from ..blind.archive import STUDIES, unpack
+
 Array = np.ndarray
-STUDIES = sorted((Path(__file__).parents[1] / "benchmarks").glob("blind_study_*"))
 STEPS, LONGEST = 20, 0.5
-SAFE: Any = {"filter": "data"} if hasattr(tarfile, "data_filter") else {}  # from 3.11.4 on
-
-
-def unpacked(study: Path, folder: Path, sealed: Path | None = None) -> None:
-    """The study as it lay after the answers in ``folder``, its truth in ``sealed``, by default
-    beside it."""
-    folder.mkdir(parents=True)
-    for archive in ("trials.tar.xz", "answers.tar.xz"):
-        if (study / archive).exists():
-            with tarfile.open(study / archive) as files:
-                files.extractall(folder, **SAFE)
-    for name in ("protocol.json", "seal.json", "answers.json"):
-        if (study / name).exists():
-            (folder / name).write_bytes((study / name).read_bytes())
-    truth = sealed or folder.with_name(f"{folder.name}-truth")
-    truth.mkdir(parents=True)
-    (truth / "truth.json").write_bytes(lzma.decompress((study / "truth.json.xz").read_bytes()))
 
 
 def errors(folder: Path, trials: Sequence[Scored]) -> dict[str, Array]:
@@ -127,7 +109,7 @@ def main() -> None:
     print("|---|---|---|---|---|---|")
     for study in STUDIES:
         with TemporaryDirectory() as place:
-            unpacked(study, Path(place) / "trials")
+            unpack(study, Path(place) / "trials")
             folder = Path(place) / "trials"
             by_kind = errors(folder, score(folder, folder.with_name("trials-truth")))
         before, after = 100 * np.median(by_kind["effect"], 0)
@@ -135,7 +117,7 @@ def main() -> None:
             1 - by_kind[kind][:, 1] / by_kind[kind][:, 0] for kind in ("effect", "none")
         )
         print(
-            f"| {study.name} | {len(shrinks)} | {before:.2f} | {after:.2f} |"
+            f"| {study} | {len(shrinks)} | {before:.2f} | {after:.2f} |"
             f" {np.median(shrinks):.2f} | {np.quantile(chance, 0.95):.2f} |"
         )
 

@@ -26,7 +26,7 @@ from tyrecal.studies.diagnose.inverse_problem import Assumed
 from tyrecal.studies.diagnose.several import priors
 from tyrecal.studies.diagnose.verdict import CHECK, RULED_OUT, SET, most_sure
 
-from .blind_least_squares import STUDIES, unpacked
+from ..blind.archive import STUDIES, unpack
 
 SINGLES, PAIRS, EFFECTS = 0.62, 0.03, 20  # together, when the answers were given; considered
 
@@ -92,7 +92,7 @@ def main(further: float) -> None:
             patch("tyrecal.studies.blind.score.guesses", lambda *args: {}),
         ):
             folder = Path(place) / "trials"
-            unpacked(study, folder)
+            unpack(study, folder)
             recorded = score(folder, folder.with_name("trials-truth"))
             diagnoses = {
                 t.id: json.loads((folder / "answers" / f"{t.id}.json").read_text())["diagnosis"]
@@ -104,7 +104,7 @@ def main(further: float) -> None:
             [again(t, checks[t.id], 1.0, 1.0) for t in recorded],
             [again(t, checks[t.id], singles, pairs) for t in recorded],
         ]
-        print(f"| {study.name} | recorded | today's rule | today's rule and prior |")
+        print(f"| {study} | recorded | today's rule | today's rule and prior |")
         print("|---|---|---|---|")
         for row in zip(*(figures(way).items() for way in ways), strict=True):
             print(f"| {row[0][0]} | {' | '.join(value for _, value in row)} |", flush=True)

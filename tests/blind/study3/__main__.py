@@ -3,7 +3,7 @@
     python -m tests.blind.study3 groups
     python -m tests.blind.study3 make DIR 205_60r15_own --one_strong 30 --two 16 --jobs 2
     python -m tests.blind.study3 answer DIR 205_60r15_own --jobs 2
-    python -m tests.blind.study3 unpack DIR                  # all that is on record, truth beside
+    python -m tests.blind.archive unpack DIR                 # all that is on record, truth beside
     python -m tests.blind.study3 score DIR > table.md        # of all answered, but LEARNED_FROM
     python -m tests.blind.study3 score DIR 11r22_5_own --least 1   # of one, few trials shown too
     python -m tests.blind.study3 score DIR --series 4 5 --least 1  # of two series together
@@ -43,8 +43,7 @@ from tyrecal.studies.blind.seal import ANSWERS, SEAL
 from tyrecal.studies.diagnose.tyre_model import TyreModel
 from tyrecal.tyre.effects.edit import changed, with_part
 
-from ...studies.blind_least_squares import unpacked
-from .cases import GROUPS, LABELS, LEARNED_FROM, RECORDED, Group, written
+from .cases import GROUPS, LABELS, LEARNED_FROM, Group, written
 from .kinds import further
 from .make import FENICS, make
 from .maker import computed
@@ -58,7 +57,7 @@ from .unlike import table_of_unlike, unlike
 COUNTS = {"none": 12, "one": 12, "one_strong": 20, "two": 4, "two_strong": 14, "three": 4}
 COUNTS |= {"three_strong": 0, "outside": 6, "outside_strong": 0, "again": 2}
 COUNTS |= {"one_faint": 0, "one_weak": 0}
-COMMANDS = "groups", "make", "answer", "unpack", "score", "power", "rises", "unlike", "mesh"
+COMMANDS = "groups", "make", "answer", "score", "power", "rises", "unlike", "mesh"
 
 
 def main() -> None:
@@ -89,9 +88,6 @@ def main() -> None:
             print(table_of_rises({g: rises(*place) for g, place in places.items()}))
         else:
             print(table_of_unlike((g, unlike(*place)) for g, place in places.items()))
-    elif o.what == "unpack":
-        for group in (each for each in RECORDED.iterdir() if each.is_dir()):
-            unpacked(group, Path(o.folder) / group.name, sealed_in(o.folder) / group.name)
     elif o.what == "score":
         print(result(Path(o.folder), o.group, o.least, o.series))
     else:

@@ -21,7 +21,6 @@ from tyrecal.tyre.section.size import parse_size
 from .section import TREAD, VOID, Mould, at, carcass, mould
 
 LABELS = list(USUAL_LABELS)
-RECORDED = Path(__file__).parents[2] / "benchmarks" / "study_3"
 LEARNED_FROM = "205_60r15_foreign"  # answered and opened while the answerer could still change
 
 CAR, TRUCK = ((160.0, 240.0, 320.0), 200.0), ((500.0, 720.0, 850.0), 620.0)  # kPa given, held out
