@@ -274,8 +274,8 @@ CLAIMS: list[tuple[str, str, Callable[[Record], list[float]]]] = [
     ),
     (
         "paper",
-        "it moves [0,0] lateral by {} % and [1,0] by {} %, A_belt alone by {} and {} %; of [3,0]"
-        " and [4,0] A_belt has more ({} and {} % for {} and {} %)",
+        "it moves [0,0] lateral by {} % and [1,0] by {} %, A_belt alone by {} and {} %. On [3,0]"
+        " and [4,0] A_belt has more effect ({} and {} % for {} and {} %)",
         lambda r: [
             change(r, step, label)
             for labels in ((AXIAL, "[1,0]"), ("[3,0]", "[4,0]"))
@@ -322,8 +322,9 @@ CLAIMS: list[tuple[str, str, Callable[[Record], list[float]]]] = [
     ),
     (
         "paper",
-        "sidewalls {} % thinner, belt cords of steel's density ({} g/cm³ for the example's 5.9) and"
-        " modulus ({} GPa, the bound), softer carcass cords ({} GPa for 9.87), denser rubber ({},",
+        "sidewalls {} % thinner. Its belt cords have steel's density ({} g/cm³ for the example's"
+        " 5.9) and modulus ({} GPa, the bound). Its carcass cords are softer ({} GPa for 9.87), and"
+        " its rubber is denser ({},",
         of(
             "inferred",
             *(("line 25 0", -100.0), ("line 33 0", 1e-3), ("line 31 0", 1e-9)),
