@@ -345,13 +345,13 @@ CLAIMS: list[tuple[str, str, Callable[[Record], list[float]]]] = [
     ),
     (
         "real_data",
-        'calibration leaves {} % (rms, weighed by all that is uncertain), p = {}; "nothing" has'
-        ' {} %, "outside the catalogue" {} %, the likeliest effect {} %',
+        'calibration leaves {} % (rms), p = {}. "Nothing" has {} %, "not explained" {} %, the'
+        " likeliest effect {} %",
         of("diagnosed", "rms %", "p", "none %", "outside %", "effect %"),
     ),
     (
         "real_data",
-        "*outside the catalogue*: {} % left, p = {}e-12",
+        "*not explained by the catalogue*: {} % left, p = {}e-12",
         of("diagnosed, section exact", "rms %", ("p", 1e12)),
     ),
     (
@@ -361,9 +361,9 @@ CLAIMS: list[tuple[str, str, Callable[[Record], list[float]]]] = [
     ),
     (
         "real_data",
-        "Of the labels [3,0] to [8,0] it is {} % sure, and it fails to fit them: {} sigmas are left"
-        " (χ² per degree of freedom {}), A_belt {}e-7 m² ± {} %, A_carcass {}e-7 m² ± {} %,"
-        " C10 {} MPa ± {} %",
+        "The labels [3,0] to [8,0] have a probability of {} %, and the fit fails: {} standard"
+        " deviations are left (χ² per degree of freedom {}). A_belt is {}e-7 m² ± {} %, A_carcass"
+        " {}e-7 m² ± {} %, C10 {} MPa ± {} %",
         of(
             "both",
             *("labels %", "objective_Hz", "chi2", ("A_belt", 1e7), "A_belt %"),
