@@ -265,7 +265,7 @@ CLAIMS: list[tuple[str, str, Callable[[Record], list[float]]]] = [
     ),
     (
         "paper",
-        "| {}, with exact slopes; {} with C10 held; {} to within 0.05 Hz |",
+        "| {}, with exact sensitivities; {} with C10 held; {} to within 0.05 Hz |",
         lambda r: [
             r["fit"]["evaluations"],
             r["fit C10 held"]["evaluations"],
