@@ -1,9 +1,11 @@
-"""Figures of the guides' pages on the paper and on real data are those that the tool computes."""
+"""Figures of the pages on the paper and on real data are those that the tool computes; links of all
+documents lead somewhere, and a page on recorded studies stays short."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,6 +27,14 @@ from .studies.both_columns import COLUMNS, PAPER_HZ
 from .studies.pages import differences, recorded
 
 NUMBER = re.compile(r"[+\-]?\d+(?:\.\d+)?")
+ROOT = CASES.parent
+BENCHMARKS = ROOT / "tests" / "benchmarks"
+DOCUMENTS = sorted(
+    document
+    for folder in (".", ".github", "cases", "solvers", "tests", "tests/benchmarks")
+    for document in (ROOT / folder).glob("*.md")
+) + sorted((BENCHMARKS / "records").glob("*.md"))
+MAX_PAGE_WORDS = 1500
 
 
 def rows(page: str, start: str) -> list[list[str]]:
@@ -97,3 +107,35 @@ def test_labels_of_the_page_on_real_data() -> None:
         off = 100 * (frequency.expected_Hz or 0.0) / frequency.frequency_Hz - 100
         assert figure(cells[3]) == pytest.approx(off, abs=0.06)
         assert figure(cells[4]) == pytest.approx(100 * frequency.probability, abs=1.0)
+
+
+def text_without_code(document: Path) -> str:
+    """A document without its blocks of code."""
+    return re.sub(r"```.*?```", "", document.read_text(encoding="utf-8"), flags=re.S)
+
+
+def anchors(document: Path) -> set[str]:
+    """Names that a link to a part of the document may have: its headings, as GitHub writes them,
+    and its explicit anchors."""
+    text = text_without_code(document)
+    headings = re.findall(r"^#+ (.*)$", text, re.M)
+    plain = [re.sub(r"\]\([^)]*\)", "]", heading).strip().lower() for heading in headings]
+    names = {re.sub(r"[^\w\- ]", "", heading).replace(" ", "-") for heading in plain}
+    return names | set(re.findall(r'<a id="([^"]*)">', text))
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_links_lead_to_a_file_and_a_heading(document: Path) -> None:
+    for link in re.findall(r"\]\(([^)\s]+)\)", text_without_code(document)):
+        if not link.startswith("http"):
+            path, _, anchor = link.partition("#")
+            target = document.parent / path if path else document
+            assert target.exists(), link
+            if anchor and target.suffix == ".md":
+                assert anchor in anchors(target), link
+
+
+@pytest.mark.parametrize("page", sorted(BENCHMARKS.glob("*.md")), ids=lambda path: path.name)
+def test_a_page_on_recorded_studies_is_short_and_has_its_notes(page: Path) -> None:
+    assert len(page.read_text(encoding="utf-8").split()) <= MAX_PAGE_WORDS
+    assert (BENCHMARKS / "records" / page.name).exists()
