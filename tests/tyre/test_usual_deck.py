@@ -46,9 +46,58 @@ def test_a_slip_is_refused_with_what_was_meant(
     file = tmp_path / "tyre.inp"
     file.write_text(STYLES[style]())
     deck = read_own_deck(file)
-    assert path in usual_numbers(deck), sorted(deck.numbers)
+    assert path in usual_numbers(deck, deck.numbers, deck.flat({})), sorted(deck.numbers)
     ((_, message),) = unusual_numbers(deck, {path: value})
     assert f"did you mean {meant}" in message
+
+
+@pytest.mark.parametrize(
+    ("edits", "path", "words"),
+    [
+        (
+            [("800000.0, 200000.0", "1e3, 0.0")],
+            "material RUBBER / HYPERELASTIC / C10",
+            "usual is 150000 to 2e+07 Pa, for a shear modulus",
+        ),
+        (
+            [("800000.0, 200000.0", "-1.5e5, 200000.0")],
+            "material RUBBER / HYPERELASTIC / C01",
+            "for a shear modulus of 0.3 to 40 MPa",
+        ),
+        (
+            [("MOONEY-RIVLIN", "OGDEN"), ("800000.0, 200000.0", "2000.0, 2.0")],
+            "material RUBBER / HYPERELASTIC / mu1",
+            "did you mean 2000 kPa, 2e+06 Pa",
+        ),
+        (
+            [("1100.0", "7850.0")],
+            "material RUBBER / DENSITY / density",
+            "usual is 700 to 2500 kg/m3 of rubber",
+        ),
+        (
+            [("1500.0\n", "7850.0\n"), ("10000000000.0", "190e6")],
+            "material CORD / ELASTIC / E",
+            "of steel, by its density; did you mean 1.9e+08 kPa, 1.9e+11 Pa",
+        ),
+        ([("10000000000.0", "2e8")], "material CORD / ELASTIC / E", "of a belt's cords"),
+        ([(", 110.0", ", 70.0")], "rebar BELT_2 / angle", "did you mean 110 degrees"),
+        ([(", 70.0", ", 20.0")], "rebar BELT_1 / angle", "20 degrees from the circumference"),
+        ([("CORD, 0.0", "CORD, 90.0")], "rebar CARCASS / angle", "usual is -30 to 30"),
+    ],
+)
+def test_numbers_that_do_not_go_together_are_refused(
+    edits: list[tuple[str, str]], path: str, words: str, tmp_path: Path
+) -> None:
+    """By the law of the rubber, the density of the cords and the place of a layer."""
+    text = plain()
+    for old, new in edits:
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    (tmp_path / "tyre.inp").write_text(text)
+    deck = read_own_deck(tmp_path / "tyre.inp")
+    slips = {slip.key: slip.message for slip in deck_slips(deck, deck.numbers)}
+    assert path in slips and words in slips[path], slips
+    assert {key.rpartition(" / ")[0] for key in slips} == {path.rpartition(" / ")[0]}
 
 
 def test_every_door_refuses_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -86,5 +135,6 @@ def test_an_angular_spacing_is_in_degrees_whatever_its_path(tmp_path: Path) -> N
     file = tmp_path / "tyre.inp"
     text = plain().replace("BELT_1,", "BELT,").replace("BELT_2,", "BELT,")
     file.write_text(text.replace("*REBAR LAYER", "*REBAR LAYER, GEOMETRY=ANGULAR"))
-    ranges = usual_numbers(read_own_deck(file))
+    deck = read_own_deck(file)
+    ranges = usual_numbers(deck, deck.numbers, deck.flat({}))
     assert {each.unit for path, each in ranges.items() if path.endswith("spacing")} == {"degrees"}

@@ -9,7 +9,7 @@ are free.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from math import pi, sqrt
 from typing import TYPE_CHECKING, Any
@@ -38,7 +38,7 @@ _SIGMAS = {"frequency_Hz": "sigma_Hz", "mass_kg": "sigma_kg"} | {
 @dataclass(frozen=True)
 class Usual:
     """A number from ``low`` to ``high``, in ``unit``; those smaller than ``least`` are 0. reason:
-    what ``high`` is."""
+    where the bounds come from."""
 
     low: float
     high: float
@@ -124,7 +124,7 @@ USUAL: dict[str, Usual] = {
     "section.outline.belt_spacing_m": Usual(1e-4, 0.02, "m", LENGTH),
     "section.outline.belt_step_m": Usual(1e-4, 0.05, "m", LENGTH),
     "mesh.hourglass_stiffness_Pa": Usual(1e2, 1e9, "Pa", STRESS),
-    # rubber: shear modulus 2 (C10 + C01) of 0.3 to 40 MPa, bulk modulus 2 / D1
+    # rubber: the shear modulus 2 (C10 + C01) is judged by `constant_beside`; bulk modulus 2 / D1
     "materials.*.C10_Pa": Usual(-1e7, 2e7, "Pa", STRESS, least=1e3),
     "materials.*.C01_Pa": Usual(-1e7, 2e7, "Pa", STRESS, least=1e2),
     "materials.*.D1_per_Pa": Usual(
@@ -142,7 +142,7 @@ USUAL: dict[str, Usual] = {
     "materials.*.prony.*.k": Usual(0, 0.95, "", SHARE),
     "materials.*.prony.*.tau_s": Usual(1e-7, 1e5, "s", {"ms": 1e-3}),
     "materials.*.reference_frequency_Hz": Usual(0.1, 1000, "Hz", FREQUENCY),
-    # textile cords 1 to 25 GPa, aramid 60 to 130, steel 150 to 210
+    # textile cords 1 to 25 GPa, aramid 60 to 130, steel 150 to 210: see `cord_modulus`
     "materials.*.youngs_modulus_Pa": Usual(5e7, 3e11, "Pa", STRESS),
     "materials.*.density_kg_per_m3": Usual(500, 9000, "kg/m3", DENSITY),
     "rebar_layers.*.area_m2": Usual(
@@ -195,6 +195,10 @@ USUAL: dict[str, Usual] = {
 # cords' angles, from the meridian, in a half turn: of a radial tyre
 CARCASS_ANGLE = Usual(-30, 30, "degrees from the meridian", FROM_CIRCUMFERENCE)
 BELT_ANGLE = Usual(25, 155, "degrees from the meridian", FROM_CIRCUMFERENCE)
+SHEAR_MODULUS_Pa = 3e5, 4e7  # of rubber
+RUBBER_DENSITY = Usual(700, 2500, "kg/m3", DENSITY, reason=" of rubber")
+STEEL_DENSITY = 5000.0  # kg/m3 from which a cord is steel, filled with rubber or not
+LEAST_ANGLE = 5.0  # degrees from the circumference, of a belt that has a side
 # slips of effects' parameters, whose ranges the catalogue has, by their unit
 OF_EFFECTS: dict[str, Slips] = {
     "": SHARE,
@@ -221,9 +225,78 @@ _PATTERNS = [(tuple(path.split(".")), usual) for path, usual in USUAL.items()]
 
 def unusual(data: Mapping[str, Any], section: Section | None) -> Problems:
     """Every stated number of ``data`` that is outside its usual range, and what is usual."""
+    refused: set[Keys] = set()
     for keys, value in _numbers(data, ()):
+        of_a_sum = keys[-1] == "C01_Pa" and USUAL["materials.*.C01_Pa"].holds(value)
+        if of_a_sum and (*keys[:-1], "C10_Pa") in refused:
+            continue
         if message := refusal(data, section, keys, value):
+            refused.add(keys)
             yield keys, message
+    yield from belts_on_one_side(data, section)
+
+
+def holds_angle(usual: Usual, value: float) -> bool:
+    """Whether a value is usual; of an angle of cords, in any of its half turns."""
+    if usual is BELT_ANGLE:
+        value %= 180
+    if usual is CARCASS_ANGLE:
+        value = (value + 90) % 180 - 90
+    return usual.holds(value)
+
+
+def constant_beside(usual: Usual, factor: float, others_Pa: float) -> Usual:
+    """Narrow the range of a rubber's constant: ``factor`` times it and ``others_Pa`` are the shear
+    modulus."""
+    low, high = ((modulus - others_Pa) / factor for modulus in SHEAR_MODULUS_Pa)
+    low, high = max(low, usual.low), min(high, usual.high)
+    if low >= high:  # another constant is wrong
+        return usual
+    return replace(usual, low=low, high=high, reason=", for a shear modulus of 0.3 to 40 MPa")
+
+
+def cord_modulus(density: float | None, is_belt: bool) -> Usual:
+    """Range of a cord's modulus, Pa, by its density, kg/m3, and by where it is."""
+    usual = USUAL["materials.*.youngs_modulus_Pa"]
+    most = USUAL["materials.*.density_kg_per_m3"].high
+    if density is not None and STEEL_DENSITY <= density <= most:
+        return replace(usual, low=5e10, high=2.5e11, reason=" of steel, by its density")
+    return replace(usual, low=1e9, reason=" of a belt's cords") if is_belt else usual
+
+
+def one_side(angles: Iterable[float]) -> str | None:
+    """Why belts at ``angles`` degrees from the meridian are not a tyre's: all lie on one side of
+    the circumference. None where they are, or where there are fewer than two."""
+    belts = [angle % 180 for angle in angles if abs(angle % 180 - 90) >= LEAST_ANGLE]
+    if len(belts) < 2 or len({angle > 90 for angle in belts}) > 1:
+        return None
+    return (
+        f"usual are belts on both sides of the circumference, all {len(belts)} lie on one; did you"
+        f" mean {180 - belts[-1]:g} degrees?"
+    )
+
+
+def belts_on_one_side(data: Mapping[str, Any], section: Section | None) -> Problems:
+    """The last belt of the case where all lie on one side of the circumference."""
+    belts = {}
+    layers = table(data, "rebar_layers")
+    for name in layers if section else ():
+        layer = {**table(layers, name), **_start(data, f"rebar_layers.{name}.angle_deg")}
+        angle = number(layer, "angle_deg")
+        if section and angle is not None and _angle(layer, section) is BELT_ANGLE:
+            belts[name] = angle
+    if message := one_side(belts.values()):
+        yield ("rebar_layers", [*belts][-1], "angle_deg"), message + ALL_THE_SAME
+
+
+def _start(data: Mapping[str, Any], path: str) -> dict[str, Any]:
+    """The start of the variable that sets the number at ``path``, by the number's key; empty
+    without one."""
+    key = path.rpartition(".")[2]
+    variables = [table(table(data, "variables"), name) for name in table(data, "variables")]
+    return next(
+        ({key: v["start"]} for v in variables if path in entries(v, "sets") and "start" in v), {}
+    )
 
 
 def refusal(
@@ -231,10 +304,9 @@ def refusal(
 ) -> str | None:
     """Why ``value`` is not usual at ``keys`` of the case that ``data`` and ``section`` are of."""
     for usual, of in () if isinstance(value, bool) else _ranges(data, section, keys):
-        judged = value % 180 if usual is BELT_ANGLE else value
-        if usual is CARCASS_ANGLE:
-            judged = (value + 90) % 180 - 90
-        if not usual.holds(judged) and (message := usual.refusal(value)):
+        if keys[-1] == "C01_Pa" and value == 0:  # C10 is judged
+            continue
+        if not holds_angle(usual, value) and (message := usual.refusal(value)):
             return of + message + ALL_THE_SAME
     return None
 
@@ -275,7 +347,33 @@ def _ranges(
             if len(pattern) == len(words) and all(
                 p in ("*", w) for p, w in zip(pattern, words, strict=True)
             ):
-                yield (_up_to_the_rim(usual, data, section) if load and section else usual), ""
+                usual = _up_to_the_rim(usual, data, section) if load and section else usual
+                yield _of_material(usual, data, section, keys), ""
+
+
+def _of_material(
+    usual: Usual, data: Mapping[str, Any], section: Section | None, keys: Keys
+) -> Usual:
+    """The range of a material's number as its other numbers leave it; of any other, ``usual``."""
+    if keys[0] != "materials" or len(keys) != 3:
+        return usual
+    name, key = str(keys[1]), keys[2]
+    material = table(table(data, "materials"), name)
+    if material.get("kind") == "rubber" and key == "density_kg_per_m3":
+        return RUBBER_DENSITY
+    if key == "youngs_modulus_Pa":
+        layers = [each for each in table(data, "rebar_layers").values() if isinstance(each, dict)]
+        is_belt = section is not None and any(
+            layer.get("material") == name and _angle(layer, section) is BELT_ANGLE
+            for layer in layers
+        )
+        return cord_modulus(number(material, "density_kg_per_m3"), is_belt)
+    if key in ("C10_Pa", "C01_Pa"):
+        other = "C01_Pa" if key == "C10_Pa" else "C10_Pa"
+        rest = number(material, other)
+        if rest is not None and USUAL[f"materials.*.{other}"].holds(rest):
+            return constant_beside(usual, 2.0, 2.0 * rest)
+    return usual
 
 
 def _up_to_the_rim(usual: Usual, data: Mapping[str, Any], section: Section) -> Usual:

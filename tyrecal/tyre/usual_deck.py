@@ -12,8 +12,21 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from .case.mistakes import Mistake
-from .own_deck.own_deck import OwnDeck
-from .usual import ALL_THE_SAME, STRESS, USUAL, Usual
+from .own_deck.flat import Flat, Ply
+from .own_deck.own_deck import UNIT_LENGTH, UNIT_MASS, OwnDeck
+from .usual import (
+    ALL_THE_SAME,
+    BELT_ANGLE,
+    CARCASS_ANGLE,
+    RUBBER_DENSITY,
+    STRESS,
+    USUAL,
+    Usual,
+    constant_beside,
+    cord_modulus,
+    holds_angle,
+    one_side,
+)
 
 RADIUS_m = Usual(0.1, 1.2, "m")  # of the outermost node
 # Linear elastic materials that are no cords: rubber from 0.5 MPa, rims and bead wires of steel.
@@ -30,7 +43,11 @@ OF_FIELD = {  # the end of a number's path: its range
     "area": USUAL["rebar_layers.*.area_m2"],
     "spacing": USUAL["rebar_layers.*.spacing_m"],
 }
-CORD_MODULUS = USUAL["materials.*.youngs_modulus_Pa"]
+SHEAR_TERMS = {"C10": 2.0, "C01": 2.0, "mu": 1.0} | {f"mu{i}": 1.0 for i in range(1, 7)}
+"""Constants of *HYPERELASTIC, and the factor with which each adds to the shear modulus."""
+OVER_THE_CROWN = 0.35  # of a section's height: how far down from the crown a belt may reach
+LEAST_BELT_ANGLE = 10.0  # degrees from the meridian; cords at less may be a piece of a carcass
+ANY_CONSTANT = Usual(-1e9, 1e9, "Pa", STRESS)
 ANGULAR_SPACING = USUAL["rebar_layers.*.spacing_deg"]
 UNITS_mm = {  # in a deck in mm, t, s: the unit's name, and SI in one of it
     "Pa": ("MPa", 1e6),
@@ -41,20 +58,32 @@ UNITS_mm = {  # in a deck in mm, t, s: the unit's name, and SI in one of it
 }
 
 
-def usual_numbers(deck: OwnDeck) -> dict[str, Usual]:
-    """The usual ranges of a deck's plain numbers by path, of those that have one."""
-    cords, angular = _cords(deck), _angular(deck)
+def usual_numbers(deck: OwnDeck, numbers: Mapping[str, float], flat: Flat) -> dict[str, Usual]:
+    """The usual ranges of a deck's plain numbers by path, of those that have one.
+
+    numbers: of the deck, with those set in its place; flat: the deck that they make.
+    """
+    cords, angular, angles = _cords(deck), _angular(deck), _angles(flat)
+    in_belts = {ply.material for ply in flat.plies if angles.get(_key(ply)) is BELT_ANGLE}
     ranges = {}
     for path in deck.numbers:
         *_, owner, last = words = [word.strip() for word in path.split("/")]
         first = words[0]
+        material = first.removeprefix("material ")
+        layer = owner.removeprefix("rebar ")
         field = re.sub(r"^material .*? / ", "", path)
         field = re.sub(r" / row \d+ / ", " / ", field)
         usual = OF_FIELD.get(field if first.startswith("material ") else last)
-        if field == "ELASTIC / E" and first.removeprefix("material ") in cords:
-            usual = CORD_MODULUS
-        if last == "spacing" and owner.removeprefix("rebar ") in angular:
+        if field == "ELASTIC / E" and material in cords:
+            usual = cord_modulus(_density(deck, numbers, first), material in in_belts)
+        if field == "DENSITY / density" and _shear_terms(deck, first):
+            usual = RUBBER_DENSITY
+        if field == f"HYPERELASTIC / {last}" and last in SHEAR_TERMS:
+            usual = _beside_others(usual or ANY_CONSTANT, deck, numbers, first, last)
+        if last == "spacing" and layer in angular:
             usual = ANGULAR_SPACING
+        if last == "angle":
+            usual = angles.get((layer.split()[0], numbers[path]))
         if usual and (first.startswith("material ") or owner.startswith("rebar ")):
             ranges[path] = _in_units(usual) if deck.units == "mm" else usual
     return ranges
@@ -62,22 +91,91 @@ def usual_numbers(deck: OwnDeck) -> dict[str, Usual]:
 
 def unusual_numbers(deck: OwnDeck, numbers: Mapping[str, float]) -> Iterator[tuple[str, str]]:
     """Paths of the numbers that are outside their usual ranges, and what is usual."""
-    for path, usual in usual_numbers(deck).items():
-        if path in numbers and (message := usual.refusal(numbers[path])):
-            yield path, message + ALL_THE_SAME
+    yield from _unusual(deck, {**deck.numbers, **numbers}, deck.flat(numbers))
 
 
 def deck_slips(deck: OwnDeck, numbers: Mapping[str, float]) -> Iterator[Mistake]:
     """The deck's radius and numbers that are not usual, each at its line of the deck."""
-    radius = max(r for r, _ in deck.flat(numbers).mesh.nodes.values())
+    flat, numbers = deck.flat(numbers), {**deck.numbers, **numbers}
+    radius = max(r for r, _ in flat.mesh.nodes.values())
     if message := RADIUS_m.refusal(radius):
         words = f"radius of the outermost node is {radius:.3g} m in these units: {message}"
         yield Mistake(str(deck.path), 0, "", "", words + ALL_THE_SAME)
-    for path, message in unusual_numbers(deck, numbers):
+    for path, message in _unusual(deck, numbers, flat):
+        if not path:  # a mark or a parameter gives the number
+            yield Mistake(str(deck.path), 0, "", "", message)
+            continue
         block, row, _ = deck.places[path]
         place = deck.blocks[block].rows[row].place
         file = str(deck.path.parent / place.file)
         yield Mistake(file, place.line, path, f"{numbers[path]:g}", message)
+
+
+def _unusual(deck: OwnDeck, numbers: Mapping[str, float], flat: Flat) -> Iterator[tuple[str, str]]:
+    """`unusual_numbers` of all numbers, and of the deck that they make."""
+    last_belt = ""
+    for path, usual in usual_numbers(deck, numbers, flat).items():
+        value = numbers[path]
+        if usual is BELT_ANGLE:
+            last_belt = path
+        is_absent = path.endswith(" / C01") and value == 0
+        if not is_absent and not holds_angle(usual, value) and (message := usual.refusal(value)):
+            yield path, message + ALL_THE_SAME
+    belts = [angle for (_, angle), usual in _angles(flat).items() if usual is BELT_ANGLE]
+    if message := one_side(belts):
+        yield last_belt, message + ALL_THE_SAME
+
+
+def _key(ply: Ply) -> tuple[str, float]:
+    """Name and angle: a layer may be given element by element, and a name serve two layers."""
+    return ply.name, ply.angle_deg
+
+
+def _angles(flat: Flat) -> dict[tuple[str, float], Usual]:
+    """Usual angles of layers: of belts, which lie over the crown alone, and of carcasses, which
+    reach from there to a bead."""
+    mesh = flat.mesh
+    radii: dict[tuple[str, float], list[float]] = {}
+    for ply in flat.plies:
+        nodes = (n for element in ply.elements for n in mesh.plies[element])
+        radii.setdefault(_key(ply), []).extend(mesh.nodes[n][0] for n in nodes)
+    section = [mesh.nodes[n][0] for n in mesh.around]
+    lowest, height = min(section), max(section) - min(section)
+    ranges = {}
+    for key, those in radii.items():
+        low, high = ((r - lowest) / height for r in (min(those), max(those)))
+        if low > 1 - OVER_THE_CROWN and abs((key[1] + 90) % 180 - 90) >= LEAST_BELT_ANGLE:
+            ranges[key] = BELT_ANGLE
+        elif low < OVER_THE_CROWN and high > 1 - OVER_THE_CROWN:
+            ranges[key] = CARCASS_ANGLE
+    return ranges
+
+
+def _shear_terms(deck: OwnDeck, material: str) -> dict[str, float]:
+    """Paths of a material's constants that make its shear modulus, and their factors."""
+    start = f"{material} / HYPERELASTIC / "
+    return {
+        start + name: factor for name, factor in SHEAR_TERMS.items() if start + name in deck.numbers
+    }
+
+
+def _beside_others(
+    usual: Usual, deck: OwnDeck, numbers: Mapping[str, float], material: str, name: str
+) -> Usual:
+    """Range, Pa, of a constant of rubber beside the others of its shear modulus."""
+    stress = UNIT_MASS[deck.units] / UNIT_LENGTH[deck.units]
+    others = 0.0
+    for path, factor in _shear_terms(deck, material).items():
+        if not path.endswith(f" / {name}"):
+            others += factor * numbers[path] * stress
+    return constant_beside(usual, SHEAR_TERMS[name], others)
+
+
+def _density(deck: OwnDeck, numbers: Mapping[str, float], material: str) -> float | None:
+    """kg/m3 of a material; None where it is no plain number."""
+    value = numbers.get(f"{material} / DENSITY / density")
+    per_volume = UNIT_MASS[deck.units] / UNIT_LENGTH[deck.units] ** 3
+    return None if value is None else value * per_volume
 
 
 def _cords(deck: OwnDeck) -> set[str]:

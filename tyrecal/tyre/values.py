@@ -21,7 +21,7 @@ from .own_deck.numbers import as_known
 from .plugins import IDS
 from .resolve import resolved
 from .state import with_states_kept
-from .usual import refusal
+from .usual import belts_on_one_side, refusal
 from .usual_deck import unusual_numbers
 
 MOST_MEANT = 3  # paths that are offered for a name that is none
@@ -106,11 +106,13 @@ def unusual_value(loaded: LoadedCase, name: str, value: float) -> str | None:
     paths = paths_of(loaded, name)
     data = loaded.case.plain()
     found = [refusal(data, loaded.drawn, keys, value) for keys in _keys(loaded, name)]
+    if any(path.startswith("rebar_layers.") and path.endswith("angle_deg") for path in paths):
+        found += [message for _, message in belts_on_one_side(data, loaded.drawn)]
     if loaded.deck:
         names = [path.removeprefix("deck.numbers.") for path in paths]
-        found += [
-            message for _, message in unusual_numbers(loaded.deck, dict.fromkeys(names, value))
-        ]
+        numbers = {**loaded.deck_numbers, **dict.fromkeys(names, value)}
+        messages = dict(unusual_numbers(loaded.deck, numbers))
+        found += [messages[path] for path in names if path in messages]
     return next((message for message in found if message), None)
 
 
