@@ -119,7 +119,7 @@ def test_findings_in_words() -> None:
         " [2,0] +7.0"
     )
     assert content["words"][1] == "every frequency rises with the load"
-    assert "0.30, [2,0] symmetric at 900 N (a low one says that the load" in content["words"][2]
+    assert "0.30, [2,0] symmetric at 900 N (the load changes shapes" in content["words"][2]
     assert content["least_overlap"] == 0.3
     back = findings("initial", [*loads, loaded(2000.0, 90.0, 91.0)]).words
     assert "but for [2,0] (900 N) from the load named on" in back[0]
@@ -243,3 +243,28 @@ def test_the_cavitys_first_mode_stands_with_the_tyres() -> None:
         sentences = [w for w in (*sweep.sentences(), *one.sentences()) if "cavity" in w]
         assert len(sentences) == count
         assert all("fore-aft 185.1, vertical 187.0 Hz, split +1.9" in each for each in sentences)
+
+
+def test_a_mode_with_little_of_its_unloaded_shape_has_no_name() -> None:
+    """Its row says which curve it is on; a sweep, whose rows are curves, brackets its frequency."""
+    loads = (
+        loaded(0.0, 80.0, 80.0, 1.0),
+        loaded(500.0, 81.0, 82.0, 0.15),
+        loaded(900.0, 83.0, 85.0, 0.149),
+    )
+    one = loaded_modes_result({}, LoadedTyre(240.0, 12.0, loads))
+    assert [row[:3] for row in one.tables()[0].rows] == [
+        ["not named", "was [2,0]", "83.00"],
+        ["not named", "was [2,0]", "85.00"],
+    ]
+    assert (
+        "at 900 N less than 0.15 of the unloaded shape is left of [2,0]" in one.findings.words[-1]
+    )
+    sweep = load_sweep_result({"a": {}}, [0.0, 500.0, 900.0], {"a": LoadedTyre(1.0, 1.0, loads)})
+    (table,) = sweep.tables()
+    assert [row[3:] for row in table.rows] == [
+        ["80.00", "81.00", "(83.00)"],
+        ["80.00", "82.00", "(85.00)"],
+    ]
+    named = loaded_modes_result({}, LoadedTyre(240.0, 12.0, loads[:2]))
+    assert named.tables()[0].rows[0][0] == "[2,0]" and not named.findings.words

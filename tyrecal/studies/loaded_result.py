@@ -15,6 +15,7 @@ from ..tyre.case import LoadedCase
 from .loaded import Loaded, LoadedMode, LoadedTyre, LoadOutcome, load_tyres, progress
 from .modes import ModesFindings, ModesResult
 from .result import (
+    LEAST_NAMED_OVERLAP,
     NAME_COLUMNS,
     CavityMode,
     Column,
@@ -83,17 +84,19 @@ class LoadSweep(Result):
         }
         order = sorted(members, key=lambda k: (lowest[k[0]], str(k[0]), k[1] != SYMMETRIES[0]))
         rows = [
-            [
-                *members[key].named(),
-                key[1],
-                *(hertz[0].cell(m[key].frequency_Hz if key in m else None) for m in found),
-            ]
+            [*members[key].named(), key[1], *(_hertz_cell(hertz[0], m.get(key)) for m in found)]
             for key in order
         ]
         for pair in zip(*(row.cavity for row in own), strict=False):
             cells = [hertz[0].cell(each.frequency_Hz) for each in pair]
             rows.append([*pair[0].named(), "", *cells])
         return Table([*NAME_COLUMNS, Column("symmetry", ""), *hertz], rows, f"{design}, Hz")
+
+
+def _hertz_cell(column: Column, mode: ModeEntry | None) -> str | None:
+    """A frequency, in brackets where the mode has lost its name."""
+    cell = column.cell(mode.frequency_Hz if mode else None)
+    return f"({cell})" if mode and mode.has_lost_name else cell
 
 
 def _csv_modes(row: LoadRow) -> list[dict[str, Any]]:
@@ -218,10 +221,9 @@ def findings(design: str, loads: Sequence[Loaded]) -> LoadFindings:
     if least:
         words.append(
             f"least overlap of a loaded shape with the unloaded one of its name:"
-            f" {least.overlap:.2f}, {least.member} at {_load_of(loads, least):g} N (a low one says"
-            " that the load has changed the shape, not that its name is doubtful: names are"
-            " followed load by load); the modes at the load before make up"
-            f" {min(m.spanned for m in loaded):.2f} of each shape or more"
+            f" {least.overlap:.2f}, {least.member} at {_load_of(loads, least):g} N (the load"
+            " changes shapes; modes are followed load by load); the modes at the load before"
+            f" make up {min(m.spanned for m in loaded):.2f} of each shape or more"
         )
     return LoadFindings(
         design=design,
@@ -312,6 +314,13 @@ def _doubts(loads: Sequence[Loaded]) -> list[str]:
     """Modes without a name, and names that depend on the loads in between."""
     words = []
     for each in loads:
+        lost = [mode.member for mode in each.modes if _entry(mode).has_lost_name]
+        if lost:
+            words.append(
+                f"at {each.load_N:g} N less than {LEAST_NAMED_OVERLAP:g} of the unloaded shape is"
+                f" left of {', '.join(map(str, lost))}: the name no longer describes it;"
+                " frequencies in brackets, or not named, continue its curve"
+            )
         if each.unnamed:
             words.append(
                 f"at {each.load_N:g} N no shape could be told to be"

@@ -46,6 +46,7 @@ class Deviation:
 
 
 Cell = str | Deviation | None  # None: there is no value
+LEAST_NAMED_OVERLAP = 0.15  # with the unloaded shape, of a mode on the road that has a name
 NAME_COLUMNS = (Column("mode", ""), Column("motion", ""))  # see `Named.named`
 
 
@@ -236,6 +237,16 @@ class ModeEntry(Named):
     # largest motion of the crown up to which friction bears the forces of a patch that sticks
     grip_mm: float | None = None
     d_ln_f_d_ln_p: float | None = None
+
+    @property
+    def has_lost_name(self) -> bool:
+        """Whether so little of the unloaded shape is left that its name describes nothing."""
+        return self.overlap is not None and self.overlap < LEAST_NAMED_OVERLAP
+
+    def named(self) -> list[str]:
+        """The cells of `NAME_COLUMNS`; a mode that has lost its name has that of its curve."""
+        mode, motion = super().named()
+        return ["not named", f"was {mode}"] if self.has_lost_name else [mode, motion]
 
 
 class CavityMode(ResultPart):
