@@ -21,7 +21,7 @@ from math import inf, log
 from numbers import Integral, Real
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from .files import printable, read_json
 from .measured.load import load_case as _load_case
@@ -38,8 +38,9 @@ from .studies.fit.calibrate import METHODS, Fit
 from .studies.fit.study import FitStudy
 from .studies.fit.targets import target_labels
 from .studies.pressure import State
-from .tyre.case import CaseError, LoadedCase, start_values, with_level
+from .tyre.case import CaseError, LoadedCase, as_written, start_values, with_level
 from .tyre.case.mistakes import suggestion
+from .tyre.case.parts import Setting
 from .tyre.effects import Effect, catalogue
 from .tyre.values import overridden, unusual_value
 from .tyre.values import with_values as _with_values
@@ -66,6 +67,7 @@ __all__ = [
     "with_values",
 ]
 MOST_SHOWN = 60  # characters of a wrong argument
+SettingValue = TypeVar("SettingValue", bound=Setting)
 
 
 def load_case(path: Path | str, mesh: str = "", allow_unusual: bool = False) -> LoadedCase:
@@ -86,11 +88,12 @@ def load_case(path: Path | str, mesh: str = "", allow_unusual: bool = False) -> 
 
 
 def with_values(
-    case: LoadedCase | Path | str, values: Mapping[str, float], allow_unusual: bool = False
+    case: LoadedCase | Path | str, values: Mapping[str, Setting], allow_unusual: bool = False
 ) -> LoadedCase:
     """The case with any of its numbers set, by path, and with variables that start at other values,
-    by name; ``overrides`` and the provenance of results list them. Raises ValueError for an unknown
-    name, an impossible value, or one that no tyre has.
+    by name; ``overrides`` and the provenance of results list them. A path takes None, and a word
+    among those of its key, where the case file does. Raises ValueError for an unknown name, an
+    impossible value, or one that no tyre has.
 
     >>> case = load_case("cases/p235_75r17.yaml", mesh="coarse")
     >>> with_values(case, {"rebar_layers.belt_1.angle_deg": 68}).overrides
@@ -379,11 +382,11 @@ def _held(
 
 
 def _refuse_unusual(
-    case: LoadedCase, what: str, name: str, value: float, allowed: bool = False
+    case: LoadedCase, what: str, name: str, value: Setting, allowed: bool = False
 ) -> None:
     """Raises ValueError where no tyre has such a value of ``name``, told as ``what``."""
     if not allowed and (message := unusual_value(case, name, value)):
-        raise ValueError(f"{what} is {value:g}: {message}")
+        raise ValueError(f"{what} is {as_written(value)}: {message}")
 
 
 def _evaluator(case: LoadedCase, solver: str, record: Path | str | None) -> Evaluator:
@@ -440,7 +443,7 @@ def _count(name: str, value: int, least: int) -> int:
     return int(value)
 
 
-def _mapping(name: str, values: Mapping[str, float]) -> dict[str, float]:
+def _mapping(name: str, values: Mapping[str, SettingValue]) -> dict[str, SettingValue]:
     if isinstance(values, Mapping) and all(isinstance(key, str) for key in values):
         return dict(values)
     raise _wrong(name, "names with values, as in {'C10': 1e6}", values)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.tyre.case import CaseError, number_at, parse_assignment, start_values
+from tyrecal.tyre.case import CaseError, number_at, parse_assignment, parse_setting, start_values
 from tyrecal.tyre.case.checks import find
 from tyrecal.tyre.load import load_case, validate
 from tyrecal.tyre.values import with_values
@@ -59,7 +59,7 @@ def test_a_case_without_targets_and_variables(tmp_path: Path) -> None:
 
 def test_angular_cords_templates_and_linear_variables(tmp_path: Path) -> None:
     (tmp_path / "mine").mkdir()
-    angle = "  angle: {sets: [rebar_layers.belt_1.angle_deg], start: -70, lower: -80, upper: 0,"
+    angle = "  angle: {sets: [rebar_layers.belt_1.angle_deg], start: -110, lower: -120, upper: 0,"
     path = put(
         tmp_path,
         ("spacing_m: 1.0e-3", "geometry: angular, spacing_deg: 0.15"),
@@ -187,7 +187,7 @@ def test_but_it_must_be_a_number(line: str, words: str, tmp_path: Path) -> None:
         ({"C10": True}, "must be a number"),
         ({"C10": "1"}, "must be a number"),
         ({"C10": 1e6, "materials.rubber.C10_Pa": 2e6}, "set twice"),
-        ({"name": 1.0}, "not a number"),
+        ({"name": 1.0}, "name is text, 'P235/75R17"),
         ({"materials": 1.0, "C10": 1e6}, "not a number"),
         ({"mesh.levels.default.rows.0": 1.5}, "whole number"),
         ({"mesh.levels.default.rows.9": 1}, "there is no '9'"),
@@ -214,6 +214,9 @@ def test_with_values_is_fast() -> None:
 
 def test_parse_assignment() -> None:
     assert parse_assignment("C10=1.2e6") == ("C10", 1.2e6)
-    for text in ("C10", "=3", "C10=", "C10=high", "C10=nan", "C10=inf"):
+    assert parse_setting("rim.free=true") == ("rim.free", True)
+    assert parse_setting("a.b=null") == ("a.b", None)
+    assert parse_setting("rim.holds = bead_surface") == ("rim.holds", "bead_surface")
+    for text in ("C10", "=3", "C10=", "C10=high", "C10=null", "C10=1e", "C10=nan", "C10=inf"):
         with pytest.raises(ValueError, match="must be"):
             parse_assignment(text)

@@ -40,12 +40,18 @@ MISTAKES = {  # what is typed: what is said
     "modes CASE --set rim_width=0.005": "did you mean 'effects.rim_width'?",
     "modes CASE --set belt_1.angle_deg=68": "did you mean 'rebar_layers.belt_1.angle_deg'?",
     "modes CASE --set presure_kPa=200": "did you mean 'pressure_kPa'?",
-    "modes CASE --set rim.holds=bead_surface": (
-        "--set rim.holds=bead_surface: rim.holds is a word, 'whole_bead'; --set takes numbers, true"
-        f" and false: edit {CASE}"
+    "modes CASE --set rim.holds=bead": (
+        "rim.holds must be 'whole_bead' or 'bead_surface', got bead"
     ),
-    "modes CASE --set mesh.element=CGAX8R": f"is a word, 'CGAX8R'; --set takes numbers, true and"
-    f" false: edit line 13 of {CASE}",
+    "modes CASE --set rim.holds=null": "rim.holds must be 'whole_bead' or 'bead_surface', got null",
+    "modes CASE --set pressure_kPa=null": "pressure_kPa must be a number, got null",
+    "modes CASE --set C10=null": "C10 is null, must be a number",
+    "modes CASE --set rim=null": "rim is not a number, it cannot be null",
+    "modes CASE --set section.stations=null": (
+        "section.stations is text, 'p235_75r17.csv'; --set takes numbers, true, false, null and"
+        " words that the schema lists: edit line"
+    ),
+    "modes CASE --set name=other": "name is text",
     "validate minimal.yaml": "minimal.yaml, line 1: holds no tyre: write a case with",
     "modes minimal.yaml": "line 1: holds no tyre: write a case with 'tyrecal init SIZE'",
     "deck CASE --output full/x": "cannot write to 'full/x': Not a directory",

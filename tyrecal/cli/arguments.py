@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from .terminal import Terminal
+
+if TYPE_CHECKING:
+    from ..tyre.case.parts import Setting
 
 
 def load(
@@ -35,8 +38,9 @@ def load(
         given = _given(case, assigned, pressure_kPa)
         for sentence in overruled(case, given):
             terminal.note(sentence)
+        changed = overridden(case, given)
         replaced = _replaced(case, assigned)
-        case = overridden(case, given)
+        case = changed
         values = start_values(case)
         case = with_values(case, values)
         for name, value in given.items():
@@ -53,7 +57,7 @@ def load(
         raise click.UsageError(str(error)) from None
 
 
-def refuse_unusual(loaded: Any, option: str, name: str, value: float, allowed: bool) -> None:
+def refuse_unusual(loaded: Any, option: str, name: str, value: Setting, allowed: bool) -> None:
     """Raises click.UsageError where nobody states such a value of the variable, or number by its
     path, ``name``, unless it is ``allowed``. option: where it is stated."""
     from ..tyre.values import unusual_value
@@ -137,22 +141,23 @@ def fitted_values(path: Path, loaded: Any, terminal: Terminal) -> dict[str, floa
     return values
 
 
-def _given(loaded: Any, assigned: Sequence[str], pressure_kPa: float | None) -> dict[str, float]:
+def _given(loaded: Any, assigned: Sequence[str], pressure_kPa: float | None) -> dict[str, Setting]:
     """Values that the user sets, by variable or path: each number once.
 
     Raises ValueError; click.UsageError where two values are given for one number.
     """
-    from ..tyre.case import parse_assignment
+    from ..tyre.case import parse_setting
     from ..tyre.own_deck.numbers import as_known
     from ..tyre.values import paths_of
 
     for text in assigned:
-        _refuse_word(loaded, text)
-    options = [(f"--set {text}", *parse_assignment(text)) for text in assigned]
+        _refuse_text(loaded, text)
+    options: list[tuple[str, str, Setting]] = []
+    options += [(f"--set {text}", *parse_setting(text)) for text in assigned]
     if pressure_kPa is not None:
         options.append((f"--pressure-kPa {pressure_kPa:g}", "pressure_kPa", pressure_kPa))
-    given: dict[str, float] = {}
-    first: dict[str, tuple[str, float]] = {}  # by path
+    given: dict[str, Setting] = {}
+    first: dict[str, tuple[str, Setting]] = {}  # by path
     for option, name, value in options:
         paths = paths_of(loaded, name)
         known = [first[path] for path in paths if path in first]
@@ -167,31 +172,31 @@ def _given(loaded: Any, assigned: Sequence[str], pressure_kPa: float | None) -> 
     return given
 
 
-def _refuse_word(loaded: Any, text: str) -> None:
-    """Raises click.UsageError where an assignment leads to a word of the case."""
+def _refuse_text(loaded: Any, text: str) -> None:
+    """Raises click.UsageError where an assignment leads to text of the case, such as a file."""
     from ..tyre.case.document import read_document
     from ..tyre.case.mistakes import dotted
-    from ..tyre.values import paths_of, value_at
+    from ..tyre.values import is_choice, paths_of, value_at
 
     name = text.partition("=")[0].strip()
     for path in paths_of(loaded, name) if "." in name else ():
         word = value_at(loaded, path)
-        if isinstance(word, str):
+        if isinstance(word, str) and not is_choice(tuple(path.split("."))):
             places = {dotted(k): line for k, (line, _) in read_document(loaded.path).places.items()}
             line = f"line {places[path]} of " if path in places else ""
             raise click.UsageError(
-                f"--set {text}: {path} is a word, '{word}'; --set takes numbers, true and false:"
-                f" edit {line}{loaded.path}"
+                f"--set {text}: {path} is text, '{word}'; --set takes numbers, true, false, null"
+                f" and words that the schema lists: edit {line}{loaded.path}"
             )
 
 
 def _replaced(loaded: Any, assigned: Sequence[str]) -> list[str]:
     """A line for each number that --set replaces: its path, the case's value and the one used."""
-    from ..tyre.case import as_written, parse_assignment, start_values
+    from ..tyre.case import as_written, parse_setting, start_values
     from ..tyre.values import paths_of, value_at
 
     lines = []
-    for name, value in map(parse_assignment, assigned):
+    for name, value in map(parse_setting, assigned):
         paths = paths_of(loaded, name)
         if name in loaded.case.variables:
             before, what = start_values(loaded)[name], f"{name} ({', '.join(paths)})"

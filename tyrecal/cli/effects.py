@@ -123,9 +123,9 @@ def command(
 
 def _variables_in(assignments: tuple[str, ...], values: Mapping[str, float]) -> list[str]:
     """Variables among what is set."""
-    from ..tyre.case import parse_assignment
+    from ..tyre.case import parse_setting
 
-    return [name for name, _ in map(parse_assignment, assignments) if name in values]
+    return [name for name, _ in map(parse_setting, assignments) if name in values]
 
 
 def _pressures(loaded: Any, text: str | None, allowed: bool) -> list[float]:

@@ -106,7 +106,8 @@ assignments = option(
     "assignments",
     multiple=True,
     metavar="NAME=VALUE",
-    help="Set a variable or any number of the case; repeatable.",
+    help="Set a variable or any number of the case, a switch (true, false), a word among those that"
+    " its key takes, or null; repeatable. Example: rim.holds=bead_surface.",
     shell_complete=complete.assignments,
 )
 pressure = option(

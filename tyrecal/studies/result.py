@@ -98,7 +98,7 @@ class Provenance(ResultPart):
     name: str
     size: str
     tyre_sha256: str
-    overrides: dict[str, float | bool]
+    overrides: dict[str, float | bool | str | None]
     state: ResultState
     mesh: str
     targets: str | None = None

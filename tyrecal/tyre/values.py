@@ -6,17 +6,17 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from difflib import get_close_matches
 from numbers import Real
-from typing import Any
+from typing import Any, Literal, get_origin
 
 from pydantic import BaseModel, ValidationError
 
 from .case.checks import at, find, folds, problems
 from .case.loaded import LoadedCase
 from .case.mistakes import Keys, dotted, suggestion
+from .case.parts import Setting, as_written
 from .case.schema import Case
-from .case.shape import explain
+from .case.shape import explain, type_at
 from .case.stations import read_section_of
-from .case.variables import as_written
 from .own_deck.numbers import as_known
 from .plugins import IDS
 from .resolve import resolved
@@ -42,8 +42,9 @@ ALONE = {
 }
 
 
-def with_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
-    """A new case with variables (by name) or any of its numbers (by dotted path) set.
+def with_values(loaded: LoadedCase, values: Mapping[str, Setting]) -> LoadedCase:
+    """A new case with variables (by name) or any of its numbers (by dotted path) set; a word among
+    others that the schema lists is set too, and None where the schema allows it.
 
     Values are in the unit of the numbers they set; a variable's bounds are not enforced. Raises
     ValueError, in one sentence, for an unknown name or a value that the case cannot have.
@@ -53,24 +54,27 @@ def with_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
     return changed
 
 
-def set_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
+def set_values(loaded: LoadedCase, values: Mapping[str, Setting]) -> LoadedCase:
     """`with_values` of who resolves the case next: that its effects can be is not asked here."""
-    targets: dict[Keys, float] = {}
+    targets: dict[Keys, Setting] = {}
     tree: dict[Any, Any] = {}
     for name, value in values.items():
-        if not isinstance(value, Real):
-            raise ValueError(f"{name} is {value!r}, must be a number")
+        is_word = value is None or isinstance(value, str)
+        if not isinstance(value, Real) and (not is_word or name in loaded.case.variables):
+            shown = as_written(value) if is_word else repr(value)
+            raise ValueError(f"{name} is {shown}, must be a number")
         for keys in _keys(loaded, name):
             if keys in targets:
                 raise ValueError(f"{name}: {dotted(keys)} is set twice")
-            targets[keys] = _number(loaded.case, keys, value)
-    for keys, number in targets.items():
+            targets[keys] = _setting(loaded.case, keys, value)
+    for keys, setting in targets.items():
         branch: Any = tree
         for key in keys[:-1]:
             branch = branch.setdefault(key, {})
-        branch[keys[-1]] = number
+        branch[keys[-1]] = setting
     case = _set(loaded.case, tree, ())
-    touched = set(tree) - ALONE
+    has_words = any(isinstance(setting, str) for setting in targets.values())
+    touched = set(tree) - (set() if has_words else ALONE)
     section = loaded.drawn
     redrawn = "outline" in tree.get("section", {})
     if redrawn:
@@ -79,13 +83,13 @@ def set_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
         data = case.plain()
         for wrong, reason in problems(data, section):
             raise ValueError(f"{dotted(wrong)} {reason}")
-        meshed = "mesh" in touched or redrawn
+        meshed = "mesh" in touched or redrawn or has_words
         if section and meshed and (message := folds(data, section)):
             raise ValueError(message)
     return replace(loaded, case=case, drawn=section, as_read=loaded.as_read or loaded)
 
 
-def overridden(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
+def overridden(loaded: LoadedCase, values: Mapping[str, Setting]) -> LoadedCase:
     """The case as its user sets it: a variable starts at its value (`start_values`), any other
     number has it, and ``overrides`` lists them. Targets keep the states that they were measured in.
     Raises what `with_values` does, and ValueError for the path of a number that a variable sets."""
@@ -96,14 +100,17 @@ def overridden(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
             if path in variable.sets:
                 raise ValueError(f"{path} is set by the variable '{name}': set {name} instead")
     changed = with_states_kept(loaded, with_values(loaded, values))
-    given = {n: x if isinstance(x, bool) else float(x) for n, x in values.items()}
+    as_it_is = (bool, str, type(None))
+    given = {n: x if isinstance(x, as_it_is) else float(x) for n, x in values.items()}
     return replace(changed, overrides={**loaded.overrides, **given})
 
 
-def unusual_value(loaded: LoadedCase, name: str, value: float) -> str | None:
+def unusual_value(loaded: LoadedCase, name: str, value: Setting) -> str | None:
     """Why no user states ``value`` of a variable, or of the number at a dotted path: what is usual,
     what was probably meant; None where it is usual. Raises ValueError for an unknown name."""
     paths = paths_of(loaded, name)
+    if value is None or isinstance(value, str):
+        return None
     data = loaded.case.plain()
     found = [refusal(data, loaded.drawn, keys, value) for keys in _keys(loaded, name)]
     if any(path.startswith("rebar_layers.") and path.endswith("angle_deg") for path in paths):
@@ -163,17 +170,30 @@ def _numbers(part: Any, keys: Keys) -> Iterator[str]:
         yield dotted(keys)
 
 
-def _number(case: Case, keys: Keys, value: float) -> float:
-    """``value`` as the kind of number that stands at ``keys`` of the case, or true or false."""
+def is_choice(keys: Keys) -> bool:
+    """Whether the schema lists the words for ``keys``; a deck is read before any word is set."""
+    return get_origin(type_at(keys)) is Literal and keys[0] != "deck"
+
+
+def _setting(case: Case, keys: Keys, value: Setting) -> Setting:
+    """``value`` as the kind that is at ``keys`` of the case: a number, true or false, a word."""
     old = at(case, keys)
+    if is_choice(keys) and (value is None or isinstance(value, str)):
+        return value
+    if isinstance(old, str):
+        raise ValueError(f"{dotted(keys)} is text, '{old}': edit the case file")
+    if value is None and isinstance(old, int | float | None):
+        return None  # the schema judges
     if isinstance(old, bool) or isinstance(value, bool):
         if isinstance(old, bool) and isinstance(value, bool):
             return value
         kind = "true or false" if isinstance(old, bool) else "a number"
         raise ValueError(f"{dotted(keys)} must be {kind}, got {as_written(value)}")
-    number = float(value)
     if not isinstance(old, int | float | None):
-        raise ValueError(f"{dotted(keys)} is not a number, it cannot be {number:g}")
+        raise ValueError(f"{dotted(keys)} is not a number, it cannot be {as_written(value)}")
+    if value is None or isinstance(value, str):
+        raise ValueError(f"{dotted(keys)} must be a number, got {as_written(value)}")
+    number = float(value)
     return int(number) if isinstance(old, int) and number.is_integer() else number
 
 
@@ -196,6 +216,6 @@ def _set(node: Any, tree: Any, keys: Keys) -> Any:
         wrong, message = next(explain(error, keys))
         value: Any = tree
         for key in wrong[len(keys) :]:
-            value = value.get(key) if isinstance(value, dict) else None
-        got = "" if value is None or isinstance(value, dict) else f", got {as_written(value)}"
+            value = value.get(key, {}) if isinstance(value, dict) else {}
+        got = "" if isinstance(value, dict) else f", got {as_written(value)}"
         raise ValueError(f"{dotted(wrong)} {message}{got}") from None

@@ -2,8 +2,16 @@
 
 from .loaded import LoadedCase
 from .mistakes import CaseError, Mistake
+from .parts import as_written
 from .schema import Case
-from .variables import as_written, number_at, overruled, parse_assignment, start_values, with_level
+from .variables import (
+    number_at,
+    overruled,
+    parse_assignment,
+    parse_setting,
+    start_values,
+    with_level,
+)
 
 __all__ = [
     "Case",
@@ -14,6 +22,7 @@ __all__ = [
     "number_at",
     "overruled",
     "parse_assignment",
+    "parse_setting",
     "start_values",
     "with_level",
 ]

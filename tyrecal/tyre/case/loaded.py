@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import InputError
+from .parts import Setting, as_written
 from .schema import Case
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ class LoadedCase:
     folder: Path  # to which the case's own paths are relative
     file_data: dict[str, Any]  # the file with what its deck adds, whatever is set later
     # set by the user since, by name or path, for results to say
-    overrides: Mapping[str, float] = field(default_factory=dict)
+    overrides: Mapping[str, Setting] = field(default_factory=dict)
     as_read: LoadedCase | None = None  # before any number was set; None: none was
     deck: OwnDeck | None = None  # that the section is of, where the case names one
     decks: OwnDecks | None = None  # in three dimensions, in place of a section
@@ -34,7 +35,8 @@ class LoadedCase:
     assumed: Mapping[str, Any] = field(default_factory=dict)  # keys that its deck adds to the file
 
     def __repr__(self) -> str:
-        case, given = self.case, (f", {name}={value:g}" for name, value in self.overrides.items())
+        case = self.case
+        given = (f", {name}={as_written(value)}" for name, value in self.overrides.items())
         words = f"{case.name}, {case.pressure_kPa:g} kPa, mesh {case.mesh.level}{''.join(given)}"
         return f"LoadedCase({str(self.path)!r}: {words})"
 

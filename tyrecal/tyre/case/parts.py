@@ -42,10 +42,19 @@ Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_\-]*$", ma
 # another one.
 NOT_IN_TEXT = r"\x00-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069"
 Text = Annotated[str, StringConstraints(pattern=rf"^[^{NOT_IN_TEXT}]*$", max_length=300)]
+Setting = float | bool | str | None
+"""What a user sets: a number, true or false, a word among those that the schema lists, null."""
 Disagreement = tuple[str, str]
 """A key of a part, and what would be right there."""
 WRONG = object()
 """Stands in a part's values for one that is already reported."""
+
+
+def as_written(value: Setting) -> str:
+    """A number, true, false, null or a word, as a case file writes it."""
+    if value is None or isinstance(value, str):
+        return value or "null"
+    return str(value).lower() if isinstance(value, bool) else f"{value:g}"
 
 
 def number(values: Mapping[str, Any], key: str) -> float | None:

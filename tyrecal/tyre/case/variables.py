@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection
 from dataclasses import replace
 from math import isfinite
 
 from .checks import at, find
 from .loaded import LoadedCase
+from .parts import Setting, as_written
 
-SWITCHES = {"true": True, "false": False}  # as a case file writes them
+CONSTANTS = {"true": True, "false": False, "null": None}  # as a case file writes them
+WORD = re.compile(r"[A-Za-z]\w*")
 
 
 def start_values(loaded: LoadedCase) -> dict[str, float]:
     """The start value of every variable by name, in the unit of the numbers it sets: its user's,
     else the case file's."""
     variables = loaded.case.variables
-    return {name: loaded.overrides.get(name, v.start) for name, v in variables.items()}
+    given = {name: x for name, x in loaded.overrides.items() if isinstance(x, int | float)}
+    return {name: given.get(name, v.start) for name, v in variables.items()}
 
 
 def overruled(loaded: LoadedCase, given: Collection[str] = ()) -> list[str]:
@@ -39,27 +43,30 @@ def overruled(loaded: LoadedCase, given: Collection[str] = ()) -> list[str]:
 
 
 def parse_assignment(text: str) -> tuple[str, float]:
-    """``NAME=VALUE`` as name and number; true and false, too. Raises ValueError."""
+    """``NAME=VALUE`` as name and number. Raises ValueError."""
+    name, value = parse_setting(text)
+    if value is None or isinstance(value, str):
+        raise ValueError(f"{name} is '{as_written(value)}', must be a number")
+    return name, value
+
+
+def parse_setting(text: str) -> tuple[str, Setting]:
+    """``NAME=VALUE`` as name and number, true, false, null or a word. Raises ValueError."""
     name, equals, value = text.partition("=")
     name = name.strip()
     if not equals or not name:
         raise ValueError(f"'{text}' must be NAME=VALUE, as in C10=1.2e6")
-    if value.strip() in SWITCHES:
-        return name, SWITCHES[value.strip()]
+    if value.strip() in CONSTANTS:
+        return name, CONSTANTS[value.strip()]
     try:
         number = float(value)
     except ValueError:
+        if WORD.fullmatch(value.strip()):
+            return name, value.strip()
         raise ValueError(f"{name} is '{value.strip()}', must be a number") from None
     if not isfinite(number):
         raise ValueError(f"{name} is '{value.strip()}', must be a finite number")
     return name, number
-
-
-def as_written(value: float | None) -> str:
-    """A number, true, false or null, as a case file writes it."""
-    if value is None:
-        return "null"
-    return str(value).lower() if isinstance(value, bool) else f"{value:g}"
 
 
 def with_level(loaded: LoadedCase, level: str) -> LoadedCase:
