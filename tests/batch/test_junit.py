@@ -12,6 +12,7 @@ from tyrecal.batch.case import CaseTask, lost
 from tyrecal.batch.drift import baseline_of, compare
 from tyrecal.batch.junit import junit
 from tyrecal.batch.studies import Asked
+from tyrecal.studies.pressure_range import PressureRange
 
 from ..conftest import ROOT
 from .data import entry, report
@@ -27,7 +28,10 @@ ALL = [
         footprint=entry("skipped", None, "the fit before it has no result"),
         modes=entry("failed", "timed_out", "too late"),
     ),
-    lost(CaseTask("c", ROOT, ROOT, ("fit",), Asked(None, ())), "its process died, twice"),
+    lost(
+        CaseTask("c", ROOT, ROOT, ("fit",), Asked(None, PressureRange(None, None, 2))),
+        "its process died, twice",
+    ),
 ]
 
 

@@ -12,6 +12,7 @@ from tyrecal.batch.studies import Asked
 from tyrecal.files import PREVIOUS, RESULTS
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.studies.pressure_range import PressureRange
 
 from ..batch.support import vary
 from ..conftest import CASES
@@ -76,7 +77,8 @@ def test_results_of_an_earlier_run_in_a_batch(there: bool, tmp_path: Path) -> No
     case = CASES / "p235_75r17.yaml" if there else tmp_path / "gone.yaml"
     out = tmp_path / "out"
     earlier(out, "modes", "fit")
-    report = run_case(CaseTask("a", case, out, ("modes",), Asked(None, ())))
+    asked = Asked(None, PressureRange(None, None, 2))
+    report = run_case(CaseTask("a", case, out, ("modes",), asked))
     assert report["studies"]["modes"]["status"] == "error"
     assert {path.name for path in out.iterdir()} == names("fit") | names("modes") | {"run.json"}
     assert json.loads((out / "run.json").read_text())["modes"]["finished"] is False
@@ -91,7 +93,7 @@ def test_results_of_a_run_that_is_done_take_the_place_of_others(
     assert run("modes", CASE, "--mesh", "coarse", "--no-pictures", "--output", str(out)) == 0
     assert json.loads((out / "modes.json").read_text())["modes"]
     assert {path.name for path in (out / PREVIOUS).iterdir()} == set(
-        names("modes") - {"modes.json", "modes_shapes.json"}
+        names("modes") - {"modes.json", "modes.csv", "modes_shapes.json"}
     )
 
 

@@ -26,6 +26,7 @@ from ..studies.fit.calibrate import history_csv
 from ..studies.fit.study import FitStudy
 from ..studies.fit.verdict import DOES_NOT_FIT, does_not_fit_words
 from ..studies.fitted import NOT_CONVERGED
+from ..studies.pressure_range import PressureRange
 from ..studies.result import Failed, Result, ResultPart
 from ..studies.sample import study as sampling
 from ..studies.sample.result import draws_csv, result
@@ -37,10 +38,10 @@ Numbers = dict[str, float]
 @dataclass(frozen=True)
 class Asked:
     """Of each study, beside the case. loads_N: of the footprint, None for the case's own;
-    pressures_kPa: of the sweep."""
+    pressures: of the sweep."""
 
     loads_N: tuple[float, ...] | None
-    pressures_kPa: tuple[float, ...]
+    pressures: PressureRange
 
 
 @dataclass
@@ -109,7 +110,7 @@ def modes(state: Studied) -> StudyOutcome:
 
 def sweep_pressure(state: Studied) -> StudyOutcome:
     """Every design over the pressure. Raises what `pressure_result.run` does."""
-    pressures = state.asked.pressures_kPa
+    pressures = state.asked.pressures.on(state.case)
     found = pressure_result.run(state.case, state.evaluator, state.designs, pressures)
     numbers = {
         f"frequency_Hz {row.design} {row.pressure_kPa:g} kPa {mode.label}": mode.frequency_Hz

@@ -11,6 +11,7 @@ import click
 from .terminal import Terminal
 
 if TYPE_CHECKING:
+    from ..studies.pressure_range import PressureRange
     from ..tyre.case.parts import Setting
 
 
@@ -105,21 +106,25 @@ def refuse_unusual_loads(loaded: Any, option: str, loads: Sequence[float], allow
             refuse_unusual(loaded, f"{option} {load:g}", "road.loads_N.0", load, allowed)
 
 
-def parse_pressures(low: float, high: float, steps: int, allowed: bool) -> tuple[float, ...]:
-    """Equidistant pressures in kPa, both ends among them; ``allowed``: unusual ones too. Raises
-    click.UsageError."""
+def parse_pressures(
+    low: float | None, high: float | None, steps: int, allowed: bool
+) -> PressureRange:
+    """The range of a sweep, kPa; ``allowed``: unusual ends too. Raises click.UsageError."""
     from math import isfinite
 
+    from ..studies.pressure_range import PressureRange
     from ..tyre.usual import ALL_THE_SAME, USUAL
 
     for option, value in (("--from-kPa", low), ("--to-kPa", high)):
+        if value is None:
+            continue
         if not (isfinite(value) and value > 0):
             raise click.UsageError(f"{option} {value:g}: must be a finite pressure above 0")
         if not allowed and (message := USUAL["pressure_kPa"].refusal(value)):
             raise click.UsageError(f"{option} {value:g}: {message}{ALL_THE_SAME}")
-    if low >= high:
+    if low is not None and high is not None and low >= high:
         raise click.UsageError(f"--from-kPa {low:g} must be less than --to-kPa {high:g}")
-    return tuple(round(low + (high - low) * i / (steps - 1), 9) for i in range(steps))
+    return PressureRange(low, high, steps)
 
 
 def fitted_values(path: Path, loaded: Any, terminal: Terminal) -> dict[str, float]:

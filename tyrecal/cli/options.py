@@ -151,19 +151,15 @@ _from = option(
     "--from-kPa",
     "from_kPa",
     type=Number(),
-    default=100.0,
     metavar="A",
-    show_default=True,
-    help="Lowest pressure of a sweep.",
+    help="Lowest pressure of a sweep (default: 5/12 of the case's, as 100 of 240 kPa).",
 )
 _to = option(
     "--to-kPa",
     "to_kPa",
     type=Number(),
-    default=320.0,
     metavar="B",
-    show_default=True,
-    help="Highest pressure of a sweep.",
+    help="Highest pressure of a sweep (default: 4/3 of the case's, as 320 of 240 kPa).",
 )
 _steps = option(
     "--steps",

@@ -23,14 +23,15 @@ from .taken import taken
 def command(
     case: Path | None,
     assignments: tuple[str, ...],
-    from_kPa: float,
-    to_kPa: float,
+    from_kPa: float | None,
+    to_kPa: float | None,
     steps: int,
     fitted: Path | None,
     pictures: bool,
     study: options.Study,
 ) -> int:
-    """Follow every mode of CASE over the inflation pressure.
+    """Follow every mode of CASE over the inflation pressure, by default from 5/12 to 4/3 of the
+    case's own.
 
     Writes pressure_sweep.json, .csv and .png: frequencies, their slopes d ln f / d ln p, and what
     they say. --set NAME=VALUE on a variable changes the initial design, on any other number both.
@@ -78,8 +79,8 @@ def command(
 def _pressures(
     loaded: Any,
     assignments: tuple[str, ...],
-    low: float,
-    high: float,
+    low: float | None,
+    high: float | None,
     steps: int,
     allow_unusual: bool,
 ) -> list[float]:
@@ -89,10 +90,10 @@ def _pressures(
 
     name = pressure_name(loaded)
     arguments.refuse_set(assignments, name, "--from-kPa and --to-kPa")
-    pressures = arguments.parse_pressures(low, high, steps, allow_unusual)
-    for end, value in (("--from-kPa", low), ("--to-kPa", high)):
+    pressures = arguments.parse_pressures(low, high, steps, allow_unusual).on(loaded)
+    for end, value in (("--from-kPa", pressures[0]), ("--to-kPa", pressures[-1])):
         try:
             with_values(loaded, {name: value})
         except ValueError as error:
             raise click.UsageError(f"{end} {value:g}: {error}") from None
-    return list(pressures)
+    return pressures
