@@ -117,7 +117,7 @@ def test_several_measured_files_have_one_hash(tmp_path: Path) -> None:
             "name",
             "name",
             ["--set", f"{TURNED}=70.07"],
-            f"{TURNED} is as in the case there, 70.07 here",
+            f"without --set {TURNED}, this command runs with --set {TURNED}=70.07",
         ),
         ("frequency_Hz: 31.7", "frequency_Hz: 35.7", [], ""),
         ("upper: 1.0e-5", "upper: 2.0e-5", [], ""),
@@ -212,4 +212,5 @@ def test_a_fit_with_other_numbers_set_says_which(
     ]
     assert run(*again) == 2
     *_, error = capsys.readouterr().err.splitlines()
-    assert f"{TURNED} is 68.0 there, as in the case here" in error and "friction" not in error
+    words = f"made with --set {TURNED}=68, this command runs without --set {TURNED}"
+    assert words in error and "friction" not in error

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from ..errors import InputError
 from ..files import read_json
-from ..tyre.case import LoadedCase, start_values
+from ..tyre.case import LoadedCase, as_written, start_values
 from ..tyre.case.identity import is_of_tyre, tyre_sha256
 from ..tyre.state import pressure_name
 from ..tyre.values import with_values
@@ -61,15 +61,20 @@ def read_fitted(path: Path, case: LoadedCase) -> tuple[dict[str, float], list[st
 
 
 def _difference(theirs: Mapping[str, Any], case: LoadedCase) -> str:
-    """What sets the tyre of the fit and that of the case apart, as far as can be told."""
+    """What sets the tyre of the fit and that of the case apart, as far as it is known."""
     ours = case.overrides
-    told = [
-        f"{name} is {theirs.get(name, 'as in the case')} there, {ours.get(name, 'as in the case')}"
-        " here"
-        for name in sorted({*theirs, *ours})
-        if is_of_tyre(name) and theirs.get(name) != ours.get(name)
-    ]
-    return "; ".join(told) or (
+    differences = []
+    for name in sorted({*theirs, *ours}):
+        if not is_of_tyre(name) or theirs.get(name) == ours.get(name):
+            continue
+        sets = [
+            f"{maker} with --set {name}={as_written(given[name])}"
+            if name in given
+            else f"{maker} without --set {name}"
+            for maker, given in (("the fit was made", theirs), ("this command runs", ours))
+        ]
+        differences.append(", ".join(sets))
+    return "; ".join(differences) or (
         f"'{case.path}', or a file that it names, has been edited since; run 'tyrecal fit' again"
     )
 
