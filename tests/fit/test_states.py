@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from tyrecal.errors import InputError
+from tyrecal.report.table import shown
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
@@ -21,6 +23,7 @@ from tyrecal.studies.fit.calibrate import calibrate, check
 from tyrecal.studies.fit.crossing import AXIAL, TORSIONAL, crossing, order, pair_clarity
 from tyrecal.studies.fit.problem import Problem
 from tyrecal.studies.fit.targets import target_labels
+from tyrecal.studies.result import Deviation
 from tyrecal.tyre.case.schema import TargetMass, TargetMode, Targets, Variable
 from tyrecal.tyre.state import AS_THE_CASE, TyreState
 from tyrecal.tyre.values import with_values
@@ -153,8 +156,14 @@ def test_tables_and_files_show_states_side_by_side() -> None:
     first, *_, before, after = fit.found.tables()
     names = [column.name for column in first.columns]
     assert names[2:5] == ["240 kPa\nrim fixed", "240 kPa\nrim free", "160 kPa\nrim fixed"]
-    assert names[-1] == "any state" and len(first.rows) == 9 + 1 and first.rows[-1][0] == "mass"
+    assert names[-1] == "any state" and len(first.rows) == 9 + 1 and first.rows[-1][0] == "mass, kg"
     assert first.rows[0][:2] == ["[0,0]", "lateral"] and None not in first.rows[0][2:-1]
+    mode = fit.found.modes[0]
+    assert first.rows[0][2] == Deviation(mode.deviation_percent, f"{mode.fitted_Hz:.2f}")
+    console = Console(width=110)
+    with console.capture() as text:
+        console.print(shown(first))
+    assert f"{mode.fitted_Hz:.2f} {mode.deviation_percent:+.2f}" in text.get()
     assert before.rows[0][0] == "nothing" and len(before.rows) == 7
     assert len(after.rows) == len(fit.found.next_states) == 4
     assert after.rows[0][0] == fit.found.next_states[0].said

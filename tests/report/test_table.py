@@ -91,7 +91,7 @@ def test_a_fit_reads_like_table_2():
         "[1,1] ×2 pitch / yaw-camber 43.85 36.92 37.80 -2.33",
         "[2,1] ×2 first out-of-plane bending 76.33 68.41 66.10 +3.49",
         "[3,1] ×2 second out-of-plane bending 117.07 107.90 102.70 +5.06",
-        "variable initial fitted bounds std. err. % scatter %",
+        "variable unit initial fitted bounds std. err. % scatter %",
         "A_belt 2.119e-07 3.648e-07 1e-07..1e-05 - 10",
         "odd[bold]name at bound 4.2e-07 1e-08 1e-08..1e-05 - -",
         "C10 held 1e+06 1e+06 - - -",

@@ -27,12 +27,13 @@ from tyrecal.studies.diagnose.covariance import by_laws
 from tyrecal.studies.diagnose.form_error import MATERIAL_LAWS
 from tyrecal.studies.diagnose.observations import Observable
 from tyrecal.studies.diagnose.section_fields import fields, with_fields
-from tyrecal.studies.diagnose.uncertainties import EFFECT_PATH, sources, values_of
+from tyrecal.studies.diagnose.uncertainties import sources, values_of
 from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.tyre.case import LoadedCase, start_values, with_level
 from tyrecal.tyre.case.schema import TargetMode, Targets
 from tyrecal.tyre.effects.edit import changed
 from tyrecal.tyre.load import load_case
+from tyrecal.tyre.number_units import EFFECT_PATH
 
 from ..conftest import CASES
 from .wrinkles import by_size

@@ -56,9 +56,10 @@ from tyrecal.studies.diagnose.section_fields import SECTION
 from tyrecal.studies.diagnose.several import probabilities, weigh
 from tyrecal.studies.diagnose.study import spans_of
 from tyrecal.studies.diagnose.tyre_model import TyreModel
-from tyrecal.studies.diagnose.uncertainties import EFFECT_PATH, sources
+from tyrecal.studies.diagnose.uncertainties import sources
 from tyrecal.studies.fit.targets import target_labels
 from tyrecal.tyre.effects.edit import changed, with_part
+from tyrecal.tyre.number_units import EFFECT_PATH
 from tyrecal.tyre.state import TyreState
 
 from ..effects.support import coarse

@@ -203,7 +203,7 @@ def _cell(cell: Cell) -> Text:
     if isinstance(cell, Deviation):
         off = abs(cell.percent)
         colour = "green" if off < CLOSE else "yellow" if off < FAR else "red"
-        return Text(f"{cell.percent:+.2f}", colour)
+        return Text(f"{cell.value} ".lstrip()).append(f"{cell.percent:+.2f}", colour)
     return Text(EMPTY_CELL if cell is None else cell)
 
 

@@ -17,6 +17,7 @@ from ..tyre.case import LoadedCase
 from ..tyre.effects import Effect
 from .result import (
     Column,
+    CsvRow,
     Failed,
     Notify,
     PositiveNumber,
@@ -25,6 +26,7 @@ from .result import (
     ResultPart,
     Table,
     Wave,
+    rows_csv,
     silent,
 )
 from .signature import Plain, Signature, rms, stated_size
@@ -142,6 +144,20 @@ class Effects(Result):
         of = Provenance.model_validate(provenance)
         rows = [each.model_copy(update={"provenance": of}) for each in self.rows]
         return self.model_copy(update={"provenance": of, "rows": rows})
+
+    def csv(self) -> str:
+        keys = ["id", "value", "unit", "mass_kg", "before_percent", "after_percent", "absorbed"]
+        return rows_csv([each.model_dump(include={*keys, "refitted"}) for each in self.rows])
+
+    def csv_rows(self) -> dict[str, list[CsvRow]]:
+        """The change of every mode."""
+        modes: list[CsvRow] = [
+            {"id": each.id, "pressure_kPa": row.pressure_kPa, **mode.model_dump()}
+            for each in self.rows
+            for row in each.rows
+            for mode in row.modes
+        ]
+        return {"modes": modes}
 
     def tables(self) -> list[Table]:
         """How far each effect moves the modes, and the variables that follow it."""

@@ -4,7 +4,7 @@ labels.csv, and a part of fit.json."""
 from __future__ import annotations
 
 from ..simulate.modes.label import Label
-from .result import Column, PositiveNumber, Result, ResultPart, Table, csv_text, state_words
+from .result import Column, CsvRow, PositiveNumber, Result, ResultPart, Table, csv_text, state_words
 
 FOREIGN_WORDS = "no mode of the tyre"
 MOST_RIVALS, LEAST_RIVAL = 4, 0.01  # labels, and labelings, beside the likeliest; probability
@@ -85,6 +85,13 @@ class Labels(ResultPart):
         ]
         return Table(heads, rows, title="Labels of frequencies that came without")
 
+    def csv_rows(self) -> list[CsvRow]:
+        """A row a frequency, with each rival in words."""
+        return [
+            {**each.model_dump(), "rivals": [f"{r.said} {r.probability:.4f}" for r in each.rivals]}
+            for each in self.frequencies
+        ]
+
     def sentences(self) -> list[str]:
         """What was told."""
         best = self.labelings[0]
@@ -118,7 +125,7 @@ class LabelsResult(Result):
 
     def csv(self) -> str:
         keys = ["frequency_Hz", "sigma_Hz", "pressure_kPa", "rim", "c", "m", "kind", "probability"]
-        return csv_text([*keys, "expected_Hz"], (f.model_dump() for f in self.labels.frequencies))
+        return csv_text([*keys, "expected_Hz", "rivals"], self.labels.csv_rows())
 
     def tables(self) -> list[Table]:
         return [self.labels.table()]

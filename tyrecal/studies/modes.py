@@ -10,7 +10,7 @@ from pydantic import Field
 from ..simulate.evaluate.results import Evaluation
 from ..simulate.modes.label import Mode, labelled
 from ..tyre.case import LoadedCase
-from .result import NAME_COLUMNS, CavityMode, Column, ModeEntry, Result, ResultPart, Table
+from .result import NAME_COLUMNS, CavityMode, Column, ModeEntry, Result, ResultPart, Table, csv_text
 
 if TYPE_CHECKING:
     from ..simulate.evaluate.evaluator import Evaluator
@@ -40,6 +40,12 @@ class ModesResult(Result):
     modes: Annotated[list[ModeEntry], Field(min_length=1)]
     cavity: list[CavityMode] = Field(default=[])  # of the tyre on the road
     findings: ModesFindings = ModesFindings()
+
+    def csv(self) -> str:
+        rows = [each.model_dump() for each in self.modes]
+        rows += [{"kind": f"cavity {each.direction}", **each.model_dump()} for each in self.cavity]
+        known = (key for key in ModeEntry.model_fields if any(row.get(key) for row in rows))
+        return csv_text(list(dict.fromkeys(["c", "m", "kind", *known])), rows)
 
     def tables(self) -> list[Table]:
         known = ("sliding_Hz", "grip_mm", "symmetry", "member", "clarity", "overlap")

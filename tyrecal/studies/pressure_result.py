@@ -16,6 +16,7 @@ from .pressure import Failure, PressureFindings, State, SweepOutcome, findings, 
 from .result import (
     NAME_COLUMNS,
     Column,
+    CsvRow,
     Failed,
     ModeEntry,
     Notify,
@@ -51,6 +52,15 @@ class PressureSweep(Result):
         keys = ["design", "pressure_kPa", "c", "m", "kind", "multiplicity", "frequency_Hz"]
         rows = ({**row.model_dump(), **m.model_dump()} for row in self.rows for m in row.modes)
         return csv_text([*keys, "d_ln_f_d_ln_p"], rows)
+
+    def csv_rows(self) -> dict[str, list[CsvRow]]:
+        """The rise of every mode from the lowest to the highest pressure."""
+        rise: list[CsvRow] = [
+            {"design": each.design, "from_kPa": each.from_kPa, "to_kPa": each.to_kPa, **mode}
+            for each in self.findings
+            for mode in each.modes
+        ]
+        return {"rise": rise}
 
     def tables(self) -> list[Table]:
         return [self._ends(each) for each in self.findings if each.modes]

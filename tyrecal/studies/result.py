@@ -40,9 +40,10 @@ class Column:
 
 @dataclass(frozen=True)
 class Deviation:
-    """A cell with a colour or mark that says how far off a target is."""
+    """A cell with a colour or mark that says how far off a target is, after the ``value``."""
 
     percent: float
+    value: str = ""
 
 
 Cell = str | Deviation | None  # None: there is no value
@@ -134,11 +135,17 @@ class Result(ResultPart):
     def texts(self) -> dict[str, str]:
         """The files by name."""
         texts = {f"{self.stem}.json": json_text(self.content())}
-        return texts | ({f"{self.stem}.csv": table} if (table := self.csv()) else {})
+        texts |= {f"{self.stem}.csv": table} if (table := self.csv()) else {}
+        further = self.csv_rows().items()
+        return texts | {f"{self.stem}_{name}.csv": rows_csv(rows) for name, rows in further if rows}
 
     def csv(self) -> str:
         """The rows, all digits, in the units of the JSON file; "": there is no such file."""
         return ""
+
+    def csv_rows(self) -> Mapping[str, Sequence[CsvRow]]:
+        """Rows of further tables, each a file STEM_NAME.csv by its name, in the same units."""
+        return {}
 
     def tables(self) -> list[Table]:
         """For the terminal and the page."""
@@ -187,6 +194,7 @@ class Failed(ResultPart):
         return ", ".join([self.design, *at])
 
 
+CsvRow = Mapping[str, Any]
 Notify = Callable[[str, EvaluationFailed | None], None]  # words; why a place was not reached
 
 
@@ -284,3 +292,22 @@ def csv_text(keys: Sequence[str], rows: Iterable[Mapping[str, Any]], end: str = 
     writer.writeheader()
     writer.writerows(rows)
     return text.getvalue()
+
+
+def rows_csv(rows: Sequence[CsvRow]) -> str:
+    """Rows as CSV: a column for each key of any row, KEY.NAME for entries of a mapping, entries of
+    a list joined by semicolons."""
+    flat = [_flat(row) for row in rows]
+    return csv_text(list(dict.fromkeys(key for row in flat for key in row)), flat)
+
+
+def _flat(row: CsvRow) -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for key, value in row.items():
+        if isinstance(value, Mapping):
+            flat |= {f"{key}.{name}": each for name, each in value.items()}
+        elif isinstance(value, list | tuple):
+            flat[key] = "; ".join(map(str, value))
+        else:
+            flat[key] = value
+    return flat

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from pydantic import Field
 
 from ...simulate.modes.label import Label
 from ..labels import Labels
-from ..result import Result, ResultPart
+from ..result import CsvRow, Result, ResultPart, rows_csv
 from .constants_told import ConstantShift, constants_told
 from .evidence import NONE, OUTSIDE
 from .gap import projection
@@ -185,6 +186,37 @@ class DiagnosisResult(Result):
     labels: Labels | None = None  # of frequencies that came without
     left_out: list[str] = Field(default=[])
     not_evaluated: dict[str, str] = Field(default={})
+
+    def csv(self) -> str:
+        residuals: list[CsvRow] = [each.model_dump() for each in self.gap.residuals]
+        return rows_csv(residuals)
+
+    def csv_rows(self) -> dict[str, list[CsvRow]]:
+        """The tables of the diagnosis page."""
+        sizes: dict[str, Mapping[str, float | None]] = {
+            "lambda": self.detectability,
+            "judged_at": self.judged_at,
+            "full_size": self.full_size,
+            "smallest_visible": self.smallest_visible,
+            "absorbed": self.absorbed,
+        }
+        ids = list(dict.fromkeys(id for by_effect in sizes.values() for id in by_effect))
+        tables: dict[str, list[CsvRow]] = {
+            "probabilities": [
+                {"explanation": key, "probability": p} for key, p in self.probabilities.items()
+            ],
+            "groups": [each.model_dump() for each in self.gap.groups],
+            "section": [asdict(each) for each in self.section_map],
+            "constants": [asdict(each) for each in self.constants],
+            "effects": [
+                {"effect": id} | {key: by_effect.get(id) for key, by_effect in sizes.items()}
+                for id in ids
+            ],
+            "next": [each.model_dump() for each in self.next_measurements],
+        }
+        if self.under_load:
+            tables["under_load"] = [each.model_dump() for each in self.under_load.rows]
+        return tables | ({"labels": self.labels.csv_rows()} if self.labels else {})
 
 
 def diagnosis_result(

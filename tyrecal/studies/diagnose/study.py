@@ -15,6 +15,7 @@ from ...simulate.evaluate.evaluator import Evaluator
 from ...tyre.case import LoadedCase
 from ...tyre.case.mistakes import suggestion
 from ...tyre.effects import Effect, catalogue
+from ...tyre.number_units import EFFECT_PATH
 from ..far_off import far_off
 from ..fit.targets import rims_of
 from ..labelling.label import label
@@ -33,7 +34,7 @@ from .regions import regions
 from .result import DiagnosisResult, diagnosis_result
 from .section_told import section_told
 from .tyre_model import TyreModel
-from .uncertainties import EFFECT_PATH, Source, calibrated, sources
+from .uncertainties import Source, calibrated, sources
 from .under_load import UnderLoad, Values, compare
 from .where import FieldValue
 

@@ -18,6 +18,7 @@ from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase, start_values
 from ...tyre.case.schema import TargetMode, Targets
 from ...tyre.effects import catalogue
+from ...tyre.number_units import EFFECT_PATH, unit_of
 from ...tyre.state import TyreState, without
 from ...tyre.templates import TemplateFailed
 from ...tyre.values import with_values
@@ -29,7 +30,7 @@ from .model import Answer, Coupling, ModelRow, Query, Span, state_of
 from .regions import regions
 from .section_design import SectionDesign
 from .section_fields import OF_COMPOUNDS, known_from
-from .uncertainties import EFFECT_PATH, Source, unit_of, values_of
+from .uncertainties import Source, values_of
 from .veering import coupling, partner
 
 Array = np.ndarray

@@ -7,34 +7,16 @@ from dataclasses import dataclass, replace
 
 from ...tyre.case import LoadedCase, number_at
 from ...tyre.case.schema import Cord, Rubber
-from ...tyre.effects import catalogue
+from ...tyre.number_units import EFFECT_PATH, unit_of
 from ...units import in_engineers_units
 from .section_fields import SectionField, fields, known_from, words
 
 DENSITY_PERCENT, MODULUS_PERCENT, SPACING_PERCENT, GAUGE_PERCENT = 1.5, 3.0, 1.0, 3.0
 ANGLE_deg, PRESSURE_kPa = 1.0, 1.0
-EFFECT_PATH = "effects."
 RIM_WIDTH = EFFECT_PATH + "rim_width"
 # m between the places where the rim holds the beads: by their build as well as by the rim's width;
 # by judgement, 2.5 mm a side from one maker of a size to another
 BEAD_SEAT_DISTANCE = {"exact": 0.0, "measured": 0.5e-3, "drawing": 1e-3, "size_code": 5e-3}
-UNIT_BY_ENDING = {  # by a key's end, the longer first
-    "kg_per_m3": "kg/m3",
-    "kg_m2": "kg m2",
-    "m_per_N": "m/N",
-    "Pa_per_m": "Pa/m",
-    "N_per_m": "N/m",
-    "rad_per_N_m": "rad/(N m)",
-    "rad_per_s": "rad/s",
-    "kPa": "kPa",
-    "Pa": "Pa",
-    "deg": "degrees",
-    "m": "m",
-    "m2": "m2",
-    "kg": "kg",
-    "Hz": "Hz",
-    "C": "C",
-}
 
 
 @dataclass(frozen=True)
@@ -130,15 +112,6 @@ def _source(name: str, steps: dict[str, float], percent: float, absolute: float)
     unit = unit_of(next(iter(steps)))
     size = f"{percent:g} %" if percent else in_engineers_units(absolute, unit)
     return Source(name, steps, f"{name.replace('_', ' ')} {size}")
-
-
-def unit_of(path: str) -> str:
-    """The unit of the number at a dotted path, "" where it has none."""
-    if path.startswith(EFFECT_PATH):
-        return catalogue()[path.removeprefix(EFFECT_PATH)].unit
-    if path.endswith(" / angle"):  # of a user's deck
-        return "degrees"
-    return next((unit for end, unit in UNIT_BY_ENDING.items() if path.endswith(f"_{end}")), "")
 
 
 def calibrated(case: LoadedCase) -> set[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -13,12 +13,14 @@ from ...measured.measurement import Measurement
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.modes.label import Label
 from ...tyre.footprint_quantities import FOOTPRINT_QUANTITIES
+from ...tyre.number_units import unit_of
 from ...tyre.state import AS_THE_CASE
 from ...tyre.values import with_values
 from ..labels import Labels
 from ..result import (
     NAME_COLUMNS,
     Column,
+    CsvRow,
     Deviation,
     Named,
     PositiveNumber,
@@ -73,6 +75,7 @@ class FittedVariable(ResultPart):
     standard_error_total: float | None = None  # by all that is uncertain; None: not known
     variance_by_cause: dict[str, float] = Field(default={})  # shares of the total's, 1 together
     at_bound: bool
+    unit: str = ""  # of the number that it sets
 
     def percent(self, error: float | None) -> str | None:
         """A standard error in per cent of the value: two digits, and never 1.9e+02."""
@@ -212,6 +215,21 @@ class FitResult(Result):
         rows = (*self.modes, *self.others)
         return csv_text(keys, (each.model_dump(exclude_unset=True) for each in rows))
 
+    def csv_rows(self) -> dict[str, list[CsvRow]]:
+        """Variables; what each state adds or would add; labels of frequencies without one."""
+        tables: dict[str, list[CsvRow]] = {
+            "variables": [
+                *({"variable": name, **v.model_dump()} for name, v in self.variables.items()),
+                *({"variable": name, "value": held} for name, held in self.fixed.items()),
+            ],
+            "states": [
+                {**each.model_dump(exclude_unset=True), "measured": measured}
+                for measured, states in ((True, self.states), (False, self.next_states))
+                for each in states
+            ],
+        }
+        return tables | ({"labels": self.labels.csv_rows()} if self.labels else {})
+
     def over_pressure(self) -> list[tuple[Label, float, float]]:
         """Label, kPa and Hz of the unloaded tyre's targets on the first one's rim."""
         return [
@@ -264,8 +282,8 @@ class FitResult(Result):
         ]
 
     def numbers(self) -> list[Table]:
-        """Of a fit over several states all targets, a line each."""
-        return [self._every_target()] if self.states else []
+        """Of a fit over several states every target with its initial and measured value."""
+        return [replace(self._every_target(), title="Every target")] if self.states else []
 
     def _every_target(self) -> Table:
         heads = [*NAME_COLUMNS, *map(Column, ("initial", "fitted", "target", "deviation %"))]
@@ -290,18 +308,21 @@ class FitResult(Result):
         return Table(heads, rows, caption=self._caption(units))
 
     def _side_by_side(self) -> Table:
-        """Deviations of all targets from fitted values, a column a state."""
+        """Fitted values and their deviations from the targets, a column a state."""
         shown: dict[tuple[str, str], dict[str, Deviation]] = {}
         for mode in self.modes:
             name, motion = mode.named()
-            shown.setdefault((name, motion), {})[mode.state] = Deviation(mode.deviation_percent)
+            off = Deviation(mode.deviation_percent, f"{mode.fitted_Hz:.2f}")
+            shown.setdefault((name, motion), {})[mode.state] = off
         for each in self.others:
-            name = ROAD_QUANTITIES[each.quantity].name.split(",")[0]
-            shown.setdefault((name, ""), {})[each.state] = Deviation(each.deviation_percent)
+            quantity = ROAD_QUANTITIES[each.quantity]
+            off = Deviation(each.deviation_percent, quantity.cell(each.fitted) or "")
+            shown.setdefault((quantity.name, ""), {})[each.state] = off
         states = list(dict.fromkeys(state for row in shown.values() for state in row))
         heads = [*NAME_COLUMNS, *(Column(in_lines(state or "any state")) for state in states)]
         rows = [[*name, *(row.get(state) for state in states)] for name, row in shown.items()]
-        return Table(heads, rows, caption=self._caption("deviations of fitted values, %"))
+        words = "fitted values, frequencies in Hz, and their deviations from targets in %"
+        return Table(heads, rows, caption=self._caption(words))
 
     def _caption(self, units: str) -> str:
         return "; ".join(filter(None, (units, str(self.provenance or ""))))
@@ -337,12 +358,12 @@ class FitResult(Result):
         return self.variables[name].percent(error)
 
     def _variables(self) -> Table:
-        heads = [Column("variable", ""), Column("", "")]
+        heads = [Column("variable", ""), Column("unit", "")]
         heads += map(Column, ("initial", "fitted", "bounds", "std. err. %", "scatter %"))
         rows: list[list[Any]] = [
             [
                 name,
-                "at bound" if each.at_bound else "",
+                ", ".join(filter(None, (each.unit, "at bound" * each.at_bound))),
                 *map(RESULT_DIGITS.cell, (each.initial, each.value)),
                 f"{each.lower:g}..{each.upper:g}",
                 each.percent(each.standard_error_total),
@@ -466,6 +487,7 @@ def _variables(
             standard_error=known.standard_errors[i],
             **more.get(v.name, {}),
             at_bound=not is_free[i],
+            unit=unit_of(problem.case.case.variables[v.name].sets[0]),
         )
     return variables
 

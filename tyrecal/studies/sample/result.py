@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from ..result import (
     NAME_COLUMNS,
     Column,
+    CsvRow,
     Named,
     PositiveNumber,
     Result,
@@ -149,6 +150,14 @@ class SampleResult(Result):
         keys = ["c", "m", "kind", "pressure_kPa", *rim, "frequency_Hz", "low", "high", "mean"]
         keys += ["standard_error", "measured_Hz", "sigma_Hz"]
         return csv_text(keys, (row.model_dump() for row in self.predicted))
+
+    def csv_rows(self) -> dict[str, list[CsvRow]]:
+        """The variables, without their histograms."""
+        apart = {"density", "box", "log"}
+        variables: list[CsvRow] = [
+            {"variable": name, **v.model_dump(exclude=apart)} for name, v in self.variables.items()
+        ]
+        return {"variables": variables}
 
     def tables(self) -> list[Table]:
         heads = ("variable", "median", "90 % from", "to", "std. err. %", "linear %", "best", "unit")
