@@ -19,8 +19,9 @@ from .terminal import Terminal
     metavar="FILE",
     help="The page (default: report.html in DIR, of several in the present folder).",
 )
+@option("--author", default="", metavar="NAME", help="Name under the title (default: none).")
 @options.talking
-def command(folders: tuple[Path, ...], output: Path | None, terminal: Terminal) -> int:
+def command(folders: tuple[Path, ...], output: Path | None, author: str, terminal: Terminal) -> int:
     """Tell the results in DIR (of fit, modes, sweep-pressure, footprint, diagnose: whatever is
     found) on one HTML page.
 
@@ -30,12 +31,12 @@ def command(folders: tuple[Path, ...], output: Path | None, terminal: Terminal) 
 
     \b
     tyrecal report p235_75r17
-    tyrecal report narrow_rim wide_rim --output rims.html
+    tyrecal report narrow_rim wide_rim --output rims.html --author "A. Engineer"
     """
     from ..report.html.page import write_page
 
     path = output or (folders[0] / "report.html" if len(folders) == 1 else Path("report.html"))
-    written = write_page(path, folders)
+    written = write_page(path, folders, author)
     terminal.result({"page": str(path), "bytes": written.size, "found": written.found})
     for folder, found in written.found.items():
         terminal.say(f"{folder}: {', '.join(found)}")

@@ -154,10 +154,10 @@ def test_what_comes_from_files_is_escaped(tmp_path: Path) -> None:
 
 
 def test_the_same_results_give_the_same_bytes(copy: Path, tmp_path: Path) -> None:
-    """Wherever they stand, whenever and wherever they were computed."""
+    """Wherever they stand, and however long they took."""
     write_page(tmp_path / "one.html", [copy])
     run = json.loads((copy / "run.json").read_text())
-    run["fit"] |= {"started": "2031-05-05T05:05:05+00:00", "seconds": 99.0, "host": "there"}
+    run["fit"] |= {"seconds": 99.0}
     (copy / "run.json").write_text(json.dumps(run))
     moved = Path(shutil.move(copy, tmp_path / "elsewhere" / "results"))
     write_page(tmp_path / "two.html", [moved])
@@ -254,6 +254,15 @@ def test_a_fit_to_footprints_alone(copy: Path) -> None:
     (copy / "fit_shapes.json").unlink()
     words = words_of(text_of(copy, copy))
     assert "4000 N contact area, cm²120.0" in words and "worst mode––" in words
+
+
+def test_the_reason_of_a_misfit_is_there_once(copy: Path) -> None:
+    fit = json.loads((copy / "fit.json").read_text())
+    reason = {"kind": "value", "words": "line 2: did you mean 31.7 Hz?", "chi2_per_dof": 1.25}
+    judged = {"verdict": "does_not_fit", "chi2_per_dof": 491.0, "reason": reason}
+    (copy / "fit.json").write_text(json.dumps(fit | judged))
+    words = words_of(text_of(copy))
+    assert words.count("did you mean 31.7 Hz?") == 1 and "Does not fit" in words
 
 
 def test_shapes_of_another_run_are_not_shown(copy: Path) -> None:
@@ -418,6 +427,8 @@ def test_the_page_says_what_its_results_are_of(copy: Path) -> None:
         "tyrecal 0.1.0",
         "a drum",
         "fedcba98",
+        "tyrecal report, 2026-01-01 Toy",
+        "2026-01-01 00:00 UTC, here: tyrecal fit 'my cases/toy.yaml'",
     ):
         assert entry in words, entry
     assert "not all of one tyre" not in words and "did not finish" not in words
@@ -429,4 +440,5 @@ def test_the_page_says_what_its_results_are_of(copy: Path) -> None:
     (copy / "run.json").write_text(json.dumps(runs))
     words = words_of(text_of(copy))
     assert "not all of one tyre" in words and "ffffffff" in words
-    assert "The last run of modes did not finish" in words
+    assert "The last run of modes did not finish" in words and words.count("00:00 UTC") == 1
+    assert "2026-01-01, A. <Engineer>" in words_of(page([read_results(copy)], "A. <Engineer>"))

@@ -23,6 +23,7 @@ def write(folder: Path, name: str = "Toy & sons", effect: str = "rim_width") -> 
                 "started": "2026-01-01T00:00:00+00:00",
                 "seconds": 1.5,
                 "host": "here",
+                "arguments": ["fit", "my cases/toy.yaml"],
             }
         },
         "fit.json": fit(),

@@ -37,7 +37,7 @@ from ..shape_data import Shapes
 from ..table import CLOSE, FAR, MINUS, fit_doubts, map_resolution
 from .comparison import comparison
 from .markdown import html
-from .results import Results, read_results
+from .results import Results, RunFacts, read_results
 from .shapes import packed
 from .summary import sentence, summary, verdict_words
 
@@ -57,13 +57,13 @@ class Page:
 Draw = Callable[[str, str, str, Callable[[], Figure]], Markup]  # see `_picture`
 
 
-def write_page(path: Path, folders: Sequence[Path]) -> Page:
-    """Write the results of ``folders`` as one page that needs no network. The same results give
-    the same bytes. Raises InputError; OSError."""
+def write_page(path: Path, folders: Sequence[Path], author: str = "") -> Page:
+    """Write the results of ``folders`` as one page that needs no network; author: a name under the
+    title. Results of the same runs give the same bytes. Raises InputError; OSError."""
     results = [read_results(folder) for folder in folders]
     _refuse(path)
     try:
-        content = page(results).encode("utf-8")
+        content = page(results, author).encode("utf-8")
     except UnicodeEncodeError:
         raise InputError("a name in the results is no text") from None
     size = len(content)
@@ -95,14 +95,16 @@ def _refuse(path: Path) -> None:
         raise InputError(f"'{path}' cannot be written: there is no folder '{path.parent}'")
 
 
-def page(results: Sequence[Results]) -> str:
-    """The page as text. Raises InputError."""
+def page(results: Sequence[Results], author: str = "") -> str:
+    """The page as text; author: a name under the title. Raises InputError."""
     chapters = [chapter(each, f"f{k}-") for k, each in enumerate(results, 1)]
     names = list(dict.fromkeys(each.case for each in results))
     template = environment().get_template("page.html.j2")
     return template.render(
         mark=Markup(MARK),
         title=" and ".join(names),
+        author=author,
+        date=max(run.started[:10] for each in results for run in [*each.runs.values(), RunFacts()]),
         chapters=chapters,
         comparison=comparison(results),
         close=CLOSE,
@@ -148,6 +150,7 @@ def _study(found: Results, result: Result, draw: Draw) -> dict[str, Any]:
     with _lists_of(found.folder / f"{result.stem}.json"):
         return {
             "id": result.study,
+            "run": found.runs.get(result.study, RunFacts()),
             "heading": result.heading,
             "summary": summary(result),
             "doubts": doubts,

@@ -9,10 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
 from ...errors import InputError
 from ...files import NotAFile, read_runs, read_text
+from ...simulate.program import join_command
 from ...studies import result_types
 from ...studies.diagnose.result import DiagnosisResult
 from ...studies.effects import Effects
@@ -25,12 +26,24 @@ StudyContent = TypeVar("StudyContent", bound=Result)
 
 
 class RunFacts(ResultPart):
-    """A study's entry in run.json, but for what differs from run to run."""
+    """A study's entry in run.json."""
 
     case: str | None = None
     command: str | None = None
     finished: bool = True
     started: str = ""
+    arguments: list[str] = Field(default=[])
+    host: str = ""
+
+    @property
+    def typed(self) -> str:
+        """The command as it was typed, "" where it is not known."""
+        return join_command(["tyrecal", *self.arguments]) if self.arguments else ""
+
+    @property
+    def minute(self) -> str:
+        """When it started: 2026-11-27 08:30 UTC."""
+        return f"{self.started[:16].replace('T', ' ')} UTC" if self.started else ""
 
 
 @dataclass(frozen=True)

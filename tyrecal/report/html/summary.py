@@ -41,8 +41,6 @@ def fit_words(fit: FitResult) -> list[str]:
         f"The objective ({equation}{fit.method}) went from {fit.initial_objective_Hz:.2f} to"
         f" {fit.objective_Hz:.2f} {unit} in {fit.evaluations} design points.",
     ]
-    if fit.reason:
-        words.append(sentence(f"likeliest reason: {fit.reason.sentence}"))
     if fit.modes:
         words.append(f"{nearness(fit.model_dump()['modes'])}.")
     return [*words, f"{moves}."]
