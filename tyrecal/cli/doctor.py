@@ -83,6 +83,8 @@ def command(solver: str, store: Path | None, terminal: Terminal) -> int:
 
 
 def _words(found: dict[str, Any]) -> list[str]:
+    from ..simulate.modes.label import in_words
+
     here, check = found["machine"], found["self_check"]
     known = [here[key] for key in ("free_memory_GB", "memory_GB") if here[key] is not None]
     of = " of ".join(f"{each:g}" for each in known) or "unknown"
@@ -111,6 +113,8 @@ def _words(found: dict[str, Any]) -> list[str]:
     for mode in check["modes"]:
         hertz, off = mode["frequency_Hz"], mode["deviation_percent"]
         now = "not found" if hertz is None else f"{hertz:.2f} Hz ({off:+.3f} %)"
-        lines.append(f"  {mode['label']:<16}recorded {mode['recorded_Hz']:.2f}, now {now}")
+        lines.append(
+            f"  {in_words(mode['label']):<17}recorded {mode['recorded_Hz']:.2f}, now {now}"
+        )
     verdict = "as recorded" if check["ok"] else "NOT as recorded"
     return [*lines, f"  {verdict}, within {check['tolerance_percent']:g} %"]

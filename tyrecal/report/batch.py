@@ -9,6 +9,8 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
+from ..simulate.modes.label import in_words
+
 MAX_ROWS = 40
 FIGURES = ("baseline", "now", "change", "allowed")
 OUTCOME_COLOURS = {"error": "red", "failed": "red", "skipped": "yellow"}
@@ -37,7 +39,7 @@ def drift_table(drift: Mapping[str, Any]) -> Table | None:
         table.add_row(
             Text(each["case"]),
             each["study"],
-            Text(each["quantity"]),
+            Text(in_words(each["quantity"])),
             f"{old:.6g}",
             "gone" if new is None else f"{new:.6g}",
             "" if new is None else _share(new - old, old, sign="+"),

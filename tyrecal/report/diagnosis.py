@@ -13,6 +13,7 @@ from ..studies.diagnose.several import PRIOR_NONE, present
 from ..studies.diagnose.study import DiagnosedCase
 from ..studies.diagnose.under_load import LoadedRow
 from ..studies.diagnose.verdict import NAMED, NO_GAP, UNDECIDED, no_gap_words
+from ..studies.fit.result import OTHER_RESIDUALS
 from ..tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ..units import in_engineers_units, said
 from .table import map_resolution
@@ -205,13 +206,12 @@ def _gap(d: Diagnosis) -> Iterator[str]:
     g = d.gap
     seen = "larger than" if g.p_value < 0.05 else "within"
     yield (
-        f"After calibration {g.rms_percent:.2f} % (rms) is left (weighed by all that is uncertain,"
-        " while `tyrecal fit` knows the scatter only and can come nearer, by variables that are"
-        f" further off). That is {seen} what repeatability,"
+        f"After calibration {g.rms_percent:.2f} % (rms) is left. That is {seen} what repeatability,"
         f" the model's own form and the constants that nobody calibrates explain: chi2"
         f" {g.chi2:.1f} for {g.freedom} degrees of freedom, p = {g.p_value:.2g}. (A figure for"
         " orientation: it is weak against a single effect, so the verdict does not rest on it.)"
     )
+    yield OTHER_RESIDUALS
     hidden = sorted((id for id, a in g.absorbed.items() if a > 0.9), key=lambda id: -g.absorbed[id])
     for id in hidden[:3]:
         moved = {name: bias[id] for name, bias in g.bias_percent.items()}

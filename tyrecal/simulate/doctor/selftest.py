@@ -15,7 +15,7 @@ from ..deck.decks import Decks
 from ..deck.tyre_design import TyreDesign
 from ..evaluate.evaluator import Evaluator, Question
 from ..evaluate.results import Evaluation
-from ..modes.label import labelled
+from ..modes.label import in_words, labelled
 from .self_check import CASE
 
 # between the carcass cords of the second pair, 1 mm apart at a radius of 0.3 m; in degrees, says
@@ -105,7 +105,7 @@ def _table(found: dict[str, Evaluation]) -> str:
     twice = {str(mode.label): "  twice" * (mode.multiplicity == 2) for mode in labelled(first)}
     rows = [("", "", *found)]
     rows += [
-        (label, words, *(f"{_hertz(each)[label]:.3f}" for each in found.values()))
+        (in_words(label), words, *(f"{_hertz(each)[label]:.3f}" for each in found.values()))
         for label, words in twice.items()
     ]
     rows.append(("total mass, kg", "", *(f"{each.mass_kg:.4f}" for each in found.values())))

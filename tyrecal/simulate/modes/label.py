@@ -73,7 +73,7 @@ class Label:
     @property
     def said(self) -> str:
         """As people say it; files and options have the label itself: ``axial`` is lateral."""
-        return str(self).replace("axial", "lateral")
+        return in_words(str(self))
 
     @property
     def motion(self) -> str:
@@ -89,6 +89,11 @@ class Label:
 
     def __str__(self) -> str:
         return f"[{self.c},{self.m}]" + (f" {self.kind}" if self.kind else "")
+
+
+def in_words(text: str) -> str:
+    """A text with labels as people say them: ``[0,0] axial`` of files is ``[0,0] lateral``."""
+    return text.replace("[0,0] axial", "[0,0] lateral")
 
 
 @dataclass(frozen=True)

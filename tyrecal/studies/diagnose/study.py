@@ -12,6 +12,7 @@ from ...errors import InputError
 from ...measured.measurement import Measurement
 from ...measured.targets import in_states, readings_of
 from ...simulate.evaluate.evaluator import Evaluator
+from ...simulate.modes.label import in_words
 from ...tyre.case import LoadedCase
 from ...tyre.case.mistakes import suggestion
 from ...tyre.effects import Effect, catalogue
@@ -324,7 +325,7 @@ def check_units(
     values = zip(observations.rows, observations.y, strict=True)
     for row, y in sorted(values, key=lambda each: each[0].label is None):  # frequencies first
         ratio = exp(y - at[row.row])
-        if row.label and (words := far_off(str(row), exp(y), exp(at[row.row]))):
+        if row.label and (words := far_off(in_words(str(row)), exp(y), exp(at[row.row]))):
             raise InputError(f"{runs[row.run]}: {words}")
         if not row.label and not 1 / MAX_MASS_RATIO < ratio < MAX_MASS_RATIO:
             raise InputError(

@@ -49,6 +49,11 @@ ROAD_QUANTITIES = {  # targets that are no modes
     },
     "mass_kg": Column("mass, kg", ".2f"),
 }
+OTHER_RESIDUALS = (
+    "A fit and a diagnosis leave different residuals: the fit weighs them by the measurement's"
+    " scatter alone, the diagnosis also by the model's own error and the uncalibrated constants,"
+    " so that it leaves what these explain."
+)
 MOST_PROPOSED = 4  # states in a table
 HERTZ, RESULT_DIGITS = Column("Hz"), Column("", ".4g")
 
@@ -279,6 +284,7 @@ class FitResult(Result):
             " material laws and uncalibrated constants. 'scatter' is the share of the measurement"
             " alone: how far a repeated test would move it.",
             f"The largest part of the total is: {cause}, {share:.0%} of the variance on average.",
+            OTHER_RESIDUALS,
         ]
 
     def numbers(self) -> list[Table]:
