@@ -106,6 +106,8 @@ def test_no_gap_has_nothing_that_explains_it(tmp_path: Path) -> None:
     d = exact(Toy(effects=3), {})
     assert d.verdict.kind == "no_gap" and d.shrinkage
     figures = drawn(d, tmp_path)
+    title = figures[1].get_suptitle()
+    assert title.startswith(("No gap is seen", "Not seen, not excluded"))
     residuals, probabilities, held = map(words, figures)
     assert "hollow" not in residuals and "explains" not in probabilities
     none = d.probabilities["none"]

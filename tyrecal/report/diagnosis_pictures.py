@@ -129,7 +129,7 @@ def draw_probabilities(d: Diagnosis) -> Figure:
     axes.set_xlabel("probability")
     title = PROBABILITY_TITLES.get(d.verdict.kind)
     none = no_gap_words(d.probabilities[NONE]).capitalize()
-    axes.set_title(title or f"{none}; how likely each effect is", loc="left")
+    headline(figure, title or f"{none}; how likely each effect is")
     figure.legend(
         *axes.get_legend_handles_labels(), loc="outside lower right", ncols=2, frameon=False
     )

@@ -29,7 +29,7 @@ def draw_evaluation(
     modes: Sequence[Mode],
     kind: str = "png",
 ) -> None:
-    """STUDY_section, all modes (at most nine of them) in modes or STUDY_modes and, per mode,
+    """STUDY_section, the lowest modes (`MAX_IN_OVERVIEW`) in modes or STUDY_modes and, per mode,
     STUDY_mode_C_M[_KIND], in a format ``kind`` of `files.PICTURE_FORMATS`; each mode as VTU too.
 
     Only modes known on the whole section are drawn: a 3-D solver gives them on the crown alone.

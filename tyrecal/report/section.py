@@ -29,6 +29,7 @@ AXES_WIDTH, LINE_HEIGHT, REST = (
     1.05,
 )  # inches: of the drawing, of a line of text, of all else
 DETAIL = 4.0  # magnification of the belt's edge
+CORD_COLOURS = (*COLOURS, "#8C6D31")  # a truck has seven layers
 EVIDENCE_COLOURS = LinearSegmentedColormap.from_list("evidence", ["#EDEDED", "#F5C98A", "#D55E00"])
 FULL_COLOUR = 5.0  # ln evidence
 MAP_WIDTH = 7.4  # inches: of the map of parts
@@ -79,8 +80,8 @@ def _draw(axes: Axes, section: SectionData, size: float) -> dict[str, Artist]:
     """Fill ``axes``, lines ``size`` times as thick; returns the legend's entries."""
     entries: dict[str, Artist] = {}
     for k, (name, layer) in enumerate(section.cords.items()):
-        colour = COLOURS[k % len(COLOURS)]
-        dashed = "-" if k < len(COLOURS) else (0, (2, 1))  # where colours begin again
+        colour = CORD_COLOURS[k % len(CORD_COLOURS)]
+        dashed = "-" if k < len(CORD_COLOURS) else (0, (2, 1))  # where colours begin again
         lines = LineCollection(
             _all(layer.lines), color=colour, lw=1.3 * size, capstyle="butt", ls=dashed, zorder=3
         )

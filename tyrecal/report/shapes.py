@@ -22,6 +22,7 @@ Array = np.ndarray
 
 ANGLES = 72
 MAX_MERIDIAN_POINTS = 33  # more are not seen
+MAX_IN_OVERVIEW = 12  # modes
 MAX_MOTION = 0.12  # displacement in the picture over the tyre's radius
 LINE_WIDTH = 0.009  # inches: meridians in bold
 NEARER = 0.1  # inches: these, to the viewer, so that only other parts of the tyre hide them
@@ -53,15 +54,17 @@ def draw_mode(path: Path, mode: Mode, mesh: SectionMesh, scale: float | None = N
 
 @in_house_style
 def draw_modes_overview(path: Path, modes: Sequence[Mode], mesh: SectionMesh) -> None:
-    """Draw up to nine modes, lowest first, in perspective on one sheet. Raises InputError."""
-    lowest = sorted(modes, key=lambda mode: mode.frequency_Hz)[:9]
+    """Draw the `MAX_IN_OVERVIEW` lowest modes in perspective on one sheet. Raises InputError."""
+    lowest = sorted(modes, key=lambda mode: mode.frequency_Hz)[:MAX_IN_OVERVIEW]
     height = 0.9 + 3.2 * -(-len(lowest) // 3)
     sheet = _Sheet(new_figure(9.0, height, None))
     for k, mode in enumerate(lowest):
         x, y = 1.5 + 3 * (k % 3), height - 1.8 - 3.2 * (k // 3)
         _view(sheet, _surface(mode, mesh, None), (x, y), 1.45, *PERSPECTIVE)
         sheet.text(x, y + 1.38, title(mode).replace(" - ", "\n"), ha="center")
-    _key(sheet, lowest, (0.3, 0.3))
+    left_out = len(modes) - len(lowest)
+    words = f"; the {len(lowest)} lowest of {len(modes)} modes" if left_out else ""
+    _key(sheet, lowest, (0.3, 0.3), words)
     save(sheet.figure, path)
 
 
@@ -80,7 +83,9 @@ class _Sheet:
         self.figure.text(x, y, words, transform=self.figure.dpi_scale_trans, **look)
 
 
-def _key(sheet: _Sheet, modes: Sequence[Mode], words_at: tuple[float, float]) -> None:
+def _key(
+    sheet: _Sheet, modes: Sequence[Mode], words_at: tuple[float, float], more: str = ""
+) -> None:
     """What the colours are, at the foot, and the lines, in inches from the lower left corner."""
     left, right, low, high = 5.9, 8.3, 0.3, 0.38
     shades = np.linspace(0, 1, 65)
@@ -97,7 +102,7 @@ def _key(sheet: _Sheet, modes: Sequence[Mode], words_at: tuple[float, float]) ->
     lines = ["grey: outline at rest"]
     if any(_twists(mode) for mode in modes):
         lines.append("orange: meridians at rest")
-    sheet.text(*words_at, "; ".join(lines), **words)
+    sheet.text(*words_at, "; ".join(lines) + more, **words)
 
 
 def _twists(mode: Mode) -> bool:

@@ -224,13 +224,24 @@ def _shapes(
         if shapes and shapes.modes:
             data = packed(shapes)
     heading = {"fit": "Shapes of the fitted tyre", "modes": "Mode shapes"}[what]
+    if what == "modes" and _is_initial(found):
+        heading = "Mode shapes of the initial tyre"
     if shapes and shapes.load_N:
-        heading = f"Mode shapes under {shapes.load_N:g} N, on the tread"
+        heading += f" under {shapes.load_N:g} N, on the tread"
     if shapes and shapes.provenance and shapes.provenance.overrides:
         given = shapes.provenance.overrides.items()
         changes = (f"{name} = {as_written(value)}" for name, value in given)
         heading += f", with {', '.join(changes)}"
     return {"id": what, "heading": heading, "data": data, "why": why}
+
+
+def _is_initial(found: Results) -> bool:
+    """Whether the modes are those of the design that the fit started from."""
+    fit, modes = found.fit, found.get(ModesResult)
+    if not fit or not modes:
+        return False
+    start = {name: each.initial for name, each in fit.variables.items()} | fit.fixed
+    return modes.variables == start
 
 
 def _shown_modes(found: Results) -> Iterator[tuple[str, Shapes | None, Sequence[Named]]]:
