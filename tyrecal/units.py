@@ -55,7 +55,7 @@ LOAD = {
 }
 SAID = {  # SI unit: what people say, and how many of it one is
     "m": ("mm", 1e3),
-    "m2": ("mm2", 1e6),
+    "m2": ("mm²", 1e6),
     "Pa": ("MPa", 1e-6),
     "m/N": ("mm/kN", 1e6),
     "N/m": ("N/mm", 1e-3),

@@ -86,7 +86,7 @@ def test_where_there_is_no_gap_nothing_explains_it(toy: Toy, plain: Diagnosis) -
     ("value", "unit", "words"),
     [
         (-0.00934, "m", "-9.34 mm"),
-        (2.1e-7, "m2", "0.21 mm2"),
+        (2.1e-7, "m2", "0.21 mm²"),
         (1.26e6, "Pa", "1.26 MPa"),
         (3e-7, "m/N", "0.3 mm/kN"),
         (0.25, "", "0.25"),

@@ -13,15 +13,19 @@ from tyrecal.report.measured import measured_table
 from tyrecal.simulate.modes.label import Label
 
 
-@pytest.mark.parametrize("name", ["[run].uff", "[bold].uff", "run [2].uff"])
-def test_names_are_no_markup(name: str) -> None:
-    """File names and labels in square brackets stand there as they are."""
+def run_of(name: str) -> ModalTest:
+    """A test with one mode, [2,1] at 66.1 Hz."""
     sensors = Sensors(np.zeros((1, 3)), np.eye(3)[:1])
     label = Label(2, 1)
     judged = Judged(label, {label: 1.0}, f"like {label}")
     mode = MeasuredMode(66.1, np.ones(1), 0.02, 0.1)
-    labelled = LabelledMode(mode, sensors, np.ones(1), 1.0, judged, "", "1")
+    return ModalTest(name, (LabelledMode(mode, sensors, np.ones(1), 1.0, judged, "", "1"),))
+
+
+@pytest.mark.parametrize("name", ["[run].uff", "[bold].uff", "run [2].uff"])
+def test_names_are_no_markup(name: str) -> None:
+    """File names and labels in square brackets stand there as they are."""
     console = Console(width=100)
     with console.capture() as text:
-        console.print(measured_table([ModalTest(name, (labelled,))]))
+        console.print(measured_table([run_of(name)]))
     assert name in text.get() and "[2,1] member 1" in text.get() and "like [2,1]" in text.get()

@@ -7,11 +7,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..studies.sample.result import PAIR_STEPS, SampledVariable, SampleResult
+from ..units import said
 from .figure import COLOURS, GREY, in_house_style, new_figure
 
 Array = np.ndarray
 WITHIN = (0.9, 0.5)  # shares of the draws inside the lines
 DRAWN_COLOUR, LINEAR_COLOUR = COLOURS[0], COLOURS[1]
+AT_BOUND = 1e-6  # of a bound, up to which the box ends at it
 
 
 def figures(found: SampleResult) -> dict[str, Figure]:
@@ -41,7 +43,7 @@ def draw_corner(found: SampleResult) -> Figure:
                 axes.set_xscale("log")
             axes.set_xlim(*v.box)
             axes.minorticks_off()
-            axes.set_xticks(_ticks(v), [f"{x:.3g}" for x in _ticks(v)])
+            axes.set_xticks(_ticks(v), _tick_labels(v))
             axes.tick_params(labelbottom=i == n - 1, labelleft=j == 0 < i, left=j < i)
             if i == n - 1:
                 axes.set_xlabel(_named(column, v))
@@ -53,7 +55,19 @@ def draw_corner(found: SampleResult) -> Figure:
 
 
 def _named(name: str, v: SampledVariable) -> str:
-    return f"{name}, {v.unit}" if v.unit else name
+    """The name with the unit that engineers use."""
+    unit, _ = said(v.unit)
+    return f"{name}, {unit}" if unit else name
+
+
+def _tick_labels(v: SampledVariable) -> list[str]:
+    """The ticks in the unit that engineers use; an end that is a bound of the variable says so."""
+    _, factor = said(v.unit)
+    labels = [f"{factor * value:.3g}" for value in _ticks(v)]
+    for place, bound in enumerate((v.lower, v.upper)):
+        if abs(v.box[place] / bound - 1) < AT_BOUND if bound else v.box[place] == bound:
+            labels[place] += "\n(cut at bound)"
+    return labels
 
 
 def _edges(v: SampledVariable, count: int) -> Array:
@@ -104,7 +118,7 @@ def _together(axes: Axes, counts: Array, across: SampledVariable, up: SampledVar
         axes.set_yscale("log")
     axes.set_ylim(*up.box)
     axes.minorticks_off()
-    axes.set_yticks(_ticks(up), [f"{value:.3g}" for value in _ticks(up)])
+    axes.set_yticks(_ticks(up), _tick_labels(up))
 
 
 def _middles(v: SampledVariable, count: int) -> Array:

@@ -89,7 +89,7 @@ def words(found: dict[str, Any], mass_kg: float) -> Iterator[str]:
             else f"{1e3 * ply['spacing_m']:.4g} mm"
         )
         yield (
-            f"ply {ply['name']} on {ply['set']}: {ply['material']}, {1e6 * ply['area_m2']:.4g} mm2"
+            f"ply {ply['name']} on {ply['set']}: {ply['material']}, {1e6 * ply['area_m2']:.4g} mm²"
             f" every {spacing}, {ply['angle_deg']:g} degrees from the meridian"
         )
     rim, crown = found["rim"], found["crown"]

@@ -1,0 +1,130 @@
+"""Numbers, signs and units that pictures and tables show; other wording is not pinned."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tyrecal.report.convergence import draw_convergence, draw_deviations, draw_states
+from tyrecal.report.load import draw_load_sweep
+from tyrecal.report.measured import measured_table
+from tyrecal.report.sample import draw_corner
+from tyrecal.report.table import MINUS, nearness, shown
+from tyrecal.studies.fit.result import FitResult
+from tyrecal.studies.loaded_result import LoadSweep
+from tyrecal.studies.modes import ModesResult
+from tyrecal.studies.result import Deviation
+from tyrecal.studies.sample.result import SampleResult
+
+from .html import ring, ring_inference, ring_under_load
+from .test_measured import run_of
+from .test_table import lines
+
+FIT = FitResult.model_validate(ring.fit())
+WITHOUT = {"A_belt": 4e-8, "C10": None}
+STATES = FitResult.model_validate(
+    ring.fit()
+    | {
+        "modes": [
+            {**mode, "pressure_kPa": kPa, "rim": "fixed", "sigma_Hz": 0.5}
+            for kPa in (160.0, 240.0)
+            for mode in ring.fit()["modes"]
+        ],
+        "states": [
+            {"pressure_kPa": p, "load_N": 0.0, "rim": "fixed", "standard_errors_without": WITHOUT}
+            for p in (160.0, 240.0)
+        ],
+    }
+)
+
+
+def test_deviations_before_and_after_have_their_signs() -> None:
+    (axes,) = draw_deviations(FIT.modes).axes
+    series = {line.get_label(): line.get_xdata() for line in axes.lines}
+    before = [100 * (mode.initial_Hz / mode.target_Hz - 1) for mode in FIT.modes]
+    assert list(series["initial"]) == before and before[0] > 16
+    assert list(series["fitted"]) == [mode.deviation_percent for mode in FIT.modes]
+    assert FIT.modes[0].deviation_percent == pytest.approx(-2.65, abs=0.01)
+    assert axes.yaxis_inverted() and "deviation from target, %" in axes.get_xlabel()
+
+
+def test_deviations_of_states_stand_in_their_panels() -> None:
+    figure = draw_states(STATES)
+    assert [axes.get_title("left") for axes in figure.axes] == [
+        "160 kPa\nrim fixed",
+        "240 kPa\nrim fixed",
+    ]
+    for axes in figure.axes:
+        (bars,) = axes.containers
+        points, _, (spread,) = bars.lines
+        assert list(points.get_xdata()) == [mode.deviation_percent for mode in FIT.modes]
+        halves = [np.ptp(segment[:, 0]) / 2 for segment in spread.get_segments()]
+        assert halves == pytest.approx([50 / mode.target_Hz for mode in FIT.modes])
+
+
+def test_convergence_shows_every_point_and_the_best_so_far() -> None:
+    objectives = [33.1, 8.6, None, 9.0, 3.1]
+    history = [
+        {"point": k, "start": 1, "objective_Hz": each, "values": {"C10": 1e6 / k}}
+        for k, each in enumerate(objectives, 1)
+    ]
+    figure = draw_convergence(history, "Hz")
+    above, below = figure.axes[:2]
+    ends = {line.get_label(): line.get_ydata() for line in above.lines}
+    assert [x for x in ends["best so far"] if math.isfinite(x)][0::4] == [33.1, 3.1]
+    points = [x for x in ends["design point"] if math.isfinite(x)]
+    assert points == [33.1, 8.6, 9.0, 3.1]
+    (ratio,) = (line for line in below.lines if line.get_label() == "C10")
+    assert list(ratio.get_ydata()) == pytest.approx([1 / k for k in range(1, 6)])
+    assert "Hz" in above.get_ylabel() and "33.10 Hz to 3.10 Hz" in figure.get_suptitle()
+
+
+def test_frequencies_over_load_have_their_values() -> None:
+    rows = LoadSweep.model_validate(ring_under_load.load_sweep()).rows
+    figure = draw_load_sweep(rows)
+    told = {x for axes in figure.axes for line in axes.lines for x in line.get_ydata()}
+    assert {mode.frequency_Hz for row in rows for mode in row.modes} <= told
+    loads = {x for axes in figure.axes for line in axes.lines for x in line.get_xdata()}
+    assert loads == {0.0, 1.0} and figure.axes[-1].get_xlabel() == "load, kN"
+
+
+def test_a_corner_is_in_engineers_units_and_says_where_a_bound_cuts() -> None:
+    content = ring_inference.sample()
+    content["variables"]["A_belt"]["lower"] = content["variables"]["A_belt"]["box"][0]
+    grid = draw_corner(SampleResult.model_validate(content)).axes
+    lowest = [axes for axes in grid if axes.get_xlabel()]
+    assert [axes.get_xlabel() for axes in lowest] == ["A_belt, mm²", "angle"]
+    ticks = [text.get_text() for text in lowest[0].get_xticklabels()]
+    assert ticks == ["0.22\n(cut at bound)", "0.4"]
+    lines_at = [line.get_xdata()[0] for line in grid[0].lines if len(set(line.get_xdata())) == 1]
+    assert lines_at == [3e-7, 2.2e-7, 4e-7]  # median and 90 %
+
+
+def test_tables_say_numbers_units_and_how_near() -> None:
+    words = nearness([mode.model_dump() for mode in FIT.modes])
+    deviations = np.array([mode.deviation_percent for mode in FIT.modes])
+    twice = [mode.multiplicity for mode in FIT.modes]
+    rms = math.sqrt(np.average(deviations**2, weights=twice))
+    assert words.startswith(f"{(abs(deviations) <= 2).sum()} of {len(deviations)} frequencies")
+    assert f"rms {rms:.1f} %" in words and f"{max(deviations, key=abs):+.1f} %" in words
+    modes = ModesResult.model_validate(ring_under_load.loaded_modes())
+    text = "\n".join(lines(shown(*modes.tables()), 200))
+    assert f"{modes.pressure_kPa:g} kPa, {modes.load_N:g} N, {modes.mass_kg:.2f} kg" in text
+    assert all(f"{mode.frequency_Hz:.2f}" in text for mode in modes.modes)
+
+
+def test_a_deviation_keeps_its_sign_in_tables() -> None:
+    table, variables, _, states, *_ = STATES.tables()
+    assert states.rows[1][:2] == ["160 kPa, rim fixed", "0"] and states.rows[1][3:] == ["11", None]
+    assert variables.rows[0][0] == "A_belt" and variables.rows[0][-1] == "10"
+    assert Deviation(FIT.modes[0].deviation_percent, "30.86") == table.rows[0][2]
+    text = "\n".join(lines(shown(table), 200))
+    assert "30.86 -2.65" in text and MINUS not in text
+
+
+def test_measured_modes_have_hertz_sigma_damping_and_label() -> None:
+    text = "\n".join(lines(measured_table([run_of("run.uff")]), 120))
+    for words in ("[2,1] member 1", "66.10", "0.100", "2.00", "1.00"):
+        assert words in text
