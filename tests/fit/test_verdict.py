@@ -157,3 +157,24 @@ def test_what_the_model_cannot_follow_has_no_reason() -> None:
     left = two_pressures(model_Hz() * np.exp(0.012 * signs))
     assert left.chi2_per_dof is not None and left.chi2_per_dof > 5
     assert likeliest_reason(left) is None
+
+
+def test_a_reason_that_is_nearly_as_likely_is_named_too() -> None:
+    """A mode whose sensitivities no other shares is off at one of two pressures: which, nothing
+    tells; the reason names one line, and the other."""
+    own = np.zeros((20, 1))
+    own[[3, 13]] = 1.0
+    both = np.hstack([np.vstack([J, J]), own])
+    values = noisy()
+    values[13] *= 1.06
+    left = remainder(values, model_Hz(), both, PRESSURES)
+    reason = likeliest_reason(left)
+    assert reason and reason.kind == "value"
+    lines = {line for line in ("line 5:", "line 15:") if line in reason.sentence}
+    assert lines == {"line 5:", "line 15:"}
+    assert "Nearly as likely: t.csv, line " in reason.sentence
+    clear = values.copy()
+    clear[13] /= 1.06
+    clear[6] *= 1.06
+    alone = likeliest_reason(remainder(clear, model_Hz(), both, PRESSURES))
+    assert alone and not alone.also and "Nearly" not in alone.sentence

@@ -46,6 +46,7 @@ MARKED = 16.0  # chi2 that a reason takes away, over the chi2 per degree of free
 MARKED_UNSTATED = 49.0  # the same where the scatter is known from the residuals alone
 FEWEST_LEFT = 3  # degrees of freedom that tell such a scatter
 LEAST_CHECKED = 1e-6  # of a value's own weight: below, nothing else checks the value
+NEXT_REASON = 6.0  # chi2 between a reason and the next, 20 times less likely: below, both are named
 SAME_VALUE = 0.015  # relative, between a corrected value and the model, besides 3 sd
 
 
@@ -55,13 +56,15 @@ class FitReason(ResultPart):
     kind: Literal["value", "exchanged", "pressure", "rim", "wheel", "pattern"]
     words: str  # a sentence that ends with the question to the user
     chi2_per_dof: float | None = None  # with the reason removed, by the linear model
+    also: str = ""  # words of a reason that is nearly as likely
 
     @property
     def sentence(self) -> str:
-        """The words, and what would be left."""
-        if self.chi2_per_dof is None:
-            return self.words
-        return f"{self.words} (chi2 per degree of freedom would be {self.chi2_per_dof:.2g})"
+        """The words, what would be left, and the next reason."""
+        left = ""
+        if self.chi2_per_dof is not None:
+            left = f" (chi2 per degree of freedom would be {self.chi2_per_dof:.2g})"
+        return self.words + left + f" Nearly as likely: {self.also}" * bool(self.also)
 
 
 @dataclass(frozen=True)
@@ -150,7 +153,7 @@ class _Suspicion:
 def likeliest_reason(left: Remainder, shifts: Sequence[Shift] = ()) -> FitReason | None:
     """The reason that takes most of chi2 away; without one, what the pattern of frequencies of
     tyres finds odd about the values; else None."""
-    best: tuple[float, FitReason] | None = None
+    likely: list[tuple[float, float, FitReason]] = []
     for each in (*_values(left), *_exchanges(left), *_shifts(left, shifts)):
         freedom = left.freedom - each.parameters
         taken = left.chi2 - each.chi2
@@ -161,11 +164,13 @@ def likeliest_reason(left: Remainder, shifts: Sequence[Shift] = ()) -> FitReason
             (max(1.0, per_dof), MARKED) if left.is_stated else (per_dof, MARKED_UNSTATED)
         )
         score = taken - each.parameters * np.log(len(left.rows)) * scale
-        if taken > marked * scale and (best is None or score > best[0]):
+        if taken > marked * scale:
             known = per_dof if left.is_stated else None
-            best = score, each.reason.model_copy(update={"chi2_per_dof": known})
-    if best:
-        return best[1]
+            likely.append((score, scale, each.reason.model_copy(update={"chi2_per_dof": known})))
+    if likely:
+        (score, scale, best), *others = sorted(likely, key=lambda each: -each[0])
+        also = others[0][2].words if others and score - others[0][0] < NEXT_REASON * scale else ""
+        return best.model_copy(update={"also": also}) if also else best
     return next((FitReason(kind="pattern", words=each) for each in doubts(left.rows)), None)
 
 
