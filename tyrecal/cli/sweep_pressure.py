@@ -33,8 +33,9 @@ def command(
     """Follow every mode of CASE over the inflation pressure, by default from 5/12 to 4/3 of the
     case's own.
 
-    Writes pressure_sweep.json, .csv and .png: frequencies, their slopes d ln f / d ln p, and what
-    they say. --set NAME=VALUE on a variable changes the initial design, on any other number both.
+    Writes pressure_sweep.json, .csv and .png: frequencies, their slopes d ln f / d ln p, what they
+    say, and the standard errors of a fitted design's frequencies. --set NAME=VALUE on a variable
+    changes the initial design, on any other number both.
     Without CASE it is that of the last fit here, whose design is swept too, or the only one here.
 
     \b
@@ -43,8 +44,9 @@ def command(
     tyrecal sweep-pressure cases/p235_75r17.yaml --fitted p235_75r17/fit.json --jobs 2
     tyrecal sweep-pressure cases/p235_75r17.yaml --from-kPa 180 --to-kPa 260 --steps 5 --json
     """
+    from ..studies.fit.prediction import read_responses
     from ..studies.fit.targets import read_targets
-    from ..studies.pressure_result import run
+    from ..studies.pressure_result import FITTED, run
     from ..tyre.state import rim_of
 
     terminal = study.terminal
@@ -52,15 +54,18 @@ def command(
     loaded, values = study.load(case, assignments)
     pressures = _pressures(loaded, assignments, from_kPa, to_kPa, steps, study.allow_unusual)
     evaluator = study.evaluator(loaded)
-    designs = {"initial": values}
+    designs, fit = {"initial": values}, None
     if fitted:
-        designs["fitted"] = arguments.fitted_values(fitted, loaded, terminal)
+        designs[FITTED] = arguments.fitted_values(fitted, loaded, terminal)
+        fit = read_responses(fitted)
     output = study.run(loaded, "sweep-pressure", evaluator, pressure_kPa=pressures)
     with terminal.progress("sweep") as bar:
         evaluator.on_progress = bar.at
-        found = run(loaded, evaluator, designs, pressures, study.jobs, study.notify)
+        found = run(loaded, evaluator, designs, pressures, study.jobs, study.notify, fit)
     if not found.rows:
         return EXIT_SOLVER
+    if found.standard_errors_unknown:
+        terminal.warn(f"no intervals of the fitted design: {found.standard_errors_unknown}")
     figures = {}
     if pictures:
         from ..report.pressure import draw_pressure_sweep

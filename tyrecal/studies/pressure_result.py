@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydantic import Field
 
 from ..simulate.evaluate.evaluator import Evaluator
+from ..simulate.evaluate.failure import EvaluationFailed
 from ..simulate.modes.label import Label
 from ..tyre.case import LoadedCase
 from .fit.targets import target_labels
@@ -28,6 +30,12 @@ from .result import (
     silent,
 )
 
+if TYPE_CHECKING:
+    from .fit.prediction import FitResponses
+
+FITTED = "fitted"  # name of the design that a fit found
+QUANTILE_90 = 1.645
+
 
 class PressureRow(ResultPart):
     """A design at a pressure."""
@@ -46,10 +54,12 @@ class PressureSweep(Result):
     designs: dict[str, dict[str, float]] = Field(default={})  # values of the variables
     rows: list[PressureRow]
     failed: list[Failed] = Field(default=[])
+    standard_errors_unknown: str = ""  # why the fitted design has none
     findings: list[PressureFindings]  # of each design with two pressures or more
 
     def csv(self) -> str:
         keys = ["design", "pressure_kPa", "c", "m", "kind", "multiplicity", "frequency_Hz"]
+        keys += ["standard_error_Hz"] * self._has_errors
         rows = ({**row.model_dump(), **m.model_dump()} for row in self.rows for m in row.modes)
         return csv_text([*keys, "d_ln_f_d_ln_p"], rows)
 
@@ -61,6 +71,10 @@ class PressureSweep(Result):
             for mode in each.modes
         ]
         return {"rise": rise}
+
+    @property
+    def _has_errors(self) -> bool:
+        return any(m.standard_error_Hz is not None for row in self.rows for m in row.modes)
 
     def tables(self) -> list[Table]:
         return [self._ends(each) for each in self.findings if each.modes]
@@ -88,7 +102,7 @@ class PressureSweep(Result):
             rows.append(
                 [
                     *ends[0].named(),
-                    *(hertz.cell(end.frequency_Hz) for end in ends),
+                    *(_with_interval(hertz, end) for end in ends),
                     rise.cell(mode["rise_Hz"]),
                     share.cell(mode["rise_percent"]),
                     *(slope.cell(end.d_ln_f_d_ln_p) for end in ends),
@@ -96,6 +110,8 @@ class PressureSweep(Result):
                 ]
             )
         caption = f"slope: d ln f / d ln p, at {found.from_kPa:g} and {high}"
+        if any(mode.standard_error_Hz is not None for mode in own[0].modes):
+            caption += "; ±: 90 % interval of the tyre's own frequency"
         return Table(columns, rows, found.design, caption)
 
     def numbers(self) -> list[Table]:
@@ -113,6 +129,13 @@ class PressureSweep(Result):
         return tables
 
 
+def _with_interval(hertz: Column, mode: ModeEntry) -> str | None:
+    """79.50 ± 1.2: the half width of the 90 % interval, where it is known."""
+    error = mode.standard_error_Hz
+    own = hertz.cell(mode.frequency_Hz)
+    return own if error is None else f"{own} ± {QUANTILE_90 * error:.2g}"
+
+
 def run(
     case: LoadedCase,
     evaluator: Evaluator,
@@ -120,9 +143,10 @@ def run(
     pressures_kPa: Sequence[float],
     jobs: int = 1,
     notify: Notify = silent,
+    fit: FitResponses | None = None,
 ) -> PressureSweep:
-    """Every design at every pressure. Raises as ``sweep`` does, and the first failure where no
-    pressure could be evaluated."""
+    """Every design at every pressure; with ``fit`` the standard errors of the design "fitted".
+    Raises as ``sweep`` does, and the first failure where no pressure could be evaluated."""
 
     def told(outcome: SweepOutcome) -> None:
         place = f"{outcome.design}, {outcome.pressure_kPa:g} kPa"
@@ -131,7 +155,38 @@ def run(
         else:
             notify(f"{place}: {len(outcome.modes)} modes", None)
 
-    return sweep_result(case, designs, sweep(case, evaluator, designs, pressures_kPa, jobs, told))
+    outcomes = sweep(case, evaluator, designs, pressures_kPa, jobs, told)
+    result = sweep_result(case, designs, outcomes)
+    if fit and fit.responses and FITTED in designs:
+        return _with_errors(result, case, evaluator, fit, jobs)
+    return result
+
+
+def _with_errors(
+    result: PressureSweep, case: LoadedCase, evaluator: Evaluator, fit: FitResponses, jobs: int
+) -> PressureSweep:
+    """The result with standard errors of the fitted design's frequencies, or why it has none."""
+    from .fit.prediction import predicted_errors  # late: not for those who read results
+
+    own = [row for row in result.rows if row.design == FITTED]
+    wanted = [(mode.label, row.pressure_kPa) for row in own for mode in row.modes]
+    try:
+        errors = predicted_errors(case, evaluator, result.designs[FITTED], fit, wanted, jobs)
+    except (ValueError, EvaluationFailed) as failure:
+        return result.model_copy(update={"standard_errors_unknown": str(failure)})
+    known = dict(zip(wanted, errors.tolist(), strict=True))
+
+    def with_error(mode: ModeEntry, pressure_kPa: float) -> ModeEntry:
+        hertz = mode.frequency_Hz * known[mode.label, pressure_kPa]
+        return mode.model_copy(update={"standard_error_Hz": hertz})
+
+    rows = [
+        row.model_copy(update={"modes": [with_error(m, row.pressure_kPa) for m in row.modes]})
+        if row.design == FITTED
+        else row
+        for row in result.rows
+    ]
+    return result.model_copy(update={"rows": rows})
 
 
 def sweep_result(

@@ -245,6 +245,7 @@ class ModeEntry(Named):
     # largest motion of the crown up to which friction bears the forces of a patch that sticks
     grip_mm: float | None = None
     d_ln_f_d_ln_p: float | None = None
+    standard_error_Hz: float | None = None  # of a fitted design, by all that is uncertain
 
     @property
     def has_lost_name(self) -> bool:

@@ -33,6 +33,7 @@ from ..result import (
 )
 from .judge import judge
 from .problem import Point, Problem
+from .responses import FitResponse
 from .search import projected_gradient
 from .states import next_states, plain, state_reports
 from .targets import objective_unit
@@ -199,6 +200,7 @@ class FitResult(Result):
     labels: Labels | None = None  # of frequencies that came without
     noise_Hz: float | None = None  # standard deviation of a frequency
     total_error_unknown: str = ""  # why no variable has a total standard error
+    responses: list[FitResponse] = Field(default=[])  # of the variables to what was measured
     correlations: dict[str, dict[str, float | None]]
     singular_values: list[float]
     starts: list[dict[str, Any]]
@@ -441,7 +443,11 @@ def fit_result(
         **({"mass": mass[0]} if mass else {}),
         **(_states(problem, point, known) if several else {}),
         "noise_Hz": known.noise_Hz,
-        **({"total_error_unknown": total} if isinstance(total, str) else {}),
+        **(
+            {"total_error_unknown": total}
+            if isinstance(total, str)
+            else {"responses": total.responses}
+        ),
         "correlations": {
             a: {b: _finite(known.correlations[i, j]) for j, b in enumerate(names)}
             for i, a in enumerate(names)

@@ -10,22 +10,19 @@ exceeds its degrees of freedom (`verdict`), cov x is multiplied by their ratio.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from ...simulate.evaluate.failure import EvaluationFailed
 from ...tyre.case import LoadedCase
 from ..diagnose.covariance import covariance, model_form
-from ..diagnose.model import Answer, Query
 from ..diagnose.observations import Observable, Observations
-from ..diagnose.tyre_model import TyreModel
 from ..diagnose.uncertainties import Source, sources
 from .problem import Point, Problem
-from .targets import Target
+from .responses import FitResponse, linear_answer
+from .targets import Target, ValueTarget
 from .uncertainty import FitUncertainty, fit_response, standard_errors
-from .variable import read_variable
 
 Array = np.ndarray
 BY_MEASUREMENT, BY_MODEL, BY_SECTION = "measurement", "material laws and mesh", "section"
@@ -36,12 +33,14 @@ LEAST_SHARE = 0.01  # of the variance, below which a cause is not listed
 class TotalError:
     """of_values (n, n): covariance of ln q of the targets that count; of_coordinates (v, v): of the
     fitted coordinates, not scaled by chi^2; shares: of their variances (v,) by cause, the largest
-    first; is_determined (v,): whether the data determine a variable."""
+    first; is_determined (v,): whether the data determine a variable; responses: how the fitted
+    coordinates answer each target that counts."""
 
     of_values: Array
     of_coordinates: Array
     shares: dict[str, Array]
     is_determined: Array
+    responses: list[FitResponse]
 
     def by_variable(
         self, problem: Problem, point: Point, chi2_per_dof: float | None
@@ -80,14 +79,39 @@ def total_error(problem: Problem, point: Point, scatter: FitUncertainty) -> Tota
     fitted = wanted + (point.residuals / problem.scale)[counts]
     rows = tuple(_row(problem.case, each) for each in measured)
     known, _ = sources(problem.case)
-    by_constants, laws = _constants(problem, point, rows, known)
+    _, by_constants, laws = linear_answer(
+        problem.case, problem.evaluator, point.values, rows, known, problem.jobs
+    )
     none = np.full(len(rows), np.nan)
     observed = Observations(rows, np.log(wanted), sigma / wanted, 0.0, none, none)
     whole = covariance(observed, by_constants, laws)
     response, is_determined = fit_response(J, problem.scale[counts])
     response = response * fitted  # d x / d ln q
     parts = _parts(response, sigma / wanted, model_form(rows, laws), by_constants, known)
-    return TotalError(whole, response @ whole @ response.T, parts, is_determined)
+    spread = response @ whole @ response.T
+    responses = [
+        _response(problem, each, float(relative), column)
+        for each, relative, column in zip(measured, sigma / wanted, response.T, strict=True)
+    ]
+    return TotalError(whole, spread, parts, is_determined, responses)
+
+
+def _response(
+    problem: Problem, target: Target | ValueTarget, scatter: float, column: Array
+) -> FitResponse:
+    """column (v,): of the fitted coordinates by ln of the target."""
+    names = (v.name for v in problem.variables)
+    response = dict(zip(names, column.tolist(), strict=True))
+    if not isinstance(target, Target):
+        return FitResponse(scatter=scatter, response=response)
+    state = target.state.told(problem.case)
+    return FitResponse(
+        **asdict(target.label),
+        pressure_kPa=state.pressure_kPa or 0.0,
+        rim=state.rim,
+        scatter=scatter,
+        response=response,
+    )
 
 
 def _row(case: LoadedCase, target: object) -> Observable:
@@ -95,23 +119,6 @@ def _row(case: LoadedCase, target: object) -> Observable:
         return Observable("mass_kg", None, 0.0)
     pressure = target.state.told(case).pressure_kPa or 0.0
     return Observable("frequency_Hz", target.label, pressure, rim=target.state.rim)
-
-
-def _constants(
-    problem: Problem, point: Point, rows: Sequence[Observable], known: list[Source]
-) -> tuple[Array, float]:
-    """Change of ln q (n, k) by one standard deviation of each source of error; the standard
-    deviation of each part of what material laws do."""
-    distinct = list(dict.fromkeys(row.row for row in rows))
-    model = TyreModel(problem.case, problem.evaluator, distinct, known, {}, problem.jobs)
-    own = (read_variable(problem.case, name) for name in model.variables)
-    x = np.array([each.scaled(point.values[each.name]) for each in own])
-    (answer,) = model.answers([Query(x, constants=True)])
-    if not isinstance(answer, Answer):
-        raise answer if isinstance(answer, EvaluationFailed) else ValueError(str(answer))
-    assert answer.constants is not None
-    places = [distinct.index(row.row) for row in rows]
-    return answer.constants[places], model.material_laws
 
 
 def _parts(

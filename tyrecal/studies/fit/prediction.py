@@ -1,0 +1,84 @@
+"""How far frequencies of a fitted design may be off where nothing was measured.
+
+A fit answers measured values q by x = x_0 + R (ln q - ln q_0), see `total_error`. ln q of the tyre
+is eta(x_t) with scatter, form and constants c; its frequency elsewhere is eta'(x_t) with form' and
+c. So the computed ln f' = eta'(x) is off by
+
+    J' R (scatter + form + G c) - (form' + G' c),    variance A Sigma A^T,  A = (J' R, -1)
+
+Sigma is the covariance of measured and other rows together, without scatter of the others. It is
+multiplied by chi2 per degree of freedom where the standard errors of the variables are. The tyre's
+own frequency is meant: another measurement adds its scatter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from pydantic import Field
+
+from ...files import read_json
+from ...simulate.evaluate.evaluator import Evaluator
+from ...simulate.modes.label import Label
+from ...tyre.case import LoadedCase
+from ...tyre.state import TyreState
+from ..diagnose.covariance import model_form
+from ..diagnose.observations import Observable
+from ..diagnose.uncertainties import sources
+from ..result import ResultPart
+from .responses import FitResponse, linear_answer
+
+Array = np.ndarray
+
+
+class FitResponses(ResultPart):
+    """Part of a fit.json that predictions need; one of an earlier version has no responses."""
+
+    responses: list[FitResponse] = Field(default=[])
+    chi2_per_dof: float | None = None
+
+
+def read_responses(path: Path) -> FitResponses:
+    """How the fit in a fit.json, or in a folder with one, answers its data. Raises ValueError,
+    OSError."""
+    return FitResponses.model_validate(read_json(path / "fit.json" if path.is_dir() else path))
+
+
+def predicted_errors(
+    case: LoadedCase,
+    evaluator: Evaluator,
+    values: Mapping[str, float],
+    fit: FitResponses,
+    wanted: Sequence[tuple[Label, float]],
+    jobs: int = 1,
+) -> Array:
+    """Standard deviations (m,) of ln f of modes (label, kPa) on the case's rim, as the design
+    ``values`` of the fit has them. Evaluates it with slopes by all sources of error once in each
+    state. Raises DeckRefused, EvaluationFailed."""
+    names = list(case.case.variables)
+    measured = tuple(_observable(case, each) for each in fit.responses)
+    others = tuple(Observable("frequency_Hz", label, p) for label, p in wanted)
+    R = np.array([[each.response.get(name, 0.0) for each in fit.responses] for name in names])
+    known, _ = sources(case)
+    J, G, laws = linear_answer(case, evaluator, values, (*measured, *others), known, jobs)
+    model = model_form((*measured, *others), laws) + G @ G.T
+    scatter = np.array([each.scatter for each in fit.responses])
+    variance = prediction_variance(J[len(measured) :], R, scatter, model)
+    return np.asarray(np.sqrt(variance * max(1.0, fit.chi2_per_dof or 0.0)))
+
+
+def prediction_variance(J: Array, R: Array, scatter: Array, model: Array) -> Array:
+    """Variances (m,) of ln f' as above; J (m, v): d ln f' / d x, R (v, n), scatter (n,), model
+    (n + m, n + m): covariance of form and constants."""
+    A = np.hstack([J @ R, -np.eye(len(J))])
+    whole = model + np.diag(np.concatenate([scatter**2, np.zeros(len(J))]))
+    return np.asarray(np.einsum("ij,jk,ik->i", A, whole, A))
+
+
+def _observable(case: LoadedCase, each: FitResponse) -> Observable:
+    if each.label is None:
+        return Observable("mass_kg", None, 0.0)
+    state = TyreState(each.pressure_kPa, 0.0, each.rim).of(case)
+    return Observable("frequency_Hz", each.label, each.pressure_kPa, rim=state.rim)
