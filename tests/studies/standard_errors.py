@@ -1,0 +1,151 @@
+"""Standard errors of `fit` against those of `sample` and `diagnose` of the same drawn tyres.
+
+    python -m tests.studies.standard_errors [COUNT] [SEED] [SAMPLED] [DIAGNOSED] [SIZE ...]
+
+Tyres as in `fit_errors`, COUNT of each size, with SAMPLED and DIAGNOSED of them. The fit weighs
+residuals by their scatter alone, R = (J^T S^-1 J)^-1 J^T S^-1, and `sample` and `diagnose` by the
+whole covariance Sigma of ln q, R' = (J^T Sigma^-1 J)^-1 J^T Sigma^-1. About one design
+
+    R Sigma R^T = (J^T Sigma^-1 J)^-1 + (R - R') Sigma (R - R')^T,
+
+so the fit's total is never the smaller one, and equal to theirs only if R = R'. Printed by size and
+variable: the mean of total over the error by Sigma, and the largest departure from this equation;
+then of single tyres by how much `sample` (linear, and a 90 % interval over 3.29) and `diagnose`
+depart from the error by Sigma. That of `diagnose` also knows how far a variable may be off its
+start (`DesignVariable.spread`), which is part of the error it is compared with. Totals are as long
+as chi2 per degree of freedom is below 1; else `fit` scales them.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from tyrecal.measured.measurement import measurements_csv
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.studies.diagnose import study as diagnosis
+from tyrecal.studies.diagnose.calibrated import calibrated_variables
+from tyrecal.studies.fit.calibrate import calibrate
+from tyrecal.studies.fit.problem import Point, Problem
+from tyrecal.studies.fit.total_error import TotalError, total_error
+from tyrecal.studies.fit.uncertainty import uncertainty
+from tyrecal.studies.sample.study import run as sample
+from tyrecal.tyre.case import LoadedCase
+
+from .fit_errors import QUANTILE_90, SIZES, case_of, drawn
+from .slips import table_of
+
+Array = np.ndarray
+DRAWS = 4000
+CHEAPEST = ("rim_width",)  # effects of a diagnosis whose variables without an effect are read
+
+
+@dataclass(frozen=True)
+class BothErrors:
+    """Covariances (v, v) of the fitted coordinates: total of the fit, by the whole covariance, and
+    what the closed form adds to that."""
+
+    total: Array
+    by_sigma: Array
+    added: Array
+
+    @property
+    def departure(self) -> float:
+        """From the closed form, relative."""
+        own = np.sqrt(np.outer(np.diag(self.total), np.diag(self.total)))
+        return float(abs((self.total - self.by_sigma - self.added) / own).max())
+
+
+def both_errors(problem: Problem, point: Point, total: TotalError) -> BothErrors:
+    """The two covariances at a fitted point."""
+    sensitivities, scatter = relative(problem, point)
+    return compared(sensitivities, scatter, total.of_values, total.of_coordinates)
+
+
+def relative(problem: Problem, point: Point) -> tuple[Array, Array]:
+    """d ln q / d x (n, v) of the targets that count, and S^(1/2) (n,), by which the fit weighs
+    them; a doublet counts twice."""
+    scale = problem.scale[problem.scale > 0]
+    hertz = np.array([point.states[t.state][t.label].frequency_Hz for t in problem.targets])
+    own = point.jacobian / problem.scale[:, None] / hertz[:, None]
+    return own, 1 / (scale * hertz)
+
+
+def compared(J: Array, scatter: Array, sigma: Array, total: Array) -> BothErrors:
+    """J (n, v), scatter (n,) by which the fit weighs, Sigma (n, n), and its total (v, v)."""
+    weighted = J / scatter[:, None] ** 2
+    R = np.linalg.solve(J.T @ weighted, weighted.T)
+    by_sigma = np.linalg.inv(J.T @ np.linalg.solve(sigma, J))
+    apart = R - by_sigma @ np.linalg.solve(sigma, J).T
+    return BothErrors(total, by_sigma, apart @ sigma @ apart.T)
+
+
+def sampled_errors(case: LoadedCase, seed: int) -> tuple[Array, Array]:
+    """Standard deviations (v,) of x by `sample`: linear, and of its draws."""
+    result = sample(case, Evaluator(TyreDesign(case)), None, DRAWS, seed)
+    low, high = np.quantile(result.drawn.chains.flat, [0.05, 0.95], axis=0)
+    return np.sqrt(np.diag(result.drawn.covariance)), (high - low) / (2 * QUANTILE_90)
+
+
+def diagnosed_errors(case: LoadedCase) -> Array:
+    """Standard deviations (v,) of ln of each variable by `diagnose`, without an effect."""
+    with TemporaryDirectory() as folder:
+        file = Path(folder, "measured.csv")
+        file.write_text(measurements_csv(table_of(case)))
+        made = diagnosis.study(case, Evaluator(TyreDesign(case)), file, effects=list(CHEAPEST))
+    own = calibrated_variables(made.diagnosis, made.model)["without"].values()
+    return np.array([each["standard_error"] / each["value"] for each in own])
+
+
+def main(count: int, seed: int, sampled: int, diagnosed: int, sizes: Sequence[str]) -> None:
+    """Print the table, and a line for each tyre that is sampled or diagnosed."""
+    print("| size | variable | total / by Sigma | least | largest | closed form within |")
+    print("|---" * 6 + "|")
+    for size in sizes:
+        case, random = case_of(size), np.random.default_rng([seed, SIZES.index(size), 3])
+        ratios: dict[str, list[float]] = defaultdict(list)
+        departure, tyre = 0.0, 0
+        while tyre < count:
+            try:
+                measured, _ = drawn(case, random)
+                evaluator = Evaluator(TyreDesign(measured))
+                fit = calibrate(measured, evaluator, "gauss-newton")
+                problem = Problem(measured, evaluator)
+                total = total_error(problem, fit.fitted, uncertainty(problem, fit.fitted))
+            except (EvaluationFailed, ValueError):
+                continue
+            tyre += 1
+            both = both_errors(problem, fit.fitted, total)
+            departure = max(departure, both.departure)
+            ratio = np.sqrt(np.diag(both.total) / np.diag(both.by_sigma))
+            for each, value in zip(problem.variables, ratio, strict=True):
+                ratios[each.name].append(float(value))
+            by_sigma = np.sqrt(np.diag(both.by_sigma))
+            if tyre <= sampled:
+                linear, of_draws = sampled_errors(measured, tyre)
+                print(f"{size} {tyre} sample: {linear / by_sigma} {of_draws / by_sigma}")
+            if tyre <= diagnosed:
+                prior = np.diag([v.spread**-2 for v in problem.variables])
+                known = np.linalg.inv(np.linalg.inv(both.by_sigma) + prior)
+                own = diagnosed_errors(measured) / np.sqrt(np.diag(known))
+                print(f"{size} {tyre} diagnose: {own}", flush=True)
+        for name, values in ratios.items():
+            print(
+                f"| {size} | {name} | {np.mean(values):.2f} | {min(values):.2f} |"
+                f" {max(values):.2f} | {departure:.1e} |",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    given = [int(x) for x in sys.argv[1:5]]
+    count, seed, sampled, diagnosed = [*given, *(10, 1, 3, 3)[len(given) :]]
+    main(count, seed, sampled, diagnosed, sys.argv[5:] or SIZES)
