@@ -113,3 +113,18 @@ def test_a_label_with_many_waves_below_one_with_few_is_reported() -> None:
     rows[-1] = replace(rows[-1], label=Label(12, 0))
     (doubt,) = doubts(rows)
     assert "[12,0] is 115.9 Hz" in doubt and "slip, or another mode" in doubt
+
+
+def test_what_is_nearly_as_likely_is_named_too() -> None:
+    """Of one mode at two pressures, and of two labels there, one pair contradicts the other: the
+    doubt names one, and then the other."""
+    rows = measured(200, 250)
+    rows[1] = replace(rows[1], value=0.88 * rows[1].value)
+    (single,) = doubts(rows)
+    first, other = single.split(" Nearly as likely is ")
+    assert first.startswith("t.csv, line 3: ") and other.startswith("t.csv, line 12: ")
+    swapped = relabelled(measured(200, 250), Label(3, 0), Label(3, 1), 200)
+    (pair,) = doubts(swapped)
+    first, other = pair.split(" Nearly as likely: ")
+    assert first.startswith("t.csv, line 9, t.csv, line 8: ")
+    assert other.startswith("t.csv, line 17, t.csv, line 18: ")

@@ -1,25 +1,33 @@
 """Whether modes, fit and footprint agree that tyres with drawn belts are stable.
 
-    python -m tests.studies.belts [COUNT] [SEED] [--bears-compression] [--calculix N] >> belts.jsonl
+    python -m tests.studies.belts [COUNT] [SEED] [--bears-compression] [--pressed N] [--calculix N]
 
 Tyres that `tyrecal init` writes, six sizes in turn, coarse mesh: belts at 16 to 30 degrees from the
 circumference, and 0.6 to 1.2 of the pressure of the size. Each is evaluated as `modes` does it, as
-`fit` does it (with the sensitivities of all variables), and pressed by 5 % of its rated load as
-`footprint` does it. With --bears-compression no cord goes slack, which carcasses under such belts
-do not survive. A line of JSON for each tyre has the failure of each evaluation, "" if there is
-none; --calculix: of the first N tyres also the largest deviation from CalculiX, % of a frequency of
-one discrete problem (`calculix`).
+`fit` does it (with the sensitivities of all variables), and inflated and judged as before a press
+on the road by `footprint`. With --bears-compression no cord goes slack, which most carcasses under
+such belts do not survive. A line of JSON is printed for each tyre, with the failure of each
+evaluation, "" if there is none, and counts to stderr. Of the first N tyres: --pressed presses them
+by 5 % of their rated load; --calculix states the largest deviation from CalculiX, % of a frequency
+of one discrete problem (`calculix`).
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable, Iterator
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
+from tyrecal_solvers.bundled.deck.request import Request
+from tyrecal_solvers.bundled.deck.steps import Deck
+from tyrecal_solvers.bundled.job import Job
+from tyrecal_solvers.errors import RunFailed
 
+from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
@@ -36,6 +44,7 @@ SIZES = ("155/80R13", "205/55R16", "225/45R17", "275/40R20", "11R22.5", "315/80R
 ANGLES_DEG, PRESSURES = (16.0, 30.0), (0.6, 1.2)  # from the circumference; of the size's pressure
 WORKING_DEG = 60.0  # a belt that is nearer to the meridian is one that props the others
 LOAD_SHARE = 0.05
+COMMANDS = ("modes", "fit", "footprint")
 ANY_HZ = 100.0  # of targets, which only say that the modes are evaluated
 MODES = ((1, 0), (1, 1), (2, 0), (2, 1), (3, 0))
 
@@ -51,23 +60,44 @@ def with_belts(case: LoadedCase, angle_deg: float, pressure_kPa: float) -> Loade
     return changed(case, rebar_layers=layers, pressure_kPa=pressure_kPa, targets=targets)
 
 
-def failures(case: LoadedCase, load_N: float) -> dict[str, str]:
+class _Inflated(Exception):
+    """The press has inflated the tyre, and judged it stable."""
+
+
+class _InflatingJob(Job):
+    """A press on the road that ends before the road touches the tyre."""
+
+    def _on_road(self) -> Any:
+        raise _Inflated
+
+
+def inflated(case: LoadedCase, load_N: float) -> None:
+    """Inflate and judge the tyre as a press does. Raises RunFailed."""
+    texts = Decks(TyreDesign(case).at(start_values(case)), loads_N=(load_N,)).texts("abaqus")
+    jobs = {name.removesuffix(".inp"): text for name, text in texts.items()}
+    with suppress(_Inflated):
+        _InflatingJob(Deck(jobs, "press", "inflate"), Request()).press()
+
+
+def failures(case: LoadedCase, load_N: float, pressed: bool) -> dict[str, str]:
     """Why each command would fail, "" if it does not."""
     start = start_values(case)
     problem = Problem(case, Evaluator(TyreDesign(case)))
     ways: dict[str, Callable[[], Any]] = {
         "modes": lambda: Evaluator(TyreDesign(case)).evaluate(Question(start)),
         "fit": lambda: problem.evaluate(problem.start()),
-        "footprint": lambda: Evaluator(TyreDesign(case)).press(start, [load_N]),
+        "footprint": lambda: inflated(case, load_N),
     }
+    if pressed:
+        ways["pressed"] = lambda: Evaluator(TyreDesign(case)).press(start, [load_N])
     return {name: _failure(way) for name, way in ways.items()}
 
 
 def _failure(way: Callable[[], Any]) -> str:
     try:
         answer = way()
-    except EvaluationFailed as failure:
-        return f"{failure.cause}: {failure.words}"
+    except (EvaluationFailed, RunFailed) as failure:
+        return f"{failure.cause}: {failure}"
     failed = getattr(answer, "failed", None)
     return f"{failed.cause}: {failed.words}" if failed else ""
 
@@ -94,13 +124,24 @@ def off_calculix(case: LoadedCase) -> float | str:
     return max((row.common for row in rows), key=abs)
 
 
-def main(count: int, seed: int, bears: bool | None, by_calculix: int) -> None:
-    """Print the lines."""
+def counts(lines: Sequence[Mapping[str, Any]]) -> str:
+    """How many tyres are computed, and about how many the commands agree."""
+    causes = [{line[name].split(":")[0] for name in COMMANDS} for line in lines]
+    agree = sum(len(each) == 1 for each in causes)
+    computed = sum(each == {""} for each in causes)
+    return f"{len(lines)} tyres, {computed} computed, the commands agree about {agree}"
+
+
+def main(count: int, seed: int, bears: bool | None, pressed: int, by_calculix: int) -> None:
+    """Print the lines, and the counts."""
+    lines = []
     for k, (drawn, case) in enumerate(tyres(count, seed, bears)):
-        line = {**drawn, **failures(case, LOAD_SHARE * parse_size(drawn["size"]).load_N)}
+        load_N = LOAD_SHARE * parse_size(drawn["size"]).load_N
+        lines.append({**drawn, **failures(case, load_N, k < pressed)})
         if k < by_calculix:
-            line["off_calculix_percent"] = off_calculix(case)
-        print(json.dumps(line), flush=True)
+            lines[-1]["off_calculix_percent"] = off_calculix(case)
+        print(json.dumps(lines[-1]), flush=True)
+    print(counts(lines), file=sys.stderr)
 
 
 if __name__ == "__main__":
@@ -108,6 +149,8 @@ if __name__ == "__main__":
     parser.add_argument("count", nargs="?", type=int, default=60)
     parser.add_argument("seed", nargs="?", type=int, default=1)
     parser.add_argument("--bears-compression", action="store_true")
+    parser.add_argument("--pressed", type=int, default=0)
     parser.add_argument("--calculix", type=int, default=0)
     given = parser.parse_args()
-    main(given.count, given.seed, True if given.bears_compression else None, given.calculix)
+    bears = True if given.bears_compression else None
+    main(given.count, given.seed, bears, given.pressed, given.calculix)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from .belts import with_belts
-from .wrinkles import by_size
+from tyrecal.tyre.case import with_level
+
+from .belts import COMMANDS, counts, failures, with_belts
+from .wrinkles import by_size, with_compression
 
 
-@pytest.mark.parametrize("size", ["155/80R13", "11R22.5"])
+@pytest.mark.parametrize("size", ["205/55R16", "11R22.5"])
 def test_working_belts_are_turned_to_their_own_sides(size: str) -> None:
     """24 degrees from the circumference; the carcass, cap plies and a truck's steep belt stay."""
     case = by_size(size)
@@ -20,3 +22,13 @@ def test_working_belts_are_turned_to_their_own_sides(size: str) -> None:
         kept = layer.angle_deg
         new = (66.0 if kept < 90 else 114.0) if name in working else kept
         assert angles[name] == pytest.approx(new)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("bears", [True, False])
+def test_the_three_commands_agree(bears: bool) -> None:
+    """A carcass that bears compression buckles under belts at 24 degrees; slack cords do not."""
+    case = with_compression(with_level(by_size("205/55R16"), "coarse"), bears)
+    line = failures(with_belts(case, 24.0, 250.0), 300.0, False)
+    assert {line[name].split(":")[0] for name in COMMANDS} == {"unstable" if bears else ""}
+    assert counts([line]) == f"1 tyres, {int(not bears)} computed, the commands agree about 1"

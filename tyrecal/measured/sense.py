@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from heapq import nlargest
 from itertools import combinations
 from pathlib import Path
 
@@ -71,24 +72,25 @@ def _of_one_rim(rows: list[Measurement]) -> Iterator[str]:
             moved -= np.log([row.value for row in rows])  # noqa: B023
             return float(base - moved @ weight @ moved)  # noqa: B023
 
-        best = likeliest_exchange(rows, gain)
+        best, following = _likeliest_exchanges(rows, gain)
         weighted = weight @ deviation
         single = weighted**2 / np.diag(weight)
         second, worst = map(int, np.argsort(single)[-2:])
         if best[0] > EXCHANGED and best[0] > single[worst]:
-            yield best[2]
+            other = following[2] if best[0] - following[0] < NEXT_SLIP else ""
+            yield best[2] + f" Nearly as likely: {other}" * bool(other)
             values = [row.value for row in rows]
             rows = [replace(row, value=values[i]) for row, i in zip(rows, best[1], strict=True)]
         elif single[worst] > OFF and len(rows) > 3:
-            other = rows[second] if single[worst] - single[second] < NEXT_SLIP else None
+            rival = rows[second] if single[worst] - single[second] < NEXT_SLIP else None
             row = rows.pop(worst)
             smooth = row.value * np.exp(-weighted[worst] / weight[worst, worst])
             yield (
                 f"{row.place}: {row.name} is {row.value:.4g} Hz at {row.pressure_kPa:g} kPa, where"
                 f" a smooth curve through the other frequencies has {smooth:.3g} Hz: is it a slip,"
                 " or another mode?"
-                + (f" Nearly as likely is {other.place}: {other.name}" if other else "")
-                + (f" is {other.value:.4g} Hz at {other.pressure_kPa:g} kPa." if other else "")
+                + (f" Nearly as likely is {rival.place}: {rival.name}" if rival else "")
+                + (f" is {rival.value:.4g} Hz at {rival.pressure_kPa:g} kPa." if rival else "")
             )
         else:
             return
@@ -99,7 +101,15 @@ def likeliest_exchange(
 ) -> tuple[float, list[int], str]:
     """The exchange of two pressures or labels, among frequencies of one rim, with most
     ``gain``, a function of the order of the values: gain, order, question; "": there is none."""
-    return max(_exchanges(rows, gain), key=lambda each: each[0], default=(0.0, [], ""))
+    return _likeliest_exchanges(rows, gain)[0]
+
+
+def _likeliest_exchanges(
+    rows: list[Measurement], gain: Callable[[Sequence[int]], float]
+) -> list[tuple[float, list[int], str]]:
+    """`likeliest_exchange` and the one after it."""
+    none: list[tuple[float, list[int], str]] = [(0.0, [], "")] * 2
+    return nlargest(2, [*_exchanges(rows, gain), *none], key=lambda each: each[0])
 
 
 def _exchanges(
