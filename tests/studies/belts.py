@@ -97,7 +97,7 @@ def _failure(way: Callable[[], Any]) -> str:
     try:
         answer = way()
     except (EvaluationFailed, RunFailed) as failure:
-        return f"{failure.cause}: {failure}"
+        return f"{failure.cause}: {failure}".split(";")[0]
     failed = getattr(answer, "failed", None)
     return f"{failed.cause}: {failed.words}" if failed else ""
 
@@ -112,7 +112,8 @@ def tyres(count: int, seed: int, bears: bool | None) -> Iterator[tuple[dict[str,
             cases[size] = case if bears is None else with_compression(case, bears)
         angle, share = random.uniform(*ANGLES_DEG), random.uniform(*PRESSURES)
         case = with_belts(cases[size], angle, share * cases[size].case.pressure_kPa)
-        yield {"size": size, "angle_deg": round(angle, 2), "pressure": round(share, 3)}, case
+        drawn = {"size": size, "angle_deg": round(angle, 2), "pressure": round(share, 3)}
+        yield drawn | ({"bears_compression": bears} if bears is not None else {}), case
 
 
 def off_calculix(case: LoadedCase) -> float | str:
