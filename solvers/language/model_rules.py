@@ -142,18 +142,20 @@ MODEL_RULES: dict[str, Rule] = {
     ),
     "SURFACE": Rule(
         "part",
-        "NAME=+surface; INTERNAL; TYPE=ELEMENT|NODE|CYLINDER|REVOLUTION|SEGMENTS",
+        "NAME=+surface; INTERNAL; TYPE=ELEMENT|NODE|CYLINDER|REVOLUTION|SEGMENTS; "
+        "FILLET RADIUS=number",
         "element? name?",
         rows=ANY_ROWS,
         needs=("NAME",),
         variants={
             "TYPE=ELEMENT": "element? name?",
             "TYPE=NODE": "node number?",
+            "TYPE=SEGMENTS": ("name 2*number", "name 4*number?"),
             "TYPE=CYLINDER": ("6*number", "3*number", "name 2*number", "name 4*number?"),
             "TYPE": "name? name?",
         },
         honoured={
-            "deck": "NAME; TYPE=ELEMENT|NODE; ~INTERNAL",
+            "deck": "NAME; TYPE=ELEMENT|NODE|SEGMENTS; ~INTERNAL; ~FILLET RADIUS",
             "section": "NAME; TYPE=ELEMENT",
             "revolve": "NAME; TYPE=CYLINDER",
         },
@@ -274,7 +276,7 @@ MODEL_RULES: dict[str, Rule] = {
         rows=ANY_ROWS,
         needs=("REF NODE", "TIE NSET|PIN NSET|ELSET|ANALYTICAL SURFACE"),
         honoured={
-            "deck": "REF NODE; TIE NSET; ELSET",
+            "deck": "REF NODE; TIE NSET; ELSET; ANALYTICAL SURFACE",
             "section": "REF NODE; TIE NSET",
             "revolve": "REF NODE; TIE NSET; ANALYTICAL SURFACE",
         },
@@ -441,6 +443,7 @@ MODEL_RULES: dict[str, Rule] = {
         rows=(0, 1),
         needs=("NAME",),
         honoured={"revolve": "NAME"},
+        is_contact=True,
     ),
     "SURFACE BEHAVIOR": Rule(
         "part model",
@@ -456,6 +459,7 @@ MODEL_RULES: dict[str, Rule] = {
         variants={"PRESSURE-OVERCLOSURE=LINEAR": "number"},
         honoured={"revolve": "PRESSURE-OVERCLOSURE=LINEAR"},
         data="slope",
+        is_contact=True,
     ),
     "FRICTION": Rule(
         "part model",
@@ -467,18 +471,23 @@ MODEL_RULES: dict[str, Rule] = {
         once="parent",
         honoured={"revolve": "ELASTIC SLIP"},
         data="coefficient",
+        is_contact=True,
     ),
     "CONTACT PAIR": Rule(
         "model",
         (
-            "INTERACTION=interaction; ADJUST=name; SMALL SLIDING; "
+            "INTERACTION=interaction; ADJUST=name; EXTENSION ZONE=number; "
+            "GEOMETRIC CORRECTION=name; HCRIT=number; MIDFACE NODES=YES|NO; "
+            "MINIMUM DISTANCE=YES|NO; NO THICKNESS; SMALL SLIDING; SMOOTH=number; "
+            "SLIDING TRANSITION=ELEMENT ORDER SMOOTHING|LINEAR SMOOTHING|QUADRATIC SMOOTHING; "
+            "SUPPLEMENTARY CONSTRAINTS=SELECTIVE|YES|NO; TIED; TRACKING=PATH|STATE; "
             "TYPE=SURFACE TO SURFACE|NODE TO SURFACE"
         ),
         "surface surface?",
         needs=("INTERACTION",),
         honoured={"revolve": "INTERACTION; TYPE=SURFACE TO SURFACE"},
         data="slave, master",
-        instead="share the bead's nodes with the rim, or *TIE it: a fixed bead is honoured",
+        is_contact=True,
     ),
     "SYMMETRIC MODEL GENERATION": Rule(
         "model",

@@ -58,8 +58,12 @@ OTHER_KEYWORDS: dict[str, Rule] = {
     **_unjudged("model part", "UEL PROPERTY", instead="use the elements that the manual has"),
     **_unjudged(
         "model part step",
-        "CONTACT",
-        instead="share the bead's nodes with the rim, or *TIE it: a fixed bead is honoured",
+        "CONTACT, CONTACT INCLUSIONS, CONTACT EXCLUSIONS, CONTACT PROPERTY ASSIGNMENT, "
+        "CONTACT INITIALIZATION ASSIGNMENT, CONTACT INITIALIZATION DATA, CONTACT FORMULATION, "
+        "CONTACT CLEARANCE, CONTACT CLEARANCE ASSIGNMENT, CONTACT CONTROLS ASSIGNMENT, "
+        "CONTACT STABILIZATION, CONTACT INTERFERENCE, CHANGE FRICTION, CONTACT DAMPING, "
+        "SURFACE PROPERTY ASSIGNMENT, CLEARANCE",
+        is_contact=True,
     ),
     **_unjudged(
         "model part",

@@ -45,9 +45,10 @@ class Rule:
     bundled solver's jobs), the options that are honoured there; a value after = is the only one.
     data: names of the data fields that are honoured, as "E:stress, nu=0", by parameter if they
     differ; one that begins with _ is no number that may be set. is_output: asks for output or says
-    how to iterate, so that it changes no answer. is_judged: False if its parameters and data are
-    not checked. instead: what a user may do if it is not honoured. calculix: why CalculiX has
-    nothing for it.
+    how to iterate, so that it changes no answer. is_contact: is about contact, which is left out of
+    a user's section where the bead is held. is_judged: False if its parameters and data are not
+    checked. instead: what a user may do if it is not honoured. calculix: why CalculiX has nothing
+    for it.
     """
 
     level: str
@@ -64,6 +65,7 @@ class Rule:
     honoured: Mapping[str, str] = field(default_factory=dict)
     data: str | Mapping[str, str] = ""
     is_output: bool = False
+    is_contact: bool = False
     is_judged: bool = True
     instead: str = ""
     calculix: str = ""

@@ -113,6 +113,7 @@ STEP_RULES: dict[str, Rule] = {
         "3*number?",
         rows=(0, 2),
         honoured={"step": "SLAVE; MASTER; STABILIZE="},
+        is_contact=True,
     ),
     "FILE FORMAT": Rule(
         "model step",

@@ -9,6 +9,7 @@ from .step_rules import STEP_RULES
 
 RULES: dict[str, Rule] = {**MODEL_RULES, **STEP_RULES, **OTHER_KEYWORDS}
 OUTPUT_KEYWORDS = frozenset(name for name, rule in RULES.items() if rule.is_output)
+CONTACT_KEYWORDS = frozenset(name for name, rule in RULES.items() if rule.is_contact)
 MATERIAL_OPTIONS = frozenset(
     name
     for name, rule in RULES.items()

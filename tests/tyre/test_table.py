@@ -19,7 +19,7 @@ from tyrecal_solvers.language.table import RULES
 from tyrecal.tyre.own_deck.own_deck import OwnDeck, read_own_deck
 from tyrecal.tyre.own_deck.text import Block, OwnDeckError
 
-from . import own_decks
+from . import own_decks, test_contact
 from .test_membranes import maker
 
 
@@ -42,6 +42,10 @@ def law(words: str, data: str) -> str:
 
 EXTRA = {
     "membranes": maker(),
+    "contact": own_decks.plain(
+        own_decks.Tyre().mesh() + test_contact.rims() + test_contact.PAIRS,
+        step=test_contact.MOUNT + own_decks.STEP,
+    ),
     "amplitude": changed(
         (
             "*STEP",

@@ -91,6 +91,9 @@ def _refuse_unrevolved(tyre: Tyre) -> None:
         "a revolve needs the rim again: hold it by one *RIGID BODY with TIE NSET": (
             len(bodies) != 1 or "TIE NSET" not in bodies[0].parameters
         ),
+        "a revolve takes contact along that is left out here, as the bead is held: delete it": bool(
+            flat.found.contact
+        ),
         "the pressure must be a *DSLOAD": any(b.name == "DLOAD" for b in flat.found.inflation),
         f"it has no node set {c.deck.crown}: name that of its crown in deck.crown": (
             named(c.deck.crown) not in flat.model.node_sets

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from .generation import MESH_READERS, read
-from .scope import Element, Scope
+from .scope import Element, Point, Scope
 from .text import Block
 
 
@@ -20,6 +20,8 @@ class Assembly:
     rebars: list[tuple[Block, str]] = field(default_factory=list)
     rules: list[tuple[Block, str]] = field(default_factory=list)  # rigid bodies, ties, embedded
     held: list[Block] = field(default_factory=list)
+    instance_nodes: dict[int, tuple[str, int]] = field(default_factory=dict)  # name, own number
+    shifts: dict[str, Point] = field(default_factory=dict)  # of instances, by their prefix
     reflect: Block | None = None
 
 
@@ -37,10 +39,8 @@ def collect(blocks: Sequence[Block]) -> Assembly:
     """The deck's. Raises OwnDeckError."""
     made, parts = Assembly(), dict[str, Part]()
     part: Part | None = None
-    instance = False
+    instance: Block | None = None
     for block in blocks:
-        if instance and block.name != "END INSTANCE":
-            raise block.refused("stands in an *INSTANCE: give it in the *PART")
         if block.name == "PART":
             name = block.need("NAME")
             if name in parts:
@@ -49,11 +49,15 @@ def collect(blocks: Sequence[Block]) -> Assembly:
         elif block.name == "END PART":
             part = None
         elif block.name == "INSTANCE":
-            instance = True
-            _instance(made, parts, block)
-        elif block.name == "END INSTANCE":
-            instance = False
+            instance, part = block, parts.get(block.need("PART"))
+            if part is None:
+                raise block.refused(f"the part {block.get('PART')} is not defined above")
+        elif block.name == "END INSTANCE" and instance:
+            _instance(made, parts, instance)
+            instance = part = None
         elif part is not None:
+            if instance and part.instances:
+                raise block.refused("stands in an *INSTANCE: give it in the *PART")
             if block.name in MESH_READERS:
                 read(part.scope, block)
             part.other.append(block)
@@ -69,15 +73,14 @@ def collect(blocks: Sequence[Block]) -> Assembly:
 
 def _instance(made: Assembly, parts: dict[str, Part], block: Block) -> None:
     """Put a part's nodes, elements, sets and options in the model under INSTANCE.NAME."""
-    name, part = block.need("NAME"), parts.get(block.need("PART"))
-    if part is None:
-        raise block.refused(f"the part {block.get('PART')} is not defined above")
+    name, part = block.need("NAME"), parts[block.need("PART")]
     if any(name in each.instances for each in parts.values()):
         raise block.refused(f"the instance {name} is defined twice")
     dr = block.rows[0].number(0, 0.0) if block.rows else 0.0
     dz = block.rows[0].number(1, 0.0) if block.rows else 0.0
     if len(block.rows) > 2 or (len(block.rows) == 2 and block.rows[1].number(6, 0.0)):
         raise block.refused("a rotation of an instance is not honoured")
+    made.shifts[f"{name}."] = dr, dz
     root, own = made.root, part.scope
     more = max(root.nodes, default=0) if root.nodes.keys() & own.nodes.keys() else 0
     further = max(root.elements, default=0) if root.elements.keys() & own.elements.keys() else 0
@@ -85,6 +88,7 @@ def _instance(made: Assembly, parts: dict[str, Part], block: Block) -> None:
     elements = {n: n + further for n in own.elements}
     for n, (r, z) in own.nodes.items():
         root.nodes[nodes[n]] = (r + dr, z + dz)
+        made.instance_nodes[nodes[n]] = name, n
     for n, e in own.elements.items():
         moved = tuple(nodes[each] for each in e.nodes)
         root.elements[elements[n]] = Element(e.kind, moved, e.block, e.row)

@@ -10,7 +10,7 @@ import numpy as np
 from .assembly import Assembly
 from .grammar import Sorted
 from .scope import Point, mirror_of, nearest
-from .surfaces import is_rigid, surface_nodes
+from .surfaces import is_rigid, rigid_nodes, surface_nodes
 from .text import Block, Row
 
 MERGED = 1e-6  # of the section's size: nodes closer than this are one where they are tied
@@ -27,9 +27,20 @@ class Embedded:
     lines: tuple[tuple[Row, tuple[int, ...]], ...]
 
 
+@dataclass(frozen=True, eq=False)
+class RigidBody:
+    """A *RIGID BODY: its reference node, the nodes that it holds, and its surfaces by name."""
+
+    block: Block
+    reference: int
+    nodes: frozenset[int]
+    surfaces: tuple[str, ...]
+
+
 class Constraints:
     """Of a deck. rim: nodes that it holds; reference: its node; same: node to the node that it is
-    one with; guests: embedded nodes where the rubber has none. Raises OwnDeckError."""
+    one with; guests: embedded nodes where the rubber has none; bodies: rigid ones; motions: of
+    reference nodes of those that only touch, by degree of freedom. Raises OwnDeckError."""
 
     def __init__(self, made: Assembly, found: Sorted):
         self.made, self.found, self.root = made, found, made.root
@@ -38,6 +49,9 @@ class Constraints:
         self.same: dict[int, int] = {}
         self.embedded: list[Embedded] = []
         self.guests: set[int] = set()
+        self.bodies: list[RigidBody] = []
+        self.seats: set[str] = set()  # rigid surfaces that nodes are tied to
+        self.motions: dict[int, dict[int, float]] = {}
         sizes = np.array(list(self.root.nodes.values()) or [(0.0, 0.0)])
         self.near = MERGED * float(np.ptp(sizes, axis=0).max())
         self._rules()
@@ -53,23 +67,47 @@ class Constraints:
                 self._tie(block, prefix)
             elif block.name == "EMBEDDED ELEMENT":
                 self._embed(block, prefix)
+        self._choose_rim()
+
+    def _choose_rim(self) -> None:
+        """The one rigid body that holds rubber; others only touch it."""
+        rubber = {n for e in self.root.elements.values() if e.is_solid for n in e.nodes}
+        for body in self.bodies:
+            is_rim = bool(body.nodes & rubber or self.seats & set(body.surfaces))
+            if not is_rim and self.found.contact:
+                self.motions[body.reference] = {}
+                continue
+            if self.reference:
+                raise body.block.refused("one rigid body is honoured, the rim")
+            self.reference = body.reference, self.root.nodes[body.reference]
 
     def _rigid(self, block: Block, prefix: str) -> None:
-        if self.reference:
-            raise block.refused("one rigid body is honoured, the rim")
         name = block.need("REF NODE")
         reference = self.root.nodes_in(prefix + name, block)
         if len(reference) != 1:
             raise block.refused(f"REF NODE={name} is {len(reference)} nodes, one is needed")
-        self.reference = reference[0], self.root.nodes[reference[0]]
-        if not (block.get("TIE NSET") or block.get("ELSET")):
-            raise block.refused("needs TIE NSET= or ELSET=")
+        if not {"TIE NSET", "ELSET", "ANALYTICAL SURFACE"} & block.parameters.keys():
+            raise block.refused("needs TIE NSET=, ELSET= or ANALYTICAL SURFACE=")
+        nodes, surfaces = dict[int, None](), list[str]()
         if tied := block.get("TIE NSET"):
-            self.rim |= dict.fromkeys(self.root.nodes_in(prefix + tied, block))
-        if body := block.get("ELSET"):
-            for n in self.root.elements_in(prefix + body, block):
-                self.rim |= dict.fromkeys(self.root.elements[n].nodes)
-        self.rim.pop(reference[0], None)
+            nodes |= dict.fromkeys(self.root.nodes_in(prefix + tied, block))
+        if elements := block.get("ELSET"):
+            members = self.root.elements_in(prefix + elements, block)
+            nodes |= dict.fromkeys(n for each in members for n in self.root.elements[each].nodes)
+            surfaces += [
+                each
+                for each, surface in self.made.surfaces.items()
+                if is_rigid(self.made, *surface)
+                and nodes.keys() >= rigid_nodes(self.made, *surface)
+            ]
+        if profile := block.get("ANALYTICAL SURFACE"):
+            surface, _ = self.made.surfaces.get(prefix + profile, (block, ""))
+            if surface.get("TYPE") != "SEGMENTS":
+                raise block.refused(f"ANALYTICAL SURFACE={profile} is no surface of TYPE=SEGMENTS")
+            surfaces.append(prefix + profile)
+        nodes.pop(reference[0], None)
+        self.rim |= nodes
+        self.bodies.append(RigidBody(block, reference[0], frozenset(nodes), tuple(surfaces)))
 
     def _tie(self, block: Block, prefix: str) -> None:
         """The bead on the rim's elements, or two surfaces of the same places."""
@@ -79,6 +117,7 @@ class Constraints:
             surface = self.made.surfaces.get(name)
             if surface and is_rigid(self.made, *surface):
                 self._seat(slaves, surface, block, row)
+                self.seats.add(name)
                 continue
             for n, distance in self._merge(
                 slaves, surface_nodes(self.made, name, block, row)
@@ -161,13 +200,18 @@ class Constraints:
         fixed: dict[int, set[int]] = {}
         for block in blocks:
             for row in block.rows:
+                nodes = self.root.nodes_in(row.name(0), block, row)
+                if nodes and self.motions.keys() >= set(nodes):
+                    self._move(nodes, block, row)
+                    continue
                 freedoms = _freedoms(block, row)
-                for n in self.root.nodes_in(row.name(0), block, row):
+                for n in nodes:
                     fixed.setdefault(n, set()).update(freedoms)
         if self.reference:
             own = fixed.pop(self.reference[0], set())
             if not {1, 2, 6} <= own:
-                raise self.made.rules[0][0].refused(
+                block = next(b.block for b in self.bodies if b.reference == self.reference[0])
+                raise block.refused(
                     f"*BOUNDARY must hold the rim's node {self.reference[0]} in 1, 2 and 6"
                 )
         solid = {n for e in self.root.elements.values() for n in e.nodes}
@@ -189,6 +233,16 @@ class Constraints:
                     else "a rim holds 1, 2 and 5 (ENCASTRE)"
                 )
                 raise block.refused(f"node {n} is held in {sorted(freedoms)} only: {hint}", row)
+
+    def _move(self, nodes: Sequence[int], block: Block, row: Row) -> None:
+        """Note displacements of rigid bodies that only touch the tyre; the last one counts."""
+        size = row.number(3, 0.0)
+        freedoms = range(row.integer(1), row.integer(2, row.integer(1)) + 1) if size else ()
+        if not {1, 2} >= set(freedoms):
+            raise block.refused("a rigid surface may move in 1 and 2, it does not turn", row)
+        for n in nodes:
+            for freedom in freedoms or _freedoms(block, row):
+                self.motions[n][freedom] = size
 
     def _where(self, number: int, blocks: Sequence[Block]) -> tuple[Block, Row]:
         return next(

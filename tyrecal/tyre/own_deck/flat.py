@@ -116,7 +116,6 @@ def flatten(found: Sorted, model: Model, length: float, mass: float) -> Flat:
             )
             write.block(option, f"*{option.name}{values}")
     static = next(block for block in found.inflation if block.name == "STATIC")
-    _check_amplitudes(found, static)
     block, row, i = model.pressure[0]
     stress = mass / length
     return Flat(
@@ -271,22 +270,3 @@ def _layer_of(block: Block, row: Row) -> Block:
     fields = [name, row.text(1), spacing, "0.", material, row.text(3, "0.")]
     parameters = {"GEOMETRY": "ANGULAR"} if is_fanned else {}
     return Block("REBAR LAYER", block.place, parameters, (Row(row.place, ",".join(fields)),))
-
-
-def _check_amplitudes(found: Sorted, static: Block) -> None:
-    """What follows an amplitude has its full size at the step's end."""
-    tables = {block.need("NAME"): block for block in found.model if block.name == "AMPLITUDE"}
-    for block in found.inflation:
-        name = block.get("AMPLITUDE")
-        if not name:
-            continue
-        if name not in tables:
-            raise block.refused(f"the amplitude {name} is not defined")
-        table = tables[name]
-        numbers = [row.number(i) for row in table.rows for i, text in enumerate(row.fields) if text]
-        period = static.rows[0].number(1, 1.0) if static.rows else 1.0
-        if len(numbers) < 2 or len(numbers) % 2:
-            raise table.refused("holds pairs of time and amplitude")
-        end = float(np.interp(period, numbers[::2], numbers[1::2]))
-        if end != 1.0:
-            raise block.refused(f"the amplitude {name} ends at {end:g}, it must end at 1")

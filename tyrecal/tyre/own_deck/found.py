@@ -50,6 +50,7 @@ def contents(deck: OwnDeck, flat: Flat) -> dict[str, Any]:
         },
         "reflected": model.reflected,
         "marks": list(deck.marks),
+        "left_out": list(model.left_out),
         "passed_over": names_of(flat.found.passed),
         "later_steps": [step_name(block.parameters.get("NAME", "")) for block in flat.found.later],
     }
@@ -105,6 +106,8 @@ def words(found: dict[str, Any], mass_kg: float) -> Iterator[str]:
     )
     if found["marks"]:
         yield f"marks: {', '.join(found['marks'])}"
+    if found["left_out"]:
+        yield f"left out: {'; '.join(found['left_out'])}"
     if found["passed_over"]:
         yield f"passed over, as they change no answer: *{', *'.join(found['passed_over'])}"
     if found["later_steps"]:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .scope import MOST, Point, Scope, mirror_of, nodes_of, reflected
+from .scope import MOST, Point, Scope, along_arc, mirror_of, nodes_of, reflected
 from .text import Block, Row, is_label, named
 
 
@@ -94,9 +94,8 @@ def _on_arc(
     radius, other = np.hypot(*u), np.hypot(*v)
     if abs(radius - other) > 1e-6 * radius or not radius:
         raise block.refused("the arc's ends are not equally far from its centre", row)
-    angle = np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v) * share
-    cos, sin = np.cos(angle), np.sin(angle)
-    return float(c[0] + cos * u[0] - sin * u[1]), float(c[1] + sin * u[0] + cos * u[1])
+    r, z = along_arc(a, b, c, share)
+    return float(r), float(z)
 
 
 def _nfill(scope: Scope, block: Block) -> None:

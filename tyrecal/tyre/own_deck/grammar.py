@@ -7,8 +7,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from .numbers import plain_number
-from .text import MATERIAL_OPTIONS, OUTPUT_KEYWORDS, RULES, Block, check_honoured
+from .text import CONTACT_KEYWORDS, MATERIAL_OPTIONS, OUTPUT_KEYWORDS, RULES, Block, check_honoured
 
 LOADS = ("DSLOAD", "DLOAD")
 
@@ -20,6 +22,7 @@ class Sorted:
     model: list[Block] = field(default_factory=list)
     inflation: list[Block] = field(default_factory=list)  # of the step that inflates
     passed: list[Block] = field(default_factory=list)  # over, as they change nothing
+    contact: list[Block] = field(default_factory=list)  # superfluous where the bead is held
     later: list[Block] = field(default_factory=list)  # *STEP of those after it
     is_nonlinear: bool = False  # NLGEOM, which stays on in later steps
 
@@ -53,6 +56,9 @@ def sort(blocks: Sequence[Block]) -> Sorted:
             raise block.refused("stands outside a step")
         if after_a_step:
             raise block.refused("stands after a step: the model's keywords stand before *STEP")
+        if name in CONTACT_KEYWORDS:
+            found.contact.append(block)
+            continue
         check_honoured(block, "deck")
         found.model.append(block)
         if name in MATERIAL_OPTIONS:
@@ -133,8 +139,13 @@ def _step(step: list[Block], found: Sorted, is_inflation: bool) -> None:
     for block in step:
         if block.name in OUTPUT_KEYWORDS:
             found.passed.append(block)
+        elif block.name in CONTACT_KEYWORDS:
+            found.contact.append(block)
         else:
-            check_honoured(block, "deck step")
+            if (
+                is_inflation or block.name != "STATIC"
+            ):  # how a step before it got there is no matter
+                check_honoured(block, "deck step")
             kept.append(block)
     held = [block for block in kept if block.name == "BOUNDARY"]
     if new := [block for block in held if block.get("OP") == "NEW"]:
@@ -146,8 +157,30 @@ def _step(step: list[Block], found: Sorted, is_inflation: bool) -> None:
         raise step[0].refused("needs one *STATIC")
     found.is_nonlinear |= "NLGEOM" in step[0].parameters
     if not is_inflation:
+        moved = [block for block in held if any(row.number(3, 0.0) for row in block.rows)]
+        _check_amplitudes(found, moved, procedures[0])
         found.model.extend(held)
         return
     if not found.is_nonlinear:
         raise step[0].refused("inflates: it needs NLGEOM=YES")
+    _check_amplitudes(found, kept, procedures[0])
     found.inflation = kept
+
+
+def _check_amplitudes(found: Sorted, blocks: Sequence[Block], static: Block) -> None:
+    """What follows an amplitude has its full size at the step's end."""
+    tables = {block.need("NAME"): block for block in found.model if block.name == "AMPLITUDE"}
+    for block in blocks:
+        name = block.get("AMPLITUDE")
+        if not name:
+            continue
+        if name not in tables:
+            raise block.refused(f"the amplitude {name} is not defined")
+        table = tables[name]
+        numbers = [row.number(i) for row in table.rows for i, text in enumerate(row.fields) if text]
+        period = static.rows[0].number(1, 1.0) if static.rows else 1.0
+        if len(numbers) < 2 or len(numbers) % 2:
+            raise table.refused("holds pairs of time and amplitude")
+        end = float(np.interp(period, numbers[::2], numbers[1::2]))
+        if end != 1.0:
+            raise block.refused(f"the amplitude {name} ends at {end:g}, it must end at 1")

@@ -9,6 +9,7 @@ import numpy as np
 
 from .assembly import Assembly, collect
 from .constraints import Constraints, Embedded, lines_of_the_other_half
+from .contact import Contact
 from .grammar import Sorted
 from .scope import Element, Point, corner_areas, faces_of, mirror_of, reflected
 from .surfaces import Face, boundary_of, surface_faces
@@ -44,6 +45,7 @@ class Model:
     boundary: tuple[Face, ...]  # free faces of the solids
     node_sets: dict[str, tuple[int, ...]]  # of the deck, for an output of modes
     reflected: bool
+    left_out: tuple[str, ...] = ()  # contact that the held bead makes superfluous, in words
 
 
 def build(found: Sorted) -> Model:
@@ -66,6 +68,9 @@ class _Builder:
         node_sets = self._all_sets()
         pressed, name, places = self._pressure()
         self.tied = Constraints(self.made, self.found)
+        left_out = (
+            Contact(self.made, self.found, self.tied).left_out() if self.found.contact else ()
+        )
         if not self.tied.rim:
             raise self.found.model[-1].refused(
                 "is the last, but no *RIGID BODY or *BOUNDARY holds the bead on a rim"
@@ -111,6 +116,7 @@ class _Builder:
             boundary,
             node_sets,
             self.made.reflect is not None,
+            left_out,
         )
 
     def _sections(self) -> tuple[tuple[Assigned, ...], tuple[Assigned, ...]]:

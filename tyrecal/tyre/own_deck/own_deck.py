@@ -109,7 +109,8 @@ class OwnDeck:
 
     def model(self, found: Sorted) -> Model:
         """The section of sorted blocks, remembered while the mesh's own stay the same."""
-        key = tuple(b for b in (*found.model, *found.inflation) if b.name in TOPOLOGY)
+        mesh = (b for b in (*found.model, *found.inflation) if b.name in TOPOLOGY)
+        key = (*mesh, *found.contact)
         if key not in self._models:
             while len(self._models) > 3:
                 self._models.pop(next(iter(self._models)))

@@ -173,6 +173,15 @@ def corner_areas(element: Element, points: Mapping[int, Point]) -> np.ndarray:
     return area
 
 
+def along_arc(a: np.ndarray, b: np.ndarray, centre: np.ndarray, share: float) -> np.ndarray:
+    """The point at a share of the shorter arc from a to b."""
+    u, v = a - centre, b - centre
+    angle = np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v) * share
+    cos, sin = np.cos(angle), np.sin(angle)
+    point: np.ndarray = centre + np.array([cos * u[0] - sin * u[1], sin * u[0] + cos * u[1]])
+    return point
+
+
 def nearest(X: np.ndarray, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Distance (n,) of points to the nearest piece, and outward normal (n, 2) there: of an end that
     pieces share, their normals' mean."""

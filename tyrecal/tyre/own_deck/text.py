@@ -10,7 +10,7 @@ if TYPE_CHECKING:  # mypy knows the folder by its own name
     from solvers.language.fields import DIMENSIONS, fields_of, placed_fields
     from solvers.language.honour import check_honoured
     from solvers.language.spelling import named
-    from solvers.language.table import MATERIAL_OPTIONS, OUTPUT_KEYWORDS, RULES
+    from solvers.language.table import CONTACT_KEYWORDS, MATERIAL_OPTIONS, OUTPUT_KEYWORDS, RULES
     from solvers.language.text import (
         LARGEST_LABEL,
         Block,
@@ -26,7 +26,12 @@ else:
     from tyrecal_solvers.language.fields import DIMENSIONS, fields_of, placed_fields
     from tyrecal_solvers.language.honour import check_honoured
     from tyrecal_solvers.language.spelling import named
-    from tyrecal_solvers.language.table import MATERIAL_OPTIONS, OUTPUT_KEYWORDS, RULES
+    from tyrecal_solvers.language.table import (
+        CONTACT_KEYWORDS,
+        MATERIAL_OPTIONS,
+        OUTPUT_KEYWORDS,
+        RULES,
+    )
     from tyrecal_solvers.language.text import (
         LARGEST_LABEL,
         Block,
@@ -41,6 +46,7 @@ else:
 from ...errors import InputError
 
 __all__ = [
+    "CONTACT_KEYWORDS",
     "DIMENSIONS",
     "LARGEST_LABEL",
     "MATERIAL_OPTIONS",

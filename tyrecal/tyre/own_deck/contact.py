@@ -1,0 +1,165 @@
+"""Contact of the bead with rims that are rigid surfaces: what a held bead makes superfluous.
+
+No contact of the section is computed. Where the bead is held, its contact with a rim is left out;
+else the deck is refused with the lines that hold the bead where the rim is after its last motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .assembly import Assembly
+from .constraints import Constraints
+from .grammar import Sorted
+from .scope import nearest
+from .surfaces import boundary_of, rigid_pieces, surface_nodes
+from .text import Block, Row
+
+TOUCHING = 0.01  # of the section's size: a node that near to the rim touches it
+PUSHED = 0.1  # of the section's size: how far a rim pushes nodes of a bead that it is mounted on
+NODES_ON_A_LINE = 12  # node numbers
+MOST_NAMES = 100
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Nodes that may touch a rigid surface, whose pieces (k, 2, 2) have the tyre on their left."""
+
+    block: Block
+    row: Row | None
+    name: str
+    nodes: tuple[int, ...]
+    pieces: Array
+    reference: int  # node of the rigid surface
+
+
+class Contact:
+    """The contact of a deck. Raises OwnDeckError."""
+
+    def __init__(self, made: Assembly, blocks: Sorted, tied: Constraints):
+        self.made, self.blocks, self.tied, self.root = made, blocks, tied, made.root
+        rubber = {n for e in self.root.elements.values() if e.is_solid for n in e.nodes}
+        points = np.array([self.root.nodes[n] for n in rubber])
+        self.middle = points[:, 0].min() / 2 + points[:, 0].max() / 2
+        self.size = float(np.ptp(points, axis=0).max())
+
+    def left_out(self) -> tuple[str, ...]:
+        """Words on each contact that is left out. Raises OwnDeckError if a bead is not held."""
+        words, free = list[str](), list[tuple[Pair, Array]]()
+        for pair in self._pairs():
+            touching, distance = self._touching(pair)
+            held = [n for n in pair.nodes if n in self.tied.rim]
+            if pair.pieces[..., 0].min() > self.middle:  # a road or a mould
+                if len(touching):
+                    raise pair.block.refused(
+                        f"the contact of {pair.name} is not honoured, only that of a bead with its"
+                        f" rim: node {touching[0]} lies {distance[0]:.3g} from it",
+                        pair.row,
+                    )
+                words.append(f"contact of {pair.name}, which do not touch in this step")
+            elif held and 2 * len(held) >= len(touching):
+                words.append(f"contact of {pair.name}, as {len(held)} of its nodes are held")
+            else:
+                free.append((pair, touching))
+        if free:
+            self._refuse(free)
+        return tuple(words)
+
+    def _pairs(self) -> Iterator[Pair]:
+        for block in self.blocks.contact:
+            if block.name == "CONTACT":
+                nodes = dict.fromkeys(n for _, _, face in boundary_of(self.root) for n in face)
+                bodies = [name for body in self.tied.bodies for name in body.surfaces]
+                if not bodies:
+                    raise block.refused("contact of the rubber with itself is not honoured")
+                for name in bodies:
+                    yield self._pair(block, None, "all free surfaces", list(nodes), name)
+            for row in block.rows if block.name == "CONTACT PAIR" else ():
+                slave, master = row.name(0), row.name(1)
+                if not any(master in body.surfaces for body in self.tied.bodies):
+                    raise block.refused(
+                        f"{master or slave} is no rigid surface: contact is honoured of a bead with"
+                        " a rim, *SURFACE of TYPE=SEGMENTS or RAX2 elements in a *RIGID BODY",
+                        row,
+                    )
+                yield self._pair(
+                    block, row, slave, surface_nodes(self.made, slave, block, row), master
+                )
+
+    def _pair(
+        self, block: Block, row: Row | None, slave: str, nodes: Sequence[int], master: str
+    ) -> Pair:
+        """A pair, the rigid surface where it is at the end of the step that inflates."""
+        body = next(body for body in self.tied.bodies if master in body.surfaces)
+        pieces = rigid_pieces(self.made, *self.made.surfaces[master])
+        motion = self.tied.motions.get(body.reference, {})
+        moved = pieces + np.array([motion.get(1, 0.0), motion.get(2, 0.0)])
+        own = tuple(dict.fromkeys(self.tied.same.get(n, n) for n in nodes))
+        return Pair(block, row, f"{slave} and {master}", own, moved, body.reference)
+
+    def _touching(self, pair: Pair) -> tuple[Array, Array]:
+        """Nodes that lie on the rigid surface or beyond it, and how far from it they are."""
+        X = np.array([self.root.nodes[n] for n in pair.nodes])
+        away, normal = nearest(X, pair.pieces[:, ::-1])
+        points, count = np.unique(pair.pieces.reshape(-1, 2), axis=0, return_counts=True)
+        ends = points[count == 1]
+        to_end = np.hypot(*(X[:, None] - ends).T).min(0, initial=np.inf)
+        past_an_end = to_end <= away * (1 + 1e-9)
+        further, _ = nearest(X + 1e-6 * self.size * normal, pair.pieces)
+        beyond = (further < away) & ~past_an_end & (away < PUSHED * self.size)
+        touching = (away <= TOUCHING * self.size) | beyond
+        return np.array(pair.nodes)[touching], away[touching]
+
+    def _refuse(self, free: Sequence[tuple[Pair, Array]]) -> None:
+        """Raises OwnDeckError with the lines that hold the beads."""
+        pair = free[0][0]
+        for each, touching in free:
+            if not {1, 2} <= self.tied.motions.get(each.reference, {}).keys():
+                raise each.block.refused(
+                    f"contact of {each.name} is not honoured, and where the rim is cannot be known:"
+                    f" *BOUNDARY must hold or move its node {each.reference} in 1 and 2",
+                    each.row,
+                )
+            if not len(touching):
+                X = np.array([self.root.nodes[n] for n in each.nodes])
+                away, _ = nearest(X, each.pieces)
+                raise each.block.refused(
+                    f"contact of {each.name} is not honoured, and none of the nodes touches the rim"
+                    f" where it is after its last motion: node {each.nodes[int(away.argmin())]} is"
+                    f" the nearest, {away.min():.3g} away; hold the bead by *BOUNDARY, ENCASTRE",
+                    each.row,
+                )
+        nodes = sorted({int(n) for _, touching in free for n in touching})
+        raise pair.block.refused(
+            f"contact of {' and '.join(each.name for each, _ in free)} is not honoured; hold the"
+            f" bead where it touches the rim by adding {self._lines(nodes)}",
+            pair.row,
+        )
+
+    def _lines(self, nodes: Sequence[int]) -> str:
+        """The lines that hold nodes, and where they belong."""
+        names = ("SEATED", *(f"SEATED_{k}" for k in range(2, MOST_NAMES)))
+        name = next(each for each in names if each not in self.root.node_sets)
+        of_instances: dict[str, list[int]] = {}
+        known = self.made.instance_nodes
+        for n in nodes:
+            instance, number = known.get(n, ("", n))
+            of_instances.setdefault(instance, []).append(number)
+        lines = []
+        for instance, numbers in of_instances.items():
+            lines.append(f"*NSET, NSET={name}" + f", INSTANCE={instance}" * bool(instance))
+            for k in range(0, len(numbers), NODES_ON_A_LINE):
+                lines.append(", ".join(map(str, numbers[k : k + NODES_ON_A_LINE])))
+        where = "before *END ASSEMBLY" if known else "before the first *STEP"
+        steps = [block for block in self.blocks.inflation if block.name == "BOUNDARY"]
+        released = [block for block in (*self.made.held, *steps) if block.get("OP") == "NEW"]
+        head = "*BOUNDARY" + ", OP=NEW" * any(block in released for block in steps)
+        held = [head, f"{name}, ENCASTRE"]
+        if known or released:
+            place = "before *END STEP of the step that inflates" if released else "before *STEP"
+            return "\n".join((f"{where}:", *lines, f"and {place}:", *held))
+        return "\n".join((f"{where}:", *lines, *held))
