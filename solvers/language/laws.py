@@ -29,3 +29,6 @@ LAW_CONSTANTS: dict[str, Callable[[int], list[str]]] = {  # of order N
 }
 OF_ORDER_N = ("REDUCED POLYNOMIAL", "POLYNOMIAL", "OGDEN")  # the others take no N
 LAWS_NOT_READ = ("VAN DER WAALS", "MARLOW", "USER", "EXTENDED TUBE", "VALANIS-LANDEL")
+INSTEAD_OF_TESTS = (
+    "give the constants of a law that fits the same tests, or of a cord its modulus by *ELASTIC"
+)

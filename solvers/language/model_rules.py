@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .laws import LAW_CONSTANTS, LAWS_NOT_READ
+from .laws import INSTEAD_OF_TESTS, LAW_CONSTANTS, LAWS_NOT_READ
 from .rule import ANY_ROWS, MANY, NO_ROWS, ONE_ROW, Rule
 
 OF_MATERIAL = ("MATERIAL",)
@@ -377,7 +377,7 @@ MODEL_RULES: dict[str, Rule] = {
         once="parent",
         variants=dict.fromkeys(("TEST DATA INPUT", *LAWS_NOT_READ), ""),
         honoured={"deck|section": f"{'; '.join(LAW_CONSTANTS)}; N; MODULI"},
-        instead="give the constants of a law that fits the same tests",
+        instead=INSTEAD_OF_TESTS,
     ),
     "VISCOELASTIC": Rule(
         "model",

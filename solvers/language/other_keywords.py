@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from .laws import INSTEAD_OF_TESTS
 from .rule import Rule
 
-TESTS = "give the constants of a law that fits the same tests"
 SHARE_NODES = "share nodes, or *TIE surfaces of the same nodes"
 
 
@@ -44,7 +44,7 @@ OTHER_KEYWORDS: dict[str, Rule] = {
         "model",
         "UNIAXIAL TEST DATA, BIAXIAL TEST DATA, PLANAR TEST DATA, VOLUMETRIC TEST DATA, "
         "SHEAR TEST DATA, SIMPLE SHEAR TEST DATA, COMBINED TEST DATA",
-        instead=TESTS,
+        instead=INSTEAD_OF_TESTS,
     ),
     **_unjudged(
         "model",
@@ -54,7 +54,7 @@ OTHER_KEYWORDS: dict[str, Rule] = {
     **_unjudged(
         "model", "HYSTERESIS", instead="give the moduli of slow loading, and *VISCOELASTIC"
     ),
-    **_unjudged("model", "USER MATERIAL", instead="write a *HYPERELASTIC that fits the same tests"),
+    **_unjudged("model", "USER MATERIAL", instead=INSTEAD_OF_TESTS),
     **_unjudged("model part", "UEL PROPERTY", instead="use the elements that the manual has"),
     **_unjudged(
         "model part step",

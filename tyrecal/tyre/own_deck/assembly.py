@@ -15,6 +15,7 @@ class Assembly:
     """What stands in the deck, parts under their instances' names."""
 
     root: Scope = field(default_factory=Scope)
+    taken: dict[str, set[int]] = field(default_factory=dict)  # numbers outside parts, by keyword
     sections: list[tuple[Block, str]] = field(default_factory=list)  # with names' prefix
     surfaces: dict[str, tuple[Block, str]] = field(default_factory=dict)
     rebars: list[tuple[Block, str]] = field(default_factory=list)
@@ -37,7 +38,7 @@ class Part:
 
 def collect(blocks: Sequence[Block]) -> Assembly:
     """The deck's. Raises OwnDeckError."""
-    made, parts = Assembly(), dict[str, Part]()
+    made, parts = Assembly(taken=_taken(blocks)), dict[str, Part]()
     part: Part | None = None
     instance: Block | None = None
     for block in blocks:
@@ -71,6 +72,18 @@ def collect(blocks: Sequence[Block]) -> Assembly:
     return made
 
 
+def _taken(blocks: Sequence[Block]) -> dict[str, set[int]]:
+    """Numbers of the nodes and elements that are given outside parts and instances."""
+    taken: dict[str, set[int]] = {"NODE": set(), "ELEMENT": set()}
+    inside = False
+    for block in blocks:
+        if block.name in ("PART", "INSTANCE", "END PART", "END INSTANCE"):
+            inside = not block.name.startswith("END")
+        elif block.name in taken and not inside:
+            taken[block.name] |= {row.integer(0) for row in block.rows}
+    return taken
+
+
 def _instance(made: Assembly, parts: dict[str, Part], block: Block) -> None:
     """Put a part's nodes, elements, sets and options in the model under INSTANCE.NAME."""
     name, part = block.need("NAME"), parts[block.need("PART")]
@@ -82,8 +95,12 @@ def _instance(made: Assembly, parts: dict[str, Part], block: Block) -> None:
         raise block.refused("a rotation of an instance is not honoured")
     made.shifts[f"{name}."] = dr, dz
     root, own = made.root, part.scope
-    more = max(root.nodes, default=0) if root.nodes.keys() & own.nodes.keys() else 0
-    further = max(root.elements, default=0) if root.elements.keys() & own.elements.keys() else 0
+    numbers_of = (
+        made.taken["NODE"] | root.nodes.keys(),
+        made.taken["ELEMENT"] | root.elements.keys(),
+    )
+    more = max(numbers_of[0]) if numbers_of[0] & own.nodes.keys() else 0
+    further = max(numbers_of[1]) if numbers_of[1] & own.elements.keys() else 0
     nodes = {n: n + more for n in own.nodes}
     elements = {n: n + further for n in own.elements}
     for n, (r, z) in own.nodes.items():

@@ -183,7 +183,10 @@ def _layer(job: SectionJob, k: Block, row: Row, lines: Lines) -> _Layer:
     if row.value(3, 0.0) != 0.0:
         raise DeckError(row.place, "the position of a layer in a surface element is 0.0")
     if material.youngs_modulus is None:
-        raise DeckError(row.place, f"material {material.name} of a rebar layer is not *ELASTIC")
+        words = (
+            f"material {material.name} of a rebar layer is not *ELASTIC: give a cord its modulus"
+        )
+        raise DeckError(row.place, words)
     if material.prony or material.table is not None:
         words = f"material {material.name} of a rebar layer is *VISCOELASTIC: cords do not relax"
         raise DeckError(row.place, words)
