@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tyrecal.cli.main import main
 from tyrecal.simulate.deck.own import asked_by_abaqus
 from tyrecal.tyre.own_deck.found import contents, words
 from tyrecal.tyre.own_deck.own_deck import read_own_deck
@@ -205,6 +206,21 @@ def test_with_the_lines_that_are_printed_it_passes(style: str, held: str, tmp_pa
     assert left_out.count("of its nodes are held") == 2
     assert ("BEAD_L and RIM_L" in left_out) != (style == "general")
     assert ("TREAD and ROAD, which do not touch" in left_out) == (style == "road")
+
+
+def test_the_command_line_prints_the_lines_as_they_go_into_the_deck(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """For the deck itself, and for a case that names it."""
+    (tmp_path / "tyre.inp").write_text(in_contact())
+    (tmp_path / "tyre.yaml").write_text("format: 1\ndeck: {file: tyre.inp}\n")
+    for command in (["init", "--deck", "tyre.inp"], ["validate", "tyre.yaml"]):
+        with pytest.raises(SystemExit) as ended:
+            main([*command[:-1], str(tmp_path / command[-1])])
+        assert ended.value.code == 2
+        first, *lines = capsys.readouterr().err.splitlines()
+        assert first.startswith("error: ") and first.endswith("before the first *STEP:")
+        assert lines[0] == "*NSET, NSET=SEATED" and lines[-2:] == ["*BOUNDARY", "SEATED, ENCASTRE"]
 
 
 def test_a_held_bead_makes_contact_superfluous(tmp_path: Path) -> None:

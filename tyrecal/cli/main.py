@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import sys
 from importlib import import_module
@@ -219,8 +220,8 @@ def main(arguments: list[str] | None = None) -> None:
         words = os_words(failure) if isinstance(failure, OSError) else str(failure)
         if isinstance(failure, MemoryError):
             words = NO_MEMORY
-        for line in words.splitlines():
-            error(line)
+        for sentence in re.split(r"\n(?=[^*\n]*: )", words):  # lines to add to a deck have no ': '
+            error(sentence)
         sys.exit(code)
 
 

@@ -37,7 +37,7 @@ class Mistake:
     def __str__(self) -> str:
         what = f"{self.key} is {self.value}: " if self.key else ""
         where = f"{self.file}, line {self.line}" if self.line else self.file
-        return printable(f"{where}: {what}{self.message}")
+        return "\n".join(map(printable, f"{where}: {what}{self.message}".split("\n")))
 
 
 class CaseError(InputError):
