@@ -25,7 +25,7 @@ from tyrecal.tyre.own_deck.found import contents
 from tyrecal.tyre.own_deck.own_deck import read_own_deck
 from tyrecal.tyre.own_deck.text import OwnDeckError
 
-from ..tyre import own_decks
+from ..tyre import maker_decks, own_decks, test_contact
 
 LONGEST_S, MOST_BYTES = 10, 1 << 30
 NUMBERS: tuple[str, ...] = (
@@ -179,6 +179,9 @@ def draw(count: int, seed: int) -> list[tuple[str, str, float, str]]:
     """Kind, judgement, seconds and text of each mutant."""
     random, mutants = Random(seed), list[tuple[str, str, float, str]]()
     texts = [style() for style in (own_decks.plain, *own_decks.STYLES.values())]
+    makers = ("lifted_membranes", "parts_of_cae", "half_section", "rim_in_contact")
+    texts += [maker_decks.DECKS[name]()[f"{name}.inp"] for name in makers]
+    texts += [test_contact.STYLES["elements"], test_contact.STYLES["instances"]]
     with TemporaryDirectory() as folder:
         path = Path(folder) / "tyre.inp"
         for _ in range(count):

@@ -15,10 +15,11 @@ from random import Random
 from tempfile import TemporaryDirectory
 
 from tyrecal.simulate.deck.own import trial
+from tyrecal.tyre.own_deck.flat import Flat
 from tyrecal.tyre.own_deck.own_deck import read_own_deck
 from tyrecal.tyre.own_deck.text import OwnDeckError
 
-from . import own_decks
+from . import maker_decks, own_decks, test_contact
 
 UNSUPPORTED_MODEL = (
     "*CONTACT PAIR, INTERACTION=I\nCAVITY, CAVITY",
@@ -26,7 +27,7 @@ UNSUPPORTED_MODEL = (
     "*EQUATION\n2\n1001, 1, 1.0, 1003, 1, -1.0",
     "*INITIAL CONDITIONS, TYPE=STRESS\nSOLID, 1.0E3",
     "*TRANSFORM, NSET=RIM\n1., 0., 0., 0., 1., 0.",
-    "*MEMBRANE SECTION, ELSET=BELT, MATERIAL=CORD\n0.001",
+    "*SHELL SECTION, ELSET=BELT, MATERIAL=CORD\n0.001",
     "*ELEMENT, TYPE=MASS, ELSET=M\n77777, 1001",
     "*ELEMENT, TYPE=SPRING1, ELSET=S\n77778, 1001",
     "*BOUNDARY\n1005, 1, 1",
@@ -227,7 +228,7 @@ KINDS: dict[str, Mutant] = {
 }
 
 
-def judged(folder: Path, text: str, flat: str) -> str:
+def judged(folder: Path, text: str, right: Flat) -> str:
     """``refused`` by line, ``same``, or what is wrong."""
     path = folder / "tyre.inp"
     path.write_text(text, encoding="utf-8")
@@ -238,7 +239,8 @@ def judged(folder: Path, text: str, flat: str) -> str:
         return "refused" if error.place.line else "no line"
     except Exception as error:
         return f"{type(error).__name__}: {error}"
-    return "same" if deck.text == flat and deck.pressure_Pa == 2e5 else "COMPUTED OTHERWISE"
+    is_same = deck.text == right.text and deck.pressure_Pa == right.pressure_Pa
+    return "same" if is_same else "COMPUTED OTHERWISE"
 
 
 def draw(count: int, seed: int) -> list[tuple[str, str, str, str]]:
@@ -246,12 +248,18 @@ def draw(count: int, seed: int) -> list[tuple[str, str, str, str]]:
     random, results = Random(seed), list[tuple[str, str, str, str]]()
     styles = {"plain": own_decks.plain, **own_decks.STYLES}
     del styles["millimetres"], styles["free_format"]  # of the same words as others
+    for name in ("lifted_membranes", "parts_of_cae"):
+        styles[name] = lambda name=name: maker_decks.DECKS[name]()[f"{name}.inp"]
+    styles["contact"] = lambda: own_decks.plain(
+        own_decks.Tyre().mesh() + test_contact.rims() + test_contact.PAIRS,
+        step=test_contact.MOUNT + own_decks.STEP,
+    )
     with TemporaryDirectory() as folder:
         while len(results) < count:
             style = random.choice(list(styles))
             text = styles[style]()
             (Path(folder) / "right.inp").write_text(text)
-            right = read_own_deck(Path(folder) / "right.inp", "m").flat({}).text
+            right = read_own_deck(Path(folder) / "right.inp", "m").flat({})
             kind = random.choice(list(KINDS))
             try:
                 wrong = KINDS[kind](text, random)
