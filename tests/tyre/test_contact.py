@@ -205,6 +205,7 @@ def test_with_the_lines_that_are_printed_it_passes(style: str, held: str, tmp_pa
     assert text == held
     assert left_out.count("of its nodes are held") == 2
     assert ("BEAD_L and RIM_L" in left_out) != (style == "general")
+    assert ("up to 0 off the rim" in left_out) == (style != "pushed_5_mm")
     assert ("TREAD and ROAD, which do not touch" in left_out) == (style == "road")
 
 
@@ -232,7 +233,7 @@ def test_a_held_bead_makes_contact_superfluous(tmp_path: Path) -> None:
     flat = read_own_deck(path).flat({})
     assert flat.text == whole.text and flat.model.reference == whole.model.reference
     assert [words.rpartition(", as ")[2] for words in flat.model.left_out] == [
-        "13 of its nodes are held"
+        "13 of its nodes are held, up to 0 off the rim"
     ] * 2
 
 

@@ -14,14 +14,14 @@ import numpy as np
 from .assembly import Assembly
 from .constraints import Constraints
 from .grammar import Sorted
-from .scope import nearest
+from .scope import FARTHEST, nearest
 from .surfaces import boundary_of, rigid_pieces, surface_nodes
 from .text import Block, Row
 
 TOUCHING = 0.01  # of the section's size: a node that near to the rim touches it
 PUSHED = 0.1  # of the section's size: how far a rim pushes nodes of a bead that it is mounted on
-NODES_ON_A_LINE = 12  # node numbers
-MOST_NAMES = 100
+NODES_ON_A_LINE, MOST_NAMES = 12, 100
+MOST_TO_COMPARE = 5_000_000  # nodes times segments of a pair
 Array = np.ndarray
 
 
@@ -49,7 +49,7 @@ class Contact:
 
     def left_out(self) -> tuple[str, ...]:
         """Words on each contact that is left out. Raises OwnDeckError if a bead is not held."""
-        words, free = list[str](), list[tuple[Pair, Array]]()
+        words, free = list[str](), list[tuple[Pair, Array, Array]]()
         for pair in self._pairs():
             touching, distance = self._touching(pair)
             held = [n for n in pair.nodes if n in self.tied.rim]
@@ -62,9 +62,10 @@ class Contact:
                     )
                 words.append(f"contact of {pair.name}, which do not touch in this step")
             elif held and 2 * len(held) >= len(touching):
-                words.append(f"contact of {pair.name}, as {len(held)} of its nodes are held")
+                off = f", up to {distance.max():.3g} off the rim" if len(touching) else ""
+                words.append(f"contact of {pair.name}, as {len(held)} of its nodes are held{off}")
             else:
-                free.append((pair, touching))
+                free.append((pair, touching, distance))
         if free:
             self._refuse(free)
         return tuple(words)
@@ -98,7 +99,11 @@ class Contact:
         pieces = rigid_pieces(self.made, *self.made.surfaces[master])
         motion = self.tied.motions.get(body.reference, {})
         moved = pieces + np.array([motion.get(1, 0.0), motion.get(2, 0.0)])
+        if not (len(moved) and np.abs(moved).max() < FARTHEST):
+            raise block.refused(f"{master} has no length, or lies where no tyre is", row)
         own = tuple(dict.fromkeys(self.tied.same.get(n, n) for n in nodes))
+        if len(own) * len(moved) > MOST_TO_COMPARE:
+            raise block.refused(f"{slave} and {master} have too many nodes and segments", row)
         return Pair(block, row, f"{slave} and {master}", own, moved, body.reference)
 
     def _touching(self, pair: Pair) -> tuple[Array, Array]:
@@ -112,13 +117,14 @@ class Contact:
         further, _ = nearest(X + 1e-6 * self.size * normal, pair.pieces)
         beyond = (further < away) & ~past_an_end & (away < PUSHED * self.size)
         touching = (away <= TOUCHING * self.size) | beyond
+        away[away < self.tied.near] = 0.0
         return np.array(pair.nodes)[touching], away[touching]
 
-    def _refuse(self, free: Sequence[tuple[Pair, Array]]) -> None:
+    def _refuse(self, free: Sequence[tuple[Pair, Array, Array]]) -> None:
         """Raises OwnDeckError with the lines that hold the beads."""
         pair = free[0][0]
-        for each, touching in free:
-            if not {1, 2} <= self.tied.motions.get(each.reference, {}).keys():
+        for each, touching, _ in free:
+            if not {1, 2} <= self.tied.motions.get(each.reference, {1: 0.0, 2: 0.0}).keys():
                 raise each.block.refused(
                     f"contact of {each.name} is not honoured, and where the rim is cannot be known:"
                     f" *BOUNDARY must hold or move its node {each.reference} in 1 and 2",
@@ -133,10 +139,12 @@ class Contact:
                     f" the nearest, {away.min():.3g} away; hold the bead by *BOUNDARY, ENCASTRE",
                     each.row,
                 )
-        nodes = sorted({int(n) for _, touching in free for n in touching})
+        nodes = sorted({int(n) for _, touching, _ in free for n in touching})
+        most = max(distance.max() for *_, distance in free)
         raise pair.block.refused(
-            f"contact of {' and '.join(each.name for each, _ in free)} is not honoured; hold the"
-            f" bead where it touches the rim by adding {self._lines(nodes)}",
+            f"contact of {' and '.join(each.name for each, *_ in free)} is not honoured; hold the"
+            f" bead where it touches the rim (its nodes stay where they are, up to {most:.3g} off"
+            f" it) by adding {self._lines(nodes)}",
             pair.row,
         )
 

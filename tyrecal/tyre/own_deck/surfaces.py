@@ -118,7 +118,8 @@ def _profile(surface: Block) -> np.ndarray:
             continue
         two = np.array([row.number(3), row.number(4)])
         if kind == "CIRCL":
-            points += [along_arc(start, one, two, share) for share in shares]
+            points += [along_arc(start, one, two, share) for share in shares[:-1]]
+            points.append(one)
         elif kind == "PARAB":  # through its middle point
             for s in shares:
                 points.append(
