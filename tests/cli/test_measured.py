@@ -18,7 +18,15 @@ from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.observations import observe
 
 from ..measured.test_universal import ANGLES, function, geometry, shape, units, write
-from ..studies.measured_data import BAND, CASES, TRUTH, evaluated, write_shapes, write_table
+from ..studies.measured_data import (
+    BAND,
+    CASES,
+    TRUTH,
+    evaluated,
+    write_shapes,
+    write_soft_clamp,
+    write_table,
+)
 from .test_cli import run
 
 FOLDER = CASES / "measured"
@@ -379,7 +387,9 @@ def test_help_and_tables_import_nothing_heavy() -> None:
 def test_the_shipped_files_are_the_scripts(tmp_path: Path) -> None:
     write_shapes(tmp_path, np.random.default_rng((20, 1)))
     write_table(tmp_path, np.random.default_rng((20, 2)))
-    assert (tmp_path / TABLE.name).read_bytes() == TABLE.read_bytes()
+    write_soft_clamp(tmp_path, np.random.default_rng((20, 3)))
+    for name in (TABLE.name, "p235_75r17_soft_clamp.csv"):
+        assert (tmp_path / name).read_bytes() == (FOLDER / name).read_bytes()
     ours, shipped = (
         pyuff.UFF(str(folder / SHAPES.name)).read_sets() for folder in (tmp_path, FOLDER)
     )

@@ -5,9 +5,9 @@
 The tyre is the model of cases/p235_75r17.yaml at the design TRUTH, with modal damping that the
 model lacks. At 240 kPa: accelerances from a skewed shaker at the shoulder, measured three times,
 the tyre mounted again between; at 200 kPa: complex mode shapes, as a laboratory's own software
-identified them; at 280 kPa: a table from a spreadsheet with semicolons and decimal commas. Noise,
-errors of gain, direction and place of the sensors, and the scatter of mounting are drawn from one
-seed.
+identified them; at 280 kPa: a table from a spreadsheet with semicolons and decimal commas. One more
+file is of that tyre in a clamp that tilts (the effect spindle_tilt). Noise, errors of gain,
+direction and place of the sensors, and the scatter of mounting are drawn from one seed.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -47,6 +48,8 @@ NOISE = 0.01  # of the accelerances' root mean square
 GAIN, TURN, PLACE = 0.03, 0.03, 0.003  # of sensors: relative, rad, m
 MOUNTING, REPEAT = 0.001, 0.0005  # relative scatter of all frequencies together, of each
 SPLIT = 0.004  # relative, of doublets at 200 kPa
+SOFT_CLAMP = {"effects.spindle_tilt": 2.4e-6}  # rad/(N m)
+SOFT_CLAMP_SIGMA = 0.002  # relative
 
 
 @dataclass(frozen=True)
@@ -61,10 +64,10 @@ class Sensor:
     measures: tuple[int, ...]
 
 
-def evaluated(pressure_kPa: float) -> list[Mode]:
-    """All modes of the true tyre."""
+def evaluated(pressure_kPa: float, effects: Mapping[str, float] | None = None) -> list[Mode]:
+    """All modes of the true tyre, with effects by path."""
     case = load_case(CASES / "p235_75r17.yaml")
-    case = with_values(case, {"analysis.highest_harmonic": HIGHEST})
+    case = with_values(case, {"analysis.highest_harmonic": HIGHEST, **(effects or {})})
     question = Question({**TRUTH, "pressure_kPa": pressure_kPa}, (), PER_HARMONIC)
     modes = paired_labels(Evaluator(TyreDesign(case)).evaluate(question).modes)
     return sorted((m for m in modes if m.frequency_Hz < CEILING), key=lambda m: m.frequency_Hz)
@@ -261,9 +264,22 @@ def write_table(folder: Path, rng: np.random.Generator) -> None:
     (folder / "p235_75r17_280kPa_table.csv").write_bytes(text.encode("utf-8-sig"))
 
 
+def write_soft_clamp(folder: Path, rng: np.random.Generator) -> None:
+    """A measurements CSV of the tyre in a clamp that tilts."""
+    lines = ["label,frequency_Hz,sigma_Hz,pressure_kPa"]
+    for mode in evaluated(240.0, SOFT_CLAMP):
+        if BAND[0] < mode.frequency_Hz < BAND[1]:
+            sigma = SOFT_CLAMP_SIGMA * mode.frequency_Hz
+            hertz = mode.frequency_Hz + sigma * rng.standard_normal()
+            label = {"axial": "[0,0] lateral", "torsional": "[0,0] torsional"}
+            name = label.get(mode.label.kind, str(mode.label))
+            lines.append(f'"{name}",{hertz:.2f},{sigma:.2f},240')
+    (folder / "p235_75r17_soft_clamp.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
 def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
-    for seed, write in enumerate((write_functions, write_shapes, write_table)):
+    for seed, write in enumerate((write_functions, write_shapes, write_table, write_soft_clamp)):
         write(folder, np.random.default_rng((SEED, seed)))
 
 
