@@ -1,11 +1,12 @@
 """Every command of the README and the guides runs, on what the commands above it have made.
 
 One ```sh block is one test. The README's run as they stand; the other guides' on the coarse mesh of
-their cases, in a fifth of the time.
+their cases, in a fifth of the time. Lines of a ```text block right below are lines of the output.
 """
 
 from __future__ import annotations
 
+import csv
 import os
 import re
 import shutil
@@ -45,15 +46,23 @@ MAKERS = {  # first words of blocks whose files those below them read
     "cases/measured_data.md": ["tyrecal measured import "],
 }
 QUICK = [  # first words of blocks of the README that the quick set runs; they need no block above
-    "tyrecal validate",
-    "tyrecal init",
+    "tyrecal init"
 ]
 
 
+def examples(guide: str) -> dict[str, str]:
+    """The guide's ```sh blocks without their set-up, each with the output that the guide shows.
+
+    The command that runs the tests is left out.
+    """
+    text = (ROOT / guide).read_text()
+    pairs = re.findall(r"```sh\n(.*?)```\n(?:```text\n(.*?)```)?", text, re.S)
+    plain = {re.sub(rf"{OWN_SETUP}.*&& .venv/bin/", "", block): output for block, output in pairs}
+    return {block: output for block, output in plain.items() if OWN_SETUP not in block}
+
+
 def blocks(guide: str) -> list[str]:
-    """The guide's ```sh blocks, but for those that set themselves up."""
-    texts = re.findall(r"```sh\n(.*?)```", (ROOT / guide).read_text(), re.S)
-    return [block for block in texts if OWN_SETUP not in block]
+    return list(examples(guide))
 
 
 def makes(guide: str, block: str) -> bool:
@@ -77,13 +86,19 @@ def parameters() -> list[object]:
     ]
 
 
-def execute(block: str, folder: Path) -> None:
-    """The block in a shell that stops at the first command that fails."""
+def execute(block: str, folder: Path) -> str:
+    """The output of the block in a shell that stops at the first command that fails."""
     environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
     done = subprocess.run(
         ["sh", "-e", "-c", block], cwd=folder, capture_output=True, text=True, env=environment
     )
     assert done.returncode == 0, f"{block}\n{done.stdout[-1500:]}{done.stderr[-1500:]}"
+    return done.stdout
+
+
+def single_blanks(text: str) -> list[str]:
+    """The lines of a text, blanks in a row as one."""
+    return [" ".join(line.split()) for line in text.splitlines()]
 
 
 Clone = Callable[[str, int], Path]
@@ -128,7 +143,8 @@ def test_commands_of(guide: str, number: int, clone: Clone) -> None:
     if makes(guide, block):
         clone(guide, number + 1)
     else:
-        execute(block, clone(guide, number))
+        output = single_blanks(execute(block, clone(guide, number)))
+        assert not set(single_blanks(examples(guide)[block])) - set(output), output
 
 
 @pytest.mark.parametrize("guide", MAKERS)
@@ -140,6 +156,18 @@ def test_what_makes_files_for_others_is_in_the_guide(guide: str) -> None:
 def test_the_quick_blocks_are_in_the_readme() -> None:
     for words in QUICK:
         assert any(block.startswith(words) for block in blocks("README.md")), words
+
+
+@pytest.mark.guide
+def test_the_results_table_is_what_the_fit_gives(clone: Clone) -> None:
+    with (clone("README.md", 1) / "p235_75r17/fit.csv").open(encoding="utf-8") as file:
+        fitted = list(csv.DictReader(file))
+    table = re.findall(r"^\| \[\d,\d\] .*?\| (.*) \|$", (ROOT / "README.md").read_text(), re.M)
+    for cells, row in zip(table, fitted, strict=True):
+        shown = [float(cell.replace("\N{MINUS SIGN}", "-")) for cell in cells.split(" | ")]
+        hertz = [row["initial_Hz"], row["fitted_Hz"], row["target_Hz"]]
+        assert shown[:3] == pytest.approx(list(map(float, hertz)), abs=0.006)
+        assert shown[3] == pytest.approx(float(row["deviation_percent"]), abs=0.06)
 
 
 @pytest.mark.guide

@@ -1,0 +1,156 @@
+"""README and guides are short sentences in plain words: lengths, sums of words, words to avoid.
+
+Tables and code are not sentences. A document that is not rewritten yet is in `NOT_YET_REWRITTEN`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from markdown_it import MarkdownIt
+
+from tyrecal.tyre.case.schema import Case
+
+ROOT = Path(__file__).parents[1]
+GUIDES = sorted((ROOT / "cases").glob("*.md"))
+DOCUMENTS = ["README.md", *(f"cases/{path.name}" for path in GUIDES), "solvers/README.md"]
+NOT_YET_REWRITTEN = [  # whoever rewrites one takes it out
+    "cases/batch.md",
+    "cases/blind.md",
+    "cases/cluster.md",
+    "cases/diagnosis.md",
+    "cases/measured_data.md",
+    "cases/own_deck.md",
+    "cases/own_effect.md",
+    "cases/own_solver.md",
+    "cases/own_template.md",
+    "cases/own_tyre.md",
+    "cases/paper.md",
+    "cases/python.md",
+    "cases/real_data.md",
+    "cases/sampling.md",
+    "cases/theory.md",
+    "solvers/README.md",
+]
+REWRITTEN = [name for name in DOCUMENTS if name not in NOT_YET_REWRITTEN]
+README_LINES = 150
+SENTENCE_WORDS = 35
+MEAN_SENTENCE_WORDS = 20.0
+WORDS = 22_000  # of all documents, without the tables of the reference
+REFERENCE = ["cases/README.md", "cases/glossary.md"]  # tables of keys and terms
+CHANGELOG_WORDS = 600  # of one version
+AVOID = re.compile(  # the left column is what a reader stumbles over, the comment what to write
+    r"""\b(
+    told | is\ said | are\ said | says?\ of            # reported, printed, listed
+    | asks?\ the\ model | is\ asked | are\ asked       # is evaluated, runs the solver
+    | hangs?\ on                                       # depends on
+    | stands?\ (in|at) | lies?\ in                     # is in, is given in
+    | comes?\ to | (is|are)\ worth                     # is, amounts to
+    | in\ play | takes?\ up | gives?\ way              # active, absorbs, yields
+    | nobody | whoever | whatever | at\ hand           # name the case
+    | an\ own | (one|some)\ of\ one's\ own | an\ own\ one  # your own
+    | discs? | telephones?                             # disk, phone
+    | beside                                           # next to, in addition to
+    | slopes?                                          # sensitivity
+    | (a|the|on|one|from|this)\ record                 # evaluation store
+    | outside\ the\ catalogue                          # not explained by the catalogue
+    | axial\ (mode|shape|\[)                           # lateral
+    | but\ for                                         # except
+    )\b""",
+    re.VERBOSE | re.IGNORECASE,
+)
+
+
+def prose(name: str) -> Iterator[str]:
+    """Paragraphs, items of lists and cells of tables of a document, links as their text.
+
+    Inline code is one word.
+    """
+    for _, text in blocks(name):
+        yield text
+
+
+def blocks(name: str) -> Iterator[tuple[str, str]]:
+    """The same, each with the kind of block that it is in: paragraph, heading, th or td."""
+    tokens = MarkdownIt().enable("table").parse((ROOT / name).read_text(encoding="utf-8"))
+    for before, token in pairwise(tokens):
+        if token.type == "inline":
+            pieces = [
+                {"text": child.content, "code_inline": "`code`", "softbreak": " "}.get(
+                    child.type, ""
+                )
+                for child in token.children or []
+            ]
+            yield before.type.removesuffix("_open"), "".join(pieces)
+
+
+def sentences(name: str) -> list[str]:
+    """Sentences of the paragraphs and lists of a document."""
+    paragraphs = [text for kind, text in blocks(name) if kind == "paragraph"]
+    return [s for text in paragraphs for s in re.split(r"(?<=[.!?])\s+(?=[^a-z])", text) if s]
+
+
+def word_count(text: str) -> int:
+    """Words: runs of letters and digits with what is joined to them by no blank."""
+    return sum(any(c.isalnum() for c in word) for word in text.split())
+
+
+def words_without_reference(name: str) -> int:
+    """Words of a document's text, code included, without the tables of the reference."""
+    lines = (ROOT / name).read_text(encoding="utf-8").splitlines()
+    kept = [line for line in lines if not (name in REFERENCE and line.startswith("|"))]
+    return word_count("\n".join(kept))
+
+
+@pytest.mark.parametrize("name", REWRITTEN)
+def test_sentences_are_short(name: str) -> None:
+    lengths = {sentence: word_count(sentence) for sentence in sentences(name)}
+    assert not [s for s, length in lengths.items() if length > SENTENCE_WORDS]
+    assert sum(lengths.values()) / len(lengths) <= MEAN_SENTENCE_WORDS
+
+
+@pytest.mark.parametrize("name", REWRITTEN)
+def test_words_are_plain(name: str) -> None:
+    assert not [(match[0], text) for text in prose(name) for match in AVOID.finditer(text)]
+
+
+def test_documents_together_are_short() -> None:
+    assert sum(map(words_without_reference, REWRITTEN)) <= WORDS
+
+
+def test_documents_left_exist() -> None:
+    assert set(NOT_YET_REWRITTEN) <= set(DOCUMENTS)
+
+
+def test_the_readme_is_one_page() -> None:
+    lines = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
+    assert len(lines) <= README_LINES
+    assert "what the model is missing" in " ".join(lines[:10])
+
+
+def test_every_key_of_a_case_is_in_its_reference() -> None:
+    schema = Case.model_json_schema()
+    keys = {
+        key for part in [schema, *schema["$defs"].values()] for key in part.get("properties", {})
+    }
+    text = (ROOT / "cases/README.md").read_text(encoding="utf-8")
+    assert not {key for key in keys if not re.search(rf"\b{key}\b", text)}
+
+
+def anchors(path: Path) -> set[str]:
+    """The headings of a document as links name them."""
+    headings = re.findall(r"^#+ (.*)$", path.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", h.lower()).replace(" ", "-") for h in headings}
+
+
+def test_links_lead_to_headings() -> None:
+    documents = [*ROOT.glob("*.md"), *ROOT.glob("[!.]*/**/*.md"), *ROOT.glob(".github/*.md")]
+    for path in documents:
+        for file, heading in re.findall(
+            r"\]\(([^)#:]*)#([^)]+)\)", path.read_text(encoding="utf-8")
+        ):
+            assert heading in anchors(path.parent / file if file else path), (path, file, heading)
