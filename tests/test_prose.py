@@ -19,18 +19,12 @@ ROOT = Path(__file__).parents[1]
 GUIDES = sorted((ROOT / "cases").glob("*.md"))
 DOCUMENTS = ["README.md", *(f"cases/{path.name}" for path in GUIDES), "solvers/README.md"]
 NOT_YET_REWRITTEN = [  # whoever rewrites one takes it out
-    "cases/batch.md",
     "cases/blind.md",
-    "cases/cluster.md",
     "cases/diagnosis.md",
     "cases/measured_data.md",
     "cases/own_deck.md",
-    "cases/own_effect.md",
-    "cases/own_solver.md",
-    "cases/own_template.md",
     "cases/own_tyre.md",
     "cases/paper.md",
-    "cases/python.md",
     "cases/real_data.md",
     "cases/sampling.md",
     "cases/theory.md",
