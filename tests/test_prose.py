@@ -22,7 +22,6 @@ NOT_YET_REWRITTEN = [  # whoever rewrites one takes it out
     "cases/blind.md",
     "cases/diagnosis.md",
     "cases/measured_data.md",
-    "cases/own_deck.md",
     "cases/own_tyre.md",
     "cases/paper.md",
     "cases/real_data.md",
