@@ -21,6 +21,7 @@ ROOT = Path(__file__).parents[1]
 GUIDES = [
     "README.md",
     "cases/README.md",
+    "cases/glossary.md",
     "cases/own_tyre.md",
     "cases/own_deck.md",
     "cases/sampling.md",
