@@ -17,15 +17,15 @@ FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 VAGUE_NAMES = {"found", "told", "asked", "said"}
 # Counts may only fall: whoever rewords one of these places lowers its number here.
-VAGUE_DOCSTRINGS_LEFT = 516
-VAGUE_LOCALS_LEFT = 1178
+VAGUE_DOCSTRINGS_LEFT = 512
+VAGUE_LOCALS_LEFT = 1167
 HOOKS = YAML(typ="safe").load(ROOT / ".pre-commit-config.yaml")["repos"][0]["hooks"]
 
 
 @pytest.mark.lint
 @pytest.mark.parametrize("hook", HOOKS, ids=lambda hook: hook["id"])
 def test_clean(hook: dict[str, str]) -> None:
-    """What a commit's hooks check."""
+    """The checks of a commit's hooks pass."""
     done = subprocess.run(
         [sys.executable, "-m", *hook["entry"].split()], cwd=ROOT, capture_output=True, text=True
     )

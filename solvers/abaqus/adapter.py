@@ -24,9 +24,9 @@ JOB, OLDJOB = "modes", "inflate"
 
 
 class Decks(Protocol):
-    """What the tool hands over; ``options``: the solver's, from the case; ``request``: among what
-    is asked, of a user's deck ``own_deck`` with its units, of those in three dimensions
-    ``own_decks``."""
+    """Decks and requests that the tool hands to the adapter. ``options``: this solver's options
+    from the case; ``request``: for a user's deck its units under ``own_deck``, for decks in three
+    dimensions ``own_decks``."""
 
     options: Mapping[str, Any]
     request: Mapping[str, Any]
@@ -54,7 +54,7 @@ class Abaqus:
     def version(self) -> str:
         """Release of the program, "unknown" where there is none."""
         try:
-            said = subprocess.run(
+            output = subprocess.run(
                 [*self.command, "information=release"],
                 capture_output=True,
                 text=True,
@@ -63,7 +63,7 @@ class Abaqus:
             ).stdout
         except (OSError, subprocess.TimeoutExpired):
             return "unknown"
-        release = re.search(r"abaqus\D*(\d[\w.\-]*)", said, re.IGNORECASE)
+        release = re.search(r"abaqus\D*(\d[\w.\-]*)", output, re.IGNORECASE)
         return release[1] if release else "unknown"
 
     def write(self, decks: Decks, folder: Path) -> list[Path]:
@@ -95,22 +95,22 @@ class Abaqus:
         job = own.last if own else JOB
         length_m, mass_kg = (own or units).length_m, (own or units).mass_kg
         if own:
-            asked, pressure_Pa = own.modes, own.pressure_Pa
+            count, pressure_Pa = own.modes, own.pressure_Pa
         else:
             question = read_question(folder / f"{JOB}.inp")
-            asked, pressure_Pa = question.modes, question.pressure * mass_kg / length_m
+            count, pressure_Pa = question.modes, question.pressure * mass_kg / length_m
         table = read_dat(folder / f"{job}.dat")
         if own:  # the mass is told with the model, not where a job only goes on
             tables = [read_dat(folder / f"{each}.dat") for each, _ in own.jobs]
             masses = [each.mass for each in tables if each.mass is not None]
             table = DatTable(table.frequencies_Hz, masses[-1] if masses else None)
-        found = checked_modes(folder / f"{job}.fil", asked, table)
-        points, vectors = length_m * found.coordinates, found.displacement
+        raw_modes = checked_modes(folder / f"{job}.fil", count, table)
+        points, vectors = length_m * raw_modes.coordinates, raw_modes.displacement
         if own:
             points, turn = about_axle(points)
             vectors = vectors @ turn.T
-        norms = np.sqrt(found.masses * mass_kg)[:, None, None]
-        places, modes = ring_modes(found.eigenvalues, points, vectors / norms)
+        norms = np.sqrt(raw_modes.masses * mass_kg)[:, None, None]
+        places, modes = ring_modes(raw_modes.eigenvalues, points, vectors / norms)
         return {
             "pressure_Pa": pressure_Pa,
             "mass_kg": table.mass and table.mass * mass_kg,

@@ -30,8 +30,8 @@ GENERATORS = {"NGEN", "NFILL", "NCOPY", "ELGEN", "ELCOPY", "SYMMETRIC MODEL GENE
 
 @dataclass(frozen=True)
 class Finding:
-    """What is wrong with a keyword or one of its data lines; sure: ABAQUS refuses it by its
-    manual, else the table has no rule for it, or the manual does not say what happens."""
+    """A fault of a keyword or of one of its data lines. ``sure``: ABAQUS' manual refuses it;
+    otherwise the table has no rule for it, or the manual does not say what happens."""
 
     block: Block
     row: Row | None
@@ -51,24 +51,24 @@ class _Names:
 
 
 def findings(blocks: Sequence[Block], before: Sequence[Block] = ()) -> list[Finding]:
-    """What is wrong with the keywords of a job that goes on from the model of another."""
+    """Faults in the keywords of a job, which may continue from the model of another, ``before``."""
     names = _Names()
     for block in before:
         list(_parameters(block, RULES.get(block.name, Rule("")), names))
         list(_data(block, RULES.get(block.name, Rule("")), names))
     names.used.clear()
     names.bare.clear()
-    found = [*_order(blocks, before)]
+    faults = [*_order(blocks, before)]
     for block in blocks:
         rule = RULES.get(block.name)
         if rule and rule.is_judged:
-            found += _parameters(block, rule, names)
-            found += _data(block, rule, names)
+            faults += _parameters(block, rule, names)
+            faults += _data(block, rule, names)
     if not any(
         block.name in BEGIN_END for block in (*before, *blocks)
     ):  # of parts, names have prefixes
-        found += _unnamed(blocks, names)
-    return found
+        faults += _unnamed(blocks, names)
+    return faults
 
 
 def _order(blocks: Sequence[Block], before: Sequence[Block]) -> Iterator[Finding]:

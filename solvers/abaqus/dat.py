@@ -34,14 +34,14 @@ def read_dat(path: Path) -> DatTable:
 
 
 def _rows(text: str) -> dict[int, float]:
-    found: dict[int, float] = {}
+    by_number: dict[int, float] = {}
     for line in text.splitlines():
         row = _ROW.match(line)
-        if row and int(row[1]) == len(found) + 1:
-            found[int(row[1])] = _number(row[2].split()[2])
-        elif found and line.strip():  # the next table, of participation factors
+        if row and int(row[1]) == len(by_number) + 1:
+            by_number[int(row[1])] = _number(row[2].split()[2])
+        elif by_number and line.strip():  # the next table, of participation factors
             break
-    return found
+    return by_number
 
 
 def _number(text: str) -> float:

@@ -14,8 +14,8 @@ from .fil import SIM, Modes, read_fil
 PRINTED_RTOL = 1e-3
 
 
-def checked_modes(path: Path, asked: int | None, table: DatTable) -> Modes:
-    """Modes of the results file at ``path``; ``asked`` of them, those that the .dat's table lists.
+def checked_modes(path: Path, expected: int | None, table: DatTable) -> Modes:
+    """Modes of the results file at ``path``; ``expected`` of them, those of the .dat's table.
 
     Raises RunFailed: ``no_results``, or ``unstable`` for a negative eigenvalue.
     """
@@ -25,15 +25,15 @@ def checked_modes(path: Path, asked: int | None, table: DatTable) -> Modes:
         raise _failed(f"{printed * bool(table.frequencies_Hz)}there is no {path.name}: {SIM}")
     if path.stat().st_mtime < path.with_suffix(".inp").stat().st_mtime:
         raise _failed(f"{path.name} is older than the deck: not of this run")
-    found = read_fil(path)
-    values = found.eigenvalues
-    if asked is not None and len(values) != asked:
-        raise _failed(f"{path.name} has {len(values)} modes, {asked} were asked")
-    if not all(np.isfinite(part).all() for part in (values, found.masses, found.displacement)):
+    modes = read_fil(path)
+    values = modes.eigenvalues
+    if expected is not None and len(values) != expected:
+        raise _failed(f"{path.name} has {len(values)} modes, {expected} were asked")
+    if not all(np.isfinite(part).all() for part in (values, modes.masses, modes.displacement)):
         raise _failed(f"{path.name} holds numbers that are none")
     if (values < 0).any():
         raise RunFailed("unstable", f"{path.name}: eigenvalue {values.min():g} is negative")
-    if not (values.all() and (found.masses > 0).all() and found.displacement.any((1, 2)).all()):
+    if not (values.all() and (modes.masses > 0).all() and modes.displacement.any((1, 2)).all()):
         raise _failed(f"{path.name}: a mode's eigenvalue, mass or shape is zero")
     own_Hz = np.sqrt(values) / (2 * np.pi)
     for number, printed_Hz in table.frequencies_Hz.items():
@@ -44,7 +44,7 @@ def checked_modes(path: Path, asked: int | None, table: DatTable) -> Modes:
             raise _failed(f"{path.name} and {dat} disagree on mode {number}")
     if table.mass is None:
         raise _failed(f"{dat} states no TOTAL MASS OF MODEL")
-    return found
+    return modes
 
 
 def _failed(message: str) -> RunFailed:

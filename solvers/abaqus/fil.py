@@ -44,7 +44,7 @@ def read_fil(path: Path) -> Modes:
 
 def _modes(text: str) -> Modes:
     places: dict[int, list[float]] = {}
-    found: dict[int, tuple[float, float]] = {}
+    mode_data: dict[int, tuple[float, float]] = {}
     shapes: dict[int, dict[int, list[float]]] = {}
     mode, is_open, last = 0, False, 0
     for key, a in records(text):
@@ -55,16 +55,16 @@ def _modes(text: str) -> Modes:
             places[int(a[0])] = _vector(a)
         elif key == MODE:
             mode = int(a[0])
-            if mode in found:
+            if mode in mode_data:
                 raise ValueError(f"mode {mode} stands in it twice: two runs, or two steps of modes")
-            found[mode], shapes[mode] = (float(a[1]), float(a[2])), {}
+            mode_data[mode], shapes[mode] = (float(a[1]), float(a[2])), {}
         elif key == U and mode:
             shapes[mode][int(a[0])] = _vector(a)
         elif key == COORD and mode:
             places.setdefault(int(a[0]), _vector(a))
     if is_open or last != END:
         raise ValueError("it is cut short: its last increment does not end")
-    return _arrays(places, found, shapes)
+    return _arrays(places, mode_data, shapes)
 
 
 def _vector(a: list[Item]) -> list[float]:
@@ -73,12 +73,12 @@ def _vector(a: list[Item]) -> list[float]:
 
 def _arrays(
     places: dict[int, list[float]],
-    found: dict[int, tuple[float, float]],
+    mode_data: dict[int, tuple[float, float]],
     shapes: dict[int, dict[int, list[float]]],
 ) -> Modes:
-    if not found:
+    if not mode_data:
         raise ValueError("it holds no mode")
-    order = sorted(found)
+    order = sorted(mode_data)
     nodes = list(shapes[order[0]])
     if not nodes:
         raise ValueError(f"no shapes in it: {SIM}")
@@ -89,8 +89,8 @@ def _arrays(
     if bare:
         raise ValueError(f"node {bare[0]} has no coordinates")
     return Modes(
-        np.array([found[n][0] for n in order]),
-        np.array([found[n][1] for n in order]),
+        np.array([mode_data[n][0] for n in order]),
+        np.array([mode_data[n][1] for n in order]),
         np.array(nodes),
         np.array([places[n] for n in nodes]),
         np.array([list(shapes[n].values()) for n in order]),

@@ -67,9 +67,9 @@ def _attempt(command: list[str], job: str, folder: Path, time_limit_s: float) ->
     try:
         code = run_command(command, folder, time_limit_s, f"{job}.out")
     except RunFailed:
-        said = last_words(folder / f"{job}.out", 1)
-        if is_queueing(said):
-            raise RunFailed("licence", f"job {job} never got its licence", said) from None
+        last_line = last_words(folder / f"{job}.out", 1)
+        if is_queueing(last_line):
+            raise RunFailed("licence", f"job {job} never got its licence", last_line) from None
         raise
     status = _tail(folder / f"{job}.sta")
     if code == 0 and SUCCESS in status:

@@ -33,8 +33,8 @@ class Options:
 
 def load(folder: Path) -> Options:
     """Options that were saved in a run folder. Raises OSError."""
-    told = json.loads((folder / OPTIONS_FILE).read_text(encoding="utf-8"))
-    return Options(**{name: told[name] for name in Options.__dataclass_fields__})
+    saved = json.loads((folder / OPTIONS_FILE).read_text(encoding="utf-8"))
+    return Options(**{name: saved[name] for name in Options.__dataclass_fields__})
 
 
 def read_options(given: Mapping[str, Any], **units: float) -> Options:

@@ -1,4 +1,5 @@
-"""What the modes deck asks for, read from the deck itself: an own template is taken at its word."""
+"""Number of modes and pressure of a modes deck, read from the deck itself, because a user's own
+template may change them."""
 
 from __future__ import annotations
 
