@@ -57,10 +57,10 @@ def _printable(error: Exception) -> str:
     return "".join(c if c.isprintable() else " " for c in str(error))
 
 
-def _words(found: dict[str, Any]) -> list[str]:
-    """What was found, for people: frequencies by harmonic, or the footprint at each load."""
+def _words(result: dict[str, Any]) -> list[str]:
+    """Lines for the terminal: frequencies by harmonic, or the footprint at each load."""
     words = []
-    for step in found.get("steps", ()):
+    for step in result.get("steps", ()):
         words += [
             f"step {step['step']}: {step['pressure_Pa'] / 1e3:g} kPa, {step['mass_kg']:.2f} kg"
         ]
@@ -68,12 +68,12 @@ def _words(found: dict[str, Any]) -> list[str]:
         for mode in step["modes"]:
             by_harmonic.setdefault(mode["n"], []).append(f"{mode['frequency_Hz']:.2f}")
         words += [f"  harmonic {n}: {', '.join(of)} Hz" for n, of in sorted(by_harmonic.items())]
-    for each in found.get("footprints", ()):
+    for each in result.get("footprints", ()):
         words += [
             f"{each['load_N']:g} N: deflection {1e3 * each['deflection_m']:.2f} mm,"
             f" contact area {1e4 * each['contact_area_m2']:.1f} cm2"
         ]
-    return words + ([found["failure"]] if found.get("failure") else [])
+    return words + ([result["failure"]] if result.get("failure") else [])
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ REQUEST_KEYS = ("own_frequency", "cavity", "sector")
 
 
 class Decks(Protocol):
-    """What the tool hands over: deck texts of a dialect, and where its variables stand in them."""
+    """Decks of a dialect, and the places of the variables in them, as the tool hands them over."""
 
     request: Mapping[str, Any]
     loads_N: tuple[float, ...]
@@ -72,8 +72,8 @@ class Bundled:
             paths[-1].write_text(text, encoding="utf-8", newline="")
         request = {k: decks.request[k] for k in REQUEST_KEYS if k in decks.request}
         if decks.loads_N:
-            asked, slopes = bool(decks.request.get("loaded_modes")), decks.tangents(self.dialect)
-            request = {k: v for k, v in request.items() if asked and k == "cavity"}
+            loaded, slopes = bool(decks.request.get("loaded_modes")), decks.tangents(self.dialect)
+            request = {k: v for k, v in request.items() if loaded and k == "cavity"}
             if slopes:
                 request["sensitivities"] = slopes
             if not request:

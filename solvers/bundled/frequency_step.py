@@ -126,17 +126,19 @@ class FrequencyStep:
 
     def rates(self, modes: list[HarmonicModes]) -> tuple[dict[str, list[Array]], dict[str, float]]:
         """d lambda / d variable per harmonic, and d mass / d variable, by variable."""
-        asked = self.tyre.request.sensitivities
-        if not asked:
+        sensitivities = self.tyre.request.sensitivities
+        if not sensitivities:
             return {}, {}
         forms = [m.forms() for m in modes]
         n, shapes, owner, eigenvalues = (np.concatenate(x) for x in zip(*forms, strict=True))
         before = np.cumsum([0, *(len(values) for *_, values in forms[:-1])])
         owner += np.repeat(before, [len(own) for _, _, own, _ in forms])
         fields = ModeShapes(n, shapes, owner)
-        found = {v: self._rates(rows, modes, fields, eigenvalues) for v, rows in asked.items()}
-        return {v: rates for v, (rates, _) in found.items()}, {
-            v: mass for v, (_, mass) in found.items()
+        by_variable = {
+            v: self._rates(rows, modes, fields, eigenvalues) for v, rows in sensitivities.items()
+        }
+        return {v: rates for v, (rates, _) in by_variable.items()}, {
+            v: mass for v, (_, mass) in by_variable.items()
         }
 
     def _static_factor(self) -> Factor:

@@ -157,7 +157,7 @@ class Job:
         step = self.steps[last]
         from .road import footprint_job, pressed_start  # late, as in `run`
 
-        found = footprint_job.press(
+        result = footprint_job.press(
             model,
             equations,
             acting,
@@ -170,8 +170,8 @@ class Job:
             partial(pressed_start.begin, start, self._of_start) if start else None,
         )
         if self.tyre.request.cavity:
-            found |= self._cavity(model, found)
-        return {"pressure_Pa": step.pressure, "mass_kg": self.mass_kg, **found}
+            result |= self._cavity(model, result)
+        return {"pressure_Pa": step.pressure, "mass_kg": self.mass_kg, **result}
 
     def _on_road(self) -> tuple[int, Model, Numbering, list[Pressure]]:
         """The place of the last static step, and the model, equations and pressures in it."""
@@ -200,12 +200,12 @@ class Job:
         self, model: Model, equations: Numbering, acting: list[Pressure], place: int
     ) -> dict[str, InflatedTangent]:
         """By variable, of the tyre that the last static step, at its ``place``, presses."""
-        asked = self.tyre.request.sensitivities
-        if not asked:
+        sensitivities = self.tyre.request.sensitivities
+        if not sensitivities:
             return {}
         stiffness = mechanics.tangents(model, self.tyre.U, acting, harmonics=False)[0]
-        newton, found = equations.factor(equations.assemble(stiffness)), {}
-        for variable, rows in asked.items():
+        newton, tangents = equations.factor(equations.assemble(stiffness)), {}
+        for variable, rows in sensitivities.items():
             section, revolve, steps = self.tyre.deck.read(rows)
             step, road = steps[place], read_road(revolve)
             step.held = self._off_road(step).held
@@ -213,10 +213,10 @@ class Job:
             loads, rate = pressures(seeded, step), lambda number: np.imag(number) / COMPLEX_STEP
             U = state_rate(seeded, self.tyre.U, loads, equations, newton)
             numbers = {name: float(rate(getattr(road, name))) for name in ROAD_NUMBERS}
-            found[variable] = InflatedTangent(seeded, loads, U, numbers)
-        return found
+            tangents[variable] = InflatedTangent(seeded, loads, U, numbers)
+        return tangents
 
-    def _cavity(self, model: Model, found: dict[str, Any]) -> dict[str, Any]:
+    def _cavity(self, model: Model, result: dict[str, Any]) -> dict[str, Any]:
         """cavity_Hz of the first wave in the cavity: of the inflated tyre, and in each footprint
         the two, fore-aft and vertical."""
         assert self.tyre.request.cavity
@@ -226,14 +226,14 @@ class Job:
         X, U = model.mesh.X, self.tyre.U
         hertz = lambda u, angles: cavity_modes(air, X, u, angles).tolist()
         footprints = [
-            {**each, "cavity_Hz": hertz(each["displacement"], found["angles"])}
-            for each in found["footprints"]
+            {**each, "cavity_Hz": hertz(each["displacement"], result["angles"])}
+            for each in result["footprints"]
         ]
         free, _ = hertz(np.stack([U, U]), np.array([0.0, np.pi]))
         return {"cavity_Hz": free, "footprints": footprints}
 
     def _vibrating(self, step: DeckStep) -> ModesAtLoad:
-        """What a *FREQUENCY step on the road asks for."""
+        """Settings of a *FREQUENCY step of a tyre on the road. Raises DeckError."""
         assert self.road is not None
         place, row = step.procedure.place, step.procedure.only_row()
         if any(row.fields[1:]):

@@ -1,4 +1,4 @@
-"""What a deck cannot say, from the file JOB.request.json beside it."""
+"""Requests that a deck cannot express, read from the file JOB.request.json next to it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MAX_HARMONIC, MAX_MODES = 999, 999  # harmonic; modes of one
 
 @dataclass
 class Request:
-    """What is asked beyond the deck."""
+    """Results and settings requested in addition to the deck."""
 
     harmonics: list[int] | None = None  # None: as many as *FREQUENCY's number of modes takes
     modes_per_harmonic: int = 2
@@ -145,9 +145,9 @@ def _sector(key: str, value: Any) -> None:
 
 def _object(key: str, value: Any, names: Sequence[str] = (), all_of_them: bool = False) -> None:
     """Checks for an object, where there are ``names`` with no others."""
-    told = f" with {' and '.join(names)}" if all_of_them else ""
+    contents = f" with {' and '.join(names)}" if all_of_them else ""
     fits = isinstance(value, dict) and (not all_of_them or set(value) == set(names))
-    _must(fits, key, value, f"must be an object{told}")
+    _must(fits, key, value, f"must be an object{contents}")
     for name in value:
         right = f"no such key; there are {', '.join(names)}"
         _must(not names or name in names, name, value[name], right)

@@ -112,14 +112,14 @@ def read_start(folder: Path, text: str) -> Array | None:
 
     Raises Refused where it is not there, or another one is; OSError.
     """
-    found = COMMENT.search(text)
-    if not found:
+    comment = COMMENT.search(text)
+    if not comment:
         return None
     path = folder / FILE
-    if found[1] != FILE or not path.is_file():
+    if comment[1] != FILE or not path.is_file():
         raise Refused(f"the deck names a shape to start from, and {FILE} is not beside it")
     content = path.read_bytes()
-    if _hash(content) != found[2]:
+    if _hash(content) != comment[2]:
         raise Refused(f"{FILE} is not the shape that the deck names: its SHA-256 is another")
     shape: Array = np.load(io.BytesIO(content), allow_pickle=False)
     if shape.ndim != 2 or shape.shape[1] != 4 or shape.dtype.kind != "f":

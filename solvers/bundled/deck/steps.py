@@ -104,41 +104,41 @@ def _steps(model: list[Block], blocks: list[list[Block]], revolved: bool) -> lis
 
 
 def _pressures(k: Block) -> dict[str, complex | float]:
-    found = {}
+    pressures = {}
     for row in k.rows:
         if row.name(1) != "P":
             raise DeckError(row.place, f"load type '{row.text(1)}' is not honoured, only P")
-        found[row.name(0)] = row.value(2)
-    return found
+        pressures[row.name(0)] = row.value(2)
+    return pressures
 
 
 def _turning(
     k: Block, before: dict[str, dict[str, complex | float]], revolved: bool
 ) -> dict[str, dict[str, complex | float]]:
     """Loads of a tyre that turns about its axle, by kind and element set."""
-    found = {kind: dict(sets) for kind, sets in before.items()}
+    turning = {kind: dict(sets) for kind, sets in before.items()}
     for row in k.rows:
         kind = row.name(1)
-        if kind not in (found if revolved else ("CENTRIF",)):
+        if kind not in (turning if revolved else ("CENTRIF",)):
             raise DeckError(row.place, f"load type '{row.text(1)}' of *DLOAD is not honoured here")
         axis = [row.value(i, 0.0) for i in range(3, 9)]
         if axis != ([0.0, 0.0, 0.0, 0.0, 1.0, 0.0] if revolved else [0.0] * 6):
             raise DeckError(row.place, "the tyre turns about its axle, 0, 0, 0 along 0, 1, 0")
-        found[kind][row.name(0)] = row.value(2)
-    return found
+        turning[kind][row.name(0)] = row.value(2)
+    return turning
 
 
 def _procedure(block: list[Block]) -> Block:
-    found = [k for k in block if k.name in PROCEDURES]
-    if len(found) != 1:
+    procedures = [k for k in block if k.name in PROCEDURES]
+    if len(procedures) != 1:
         raise DeckError(
             block[0].place, "a step needs one *STATIC, *FREQUENCY or *COMPLEX FREQUENCY"
         )
-    if found[0].name == "STATIC" and "NLGEOM" not in block[0].parameters:
+    if procedures[0].name == "STATIC" and "NLGEOM" not in block[0].parameters:
         raise DeckError(block[0].place, "a *STATIC step needs NLGEOM=YES")
-    if found[0].name == "STATIC" and "PERTURBATION" in block[0].parameters:
+    if procedures[0].name == "STATIC" and "PERTURBATION" in block[0].parameters:
         raise DeckError(block[0].place, "a *STATIC step is no linear PERTURBATION")
-    return found[0]
+    return procedures[0]
 
 
 def _check_transfer(section: list[Block], steps: list[DeckStep], revolve: list[Block]) -> None:

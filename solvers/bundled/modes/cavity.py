@@ -84,8 +84,8 @@ class Coupling:
         flow = self.H[:, self.flowing]
         stiff = np.linalg.solve(self.Q, flow).T
         own = stiff @ flow - eigenvalue * flow[self.flowing]
-        found: Array = np.linalg.solve(own, -stiff @ np.tensordot(self.C, u, 2))
-        return found
+        amplitudes: Array = np.linalg.solve(own, -stiff @ np.tensordot(self.C, u, 2))
+        return amplitudes
 
 
 def coupling(air: GasCavity, X: Array, U: Array, n: int) -> Coupling:

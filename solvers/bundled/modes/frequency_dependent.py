@@ -45,31 +45,31 @@ class SelfConsistent:
     def _at(self, frequency_Hz: float, n: int, count: int) -> HarmonicModes:
         return self.vibration.at(self._ratios(frequency_Hz)).modes(n, count)
 
-    def _settled(self, found: HarmonicModes, j: int) -> HarmonicModes:
+    def _settled(self, modes: HarmonicModes, j: int) -> HarmonicModes:
         """Mode j, from the modes at ``START_HZ``: the frequency at which the shape has its own
         modulus, then the shape there, until both agree."""
         frequency = START_HZ
         for _ in range(MAX_SETTLING):
-            before, frequency = frequency, self._own(found, j, frequency)
+            before, frequency = frequency, self._own(modes, j, frequency)
             if abs(frequency / before - 1) <= SHAPE_RTOL:
-                mode = found.where(slice(j, j + 1))
+                mode = modes.where(slice(j, j + 1))
                 return replace(mode, eigenvalues=np.array([(2 * np.pi * frequency) ** 2]))
-            found = self._at(frequency, found.n, j + 1)
-        raise _unsettled(found.n, j)
+            modes = self._at(frequency, modes.n, j + 1)
+        raise _unsettled(modes.n, j)
 
-    def _own(self, found: HarmonicModes, j: int, frequency_Hz: float) -> float:
+    def _own(self, modes: HarmonicModes, j: int, frequency_Hz: float) -> float:
         """f with (2 pi f)^2 = lambda + sum_l (rho_l(f) - rho_l(f_0)) phi^H dK_l phi for mode j of
         the modulus at f_0 = ``frequency_Hz``: Rayleigh's quotient, right to the square of the
         shape's change."""
-        forms = self.vibration.forms(found.n, found.shapes[j])
-        start, value = self._ratios(frequency_Hz), float(found.eigenvalues[j])
+        forms = self.vibration.forms(modes.n, modes.shapes[j])
+        start, value = self._ratios(frequency_Hz), float(modes.eigenvalues[j])
         f = np.sqrt(value) / (2 * np.pi)
         for _ in range(MAX_SETTLING):
             new = np.sqrt(value + (self._ratios(f) - start) @ forms) / (2 * np.pi)
             if abs(new / f - 1) <= FREQUENCY_RTOL:
                 return float(new)
             f = new
-        raise _unsettled(found.n, j)
+        raise _unsettled(modes.n, j)
 
 
 def _unsettled(n: int, j: int) -> RunFailed:

@@ -32,7 +32,7 @@ MIN_AIR_SHARE = 0.5
 
 
 class Combination(Protocol):
-    """What a mode that is not one harmonic of a tyre at rest is made of."""
+    """Modes that are not one harmonic of a tyre at rest, as combinations of harmonics."""
 
     def forms(self) -> tuple[Array, Array, Array, Array]:
         """As `HarmonicModes.forms`."""
@@ -46,7 +46,7 @@ class Combination(Protocol):
 
 @dataclass
 class SeededTyre:
-    """What carries p's tangent along with the section and its loads."""
+    """Model, spin and attached elements that carry the tangent of a number p."""
 
     model: Model
     spin: complex | float  # Omega, rad/s
@@ -143,15 +143,15 @@ class Vibration:
 
     def forms(self, n: int, shape: Array) -> Array:
         """phi^H dK_l phi of a shape (nodes, 3) for every law of frequency."""
-        field, found = shape[..., None], []
+        field, values = shape[..., None], []
         for K0, K1, K2 in self._parts[1:]:
             image = bordered.apply(K0, field)
             if n:
                 image = (
                     image + 1j * n * bordered.apply(K1, field) + n * n * bordered.apply(K2, field)
                 )
-            found.append(self._symmetry.copies * float(np.vdot(field, image).real))
-        return np.array(found)
+            values.append(self._symmetry.copies * float(np.vdot(field, image).real))
+        return np.array(values)
 
     def factor(self, n: int) -> Factor | Bordered:
         """Factor of K(n) - shift M. Raises RunFailed."""
@@ -222,12 +222,12 @@ class Vibration:
 
         Raises RunFailed.
         """
-        factor, asked = factor or self.factor(n), count
+        factor, wanted = factor or self.factor(n), count
         while True:
-            found, is_tyres = self._lowest(n, asked, factor)
-            if is_tyres.sum() >= count or len(is_tyres) < asked:
-                return found.where(np.flatnonzero(is_tyres)[:count])
-            asked += count - int(is_tyres.sum())
+            modes, is_tyres = self._lowest(n, wanted, factor)
+            if is_tyres.sum() >= count or len(is_tyres) < wanted:
+                return modes.where(np.flatnonzero(is_tyres)[:count])
+            wanted += count - int(is_tyres.sum())
 
     def _lowest(self, n: int, count: int, factor: Factor | Bordered) -> tuple[HarmonicModes, Array]:
         """The lowest modes, and which of them are the tyre's."""
@@ -288,23 +288,23 @@ def lowest_of_all(
 
     Harmonics are added until one starts above the highest mode kept; ``check`` may raise to stop.
     """
-    found: list[HarmonicModes] = []
+    kept: list[HarmonicModes] = []
     for n in range(MAX_HARMONICS):
         check()
         count = 2
         while True:
             count = min(2 * count, wanted)
             modes = vibration.modes(n, count)
-            limit = _highest_kept([*found, modes], wanted)
+            limit = _highest_kept([*kept, modes], wanted)
             if modes.eigenvalues[-1] > limit or count == wanted:
                 break
-        found.append(modes)
+        kept.append(modes)
         if n >= 2 and modes.eigenvalues[0] > limit:
             break
-    limit = _highest_kept(found, wanted)
-    return [m.below(np.sqrt(limit) / (2 * np.pi) * (1 + 1e-12)) for m in found]
+    limit = _highest_kept(kept, wanted)
+    return [m.below(np.sqrt(limit) / (2 * np.pi) * (1 + 1e-12)) for m in kept]
 
 
-def _highest_kept(found: list[HarmonicModes], wanted: int) -> float:
-    values = np.sort(np.concatenate([np.repeat(m.eigenvalues, 2 if m.n else 1) for m in found]))
+def _highest_kept(kept: list[HarmonicModes], wanted: int) -> float:
+    values = np.sort(np.concatenate([np.repeat(m.eigenvalues, 2 if m.n else 1) for m in kept]))
     return float(values[wanted - 1]) if len(values) >= wanted else float("inf")

@@ -85,8 +85,8 @@ def eigenvalue_rates(
 
 @dataclass(frozen=True)
 class RimAndAir:
-    """What moves along with the tyre: rim and air with p's tangent, and the modes' amplitudes of
-    their motions, per mode (q,) and (w,)."""
+    """Rim and air with the tangent of a number p, and the amplitudes of their motions in each mode,
+    (q,) and (w,)."""
 
     wheel: Wheel | None
     air: GasCavity | None

@@ -104,7 +104,7 @@ def free_along_load(keywords: list[Block], mesh: DeckMesh, step: DeckStep) -> fl
     """Mass, kg, of the wheel whose centre ``step`` releases along the first axis; None: all is
     held. Raises DeckError."""
     elements = _point_elements(keywords, mesh)
-    found = None
+    mass_kg = None
     for reference in mesh.reference_nodes:
         freedoms = rim_freedoms(mesh, step, reference)
         if freedoms - {1}:
@@ -115,8 +115,8 @@ def free_along_load(keywords: list[Block], mesh: DeckMesh, step: DeckStep) -> fl
             )
         if freedoms:
             inertia = _properties(keywords, elements, reference)[1]
-            found = float(np.real(inertia.get("radial", 0.0)))
-    return found
+            mass_kg = float(np.real(inertia.get("radial", 0.0)))
+    return mass_kg
 
 
 def _point_elements(keywords: list[Block], mesh: DeckMesh) -> dict[str, tuple[str, list[int]]]:

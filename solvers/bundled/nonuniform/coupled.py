@@ -63,8 +63,8 @@ class Basis:
         return np.array([self.eigenvalues[rows] @ vectors[rows] ** 2 for rows in self._rows])
 
     def part(self, f: int, vectors: Array) -> Array:
-        """Of fields given by vectors (fields, m): the shapes (m, nodes, 3) of the f-th family,
-        unit mass as in it."""
+        """Shapes (m, nodes, 3) of the f-th family for fields given by vectors (fields, m), scaled
+        to unit mass as in the family."""
         return np.tensordot(self.amplitudes(f, vectors).T, self.families[f].shapes, 1)
 
     def at_zero(self, attached: PointElements) -> Array:
@@ -104,9 +104,12 @@ def attached_modes(
     K = block_diag(np.diag(basis.eigenvalues[low]), rest.T * basis.eigenvalues[high] @ rest)
     K += at.T @ (attached.stiffness.real[:, None] * at)
     M = np.eye(len(K)) + at.T @ (attached.mass.real[:, None] * at)
-    values, found = eigh(K, M)
+    values, eigenvectors = eigh(K, M)
     vectors = np.empty((len(basis.eigenvalues), min(looked, len(values))))
-    vectors[low], vectors[high] = found[: len(low), :looked], rest @ found[len(low) :, :looked]
+    vectors[low], vectors[high] = (
+        eigenvectors[: len(low), :looked],
+        rest @ eigenvectors[len(low) :, :looked],
+    )
     return named(basis, values[:looked], vectors, harmonics, count, p)
 
 
@@ -132,9 +135,9 @@ def _unit_forces(numbering: Coordinates, attached: PointElements) -> Array:
     loaded = np.flatnonzero(force.any(1))
     across, sizes, _ = np.linalg.svd(force[loaded], full_matrices=False)
     across = across[:, sizes > MIN_RESPONSE_SHARE * sizes[0]]
-    found = np.zeros((len(force), across.shape[1]))
-    found[loaded] = across
-    return found
+    forces = np.zeros((len(force), across.shape[1]))
+    forces[loaded] = across
+    return forces
 
 
 def _with_response(vibration: Vibration, n: int, count: int, force: Array) -> Family:
@@ -217,8 +220,8 @@ def named(
         for n in harmonics
         for k, amplitude in enumerate(basis.amplitudes(place[n], vectors))
     }
-    told = tell(held, harmonics, count)
-    order = [j for n in harmonics for j in told[n]]
+    by_harmonic = tell(held, harmonics, count)
+    order = [j for n in harmonics for j in by_harmonic[n]]
     values, vectors = values[order], vectors[:, order]
     which, mode = np.nonzero(basis.energy(vectors) > MIN_ENERGY_SHARE * values)
     parts = [basis.part(f, vectors[:, mode[which == f]]) for f in np.unique(which).tolist()]
@@ -226,7 +229,7 @@ def named(
     whole = CoupledShapes(mode, n_of[which], np.concatenate(parts), values, p @ vectors)
     result, first = [], 0
     for n in harmonics:
-        mine = slice(first, first + len(told[n]))
+        mine = slice(first, first + len(by_harmonic[n]))
         own = basis.part(place[n], vectors[:, mine])
         result.append(split(n, values[mine], own, whole.where(mine)))
         first = mine.stop
@@ -245,12 +248,12 @@ def tell(
     looked = CANDIDATES_PER_MODE * len(seats) + 10
     overlap = np.array([held[seat][:looked] for seat in seats])
     taken = assigned(overlap)
-    told: dict[int, list[int]] = {n: [] for n in harmonics}
+    by_harmonic: dict[int, list[int]] = {n: [] for n in harmonics}
     for n in harmonics:
         for k in range(count):
             places = [int(t) for seat, t in zip(seats, taken, strict=True) if seat == (n, k)]
-            told[n] += sorted(places)
-    return told
+            by_harmonic[n] += sorted(places)
+    return by_harmonic
 
 
 def assigned(overlap: Array) -> Array:

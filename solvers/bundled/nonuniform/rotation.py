@@ -70,7 +70,7 @@ class Whirl:
         return self.omega - self.n * self.spin
 
     def forms(self) -> tuple[Array, Array, Array, Array]:
-        """Of lambda = omega^2."""
+        """The forms as in `HarmonicModes.forms`, for the eigenvalues lambda = omega^2."""
         modes = len(self.omega)
         return np.full(modes, self.n), self.shapes, np.arange(modes), self.omega**2
 

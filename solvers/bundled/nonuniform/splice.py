@@ -119,7 +119,7 @@ class FullCircle:
         return np.asarray(back[:, self._other] * HALF_TURN)
 
     def part(self, field: Array) -> Array:
-        """What of a field is one of these."""
+        """Projection of a field on the fields of this symmetry."""
         return (field + self.turn * self.turned(field)) / 2 if self.turn else field
 
     def whole(self, sums: Array) -> Array:
@@ -206,13 +206,13 @@ def sector_modes(
     values = np.concatenate([each.eigenvalues for each in apart])
     order = np.argsort(values, kind="stable")
     held = {key: np.concatenate([each.held[key] for each in apart])[order] for key in plain}
-    told = tell(held, harmonics, count)
+    by_harmonic = tell(held, harmonics, count)
     shape_of = [partial(each.shape, j) for each in apart for j in range(len(each.eigenvalues))]
     result = []
     for n in harmonics:
         size = np.sqrt(np.pi if n else 2 * np.pi)  # from the whole circle's unit mass
-        shapes = np.array([size * fields.wave(shape_of[j](), n) for j in order[told[n]]])
-        result.append(split(n, values[order[told[n]]], shapes))
+        shapes = np.array([size * fields.wave(shape_of[j](), n) for j in order[by_harmonic[n]]])
+        result.append(split(n, values[order[by_harmonic[n]]], shapes))
     return result
 
 

@@ -68,7 +68,7 @@ class FlatRoad:
         return np.maximum(self.height - points.positions(self.U)[..., 0], 0.0)
 
     def share(self, points: Points, height: float) -> tuple[Array, Array]:
-        """Of a step to ``height``, what each point went on the road, and its slope, 1/m."""
+        """Share of a step to ``height`` that each point spends on the road, and its slope, 1/m."""
         rise, gap = max(self.height - height, 1e-12), self.gap(points)
         met = gap < rise
         return np.where(met, 1.0 - gap / rise, 0.0), np.where(met, -gap / rise**2, 0.0)
@@ -147,7 +147,7 @@ class Contact:
     growth: Array  # of the share with the road's height, 1/m
 
     def bound(self, share: Array | float) -> Bound:
-        """What is to limit the friction of a step, of which the points go ``share`` on the road."""
+        """Limit of the friction for a step of which the points spend ``share`` on the road."""
         return Bound(self.points, self.normal, share + 0.0 * self.normal)
 
     @property
@@ -219,7 +219,7 @@ class Contact:
 
     @property
     def stiffness(self) -> float:
-        """Of the vertical force of half the tyre against the road's height, N/m."""
+        """Stiffness of half the tyre's vertical force against the road's height, N/m."""
         return float(self._stiff.sum())
 
     def force_by_height(self) -> Array:

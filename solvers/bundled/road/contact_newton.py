@@ -88,7 +88,7 @@ class ContactNewton:
         road: FlatRoad,
         U: Array,
         check: Callable[[], None],
-        settled: Callable[[ContactNewton, PressedState], None] = lambda work, found: None,
+        settled: Callable[[ContactNewton, PressedState], None] = lambda work, state: None,
     ):
         self.tyre, self.symmetry, self.check, self.settled = tyre, symmetry, check, settled
         self.free_radius = road.height
@@ -130,7 +130,7 @@ class ContactNewton:
             self.check()
             target = min(self.load + step, load)
             try:
-                found = self._newton(target)
+                state = self._newton(target)
             except (NoEquilibrium, Indefinite, Inverted) as error:
                 step /= 2
                 self._factor = None
@@ -140,13 +140,13 @@ class ContactNewton:
                         f"{self.depth()}: {self._buckling() or error}"
                     ) from None
                 continue
-            self.parts, self.height, self.load = found.parts, found.height, target
+            self.parts, self.height, self.load = state.parts, state.height, target
             if self.height <= self.flat:
                 raise NoEquilibrium(f"the tyre is flat on its rim at {target:.4g} N{self.depth()}")
-            self.settled(self, found)
-            self.road = self.road.settled(found.contact)
+            self.settled(self, state)
+            self.road = self.road.settled(state.contact)
             if target == load:
-                return found
+                return state
             self._check_reach(load)
             log.info("%g of %g N are reached%s", target, load, self.depth())
 
@@ -206,7 +206,7 @@ class ContactNewton:
     def _newton(self, load: float) -> PressedState:
         """With Coulomb's friction from where the last load's stiffness points; where that does not
         converge, by Tresca's friction, with the last normal forces, to where it does."""
-        found = self._from_first_guess(load)
+        state = self._from_first_guess(load)
         parts, height = self.parts, self.height
         self._stale = self._factor is not None and load > SAME_FACTOR * self._formed_at
         if self._slope:
@@ -214,22 +214,22 @@ class ContactNewton:
             height += (load - self.load) * self._slope[1]
         else:
             height -= FIRST_COMPLIANCE * load
-        if not found and load <= NEAR_LOAD * self.load:
-            found = self._by_coulomb(parts, height, load)
+        if not state and load <= NEAR_LOAD * self.load:
+            state = self._by_coulomb(parts, height, load)
         bound, reached = self._bound, FRICTION_BOUND_RTOL
         for _ in range(MAX_NEWTON):
-            if found:
+            if state:
                 break
             parts, height, contact = self._softly(parts, height, load, bound, reached)
             bound = contact.bound(self.road.share(contact.points, height)[0])
             if reached > COULOMB_RTOL:
                 reached = COULOMB_RTOL  # what newly touches had no friction yet
                 continue
-            found = self._by_coulomb(parts, height, load)
+            state = self._by_coulomb(parts, height, load)
             reached = max(0.1 * reached, CONTACT_FORCE_RTOL)
-        if not found:
+        if not state:
             raise NoEquilibrium("the friction did not settle")
-        parts, height, contact = found
+        parts, height, contact = state
         self._bound = contact.bound(1.0)
         unit = self._unit(contact)
         self._slope = -unit[0] / 2, -unit[1] / 2
@@ -369,8 +369,8 @@ class ContactNewton:
             return np.append((y - answer * rise).ravel(), rise / scale)
 
         begin = precondition(right, first) / float(np.linalg.norm(right))
-        found, used, left = gmres(product, precondition, right, tolerance, MAX_GMRES, begin)
-        return found[:-1].reshape(shape), float(found[-1]) * scale, used, left
+        solution, used, left = gmres(product, precondition, right, tolerance, MAX_GMRES, begin)
+        return solution[:-1].reshape(shape), float(solution[-1]) * scale, used, left
 
     def solve_closely(
         self, tangent: Tangent, force: Array, lacking: float, tolerance: float
@@ -395,16 +395,16 @@ class ContactNewton:
     def _unit(self, contact: Contact) -> tuple[Array, float]:
         """Parts and the road's rise that answer a unit of the force of half the tyre."""
         tangent = Tangent.of(contact, self.symmetry)
-        found, rise, left = self.solve_closely(tangent, 0 * self.parts, 1.0, UNIT_RTOL)
+        unit, rise, left = self.solve_closely(tangent, 0 * self.parts, 1.0, UNIT_RTOL)
         if left > MAX_UNIT_RESIDUAL:
             raise NoEquilibrium(f"the vertical stiffness was not found in {MAX_GMRES} iterations")
-        return found, rise
+        return unit, rise
 
 
 @dataclass(frozen=True)
 class Tangent:
-    """Of half the tyre: the contact's stiffness, and the road's height as one more unknown, its
-    column and row, on the parts."""
+    """Linearised equations of half the tyre: the contact's stiffness on the parts, and the road's
+    height as one more unknown with its column and row."""
 
     contact: Contact
     touching: csr_matrix  # (k n 3, k n 3), N/m

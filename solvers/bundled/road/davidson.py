@@ -31,17 +31,17 @@ class Basis:
     images: Array
 
     def turned(self, turn: Array) -> Basis:
-        """Of combinations, ``turn`` (b', b)."""
+        """Basis of the combinations ``turn`` (b', b) of these vectors."""
         return Basis(turn @ self.vectors, turn @ self.images)
 
     def joined(self, other: Basis) -> Basis:
-        """Of both."""
+        """Basis of the vectors of both."""
         vectors = np.concatenate([self.vectors, other.vectors])
         return Basis(vectors, np.concatenate([self.images, other.images]))
 
 
 def basis_of(fields: Array, product: Operator, mass: Operator) -> Basis:
-    """Of what fields (b, size) span."""
+    """Orthonormal basis of the space that fields (b, size) span."""
     vectors = _orthonormal(fields, np.empty((0, fields.shape[1])), mass)
     return Basis(vectors, product(vectors))
 

@@ -23,7 +23,7 @@ Range = tuple[int, int]
 
 @dataclass(frozen=True)
 class Kind:
-    """Of one kind of elements those of a column, with their mirror images."""
+    """Elements of one kind in a column, with their mirror images."""
 
     here: Array  # (e,) rows of the elements on z >= 0
     there: Array  # (e,) rows of their images
@@ -101,14 +101,14 @@ class Dissection:
         return [len(fronts) - 1]
 
     def _apart(self, halves: list[tuple[Range, Range]]) -> Array:
-        """What lies inside one of the halves."""
+        """Unknowns inside one of the halves, a mask (f, q)."""
         inside = np.zeros(self.symmetry.mask.shape[1:3], bool)
         for half in halves:
             inside |= self._inside(*half)
         return inside
 
     def _inside(self, columns: Range, pieces: Range) -> Array:
-        """What a box of cells couples with itself alone (f, q)."""
+        """Unknowns that a box of cells couples only with each other, a mask (f, q)."""
         within = lambda ends, box: (ends[0] >= box[0]) & (ends[1] < box[1])
         return np.multiply.outer(within(self._functions, pieces), within(self._nodes, columns))
 

@@ -99,11 +99,11 @@ def press(
     failure = cause = ""
     for load in wanted:
         try:
-            found = work.to(load)
-            footprint = _footprint(work, found, load, rings)
-            footprint |= slopes.at(work, found, rings)
+            state = work.to(load)
+            footprint = _footprint(work, state, load, rings)
+            footprint |= slopes.at(work, state, rings)
             if load in vibrations:
-                footprint |= _modes(work, found, vibrations[load], equations, U, rings)
+                footprint |= _modes(work, state, vibrations[load], equations, U, rings)
         except (RunFailed, np.linalg.LinAlgError) as error:
             cause = getattr(error, "cause", "crashed")
             if cause == "timed_out" and work.load:
@@ -126,13 +126,13 @@ def press(
 
 
 def _footprint(
-    work: ContactNewton, found: PressedState, load: float, angles: Array
+    work: ContactNewton, state: PressedState, load: float, angles: Array
 ) -> dict[str, Any]:
     """One load's results on the whole tyre, whose other half is this one's half turn; ``angles``
     of the rings."""
     symmetry, around = work.symmetry, work.symmetry.around
-    U = symmetry.spread(found.parts)
-    contact = found.contact
+    U = symmetry.spread(state.parts)
+    contact = state.contact
     other = symmetry.other
     displacement = _at(around, angles, U)
     turned = np.empty_like(displacement)
@@ -161,8 +161,8 @@ def _footprint(
         "load_N": load,
         "road_N": contact.force,
         "rim_N": np.array([2 * down, 0.0, 0.0]),
-        "deflection_m": work.free_radius - found.height,
-        "stiffness_N_per_m": found.stiffness,
+        "deflection_m": work.free_radius - state.height,
+        "stiffness_N_per_m": state.stiffness,
         "ring": ring,
         "node": np.concatenate([nodes, other[nodes][again]]),
         "along_m": both(along, -1.0),
@@ -179,7 +179,7 @@ def _footprint(
 
 def _modes(
     work: ContactNewton,
-    found: PressedState,
+    state: PressedState,
     wanted: ModesAtLoad,
     equations: Numbering,
     inflated: Array,
@@ -187,11 +187,11 @@ def _modes(
 ) -> dict[str, Array]:
     """The whole tyre's modes about one load, their shapes at the wanted nodes of the rings."""
     tyre = Revolved(wanted.model, work.tyre.loads, work.tyre.around)
-    U = work.symmetry.spread(found.parts)
+    U = work.symmetry.spread(state.parts)
     work.tyre.residual(U)
-    road = found.contact.road
-    smooth = replace(found.contact, road=replace(road, friction=0.0))
-    holds = [held(each) for each in (found.contact, smooth)]
+    road = state.contact.road
+    smooth = replace(state.contact, road=replace(road, friction=0.0))
+    holds = [held(each) for each in (state.contact, smooth)]
     holds = holds if road.friction else holds[:1]
     vibration = Vibration(wanted.model, inflated, tyre.loads, equations, 0.0)
     start = lowest_of_all(vibration, 2 * (wanted.count + 2 * SPARE), work.check)
@@ -199,21 +199,21 @@ def _modes(
     modes = loaded_modes(
         tyre, work.symmetry, U, holds, start, wanted.count, work.check, wanted.wheel_kg
     )
-    told = {"mode_node": wanted.nodes}
+    arrays = {"mode_node": wanted.nodes}
     for name, each in zip(("mode", "sliding"), modes, strict=False):
         shapes = np.array([_at(work.symmetry.around, angles, shape) for shape in each.shapes])
         turned = each.parity[:, None, None, None] * (HALF_TURN * shapes)[:, :, work.symmetry.other]
         whole = np.concatenate([shapes, turned[:, 1:-1][:, ::-1]], 1)
-        told[f"{name}_frequency_Hz"] = np.sqrt(each.eigenvalues) / (2 * np.pi)
-        told[f"{name}_shape"] = whole[:, :, wanted.nodes]
+        arrays[f"{name}_frequency_Hz"] = np.sqrt(each.eigenvalues) / (2 * np.pi)
+        arrays[f"{name}_shape"] = whole[:, :, wanted.nodes]
     if road.friction:
-        told["mode_traction_N"] = np.array(
+        arrays["mode_traction_N"] = np.array(
             [
                 _traction(work.symmetry.around, (holds[0] @ V.ravel()).reshape(V.shape))
                 for V in modes[0].shapes
             ]
         )
-    return told
+    return arrays
 
 
 def _traction(around: HalfCircle, forces: Array) -> float:
@@ -251,7 +251,7 @@ def write(stem: Path, model: Model, result: dict[str, Any]) -> None:
 
 
 def read(stem: Path) -> dict[str, Any]:
-    """What `write` wrote, as plain data."""
+    """Read the results that `write` wrote, as plain data."""
     answer: dict[str, Any] = json.loads(
         stem.with_name(stem.name + ".json").read_text(encoding="utf-8")
     )

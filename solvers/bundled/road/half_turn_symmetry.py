@@ -106,5 +106,6 @@ class HalfTurn:
         return csr_matrix((values, places), shape=(k * n * 3, here.size))
 
     def fold(self, stiffness: csr_matrix) -> csr_matrix:
-        """What a stiffness between fields (k n 3, k n 3) is to the parts (2 f q 3, 2 f q 3)."""
+        """Fold a stiffness between fields (k n 3, k n 3) into one between the parts (2 f q 3, 2 f q
+        3)."""
         return csr_matrix(self._spread.T @ stiffness @ self._spread)

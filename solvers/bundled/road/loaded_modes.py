@@ -70,14 +70,14 @@ def loaded_modes(
     while (short := _short(kinds, count)) is not None:
         wanted[short] += SPARE
         kinds[short] = kind(short, wanted[short])
-    found = []
+    result = []
     for keeping, reversing in zip(kinds[1], kinds[-1], strict=True):
         values = np.concatenate([keeping[0], reversing[0]])
         order = np.argsort(values, kind="stable")[:count]
         parity = np.repeat([1, -1], [len(keeping[0]), len(reversing[0])])
         shapes = np.concatenate([keeping[1], reversing[1]])
-        found.append(LoadedModes(values[order], parity[order], shapes[order]))
-    return found
+        result.append(LoadedModes(values[order], parity[order], shapes[order]))
+    return result
 
 
 def _short(kinds: dict[int, list[tuple[Array, Array]]], count: int) -> int | None:
@@ -118,11 +118,11 @@ class _Kind:
         self.down = down * ~symmetry.free  # the rim's nodes (k, n, 3), by 1 m
 
     def lowest(self, holds: Sequence[csr_matrix], count: int) -> list[tuple[Array, Array]]:
-        """Of each hold omega^2 (count,) and shapes (count, k, n, 3); each starts from what the one
-        before has found."""
+        """For each hold omega^2 (count,) and shapes (count, k, n, 3); each search starts from the
+        result of the one before."""
         kg = self.wheel_kg or 0.0
         inertia = self._each(Inertia(self.tyre.model, self.symmetry.around), kg / 2)
-        found: list[tuple[Array, Array]] = []
+        result: list[tuple[Array, Array]] = []
         basis = None
         for before, hold in pairwise([holds[0], *holds]):
             self.factor.to(self.symmetry.fold(hold))
@@ -135,8 +135,8 @@ class _Kind:
                 basis = davidson.Basis(basis.vectors, basis.images + images)
             values, x, basis = davidson.lowest(stiffness, inertia, inverse, basis, count)
             # the half tyre has half of the modal mass
-            found.append((values, np.array([self._field(row) for row in x]) / np.sqrt(2)))
-        return found
+            result.append((values, np.array([self._field(row) for row in x]) / np.sqrt(2)))
+        return result
 
     def _forces_of(self, hold: csr_matrix, V: Array) -> Array:
         """The tyre's and the hold's (k, n, 3), N/m."""
@@ -207,7 +207,7 @@ class Inertia:
 
 
 def standing_waves(unloaded: list[HarmonicModes], symmetry: HalfTurn) -> list[Array]:
-    """What the modes of the inflated tyre have of the fold's parity, fields (k, n, 3)."""
+    """Components of the inflated tyre's modes that have the fold's parity, fields (k, n, 3)."""
     waves = []
     for modes in unloaded:
         turn = symmetry.around.turn(modes.n)[:, None, None]

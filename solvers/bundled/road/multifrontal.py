@@ -205,8 +205,9 @@ def _add(whole: Array, here: Array, some: Array, block: Array) -> None:
 
 
 def _fold(column: Column, kind: Kind, g: int, h: int) -> csr_matrix:
-    """What elements' stiffness, between even and odd fields (2, 2, 2 e, 3a, 3a) flat, is between
-    the components of parts g and h at the column's nodes: that here, and as it is in the mirror."""
+    """Map from the elements' stiffness, flat between even and odd fields (2, 2, 2 e, 3a, 3a), to
+    the stiffness between the components of parts g and h at the column's nodes. Each element
+    contributes here and as its mirror image."""
     e, a = kind.places.shape
     comp = np.tile(np.arange(3), a)
     row, col = np.indices((3 * a, 3 * a))

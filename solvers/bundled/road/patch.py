@@ -21,7 +21,8 @@ WIDTH_SAMPLES = 5  # angles of a span at which the width is looked at
 
 @dataclass(frozen=True)
 class Patch:
-    """Of half the tyre, rings k and nodes n; length and width of the whole one's."""
+    """Contact patch of half the tyre, on rings k and nodes n; length and width are those of the
+    whole patch."""
 
     area: Array  # (k, n): of the deformed tread, m2
     force: Array  # (k, n, 3): down, along, across, N
@@ -80,6 +81,6 @@ def _roots(over: Array, z: Array) -> Array:
             np.divide(steep, 2 * a, out=np.full_like(c, 2.0), where=a != 0),
         ]
     )
-    found = (abs(xi) <= 1) & (b * b >= 4 * a * c)
+    valid = (abs(xi) <= 1) & (b * b >= 4 * a * c)
     c, b, a = parabola(z)
-    return np.where(found, c + xi * (b + xi * a), 0.0)
+    return np.where(valid, c + xi * (b + xi * a), 0.0)

@@ -1,5 +1,5 @@
-"""What a job says of the road, of modes there and its numbers' tangents: plain data, so that a tyre
-that is not pressed needs nothing else of the road."""
+"""Data of a job for the road: contact, modes there and the tangents of its numbers. They are plain
+data, so that a tyre that is not pressed needs nothing else of the road."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ROAD_NUMBERS = ("stiffness", "friction")  # of a `FlatRoad`
 
 @dataclass(frozen=True)
 class RoadData:
-    """What a deck says of the road."""
+    """Road and contact data of a deck."""
 
     node: str  # its reference node
     tread: str  # the tread's surface
@@ -53,15 +53,15 @@ def read_road(model: list[Block]) -> RoadData | None:
     if not bodies or not roads:
         raise DeckError(pair.place, f"{surface} is no analytical surface of a *RIGID BODY")
     _check_flat(roads[0])
-    found = {k.name: k for k in model if k.name in ("SURFACE BEHAVIOR", "FRICTION")}
-    if len(found) < 2:
+    blocks = {k.name: k for k in model if k.name in ("SURFACE BEHAVIOR", "FRICTION")}
+    if len(blocks) < 2:
         raise DeckError(pair.place, "the contact needs a *SURFACE BEHAVIOR and a *FRICTION")
-    stiffness = found["SURFACE BEHAVIOR"].only_row().value(0)
-    friction = found["FRICTION"].only_row().value(0)
-    slip = float(np.real(found["FRICTION"].number("ELASTIC SLIP") or 0.0))
+    stiffness = blocks["SURFACE BEHAVIOR"].only_row().value(0)
+    friction = blocks["FRICTION"].only_row().value(0)
+    slip = float(np.real(blocks["FRICTION"].number("ELASTIC SLIP") or 0.0))
     if not (np.real(stiffness) > 0 and np.real(friction) >= 0 and slip >= MIN_ELASTIC_SLIP):
         raise DeckError(
-            found["FRICTION"].place,
+            blocks["FRICTION"].place,
             "the contact's stiffness must be positive, friction not negative, the elastic slip at"
             f" least {MIN_ELASTIC_SLIP:g} m",
         )

@@ -53,23 +53,23 @@ class Slopes:
         """faces (e, a): nodes of the tread's line elements."""
         self.paths = {name: _Path(own, around, faces, road) for name, own in numbers.items()}
 
-    def follow(self, work: ContactNewton, found: PressedState) -> None:
+    def follow(self, work: ContactNewton, state: PressedState) -> None:
         """To the state that slip counts from next. Raises NoEquilibrium."""
         if self.paths:
-            tangent = Tangent.of(found.contact, work.symmetry)
+            tangent = Tangent.of(state.contact, work.symmetry)
         for path in self.paths.values():
-            path.follow(work, found, tangent)
+            path.follow(work, state, tangent)
 
-    def at(self, work: ContactNewton, found: PressedState, rings: Array) -> dict[str, Any]:
+    def at(self, work: ContactNewton, state: PressedState, rings: Array) -> dict[str, Any]:
         """``slopes`` of a footprint's numbers at the last state followed to, whose patch is on
         nodes at the angles ``rings``, by name; nothing where none was asked for. Raises
         NoEquilibrium."""
         if not self.paths:
             return {}
-        tangent = Tangent.of(found.contact, work.symmetry).transposed
-        parts, lift = _solved(work, tangent, 0 * found.parts, 1.0)
+        tangent = Tangent.of(state.contact, work.symmetry).transposed
+        parts, lift = _solved(work, tangent, 0 * state.parts, 1.0)
         unit = work.symmetry.spread(parts), lift
-        rates = {name: path.rates(work, found, unit, rings) for name, path in self.paths.items()}
+        rates = {name: path.rates(work, state, unit, rings) for name, path in self.paths.items()}
         return {"slopes": rates}
 
 
@@ -87,9 +87,9 @@ class _Path:
         self.elastic = 0 * road.elastic
         self.since: dict[str, Array | float] = {}  # of the road: the state before
 
-    def follow(self, work: ContactNewton, found: PressedState, tangent: Tangent) -> None:
+    def follow(self, work: ContactNewton, state: PressedState, tangent: Tangent) -> None:
         """From the state before to this one."""
-        contact = found.contact
+        contact = state.contact
         self.since = {"U": self.U, "elastic": self.elastic, "height": self.height}
         self.U, self.height = 0 * self.U, 0.0
         step, (above, below) = self._beside(contact)
@@ -103,25 +103,25 @@ class _Path:
         self.elastic = slip / (2 * step)
 
     def rates(
-        self, work: ContactNewton, found: PressedState, unit: tuple[Array, float], rings: Array
+        self, work: ContactNewton, state: PressedState, unit: tuple[Array, float], rings: Array
     ) -> Values:
         """d / dp of a footprint's numbers; unit: w on the fields and on the road's height."""
         W, lift = unit
-        S, rise = work.symmetry.spread(found.unit[0]), found.unit[1]
-        step, contacts = self._beside(found.contact)
-        told = []
+        S, rise = work.symmetry.spread(state.unit[0]), state.unit[1]
+        step, contacts = self._beside(state.contact)
+        sizes = []
         for sign, each in zip((1, -1), contacts, strict=True):
             half = patch(each, self.X + sign * step * self.dX, rings)
             forces = (each.matrix() @ S.ravel()).reshape(S.shape) + rise * each.by_height()
             load = (each.force_by_height() * S).sum() + rise * each.stiffness
             bent = (W * forces).sum() + lift * load
-            told.append([2 * half.area.sum(), half.length, half.width, bent])
-        area, length, width, bent = (np.array(told[0]) - told[1]) / (2 * step)
-        self.tyre.residual(found.contact.U + 1j * COMPLEX_STEP * self.U)
+            sizes.append([2 * half.area.sum(), half.length, half.width, bent])
+        area, length, width, bent = (np.array(sizes[0]) - sizes[1]) / (2 * step)
+        self.tyre.residual(state.contact.U + 1j * COMPLEX_STEP * self.U)
         bent += (W * self.tyre.product(S).imag).sum() / COMPLEX_STEP
         return {
             "deflection_m": self.free_radius - self.height,
-            "stiffness_N_per_m": float(found.stiffness**2 / 2 * bent),
+            "stiffness_N_per_m": float(state.stiffness**2 / 2 * bent),
             "contact_area_m2": float(area),
             "contact_length_m": float(length),
             "contact_width_m": float(width),

@@ -1,4 +1,4 @@
-"""What holds the patch to the road while the tyre vibrates.
+"""Hold of the road on the patch while the tyre vibrates.
 
 As ABAQUS in a *FREQUENCY step: contact neither opens nor closes, and where there is friction
 nothing slides. The contact's own stiffness holds every point of the patch, along the normal and

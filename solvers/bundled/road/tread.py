@@ -162,8 +162,8 @@ class Points:
         return frame
 
     def _lines(self, U: Array, M: Array) -> Array:
-        """What the functions round the tyre are multiplied by on the lines (i, j, l, 3);
-        M (j, a) or (i, j, a)."""
+        """Factors of the functions round the tyre on the lines (i, j, l, 3), for M (j, a) or (i, j,
+        a)."""
         own = U[self._places]  # (i, l, a, 3)
         return np.asarray((M[..., None, :, :] @ own).swapaxes(1, 2))
 

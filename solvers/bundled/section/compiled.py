@@ -18,11 +18,11 @@ def compiled(name: str) -> ModuleType:
 
     It is the same one for who imports the package before or later."""
     folder = Path(scipy.__file__).parent.joinpath(*name.split(".")[1:-1])
-    found = FileFinder(str(folder), (ExtensionFileLoader, EXTENSION_SUFFIXES)).find_spec(name)
-    if name in sys.modules or found is None or found.loader is None:
+    spec = FileFinder(str(folder), (ExtensionFileLoader, EXTENSION_SUFFIXES)).find_spec(name)
+    if name in sys.modules or spec is None or spec.loader is None:
         return import_module(name)
-    module = sys.modules[name] = module_from_spec(found)
-    found.loader.exec_module(module)
+    module = sys.modules[name] = module_from_spec(spec)
+    spec.loader.exec_module(module)
     return module
 
 

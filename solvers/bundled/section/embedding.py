@@ -61,7 +61,7 @@ class Embedded:
     rows: Array  # (e, h): what its elements are connected to
 
     def weights(self, X: Array, guests: Sequence[Guest]) -> Array:
-        """Of the host nodes in the line's own ones (e, a, h)."""
+        """Weights of the host nodes in the line's own nodes (e, a, h)."""
         known = {-1 - k: (guests[k].rows, guests[k].weights(X)) for k in self._guests()}
         kind = np.result_type(float, *(w for _, w in known.values()))
         result = np.zeros((*self.points.shape, self.rows.shape[1]), kind)
@@ -92,7 +92,7 @@ class Embedded:
 
 @dataclass
 class Embedding:
-    """What the keywords of a deck embed."""
+    """Elements and nodes that the keywords of a deck embed."""
 
     guests: list[Guest] = field(default_factory=list)
     of_node: dict[int, int] = field(default_factory=dict)  # guest by its row in the deck
@@ -108,7 +108,7 @@ def embedding(
     sets: Mapping[str, Sequence[int]],
 ) -> Embedding:
     """The deck's; no guest is a node of rubber. Raises DeckError where one lies outside."""
-    found = Embedding()
+    result = Embedding()
     lines = {
         number: connectivity[kind][row]
         for number, (kind, row) in place.items()
@@ -133,32 +133,32 @@ def embedding(
                         raise DeckError(
                             row.place, f"element {number} of {name} is no line of cords"
                         )
-                    for n in sorted({*lines[number].tolist()} - rubber - found.of_node.keys()):
-                        found.of_node[n] = len(found.guests)
+                    for n in sorted({*lines[number].tolist()} - rubber - result.of_node.keys()):
+                        result.of_node[n] = len(result.guests)
                         guest = _guest(row, X, hosts, n, tolerance, roundoff)
-                        found.guests.append(guest)
-    _sort(found, lines, place)
-    return found
+                        result.guests.append(guest)
+    _sort(result, lines, place)
+    return result
 
 
 def _sort(
-    found: Embedding, lines: Mapping[int, Array], place: Mapping[int, tuple[str, int]]
+    embedded: Embedding, lines: Mapping[int, Array], place: Mapping[int, tuple[str, int]]
 ) -> None:
     """Blocks of lines that have as many host nodes."""
     blocks: dict[str, tuple[str, list[list[int]], list[list[int]]]] = {}
     for number, nodes in lines.items():
-        points = [-1 - found.of_node[n] if n in found.of_node else int(n) for n in nodes]
+        points = [-1 - embedded.of_node[n] if n in embedded.of_node else int(n) for n in nodes]
         if min(points) >= 0:
             continue
-        own = [found.guests[-1 - p].rows.tolist() if p < 0 else [p] for p in points]
+        own = [embedded.guests[-1 - p].rows.tolist() if p < 0 else [p] for p in points]
         rows = sorted({n for each in own for n in each})
         line = place[number][0]
         name = f"{line} in {len(rows)}"
         _, all_points, all_rows = blocks.setdefault(name, (line, [], []))
-        found.place[number] = name, len(all_rows)
+        embedded.place[number] = name, len(all_rows)
         all_points.append(points)
         all_rows.append(rows)
-    found.blocks = {
+    embedded.blocks = {
         name: Embedded(line, np.array(points), np.array(rows))
         for name, (line, points, rows) in blocks.items()
     }

@@ -82,8 +82,8 @@ def _reached(solve: _Solver, start: Array, check: Callable[[], None]) -> Array:
 
 def stopped(reached: float, pressure: float, why: str) -> NoEquilibrium:
     """No stable equilibrium beyond ``reached`` times the load that was asked for."""
-    full, found = pressure / 1e3, reached * pressure / 1e3
-    return NoEquilibrium(f"inflation stopped at {found:.4g} of {full:.4g} kPa: {why}")
+    full, reached_kPa = pressure / 1e3, reached * pressure / 1e3
+    return NoEquilibrium(f"inflation stopped at {reached_kPa:.4g} of {full:.4g} kPa: {why}")
 
 
 def buckled_cords(model: Model, U: Array) -> str:
@@ -125,11 +125,11 @@ class _Solver:
             for load in self.loads
         ]
         tension = 0.0 if U.any() else share * self.tension
-        found, used, self.why = _newton(
+        solution, used, self.why = _newton(
             model, self.numbering, loads, lambda: self.mass, U, tension, longest
         )
         self.factorisations += used
-        return found
+        return solution
 
 
 def _by_stiffness(solve: _Solver, start: Array, check: Callable[[], None]) -> Array | None:

@@ -61,7 +61,8 @@ class Material:
 
     @property
     def law(self) -> Hyperelastic | None:
-        """Of a solid: rubber's, or linear elasticity; None: it is neither. Raises DeckError."""
+        """Law of a solid: its rubber law, or linear elasticity; None: the material has neither.
+        Raises DeckError."""
         if self.rubber is not None or self.youngs_modulus is None:
             return self.rubber
         if self.tension_only:

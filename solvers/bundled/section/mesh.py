@@ -159,18 +159,18 @@ def _mesh(keywords: list[Block]) -> DeckMesh:
 
 def _with_embedded(mesh: DeckMesh, keywords: list[Block]) -> DeckMesh:
     """The mesh without the nodes that move with host elements. Raises DeckError."""
-    found = embedding(keywords, mesh.X, mesh.connectivity, mesh.place, mesh.element_sets)
-    kept = np.setdiff1d(np.arange(len(mesh.X)), list(found.of_node))
+    embedded = embedding(keywords, mesh.X, mesh.connectivity, mesh.place, mesh.element_sets)
+    kept = np.setdiff1d(np.arange(len(mesh.X)), list(embedded.of_node))
     new = np.full(len(mesh.X), -1)
     new[kept] = np.arange(len(kept))
     connectivity, place = {}, dict(mesh.place)
     for kind, rows in mesh.connectivity.items():
         own = [number for number, (k, _) in mesh.place.items() if k == kind]
-        own = [number for number in own if number not in found.place]
+        own = [number for number in own if number not in embedded.place]
         if own:
             connectivity[kind] = new[rows[[mesh.place[number][1] for number in own]]]
             place |= {number: (kind, k) for k, number in enumerate(own)}
-    blocks = {kind: block.renumbered(new) for kind, block in found.blocks.items()}
+    blocks = {kind: block.renumbered(new) for kind, block in embedded.blocks.items()}
     for name, rows in mesh.edges.items():
         if (new[rows] < 0).any():
             raise DeckError(keywords[0].place, f"surface {name} lies on an embedded element")
@@ -181,12 +181,12 @@ def _with_embedded(mesh: DeckMesh, keywords: list[Block]) -> DeckMesh:
         X=mesh.X[kept],
         index=index,
         connectivity=connectivity | {kind: block.rows for kind, block in blocks.items()},
-        place=place | found.place,
+        place=place | embedded.place,
         node_sets=sets,
         edges={name: new[rows] for name, rows in mesh.edges.items()},
         reference_nodes={n: [m for m in s if m in index] for n, s in mesh.reference_nodes.items()},
         embedded=blocks,
-        guests=[guest.renumbered(new) for guest in found.guests],
+        guests=[guest.renumbered(new) for guest in embedded.guests],
     )
 
 

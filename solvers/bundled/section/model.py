@@ -1,4 +1,4 @@
-"""What fills the mesh: the section's parts with their constants."""
+"""Parts of the section, with their constants, that fill the mesh."""
 
 from __future__ import annotations
 

@@ -69,10 +69,10 @@ class Sparse:
 
     def diagonal(self) -> Array:
         """Its entries (n,) on the diagonal; 0 where there is none."""
-        found = np.zeros(len(self.starts) - 1, self.entries.dtype)
+        diagonal = np.zeros(len(self.starts) - 1, self.entries.dtype)
         on = self._rows == self.columns
-        found[self.columns[on]] = self.entries[on]
-        return found
+        diagonal[self.columns[on]] = self.entries[on]
+        return diagonal
 
 
 def narrow_order(pairs: Array, n: int) -> Array:

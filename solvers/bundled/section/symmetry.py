@@ -49,7 +49,7 @@ class Whole:
     copies = 1  # of the elements that are there make the tyre
 
     def share(self, rows: Array) -> Array:
-        """Of the integration weights of elements (e, a), that counts (e, 1)."""
+        """Share (e, 1) of the integration weights of elements (e, a) that counts."""
         return np.ones((len(rows), 1))
 
     def field(self, u: Array) -> Array:

@@ -57,10 +57,10 @@ def read_law(k: Block) -> Hyperelastic:
     given |= {f"inverse_{name}": 1 / D if D else 0.0 for name, D in given.items() if name[0] == "D"}
     own = (*law.shear_moduli, *law.bulk_moduli, *law.numbers)
     constants: dict[str, Any] = {name: np.asarray(given.get(name, 0.0)) for name in own}
-    found = law(**constants)
-    if not np.real(found.shear_modulus) > 0:
+    instance = law(**constants)
+    if not np.real(instance.shear_modulus) > 0:
         raise DeckError(k.rows[0].place, "the shear modulus of small strains must be positive")
-    return found
+    return instance
 
 
 def _numbers(k: Block, names: list[str]) -> list[Scalar]:

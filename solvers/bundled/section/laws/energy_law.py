@@ -1,4 +1,4 @@
-"""What every law is: an energy W of rows z (see `parts.elastic`), its force and its tangent.
+"""Base class of every law: an energy W of rows z (see `parts.elastic`), its force and its tangent.
 
 A law is a dataclass; its arrays are constants per Gauss point (p,), or per Gauss point and station
 round the tyre (p, s). Rows and constants may be complex, which is how slopes are formed.
@@ -51,7 +51,8 @@ class EnergyLaw(ABC):
         return self
 
     def growing(self, table: int) -> Self | None:
-        """What grows of the tangent with the modulus table of that place; None: nothing."""
+        """The part of the tangent that scales with the modulus of table number ``table``; None: no
+        part."""
         return None
 
     def at_stations(self, points: int, stations: int) -> Self:

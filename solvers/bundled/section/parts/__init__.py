@@ -1,1 +1,1 @@
-"""What the tyre is made of and what acts on it, one part a file."""
+"""Parts of the tyre and the loads that act on it, one per file."""

@@ -121,7 +121,8 @@ NOT_COMPRESSED = CompressedCords(0.0, "", np.zeros(0, int))
 def _most_compressed(
     law: EnergyLaw, z: Array, layers: tuple[str, ...], connectivity: Array
 ) -> CompressedCords:
-    """Of cords with the vectors z (p, 3), all points of an element in a row."""
+    """The most compressed cord by the vectors z (p, 3); the points of an element follow each
+    other."""
     assert isinstance(law, LogarithmicCord)
     bear = np.asarray(law.compressed) > 0
     strain = np.where(bear, np.log(stretch(z)), 0.0)

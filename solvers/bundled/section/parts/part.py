@@ -1,5 +1,5 @@
-"""What every part of the tyre has: energy, force, tangents, mass and form, and the same in 3-D;
-what it is read from, the modes that its form is of, and the rows that they are taken through.
+"""Base class of the tyre's parts: energy, force, tangents, mass and form, and the same in 3-D; also
+the blocks that a part is read from, the modes that its form belongs to, and their rows.
 
 All that a step, a vibration or a slope needs of the tyre is a sum over its parts. State U (n, 3)
 in m: displacements in the frame of the reference angle (see `elements`); energies per radian.
@@ -52,7 +52,8 @@ class TyrePart(ABC):
         """The part in three dimensions, in a section of so many nodes."""
 
     def growing(self, table: int) -> TyrePart | None:
-        """What grows of its stiffness with the modulus table of that place; None: nothing."""
+        """The part of its stiffness that scales with the modulus of table number ``table``; None:
+        no part."""
         return None
 
     def form(self, U: Array, fields: ModeShapes) -> Array:
@@ -144,7 +145,7 @@ class Rows:
 
     @cached_property
     def B1(self) -> Array:
-        """What du/dTheta adds to the rows ``around``."""
+        """Rows that du/dTheta adds to the rows ``around``."""
         return on_diagonals(self.hoop)
 
 
