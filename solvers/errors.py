@@ -1,4 +1,4 @@
-"""What the solvers raise: two trees, and two states that Newton's method steps back from.
+"""Exceptions of the solvers: two trees, and two states from which Newton's method steps back.
 
     Refused                     an option, or a request, that the solver cannot honour
         DeckError               a deck that it cannot, with its line
@@ -14,7 +14,8 @@ from __future__ import annotations
 
 
 class Refused(ValueError):
-    """What is given cannot be honoured; the message says what would be right."""
+    """An option, a request or a deck that cannot be honoured; the message says what would be
+    right."""
 
 
 class RunFailed(RuntimeError):

@@ -41,6 +41,6 @@ def save(request: Mapping[str, Any], folder: Path) -> list[Path]:
 
 
 def load(folder: Path) -> OwnDecks | None:
-    """What was saved in a run folder; None where it has no own decks. Raises OSError."""
+    """Load the own decks that were saved in a run folder; None if it has none. Raises OSError."""
     path = folder / OWN_DECKS_FILE
     return OwnDecks(**json.loads(path.read_text(encoding="utf-8"))) if path.exists() else None

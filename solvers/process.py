@@ -75,7 +75,7 @@ def end_commands() -> None:
 
 
 def _leash(program: str) -> list[str]:
-    """What a command starts with so that the kernel ends it with the thread that started it.
+    """Words that start a command so that the kernel ends it with the thread that started it.
 
     `run_command` waits in that thread. (util-linux; Python's preexec_fn is not safe in threads.)
     Nothing where it is not installed, or where ``program`` is not: Popen then says so.
@@ -130,5 +130,5 @@ def last_words(log: Path, lines: int = 3) -> str:
     with log.open("rb") as file:
         file.seek(max(0, log.stat().st_size - 4000))
         text = file.read().decode(errors="replace")
-    said = [line.strip() for line in text.splitlines() if line.strip()]
-    return " | ".join(said[-lines:])
+    nonblank = [line.strip() for line in text.splitlines() if line.strip()]
+    return " | ".join(nonblank[-lines:])

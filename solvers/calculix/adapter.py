@@ -30,8 +30,8 @@ OPTIONS: dict[str, Any] = {"parallel": 1, "element": "C3D20R", "ply_thickness_m"
 
 
 class Decks(Protocol):
-    """What the tool hands over; ``options``: the solver's, from the case; ``request``: among what
-    is asked, ``own_decks`` of a user's in three dimensions."""
+    """Decks and requests that the tool hands to the adapter. ``options``: this solver's options
+    from the case; ``request``: for a user's decks in three dimensions ``own_decks``."""
 
     options: Mapping[str, Any]
     request: Mapping[str, Any]
@@ -134,8 +134,8 @@ class CalculiX:
         inflated, front = _inflated(folder / f"{INFLATE}.frd")
         for diameter, job in jobs:
             deck = folder / f"{job}.inp"
-            asked = int(_find(r"\*FREQUENCY\s+(\d+)", deck))
-            eigenvalues = read_eigenvalues(folder / f"{job}.dat", diameter, asked)
+            count = int(_find(r"\*FREQUENCY\s+(\d+)", deck))
+            eigenvalues = read_eigenvalues(folder / f"{job}.dat", diameter, count)
             fields = read_fields(folder / f"{job}.frd")
             values = pairs(eigenvalues, f"{job}.dat")
             shapes = _shapes(fields, len(values), diameter, sectors, job)
@@ -164,11 +164,13 @@ def _of_own_decks(folder: Path, own: own_decks.OwnDecks) -> dict[str, Any]:
     table = folder / f"{own.last}.dat"
     eigenvalues = read_eigenvalues(table, None, own.modes)
     fields = read_fields(folder / f"{own.last}.frd", static=False)
-    found = {mode: values for mode, name, values in fields.blocks if name == "DISP"}
-    if set(found) != set(range(1, len(eigenvalues) + 1)):
+    displacements = {mode: values for mode, name, values in fields.blocks if name == "DISP"}
+    if set(displacements) != set(range(1, len(eigenvalues) + 1)):
         raise RunFailed("no_results", f"{own.last}.frd lacks shapes of modes")
     points, turn = about_axle(own.length_m * fields.points)
-    shapes = np.array([found[mode] for mode in sorted(found)]) / np.sqrt(own.mass_kg)
+    shapes = np.array([displacements[mode] for mode in sorted(displacements)]) / np.sqrt(
+        own.mass_kg
+    )
     places, modes = ring_modes(eigenvalues, points, shapes @ turn.T)
     return {
         "pressure_Pa": own.pressure_Pa,
@@ -213,11 +215,11 @@ def _inflated(path: Path) -> tuple[Fields, Array]:
 @lru_cache
 def _version(command: tuple[str, ...]) -> str:
     try:
-        said = subprocess.run([*command, "-v"], capture_output=True, text=True, timeout=20).stdout
+        output = subprocess.run([*command, "-v"], capture_output=True, text=True, timeout=20).stdout
     except (OSError, subprocess.TimeoutExpired):
         return "unknown"
-    found = re.search(r"Version (\S+)", said)
-    return found[1] if found else "unknown"
+    match = re.search(r"Version (\S+)", output)
+    return match[1] if match else "unknown"
 
 
 def _shapes(fields: Fields, count: int, n: int, sectors: int, job: str) -> list[Array]:
@@ -225,15 +227,15 @@ def _shapes(fields: Fields, count: int, n: int, sectors: int, job: str) -> list[
 
     At Theta = 0, x, y, z are r, theta, z. CalculiX normalises to one sector's mass.
     """
-    found: dict[int, dict[str, Array]] = {}
+    by_mode: dict[int, dict[str, Array]] = {}
     for mode, name, values in fields.blocks:
-        found.setdefault(mode, {})[name] = values
+        by_mode.setdefault(mode, {})[name] = values
     wanted = range(1, 2 * count, 2)
-    if any(set(found.get(mode, ())) != {"DISP", "DISPI"} for mode in wanted):
+    if any(set(by_mode.get(mode, ())) != {"DISP", "DISPI"} for mode in wanted):
         raise RunFailed("no_results", f"{job}.frd lacks shapes of modes")
     shapes = []
     for mode in wanted:
-        shape = found[mode]["DISP"] + 1j * found[mode]["DISPI"]
+        shape = by_mode[mode]["DISP"] + 1j * by_mode[mode]["DISPI"]
         largest = shape.ravel()[abs(shape).argmax()]
         if not abs(largest) > 0:
             raise RunFailed("no_results", f"{job}.frd: the shape of mode {mode} is no shape")
@@ -264,10 +266,10 @@ def _check_rubber(path: Path) -> None:
 
 
 def _find(pattern: str, path: Path) -> str:
-    found = re.search(pattern, path.read_text(encoding="utf-8"), re.I)
-    if not found:
+    match = re.search(pattern, path.read_text(encoding="utf-8"), re.I)
+    if not match:
         raise RunFailed("no_results", f"{path.name} has no {pattern.split(' *')[0]}")
-    return found[1]
+    return match[1]
 
 
 def _settings(given: Mapping[str, Any]) -> dict[str, Any]:

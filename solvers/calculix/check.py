@@ -1,4 +1,5 @@
-"""What CalculiX 2.20 has nothing for of a section's deck that others honour, by its manual."""
+"""Keywords of a section's deck that CalculiX 2.20 lacks by its manual, although other solvers
+honour them."""
 
 from __future__ import annotations
 
@@ -17,13 +18,13 @@ ELEMENTS = {
 
 def lacking(blocks: Sequence[Block]) -> Iterator[tuple[Block, str]]:
     """Keywords that CalculiX has nothing for and why, each reason where it is met first."""
-    said = set()
+    seen = set()
     for block in blocks:
         rule = RULES.get(block.name)
         why: str | None = rule.calculix if rule else ""
         if block.name == "ELEMENT":
             kind = block.parameters.get("TYPE", "").upper()
             why = next((words for start, words in ELEMENTS.items() if kind.startswith(start)), None)
-        if why and why not in said:
-            said.add(why)
+        if why and why not in seen:
+            seen.add(why)
             yield block, why

@@ -26,7 +26,7 @@ class Fields:
     blocks: list[tuple[int, str, Array]]
 
 
-def read_eigenvalues(path: Path, diameter: int | None, asked: int | None) -> Array:
+def read_eigenvalues(path: Path, diameter: int | None, expected: int | None) -> Array:
     """omega^2 (asked,) in 1/s2, ascending, as .dat has them, of a nodal diameter of a sector; None:
     of a whole tyre, or as many as there are.
 
@@ -36,11 +36,11 @@ def read_eigenvalues(path: Path, diameter: int | None, asked: int | None) -> Arr
     text = _text(path)
     which = "" if diameter is None else f" +{diameter}"
     row = re.compile(rf"^{which} +(\d+)((?: +\S+){{4}}) *$", re.M)
-    found = [(int(m[1]), _number(m[2].split()[0], path)) for m in row.finditer(_table(text))]
-    count = len(found) if asked is None else asked
-    if not found or [number for number, _ in found] != list(range(1, count + 1)):
-        raise RunFailed("no_results", f"{path.name} has {len(found)} of {asked or 'any'} modes")
-    values = np.array([value for _, value in found])
+    rows = [(int(m[1]), _number(m[2].split()[0], path)) for m in row.finditer(_table(text))]
+    count = len(rows) if expected is None else expected
+    if not rows or [number for number, _ in rows] != list(range(1, count + 1)):
+        raise RunFailed("no_results", f"{path.name} has {len(rows)} of {expected or 'any'} modes")
+    values = np.array([value for _, value in rows])
     if not values.any():
         raise RunFailed("no_results", f"{path.name}: all eigenvalues are 0")
     if (values <= 0).any():
@@ -59,10 +59,10 @@ def _table(text: str) -> str:
 def read_mass(path: Path, elements: str = "EVERYTHING") -> float:
     """Mass of a set of elements, in the deck's unit, as it is told last. Raises RunFailed
     (``no_results``)."""
-    found = re.findall(MASS.format(re.escape(elements)), _text(path))
-    if not found:
+    matches = re.findall(MASS.format(re.escape(elements)), _text(path))
+    if not matches:
         raise RunFailed("no_results", f"{path.name} has no mass of {elements}")
-    return _number(found[-1], path)
+    return _number(matches[-1], path)
 
 
 def pairs(eigenvalues: Array, name: str) -> Array:

@@ -71,8 +71,8 @@ def _run(folder: Path, job: str, command: Sequence[str], time_limit_s: float) ->
 
 
 def _said(log: Path) -> tuple[str, bool, bool]:
-    """Of a log of any length: the first ``*ERROR`` with the two lines that follow it, or "";
-    whether there was no equilibrium; whether the job finished.
+    """First error, lost equilibrium and end of a log of any length: the first ``*ERROR`` with the
+    two lines that follow it, or ""; whether there was no equilibrium; whether the job finished.
 
     A card that ccx skips, or of which it skips a parameter, is an error too: it only warns.
     """

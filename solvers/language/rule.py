@@ -1,4 +1,4 @@
-"""What ABAQUS' manual says of a keyword, and how that is written.
+"""Rules of ABAQUS' manual for a keyword, and the notation of the rule tables.
 
 Of each: the level it belongs to, its parameters, what it must stand under, come after or have, how
 often it may stand, and its data lines.
@@ -70,7 +70,7 @@ class Rule:
 
     @cached_property
     def parameters(self) -> dict[str, str]:
-        """What each may be: words in capitals, split at |, or a kind."""
+        """Permitted values of each parameter: words in capitals, split at |, or a kind."""
         pairs = (option.partition("=") for option in self.options.split("; ") if option)
         return {name: value for name, _, value in pairs}
 

@@ -125,7 +125,7 @@ class Block:
 
     @cached_property
     def identity(self) -> tuple[object, ...]:
-        """What the block says, wherever it stands: a key for what is derived from it."""
+        """Content of the block without its place: a key for what is derived from it."""
         return self.name, tuple(self.parameters.items()), tuple(row.line for row in self.rows)
 
     def get(self, parameter: str, default: str = "") -> str:
