@@ -1,4 +1,4 @@
-"""What a Dask worker loads first: every run of the solver is written down, with who runs it."""
+"""Record every run of the solver with its process; a Dask worker loads this module first."""
 
 from __future__ import annotations
 

@@ -27,9 +27,9 @@ from .support import vary
 DASK = [sys.executable, "-m", "dask"]
 
 
-def wait_for(found: Callable[[], Any], seconds: float = 300.0) -> Any:
+def wait_for(condition: Callable[[], Any], seconds: float = 300.0) -> Any:
     end = time.monotonic() + seconds
-    while not (answer := found()):
+    while not (answer := condition()):
         assert time.monotonic() < end
         time.sleep(0.02)
     return answer
@@ -103,8 +103,8 @@ def square(task: float) -> float:
 def test_one_of_four_workers_killed_in_the_middle(machines: Machines, tmp_path: Path) -> None:
     cases = list(map(str, vary(tmp_path / "cases", 5)))
     plain, out = tmp_path / "plain", tmp_path / "out"
-    asked = ["--quiet"]
-    command = [sys.executable, "-m", "tyrecal", "batch", *cases, *asked]
+    options = ["--quiet"]
+    command = [sys.executable, "-m", "tyrecal", "batch", *cases, *options]
     batch = subprocess.Popen([*command, "--scheduler", machines.address, "--output", out])
     wait_for(lambda: len(machines.runs()) > 10 or batch.poll() is not None)
     assert batch.poll() is None
@@ -116,7 +116,7 @@ def test_one_of_four_workers_killed_in_the_middle(machines: Machines, tmp_path: 
     worker.kill()
     worker.wait()
     assert batch.wait() == 0
-    assert run("batch", *cases, *asked, "--jobs", "2", "--output", str(plain)) == 0
+    assert run("batch", *cases, *options, "--jobs", "2", "--output", str(plain)) == 0
     assert (out / "batch.json").read_bytes() == (plain / "batch.json").read_bytes()
     for case in json.loads((plain / "batch.json").read_text())["cases"]:
         for file in ("fit.json", "fit_history.csv"):

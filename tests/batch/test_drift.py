@@ -33,9 +33,9 @@ def reports(x: float) -> list[dict]:
 def test_a_number_drifts_beyond_the_larger_tolerance(
     old: float, new: float, relative: float, absolute: float
 ) -> None:
-    found = compare(reports(new), one(old, {"relative": relative, "absolute": absolute}))
-    assert found["compared"] == 1
-    assert bool(found["drifted"]) == (abs(new - old) > max(relative * abs(old), absolute))
+    drift = compare(reports(new), one(old, {"relative": relative, "absolute": absolute}))
+    assert drift["compared"] == 1
+    assert bool(drift["drifted"]) == (abs(new - old) > max(relative * abs(old), absolute))
 
 
 @given(FINITE)
@@ -57,14 +57,14 @@ def test_what_is_gone_missing_or_new_is_said() -> None:
         report("a", fit=entry(objective=1.0, **{"fitted_Hz [1,0]": 3.0}), footprint=entry()),
         report("c", fit=entry(objective=1.0)),
     ]
-    found = compare(now, baseline_of(before, None))
-    (gone,) = found["drifted"]
+    drift = compare(now, baseline_of(before, None))
+    (gone,) = drift["drifted"]
     assert (gone["quantity"], gone["value"]) == ("mass_kg", None)
     assert drift_line(gone) == "mass_kg: 2 is gone"
-    assert (found["missing_cases"], found["new_cases"]) == (["b"], ["c"])
-    assert (found["missing_studies"], found["new_studies"]) == (["a/modes"], ["a/footprint"])
-    assert found["new"] == 1 and found["compared"] == 2
-    verdicts = {c["name"]: c["verdict"] for c in summary(["fit"], now, found)["cases"]}
+    assert (drift["missing_cases"], drift["new_cases"]) == (["b"], ["c"])
+    assert (drift["missing_studies"], drift["new_studies"]) == (["a/modes"], ["a/footprint"])
+    assert drift["new"] == 1 and drift["compared"] == 2
+    verdicts = {c["name"]: c["verdict"] for c in summary(["fit"], now, drift)["cases"]}
     assert verdicts == {"a": "drifted", "c": "good"}
 
 
@@ -75,9 +75,9 @@ def test_the_worst_stands_first_and_a_failure_is_no_drift() -> None:
         report("b", fit=entry(objective=90.0)),
         report("c", fit=entry("failed", "not_converged", "no", objective=0.0)),
     ]
-    found = compare(now, baseline_of(before, None))
-    assert [each["case"] for each in found["drifted"]] == ["b", "a"]
-    counts = summary(["fit"], now, found)["counts"]
+    drift = compare(now, baseline_of(before, None))
+    assert [each["case"] for each in drift["drifted"]] == ["b", "a"]
+    counts = summary(["fit"], now, drift)["counts"]
     assert counts == {"cases": 3, "error": 0, "failed": 1, "drifted": 2, "good": 0}
 
 

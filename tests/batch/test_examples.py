@@ -73,5 +73,5 @@ def test_the_gitlab_example_is_yaml_with_a_command_that_exists() -> None:
     (block,) = (ROOT / "cases/batch.md").read_text().split("```yaml\n")[1:]
     script = YAML(typ="safe").load(block.partition("```")[0])["tyres"]["script"]
     options = [word for word in script[-1].split() if word.startswith("--")]
-    said = subprocess.run([BIN / "tyrecal", "batch", "--help"], capture_output=True, text=True)
-    assert options and all(f"{option} " in said.stdout for option in options)
+    completed = subprocess.run([BIN / "tyrecal", "batch", "--help"], capture_output=True, text=True)
+    assert options and all(f"{option} " in completed.stdout for option in options)
