@@ -1,4 +1,4 @@
-"""What a batch costs a Dask scheduler: bytes moved and stored per case, tasks per second, memory.
+"""Cost of a batch on a Dask scheduler: bytes moved and stored per case, tasks per second, memory.
 
     python tests/benchmarks/cluster.py [--cases 6] [--tasks 10000]
 

@@ -63,7 +63,7 @@ class Watched(Evaluator):
 
 
 def processor_s(process: multiprocessing.process.BaseProcess) -> float:
-    """What a process has used so far: fields 14 and 15 of its status on Linux."""
+    """Processor seconds that a process has used so far: fields 14 and 15 of its status on Linux."""
     fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
@@ -98,7 +98,7 @@ def main(measured: Path | None, jobs: int) -> None:
         measured = measured or made(LOADED, Path(folder) / "measured.csv")
         evaluator = Watched(TyreDesign(LOADED)) if jobs == 1 else Evaluator(TyreDesign(LOADED))
         wall, start = time.perf_counter(), time.process_time()
-        found = study(LOADED, evaluator, measured, jobs=jobs)
+        result = study(LOADED, evaluator, measured, jobs=jobs)
         wall, own = time.perf_counter() - wall, time.process_time() - start
     workers = sum(map(processor_s, multiprocessing.active_children()))  # kept for more
     if isinstance(evaluator, Watched):
@@ -106,11 +106,11 @@ def main(measured: Path | None, jobs: int) -> None:
         for kind, seconds in sorted(evaluator.seconds.items(), key=lambda item: -item[1]):
             count = evaluator.count[kind]
             print(f"| {kind} | {count} | {seconds:.2f} | {seconds / count:.3f} |")
-        asked = sum(evaluator.seconds.values())
-        print(f"| all | {sum(evaluator.count.values())} | {asked:.1f} | |")
-        print(f"\nthe rest, mostly evidence: {own - asked:.1f} s")
+        evaluations_s = sum(evaluator.seconds.values())
+        print(f"| all | {sum(evaluator.count.values())} | {evaluations_s:.1f} | |")
+        print(f"\nthe rest, mostly evidence: {own - evaluations_s:.1f} s")
     print(f"wall {wall:.1f} s, processor time {own:.1f} s here, {workers:.1f} s in other processes")
-    print(f"solver runs: {evaluator.counts.runs}; verdict: {found.diagnosis.verdict.kind}")
+    print(f"solver runs: {evaluator.counts.runs}; verdict: {result.diagnosis.verdict.kind}")
 
 
 if __name__ == "__main__":

@@ -38,7 +38,7 @@ Factored = tuple[type, list[np.ndarray], list[np.ndarray]]  # class, matrices, r
 
 
 def record(evaluator: Evaluator, question: Question) -> list[Factored]:
-    """What is factorised in one evaluation, each with its right-hand sides."""
+    """Factorisations of one evaluation, each with its right-hand sides."""
     log: list[Factored] = []
     plain = [(kind, kind.__init__, kind.solve) for kind in FACTORS]
     for kind, init, solve in plain:

@@ -86,9 +86,9 @@ def main(folder: Path) -> None:
     judge = rows["CalculiX F6"][0][0]
     print("| run | wall, s | deflection, mm | force, N | area, cm² | CalculiX takes, times |")
     print("|---|---|---|---|---|---|")
-    for name, found in rows.items():
-        _, deflection, force, area = found[0]
-        times = [seconds for seconds, *_ in found]
+    for name, entries in rows.items():
+        _, deflection, force, area = entries[0]
+        times = [seconds for seconds, *_ in entries]
         print(
             f"| {name} | {' and '.join(f'{s:.1f}' for s in times)} | {1e3 * deflection:.3f}", end=""
         )

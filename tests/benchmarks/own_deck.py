@@ -69,9 +69,9 @@ def fit_seconds(path: Path, mesh: str) -> tuple[float, dict[str, Any]]:
         level = ["--mesh", mesh] if mesh else []
         words = ["fit", str(path), "--no-pictures", "--no-store", "--output", folder, *level]
         subprocess.run([sys.executable, "-m", "tyrecal", *words, "--quiet"], check=True)
-        found = json.loads((Path(folder) / "fit.json").read_text())
+        fit = json.loads((Path(folder) / "fit.json").read_text())
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, found
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, fit
 
 
 def finer(folder: Path) -> Path:
@@ -91,10 +91,10 @@ def compare_fits(of: Path, own: Path, mesh: str, rounds: int) -> None:
             seconds, results[name] = fit_seconds(path, level)
             spent[name].append(seconds)
     ratios = [deck / case for case, deck in zip(*spent.values(), strict=True)]
-    for name, found in results.items():
+    for name, fit in results.items():
         print(
-            f"{name}: {statistics.median(spent[name]):.2f} s, {found['evaluations']} evaluations,"
-            f" objective {found['objective_Hz']:.6f} Hz"
+            f"{name}: {statistics.median(spent[name]):.2f} s, {fit['evaluations']} evaluations,"
+            f" objective {fit['objective_Hz']:.6f} Hz"
         )
     print(f"a fit of the deck over one of the case: {statistics.median(ratios):.2f}")
 
@@ -132,9 +132,9 @@ def main() -> None:
             evaluator = Evaluator(TyreDesign(with_values(each, start)), "bundled")
             evaluator.evaluate(Question(start))  # the nominal shape, which a fit has once
             began = time.process_time()
-            found = evaluator.evaluate(Question(values, tuple(start)))
+            result = evaluator.evaluate(Question(values, tuple(start)))
             spent[name].append(time.process_time() - began)
-            hertz[name] = [mode.frequency_Hz for mode in found.modes]
+            hertz[name] = [mode.frequency_Hz for mode in result.modes]
     medians = {name: statistics.median(times[1:]) for name, times in spent.items()}
     print(f"{len(flat.mesh.nodes)} nodes, {len(start_values(own))} variables")
     print({name: round(value, 3) for name, value in medians.items()})
