@@ -30,11 +30,11 @@ CHEAP = sorted(set(other_laws(frozenset({"modes"}))))
 
 
 def ln_f(case: LoadedCase) -> np.ndarray:
-    found = {
+    frequencies = {
         m.label: m.frequency_Hz
         for m in paired_labels(Evaluator(TyreDesign(case)).evaluate(Question({})).modes)
     }
-    return np.log([found[label] for label in LABELS])
+    return np.log([frequencies[label] for label in LABELS])
 
 
 PLAIN = ln_f(AT)
@@ -102,7 +102,7 @@ def test_sizes_are_drawn_on_both_sides(chance: Chance) -> None:
 def test_the_emulated_model_is_the_model_between_its_designs_and_goes_straight_on_beyond() -> None:
     scale = Scale()
     twin = emulate(scale)
-    random, asked = generator(1), scale.asked
+    random, count = generator(1), scale.asked
     for _ in range(10):
         x = scale.start + random.uniform(-0.7, 0.7, 3)
         point = Query(x, {"e1": float(random.uniform(0, 1))}, constants=True)
@@ -111,10 +111,10 @@ def test_the_emulated_model_is_the_model_between_its_designs_and_goes_straight_o
         assert isinstance(got, Answer) and isinstance(want, Answer)
         for name in ("eta", "jacobian", "constants"):
             assert np.allclose(getattr(got, name), getattr(want, name), atol=1e-6)
-    assert scale.asked == asked + 10
+    assert scale.asked == count + 10
     edge, beyond = (Query(scale.start + step * np.array([1.0, 0.2, 0.1])) for step in (0.8, 1.3))
     at, after = twin.answers([edge, beyond])
-    assert isinstance(at, Answer) and isinstance(after, Answer) and scale.asked == asked + 10
+    assert isinstance(at, Answer) and isinstance(after, Answer) and scale.asked == count + 10
     assert np.allclose(after.jacobian[:, 0], at.jacobian[:, 0], atol=0.05)
     middle = at.eta + at.jacobian[:, 0] * 0.5
     rest = after.eta - middle  # what the other two, still inside, add

@@ -1,4 +1,5 @@
-"""What could be found before anything is measured, against lambda by its formula."""
+"""Effects that a test could detect, judged before anything is measured, against lambda by its
+formula."""
 
 from __future__ import annotations
 

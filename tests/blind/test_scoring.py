@@ -214,8 +214,8 @@ def test_the_ruler_of_a_model_is_its_own_sensitivities() -> None:
 def test_baselines_find_a_strong_effect_and_none_where_there_is_none() -> None:
     r, places = ruler(), np.arange(4)
     sigma = r.sigma(places, np.full(4, 2), RULES, constants=False)
-    found = guesses(r, np.array([0.02, 0, 0, 0]) + 0.1, places, sigma)
-    assert set(found.values()) == {"a"}
+    by_baseline = guesses(r, np.array([0.02, 0, 0, 0]) + 0.1, places, sigma)
+    assert set(by_baseline.values()) == {"a"}
     assert set(guesses(r, np.full(4, 0.1), places, sigma).values()) == {"none"}
     assert sqrt(sigma[0, 0]) == pytest.approx(RULES.noise / sqrt(2))
 

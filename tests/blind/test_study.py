@@ -47,27 +47,27 @@ def scored(trials: Path) -> list[Scored]:
 def test_calibrated_as_usual_the_error_shrinks_too(
     study: Path, trials: Path, scored: list[Scored]
 ) -> None:
-    found = errors(trials, scored)
-    before, after = 100 * np.median(found["effect"], 0)
-    shrinks, chance = (1 - found[kind][:, 1] / found[kind][:, 0] for kind in ("effect", "none"))
+    by_kind = errors(trials, scored)
+    before, after = 100 * np.median(by_kind["effect"], 0)
+    shrinks, chance = (1 - by_kind[kind][:, 1] / by_kind[kind][:, 0] for kind in ("effect", "none"))
     got = before, after, np.median(shrinks), np.quantile(chance, 0.95)
     assert got == pytest.approx(LEAST_SQUARES[study.name], abs=0.006)
 
 
-def alike(found: Any, stated: Any, where: str = "") -> None:
+def alike(computed: Any, stated: Any, where: str = "") -> None:
     """Plain data that is the same, numbers to 1e-6."""
     if isinstance(stated, dict):
-        assert found.keys() == stated.keys(), where
+        assert computed.keys() == stated.keys(), where
         for key in stated:
-            alike(found[key], stated[key], f"{where}/{key}")
+            alike(computed[key], stated[key], f"{where}/{key}")
     elif isinstance(stated, list):
-        assert len(found) == len(stated), where
-        for i, pair in enumerate(zip(found, stated, strict=True)):
+        assert len(computed) == len(stated), where
+        for i, pair in enumerate(zip(computed, stated, strict=True)):
             alike(*pair, f"{where}/{i}")
     elif stated is None:
-        assert found is None, where
+        assert computed is None, where
     else:
-        assert found == pytest.approx(stated, rel=1e-6, abs=1e-9), where
+        assert computed == pytest.approx(stated, rel=1e-6, abs=1e-9), where
 
 
 @pytest.mark.slow

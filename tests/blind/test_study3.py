@@ -87,12 +87,12 @@ def test_a_section_has_the_size_s_dimensions_and_no_folded_element(size: str) ->
 def own_frequencies(case: LoadedCase, pressures: list[float]) -> dict[float, dict[Any, float]]:
     """Hz of the answerer's model by pressure and label."""
     evaluator = Evaluator(TyreDesign(case), "bundled")
-    found = {}
+    by_pressure = {}
     for p in pressures:
         answer = evaluator.evaluate(Question({"pressure_kPa": p}))
         modes = match(label_modes(answer.modes), LABELS)
-        found[p] = {label: modes[label].frequency_Hz for label in LABELS}
-    return found
+        by_pressure[p] = {label: modes[label].frequency_Hz for label in LABELS}
+    return by_pressure
 
 
 @pytest.mark.parametrize(
@@ -103,9 +103,9 @@ def own_frequencies(case: LoadedCase, pressures: list[float]) -> dict[float, dic
 def test_the_model_of_every_group_inflates_and_has_its_modes(group: Group, tmp_path: Path) -> None:
     """At all pressures of the study; a stiffer state has higher frequencies."""
     pressures = sorted([*group.given_kPa, group.held_out_kPa])
-    found = own_frequencies(with_level(written(group, tmp_path), "coarse"), pressures)
+    by_pressure = own_frequencies(with_level(written(group, tmp_path), "coarse"), pressures)
     for label in LABELS:
-        assert np.all(np.diff([found[p][label] for p in pressures]) > 0)
+        assert np.all(np.diff([by_pressure[p][label] for p in pressures]) > 0)
 
 
 @pytest.mark.slow
@@ -149,23 +149,23 @@ def test_a_law_says_nothing_at_0_and_something_else_at_every_size(
     """Whether it moves nodes, cells or constants, at two pressures; the least size drawn, too."""
     case, group = written(Group(size, False), tmp_path), Group(size, True)
     sound = tyre_of(case, mould(size), columns(mould(size)))
-    asked = lambda tyre: problem(tyre, [0.8e-3 * sound.nominal_Pa, 1.2e-3 * sound.nominal_Pa])
-    plain = asked(sound)
+    problem_of = lambda tyre: problem(tyre, [0.8e-3 * sound.nominal_Pa, 1.2e-3 * sound.nominal_Pa])
+    plain = problem_of(sound)
     known = (*known_laws(case, group), EVIDENT)
     for law in [law for laws in known for law in laws.values()]:
-        assert asked(law.add(sound, 0.0)) == plain
+        assert problem_of(law.add(sound, 0.0)) == plain
         sizes = [share * end for end in {law.low, law.high} - {0.0} for share in (0.2, 1.0)]
-        every = [plain, *(asked(law.add(sound, e)) for e in sizes)]
+        every = [plain, *(problem_of(law.add(sound, e)) for e in sizes)]
         assert all(a != b for i, a in enumerate(every) for b in every[:i])
 
 
 def toy(
-    fenics: Fenics, told: Tyre, pressures: list[float], labels: list[Any], near: bool
+    fenics: Fenics, tyre: Tyre, pressures: list[float], labels: list[Any], near: bool
 ) -> dict[float, Any]:
     """Frequencies that a few of the tyre's numbers set; some tyres have no solution."""
-    if int(1e7 * told.mould.filler) % 3 == 0:
+    if int(1e7 * tyre.mould.filler) % 3 == 0:
         raise EvaluationFailed("no_equilibrium", "of 1 N 1 is left")
-    f = np.log(50.0) + 0.01 * told.cap / 1e6 + 0.1 * told.kelvin / 15 + told.mould.belts[0]
+    f = np.log(50.0) + 0.01 * tyre.cap / 1e6 + 0.1 * tyre.kelvin / 15 + tyre.mould.belts[0]
     return {p: Computed({x: (f, f) for x in labels}, np.log(10.0)) for p in pressures}
 
 
@@ -223,7 +223,7 @@ def test_what_the_rules_tell_of_further_effects_is_the_counts_mean_number() -> N
 
 @pytest.mark.slow
 def test_effects_of_a_band_are_those_of_which_the_ruler_foresees_as_much(chance: Chance) -> None:
-    """Of the recorded ruler: each strong one's lambda is 25 or more, each of a pair's 15, a weak
+    """By the recorded ruler, each strong effect's lambda is 25 or more, each of a pair's 15, a weak
     one's 10 to 25, a faint one's 4 to 10; of any size some are below. A size of none moves nothing.
     False failures: 1e-7."""
     group = next(group for group in GROUPS if group.name == "205_60r15_own")
@@ -251,8 +251,8 @@ def test_effects_of_a_band_are_those_of_which_the_ruler_foresees_as_much(chance:
 
 
 def test_what_is_evident_outside_the_catalogue_moves_as_much_as_one_effect(tmp_path: Path) -> None:
-    """Of the recorded ruler: the first mode 10 % lower at all pressures is evident, 0.1 % lower
-    is not; sizes are the far ends of their ranges."""
+    """By the recorded ruler, the first mode 10 % lower at all pressures is evident, 0.1 % lower is
+    not; sizes are the far ends of their ranges."""
     group = next(group for group in GROUPS if group.name == "205_60r15_own")
     unpacked(RECORDED / group.name, tmp_path / "trials")
     case, rules = case_of(tmp_path / "trials"), read_protocol(RECORDED / group.name)
@@ -269,8 +269,8 @@ def test_what_is_evident_outside_the_catalogue_moves_as_much_as_one_effect(tmp_p
 
 def on_the_same_stations(case: LoadedCase) -> dict[str, Any]:
     """The case's own stations and laws, for the maker's solver: nothing of its sections."""
-    told = tyre_told(case)
-    lines, belted = stations_section(told["stations"], 12, 20)
+    tyre_data = tyre_told(case)
+    lines, belted = stations_section(tyre_data["stations"], 12, 20)
     middle = lines.shape[1] // 2
     half, belted = lines[:, middle:], belted[middle:]
     places = np.arange(half.shape[1], dtype=float)
@@ -278,16 +278,16 @@ def on_the_same_stations(case: LoadedCase) -> dict[str, Any]:
     count = mesh.rows * (half.shape[1] // 2)
     whole = lambda value: [value] * (2 * count)
     table = {key: np.zeros((2, mesh.rows, half.shape[1] // 2)) for key in ("k", "angle", "m")}
-    for name, cord in told["cords"].items():
+    for name, cord in tyre_data["cords"].items():
         there = belted[1::2] | (name == "ply")
         row, per_m = LINES.index(name) - 1, cord["area"] / cord["spacing"]
         table["k"][0, row, there] = cord["modulus"] * per_m
         table["angle"][0, row, there] = np.radians(cord["angle_deg"])
         table["m"][0, row, there] = cord["density"] * per_m
-    state = {key: whole(told[key]) for key in ("C10", "D1", "density")}
+    state = {key: whole(tyre_data[key]) for key in ("C10", "D1", "density")}
     state |= {key: whole(0.0) for key in ("dynamic_C10", "hoop_Pa", "lining", "prestrain")}
     state |= {"stiffness": table["k"].ravel().tolist(), "angle": table["angle"].ravel().tolist()}
-    state |= {"area_density": table["m"].ravel().tolist(), "pressure": told["pressure"]}
+    state |= {"area_density": table["m"].ravel().tolist(), "pressure": tyre_data["pressure"]}
     laws_alike = {"cord_law": "logarithmic", "volume_law": "J - 1"}
     rim, soft = case.case.rim, case.case.rim.spindle
     spindle = {
@@ -315,8 +315,8 @@ def test_on_the_same_stations_with_the_same_laws_both_solvers_agree(
     labels = labels_of(case)
     answer = Evaluator(TyreDesign(case), "bundled").evaluate(Question({}))
     ours = match(label_modes(answer.modes), labels)
-    found = fenics.ask(on_the_same_stations(case))
-    theirs = modes(found, found["states"][0], labels)
+    result = fenics.ask(on_the_same_stations(case))
+    theirs = modes(result, result["states"][0], labels)
     for label in labels:
         assert theirs[label] == pytest.approx(ours[label].frequency_Hz, rel=5e-3)
 
@@ -335,8 +335,8 @@ def test_a_bead_that_does_not_sit_moves_modes_as_the_catalogue_says(
         ln_f = []
         for each in (bead_seat(plain, share), plain):
             finer = replace(each, columns=[times * n for n in each.columns])
-            found = computed(fenics, finer, [240.0], LABELS)[240.0].ln_f
-            ln_f.append(np.array([found[label][0] for label in LABELS]))
+            by_label = computed(fenics, finer, [240.0], LABELS)[240.0].ln_f
+            ln_f.append(np.array([by_label[label][0] for label in LABELS]))
         return np.asarray(ln_f[0] - ln_f[1])
 
     theirs, finer = shift(1), shift(2)
@@ -356,15 +356,15 @@ def test_a_wheel_that_nothing_holds_moves_with_its_tyre_as_a_rigid_body(
 ) -> None:
     """Along the axle by k / m; in four directions by eigenvalues that are nothing beside a tyre's
     own. So gas, cords and what turns in a turn are complete; a wheel on stiff springs is held."""
-    asked = {**problem(tyre("205/60R15", tmp_path), [240.0]), "harmonics": [0, 1]}
+    request = {**problem(tyre("205/60R15", tmp_path), [240.0]), "harmonics": [0, 1]}
     soft, mass = 1e-3, 1e-3
     ways = ("lateral", "radial", "torsional", "tilt")
     lowest = lambda answer, n: [
         mode["eigenvalue"] for mode in answer["states"][0]["modes"] if mode["n"] == n
     ]
-    held = fenics.ask(asked)
-    free = fenics.ask({**asked, "wheel": dict.fromkeys(ways, (soft, mass))})
-    firm = fenics.ask({**asked, "wheel": dict.fromkeys(ways, (1e13, mass))})
+    held = fenics.ask(request)
+    free = fenics.ask({**request, "wheel": dict.fromkeys(ways, (soft, mass))})
+    firm = fenics.ask({**request, "wheel": dict.fromkeys(ways, (1e13, mass))})
     assert lowest(free, 0)[0] == pytest.approx(soft / (held["mass_kg"] + mass), rel=0.02)
     for n in (0, 1):
         assert max(map(abs, lowest(free, n)[:2])) < 1e-6 * lowest(held, n)[0]
@@ -376,9 +376,9 @@ def test_a_wheel_that_nothing_holds_moves_with_its_tyre_as_a_rigid_body(
 def test_the_mass_is_that_of_the_section_s_own_integral(tmp_path: Path, fenics: Fenics) -> None:
     """By Pappus and Guldin, by quadrangles as long as elements and half as long: with their error
     of second order taken off, 0.02 %."""
-    told = tyre("175/70R13", tmp_path)
-    asked = {**problem(told, [240.0]), "harmonics": []}
-    points, state = section(told.mould, told.columns).points, asked["states"][0]
+    example = tyre("175/70R13", tmp_path)
+    request = {**problem(example, [240.0]), "harmonics": []}
+    points, state = section(example.mould, example.columns).points, request["states"][0]
     count = (points.shape[0] - 1, (points.shape[1] - 1) // 2)
 
     def mass(each: int) -> float:
@@ -395,7 +395,7 @@ def test_the_mass_is_that_of_the_section_s_own_integral(tmp_path: Path, fenics: 
         return 4 * np.pi * float((density * area * radius + on_lines * length * at).sum())
 
     whole = (4 * mass(2) - mass(1)) / 3
-    assert fenics.ask(asked)["mass_kg"] == pytest.approx(whole, rel=2e-4)
+    assert fenics.ask(request)["mass_kg"] == pytest.approx(whole, rel=2e-4)
 
 
 @pytest.mark.parametrize("group", ON_RECORD, ids=lambda group: group.name)

@@ -52,22 +52,22 @@ def test_what_is_named_comes_before_what_is_likeliest_with_more() -> None:
 def test_a_rate_counts_its_own_trials_and_few_are_not_shown() -> None:
     pairs = [answered("a+b", "a+b")] * 45 + [answered("a+b", "c")] * 15
     weak = [answered("a+b", "none", lam=3.0)] * 100
-    said = figures(pairs + weak, 60)
+    rates = figures(pairs + weak, 60)
     name = "two effects, each lambda from 15: all in the 90 % set"
-    assert said[name] == "45 of 60, 75 % (62 to 85)"
-    assert said["named: right, or in part of several"].startswith("45 of 60")
+    assert rates[name] == "45 of 60, 75 % (62 to 85)"
+    assert rates["named: right, or in part of several"].startswith("45 of 60")
     assert figures(pairs[1:], 60)[name] == "not shown (59)"
     seen = "two, together from 25, too: one of them named first"
     hidden = [replace(each, together=12.0) for each in pairs]
-    assert figures(pairs + hidden, 60)[seen] == figures(pairs, 60)[seen] == said[seen]
-    assert said[seen].startswith("45 of 60")
+    assert figures(pairs + hidden, 60)[seen] == figures(pairs, 60)[seen] == rates[seen]
+    assert rates[seen].startswith("45 of 60")
 
 
 def test_sizes_are_held_by_the_catalogues_law_and_springs_by_what_they_are() -> None:
     spring = answered("a", "a", held=(False,), compliances=(True,))
-    said = figures([spring] * 60 + [answered("b", "b", held=(True,))] * 20, 60)
-    assert said["90 % interval holds the size"].startswith("20 of 80")
-    assert said["90 % interval holds a spring's own compliance"].startswith("60 of 60")
+    rates = figures([spring] * 60 + [answered("b", "b", held=(True,))] * 20, 60)
+    assert rates["90 % interval holds the size"].startswith("20 of 80")
+    assert rates["90 % interval holds a spring's own compliance"].startswith("60 of 60")
 
 
 def test_shrinkage_is_of_what_was_named_and_strong_and_exchanged_labels_count_for_nothing() -> None:
@@ -76,12 +76,12 @@ def test_shrinkage_is_of_what_was_named_and_strong_and_exchanged_labels_count_fo
     named = [answered("a", "a", usual=(1.0, 0.2), least=0.1)] * 60
     weak, undecided = answered("a", "a", lam=9.0), answered("a", "a", verdict="undecided")
     sound = [answered("", "none", usual=(1.0, 0.75), after=0.9)] * 5
-    said = figures([*named, answered("a", "a"), weak, undecided, *sound], 60)
+    rates = figures([*named, answered("a", "a"), weak, undecided, *sound], 60)
     start, end = "held out by ", ", named, lambda from 25: median shrinkage"
-    assert said[f"{start}least squares{end}"] == "0.80 (chance 0.25)"
-    assert said[f"{start}the diagnosis{end}"] == "0.50 (chance 0.10)"
+    assert rates[f"{start}least squares{end}"] == "0.80 (chance 0.25)"
+    assert rates[f"{start}the diagnosis{end}"] == "0.50 (chance 0.10)"
     known = "least squares that know the effect and its best size"
-    assert said[f"{start}{known}{end}"] == "0.90"
+    assert rates[f"{start}{known}{end}"] == "0.90"
     few = figures([*named[1:], answered("a", "a"), *sound], 60)
     assert few[f"{start}least squares{end}"] == "not shown (59)"
 
@@ -92,17 +92,17 @@ def test_what_is_named_likeliest_may_be_there_with_others() -> None:
     assert part.in_part and not part.right
     assert not answered("a", "a+b").in_part and not answered("a", "none").in_part
     assert answered("", "none").in_part and not answered("", "a").in_part
-    said = figures([part] * 60, 60)
-    assert said["calibration error (95 % quantile)"].startswith("0.500 ")
+    rates = figures([part] * 60, 60)
+    assert rates["calibration error (95 % quantile)"].startswith("0.500 ")
     name = "the same of what is named likeliest, whatever else is there"
-    assert said[name].startswith("0.100 ")
+    assert rates[name].startswith("0.100 ")
 
 
 def test_what_is_named_besides_and_is_not_there_counts() -> None:
     trials = [answered("a", "a+b")] * 20 + [answered("a+b", "a")] * 20 + [answered("a", "c")] * 20
-    said = figures(trials, 60)
-    assert said["named: right, or in part of several"].startswith("40 of 60")
-    assert said["named: all of it is there"].startswith("20 of 60")
+    rates = figures(trials, 60)
+    assert rates["named: right, or in part of several"].startswith("40 of 60")
+    assert rates["named: all of it is there"].startswith("20 of 60")
 
 
 def test_outside_counts_by_what_it_moved() -> None:
@@ -112,13 +112,13 @@ def test_outside_counts_by_what_it_moved() -> None:
         hard={"outside": Difficulty(30.0, 30.0, ("outside",), None)},
     )
     weak = replace(seen, hard={"outside": Difficulty(3.0, 3.0, ("outside",), None)})
-    said = figures([seen] * 60 + [replace(weak, verdict="no_gap")] * 60, 60)
-    assert said["outside: said so, or undecided"].startswith("60 of 120")
-    assert said["outside, lambda from 25: said so, or undecided"].startswith("60 of 60")
+    rates = figures([seen] * 60 + [replace(weak, verdict="no_gap")] * 60, 60)
+    assert rates["outside: said so, or undecided"].startswith("60 of 120")
+    assert rates["outside, lambda from 25: said so, or undecided"].startswith("60 of 60")
     alias = replace(seen, hard={"outside": Difficulty(30.0, 8.0, ("outside", "a"), None)})
-    said = figures([seen] * 60 + [replace(alias, verdict="named")] * 20, 60)
-    assert said["outside, lambda from 25: named"].startswith("20 of 80")
-    assert said["outside, lambda from 25, like no effect: named"].startswith("0 of 60")
+    rates = figures([seen] * 60 + [replace(alias, verdict="named")] * 20, 60)
+    assert rates["outside, lambda from 25: named"].startswith("20 of 80")
+    assert rates["outside, lambda from 25, like no effect: named"].startswith("0 of 60")
 
 
 def test_misses_are_what_was_named_wrongly_and_what_should_have_been_found() -> None:
@@ -134,13 +134,13 @@ def test_what_was_foretold_is_the_tyre_s_own_frequency() -> None:
     """At the pressure held out, the mean of a pair, without noise; old answers foretell nothing."""
     at = lambda p, f: {"pressure_kPa": p, "ln_f": {"[1,0]": np.log(f), "[2,0]": np.log(f) + 1}}
     truth = {"swapped": False, "with_effect": [at(160.0, [9.0, 9.0]), at(200.0, [9.9, 10.1])]}
-    told = {"[1,0]": [9.5, 9.0, 10.1], "[2,0]": [10.0, 9.9, 10.1]}
-    assert foretold(truth, {"expected_Hz": told}, 200.0) == (True, False)
+    expected = {"[1,0]": [9.5, 9.0, 10.1], "[2,0]": [10.0, 9.9, 10.1]}
+    assert foretold(truth, {"expected_Hz": expected}, 200.0) == (True, False)
     assert foretold(truth, {}, 200.0) == foretold({"swapped": True}, {}, 200.0) == ()
-    said = lambda flags: figures([answered("a", "a", foretold=flags)] * 60, 60)
+    figures_of = lambda flags: figures([answered("a", "a", foretold=flags)] * 60, 60)
     name = "90 % intervals hold frequencies held out"
-    assert said((True, False))[name] == "50 % of 60 trials' (50 to 50)"
-    assert said(())[name] == "not shown (0)"
+    assert figures_of((True, False))[name] == "50 % of 60 trials' (50 to 50)"
+    assert figures_of(())[name] == "not shown (0)"
 
 
 def test_answers_are_weighed_again_as_if_they_had_been_told_of_further_effects() -> None:
@@ -156,10 +156,10 @@ def test_answers_are_weighed_again_as_if_they_had_been_told_of_further_effects()
 
     assert weighed_again(posterior(0.05), 0.05, 0.6) == pytest.approx(posterior(0.6))
     again = replace(answered("a+b", "a", stated=1.0), if_told=answered("a+b", "a+b", stated=1.0))
-    said = figures([again] * 60, 60)
-    assert said["calibration error (95 % quantile)"].startswith("1.000 ")
-    assert said["the same, told how many effects tyres have"].startswith("0.000 ")
-    assert said["90 % set holds the truth, told so"].startswith("60 of 60")
+    rates = figures([again] * 60, 60)
+    assert rates["calibration error (95 % quantile)"].startswith("1.000 ")
+    assert rates["the same, told how many effects tyres have"].startswith("0.000 ")
+    assert rates["90 % set holds the truth, told so"].startswith("60 of 60")
 
 
 def test_few_trials_are_shown_where_that_is_asked_for() -> None:
@@ -188,16 +188,16 @@ def test_a_rise_is_the_tyre_s_own_beyond_the_model_s_at_its_numbers() -> None:
 
 
 def test_makers_and_catalogue_mean_the_same_by_a_spring(tmp_path: Path) -> None:
-    """Of what one moves calibration and constants leave nothing that the other does not; the table
-    says of how many."""
+    """Calibration and constants leave nothing of one spring's shift that the other spring does not
+    leave; the table gives the number of springs."""
     group = Group("205/60R15", True, 15)
     unpacked(RECORDED / group.name, tmp_path / "trials", tmp_path / "truth")
-    found = unlike(tmp_path / "trials", tmp_path / "truth")
+    by_effect = unlike(tmp_path / "trials", tmp_path / "truth")
     springs = [
-        each for id, several in found.items() if id.startswith("spindle") for each in several
+        each for id, several in by_effect.items() if id.startswith("spindle") for each in several
     ]
     left, ratio = np.array(springs).T
     assert len(springs) > 5 and left.max() < 0.05 and abs(np.log(ratio)).max() < 0.4
-    count = len(found["bead_filler"])
-    said = table_of_unlike([(group, found), (Group("205/60R15", False, 15), {})])
-    assert f"({count}) |" in said and said.splitlines()[0] == "| effect | 205/60R15 own |"
+    count = len(by_effect["bead_filler"])
+    table = table_of_unlike([(group, by_effect), (Group("205/60R15", False, 15), {})])
+    assert f"({count}) |" in table and table.splitlines()[0] == "| effect | 205/60R15 own |"

@@ -79,14 +79,14 @@ def test_members_stand_in_an_order_by_chance_and_values_go_missing(tmp_path: Pat
 
 
 def test_draws_have_the_stated_distribution() -> None:
-    found, _ = sources(CASE)
-    truths = draw(protocol(effect=600), CASE, found, MAKER.laws, MAKER.outside, 1)
+    own_sources, _ = sources(CASE)
+    truths = draw(protocol(effect=600), CASE, own_sources, MAKER.laws, MAKER.outside, 1)
     sizes = np.array([t.size for t in truths])
     assert sizes.min() >= 0.2 and sizes.max() <= 1.0 and abs(sizes.mean() - 0.6) < 0.03
     counts = Counter(t.law for t in truths)
     assert set(counts) == set(MAKER.laws) and min(counts.values()) > 100
     z = np.array([list(t.constants.values()) for t in truths])
-    assert z.shape == (600, len(found)) and abs(z.std() - 1) < 0.02 and abs(z.mean()) < 0.05
+    assert z.shape == (600, len(own_sources)) and abs(z.std() - 1) < 0.02 and abs(z.mean()) < 0.05
     start = next(iter(truths[0].variables))
     ratios = np.array([t.variables[start] for t in truths]) / CASE.case.variables[start].start
     assert ratios.min() > 1 / 1.4 and ratios.max() < 1.4 and ratios.std() > 0.15

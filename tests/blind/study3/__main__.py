@@ -73,7 +73,7 @@ def main() -> None:
     for kind, count in COUNTS.items():
         parser.add_argument(f"--{kind}", type=int, default=count)
     o = parser.parse_args()
-    told = lambda done, all: print(f"{done} of {all}", file=sys.stderr, flush=True)
+    on_progress = lambda done, all: print(f"{done} of {all}", file=sys.stderr, flush=True)
     groups = {group.name: group for group in GROUPS}
     if o.what == "groups":
         print("\n".join(groups))
@@ -98,12 +98,12 @@ def main() -> None:
         folder, sealed = Path(o.folder) / o.group, sealed_in(o.folder) / o.group
         if o.what == "make":
             counts = {kind: getattr(o, kind) for kind in COUNTS}
-            print(make(folder, sealed, groups[o.group], counts, o.jobs, o.seed, told))
+            print(make(folder, sealed, groups[o.group], counts, o.jobs, o.seed, on_progress))
         else:
             case, protocol = case_of(folder), read_protocol(folder)
             model = tyre_model(case, Evaluator(TyreDesign(case)), protocol, o.jobs)
             more = further(protocol.counts)
-            print(answer(folder, model, rows_of(case, protocol), o.jobs, told, more))
+            print(answer(folder, model, rows_of(case, protocol), o.jobs, on_progress, more))
 
 
 def sealed_in(folder: str) -> Path:
@@ -120,19 +120,19 @@ def result(
     counted = [g for g in wanted if (folder / g.name / ANSWERS).exists()]
     parts = ["# Blind study 3, as it was answered", ""]
     for series in [together] if together else [(n,) for n in sorted({g.series for g in counted})]:
-        found = {
+        scores = {
             g: scored(folder / g.name, sealed_in(str(folder)) / g.name)
             for g in counted
             if g.series in series
         }
-        names = ", ".join(g.name for g in found)
+        names = ", ".join(g.name for g in scores)
         parts += [
             f"## Series {' and '.join(map(str, series))}",
             "",
             f"{names}.",
             "",
-            table(found, least),
-            misses(found),
+            table(scores, least),
+            misses(scores),
             "",
         ]
     return "\n".join(parts).rstrip()
@@ -141,44 +141,47 @@ def result(
 def power(folder: Path) -> str:
     """lambda of each effect at the far end of its range, by group, from the tyres' rulers; in
     parentheses where that is too little to be named as a rule."""
-    found = {}
+    by_group = {}
     for group in (g for g in GROUPS if (folder / g.name / SEAL).exists()):
         trials = folder / group.name
         ruler = read_ruler(trials, labels_of(case_of(trials)))
-        found[group] = {each.id: each for each in powers(ruler, read_protocol(trials))}
-    ids = sorted(set[str]().union(*found.values()), key=lambda id: -lambdas(found, id)[0])
-    heads = [f"{group.size} {'own' if group.own else 'foreign'}" for group in found]
+        by_group[group] = {each.id: each for each in powers(ruler, read_protocol(trials))}
+    ids = sorted(set[str]().union(*by_group.values()), key=lambda id: -lambdas(by_group, id)[0])
+    heads = [f"{group.size} {'own' if group.own else 'foreign'}" for group in by_group]
     lines = [f"| effect | {' | '.join(heads)} |", "|---" * (1 + len(heads)) + "|"]
     for id in ids:
-        cells = [f"{x:.0f}" if x >= NAMED_AS_A_RULE else f"({x:.0f})" for x in lambdas(found, id)]
+        cells = [
+            f"{x:.0f}" if x >= NAMED_AS_A_RULE else f"({x:.0f})" for x in lambdas(by_group, id)
+        ]
         lines.append(f"| {id} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
-def lambdas(found: Mapping[Group, Mapping[str, Power]], id: str) -> list[float]:
+def lambdas(by_group: Mapping[Group, Mapping[str, Power]], id: str) -> list[float]:
     """By group; 0 where it was not weighed."""
-    return [each[id].full if id in each else 0.0 for each in found.values()]
+    return [each[id].full if id in each else 0.0 for each in by_group.values()]
 
 
 def mesh(size: str) -> None:
-    """What the mould's modes at the group's second pressure, per cent, are above those with
-    elements half as long, and what the model's with this section are above them."""
+    """Print, in per cent, how far the mould's modes at the group's second pressure are above those
+    with elements half as long, and how far the model's modes with this section are above the
+    mould's."""
     group = next(g for g in GROUPS if g.size == size)
     with TemporaryDirectory() as folder:
         case = written(replace(group, own=True), Path(folder))
-    pressure, found = group.given_kPa[1], []
+    pressure, ln_f = group.given_kPa[1], []
     for times in (1, 2):
         tyre = tyre_of(case, mould(size), columns(mould(size), times))
         (state,) = computed(FENICS, tyre, [pressure], LABELS).values()
-        found.append(np.array([state.ln_f[label][0] for label in LABELS]))
+        ln_f.append(np.array([state.ln_f[label][0] for label in LABELS]))
     FENICS.close()
-    off = {"elements half as long": found[0] - found[1]}
+    off = {"elements half as long": ln_f[0] - ln_f[1]}
     for holds in ("whole_bead", "bead_surface"):
         held = changed(case, rim=with_part(case.case.rim, holds=holds))
         model = TyreModel(
             held, Evaluator(TyreDesign(held)), [(label, pressure) for label in LABELS], [], {}
         )
-        off[f"model, {holds.replace('_', ' ')}"] = model.values_at(model.start) - found[0]
+        off[f"model, {holds.replace('_', ' ')}"] = model.values_at(model.start) - ln_f[0]
     print(f"| size, {pressure:g} kPa | what | " + " | ".join(map(str, LABELS)) + " |")
     print("|---" * (2 + len(LABELS)) + "|")
     for what, shift in off.items():

@@ -39,7 +39,7 @@ class Group:
 
     @property
     def name(self) -> str:
-        """Of its folder."""
+        """Name of the group's folder."""
         size = self.size.lower().replace("/", "_").replace(".", "_")
         series = f"_{self.series}" if self.series > 1 else ""
         return f"{size}_{'own' if self.own else 'foreign'}{series}"
@@ -89,8 +89,8 @@ def written(group: Group, folder: Path) -> LoadedCase:
         assert "holds: bead_surface" in text
     if group.own:
         for what, percent in KNOWN.items():
-            text, found = re.subn(rf"(_{what}: {{[^}}]*percent: )[0-9.]+", rf"\g<1>{percent}", text)
-            assert found
+            text, count = re.subn(rf"(_{what}: {{[^}}]*percent: )[0-9.]+", rf"\g<1>{percent}", text)
+            assert count
     path.write_text(text, encoding="utf-8")
     return load_case(path, allow_unusual=True)
 

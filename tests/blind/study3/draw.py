@@ -1,4 +1,4 @@
-"""What is true of each tyre of study 3, drawn at random, and the tyre itself."""
+"""Truth of each tyre of study 3, drawn at random, and the tyre itself."""
 
 from __future__ import annotations
 
@@ -68,15 +68,15 @@ def drawn(
     one effect that are mounted and measured once more. ruler: for those of `FORESEEN`."""
     random = np.random.default_rng(seed)
     kinds = [kind for kind in EFFECTS_OF for _ in range(counts.get(kind, 0))]
-    found = [one_drawn(protocol, case, group, kind, random, ruler) for kind in kinds]
-    ones = [each for each in found if EFFECTS_OF[each.kind] == 1]
+    draws = [one_drawn(protocol, case, group, kind, random, ruler) for kind in kinds]
+    ones = [each for each in draws if EFFECTS_OF[each.kind] == 1]
     for each in ones[: counts.get("again", 0)]:
         other = replace(
             each.truth, id=random.bytes(6).hex(), scatter=int(random.integers(2**63)), swapped=False
         )
         again = replace(each, truth=other, mounting=int(random.integers(2**63)))
-        found.append(replace(again, again=each.truth.id))
-    return sorted(found, key=lambda each: each.truth.id)
+        draws.append(replace(again, again=each.truth.id))
+    return sorted(draws, key=lambda each: each.truth.id)
 
 
 def one_drawn(
@@ -112,9 +112,9 @@ def one_drawn(
             break
     else:
         raise InputError(f"no effects of kind {kind} could be seen, by the ruler")
-    said = {0: kind.removesuffix("_strong"), 1: "effect"}.get(EFFECTS_OF[kind], "several")
+    stated_kind = {0: kind.removesuffix("_strong"), 1: "effect"}.get(EFFECTS_OF[kind], "several")
     size = next(iter(sizes.values()), 0.0)
-    truth = replace(truth, kind=said, law="+".join(ids), size=size)
+    truth = replace(truth, kind=stated_kind, law="+".join(ids), size=size)
     return Drawn(kind, truth, sizes, *(int(random.integers(2**63)) for _ in range(2)))
 
 
@@ -150,8 +150,8 @@ def evident(trial: Trial, protocol: Protocol, ruler: Ruler | None) -> bool:
     """Whether what is outside the catalogue moves as much as one effect that should be found."""
     assert ruler is not None
     labels = [label for label, _ in ruler.rows if label]
-    told, places = plain_trial(trial), measured_places(ruler, protocol)
-    return seen(ruler, protocol, trial.truth, *true_shift(told, ruler, places, labels)) >= ONE
+    plain, places = plain_trial(trial), measured_places(ruler, protocol)
+    return seen(ruler, protocol, trial.truth, *true_shift(plain, ruler, places, labels)) >= ONE
 
 
 def drawn_anew(
@@ -177,9 +177,9 @@ def made(each: Drawn, case: LoadedCase, group: Group, without: tuple[str, ...] =
     Its own geometry goes with its constants, so that the same tyre mounted again has it, too.
     """
     truth, case = each.truth, with_exact_section(case)
-    found, _ = sources(case)
+    own_sources, _ = sources(case)
     nominal = case.file_data["pressure_kPa"]
-    plain = tyre(truth, case, found, nominal, None)
+    plain = tyre(truth, case, own_sources, nominal, None)
     moulded = mould(group.size)
     constants = np.array([*truth.variables.values(), *truth.constants.values()])
     random = np.random.default_rng(np.frombuffer(constants.tobytes(), np.uint32))

@@ -1,4 +1,4 @@
-"""What is the matter with tyres of study 3, written on the maker's own tyre.
+"""Faults of the tyres of study 3, written on the maker's own tyre.
 
 Parameters mean what the catalogue's do and have its ranges; how they enter is the maker's own. Six
 families that no catalogue holds, each with what it is in a workshop's words. They were chosen
@@ -147,8 +147,8 @@ def _held(tyre: Tyre, unseated: float) -> Tyre:
 
 
 def _spindle(way: str) -> Law:
-    """What clamps the wheel is softer, and its hub, a fifth of the wheel's mass that no case knows,
-    moves with it."""
+    """A softer clamp of the wheel; its hub, a fifth of the wheel's mass that no case knows, moves
+    with it."""
 
     def add(tyre: Tyre, e: float) -> Tyre:
         mass, polar, diametral = tyre.wheel

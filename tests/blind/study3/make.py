@@ -77,15 +77,15 @@ def make(
     known = read_ruler(folder, labels_of(case)) if judged else None
     every = drawn(protocol, case, group, counts, seed, known)
     work = partial(one, sealed, protocol, case, group, known)
-    found = []
+    results = []
     with process_pool(jobs) if jobs > 1 else nullcontext() as pool:
         for each in (pool.map if pool else map)(work, every):
-            found.append(each)
-            on_progress(len(found), len(every))
+            results.append(each)
+            on_progress(len(results), len(every))
     FENICS.close()
     copy_case(case, folder)
     write_protocol(folder, protocol)
-    write_trials(folder, protocol, [trial for trial, *_ in found])
+    write_trials(folder, protocol, [trial for trial, *_ in results])
     truth = [
         {
             **sealed_trial(trial, protocol),
@@ -94,7 +94,7 @@ def make(
             "again": each.again,
             "members": shifts(trial, members),
         }
-        for each, (trial, effects, members) in zip(every, found, strict=True)
+        for each, (trial, effects, members) in zip(every, results, strict=True)
     ]
     return seal(folder, sealed, {"seed": seed, "group": asdict(group), "trials": truth})
 
@@ -114,8 +114,8 @@ def one(
     each: Drawn,
 ) -> Made:
     """A trial as it was made before it was stopped, or made now."""
-    asked = json.dumps([asdict(each), asdict(group), protocol.maker], sort_keys=True)
-    path = sealed / "made" / f"{sha256(asked.encode()).hexdigest()[:16]}.json"
+    request = json.dumps([asdict(each), asdict(group), protocol.maker], sort_keys=True)
+    path = sealed / "made" / f"{sha256(request.encode()).hexdigest()[:16]}.json"
     if not path.exists():
         path.parent.mkdir(exist_ok=True)
         trial, effects, members = _made(protocol, case, group, ruler, each)
@@ -157,7 +157,7 @@ def _made(
 
 
 def shifts(trial: Trial, members: Members) -> dict[str, Any]:
-    """What each of several effects moves while the others are there: tables as ``without``."""
+    """Shifts by each of several effects while the others are present: tables as ``without``."""
     return {
         id: plain_trial(replace(trial, without=table))["without"] for id, table in members.items()
     }

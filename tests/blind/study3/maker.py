@@ -32,7 +32,7 @@ class Fenics:
     def __init__(self) -> None:
         self._process: subprocess.Popen[str] | None = None
 
-    def ask(self, told: dict[str, Any]) -> dict[str, Any]:
+    def ask(self, request: dict[str, Any]) -> dict[str, Any]:
         """Raises EvaluationFailed; InputError where FEniCSx is missing."""
         if self._process is None or self._process.poll() is not None:
             self._process = subprocess.Popen(
@@ -43,7 +43,7 @@ class Fenics:
                 text=True,
             )
         assert self._process.stdin and self._process.stdout
-        self._process.stdin.write(json.dumps(told) + "\n")
+        self._process.stdin.write(json.dumps(request) + "\n")
         self._process.stdin.flush()
         line = self._process.stdout.readline()
         if not line:
@@ -85,8 +85,10 @@ def computed(
     """By pressure, without noise; near: nearly the tyre asked before. Raises EvaluationFailed,
     ValueError."""
     answer = fenics.ask({**problem(tyre, pressures_kPa), "near": near})
-    found = {}
+    by_pressure = {}
     for p, state in zip(pressures_kPa, answer["states"], strict=True):
         ln_f = {label: float(np.log(f)) for label, f in modes(answer, state, labels).items()}
-        found[p] = Computed({x: (f, f) for x, f in ln_f.items()}, float(np.log(answer["mass_kg"])))
-    return found
+        by_pressure[p] = Computed(
+            {x: (f, f) for x, f in ln_f.items()}, float(np.log(answer["mass_kg"]))
+        )
+    return by_pressure

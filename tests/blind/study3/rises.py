@@ -32,12 +32,12 @@ def rises(folder: Path, sealed: Path) -> dict[Label, Array]:
     ruler = read_ruler(folder, labels_of(case))
     names = [source.name for source in sources(with_exact_section(case))[0]]
     each = [risen(ruler, names, truth) for truth in content["trials"]]
-    return {label: np.array([found[label] for found in each]) for label in each[0]}
+    return {label: np.array([by_label[label] for by_label in each]) for label in each[0]}
 
 
 def risen(ruler: Ruler, names: Iterable[str], truth: Mapping[str, Any]) -> dict[Label, float]:
-    """Of one tyre. names: of the ruler's constants, those of the section aside, which
-    come after them."""
+    """Rise of each mode of one tyre with pressure beyond the model's, in ln f. names: those of the
+    ruler's constants, except the section's, which come after them."""
     every = np.arange(len(ruler.rows))
     x = np.array([log(value) for value in truth["variables"].values()])
     constants = np.array([truth["constants"].get(name, 0.0) for name in names])
@@ -54,14 +54,14 @@ def risen(ruler: Ruler, names: Iterable[str], truth: Mapping[str, Any]) -> dict[
     }
 
 
-def table_of_rises(found: Mapping[Group, Mapping[Label, Array]]) -> str:
+def table_of_rises(by_group: Mapping[Group, Mapping[Label, Array]]) -> str:
     """Medians, per cent, and in parentheses half of what the middle 68 % of the tyres span."""
-    labels = list(next(iter(found.values())))
+    labels = list(next(iter(by_group.values())))
     lines = [
         f"| group | tyres | {' | '.join(map(str, labels))} |",
         "|---" * (2 + len(labels)) + "|",
     ]
-    for group, modes in found.items():
+    for group, modes in by_group.items():
         cells = []
         for label in labels:
             low, middle, high = 100 * np.percentile(modes[label], (16, 50, 84))

@@ -115,7 +115,7 @@ class Scored:
 
     @property
     def most_shrinkage(self) -> float:
-        """What `usual_shrinkage` could be at most; NaN where it is not known."""
+        """Largest possible value of `usual_shrinkage`; NaN if it is unknown."""
         return 1 - self.least / (self.usual or (1.0,))[0]
 
 
@@ -124,8 +124,8 @@ def scored(folder: Path, sealed: Path) -> list[Scored]:
     content, protocol = open_truth(folder, sealed), read_protocol(folder)
     labels = labels_of(case_of(folder))
     ruler = read_ruler(folder, labels)
-    told = lambda truth: read_json(folder / "answers" / f"{truth['id']}.json")
-    return [one(t, told(t), folder, ruler, protocol, labels) for t in content["trials"]]
+    answer_of = lambda truth: read_json(folder / "answers" / f"{truth['id']}.json")
+    return [one(t, answer_of(t), folder, ruler, protocol, labels) for t in content["trials"]]
 
 
 def one(
@@ -148,9 +148,9 @@ def one(
     if truth["kind"] == "outside":
         shift, split = true_shift(truth, ruler, places, labels)
         hard["outside"] = difficulty(ruler, protocol, "outside", d, places, counts, shift, split)
-    said, out = answer["diagnosis"], answer["held_out"]
-    p, named = said["probabilities"], said["effect"]
-    sizes = said["parameters"] if named else {}
+    diagnosis, out = answer["diagnosis"], answer["held_out"]
+    p, named = diagnosis["probabilities"], diagnosis["effect"]
+    sizes = diagnosis["parameters"] if named else {}
     equal = {id: h.equivalent for id, h in hard.items()}
     held = lambda true: tuple(
         sizes[id]["low"] <= value <= sizes[id]["high"]
@@ -158,14 +158,14 @@ def one(
         if id in sizes and value is not None
     )
     error = lambda key: held_out_error(truth["held_out"], out[key] or out["plain_Hz"])
-    found = Scored(
+    score = Scored(
         truth["id"],
         truth["kind"],
         effects,
         hard,
-        said["verdict"],
+        diagnosis["verdict"],
         named,
-        bool((said.get("robust") or {}).get("robust")),
+        bool((diagnosis.get("robust") or {}).get("robust")),
         (),
         0.0,
         frozenset(),
@@ -180,23 +180,23 @@ def one(
     if len(effects) > 1:
         moved, split = true_shift(truth, ruler, places, labels)
         whole = difficulty(ruler, protocol, effects[0], d, places, counts, moved, split)
-        found = replace(found, together=whole.lam)
-    found = replace(
-        weighed(found, p),
+        score = replace(score, together=whole.lam)
+    score = replace(
+        weighed(score, p),
         foretold=foretold(truth, out, protocol.held_out_kPa),
-        if_told=weighed(found, again),
+        if_told=weighed(score, again),
     )
-    if truth["swapped"] or said["exchanged_labels"]:
-        return found
+    if truth["swapped"] or diagnosis["exchanged_labels"]:
+        return score
     there = held_out(truth, ruler, protocol, labels)
-    with_effects = {id: each["value"] for id, each in said["parameters"].items()}
+    with_effects = {id: each["value"] for id, each in diagnosis["parameters"].items()}
     rms = lambda sizes: held_out_rms(ruler, y, places, there, sizes)
-    found = replace(found, usual=(rms({}), rms(with_effects)))
+    score = replace(score, usual=(rms({}), rms(with_effects)))
     if len(effects) != 1 or hard[effects[0]].lam < ONE or effects[0] not in ruler.signatures:
-        return found
+        return score
     (id,) = effects
     sizes = np.linspace(*ruler.signatures[id].sizes[[0, -1]], SIZES_TRIED)
-    return replace(found, least=min(rms({id: float(e)}) for e in sizes))
+    return replace(score, least=min(rms({id: float(e)}) for e in sizes))
 
 
 def moved_by(

@@ -76,10 +76,10 @@ class Mould:
 
 
 def mould(text: str) -> Mould:
-    """Of a size code, by usual proportions of cut tyres: belts narrower than the tread, which is
-    about 0.8 S wide on a truck; beads that grow with the section, not with the rim; of a truck a
-    turned-up ply that ends below its filler's tip, as cords that end above it would part there,
-    and a carcass that leans 25 to 35 degrees at a quarter of the height and less at the rim."""
+    """Mould of a size code, by usual proportions of cut tyres. Belts are narrower than the tread,
+    which is about 0.8 S wide on a truck. Beads grow with the section, not with the rim. A truck's
+    turned-up ply ends below its filler's tip, because cords that end above it would part there; its
+    carcass leans 25 to 35 degrees at a quarter of the height and less at the rim."""
     size = parse_size(text)
     S, H = size.section_width(size.measuring_rim), size.section_height
     truck = size.truck
@@ -228,7 +228,7 @@ def at(m: Mould, s: Array) -> Section:
 
 
 def _offsets(m: Mould, s: Array, marks: dict[str, float]) -> Array:
-    """Of each line from the carcass, m outwards: (lines, columns)."""
+    """Offset of each line from the carcass, m outwards: (lines, columns)."""
     half, widest, rim = marks["belt"], marks["widest"], marks["rim"]
     five = np.linspace(0, rim, 5)
     inside = PchipInterpolator(

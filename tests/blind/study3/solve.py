@@ -73,8 +73,8 @@ class Tyre:
         constants = [fem.Constant(msh, PETSc.ScalarType(0)) for _ in range(3)]
         self.pressure, self.help, self.vibrates = constants
         facets = self._facets()
-        found = {key: [facets[frozenset(e)] for e in problem[key]] for key in ("lines", "inner")}
-        tags = {f: 1 for f in found["lines"]} | {f: 2 for f in found["inner"]}
+        by_kind = {key: [facets[frozenset(e)] for e in problem[key]] for key in ("lines", "inner")}
+        tags = {f: 1 for f in by_kind["lines"]} | {f: 2 for f in by_kind["inner"]}
         numbers, values = np.array(sorted(tags.items()), np.int32).T.copy()
         metadata = {"quadrature_degree": QUADRATURE}
         data = {"subdomain_data": mesh.meshtags(msh, 1, numbers, values), "metadata": metadata}
@@ -137,7 +137,8 @@ class Tyre:
         self.weight = form(self._inertia(one, one))
 
     def _on_lines(self, per_area: Any) -> Any:
-        """Of the two triangles at a line the outer one's data are 0."""
+        """Form of an integral over the lines; data of the outer one of the two triangles at a line
+        are 0."""
         return per_area * self.R("+") * self.dS(1)
 
     def _energy(self, u: Any, g: Any) -> Any:
@@ -228,8 +229,8 @@ class Tyre:
         return taken
 
     def motions(self, n: int) -> dict[str, tuple[Array, Array, float]]:
-        """Of a wheel, by direction: a and b of what it holds, and the work on u2 of a turn by 1,
-        N m per radian."""
+        """Motions of a wheel, by direction: a and b of the nodes that it holds, and the work on u2
+        of a turn by 1, N m per radian."""
         R, z = self.W.tabulate_dof_coordinates()[self.held, :2].T
         force = assembled(self.force).reshape(-1, 3)[self.held]
         one, none = np.ones_like(R), np.zeros_like(R)
@@ -260,7 +261,7 @@ class Tyre:
         uu, gu, gg, gas, M = map(sparse, (self.uu, self.gu, self.gg, self.ug_gas, self.mass))
         uu = (uu + uu.T) / 2  # the gas' part is symmetric but for its quadrature, as ends are held
         S = gu - gu.T - (gas - gas.T) / 2
-        found = []
+        result = []
         mass = bmat([[M[fa][:, fa], None], [None, M[fb][:, fb]]], "csr")
         for n in harmonics:
             D, off = uu + n * n * gg, n * S[fa][:, fb]
@@ -280,10 +281,10 @@ class Tyre:
                 for q, (_, a, b, _) in zip(vector[len(fa) + len(fb) :], moved, strict=True):
                     pair += q * np.array([a, b])
                 a, b = (self.at_corners(part) for part in pair)
-                found.append(
+                result.append(
                     {"n": n, "eigenvalue": float(value), "cos": a.tolist(), "sin": b.tolist()}
                 )
-        return found
+        return result
 
     def at_corners(self, field: Array) -> Array:
         """Values (k, 3) at the elements' corners."""
@@ -294,7 +295,7 @@ class Tyre:
         return whole
 
     def mass_kg(self) -> float:
-        """Of both halves."""
+        """Mass of both halves, kg."""
         return 4 * np.pi * float(fem.assemble_scalar(self.weight))
 
     def answer(self, problem: dict[str, Any]) -> dict[str, Any]:
@@ -335,9 +336,9 @@ def sparse(form: Any) -> csr_matrix:
     matrix = petsc.assemble_matrix(form)
     matrix.assemble()
     indices, columns, values = matrix.getValuesCSR()
-    found = csr_matrix((values, columns, indices), matrix.size)
+    result = csr_matrix((values, columns, indices), matrix.size)
     matrix.destroy()
-    return found
+    return result
 
 
 def assembled(form: Any) -> Array:

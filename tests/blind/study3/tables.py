@@ -93,13 +93,13 @@ def figures(
         ),
         "named and called robust: likewise": shown((some(t) for t in robust), least_robust),
         **{
-            f"outside{words}: {said}": shown(t.verdict in verdicts for t in those)
+            f"outside{words}: {answer}": shown(t.verdict in verdicts for t in those)
             for words, those in (
                 ("", outside),
                 (f", lambda from {ONE:g}", seen),
                 (f", lambda from {ONE:g}, like no effect", unlike),
             )
-            for said, verdicts in (
+            for answer, verdicts in (
                 ("said so, or undecided", ("outside", "undecided")),
                 ("named", ("named",)),
             )
@@ -131,7 +131,8 @@ def figures(
 
 
 def misses(groups: Mapping[Group, Sequence[Scored]]) -> str:
-    """What was named wrongly or in part, and what was not found though it moved enough."""
+    """Table of the trials that were named wrongly or in part, or missed although the effect moved
+    enough."""
     heads = "group", "trial", "truth", "lambda of each", "verdict", "named", "likeliest"
     lines = [f"| missed: {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for group, trials in groups.items():
@@ -151,9 +152,9 @@ def misses(groups: Mapping[Group, Sequence[Scored]]) -> str:
 def _shown(flags: Sequence[bool], least: int) -> str:
     if len(flags) < least:
         return _few(len(flags))
-    found = rate(flags)
-    share, low, high = (f"{100 * found[key]:.0f}" for key in ("share", "low", "high"))
-    return f"{found['right']} of {found['count']}, {share} % ({low} to {high})"
+    result = rate(flags)
+    share, low, high = (f"{100 * result[key]:.0f}" for key in ("share", "low", "high"))
+    return f"{result['right']} of {result['count']}, {share} % ({low} to {high})"
 
 
 def _calibration(stated: np.ndarray, right: np.ndarray, least: int, quantile: float) -> str:
@@ -164,7 +165,8 @@ def _calibration(stated: np.ndarray, right: np.ndarray, least: int, quantile: fl
 
 
 def _mean_share(flags: Sequence[Sequence[bool]], least: int) -> str:
-    """Of all flags; its 95 % bounds by the scatter from trial to trial, whose flags go together."""
+    """Share of all flags; its 95 % bounds follow from the scatter between trials, because the flags
+    of one trial go together."""
     if len(flags) < max(least, 2):
         return _few(len(flags))
     each = np.array([np.mean(own) for own in flags])

@@ -40,8 +40,8 @@ class Compound:
 
 @dataclass(frozen=True)
 class Cords:
-    """Of a ply: E A / spacing, N/m; radians from the meridian; kg/m2; textile ones soften with
-    temperature; prestrain: strain from the built state at which they bear nothing."""
+    """Cords of a ply: E A / spacing, N/m; radians from the meridian; kg/m2; textile ones soften
+    with temperature; prestrain: strain from the built state at which they bear nothing."""
 
     stiffness: float
     angle: float

@@ -30,9 +30,10 @@ Unlike = dict[str, list[tuple[float, float]]]  # by id: share of lambda left, an
 
 
 def unlike(folder: Path, sealed: Path) -> Unlike:
-    """Of every effect of a group that is seen, alone or among others. Raises InputError."""
+    """For every effect of a group that is seen, alone or among others: the share of its shift that
+    the catalogue's effect leaves, and the ratio of the sizes. Raises InputError."""
     labels, protocol = labels_of(case_of(folder)), read_protocol(folder)
-    ruler, found = read_ruler(folder, labels), Unlike()
+    ruler, result = read_ruler(folder, labels), Unlike()
     for truth in open_truth(folder, sealed)["trials"]:
         readings = read_measurements(folder / "trials" / f"{truth['id']}.csv")
         _, places, counts = means(readings, ruler)
@@ -47,15 +48,15 @@ def unlike(folder: Path, sealed: Path) -> Unlike:
             lam = float(shift @ P @ shift)
             if lam >= SEEN:
                 best = int(np.argmin(left))
-                found.setdefault(id, []).append((float(left[best]) / lam, sizes[best] / size))
-    return found
+                result.setdefault(id, []).append((float(left[best]) / lam, sizes[best] / size))
+    return result
 
 
-def table_of_unlike(found: Iterable[tuple[Group, Unlike]]) -> str:
+def table_of_unlike(by_group: Iterable[tuple[Group, Unlike]]) -> str:
     """Medians by effect, size and section: per cent of lambda left, ratio of sizes, and of how
     many."""
     cells: dict[str, dict[tuple[str, bool], list[tuple[float, float]]]] = {}
-    for group, each in found:
+    for group, each in by_group:
         for id, several in each.items():
             place = cells.setdefault(id, {}).setdefault((group.size, group.own), [])
             place.extend(several)
