@@ -35,10 +35,10 @@ def start(work: Round) -> list[HarmonicModes]:
 
 def modes(work: Round, U: Array, held: csr_matrix, around: HalfCircle, count: int) -> LoadedModes:
     symmetry = work.symmetry(around)
-    (found,) = loaded_modes(
+    (result,) = loaded_modes(
         work.tyre(around), symmetry, U, [held], start(work), count, lambda: None
     )
-    return found
+    return result
 
 
 def no_hold(work: Round, around: HalfCircle) -> csr_matrix:
@@ -58,9 +58,9 @@ class State:
 
 def press(work: Round, load: float, friction: float = 0.5, stiffness: float = 1e9) -> State:
     stand = work.press(LENGTHS, stiffness, friction)
-    found = stand.to(load)
-    U = stand.symmetry.spread(found.parts)
-    return State(stand.tyre.around, U, found, stick.held(found.contact))
+    state = stand.to(load)
+    U = stand.symmetry.spread(state.parts)
+    return State(stand.tyre.around, U, state, stick.held(state.contact))
 
 
 def shifted(work: Round, around: HalfCircle, component: int) -> Array:

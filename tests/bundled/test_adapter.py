@@ -1,4 +1,4 @@
-"""What the adapter writes for a job of the bundled solver, and how the results are read."""
+"""Files that the adapter writes for a job of the bundled solver, and how it reads the results."""
 
 from __future__ import annotations
 
@@ -52,11 +52,11 @@ def test_the_adapter_writes_the_decks_and_what_they_cannot_say(tmp_path: Path) -
 def test_the_two_that_a_doublet_has_split_into_are_read_as_one(tmp_path: Path) -> None:
     """With both frequencies, the mean of them and of their slopes, and the first one's shape."""
     density = texts(MASS)["inflate"].splitlines().index("*DENSITY") + 2
-    asked = {"p": [("inflate", density, 0, 1.0)]}
-    job = Job(Deck(texts(MASS), "modes", "inflate"), Request([0, 1], 2, asked))
+    sensitivities = {"p": [("inflate", density, 0, 1.0)]}
+    job = Job(Deck(texts(MASS), "modes", "inflate"), Request([0, 1], 2, sensitivities))
     (result,) = job.run()
     write(tmp_path / "modes", job.model, [result])
-    found = Bundled().read(tmp_path)
+    answer = Bundled().read(tmp_path)
     shapes = np.load(tmp_path / "modes.npz")["shapes_2"]
     order = np.sort(np.concatenate([m.eigenvalues for m in result.modes]))
     wanted = {}
@@ -67,8 +67,8 @@ def test_the_two_that_a_doublet_has_split_into_are_read_as_one(tmp_path: Path) -
             slope = (rates[own] / (8 * np.pi**2 * hertz[own])).mean()
             first = shapes[np.flatnonzero(order == m.eigenvalues[i])[0]]
             wanted[hertz[own].mean()] = m.n, size, list(hertz[own]), slope, first
-    assert len(found["modes"]) == len(wanted) == 4
-    for mode, slope in zip(found["modes"], found["gradients"]["p"], strict=True):
+    assert len(answer["modes"]) == len(wanted) == 4
+    for mode, slope in zip(answer["modes"], answer["gradients"]["p"], strict=True):
         place = min(wanted, key=lambda f, mode=mode: abs(f - mode["frequency_Hz"]))
         n, size, members, own, shape = wanted[place]
         assert mode["frequency_Hz"] == pytest.approx(place) and slope == pytest.approx(own)
@@ -76,10 +76,10 @@ def test_the_two_that_a_doublet_has_split_into_are_read_as_one(tmp_path: Path) -
         assert mode.get("members", members) == pytest.approx(members)
         assert ("members" in mode) == (n > 0)
         np.testing.assert_array_equal(mode["amplitude"], shape)
-    assert (found["mass_kg"], found["pressure_Pa"]) == (job.mass_kg, 160e3)
-    np.testing.assert_array_equal(found["displacement"], result.U)
-    np.testing.assert_array_equal(found["points"], job.model.mesh.X)
-    assert found["nodes"].tolist() == list(job.model.mesh.index)
+    assert (answer["mass_kg"], answer["pressure_Pa"]) == (job.mass_kg, 160e3)
+    np.testing.assert_array_equal(answer["displacement"], result.U)
+    np.testing.assert_array_equal(answer["points"], job.model.mesh.X)
+    assert answer["nodes"].tolist() == list(job.model.mesh.index)
 
 
 def test_modes_are_written_by_rising_frequency(tmp_path: Path) -> None:
@@ -87,8 +87,8 @@ def test_modes_are_written_by_rising_frequency(tmp_path: Path) -> None:
     lines = texts(PLAIN)["inflate"].splitlines()
     density = lines.index("*DENSITY") + 2
     deck = Deck(texts(PLAIN), "modes", "inflate")
-    asked = {"rho": [("inflate", density, 0, 1.0)]}
-    analysis = Job(deck, Request(harmonics=[2, 0, 1], sensitivities=asked))
+    sensitivities = {"rho": [("inflate", density, 0, 1.0)]}
+    analysis = Job(deck, Request(harmonics=[2, 0, 1], sensitivities=sensitivities))
     (result,) = analysis.run()
     write(tmp_path / "modes", analysis.model, [result])
     (step,) = json.loads((tmp_path / "modes.json").read_text())["steps"]

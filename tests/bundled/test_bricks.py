@@ -49,7 +49,8 @@ class Bricks:
         self.keep = np.tile(free.ravel(), k)
 
     def matrix(self, blocks: list[tuple[Array, Array, Array, Array]]) -> csr_array:
-        """Of (connectivity, by u u, u v, v v) parts (s, e, 3a, 3a), v = du/dTheta."""
+        """Assemble parts (s, e, 3a, 3a) of u u, u v and v v with their connectivity, v =
+        du/dTheta."""
         n, size = self.free.size, len(self.keep)
         rows, cols, values = [], [], []
         for connectivity, uu, uv, vv in blocks:

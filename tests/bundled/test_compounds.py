@@ -49,8 +49,8 @@ def compounded() -> dict[str, str]:
 
 
 def run(pair: dict[str, str], **request: object) -> StepResult:
-    asked = Request(harmonics=[0, 1, 2], modes_per_harmonic=2, **request)  # type: ignore[arg-type]
-    return Job(Deck(pair, "modes", "inflate"), asked).run()[-1]
+    whole_request = Request(harmonics=[0, 1, 2], modes_per_harmonic=2, **request)  # type: ignore[arg-type]
+    return Job(Deck(pair, "modes", "inflate"), whole_request).run()[-1]
 
 
 def test_each_element_has_its_own_stuff() -> None:
@@ -99,14 +99,16 @@ def test_slopes_by_numbers_of_each_law(monkeypatch: pytest.MonkeyPatch) -> None:
     result = run(pair, sensitivities=tangents)
     highest = max(each.eigenvalues.max() for each in result.modes)
     for name in COMPOUNDS:
-        found = []
+        eigenvalues = []
         for step in (-2, -1, 1, 2):
             own, numbers = list(lines), lines[places[name]].split(",")
             numbers[fields[name]] = repr(values[name] * (1 + step * STEP))
             own[places[name]] = ",".join(numbers)
             moved = run({**pair, "inflate": "\n".join(own) + "\n"})
-            found.append(np.concatenate([each.eigenvalues for each in moved.modes]))
-        wanted = (found[0] - 8 * found[1] + 8 * found[2] - found[3]) / (12 * STEP)
+            eigenvalues.append(np.concatenate([each.eigenvalues for each in moved.modes]))
+        wanted = (eigenvalues[0] - 8 * eigenvalues[1] + 8 * eigenvalues[2] - eigenvalues[3]) / (
+            12 * STEP
+        )
         got = np.concatenate(result.rates[name])
         noise = 1e-10 * highest / STEP
         np.testing.assert_allclose(got, wanted, atol=1e-6 * abs(wanted).max() + noise)

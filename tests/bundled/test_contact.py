@@ -93,11 +93,11 @@ def test_a_round_ring_on_the_road(work: Round, depth: float) -> None:
     wanted = STIFFNESS * WIDTH * HEIGHT * (HEIGHT * np.sin(t) - (HEIGHT - depth) * t)
     assert contact.force / 2 == pytest.approx(wanted, rel=1e-7)
     assert contact.stiffness == pytest.approx(STIFFNESS * WIDTH * HEIGHT * t, rel=1e-8)
-    found = patch(contact, work.model.mesh.X, AROUND.angles)
-    assert found.length == pytest.approx(2 * HEIGHT * np.sin(t), rel=1e-8)
-    assert found.width == pytest.approx(WIDTH)
-    assert found.area.sum() == pytest.approx(WIDTH * HEIGHT * np.sin(t), rel=1e-7)
-    assert found.force[..., 0].sum() == pytest.approx(wanted, rel=1e-7)
+    footprint = patch(contact, work.model.mesh.X, AROUND.angles)
+    assert footprint.length == pytest.approx(2 * HEIGHT * np.sin(t), rel=1e-8)
+    assert footprint.width == pytest.approx(WIDTH)
+    assert footprint.area.sum() == pytest.approx(WIDTH * HEIGHT * np.sin(t), rel=1e-7)
+    assert footprint.force[..., 0].sum() == pytest.approx(wanted, rel=1e-7)
     assert not contact.traction.any()  # has touched nothing before
 
 
@@ -113,11 +113,11 @@ def test_a_ball_on_the_road(depth: float) -> None:
     across = (R - depth) / R
     wanted = 2 * np.pi * R**2 * (R / 2 * (1 - across**2) - (R - depth) * (1 - across))
     assert contact.force == pytest.approx(STIFFNESS * wanted, rel=5e-3)
-    found = patch(contact, work.model.mesh.X, around.angles)
+    footprint = patch(contact, work.model.mesh.X, around.angles)
     radius = np.sqrt(2 * R * depth - depth**2)
-    assert found.length == pytest.approx(2 * radius, rel=1e-3)
-    assert found.width == pytest.approx(2 * radius, rel=1e-3)
-    assert 2 * found.area.sum() == pytest.approx(np.pi * radius**2, rel=1e-2)
+    assert footprint.length == pytest.approx(2 * radius, rel=1e-3)
+    assert footprint.width == pytest.approx(2 * radius, rel=1e-3)
+    assert 2 * footprint.area.sum() == pytest.approx(np.pi * radius**2, rel=1e-2)
 
 
 @pytest.mark.parametrize("size", [pytest.param(1e-5, marks=pytest.mark.slow), 3e-5, 3e-4])
@@ -143,18 +143,18 @@ def test_nodes_share_the_patch(work: Round, random: np.random.Generator) -> None
     U[..., 2] += 0.05 * X[:, 1]
     U[..., 1] += 0.02 * HEIGHT * np.sin(AROUND.angles)[:, None]
     contact = road.forces(U, HEIGHT)
-    found = patch(contact, X, AROUND.angles)
-    np.testing.assert_allclose(found.force.sum((0, 1))[0], contact.normal.sum())
+    footprint = patch(contact, X, AROUND.angles)
+    np.testing.assert_allclose(footprint.force.sum((0, 1))[0], contact.normal.sum())
     np.testing.assert_allclose(
-        found.force[..., 1:].sum((0, 1)), contact.traction.sum((0, 1, 2)), atol=1e-9
+        footprint.force[..., 1:].sum((0, 1)), contact.traction.sum((0, 1, 2)), atol=1e-9
     )
     points = contact.points
     stretch = points.densities(U)[points.angle < 0.02]
     np.testing.assert_allclose(stretch, 1.02 * 1.05, rtol=2e-3)
-    assert found.area.sum() == pytest.approx((points.area * points.densities(U)).sum())
-    assert found.area.min() == 0.0 and (found.area[found.force[..., 0] > 0] > 0).all()
+    assert footprint.area.sum() == pytest.approx((points.area * points.densities(U)).sum())
+    assert footprint.area.min() == 0.0 and (footprint.area[footprint.force[..., 0] > 0] > 0).all()
     middle = np.flatnonzero(abs(X[:, 1]) + abs(X[:, 0] - HEIGHT) < 1e-9)[0]
-    pressure = found.force[2, middle, 0] / found.area[2, middle]
+    pressure = footprint.force[2, middle, 0] / footprint.area[2, middle]
     over = road.forces(U, HEIGHT).positions[..., 0].max() - HEIGHT
     assert pressure == pytest.approx(STIFFNESS * over / (1.02 * 1.05), rel=0.02)
 
@@ -181,9 +181,9 @@ def test_tangent_is_the_forces_derivative(
     phi, e = random.normal(size=U.shape), 1e-9
     force = lambda step: road.forces(V + step * phi, HEIGHT).field
     wanted = (force(e) - force(-e)) / (2 * e)
-    found = (contact.matrix() @ phi.ravel()).reshape(phi.shape)
+    product = (contact.matrix() @ phi.ravel()).reshape(phi.shape)
     close = 1e-2 if friction else 1e-4
-    np.testing.assert_allclose(found, wanted, rtol=0, atol=close * abs(found).max())
+    np.testing.assert_allclose(product, wanted, rtol=0, atol=close * abs(product).max())
 
 
 @pytest.mark.parametrize("state", ["sticking", "sliding"])
@@ -207,8 +207,8 @@ def test_bounded_friction_has_a_potential(
     assert one == pytest.approx(other, rel=1e-10)
     force = lambda step: road.forces(V + step * phi, HEIGHT, bound).field
     wanted = (force(e) - force(-e)) / (2 * e)
-    found = (K @ phi.ravel()).reshape(phi.shape)
-    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-4 * abs(found).max())
+    product = (K @ phi.ravel()).reshape(phi.shape)
+    np.testing.assert_allclose(product, wanted, rtol=0, atol=1e-4 * abs(product).max())
 
 
 def test_the_potential_has_no_jump_where_a_point_begins_to_slide(work: Round) -> None:
@@ -334,9 +334,9 @@ def test_gmres_takes_the_first_direction_that_it_is_given(random: np.random.Gene
         return np.asarray(M @ v)
 
     plain = gmres(lambda v: A @ v, precondition, b, 1e-8, 40)
-    asked = len(calls)
+    count = len(calls)
     given = gmres(lambda v: A @ v, precondition, b, 1e-8, 40, M @ b / np.linalg.norm(b))
-    assert len(calls) == 2 * asked - 1
+    assert len(calls) == 2 * count - 1
     np.testing.assert_allclose(given[0], plain[0], rtol=1e-12, atol=1e-12)
     assert given[1] == plain[1]
 

@@ -46,7 +46,7 @@ def test_a_first_load_out_of_reach_fails(solid: Round) -> None:
 
 
 def test_a_clock_that_runs_out_between_loads(solid: Round) -> None:
-    """What was reached before stays; the same from `ContactNewton` and from the job."""
+    """The loads reached before stay, in `ContactNewton` and in the job."""
     press = solid.press(LENGTHS, 1e10)
     first = press.to(50.0)
     press.check = Late(1)
@@ -63,9 +63,9 @@ def footprints(work: Round, clock: Late, loads: list[float]) -> dict[str, Any]:
 
 
 def test_nodes_that_bear_less_than_a_newton_belong_to_the_patch(solid: Round) -> None:
-    (found,) = footprints(solid, Late(1000), [0.5])["footprints"]
-    assert found["pressure_Pa"] @ found["area_m2"] == pytest.approx(0.5, rel=1e-6)
-    assert (found["pressure_Pa"] > 0).all() and len(found["node"]) > 1
+    (footprint,) = footprints(solid, Late(1000), [0.5])["footprints"]
+    assert footprint["pressure_Pa"] @ footprint["area_m2"] == pytest.approx(0.5, rel=1e-6)
+    assert (footprint["pressure_Pa"] > 0).all() and len(footprint["node"]) > 1
 
 
 def test_each_load_that_is_reached_is_told(
@@ -86,9 +86,9 @@ def test_each_load_that_is_reached_is_told(
     assert caplog.records[0] is iterations[0]
     assert re.match(r"50 N: Newton iteration 1, residual \S+$", iterations[0].getMessage())
     first, halfway, last = (each for each in caplog.records if each not in iterations)
-    told = [(each.getMessage(), each.__dict__.get("loads")) for each in (first, last)]
-    assert told[0] == ("load 1 of 2 is reached: 50 N", (1, 2))
-    assert told[1] == ("load 2 of 2 is reached: 150 N", (2, 2))
+    messages = [(each.getMessage(), each.__dict__.get("loads")) for each in (first, last)]
+    assert messages[0] == ("load 1 of 2 is reached: 50 N", (1, 2))
+    assert messages[1] == ("load 2 of 2 is reached: 150 N", (2, 2))
     assert re.match(r"100 of 150 N are reached \(\d+ of \d+ mm down", halfway.getMessage())
 
 
@@ -102,10 +102,10 @@ def test_footprints_before_the_time_limit_stay(solid: Round) -> None:
     """The job keeps the loads that were reached in time, and says why there are no more."""
     unhurried = Late(1000)
     wanted = footprints(solid, unhurried, [50.0])
-    found = footprints(solid, Late(1000 - unhurried.left + 2), [50.0, 200.0])
-    assert found["cause"] == "timed_out" and "time limit" in found["failure"]
-    assert [f["load_N"] for f in found["footprints"]] == [50.0]
-    assert found["footprints"][0]["deflection_m"] == wanted["footprints"][0]["deflection_m"]
+    result = footprints(solid, Late(1000 - unhurried.left + 2), [50.0, 200.0])
+    assert result["cause"] == "timed_out" and "time limit" in result["failure"]
+    assert [f["load_N"] for f in result["footprints"]] == [50.0]
+    assert result["footprints"][0]["deflection_m"] == wanted["footprints"][0]["deflection_m"]
     assert wanted["cause"] == wanted["failure"] == ""
     with pytest.raises(RunFailed):
         footprints(solid, Late(2), [50.0, 200.0])
@@ -167,11 +167,11 @@ def test_a_little_more_load_is_one_step_along_the_slope(solid: Round) -> None:
     method leaves of that of fourth, so two do, with the preconditioner of the load before; without
     the slope it takes several. A fifth more has one of its own."""
     press = solid.press(LENGTHS, 1e10)
-    found = [press.to(load) for load in (198.0, 200.0)]
+    states = [press.to(load) for load in (198.0, 200.0)]
     before = press.iterations, press.factorisations
-    found.append(press.to(202.0))
+    states.append(press.to(202.0))
     assert (press.iterations, press.factorisations) == (before[0] + 2, before[1])
-    parts, heights = np.array([f.parts for f in found]), [f.height for f in found]
+    parts, heights = np.array([f.parts for f in states]), [f.height for f in states]
     curved = np.linalg.norm(parts[0] - 2 * parts[1] + parts[2])
     assert curved < 0.02 * np.linalg.norm(parts[2] - parts[1])
     assert abs(heights[0] - 2 * heights[1] + heights[2]) < 0.02 * (heights[1] - heights[2])
@@ -279,7 +279,7 @@ def test_a_load_starts_along_the_slope_of_the_last_one(
 
 
 def test_how_far_down_is_told_in_words(solid: Round) -> None:
-    """Of the way to where the crown, 10 mm thick, lies on the rim, 200 mm from the axle."""
+    """The way ends where the crown, 10 mm thick, lies on the rim, 200 mm from the axle."""
     X = np.array(
         [[0.15, 0.0], [0.2, 0.1], [0.2, -0.1], [0.3, 0.1], [0.31, 0], [0.305, 0], [0.3, 0]]
     )
@@ -323,9 +323,9 @@ def test_a_much_larger_load_after_a_small_one(solid: Round) -> None:
     """A hundred times the load: the same as at once."""
     press = solid.press(LENGTHS, 1e10)
     press.to(5.0)
-    found, direct = press.to(500.0), solid.press(LENGTHS, 1e10).to(500.0)
-    assert found.height == pytest.approx(direct.height, rel=1e-8)
-    np.testing.assert_allclose(found.parts, direct.parts, atol=1e-6 * abs(direct.parts).max())
+    state, direct = press.to(500.0), solid.press(LENGTHS, 1e10).to(500.0)
+    assert state.height == pytest.approx(direct.height, rel=1e-8)
+    np.testing.assert_allclose(state.parts, direct.parts, atol=1e-6 * abs(direct.parts).max())
 
 
 @pytest.mark.parametrize(
@@ -336,20 +336,20 @@ def test_friction_of_any_size_converges(solid: Round, friction: float, slip: flo
     """From a soft to a hard stick, and more friction than rubber has."""
     press = solid.press(LENGTHS, 1e10, friction, slip)
     press.to(50.0)
-    found = press.to(100.0)
-    assert found.contact.force == pytest.approx(100.0, rel=1e-7)
-    traction = np.linalg.norm(found.contact.traction, axis=-1)
-    assert (traction <= friction * found.contact.normal * (1 + 1e-9)).all()
+    state = press.to(100.0)
+    assert state.contact.force == pytest.approx(100.0, rel=1e-7)
+    traction = np.linalg.norm(state.contact.traction, axis=-1)
+    assert (traction <= friction * state.contact.normal * (1 + 1e-9)).all()
 
 
 def test_a_ring_is_pressed_in_the_middle(solid: Round) -> None:
     """No cords: mirror images in both planes, so the second part of the fold stays nil."""
     press = solid.press(LENGTHS, 1e10, 0.5)
     press.to(50.0)
-    found = press.to(100.0)
-    assert abs(found.parts[1]).max() < 1e-9 * abs(found.parts[0]).max()
-    assert found.contact.force == pytest.approx(100.0, rel=1e-8)
-    assert abs(found.contact.traction).max() > 0.0  # friction is at work
+    state = press.to(100.0)
+    assert abs(state.parts[1]).max() < 1e-9 * abs(state.parts[0]).max()
+    assert state.contact.force == pytest.approx(100.0, rel=1e-8)
+    assert abs(state.contact.traction).max() > 0.0  # friction is at work
 
 
 @pytest.mark.slow

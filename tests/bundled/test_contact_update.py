@@ -116,7 +116,8 @@ def test_takes_what_the_factor_left_out_of_the_contact() -> None:
 
 
 def test_changes_of_less_than_a_thousandth_are_left_out() -> None:
-    """Of the stiffest contact's stiffness; with what is left out the solution is the factor's."""
+    """Changes below a thousandth of the stiffest contact's stiffness are left out; the solution is
+    then the factor's."""
     work = ring((0.2, 0.21, 0.23), 0.02, 2, support.Rubber(), 2e3)
     plain = Inflated(None, work.model, ~work.free, work.loads, work.U)  # type: ignore[arg-type]
     blocks = np.zeros((2 * len(LENGTHS) + 1, len(work.U), 3, 3))

@@ -60,11 +60,11 @@ def test_secular_equation(
         return float(np.sort(np.linalg.eigvals(np.eye(3) + change(value) @ H).real)[0])
 
     was = plain(vibration)
-    found = frequencies(modes)
-    moved = np.argsort(-abs(found / was - 1))[:2]
+    values = frequencies(modes)
+    moved = np.argsort(-abs(values / was - 1))[:2]
     for j in moved:
-        step = 2e-3 * abs(found[j] - was[j])
-        assert gap(found[j] - step) * gap(found[j] + step) < 0
+        step = 2e-3 * abs(values[j] - was[j])
+        assert gap(values[j] - step) * gap(values[j] + step) < 0
 
 
 def test_what_is_attached_leaves_shapes_of_unit_mass(
@@ -73,9 +73,11 @@ def test_what_is_attached_leaves_shapes_of_unit_mass(
     """Next to nothing on the tyre: each member of a doublet is as large as the plain mode."""
     modes = coupled.attached_modes(vibration, on_crown(inflated, 1e-9), WAVES, COUNT)
     mass = lambda u: float((u.conj() * (vibration.mass @ u)).real.sum())
-    for n, found in zip(WAVES, modes, strict=True):
+    for n, harmonic in zip(WAVES, modes, strict=True):
         own = mass(vibration.modes(n, 1).shapes[0])
-        assert [mass(u) for u in found.shapes] == pytest.approx([own] * len(found.shapes), rel=1e-6)
+        assert [mass(u) for u in harmonic.shapes] == pytest.approx(
+            [own] * len(harmonic.shapes), rel=1e-6
+        )
 
 
 def test_time_is_looked_at_for_every_harmonic_of_what_is_attached(
@@ -121,8 +123,8 @@ def test_small_mass_by_first_order_perturbation(
         u = known.shapes[k][a.rows, a.components] / np.sqrt(np.pi) * a.share(n)
         p = np.stack([u.real, -u.imag], 1)
         shift = -known.eigenvalues[k] * mass * np.linalg.eigvalsh(p.T @ p)[::-1]
-        found = modes.eigenvalues[2 * k : 2 * k + 2] - known.eigenvalues[k]
-        np.testing.assert_allclose(found, shift, rtol=2e-3, atol=1e-9 * known.eigenvalues[k])
+        change = modes.eigenvalues[2 * k : 2 * k + 2] - known.eigenvalues[k]
+        np.testing.assert_allclose(change, shift, rtol=2e-3, atol=1e-9 * known.eigenvalues[k])
 
 
 def test_slopes_by_masses_and_springs(random: np.random.Generator) -> None:
@@ -158,7 +160,8 @@ def test_few_fields_stand_for_those_far_above(random: np.random.Generator) -> No
 
 
 def test_the_response_to_what_is_attached_is_among_the_fields() -> None:
-    """Of stiff stuff as of soft; two of one component have one."""
+    """The response is among the fields for stiff rubber as for soft; two elements of one component
+    have one."""
     for shear in (1e5, 1e15):
         work = ring((0.2, 0.21, 0.23), 0.02, 2, support.Rubber(C10=shear))
         still = Vibration(work.model, work.U, [], support.numbering(work.model, ~work.free), 0.0)

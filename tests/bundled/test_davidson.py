@@ -81,8 +81,8 @@ def test_davidson_fails_by_name(
 
 
 def test_only_new_directions_are_taken_into_a_basis(random: np.random.Generator) -> None:
-    """Of six fields, two in the basis, one of the others' sum and one a thousandfold: two are new,
-    M-orthonormal to the basis and to each other; none of those in the basis alone."""
+    """Six fields: two in the basis, one of the others' sum and one a thousandfold. Two are new,
+    M-orthonormal to the basis and to each other; none of those in the basis alone is."""
     _, M = matrices(random)
     V = davidson._orthonormal(random.normal(size=(3, 120)), np.empty((0, 120)), block(M))
     a, b = random.normal(size=(2, 120))

@@ -63,8 +63,8 @@ def test_the_map_is_inverted(name: str) -> None:
         X = np.vstack([X, (X + np.roll(X, -1, 0)) / 2])
     X = 0.3 + 0.01 * (X + 0.08 * random.uniform(-1, 1, X.shape))
     for xi in random.uniform(0.05, 0.45, (20, 2)):
-        found = _inverse(kind, X, kind.at(xi[None])[0][0] @ X)
-        assert found == pytest.approx(xi, abs=1e-12)
+        result = _inverse(kind, X, kind.at(xi[None])[0][0] @ X)
+        assert result == pytest.approx(xi, abs=1e-12)
 
 
 @pytest.mark.parametrize("kind", HOSTS)

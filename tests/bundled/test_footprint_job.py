@@ -153,9 +153,9 @@ def test_with_friction_the_way_hardly_matters(tmp_path: Path, pressed: dict[str,
     """A load at once, in two steps or in six: nodes rub from where the road met them on."""
     direct = run(tmp_path, (2000.0,))["footprints"][-1]
     steps = run(tmp_path, (300.0, 700.0, 1000.0, 1300.0, 1700.0, 2000.0))["footprints"][-1]
-    for found in (direct, pressed["footprints"][-1]):
-        assert found["deflection_m"] == pytest.approx(steps["deflection_m"], rel=1e-2)
-        assert found["contact_area_m2"] == pytest.approx(steps["contact_area_m2"], rel=3e-2)
+    for footprint in (direct, pressed["footprints"][-1]):
+        assert footprint["deflection_m"] == pytest.approx(steps["deflection_m"], rel=1e-2)
+        assert footprint["contact_area_m2"] == pytest.approx(steps["contact_area_m2"], rel=3e-2)
     rubbing, after = (np.linalg.norm(f["traction_Pa"], axis=1).max() for f in (direct, steps))
     assert rubbing == pytest.approx(after, rel=0.3)
 
@@ -234,12 +234,12 @@ def test_an_unreachable_load_keeps_the_others(
 ) -> None:
     """The load before it stays, with a sentence why there is no more."""
     support.bears(monkeypatch, 1500.0)
-    found = run(tmp_path, (1000.0, 1e4), 0.0)
-    assert [f["load_N"] for f in found["footprints"]] == [1000.0]
-    assert found["cause"] == "no_equilibrium"
+    result = run(tmp_path, (1000.0, 1e4), 0.0)
+    assert [f["load_N"] for f in result["footprints"]] == [1000.0]
+    assert result["cause"] == "no_equilibrium"
     assert re.fullmatch(
         r"no equilibrium between 1000 and \d+ N \(\d+ of \d+ mm down to the rim\): too much",
-        found["failure"],
+        result["failure"],
     )
 
 
@@ -251,12 +251,12 @@ def test_an_absurd_load_is_not_tried(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(
         ContactNewton, "_newton", lambda press, load: tried.append(load) or newton(press, load)
     )
-    found = run(tmp_path, (1000.0, 1e7), 0.0)
+    result = run(tmp_path, (1000.0, 1e7), 0.0)
     assert tried == [1000.0]
-    reached = found["footprints"][0]
+    reached = result["footprints"][0]
     down = reached["deflection_m"] + (1e7 - 1000.0) / reached["stiffness_N_per_m"]
-    assert found["failure"].endswith(f"down by {1e3 * down:.0f} mm")
-    assert found["cause"] == "no_equilibrium"
+    assert result["failure"].endswith(f"down by {1e3 * down:.0f} mm")
+    assert result["cause"] == "no_equilibrium"
 
 
 def test_the_time_limit_passes(tmp_path: Path) -> None:
@@ -286,5 +286,7 @@ def test_incompressible_rubber_is_pressed(tmp_path: Path) -> None:
         (tmp_path / name).write_text(hybrid)
     job.run(tmp_path, "press", "inflate")
     low, high = footprint_job.read(tmp_path / "press")["footprints"]
-    found = 10.0 / (high["deflection_m"] - low["deflection_m"])
-    assert found == pytest.approx((low["stiffness_N_per_m"] + high["stiffness_N_per_m"]) / 2, 0.01)
+    stiffness = 10.0 / (high["deflection_m"] - low["deflection_m"])
+    assert stiffness == pytest.approx(
+        (low["stiffness_N_per_m"] + high["stiffness_N_per_m"]) / 2, 0.01
+    )

@@ -77,19 +77,19 @@ def test_one_spring_in_closed_form() -> None:
     """omega^2 = omega0^2 (f / f_ref)^beta: f = (f0 f_ref^(-beta/2))^(1 / (1 - beta/2)), for
     every mode, to 1e-10."""
     f0 = support.hertz(tube(None).modes(0, 4).eigenvalues)
-    found = support.hertz(tube(POWER).modes(0, 4).eigenvalues)
+    frequencies = support.hertz(tube(POWER).modes(0, 4).eigenvalues)
     exact = (f0 * REFERENCE ** (-BETA / 2)) ** (1 / (1 - BETA / 2))
     assert f0[0] < REFERENCE < f0[-1] < 1000.0
-    np.testing.assert_allclose(found, exact, rtol=1e-10)
+    np.testing.assert_allclose(frequencies, exact, rtol=1e-10)
     alone = tube(POWER).modes(0, 1)
     assert support.hertz(alone.eigenvalues) == pytest.approx(exact[:1], rel=1e-10)
 
 
 def test_waves_that_only_shear_in_closed_form() -> None:
     """The same of waves round the tube that move along the axle alone."""
-    f0, found = (support.hertz(tube(law, 2).modes(3, 2).eigenvalues) for law in (None, POWER))
+    f0, frequencies = (support.hertz(tube(law, 2).modes(3, 2).eigenvalues) for law in (None, POWER))
     exact = (f0 * REFERENCE ** (-BETA / 2)) ** (1 / (1 - BETA / 2))
-    np.testing.assert_allclose(found, exact, rtol=1e-10)
+    np.testing.assert_allclose(frequencies, exact, rtol=1e-10)
 
 
 def test_a_law_that_settles_nowhere_is_a_failure() -> None:

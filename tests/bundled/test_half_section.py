@@ -53,8 +53,8 @@ def edited(effects: tuple[tuple[str, float], ...], *edits: Edit) -> dict[str, st
 
 
 def job(pair: dict[str, str], **request: Any) -> Job:
-    asked = {"harmonics": HARMONICS, "modes_per_harmonic": 2, **request}
-    return Job(Deck(pair, "modes", "inflate"), Request(**asked))
+    settings = {"harmonics": HARMONICS, "modes_per_harmonic": 2, **request}
+    return Job(Deck(pair, "modes", "inflate"), Request(**settings))
 
 
 @pytest.fixture
@@ -168,8 +168,8 @@ BESIDE, IMAGE = 17009, 25009  # corners on the tread, each the mirror image of t
 @pytest.mark.parametrize("which", [(BESIDE,), (IMAGE,)])
 @pytest.mark.parametrize("field", [1, 2])
 def test_slopes_by_one_sides_coordinates(which: tuple[int, ...], field: int, both: Any) -> None:
-    """Of a variable that moves one node, whose image stays, half moves both sides alike: the rest
-    gives no slope."""
+    """Half of a variable that moves one node, while its image stays, moves both sides alike: the
+    rest gives no slope."""
     own = edited(())
     lines = own["inflate"].splitlines()
     rows = [("inflate", lines.index(node(number)) + 1, field, 1.0) for number in which]
@@ -202,14 +202,14 @@ def test_what_is_not_symmetric_is_solved_on_the_whole(edits: list[Edit]) -> None
 
 def test_a_tyre_that_leans_has_the_frequencies_of_its_mirror_image() -> None:
     """A node moved by 2 mm, or its image: the half turn carries one tyre into the other."""
-    found = []
+    results = []
     for number, side in ((BESIDE, 1.0), (IMAGE, -1.0)):
         leaning = job(edited((), moved(number, 2e-3, side * 1e-3)))
         assert not leaning.tyre.half
-        found.append(leaning.run()[-1])
+        results.append(leaning.run()[-1])
     other = mirror_images(job(edited(())).model.mesh.X)
-    for one, image in zip(found[0].modes, found[1].modes, strict=True):
+    for one, image in zip(results[0].modes, results[1].modes, strict=True):
         np.testing.assert_allclose(one.eigenvalues, image.eigenvalues, rtol=2 * ROUND_OFF)
-    np.testing.assert_allclose(found[0].U, found[1].U[other] * HALF_TURN, atol=1e-12)
+    np.testing.assert_allclose(results[0].U, results[1].U[other] * HALF_TURN, atol=1e-12)
     straight = job(edited(())).run()[-1]
-    assert abs(found[0].modes[1].eigenvalues / straight.modes[1].eigenvalues - 1).max() > 1e-5
+    assert abs(results[0].modes[1].eigenvalues / straight.modes[1].eigenvalues - 1).max() > 1e-5

@@ -110,9 +110,9 @@ def test_a_splice_is_solved_on_half_where_the_sector_is_symmetric_too(
     texts = decks(CASE, stiffness_splice=0.5)
     sector = read_keywords(texts["splice.inp"])
     own = Deck({name: texts[f"{name}.inp"] for name in ("inflate", "modes")}, "modes", "inflate")
-    asked = Request(harmonics=[0], sector={"job": "splice", "width_deg": 10.0})
-    assert Job(own, asked, sector=sector).tyre.half
+    request = Request(harmonics=[0], sector={"job": "splice", "width_deg": 10.0})
+    assert Job(own, request, sector=sector).tyre.half
     kept = jobs.keeps_half_turn
     lopsided = lambda mesh, filled, steps: filled != sector and kept(mesh, filled, steps)
     monkeypatch.setattr(jobs, "keeps_half_turn", lopsided)
-    assert not Job(own, asked, sector=sector).tyre.half and Job(own, asked).tyre.half
+    assert not Job(own, request, sector=sector).tyre.half and Job(own, request).tyre.half

@@ -53,12 +53,12 @@ def test_gather_is_the_transpose_of_spread(symmetry: HalfTurn, random: np.random
 def test_a_folded_stiffness_is_that_of_the_spread_parts(
     symmetry: HalfTurn, random: np.random.Generator
 ) -> None:
-    """Of any stiffness between nodes, symmetric or not."""
+    """Folding and spreading agree for any stiffness between nodes, symmetric or not."""
     x, size = masked(symmetry, random), int(np.prod(symmetry.shape))
     K = random_matrix((size, size), density=1e-3, rng=1, format="csr")
     wanted = symmetry.gather((K @ symmetry.spread(x).ravel()).reshape(symmetry.shape))
-    found = (symmetry.fold(K) @ x.ravel()).reshape(x.shape)
-    np.testing.assert_allclose(found, wanted, atol=1e-12 * abs(wanted).max())
+    folded = (symmetry.fold(K) @ x.ravel()).reshape(x.shape)
+    np.testing.assert_allclose(folded, wanted, atol=1e-12 * abs(wanted).max())
 
 
 def test_a_turned_tyre_is_the_same(symmetry: HalfTurn, random: np.random.Generator) -> None:

@@ -60,13 +60,13 @@ def test_the_lowest_of_all_harmonics(random: np.random.Generator, wanted: int) -
         values = [own - own[0] + first for own, first in zip(spectra, start, strict=True)]
         whole = np.sort(np.concatenate([np.repeat(v, 2 if n else 1) for n, v in enumerate(values)]))
         limit, spectrum = whole[wanted - 1], Spectrum(values)
-        found = harmonics.lowest_of_all(spectrum, wanted, lambda own=spectrum: own.looks.append(1))
+        modes = harmonics.lowest_of_all(spectrum, wanted, lambda own=spectrum: own.looks.append(1))
         last = next(n for n in range(2, 40) if start[n] > limit)
-        assert [m.n for m in found] == list(range(last + 1))
+        assert [m.n for m in modes] == list(range(last + 1))
         assert (
             sorted(set(spectrum.asked)) == list(range(last + 1)) and len(spectrum.looks) == last + 1
         )
-        for n, m in enumerate(found):
+        for n, m in enumerate(modes):
             np.testing.assert_array_equal(m.eigenvalues, values[n][values[n] <= limit])
 
 

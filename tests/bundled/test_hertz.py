@@ -178,8 +178,8 @@ def _press(
 ) -> Found:
     press = work.press(around, stiffness, friction, 1e-6)
     for i in range(steps):
-        found = press.to(F * (i + 1) / steps)
-    covered = patch(found.contact, work.model.mesh.X, press.tyre.around.angles)
+        state = press.to(F * (i + 1) / steps)
+    covered = patch(state.contact, work.model.mesh.X, press.tyre.around.angles)
     touches = covered.area > 0
     force = covered.force[touches] / covered.area[touches][:, None]
     plane = not work.free[:, 2].any()
@@ -189,7 +189,7 @@ def _press(
         float(force[:, 0].max() / (p0 * peak)),
         covered.length / (2 * a * radius),
         whole / (2 * covered.area.sum()),
-        (press.free_radius - found.height) * R / a**2 / (1.0 if plane else depth),
+        (press.free_radius - state.height) * R / a**2 / (1.0 if plane else depth),
         float(np.linalg.norm(force[:, 1:], axis=1).max() / p0),
         len(around),
         len(work.U),
@@ -208,11 +208,11 @@ def cylinder_without_friction(degrees: float) -> Found:
 @pytest.mark.parametrize(("degrees", "close"), [(2.0, 0.03), (1.0, 0.012), QUARTERED])
 def test_cylinder(degrees: float, close: float) -> None:
     """a/R = 0.1 with 3, 6 and 12 elements in the half width."""
-    found = cylinder_without_friction(degrees)
-    assert found.peak == pytest.approx(1.0, abs=0.01)
-    assert found.radius == pytest.approx(1.0, abs=close)
-    assert found.mean == pytest.approx(1.0, abs=close)
-    assert found.traction == 0.0
+    ratios = cylinder_without_friction(degrees)
+    assert ratios.peak == pytest.approx(1.0, abs=0.01)
+    assert ratios.radius == pytest.approx(1.0, abs=close)
+    assert ratios.mean == pytest.approx(1.0, abs=close)
+    assert ratios.traction == 0.0
 
 
 @pytest.mark.slow
@@ -245,7 +245,7 @@ def test_cylinder_with_friction() -> None:
 def test_ball() -> None:
     """Curved both ways, three elements in the patch's radius, free to move across; with five
     (tests/studies/hertz_cylinder.py) peak and radius are within 1.1 %."""
-    found = ball(0.1, 2.0)
-    assert found.peak == pytest.approx(1.0, abs=0.025)
-    assert found.radius == pytest.approx(1.0, abs=0.04)
-    assert found.deflection == pytest.approx(1.0, abs=0.02)
+    ratios = ball(0.1, 2.0)
+    assert ratios.peak == pytest.approx(1.0, abs=0.025)
+    assert ratios.radius == pytest.approx(1.0, abs=0.04)
+    assert ratios.deflection == pytest.approx(1.0, abs=0.02)

@@ -41,7 +41,7 @@ class Cells:
     rows: Array
 
     def model(self, D1: float, inner: float | None = None) -> Model:
-        """Of neo-Hooke's law; ``inner``: the radius of the surface CAVITY."""
+        """Model of neo-Hookean rubber; ``inner``: the radius of the surface CAVITY."""
         out = ["*NODE, NSET=ALL"]
         out += [f"{i}, {r!r}, {z!r}" for i, (r, z) in enumerate(self.X.tolist(), 1)]
         out += [f"*ELEMENT, TYPE={self.kind}, ELSET=RUBBER"]
@@ -98,8 +98,8 @@ def test_the_projection(bent: tuple[Hybrid, Array]) -> None:
 
 
 def test_force_and_stiffness_are_derivatives(bent: tuple[Hybrid, Array]) -> None:
-    """Of the energy by complex step, in the section; at a vibration's moduli at rest, those of such
-    rubber."""
+    """Derivatives of the energy by complex step, in the section; at a vibration's moduli at rest,
+    those of such rubber."""
     part, U = bent
     force, K0, _ = part.force(U), *part.tangents(U, False)[:2]
     for b in range(part.connectivity.shape[1]):
@@ -241,9 +241,9 @@ def grown(kind: str, elements: int) -> float:
     held[:, 1] = True
     p = pressure(1.15 * a)
     U = support.inflate(m, held, support.cavity(m, p))
-    found = U[abs(own.X[:, 0] - a) < 1e-9, 0].mean()
+    displacement = U[abs(own.X[:, 0] - a) < 1e-9, 0].mean()
     assert brentq(lambda x: pressure(x) - p, a, 1.3 * a) == pytest.approx(1.15 * a)
-    return float(found / (0.15 * a) - 1)
+    return float(displacement / (0.15 * a) - 1)
 
 
 @pytest.mark.parametrize(
@@ -283,14 +283,14 @@ def moment(kind: str, across: int, D1: float) -> float:
         U.reshape(-1)[rows] -= spsolve(K.tocsc(), mechanics.gradient(m, U, []).reshape(-1)[rows])
     force, top = mechanics.gradient(m, U, []), abs(z - length / 2) < 1e-9
     across_axis, along_axis = (x + A + U[:, 0])[top], (z + U[:, 2])[top]
-    found = (across_axis * force[top, 2] - along_axis * force[top, 0]).sum() / R
+    torque = (across_axis * force[top, 2] - along_axis * force[top, 0]).sum() / R
     # M = int s_theta r dr, s_theta = s_r + l W', s_r = W(l) - W(l1), W = C10 (l^2 + l^-2 - 2)
     q, w = np.polynomial.legendre.leggauss(20)
     place = (inner + outer) / 2 + (outer - inner) / 2 * q
     energy = lambda s: C10 * (s**2 + s**-2 - 2)
     s = place / A
     hoop = energy(s) - energy(inner / A) + C10 * 2 * (s**2 - s**-2)
-    return float(found / ((hoop * place) @ w * (outer - inner) / 2) - 1)
+    return float(torque / ((hoop * place) @ w * (outer - inner) / 2) - 1)
 
 
 @pytest.mark.parametrize(
@@ -321,8 +321,8 @@ def tyre(kind: str, D1: str) -> dict[str, str]:
 
 
 def run(pair: dict[str, str], **request: object) -> StepResult:
-    asked = Request(harmonics=[0, 1, 2], modes_per_harmonic=2, **request)  # type: ignore[arg-type]
-    return Job(Deck(pair, "modes", "inflate"), asked).run()[-1]
+    whole_request = Request(harmonics=[0, 1, 2], modes_per_harmonic=2, **request)  # type: ignore[arg-type]
+    return Job(Deck(pair, "modes", "inflate"), whole_request).run()[-1]
 
 
 @pytest.mark.parametrize(("kind", "D1"), [("CGAX8H", "5.085e-08"), ("CGAX8RH", "0")])

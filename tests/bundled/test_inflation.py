@@ -43,9 +43,9 @@ class Newton:
         before = U.ravel()[0], U.ravel()[1] or 1.0
         if not self.bears(*before, share, stiffness):
             return None, 2, "it wrinkles"
-        found = np.zeros_like(U)
-        found.ravel()[:2] = share, stiffness
-        return found, 2, ""
+        result = np.zeros_like(U)
+        result.ravel()[:2] = share, stiffness
+        return result, 2, ""
 
 
 def inflate(
@@ -139,8 +139,8 @@ def test_how_newtons_method_ends(small: Model) -> None:
     at = np.zeros((len(small.mesh.X), 3))
     assert run(at, 0.0, 5, 1.0)[1:] == (0, "")
     assert run(at, 1e4, 1, 1.0) == (None, 1, "Newton's method did not converge in 1 iterations")
-    found, used, _ = run(at, 1e4, 30, 1.0)
-    assert found is not None and used <= 6
-    assert run(found, 1e4, 30, 1.0)[1:] == (0, "")
+    state, used, _ = run(at, 1e4, 30, 1.0)
+    assert state is not None and used <= 6
+    assert run(state, 1e4, 30, 1.0)[1:] == (0, "")
     # none, then 4e5 to 4e15 by tens
     assert run(at, 1e9, 30, 0.0) == (None, 12, "the tangent stiffness is not positive definite")

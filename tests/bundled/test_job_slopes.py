@@ -59,8 +59,8 @@ def test_slopes_by_density_and_shape_against_differences(
             )
             return np.concatenate([m.eigenvalues for m in (waves or [result])[0].modes])
 
-        asked = {"p": [("inflate", line + 1, field, scale)]}
-        result = run(effects, harmonics=[0, 1, 2], sensitivities=asked)[-1]
+        sensitivities = {"p": [("inflate", line + 1, field, scale)]}
+        result = run(effects, harmonics=[0, 1, 2], sensitivities=sensitivities)[-1]
         h = 5e-3
         wanted = (8 * (at(h) - at(-h)) - at(2 * h) + at(-2 * h)) / (12 * h)
         got = np.concatenate(result.rates["p"])

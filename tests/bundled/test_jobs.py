@@ -59,13 +59,13 @@ def test_a_section_alone_has_the_modes_without_waves() -> None:
     """Its *FREQUENCY step, whatever harmonics a request would have."""
     text = texts(PLAIN)["inflate"] + f"*STEP\n{FREQUENCY.replace('20', '4')}*END STEP\n"
     for request in (Request(), Request(harmonics=[0, 1, 2])):
-        (found,) = Job(Deck({"inflate": text}, "inflate", None), request).run()
-        assert [m.n for m in found.modes] == [0]
-        assert len(found.modes[0].eigenvalues) == request.modes_per_harmonic
+        (result,) = Job(Deck({"inflate": text}, "inflate", None), request).run()
+        assert [m.n for m in result.modes] == [0]
+        assert len(result.modes[0].eigenvalues) == request.modes_per_harmonic
 
 
 def test_as_many_modes_of_each_harmonic_as_the_fullest_has() -> None:
-    """Of a tyre that is not the same all round, whose harmonics *FREQUENCY's number finds."""
+    """A tyre that is not the same all round, whose harmonics *FREQUENCY's number determines."""
     few = (FREQUENCY, FREQUENCY.replace("20", "9"))
     plain, split = (run(effects, few)[0].modes for effects in (PLAIN, MASS))
     most = max(len(m.eigenvalues) for m in plain)
@@ -89,9 +89,9 @@ def test_what_holds_other_nodes_does_not_hold_the_rim() -> None:
 
 def test_a_job_without_a_frequency_step_ends_with_its_static_state() -> None:
     text = texts(PLAIN)["inflate"]
-    (found,) = Job(Deck({"inflate": text}, "inflate", None), Request()).run()
-    assert (found.step, found.pressure_Pa, found.modes) == (1, 160000.0, [])
-    assert 1e-4 < abs(found.U).max() < 0.02 and found.factorisations > 1
+    (result,) = Job(Deck({"inflate": text}, "inflate", None), Request()).run()
+    assert (result.step, result.pressure_Pa, result.modes) == (1, 160000.0, [])
+    assert 1e-4 < abs(result.U).max() < 0.02 and result.factorisations > 1
 
 
 def test_the_time_limit_counts_processor_time(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -150,13 +150,13 @@ def test_modes_above_the_limit_are_left_out(effects: tuple[tuple[str, float], ..
     a doublet that has split. A turning tyre's waves are asked for by another step, which has no
     limit."""
     density = texts(effects)["inflate"].splitlines().index("*DENSITY") + 2
-    asked = {"p": [("inflate", density, 0, 1.0)]}
-    (first, *_) = run(effects, harmonics=[0, 1, 2], sensitivities=asked)
+    sensitivities = {"p": [("inflate", density, 0, 1.0)]}
+    (first, *_) = run(effects, harmonics=[0, 1, 2], sensitivities=sensitivities)
     whole = first.modes
     hertz = np.sort(np.sqrt(np.concatenate([m.eigenvalues for m in whole]))) / (2 * np.pi)
     limit = (hertz[2] + hertz[3]) / 2
     edit = FREQUENCY, f"{FREQUENCY[:-1]}, , {float(limit)!r}\n"
-    cut = run(effects, edit, harmonics=[0, 1, 2], sensitivities=asked)
+    cut = run(effects, edit, harmonics=[0, 1, 2], sensitivities=sensitivities)
     left = cut[0].modes
     slopes = zip(cut[0].rates["p"], first.rates["p"], strict=True)
     for few, many, (own, all_) in zip(left, whole, slopes, strict=True):

@@ -91,7 +91,7 @@ def test_what_is_not_positive_definite(band: float, D: float, words: str) -> Non
 
 
 def test_whole_fields_and_forces(halves: Halves, random: np.random.Generator) -> None:
-    """Of half the elements: the state is completed, forces and sums are those of all."""
+    """With half the elements the state is completed, and forces and sums are those of all."""
     symmetry = halves.symmetry
     even = halves.U * symmetry.here[:, None]
     np.testing.assert_allclose(symmetry.field(even), halves.U, atol=1e-15)

@@ -169,7 +169,8 @@ def test_hourglass_stiffness_is_of_the_section_above_it() -> None:
     ],
 )
 def test_refusals_name_the_line(old: str, new: str, line: int, words: str) -> None:
-    """What is not honoured or not a deck is refused, with its 1-based line and the word."""
+    """Keywords that are not honoured and texts that are no deck are refused, with the 1-based line
+    and the word."""
     error = refused(changed(old, new))
     assert error.place.line == line
     assert words in str(error)

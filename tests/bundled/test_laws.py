@@ -259,8 +259,9 @@ def test_slopes_by_every_number_of_the_deck(name: str, F: Array) -> None:
 
 @LAW
 def test_moduli_scale_shear_and_volume_apart(name: str, F: Array) -> None:
-    """What a vibration, a Prony series or a path to an equilibrium makes of them: W of Wbar and U
-    so many times; a pressure of the element's own in place of U's has no stiffness but stress's."""
+    """A vibration, a Prony series and a path to an equilibrium scale Wbar and U of W by their own
+    factors; a pressure of the element's own in place of U's has no stiffness except that of the
+    stress."""
     law = read(deck(name))
     bare = law.scaled(1.0, 0.0)
     np.testing.assert_allclose(

@@ -42,7 +42,7 @@ def pressed(tyre: Round) -> State:
 
 
 @pytest.fixture(scope="module")
-def found(tyre: Round, pressed: State) -> LoadedModes:
+def lowest(tyre: Round, pressed: State) -> LoadedModes:
     return modes(tyre, pressed.U, pressed.hold, pressed.around, 10)
 
 
@@ -53,34 +53,34 @@ def test_without_a_road_the_modes_are_the_harmonic_ones(tyre: Round) -> None:
     errors: dict[int, list[float]] = {2: [], 3: []}
     for elements in (8, 16):
         around = half_circle(np.full(elements, np.pi / elements))
-        found = modes(tyre, tyre.everywhere(around), no_hold(tyre, around), around, 12)
-        assert (np.diff(found.eigenvalues) >= 0).all()
+        loaded = modes(tyre, tyre.everywhere(around), no_hold(tyre, around), around, 12)
+        assert (np.diff(loaded.eigenvalues) >= 0).all()
         for n, value in exact.items():
-            near = np.argsort(abs(found.eigenvalues - value))[: 2 if n else 1]
+            near = np.argsort(abs(loaded.eigenvalues - value))[: 2 if n else 1]
             if n < 2:
-                np.testing.assert_allclose(found.eigenvalues[near], value, rtol=1e-7)
+                np.testing.assert_allclose(loaded.eigenvalues[near], value, rtol=1e-7)
             else:
-                errors[n].append(found.eigenvalues[near].mean() / value - 1)
-                np.testing.assert_allclose(*found.eigenvalues[near], rtol=1e-7)
-            assert sorted(found.parity[near]) == ([-1, 1] if n else sorted(found.parity[near]))
+                errors[n].append(loaded.eigenvalues[near].mean() / value - 1)
+                np.testing.assert_allclose(*loaded.eigenvalues[near], rtol=1e-7)
+            assert sorted(loaded.parity[near]) == ([-1, 1] if n else sorted(loaded.parity[near]))
     for each in errors.values():
         assert 0 < each[1] < 0.01
         assert support.order(each)[0] > 3.5
 
 
 def test_waves_beyond_the_patch_are_the_modes_own(tyre: Round) -> None:
-    """What elements of 1 degree near the patch and waves to 5 beyond leave of the harmonic modes'
-    error is the elements' own, fourth order in their length, up to n = 4."""
+    """With elements of 1 degree near the patch and waves to 5 beyond, the remaining error of the
+    harmonic modes is the elements' own, fourth order in their length, up to n = 4."""
     errors = []
     for elements in (6, 12):
         around = half_circle(np.full(elements, np.radians(36.0) / elements), 5)
-        found = modes(tyre, tyre.everywhere(around), no_hold(tyre, around), around, 14)
+        loaded = modes(tyre, tyre.everywhere(around), no_hold(tyre, around), around, 14)
         errors.append([])
         for n in range(5):
             value = harmonic(tyre, n).eigenvalues[0]
-            near = np.argsort(abs(found.eigenvalues - value))[: 2 if n else 1]
-            assert sorted(found.parity[near]) == ([-1, 1] if n else sorted(found.parity[near]))
-            errors[-1].append(abs(found.eigenvalues[near] / value - 1).max())
+            near = np.argsort(abs(loaded.eigenvalues - value))[: 2 if n else 1]
+            assert sorted(loaded.parity[near]) == ([-1, 1] if n else sorted(loaded.parity[near]))
+            errors[-1].append(abs(loaded.eigenvalues[near] / value - 1).max())
     assert max(errors[1]) < 1e-6 and max(errors[0][:2]) < 1e-7
 
 
@@ -92,9 +92,9 @@ def test_standing_waves_of_the_unloaded_tyre_are_nearly_its_modes(tyre: Round) -
     work.residual(tyre.everywhere(around))
     for n in range(4):
         (value,) = (unloaded := harmonic(tyre, n, 1)).eigenvalues
-        found = {p: standing_waves([unloaded], tyre.symmetry(around, p)) for p in (1, -1)}
-        assert [bool(waves) for waves in found.values()].count(True) == (2 if n else 1)
-        for parity, waves in found.items():
+        by_parity = {p: standing_waves([unloaded], tyre.symmetry(around, p)) for p in (1, -1)}
+        assert [bool(waves) for waves in by_parity.values()].count(True) == (2 if n else 1)
+        for parity, waves in by_parity.items():
             symmetry = tyre.symmetry(around, parity)
             for V in waves:
                 quotient = (V * work.product(V)).sum() / (V * weigh(V)).sum()
@@ -104,12 +104,12 @@ def test_standing_waves_of_the_unloaded_tyre_are_nearly_its_modes(tyre: Round) -
                 )
 
 
-def test_they_solve_the_whole_problem(tyre: Round, pressed: State, found: LoadedModes) -> None:
+def test_they_solve_the_whole_problem(tyre: Round, pressed: State, lowest: LoadedModes) -> None:
     """K x = lambda M x on the whole tyre, modal masses 1, different modes orthogonal."""
     work = tyre.tyre(pressed.around)
     work.residual(pressed.U)
     weigh = Inertia(tyre.model, pressed.around)
-    for value, parity, x in zip(found.eigenvalues, found.parity, found.shapes, strict=True):
+    for value, parity, x in zip(lowest.eigenvalues, lowest.parity, lowest.shapes, strict=True):
         symmetry = tyre.symmetry(pressed.around, int(parity))
         gathered = lambda F, symmetry=symmetry: symmetry.gather(F)
         force = gathered(work.product(x) + held(pressed, x))
@@ -117,16 +117,16 @@ def test_they_solve_the_whole_problem(tyre: Round, pressed: State, found: Loaded
         assert np.linalg.norm(force - inertia) < 2e-3 * np.linalg.norm(inertia)
         energy = float((x * (work.product(x) + held(pressed, x))).sum())
         assert 2 * energy == pytest.approx(value, rel=1e-8)
-    gram = 2 * np.einsum("akni,bkni->ab", found.shapes, [weigh(x) for x in found.shapes])
-    same = found.parity[:, None] == found.parity
+    gram = 2 * np.einsum("akni,bkni->ab", lowest.shapes, [weigh(x) for x in lowest.shapes])
+    same = lowest.parity[:, None] == lowest.parity
     np.testing.assert_allclose(gram[same], np.eye(10)[same], atol=1e-7)
 
 
 @pytest.mark.slow
-def test_a_wheel_free_along_the_load(tyre: Round, pressed: State, found: LoadedModes) -> None:
-    """What the half turn reverses is as it was. A wheel far heavier than the tyre swings slowly on
-    the tyre's stiffness, which statics knows, all else as if it were held; a wheel without mass
-    lowers each eigenvalue, and none below the one before."""
+def test_a_wheel_free_along_the_load(tyre: Round, pressed: State, lowest: LoadedModes) -> None:
+    """Modes that the half turn reverses stay as they were. A wheel far heavier than the tyre swings
+    slowly on the tyre's stiffness, which statics gives, and all else is as if it were held; a wheel
+    without mass lowers each eigenvalue, and none below the one before."""
     symmetry, work = tyre.symmetry(pressed.around), tyre.tyre(pressed.around)
 
     def free(wheel_kg: float) -> LoadedModes:
@@ -134,10 +134,10 @@ def test_a_wheel_free_along_the_load(tyre: Round, pressed: State, found: LoadedM
         return loaded_modes(*given)[0]
 
     heavy, light = free(1e6), free(0.0)
-    keeps = found.eigenvalues[found.parity == 1]
+    keeps = lowest.eigenvalues[lowest.parity == 1]
     np.testing.assert_allclose(
         heavy.eigenvalues[heavy.parity == -1][:3],
-        found.eigenvalues[found.parity == -1][:3],
+        lowest.eigenvalues[lowest.parity == -1][:3],
         rtol=1e-7,
     )
     swing, *others = heavy.eigenvalues[heavy.parity == 1]
@@ -173,9 +173,9 @@ def test_a_road_before_waves(tyre: Round) -> None:
     for around in (half_circle(LENGTHS), half_circle(np.radians([5.0] * 4 + [10.0]), 7)):
         symmetry, start = tyre.symmetry(around), tyre.everywhere(around)
         road = tyre.road(around, 1e9)
-        found = ContactNewton(tyre.tyre(around), symmetry, road, start, lambda: None).to(10.0)
-        assert found.contact.force == pytest.approx(10.0, rel=1e-6)
-        heights.append(0.1 - found.height)
+        state = ContactNewton(tyre.tyre(around), symmetry, road, start, lambda: None).to(10.0)
+        assert state.contact.force == pytest.approx(10.0, rel=1e-6)
+        heights.append(0.1 - state.height)
     assert heights[1] == pytest.approx(heights[0], rel=0.01)
 
 
@@ -191,21 +191,21 @@ def test_mass_of_rigid_motions(tyre: Round) -> None:
         assert (V * weigh(V)).sum() == pytest.approx(total / 2, rel=1e-9)
 
 
-def test_a_hold_raises_every_frequency(tyre: Round, pressed: State, found: LoadedModes) -> None:
+def test_a_hold_raises_every_frequency(tyre: Round, pressed: State, lowest: LoadedModes) -> None:
     """Weyl: none of the pressed tyre's eigenvalues falls with the hold, more so a rigid one; what
     the contact's own stiffness leaves to a rigid hold is little."""
     free = modes(tyre, pressed.U, 0 * pressed.hold, pressed.around, 10)
     rigid = modes(tyre, pressed.U, 1e2 * pressed.hold, pressed.around, 10)
-    assert (free.eigenvalues < found.eigenvalues * (1 + 1e-9)).all()
-    assert (found.eigenvalues < rigid.eigenvalues * (1 + 1e-9)).all()
-    np.testing.assert_allclose(found.eigenvalues, rigid.eigenvalues, rtol=0.02)
-    assert (found.eigenvalues / free.eigenvalues).max() > 1.05
+    assert (free.eigenvalues < lowest.eigenvalues * (1 + 1e-9)).all()
+    assert (lowest.eigenvalues < rigid.eigenvalues * (1 + 1e-9)).all()
+    np.testing.assert_allclose(lowest.eigenvalues, rigid.eigenvalues, rtol=0.02)
+    assert (lowest.eigenvalues / free.eigenvalues).max() > 1.05
 
 
-def test_the_same_bits_again(tyre: Round, pressed: State, found: LoadedModes) -> None:
+def test_the_same_bits_again(tyre: Round, pressed: State, lowest: LoadedModes) -> None:
     again = modes(tyre, pressed.U, pressed.hold, pressed.around, 10)
-    np.testing.assert_array_equal(again.eigenvalues, found.eigenvalues)
-    np.testing.assert_array_equal(again.shapes, found.shapes)
+    np.testing.assert_array_equal(again.eigenvalues, lowest.eigenvalues)
+    np.testing.assert_array_equal(again.shapes, lowest.shapes)
 
 
 def test_time_is_looked_at_before_the_factor_and_every_product(
@@ -248,7 +248,7 @@ def test_an_unstable_state_fails_by_its_name(tyre: Round, pressed: State) -> Non
 
 
 @pytest.mark.slow
-def test_results_hold_the_half_turn(tyre: Round, pressed: State, found: LoadedModes) -> None:
+def test_results_hold_the_half_turn(tyre: Round, pressed: State, lowest: LoadedModes) -> None:
     """Shapes on the whole tyre, as the job writes them: each kept or reversed by the half turn."""
     work = tyre.press(LENGTHS, 1e9, 0.5)
     rows = np.arange(len(tyre.U))
@@ -259,9 +259,9 @@ def test_results_hold_the_half_turn(tyre: Round, pressed: State, found: LoadedMo
     shapes = written["mode_shape"]
     back = (-np.arange(shapes.shape[1])) % shapes.shape[1]
     image = HALF_TURN * shapes[:, back][:, :, work.symmetry.other]
-    parity = found.parity[:6, None, None, None]
+    parity = lowest.parity[:6, None, None, None]
     np.testing.assert_allclose(shapes, parity * image, atol=1e-6 * abs(shapes).max())
-    hertz = np.sqrt(found.eigenvalues[:6]) / (2 * np.pi)
+    hertz = np.sqrt(lowest.eigenvalues[:6]) / (2 * np.pi)
     np.testing.assert_allclose(written["mode_frequency_Hz"], hertz, rtol=1e-7)
 
 

@@ -70,10 +70,10 @@ def test_the_deck_says_how_the_wheel_stands(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Held, or free along the load with the rim's mass, which no plain footprint's deck has."""
-    asked: list[Any] = []
+    vibrations: list[Any] = []
 
     def press(*given: Any) -> dict[str, Any]:
-        asked.extend(given[-3].values())
+        vibrations.extend(given[-3].values())
         raise RunFailed("crashed", "enough")
 
     monkeypatch.setattr(footprint_job, "press", press)
@@ -82,7 +82,7 @@ def test_the_deck_says_how_the_wheel_stands(
             (tmp_path / name).write_text(text)
         with pytest.raises(RunFailed, match="enough"):
             job.run(tmp_path, "press", "inflate")
-        assert asked[-1].wheel_kg == kg
+        assert vibrations[-1].wheel_kg == kg
     plain = Decks(TyreDesign(coarse_case(wheel="free_along_load")), loads_N=LOADS).texts("abaqus")
     assert "MASS" not in plain["press.inp"]
 
@@ -102,17 +102,17 @@ def test_what_the_job_asks_for_and_how_it_writes_it(
     k, nodes = len(work.tyre.around.angles), np.array([3, 0, 5])
     shapes = generator(2).normal(size=(2, k, len(tyre.U), 3))
     canned = LoadedModes(np.array([400.0, 900.0]) * np.pi**2, np.array([1, -1]), shapes)
-    asked: list[Any] = []
+    calls: list[Any] = []
 
     def lowest(vibration: Vibration, wanted: int, check: object) -> list[HarmonicModes]:
-        asked.append((vibration.shift, wanted, vibration.factor(0).solve(np.ones(free))))
+        calls.append((vibration.shift, wanted, vibration.factor(0).solve(np.ones(free))))
         return []
 
     loose = LoadedModes(np.array([100.0]) * np.pi**2, np.array([-1]), shapes[1:])
 
     def modes_(work_: Revolved, kept: Any, U: Array, holds: Any, *rest: Any) -> list[LoadedModes]:
         work_.residual(U)
-        asked.append((work_.product(shapes[0]), holds, rest))
+        calls.append((work_.product(shapes[0]), holds, rest))
         return [canned, loose]
 
     monkeypatch.setattr(footprint_job, "lowest_of_all", lowest)
@@ -123,7 +123,7 @@ def test_what_the_job_asks_for_and_how_it_writes_it(
     work.tyre.residual(0 * shapes[0])  # a state that is not the wanted one
     written = footprint_job._modes(work, state, wanted, equations, tyre.U, work.tyre.around.angles)
     assert work._factor is None
-    (shift, started, solved), (product, (hold, smooth), rest) = asked
+    (shift, started, solved), (product, (hold, smooth), rest) = calls
     plain = Vibration(tyre.model, tyre.U, work.tyre.loads, equations, 0.0)
     np.testing.assert_array_equal(solved, plain.factor(0).solve(np.ones(free)))
     assert (shift, started) == (0.0, 2 * (2 + 6)) and rest[:2] == ([], 2)

@@ -29,11 +29,11 @@ def test_masses_and_springs_stand_in_their_components() -> None:
     deck = Deck(pair, "modes", "inflate")
     model = Job(deck, Request()).model
     _, revolve, _ = deck.read([])
-    found = read_point_elements(revolve, model.mesh)
+    elements = read_point_elements(revolve, model.mesh)
     at = {
         (int(r), int(c)): (m, k)
         for r, c, m, k in zip(
-            found.rows, found.components, found.mass, found.stiffness, strict=True
+            elements.rows, elements.components, elements.mass, elements.stiffness, strict=True
         )
     }
     one, other = model.mesh.index[21009], model.mesh.index[19009]
@@ -43,12 +43,12 @@ def test_masses_and_springs_stand_in_their_components() -> None:
         (one, 2): (0.1, 2e3),
         (other, 1): (0.0, 3e3),
     }
-    assert found.total_kg == pytest.approx(0.1) and found.sectors == found.highest == 60
+    assert elements.total_kg == pytest.approx(0.1) and elements.sectors == elements.highest == 60
     angle = np.linspace(-np.pi / 60, np.pi / 60, 2001)
     for n in (0, 1, 7):
-        assert found.share(n) == pytest.approx(np.mean(np.cos(n * angle)), rel=1e-3)
+        assert elements.share(n) == pytest.approx(np.mean(np.cos(n * angle)), rel=1e-3)
     for n in (0, 1):
-        assert found.share(n) == pytest.approx(trapezoid(np.cos(n * angle), angle) * 30 / np.pi)
+        assert elements.share(n) == pytest.approx(trapezoid(np.cos(n * angle), angle) * 30 / np.pi)
     bad = springs.format(4, 21009, 1e3)
     pair["modes"] = pair["modes"].replace("*STEP, NAME=EQ", bad + "*STEP, NAME=EQ")
     _, revolve, _ = Deck(pair, "modes", "inflate").read([])

@@ -109,10 +109,10 @@ def test_a_tyre_on_the_road() -> None:
     texts = Decks(FILLED, loads_N=LOADS).texts("abaqus")
     pair = {name: texts[f"{name}.inp"] for name in ("inflate", "press")}
     cavity = {"material": "CAVITY_GAS", "surfaces": ["CAVITY", "WELL"]}
-    found = Job(Deck(pair, "press", "inflate"), Request(cavity=cavity)).press()
-    free, splits = found["cavity_Hz"], [0.0]
+    result = Job(Deck(pair, "press", "inflate"), Request(cavity=cavity)).press()
+    free, splits = result["cavity_Hz"], [0.0]
     assert free == pytest.approx(186.0, rel=0.01)
-    for each in found["footprints"]:
+    for each in result["footprints"]:
         fore_aft, vertical = each["cavity_Hz"]
         assert fore_aft < free < vertical
         assert (fore_aft + vertical) / 2 == pytest.approx(free, rel=1e-3)

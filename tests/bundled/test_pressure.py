@@ -164,11 +164,11 @@ def test_an_end_that_is_free_along_the_axle_is_refused() -> None:
         tube("LOW, 2").run()
     with pytest.raises(DeckError, match="free along the axle"):
         tube("LOW, 2", "HIGH, 1").run()
-    (found,) = tube("LOW, 2", "HIGH, 2").run()
+    (result,) = tube("LOW, 2", "HIGH, 2").run()
     rubber, a, b = support.Rubber(), 0.30, 0.31
     G, K = rubber.shear, 2 / rubber.D1
     wanted = 100.0 * a**2 / (b**2 - a**2) * (a / (2 * (K + G / 3)) + b**2 / (2 * G * a))
-    assert found.U[inner, 0] == pytest.approx(wanted, rel=2e-3)
+    assert result.U[inner, 0] == pytest.approx(wanted, rel=2e-3)
 
 
 def test_an_end_is_closed_by_a_surface_under_the_same_pressure() -> None:

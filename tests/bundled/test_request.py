@@ -32,8 +32,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def told(folder: Path, request: Any, capsys: pytest.CaptureFixture[str]) -> str:
-    """What the command says of a request that it refuses."""
+def refusal(folder: Path, request: Any, capsys: pytest.CaptureFixture[str]) -> str:
+    """Message of the command about a request that it refuses."""
     text = request if isinstance(request, str) else json.dumps(request)
     (folder / "modes.request.json").write_text(text)
     assert main([str(folder / "modes.inp"), "--oldjob", "inflate"]) == 2
@@ -86,9 +86,11 @@ def told(folder: Path, request: Any, capsys: pytest.CaptureFixture[str]) -> str:
 def test_a_wrong_request_is_one_sentence(
     folder: Path, request_: Any, words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    said = told(folder, request_, capsys)
-    assert words in said
-    assert said.startswith(("error: modes.request.json: ", "error: inflate.inp, ", "error: deck"))
+    message = refusal(folder, request_, capsys)
+    assert words in message
+    assert message.startswith(
+        ("error: modes.request.json: ", "error: inflate.inp, ", "error: deck")
+    )
 
 
 @pytest.mark.parametrize(
@@ -124,8 +126,8 @@ def test_requests_at_their_limits(tmp_path: Path, request_: dict[str, Any], fine
     path = tmp_path / "modes.request.json"
     path.write_text(json.dumps(request_))
     if fine:
-        found = read_request(path, ["modes"])
-        assert all(getattr(found, key) == value for key, value in request_.items())
+        result = read_request(path, ["modes"])
+        assert all(getattr(result, key) == value for key, value in request_.items())
     else:
         with pytest.raises(Refused):
             read_request(path, ["modes"])
@@ -134,8 +136,8 @@ def test_requests_at_their_limits(tmp_path: Path, request_: dict[str, Any], fine
 def test_what_a_request_does_not_ask_for_is_not_done(tmp_path: Path) -> None:
     """Two modes of each harmonic, at the moduli of the deck, no slopes and nothing beside."""
     path = tmp_path / "modes.request.json"
-    for found in (read_request(path, ["modes"]), path.write_text("{}") and read_request(path, [])):
-        assert found == Request(None, 2, {}, False, None, None)  # type: ignore[comparison-overlap]
+    for result in (read_request(path, ["modes"]), path.write_text("{}") and read_request(path, [])):
+        assert result == Request(None, 2, {}, False, None, None)  # type: ignore[comparison-overlap]
 
 
 def test_rows_may_be_of_the_sectors_job(tmp_path: Path) -> None:
@@ -207,10 +209,10 @@ def test_a_request_that_is_no_file(tmp_path: Path) -> None:
 def test_the_command_says_what_it_found(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "modes.request.json").write_text('{"harmonics": [2], "modes_per_harmonic": 1}')
     assert main([str(folder / "modes"), "--oldjob", "inflate.inp"]) == 0
-    said = capsys.readouterr().out
+    output = capsys.readouterr().out
     (mode,) = json.loads((folder / "modes.json").read_text())["steps"][-1]["modes"]
-    assert f"harmonic 2: {mode['frequency_Hz']:.2f} Hz\n" in said and "240 kPa" in said
-    assert f"results in {folder / 'modes.json'} and {folder / 'modes.npz'}" in said
+    assert f"harmonic 2: {mode['frequency_Hz']:.2f} Hz\n" in output and "240 kPa" in output
+    assert f"results in {folder / 'modes.json'} and {folder / 'modes.npz'}" in output
     assert main([str(folder / "modes")]) == 2
     deck = (folder / "modes.inp").read_text().splitlines()
     (line,) = (i for i, text in enumerate(deck, 1) if text.startswith("*SYMMETRIC MODEL"))

@@ -117,8 +117,8 @@ def test_what_waves_stand_for() -> None:
 
 
 def test_coefficients_of_harmonics() -> None:
-    """Of exp(i n theta): exact all round for n < 2, beyond the elements up to the highest wave, and
-    the nearest sum of waves above."""
+    """Coefficients of exp(i n theta): exact all round for n < 2, beyond the elements up to the
+    highest wave, and the nearest sum of waves above."""
     around = half_circle(np.array([0.1, 0.2, 0.3]), 4)
     far = around.stations > JOIN
     for n in range(5):
@@ -179,9 +179,9 @@ def test_product_is_the_residuals_derivative(
     e = 2e-7
     one, two = (tyre.residual(U + s * e * phi) - tyre.residual(U - s * e * phi) for s in (1, 2))
     tyre.residual(U)
-    found = tyre.product(phi)
+    product = tyre.product(phi)
     wanted = (8 * one - two) / (12 * e)
-    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-7 * abs(found).max())
+    np.testing.assert_allclose(product, wanted, rtol=0, atol=1e-7 * abs(product).max())
 
 
 def test_product_is_symmetric(inflated: Inflated, random: np.random.Generator) -> None:
@@ -221,8 +221,8 @@ def test_tangents_of_the_stations_give_the_product(
             for station in range(s):
                 np.add.at(nodal[station], c, force[station].reshape(e, -1, 3))
             total += np.einsum("sk,s,snj->knj", operator, around.weights, nodal)
-    found = tyre.product(phi)
-    np.testing.assert_allclose(total, found, atol=1e-12 * abs(found).max())
+    product = tyre.product(phi)
+    np.testing.assert_allclose(total, product, atol=1e-12 * abs(product).max())
 
 
 def test_axisymmetric_state_is_the_sections(inflated: Inflated) -> None:
@@ -293,8 +293,8 @@ def test_harmonics_are_the_limit_of_many_elements(inflated: Inflated, n: int) ->
         tyre = Revolved(inflated.model, inflated.loads, around)
         tyre.residual(np.repeat(inflated.U[None], len(around.angles), 0))
         wave = np.exp(1j * n * around.angles)[:, None, None] * phi
-        found = sum((u * tyre.product(u)).sum() for u in (wave.real, wave.imag))
-        errors.append(found / wanted - 1)
+        energy = sum((u * tyre.product(u)).sum() for u in (wave.real, wave.imag))
+        errors.append(energy / wanted - 1)
     if n < 2:
         assert abs(np.array(errors)).max() < 1e-9
     else:

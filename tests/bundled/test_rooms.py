@@ -15,13 +15,13 @@ FLOOR = {room: i for i, rooms in enumerate(FLOORS) for room in rooms}
 
 def imports(path: Path) -> set[Path]:
     """The solver's files that a file imports."""
-    found = set()
+    paths = set()
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.ImportFrom) and node.level:
             folder = path.parents[node.level - 1].joinpath(*(node.module or "").split("."))
             modules = [folder / name.name for name in node.names] if folder.is_dir() else [folder]
-            found |= {m.with_suffix(".py") for m in modules if m.with_suffix(".py").exists()}
-    return {path for path in found if path.is_relative_to(TOP)}  # not what all solvers share
+            paths |= {m.with_suffix(".py") for m in modules if m.with_suffix(".py").exists()}
+    return {path for path in paths if path.is_relative_to(TOP)}  # not what all solvers share
 
 
 def room(path: Path) -> str:

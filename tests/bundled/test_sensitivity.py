@@ -82,13 +82,13 @@ def solve(text: str, pressure: float = PRESSURE) -> Modes:
     mask, loads = support.held(m, TYRE.rim), support.cavity(m, pressure)
     U = support.inflate(m, mask, loads)
     vibration = harmonics.Vibration(m, U, loads, support.numbering(m, mask), 0.0)
-    found = [vibration.modes(n, COUNT) for n in HARMONICS]
+    modes = [vibration.modes(n, COUNT) for n in HARMONICS]
     return Modes(
         U,
         vibration,
         np.repeat(HARMONICS, COUNT),
-        np.concatenate([f.shapes for f in found]),
-        np.concatenate([f.eigenvalues for f in found]),
+        np.concatenate([f.shapes for f in modes]),
+        np.concatenate([f.eigenvalues for f in modes]),
     )
 
 
@@ -206,9 +206,9 @@ def test_four_node_elements() -> None:
         mask, loads = support.held(m, tyre.rim), support.cavity(m, PRESSURE)
         U = support.inflate(m, mask, loads)
         vibration = harmonics.Vibration(m, U, loads, support.numbering(m, mask), 0.0)
-        found = [vibration.modes(n, 8) for n in (0, 2)]
-        shapes = np.concatenate([f.shapes for f in found])
-        values = np.concatenate([f.eigenvalues for f in found])
+        modes = [vibration.modes(n, 8) for n in (0, 2)]
+        shapes = np.concatenate([f.shapes for f in modes])
+        values = np.concatenate([f.eigenvalues for f in modes])
         return Modes(U, vibration, np.repeat((0, 2), 8), shapes, values), vibration
 
     base, vibration = solved(tyre.deck)

@@ -129,8 +129,8 @@ def test_no_share_is_the_plain_tyre(vibration: Vibration, inflated: Inflated) ->
 
 
 def test_the_iteration_finds_the_lowest_and_looks_at_the_time() -> None:
-    """Of a diagonal problem, K over M known; the first fields' shares in the modes are theirs; time
-    is looked at for every field."""
+    """A diagonal problem, K over M known; the first fields' shares in the modes are theirs; the
+    time is checked for every field."""
     k, m = np.arange(1.0, 41.0).reshape(4, 5, 2) ** 2, np.linspace(1, 2, 40).reshape(4, 5, 2)
     fields: Any = SimpleNamespace(
         inertia=lambda f: m * f, forces=lambda f: k * f, response=lambda f: f / k

@@ -23,7 +23,7 @@ STIFFER = {name: 1.2 * value for name, value in START.items()}
 
 
 def answer(folder: Path, values: dict[str, float], start: np.ndarray | None = None) -> dict:
-    """What the solver says of a design from a start; its factorisations among it."""
+    """Results of the solver for a design from a start, its factorisations among them."""
     folder.mkdir()
     solver = Bundled()
     solver.write(Decks(TyreDesign(CASE, values), ("C10",), start=start), folder)
@@ -31,8 +31,8 @@ def answer(folder: Path, values: dict[str, float], start: np.ndarray | None = No
     return solver.read(folder)
 
 
-def shape(found: dict) -> np.ndarray:
-    return np.column_stack([found["nodes"], found["displacement"]])
+def shape(result: dict) -> np.ndarray:
+    return np.column_stack([result["nodes"], result["displacement"]])
 
 
 @pytest.fixture(scope="module")
@@ -41,16 +41,16 @@ def nominal(tmp_path_factory: pytest.TempPathFactory) -> np.ndarray:
 
 
 def factorisations(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Of each inflation from now on."""
+    """Counts of factorisations, one for each inflation from now on."""
     from tyrecal_solvers.bundled import job
 
     counted: list[int] = []
     whole = job.equilibrium
 
     def counting(*arguments):
-        found = whole(*arguments)
-        counted.append(found[1])
-        return found
+        result = whole(*arguments)
+        counted.append(result[1])
+        return result
 
     monkeypatch.setattr(job, "equilibrium", counting)
     return counted
@@ -86,7 +86,8 @@ def test_nodes_may_come_in_any_order(tmp_path: Path, nominal: np.ndarray) -> Non
 def test_a_shape_that_does_not_help_does_no_harm(
     kind: str, tmp_path: Path, nominal: np.ndarray
 ) -> None:
-    """Of another mesh it is left aside, and where nothing comes of it the tyre starts at rest."""
+    """A start of another mesh is ignored, and a start that leads nowhere is replaced by the tyre at
+    rest."""
     start = nominal.copy()
     if kind == "fewer nodes":
         start = start[:-1]

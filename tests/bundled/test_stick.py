@@ -1,4 +1,4 @@
-"""What holds the patch to the road while the tyre vibrates, and where it goes with the load."""
+"""Hold of the road on the patch while the tyre vibrates, and its limits as the load changes."""
 
 from __future__ import annotations
 

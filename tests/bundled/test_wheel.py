@@ -98,9 +98,9 @@ def test_on_a_soft_spring_tyre_and_wheel_move_as_one(motion: str) -> None:
     }
     own["radial"] = own["axial"]
     k = STEEL[motion] + own[motion]  # omega = 1 rad/s
-    found = tyre.vibration(tyre.wheel((motion,), **{motion: k}), shift=-1e2).modes(n, 1)
-    assert found.eigenvalues[0] == pytest.approx(1.0, rel=1e-4)
-    assert abs(found.rim[0, 0]) ** 2 / (2 * np.pi if n == 0 else np.pi) == pytest.approx(
+    modes = tyre.vibration(tyre.wheel((motion,), **{motion: k}), shift=-1e2).modes(n, 1)
+    assert modes.eigenvalues[0] == pytest.approx(1.0, rel=1e-4)
+    assert abs(modes.rim[0, 0]) ** 2 / (2 * np.pi if n == 0 else np.pi) == pytest.approx(
         1 / (STEEL[motion] + own[motion]), rel=1e-4
     )
 
@@ -132,7 +132,7 @@ def test_two_masses_in_closed_form(motion: str) -> None:
     spin   u = a J1 + b Y1, (u/r)'(B) = 0, 2 pi A^3 L G (u/r)'(A) = (k - omega^2 I) u(A) / A."""
     order = {"axial": 0, "spin": 1}[motion]
     k, inertia = {"axial": (4e5, 2.0), "spin": (2e4, 0.1)}[motion]
-    found = tube(motion, k, inertia)
+    frequencies = tube(motion, k, inertia)
 
     def strain(kappa: float, r: float) -> tuple[float, float]:
         """u' or r (u/r)' of J and of Y."""
@@ -149,11 +149,11 @@ def test_two_masses_in_closed_form(motion: str) -> None:
         hold = (k - omega2 * inertia) / (A if order else 1.0)
         return a * (face * d - hold * u[1]) - b * (face * c - hold * u[0])
 
-    for value in found:
+    for value in frequencies:
         exact = brentq(lack, 0.98 * value, 1.02 * value, xtol=1e-9 * value)
         assert value == pytest.approx(exact, rel=2e-5)
     held = tube(motion, 1e15, inertia)
-    assert found[0] < held[0]
+    assert frequencies[0] < held[0]
 
 
 def test_reference_point_matters_only_to_the_springs() -> None:
