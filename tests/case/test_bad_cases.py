@@ -21,9 +21,9 @@ def test_wrong_case(name: str, tmp_path: Path) -> None:
     before = {file: file.read_bytes() for file in tmp_path.iterdir()}
     mistakes = validate(path)
     assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before
-    told = "\n".join(map(str, mistakes))
-    assert any(m.key == BAD[name].key and BAD[name].words in m.message for m in mistakes), told
+    listing = "\n".join(map(str, mistakes))
+    assert any(m.key == BAD[name].key and BAD[name].words in m.message for m in mistakes), listing
     for mistake in mistakes:
         assert str(mistake).isprintable() and len(mistake.message) < 400
-        found = path.is_file()  # else no line is to blame
-        assert mistake.line >= found and mistake.file.startswith(str(tmp_path))
+        exists = path.is_file()  # else no line is to blame
+        assert mistake.line >= exists and mistake.file.startswith(str(tmp_path))

@@ -73,7 +73,7 @@ def test_angular_cords_templates_and_linear_variables(tmp_path: Path) -> None:
 
 
 def test_one_wrong_key_of_a_part_hides_no_other(tmp_path: Path) -> None:
-    """What must agree between the keys of a part is judged where another of its keys is wrong."""
+    """Keys of a part that must agree are checked even where another of its keys is wrong."""
     path = put(
         tmp_path,
         ("stations: p235_75r17.csv", "stations: p235_75r17.csv\n  outline: {file: 7}"),

@@ -198,8 +198,8 @@ def test_what_stands_on_the_command_line_is_judged_too(
     arguments: list[str], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    asked = [*arguments, str(CASES / "p235_75r17.yaml")]
-    done = CliRunner().invoke(cli, asked, standalone_mode=False)
+    command = [*arguments, str(CASES / "p235_75r17.yaml")]
+    done = CliRunner().invoke(cli, command, standalone_mode=False)
     assert words in str(done.exception) and "--allow-unusual" in str(done.exception)
     assert not list(tmp_path.iterdir())  # before anything is made
 
@@ -222,8 +222,8 @@ def test_init_judges_its_numbers(
 
 def test_init_writes_an_unusual_case_where_it_is_allowed(tmp_path: Path) -> None:
     path = tmp_path / "a.yaml"
-    asked = ["init", "225/40R18", "--pressure-kPa", "40", "--output", str(path), "--no-pictures"]
-    assert CliRunner().invoke(cli, [*asked, "--allow-unusual"]).exit_code == 0
+    command = ["init", "225/40R18", "--pressure-kPa", "40", "--output", str(path), "--no-pictures"]
+    assert CliRunner().invoke(cli, [*command, "--allow-unusual"]).exit_code == 0
     assert [mistake.key for mistake in validate(path)] == ["pressure_kPa"]
 
 
@@ -243,8 +243,8 @@ SIZES = [
 @pytest.mark.parametrize("size", SIZES)
 def test_cases_of_any_size_are_usual(size: str, tmp_path: Path) -> None:
     path = tmp_path / "a.yaml"
-    asked = ["init", size, "--output", str(path), "--no-pictures"]
-    assert CliRunner().invoke(cli, asked).exit_code == 0
+    command = ["init", size, "--output", str(path), "--no-pictures"]
+    assert CliRunner().invoke(cli, command).exit_code == 0
     assert validate(path) == []
 
 
@@ -265,11 +265,11 @@ def test_every_range_is_of_a_number_that_a_case_can_have() -> None:
         data = with_defaults(loaded.file_data)
         for pattern in USUAL:
             words = pattern.split(".")
-            found = [((), data)]
+            entries = [((), data)]
             for word in words:
-                found = [
+                entries = [
                     ((*keys, key), value)
-                    for keys, part in found
+                    for keys, part in entries
                     for key, value in (
                         part.items()
                         if isinstance(part, dict)
@@ -279,7 +279,7 @@ def test_every_range_is_of_a_number_that_a_case_can_have() -> None:
                     )
                     if word in ("*", key)
                 ]
-            for keys, value in found:
+            for keys, value in entries:
                 reached.add(pattern)
                 if isinstance(value, float | int):
                     assert USUAL[pattern].holds(value), (keys, value)
@@ -326,10 +326,10 @@ def test_what_no_computer_holds_is_never_allowed(
     ["materials.rubber.density_kg_per_m3=1.1", "pressure_kPa=24", "effects.rim_width=0.02"],
 )
 def test_an_unusual_tyre_is_computed_where_it_is_allowed(setting: str, tmp_path: Path) -> None:
-    asked = ["modes", str(CASES / "p235_75r17.yaml"), "--mesh", "coarse", "--no-store", "--json"]
-    asked += ["--set", setting, "--output", str(tmp_path)]
-    assert CliRunner().invoke(cli, asked).exit_code == 2
-    done = CliRunner().invoke(cli, [*asked, "--allow-unusual"], standalone_mode=False)
+    command = ["modes", str(CASES / "p235_75r17.yaml"), "--mesh", "coarse", "--no-store", "--json"]
+    command += ["--set", setting, "--output", str(tmp_path)]
+    assert CliRunner().invoke(cli, command).exit_code == 2
+    done = CliRunner().invoke(cli, [*command, "--allow-unusual"], standalone_mode=False)
     assert done.exit_code == 0 and done.return_value == 0, done.output
     assert (tmp_path / "modes.json").exists()
 

@@ -226,7 +226,8 @@ def test_an_effect_that_varies(tmp_path: Path) -> None:
 
 
 def test_a_section_from_an_outline(tmp_path: Path) -> None:
-    """What its curves and numbers say counts, not what is drawn from them while one varies."""
+    """The contents of its curves and numbers count, not the points drawn from them while a number
+    varies."""
 
     def outlined(data: dict[str, Any]) -> None:
         data["section"] = {
