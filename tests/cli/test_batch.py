@@ -54,17 +54,17 @@ def done(cases: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """All studies but the footprint, and a baseline."""
     out = tmp_path_factory.mktemp("done")
     baseline = ["--baseline", str(out / "baseline.json"), "--write-baseline"]
-    asked = ["--studies", "sweep-pressure,fit,modes", "--junit", str(out / "junit.xml"), *SWEEP]
-    assert batched(cases, out, *asked, *baseline) == 5
+    options = ["--studies", "sweep-pressure,fit,modes", "--junit", str(out / "junit.xml"), *SWEEP]
+    assert batched(cases, out, *options, *baseline) == 5
     return out
 
 
 @pytest.mark.slow
 def test_a_poisoned_case_costs_itself_only(done: Path) -> None:
-    found = result(done)
-    assert found["counts"] == {"cases": 3, "error": 1, "failed": 0, "drifted": 0, "good": 2}
-    assert found["studies"] == ["fit", "modes", "sweep-pressure"]
-    bad = found["cases"][1]
+    report = result(done)
+    assert report["counts"] == {"cases": 3, "error": 1, "failed": 0, "drifted": 0, "good": 2}
+    assert report["studies"] == ["fit", "modes", "sweep-pressure"]
+    bad = report["cases"][1]
     assert bad["name"] == "tyre_01" and bad["verdict"] == "error"
     assert bad["studies"]["fit"]["cause"] == "unstable"
     assert "not positive definite" in bad["studies"]["fit"]["words"]
@@ -97,16 +97,16 @@ def test_each_case_has_the_results_of_the_commands(
 def test_a_batch_samples_as_the_command_does(tmp_path: Path) -> None:
     (case,) = vary(tmp_path / "cases", 1)
     out, own = tmp_path / "out", tmp_path / "own"
-    told = {0: 0, 5: 4}  # good, or in doubt: a box that could not grow
+    expected = {0: 0, 5: 4}  # good, or in doubt: a box that could not grow
     status = batched([case], out, "--studies", "sample")
     options = ["--output", str(own), "--no-pictures", "--quiet", "--store", str(out / "record")]
-    assert run("sample", str(case), *options) == told[status]
+    assert run("sample", str(case), *options) == expected[status]
     for file in ("sample.json", "sample.csv", "sample_draws.csv"):
         assert (out / case.stem / file).read_bytes() == (own / file).read_bytes(), file
     numbers = result(out)["cases"][0]["studies"]["sample"]["quantities"]
-    found = json.loads((own / "sample.json").read_text())
-    assert numbers["median C10"] == found["variables"]["C10"]["median"]
-    (row,) = [r for r in found["predicted"] if r["c"] == 4 and r["m"] and r["pressure_kPa"] == 240]
+    sample = json.loads((own / "sample.json").read_text())
+    assert numbers["median C10"] == sample["variables"]["C10"]["median"]
+    (row,) = [r for r in sample["predicted"] if r["c"] == 4 and r["m"] and r["pressure_kPa"] == 240]
     assert numbers["predicted_Hz 240 kPa [4,1]"] == row["frequency_Hz"]
 
 
@@ -179,14 +179,14 @@ def test_the_numbers_are_those_of_the_files(done: Path) -> None:
 def test_again_it_is_answered_and_says_the_same_with_other_jobs(
     done: Path, cases: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    asked = ["--studies", "fit,modes,sweep-pressure", *SWEEP]
+    options = ["--studies", "fit,modes,sweep-pressure", *SWEEP]
     before = (done / "batch.json").read_bytes()
-    assert batched(list(reversed(cases)), done, *asked) == 5
+    assert batched(list(reversed(cases)), done, *options) == 5
     assert (done / "batch.json").read_bytes() == before
     assert all(facts(done, f"tyre_0{i}")["answered"] for i in range(3))
     capsys.readouterr()
     elsewhere = ["--store", str(done / "record"), "--jobs", "2"]
-    assert batched(cases, tmp_path, *asked, *elsewhere, "--json", "--quiet") == 5
+    assert batched(cases, tmp_path, *options, *elsewhere, "--json", "--quiet") == 5
     assert (tmp_path / "batch.json").read_bytes() == before
     assert facts(tmp_path, "tyre_00")["solver_runs"] == 0
     assert facts(tmp_path, "tyre_00")["answered_from_record"] > 0
@@ -200,8 +200,8 @@ def test_what_changed_is_studied_again(tmp_path: Path) -> None:
     modes = ["--studies", "modes", "--quiet"]
     assert batched([case], out, *modes) == 0
     assert batched([case], out, *modes, "--mesh", "coarse") == 0  # the same by another name
-    told = facts(out, "tyre_00")
-    assert (told["solver_runs"], told["answered_from_record"]) == (0, 1)
+    run_facts = facts(out, "tyre_00")
+    assert (run_facts["solver_runs"], run_facts["answered_from_record"]) == (0, 1)
     case.write_text(case.read_text().replace("pressure_kPa: 240.0", "pressure_kPa: 210.0"))
     assert batched([case], out, *modes) == 0
     assert facts(out, "tyre_00")["solver_runs"] == 1
@@ -230,8 +230,8 @@ def test_a_fit_that_converged_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         assert contents(out / "tyre_00") == good
         ran = json.loads((out / "tyre_00/run.json").read_text())["fit"]
         assert ran["results"] == "not_converged" and ran["finished"]
-        told = json.loads((out / "tyre_00/not_converged/fit.json").read_text())
-        assert told["moved"] is False
+        entry = json.loads((out / "tyre_00/not_converged/fit.json").read_text())
+        assert entry["moved"] is False
         assert ("answered" in facts(out, "tyre_00")) == answered
     (out / "tyre_00/finished.json").unlink()
     assert batched([case], out, *fit) == 0
@@ -256,9 +256,9 @@ def test_drift_is_said_and_ends_in_5(
     capsys.readouterr()
     junit = ["--junit", str(tmp_path / "ci/junit.xml")]
     assert batched(good, tmp_path / "a", *modes, *junit) == 5
-    said = capsys.readouterr().out
-    assert "[2,0]" in said and "-0.99 %" in said and "0.001 %" in said
-    assert "not in this batch: gone" in said and "1 drifted, 1 good" in said
+    output = capsys.readouterr().out
+    assert "[2,0]" in output and "-0.99 %" in output and "0.001 %" in output
+    assert "not in this batch: gone" in output and "1 drifted, 1 good" in output
     (drifted,) = result(tmp_path / "a")["baseline"]["drifted"]
     assert drifted["case"] == "tyre_02" and drifted["baseline"] == numbers["frequency_Hz [2,0]"]
     assert 'type="drift"' in (tmp_path / "ci/junit.xml").read_text()
@@ -353,8 +353,8 @@ def test_wrong_cases_are_errors_of_theirs(tmp_path: Path) -> None:
     first, second, third = vary(tmp_path / "c", 3)
     first.write_text(first.read_text().replace("format: 1", "format: 9"))
     second.write_text(second.read_text().replace("name: bundled", "name: none"))
-    asked = ["--studies", "modes", "--quiet", "--mesh", "fine"]
-    assert batched([first, second, third], tmp_path / "out", *asked) == 5
+    options = ["--studies", "modes", "--quiet", "--mesh", "fine"]
+    assert batched([first, second, third], tmp_path / "out", *options) == 5
     entries = [case["studies"]["modes"] for case in result(tmp_path / "out")["cases"]]
     assert {each["cause"] for each in entries} == {"input"}
     assert "tyre_00.yaml, line 3" in entries[0]["words"]

@@ -65,8 +65,8 @@ def test_a_study_from_end_to_end(
     only = lambda case, evaluator, ids=None: spans_of(case, evaluator, ["spindle_lateral"])
     monkeypatch.setattr("tyrecal.studies.blind.answer.spans_of", only)  # the ruler's, too
     assert run("blind", "power", str(coarse), "--noise-percent", "0.5") == 0
-    said = capsys.readouterr().out
-    assert "every value to 0.5%" in said and "| `spindle_lateral` |" in said
+    output = capsys.readouterr().out
+    assert "every value to 0.5%" in output and "| `spindle_lateral` |" in output
     out = tmp_path / "t"
     make = [
         "make",

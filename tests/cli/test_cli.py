@@ -132,8 +132,8 @@ def test_a_deck_that_the_solver_refuses(tmp_path: Path, capsys: pytest.CaptureFi
     ):
         out = tmp_path / "out"
         assert run("deck", case, "--solver", "calculix", "--output", str(out), *more) == 2
-        *_, told = capsys.readouterr().err.splitlines()
-        assert told.startswith("error: ") and why in told
+        *_, message = capsys.readouterr().err.splitlines()
+        assert message.startswith("error: ") and why in message
         assert not out.exists()
 
 
@@ -260,11 +260,11 @@ def test_a_number_that_a_variable_sets_is_said_not_to_count(
 
 
 def test_results_go_on_where_their_project_was_moved(case_folder: Path, tmp_path: Path) -> None:
-    asked = ["--mesh", "coarse", "--quiet", "--output"]
+    options = ["--mesh", "coarse", "--quiet", "--output"]
     out = case_folder / "out"
-    assert run("modes", str(case_folder / "p235_75r17.yaml"), *asked, str(out)) == 0
+    assert run("modes", str(case_folder / "p235_75r17.yaml"), *options, str(out)) == 0
     moved = case_folder.rename(tmp_path / "moved")
-    assert run("modes", str(moved / "p235_75r17.yaml"), *asked, str(moved / "out")) == 0
+    assert run("modes", str(moved / "p235_75r17.yaml"), *options, str(moved / "out")) == 0
     facts = json.loads((moved / "out" / "run.json").read_text())["modes"]
     assert facts["case"] == "../p235_75r17.yaml" and facts["solver_runs"] == 0
 

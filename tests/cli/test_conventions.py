@@ -1,4 +1,4 @@
-"""What every command has in common: help with examples, options, exit codes, Ctrl-C, colours."""
+"""Conventions of every command: help with examples, options, exit codes, Ctrl-C, colours."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ TYRECAL = [sys.executable, "-m", "tyrecal"]
 def commands() -> dict[str, click.Command]:
     """Every command by what is typed, those of groups too."""
     context = click.Context(cli)
-    found: dict[str, click.Command] = {}
+    by_name: dict[str, click.Command] = {}
     for name in COMMANDS:
         command = cli.get_command(context, name)
         assert command is not None
         if isinstance(command, click.Group):
-            found |= {f"{name} {sub}": each for sub, each in command.commands.items()}
+            by_name |= {f"{name} {sub}": each for sub, each in command.commands.items()}
         else:
-            found[name] = command
-    return found
+            by_name[name] = command
+    return by_name
 
 
 @pytest.mark.parametrize("name", commands())
@@ -116,12 +116,12 @@ def test_exit_codes(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("asked", [[], ["--json"]])
-def test_a_reader_that_leaves_early_costs_no_result(asked: list[str], tmp_path: Path) -> None:
+@pytest.mark.parametrize("options", [[], ["--json"]])
+def test_a_reader_that_leaves_early_costs_no_result(options: list[str], tmp_path: Path) -> None:
     """As with `tyrecal fit CASE | head -3`: pictures are drawn, the run finishes all the same."""
     reader, writer = os.pipe()
     os.close(reader)
-    fit = ["fit", CASE, *COARSE, "--output", str(tmp_path), *asked]
+    fit = ["fit", CASE, *COARSE, "--output", str(tmp_path), *options]
     done = subprocess.run([*TYRECAL, *fit], stdout=writer, stderr=subprocess.PIPE, text=True)
     os.close(writer)
     assert done.returncode == 0 and "Error" not in done.stderr, done.stderr
@@ -133,8 +133,8 @@ def test_exit_codes_are_told_alike() -> None:
     (line,) = re.findall(
         r"Exit codes, for scripts: (.*?\.)", (ROOT / "README.md").read_text(), re.S
     )
-    told = [int(code) for code in re.findall(r"(?:^|; ?)\s*(\d+) ", " ".join(line.split()))]
-    assert told == list(EXIT_CODES)
+    codes = [int(code) for code in re.findall(r"(?:^|; ?)\s*(\d+) ", " ".join(line.split()))]
+    assert codes == list(EXIT_CODES)
 
 
 @pytest.mark.slow
@@ -188,7 +188,7 @@ def test_ctrl_c_without_a_record_says_so(
 
 
 def on_a_terminal(*arguments: str, **environment: str) -> str:
-    """What a command writes to standard error on a terminal."""
+    """Output of a command to standard error on a terminal."""
     ours, theirs = pty.openpty()
     plain = {k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "FORCE_COLOR")}
     process = subprocess.Popen(
@@ -198,24 +198,24 @@ def on_a_terminal(*arguments: str, **environment: str) -> str:
         env={**plain, "TERM": "xterm-256color", "COLUMNS": "100", **environment},
     )
     os.close(theirs)
-    said = b""
+    output = b""
     try:
         while piece := os.read(ours, 65536):
-            said += piece
+            output += piece
     except OSError:  # the other end is closed
         pass
     process.wait()
     os.close(ours)
-    return said.decode()
+    return output.decode()
 
 
 @pytest.mark.slow
 def test_progress_is_on_terminals_only(tmp_path: Path) -> None:
     command = ["sweep-pressure", CASE, *COARSE, "--steps", "3", "--no-pictures", "--output"]
-    said = on_a_terminal(*command, str(tmp_path / "a"))
-    assert "3/3" in said and "\x1b[" in said
-    shown = re.findall(r"(\d)/3 (.*?)\s*\r", re.sub(r"\x1b\[[\d;?]*[A-Za-z]", "", said))
-    assert shown and "left" in said
+    output = on_a_terminal(*command, str(tmp_path / "a"))
+    assert "3/3" in output and "\x1b[" in output
+    shown = re.findall(r"(\d)/3 (.*?)\s*\r", re.sub(r"\x1b\[[\d;?]*[A-Za-z]", "", output))
+    assert shown and "left" in output
     for done, clock in shown:  # nothing is left before something is done, nor after all is
         left = ", 0:\\d\\d left" if done in "12" else ""
         assert re.fullmatch(rf"0:\d\d elapsed{left}", clock), clock
@@ -228,7 +228,7 @@ def test_progress_is_on_terminals_only(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_loads_show_on_the_bar(tmp_path: Path) -> None:
-    said = on_a_terminal(
+    output = on_a_terminal(
         "footprint",
         CASE,
         "--mesh",
@@ -239,7 +239,7 @@ def test_loads_show_on_the_bar(tmp_path: Path) -> None:
         str(tmp_path),
         "--no-pictures",
     )
-    assert "footprint, load 2 of 2" in said and "1/1" in said
+    assert "footprint, load 2 of 2" in output and "1/1" in output
 
 
 @pytest.mark.parametrize(
@@ -247,8 +247,8 @@ def test_loads_show_on_the_bar(tmp_path: Path) -> None:
     [pytest.param({}, True, marks=pytest.mark.slow), ({"NO_COLOR": "1"}, False)],
 )
 def test_colours(environment: dict[str, str], red: bool) -> None:
-    said = on_a_terminal("validate", "none.yaml", **environment)
-    assert "error: " in said and ("\x1b[31m" in said) == red
+    output = on_a_terminal("validate", "none.yaml", **environment)
+    assert "error: " in output and ("\x1b[31m" in output) == red
 
 
 @pytest.mark.parametrize(

@@ -60,11 +60,11 @@ def test_a_diagnosis_in_files_and_again_from_the_record(
     command = ["diagnose", str(coarse), "--measured", str(file), *EFFECTS, "--output", str(out)]
     assert run(*command, "--json") == 0
     printed = capsys.readouterr()
-    told = json.loads(printed.out)
-    assert told == json.loads((out / "diagnosis.json").read_text())
-    assert told["verdict"] == "named" and told["effect"] == "bead_filler"
-    assert told["parameter"]["low"] < 2.0 < told["parameter"]["high"]
-    assert "cannot show a cause" in printed.err or told["rung"] == 4
+    diagnosis = json.loads(printed.out)
+    assert diagnosis == json.loads((out / "diagnosis.json").read_text())
+    assert diagnosis["verdict"] == "named" and diagnosis["effect"] == "bead_filler"
+    assert diagnosis["parameter"]["low"] < 2.0 < diagnosis["parameter"]["high"]
+    assert "cannot show a cause" in printed.err or diagnosis["rung"] == 4
     for name in PICTURES:
         assert (out / f"diagnosis_{name}.png").stat().st_size > 3000
     before = {name: (out / name).read_bytes() for name in FILES}
@@ -86,10 +86,10 @@ def test_frequencies_without_labels_are_evidence(
     file.write_text("\n".join(bare) + "\n")
     given = ["--measured", str(file), *EFFECTS[:2], "--no-pictures", "--output", str(out)]
     assert run("diagnose", str(coarse), *given, "--json") == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["verdict"] == "named" and told["effect"] == "bead_filler"
-    assert told["parameter"]["low"] < 2.0 < told["parameter"]["high"]
-    labels = [each for each in told["labels"]["frequencies"] if each["probability"] > 0.9]
+    diagnosis = json.loads(capsys.readouterr().out)
+    assert diagnosis["verdict"] == "named" and diagnosis["effect"] == "bead_filler"
+    assert diagnosis["parameter"]["low"] < 2.0 < diagnosis["parameter"]["high"]
+    labels = [each for each in diagnosis["labels"]["frequencies"] if each["probability"] > 0.9]
     assert [(each["c"], each["m"]) for each in labels] == [(2, 1), (3, 1)]
     assert "## Which labels?" in (out / "diagnosis.md").read_text()
 
@@ -114,12 +114,12 @@ def test_what_was_measured_under_load_is_compared(
             lines.write(f"contact_area_m2{at}{area:.8f},{0.01 * area:.8f}\n")
     command = ["diagnose", str(coarse), "--measured", str(file), *EFFECTS, "--output", str(out)]
     assert run(*command, "--no-pictures", "--report") == 0
-    told = json.loads((out / "diagnosis.json").read_text())
-    road = told["under_load"]
-    assert told["effect"] == road["effect"] == "bead_filler" and not told["left_out"]
+    diagnosis = json.loads((out / "diagnosis.json").read_text())
+    road = diagnosis["under_load"]
+    assert diagnosis["effect"] == road["effect"] == "bead_filler" and not diagnosis["left_out"]
     assert [row["load_N"] for row in road["rows"]] == [200, 200, 500, 500] and not road["failed"]
     assert road["effect_rms_percent"] < 0.3 * road["calibrated_rms_percent"]
-    assert set(told["gap"]["by_load"]) == {"200", "500"}
+    assert set(diagnosis["gap"]["by_load"]) == {"200", "500"}
     words = (out / "diagnosis.md").read_text()
     assert "Under load nothing was fitted" in words
     off = road["rows"][1]["calibrated_percent"]

@@ -17,12 +17,12 @@ def test_a_sound_installation(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert run("doctor", "--json") == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["ok"] and found["self_check"]["ok"] and found["self_check"]["seconds"] < 60
-    assert {p["name"] for p in found["packages"]} >= {"numpy", "scipy", "click"}
-    assert {s["name"] for s in found["solvers"]} >= {"abaqus", "bundled", "calculix"}
-    assert found["machine"]["cores"] >= 1 and found["machine"]["memory_GB"] > 0.1
-    assert found["records"] == []
+    report = json.loads(capsys.readouterr().out)
+    assert report["ok"] and report["self_check"]["ok"] and report["self_check"]["seconds"] < 60
+    assert {p["name"] for p in report["packages"]} >= {"numpy", "scipy", "click"}
+    assert {s["name"] for s in report["solvers"]} >= {"abaqus", "bundled", "calculix"}
+    assert report["machine"]["cores"] >= 1 and report["machine"]["memory_GB"] > 0.1
+    assert report["records"] == []
     assert run("doctor") == 0
     assert "as recorded, within 0.1 %" in capsys.readouterr().out
 

@@ -139,10 +139,10 @@ def test_a_failing_effect_costs_no_other(
 
 def test_re_fit_finds_the_variable_that_an_effect_is_and_leaves_what_is_across() -> None:
     plain = Plain(LOADED, Evaluator(TyreDesign(LOADED)), START, (160.0, 240.0))
-    found = plain.signature("temperature", 1.0)
-    assert found.absorbed == pytest.approx(1, abs=1e-4)
-    assert found.refitted["C10"] == pytest.approx(0.9925 * START["C10"], rel=1e-3)
-    assert found.refitted["A_belt"] == pytest.approx(START["A_belt"], rel=1e-3)
+    signature = plain.signature("temperature", 1.0)
+    assert signature.absorbed == pytest.approx(1, abs=1e-4)
+    assert signature.refitted["C10"] == pytest.approx(0.9925 * START["C10"], rel=1e-3)
+    assert signature.refitted["A_belt"] == pytest.approx(START["A_belt"], rel=1e-3)
     rest = np.log1p(plain.signature("cap_ply", 1e6).after / 100) * plain.weights
     across = np.einsum("pm,pmv->v", rest, plain.jacobian * plain.weights[:, :, None])
     assert across == pytest.approx(0, abs=1e-10)

@@ -33,7 +33,7 @@ def names(study: str) -> set[str]:
 
 
 def earlier(folder: Path, *studies: str) -> None:
-    """What runs of ``studies`` left."""
+    """Write the result files that runs of ``studies`` would have left."""
     folder.mkdir()
     for study in studies:
         for name in names(study):

@@ -111,8 +111,10 @@ def test_a_solver_without_a_road(
 ) -> None:
     out = tmp_path / "out"
     assert run("fit", case, "--output", str(out), "--solver", solver) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1 and f"solver '{solver}' cannot press a tyre on a road" in said
+    message = capsys.readouterr().err
+    assert (
+        message.count("\n") == 1 and f"solver '{solver}' cannot press a tyre on a road" in message
+    )
     assert not out.exists()
 
 
@@ -125,8 +127,8 @@ def test_too_few_targets(
     path.write_text(f"{text[:begin]}{text[end:]}")
     arguments = ["fit", case, "--output", str(tmp_path / "out"), "--no-pictures"]
     assert run(*arguments) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1 and "2 targets cannot determine 3 free variables" in said
+    message = capsys.readouterr().err
+    assert message.count("\n") == 1 and "2 targets cannot determine 3 free variables" in message
     assert run(*arguments, "--fix", "A_belt", "--quiet") == 0
 
 

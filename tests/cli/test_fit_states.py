@@ -56,13 +56,13 @@ def test_a_case_holds_targets_in_several_states(case: Path, tmp_path: Path) -> N
     """Fitted, reported; what each state was stands in the results."""
     given = [str(case), "--mesh", "coarse", "--no-pictures", "--report", "--output", str(tmp_path)]
     assert run("fit", *given) == 0
-    found = json.loads((tmp_path / "fit.json").read_text())
+    fit = json.loads((tmp_path / "fit.json").read_text())
     for name, truth in TRUTH.items():
-        assert found["variables"][name]["value"] == pytest.approx(truth, rel=0.02)
-    assert [m["rim"] for m in found["modes"]] == ["fixed"] * 9 + ["free"] * 9
-    state = found["provenance"]["state"]
+        assert fit["variables"][name]["value"] == pytest.approx(truth, rel=0.02)
+    assert [m["rim"] for m in fit["modes"]] == ["fixed"] * 9 + ["free"] * 9
+    state = fit["provenance"]["state"]
     assert state == {"pressure_kPa": [160, 240], "load_N": 0, "rim": ["fixed", "free"]}
-    assert found["mass"]["fitted"] == pytest.approx(found["mass_kg"])
+    assert fit["mass"]["fitted"] == pytest.approx(fit["mass_kg"])
     page = (tmp_path / "report.html").read_text()
     assert "160 kPa" in page and "states side by side" in page
     shapes = json.loads((tmp_path / "fit_shapes.json").read_text())
@@ -108,10 +108,13 @@ def test_mistakes_are_told_with_their_line(
     )
     path = edited(tmp_path, lines)
     assert run("validate", str(path)) == 2
-    told = capsys.readouterr()
+    printed = capsys.readouterr()
     line = path.read_text().splitlines().index(lines.splitlines()[0]) + 1
-    assert f"{path}, line {line}" in told.out + told.err or f":{line}" in told.out + told.err
-    assert words in told.out + told.err
+    assert (
+        f"{path}, line {line}" in printed.out + printed.err
+        or f":{line}" in printed.out + printed.err
+    )
+    assert words in printed.out + printed.err
 
 
 def test_the_same_mode_twice_in_one_state_is_a_mistake(
@@ -122,8 +125,8 @@ def test_the_same_mode_twice_in_one_state_is_a_mistake(
     other = "    - {c: 3, m: 0, frequency_Hz: 99.5}\n"
     assert run("validate", str(edited(tmp_path, twice + once + other))) == 0
     assert run("validate", str(edited(tmp_path, twice + twice + other))) == 2
-    told = capsys.readouterr()
-    assert "the mode [2,0] is a target already in this state" in told.out + told.err
+    printed = capsys.readouterr()
+    assert "the mode [2,0] is a target already in this state" in printed.out + printed.err
 
 
 def test_a_fit_reports_exchanged_pressures_before_it_begins(

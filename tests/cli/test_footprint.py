@@ -36,14 +36,14 @@ def test_both_designs(
     fit = fit_of(REFERENCE["p235_75r17"][1], tmp_path / "fit.json")
     out = tmp_path / "out"
     assert run("footprint", CASE, "--output", str(out), *TWO, "--fitted", fit) == 0
-    found = result(out)
-    assert [(row["design"], row["load_N"]) for row in found["rows"]] == [
+    footprints = result(out)
+    assert [(row["design"], row["load_N"]) for row in footprints["rows"]] == [
         ("initial", 1000),
         ("initial", 4000),
         ("fitted", 1000),
         ("fitted", 4000),
     ]
-    assert set(found["rows"][0]) == {
+    assert set(footprints["rows"][0]) == {
         "design",
         "load_N",
         "deflection_m",
@@ -120,9 +120,9 @@ def test_a_load_out_of_reach_keeps_those_below(
         )
         == 3
     )
-    printed, found = capsys.readouterr(), result(tmp_path)
-    assert [row["load_N"] for row in found["rows"]] == [4000]
-    (failed,) = found["failed"]
+    printed, footprints = capsys.readouterr(), result(tmp_path)
+    assert [row["load_N"] for row in footprints["rows"]] == [4000]
+    (failed,) = footprints["failed"]
     assert (failed["load_N"], failed["cause"]) == (30000, "no_equilibrium")
     (kept,) = (tmp_path / "runs").iterdir()
     assert "error: initial, 30000 N: the rim is on the road" in printed.err
@@ -176,8 +176,8 @@ def test_more_than_the_tyre_can_bear(tmp_path: Path, capsys: pytest.CaptureFixtu
     loads = ["--loads-N", "2000,200000", "--no-pictures", "--allow-unusual"]
     assert run("footprint", str(case), "--output", str(out), *loads) == 3
     assert [row["load_N"] for row in result(out)["rows"]] == [2000]
-    said = capsys.readouterr().err
-    assert "error: initial, 200000 N: " in said and "mm down to the rim)" in said
+    message = capsys.readouterr().err
+    assert "error: initial, 200000 N: " in message and "mm down to the rim)" in message
 
 
 @pytest.mark.parametrize(
@@ -224,8 +224,10 @@ def test_solvers_without_a_road(
 ) -> None:
     out = tmp_path / "out"
     assert run("footprint", CASE, "--output", str(out), "--solver", solver) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1 and f"solver '{solver}' cannot press a tyre on a road" in said
+    message = capsys.readouterr().err
+    assert (
+        message.count("\n") == 1 and f"solver '{solver}' cannot press a tyre on a road" in message
+    )
     assert not out.exists()
 
 

@@ -36,7 +36,8 @@ def folder(finished: Path, tmp_path: Path) -> Path:
 
 @pytest.fixture
 def elsewhere(tmp_path: Path) -> Path:
-    """What must stay as it is: a file, and a folder with what we would delete in our own."""
+    """A place that must stay unchanged: a file, and a folder with names that tyrecal deletes in its
+    own folders."""
     place = tmp_path / "elsewhere"
     (place / "run-xyz").mkdir(parents=True)
     for name in ("victim", "run-xyz/file", "modes.json"):

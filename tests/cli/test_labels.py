@@ -29,10 +29,10 @@ FOREIGN_Hz = 24.0
 def modes() -> Modes:
     """The coarse mesh's at TRUTH, less some, and a frequency that is no mode, rising."""
     case = with_level(load_case(CASE), "coarse")
-    found = paired_labels(Evaluator(TyreDesign(case)).evaluate(Question(TRUTH)).modes)
+    paired = paired_labels(Evaluator(TyreDesign(case)).evaluate(Question(TRUTH)).modes)
     wanted = [*target_labels(case)]
     hertz: Modes = {None: FOREIGN_Hz}
-    for mode in sorted(found, key=lambda mode: mode.frequency_Hz):
+    for mode in sorted(paired, key=lambda mode: mode.frequency_Hz):
         if mode.label in wanted and mode.label not in MISSING:
             hertz[mode.label] = round(mode.frequency_Hz, 3)
     return hertz
@@ -55,15 +55,15 @@ def test_a_fit_to_frequencies_without_labels(
     more = ["--measured", str(unlabelled), "--no-pictures", "--report"]
     assert run("fit", *given, *more) == 0
     shown = capsys.readouterr().out
-    found = json.loads((tmp_path / "fit.json").read_text())
-    told = {
+    result = json.loads((tmp_path / "fit.json").read_text())
+    assigned = {
         each["frequency_Hz"]: each["c"] is not None and Label(each["c"], each["m"], each["kind"])
-        for each in found["labels"]["frequencies"]
+        for each in result["labels"]["frequencies"]
     }
-    assert told == {f: label or False for label, f in modes.items()}
-    assert len(found["modes"]) == len(modes) - 1
+    assert assigned == {f: label or False for label, f in modes.items()}
+    assert len(result["modes"]) == len(modes) - 1
     for name, truth in TRUTH.items():
-        assert found["variables"][name]["value"] == pytest.approx(truth, rel=1e-3)
+        assert result["variables"][name]["value"] == pytest.approx(truth, rel=1e-3)
     words = "Labels of frequencies that came without"
     assert words in shown and words in (tmp_path / "report.html").read_text()
 
@@ -81,7 +81,8 @@ def test_a_fit_to_frequencies_without_labels(
 def test_labels_are_asked_for_where_they_are_needed(
     unlabelled: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Of other commands and files, with those that find them; nothing is labelled twice."""
+    """Other commands and files that need labels are refused with the command that finds them;
+    nothing is labelled twice."""
     labelled = ["--measured", str(CASES / "p235_75r17_wheeler.csv"), "--output", str(tmp_path)]
     for more in (["--repeats", str(unlabelled)], ["--toggled", str(unlabelled), "spindle_tilt=0"]):
         assert run("diagnose", CASE, *labelled, *more) == 2

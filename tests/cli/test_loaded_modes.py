@@ -45,11 +45,11 @@ def test_one_load_the_record_and_a_load_out_of_reach(
     sweep = ["modes", case, "--output", str(out), "--sweep-load", "0,300,300000", "--allow-unusual"]
     support.bears(monkeypatch, 1000.0)
     assert run(*sweep) == 3
-    said = capsys.readouterr().err
-    assert "error: initial, 300000 N: " in said and "mm down to the rim)" in said
-    found = json.loads((out / "load_sweep.json").read_text())
-    assert [row["load_N"] for row in found["rows"]] == [0, 300]
-    assert found["failed"][0]["load_N"] == 300000
+    message = capsys.readouterr().err
+    assert "error: initial, 300000 N: " in message and "mm down to the rim)" in message
+    result = json.loads((out / "load_sweep.json").read_text())
+    assert [row["load_N"] for row in result["rows"]] == [0, 300]
+    assert result["failed"][0]["load_N"] == 300000
     lines = (out / "load_sweep.csv").read_text().splitlines()
     assert len(lines) == 1 + 2 * 10 and lines[0].startswith("design,load_N,deflection_m,c,m,kind")
     assert (out / "load_sweep.png").stat().st_size > 10000
@@ -116,5 +116,5 @@ def test_a_picture_of_both_designs(tmp_path: Path) -> None:
 
 def test_the_command_explains_itself(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("modes", "--help") == 0
-    said = capsys.readouterr().out
-    assert "--load-N" in said and "--sweep-load" in said and "--load-N 4000" in said
+    help_text = capsys.readouterr().out
+    assert "--load-N" in help_text and "--sweep-load" in help_text and "--load-N 4000" in help_text

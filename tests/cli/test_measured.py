@@ -56,9 +56,9 @@ def identified(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 def test_functions_become_the_true_frequencies(identified: Path) -> None:
-    found, right = read_measurements(identified), truth(240.0)
-    assert {each.label for each in found} == set(right)
-    for each in found:
+    readings, right = read_measurements(identified), truth(240.0)
+    assert {each.label for each in readings} == set(right)
+    for each in readings:
         assert each.label is not None and abs(each.value - right[each.label]) < 2.5 * each.sigma
         assert each.sigma < 0.002 * each.value
     picture = identified.with_suffix(".png")
@@ -83,8 +83,8 @@ def test_a_fit_to_them_finds_the_true_design(
     assert code == 0 and fit["objective_unit"] == "sigma" and fit["objective_Hz"] < 4
     assert {Label(m["c"], m["m"], m["kind"]) for m in fit["modes"]} == set(truth(240.0))
     for name, value in TRUTH.items():
-        found = fit["variables"][name]
-        assert abs(found["value"] - value) < 2.5 * found["standard_error"]
+        variable = fit["variables"][name]
+        assert abs(variable["value"] - value) < 2.5 * variable["standard_error"]
 
 
 def test_several_kinds_of_files_join_and_the_diagnosis_reads_them(
@@ -108,10 +108,10 @@ def test_several_kinds_of_files_join_and_the_diagnosis_reads_them(
         )
         == 0
     )
-    told = json.loads(capsys.readouterr().out)
-    assert all(mode["confidence"] > 0.9 and not mode["why"] for mode in told["modes"])
+    summary = json.loads(capsys.readouterr().out)
+    assert all(mode["confidence"] > 0.9 and not mode["why"] for mode in summary["modes"])
     right = truth(200.0)
-    for mode in told["modes"]:
+    for mode in summary["modes"]:
         label = Label(mode["c"], mode["m"], mode["kind"])
         assert mode["frequency_Hz"] == pytest.approx(right[label], rel=0.005)
         assert mode["member"] in (("1", "2") if label.c else ("",))
@@ -173,18 +173,18 @@ def test_fits_take_what_is_at_their_pressure(
         str(tmp_path / "f"),
     )
     assert code == 2
-    told = capsys.readouterr().err
-    assert "no target was measured at 150 kPa, only at 200 kPa, 239.4 kPa, 240 kPa: set" in told
+    message = capsys.readouterr().err
+    assert "no target was measured at 150 kPa, only at 200 kPa, 239.4 kPa, 240 kPa: set" in message
 
 
 def test_sensors_are_judged_before_a_test(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run("measured", "sensors", str(SHAPES), *TEST, "--json") == 0
-    told = json.loads(capsys.readouterr().out)
-    assert len(told) == 5 + 4 * 8
-    assert all(entry["told"] for entry in told if entry["m"] == 0)
-    looks_like = {(entry["c"], entry["m"]): entry["looks_like"] for entry in told}
+    entries = json.loads(capsys.readouterr().out)
+    assert len(entries) == 5 + 4 * 8
+    assert all(entry["told"] for entry in entries if entry["m"] == 0)
+    looks_like = {(entry["c"], entry["m"]): entry["looks_like"] for entry in entries}
     assert looks_like[1, 2][0] == "[1,0]"  # no two of the tread's sensors share an angle
     even = {
         **geometry(),

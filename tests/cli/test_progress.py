@@ -36,8 +36,8 @@ def test_nothing_is_left_until_something_is_done(clock: Clock) -> None:
 
 
 def test_a_stage_has_a_name_a_place_and_a_rest_of_its_own(clock: Clock) -> None:
-    said: list[str] = []
-    progress = Progress("diagnose", ["calibrate", "map"], said.append)
+    lines: list[str] = []
+    progress = Progress("diagnose", ["calibrate", "map"], lines.append)
     progress.begin("calibrate")
     progress.at(0, 95)
     clock.now = 100.0
@@ -45,7 +45,7 @@ def test_a_stage_has_a_name_a_place_and_a_rest_of_its_own(clock: Clock) -> None:
     progress.at(0, 4)
     clock.now = 131.0
     progress.at(1, 4)
-    assert said == [
+    assert lines == [
         "stage 1 of 2, calibrate ...",
         "stage 2 of 2, map ...",
         "stage 2 of 2, map, 1 of 4 done, 2:11 elapsed, 1:33 left in this stage",
@@ -68,8 +68,8 @@ def test_further_pieces_of_a_stage_are_counted_on_top(clock: Clock) -> None:
 
 
 def test_lines_come_now_and_then_only(clock: Clock) -> None:
-    said: list[str] = []
-    progress = Progress("footprint", (), said.append)
+    lines: list[str] = []
+    progress = Progress("footprint", (), lines.append)
     progress.begin("")
     for second in range(0, 100, 5):
         clock.now = float(second)
@@ -77,7 +77,7 @@ def test_lines_come_now_and_then_only(clock: Clock) -> None:
     progress.within(1, 3)
     clock.now = 131.0
     progress.within(2, 3)
-    assert said == [
+    assert lines == [
         "footprint ...",
         "footprint, 35 of 1000 done, 0:35 elapsed, 16:05 left",
         "footprint, 70 of 1000 done, 1:10 elapsed, 15:30 left",

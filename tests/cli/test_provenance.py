@@ -157,8 +157,8 @@ def test_a_fit_is_of_its_tyre(
         str(project / "out/fit.json"),
     ]
     assert run(*sweep, *more) == (2 if words else 0)
-    told = capsys.readouterr().err
-    assert ("is a fit of another tyre" in told) == bool(words) and words in told
+    message = capsys.readouterr().err
+    assert ("is a fit of another tyre" in message) == bool(words) and words in message
 
 
 def test_another_mesh_is_taken_and_said(

@@ -54,9 +54,9 @@ def test_several_folders(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     page = tmp_path / "both.html"
     assert run("report", *folders, "--output", str(page), "--json") == 0
     printed = capsys.readouterr()
-    told = json.loads(printed.out)
-    assert told["bytes"] == page.stat().st_size and list(told["found"]) == folders
-    assert told["found"][folders[0]][:2] == ["fit", "modes"] and str(page) in printed.err
+    summary = json.loads(printed.out)
+    assert summary["bytes"] == page.stat().st_size and list(summary["found"]) == folders
+    assert summary["found"][folders[0]][:2] == ["fit", "modes"] and str(page) in printed.err
     assert "tyre one and tyre two" in page.read_text()
 
 

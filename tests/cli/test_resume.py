@@ -60,9 +60,9 @@ def test_killed_four_times_and_run_again(undisturbed: Path, tmp_path: Path) -> N
     subprocess.run([*COMMAND, str(out)], check=True)
     for name in RESULTS:
         assert (out / name).read_bytes() == (undisturbed / name).read_bytes()
-    said = facts(out)
-    assert said["answered_from_record"] == len(finished)
-    assert said["solver_runs"] == runs - len(finished) == len(record(out) - finished)
+    run_facts = facts(out)
+    assert run_facts["answered_from_record"] == len(finished)
+    assert run_facts["solver_runs"] == runs - len(finished) == len(record(out) - finished)
     assert not (out / "runs").exists()
     assert not list(out.rglob("*.partial"))
 
@@ -165,8 +165,8 @@ def test_a_full_disc_ends_in_one_sentence(most_bytes: int, command: str, tmp_pat
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, most_bytes)),
     )
     assert done.returncode == 2
-    *others, told = done.stderr.splitlines()  # a slow machine says that it is at work
-    assert "error: " in told and "File too large" in told, done.stderr
+    *others, message = done.stderr.splitlines()  # a slow machine says that it is at work
+    assert "error: " in message and "File too large" in message, done.stderr
     assert others in ([], [f"{command} ..."]), done.stderr
     left = {p.relative_to(tmp_path / "out").as_posix() for p in (tmp_path / "out").rglob("*")}
     assert left <= {"run.json", ".lock", "record"}
@@ -206,8 +206,8 @@ def test_no_store_and_a_store_of_the_environment(
     assert run("modes", CASE, "--output", str(tmp_path / "a"), "--quiet", "--no-store") == 0
     assert facts(tmp_path / "a", "modes")["solver_runs"] == 1
     assert run("store", "--json") == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["records"] == 1 and found["solvers"] == {"bundled 1.0.0": 1}
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["records"] == 1 and summary["solvers"] == {"bundled 1.0.0": 1}
 
 
 def test_store_verifies_and_prunes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -220,11 +220,11 @@ def test_store_verifies_and_prunes(tmp_path: Path, capsys: pytest.CaptureFixture
     assert run("store", str(tmp_path)) == 0
     assert "3 records" in capsys.readouterr().out
     assert run("store", str(tmp_path), "--verify", "--json") == 0
-    found = json.loads(capsys.readouterr().out)
-    assert (found["records"], found["damaged"]) == (2, 1)
+    summary = json.loads(capsys.readouterr().out)
+    assert (summary["records"], summary["damaged"]) == (2, 1)
     assert run("store", str(tmp_path), "--prune", "0.4") == 0
-    said = capsys.readouterr().out
-    assert "1 record," in said and "removed: 1" in said and "damaged: 0" in said
+    output = capsys.readouterr().out
+    assert "1 record," in output and "removed: 1" in output and "damaged: 0" in output
     assert run("store") == 2 and run("store", str(tmp_path / "none")) == 2
     assert "Traceback" not in capsys.readouterr().err
 
@@ -243,10 +243,10 @@ def test_solvers_lists_what_works_and_what_does_not(
     ]
     monkeypatch.setattr(solver, "entry_points", lambda group: entries)
     assert run("solvers", "--json") == 0
-    found = {each["name"]: each for each in json.loads(capsys.readouterr().out)}
-    assert {"footprint", "gradients", "modes"} <= set(found["bundled"]["capabilities"])
-    assert found["bundled"]["dialect"] == "abaqus" and found["bundled"]["problem"] is None
-    assert "no_such_package" in found["broken"]["problem"]
-    assert found["not_one"]["problem"]
+    solvers = {each["name"]: each for each in json.loads(capsys.readouterr().out)}
+    assert {"footprint", "gradients", "modes"} <= set(solvers["bundled"]["capabilities"])
+    assert solvers["bundled"]["dialect"] == "abaqus" and solvers["bundled"]["problem"] is None
+    assert "no_such_package" in solvers["broken"]["problem"]
+    assert solvers["not_one"]["problem"]
     assert run("solvers") == 0
     assert "no_such_package" in capsys.readouterr().out

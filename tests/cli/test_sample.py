@@ -28,35 +28,35 @@ def test_a_sample_of_two_processes_in_files_and_the_same_bytes_from_the_record(
     case.write_text(case.read_text().replace("known_from: size_code", "known_from: exact"))
     command = ["sample", str(case), "--measured", DATA, *COARSE, "--at-kPa", "200"]
     assert run(*command, "--output", str(out), "--json", "--jobs", "2") == 0
-    said = capsys.readouterr()
-    found = json.loads((out / "sample.json").read_text())
-    assert json.loads(said.out) == found and "stage 3 of 4, sample" in said.err
-    assert found["provenance"]["measured_sha256"] and found["provenance"]["mesh"] == "coarse"
-    assert set(found["variables"]) == {"A_belt", "A_carcass", "C10"}
-    for v in found["variables"].values():
+    printed = capsys.readouterr()
+    sample = json.loads((out / "sample.json").read_text())
+    assert json.loads(printed.out) == sample and "stage 3 of 4, sample" in printed.err
+    assert sample["provenance"]["measured_sha256"] and sample["provenance"]["mesh"] == "coarse"
+    assert set(sample["variables"]) == {"A_belt", "A_carcass", "C10"}
+    for v in sample["variables"].values():
         assert v["lower"] < v["low"] < v["median"] < v["high"] < v["upper"]
         assert v["high"] - v["low"] == pytest.approx(2 * 1.645 * v["standard_error"], rel=0.3)
-    assert {row["pressure_kPa"] for row in found["predicted"]} == {200.0, 240.0}
-    measured = [row for row in found["predicted"] if row["measured_Hz"]]
+    assert {row["pressure_kPa"] for row in sample["predicted"]} == {200.0, 240.0}
+    measured = [row for row in sample["predicted"] if row["measured_Hz"]]
     assert len(measured) == 9 and {row["pressure_kPa"] for row in measured} == {240.0}
-    assert any((row["c"], row["m"]) == (4, 1) for row in found["predicted"])
-    for row in found["predicted"]:
+    assert any((row["c"], row["m"]) == (4, 1) for row in sample["predicted"])
+    for row in sample["predicted"]:
         assert row["low"] < row["frequency_Hz"] < row["high"]
-    emulator = found["emulator"]
+    emulator = sample["emulator"]
     assert 40 <= emulator["evaluations"] <= 80 and emulator["stated_error"] < 5e-3
     assert emulator["evaluations_of_all"] == emulator["evaluations"] + emulator["failed"]
     draws = list(csv.DictReader((out / "sample_draws.csv").open()))
-    assert len(draws) == found["chains"]["kept"] > 1000
+    assert len(draws) == sample["chains"]["kept"] > 1000
     runs = json.loads((out / "run.json").read_text())["sample"]
     assert runs["solver_runs"] > 40 and not (out / "runs").exists()
 
     bytes_ = {name: (out / name).read_bytes() for name in FILES}
     assert run(*command, "--output", str(out), "--report") == 0
-    said = capsys.readouterr()
+    printed = capsys.readouterr()
     assert {name: (out / name).read_bytes() for name in FILES} == bytes_
     assert json.loads((out / "run.json").read_text())["sample"]["solver_runs"] == 0
-    assert "A_carcass" in said.out and "third out-of-plane bending" in said.out
-    assert "off by less than" in said.out
+    assert "A_carcass" in printed.out and "third out-of-plane bending" in printed.out
+    assert "off by less than" in printed.out
     page = (out / "report.html").read_text()
     assert "<h2>Sample</h2>" in page and "90 % of the draws" in page
     assert 'aria-label="Sample"' in page and "A_belt, m2</text>" in page
@@ -72,8 +72,8 @@ def test_targets_without_a_sigma_have_that_of_the_fit(
     command = ["sample", CASE, *shared, "--draws", "5000", "--no-pictures"]
     assert run(*command, "--output", str(out)) == 0  # it draws on until they are enough
     noise = json.loads((fit / "fit.json").read_text())["noise_Hz"]
-    found = json.loads((out / "sample.json").read_text())
-    assert found["noise_Hz"] == noise and not (out / "sample_corner.png").exists()
+    sample = json.loads((out / "sample.json").read_text())
+    assert sample["noise_Hz"] == noise and not (out / "sample_corner.png").exists()
     assert f"the targets state no sigma: {noise:.2f} Hz" in capsys.readouterr().out
 
 
@@ -101,8 +101,8 @@ def test_what_is_refused(
     Path("mass.csv").write_text(f"{head}\nmass_kg,,,,,,,12.8,0.1\n")
     Path("high.csv").write_text(f"{head}\nfrequency_Hz,2,0,,,240,0,200.0,1.0\n")
     assert run("sample", CASE, *given) == 2
-    said = capsys.readouterr().err
-    assert words in said and "Traceback" not in said
+    message = capsys.readouterr().err
+    assert words in message and "Traceback" not in message
 
 
 PRESSED = """\
@@ -130,6 +130,6 @@ def test_a_missing_emcee_is_one_sentence_before_anything_is_written(
 ) -> None:
     monkeypatch.setitem(sys.modules, "emcee", None)
     assert run("sample", CASE, "--output", str(tmp_path / "out")) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1 and "pip install '.[sample]'" in said
+    message = capsys.readouterr().err
+    assert message.count("\n") == 1 and "pip install '.[sample]'" in message
     assert not (tmp_path / "out").exists()

@@ -43,11 +43,11 @@ def test_pairs_of_decks_and_what_they_should_give(
             assert min(abs(float(row["frequency_Hz"]) / h - 1) for h in hertz) < 1e-5
             assert row["mode"] in page
         if folder == "plain":
-            found = {row["mode"]: float(row["frequency_Hz"]) for row in rows}
-            assert found == {k: pytest.approx(v, rel=1e-4) for k, v in RECORDED_HZ.items()}
+            frequencies = {row["mode"]: float(row["frequency_Hz"]) for row in rows}
+            assert frequencies == {k: pytest.approx(v, rel=1e-4) for k, v in RECORDED_HZ.items()}
     for row in rows:  # of the angular layer by its readings; with one spacing it is the plain one
         line = re.findall(rf"^ *{re.escape(row['mode'])} +([\d. ]+)", page, re.MULTILINE)[1]
         manual, one, radians, metres = map(float, line.split())
         assert manual == pytest.approx(float(row["frequency_Hz"]), abs=6e-4)
-        assert one == pytest.approx(found[row["mode"]], abs=6e-4)
+        assert one == pytest.approx(frequencies[row["mode"]], abs=6e-4)
         assert manual > 1.001 * one and one > 1.2 * radians > 1.2 * metres

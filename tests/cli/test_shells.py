@@ -75,14 +75,14 @@ def terminal(shell: str, folder: Path) -> Iterator[int]:
         os.close(ours)
 
 
-def asked(end: int, keys: bytes, answer: Path) -> str:
-    """What the shell writes to the file after these keys."""
+def words_after(end: int, keys: bytes, answer: Path) -> str:
+    """Words that the shell writes to the file after these keys."""
     os.write(end, keys)
-    said, until = b"", time.monotonic() + 60
+    output, until = b"", time.monotonic() + 60
     while not (answer.exists() and answer.read_bytes().endswith(b"\n")):
-        assert time.monotonic() < until, said.decode(errors="replace")
+        assert time.monotonic() < until, output.decode(errors="replace")
         try:  # else the shell waits for its words to be read
-            said += os.read(end, 65536)
+            output += os.read(end, 65536)
         except BlockingIOError:
             time.sleep(0.01)
     text = answer.read_text().removesuffix("\n")
@@ -102,7 +102,7 @@ def test_lines_are_completed(shell: str, tmp_path: Path) -> None:
     for name in ("my tyre.yaml", "a,b.yaml", "deep/case.yaml"):
         shutil.copy(CASES / "p235_75r17.yaml", tmp_path / name)
     with terminal(shell, tmp_path) as end:
-        assert asked(end, f"{SET_UP[shell]}; echo up >up\n".encode(), tmp_path / "up") == "up"
+        assert words_after(end, f"{SET_UP[shell]}; echo up >up\n".encode(), tmp_path / "up") == "up"
         for typed, line in TYPED.items():
             keys = CTRL_U + typed.encode() + b"\t" + CTRL_T
-            assert asked(end, keys, tmp_path / "line") == line
+            assert words_after(end, keys, tmp_path / "line") == line

@@ -86,8 +86,8 @@ def test_the_solver_ends_with_all_that_it_started(
     process.send_signal(how)
     words = process.communicate(timeout=200)[1]
     assert process.returncode == 128 + how, words
-    told = rf"\n{WORDS[how.name]}: evaluations .* the same command goes on from there\n"
-    assert re.fullmatch(told, words), words
+    pattern = rf"\n{WORDS[how.name]}: evaluations .* the same command goes on from there\n"
+    assert re.fullmatch(pattern, words), words
     assert len(pids) == 2 * jobs and not [pid for pid in pids if alive(pid)]
     assert not (tmp_path / "out" / "runs").exists()
 
@@ -133,8 +133,8 @@ os.setsid()
 os.close(os.open({os.ttyname(theirs)!r}, os.O_RDWR))
 os.execvp({command[0]!r}, {command!r})"""
     leader = [sys.executable, "-c", session]
-    with (tmp_path / "said").open("wb") as said:
-        process = subprocess.Popen(leader, stdin=theirs, stdout=said, stderr=theirs, cwd=tmp_path)
+    with (tmp_path / "said").open("wb") as log:
+        process = subprocess.Popen(leader, stdin=theirs, stdout=log, stderr=theirs, cwd=tmp_path)
     os.close(theirs)
     while not list(tmp_path.glob("out/record/*/*.record")) and process.poll() is None:
         time.sleep(0.01)
@@ -208,8 +208,8 @@ def test_nothing_was_changed_only_where_that_is_so(
 
     monkeypatch.setattr(Path, "replace", then_ctrl_c)
     assert run(*words) == 130
-    said = capsys.readouterr().err
-    assert "nothing was changed" not in said and "the same command" in said
+    message = capsys.readouterr().err
+    assert "nothing was changed" not in message and "the same command" in message
     assert any(tmp_path.iterdir())
 
     def at_once(*_: object) -> None:
@@ -289,7 +289,7 @@ def test_a_batch_whose_workers_are_jobs(tmp_path: Path) -> None:
 
 
 def environment(path: Path) -> str:
-    """Of a process; empty once it has ended."""
+    """Environment of a process; empty once it has ended."""
     try:
         return path.read_bytes().decode(errors="replace")
     except OSError:

@@ -36,8 +36,8 @@ def test_a_slip(
     monkeypatch.chdir(tmp_path)
     assert run(*typed.split()) == 2
     printed = capsys.readouterr()
-    (told,) = printed.err.splitlines()
-    assert told.startswith("error: ") and SLIPS[typed] in f"{told}\n"
+    (message,) = printed.err.splitlines()
+    assert message.startswith("error: ") and SLIPS[typed] in f"{message}\n"
     assert not printed.out
     assert not list(tmp_path.iterdir())
 
@@ -45,7 +45,8 @@ def test_a_slip(
 def test_a_long_folder_makes_no_two_names_alike(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """What lies beside is compared by its name, however much of the path is the same."""
+    """Neighbouring files are compared by their names alone, however much of the path is the
+    same."""
     folder = tmp_path / ("a" * 60)
     (folder / "cases").mkdir(parents=True)
     (folder / ".pre-commit-config.yaml").write_text("repos: []\n")
@@ -58,9 +59,9 @@ def test_a_long_folder_makes_no_two_names_alike(
 @pytest.mark.parametrize("typed", [["help"], ["help", "fit"]])
 def test_help_is_help(typed: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert run(*typed) == 0
-    told = capsys.readouterr().out
+    help_text = capsys.readouterr().out
     assert run(*typed[1:], "--help") == 0
-    assert capsys.readouterr().out.split() == told.split()
+    assert capsys.readouterr().out.split() == help_text.split()
 
 
 @pytest.mark.slow

@@ -72,14 +72,14 @@ def test_both_designs_against_the_reference(
         run("sweep-pressure", str(CASES / f"{name}.yaml"), "--output", str(out), "--fitted", fit)
         == 0
     )
-    found = result(out)
-    assert [row["pressure_kPa"] for row in found["rows"]] == [*range(100, 321, 20)] * 2
+    sweep = result(out)
+    assert [row["pressure_kPa"] for row in sweep["rows"]] == [*range(100, 321, 20)] * 2
     compared = 0
     for design, points in (("initial", [0, 2, 3, 4, 5]), ("fitted", [1])):
         for point in (REFERENCE[name][i] for i in points):
             (row,) = (
                 row
-                for row in found["rows"]
+                for row in sweep["rows"]
                 if (row["design"], row["pressure_kPa"]) == (design, point["pressure_kPa"])
             )
             modes = {key(mode): mode["frequency_Hz"] for mode in row["modes"]}
@@ -88,13 +88,13 @@ def test_both_designs_against_the_reference(
                 assert modes[text] == pytest.approx(frequency, rel=2e-3), (design, text)
                 compared += 1
     assert compared == 6 * 9
-    for findings in found["findings"]:
+    for findings in sweep["findings"]:
         assert all(m["rises"] and m["curvature"] == "concave" for m in findings["modes"])
         assert all(each["grows_with_c"] for each in findings["families"])
         assert findings["disagreements"] == [] and findings["least_mac"] > 0.9
-    said = capsys.readouterr().out
-    assert "fitted: every mode rises from 100 to 320 kPa" in said
-    assert "fitted: labels stay with the shapes throughout" in said
+    output = capsys.readouterr().out
+    assert "fitted: every mode rises from 100 to 320 kPa" in output
+    assert "fitted: labels stay with the shapes throughout" in output
     lines = (out / "pressure_sweep.csv").read_text().splitlines()
     assert len(lines) == 1 + 2 * 12 * 10
     assert lines[0] == "design,pressure_kPa,c,m,kind,multiplicity,frequency_Hz,d_ln_f_d_ln_p"
@@ -107,10 +107,10 @@ def test_exact_slopes_are_those_of_the_frequencies(
     """Between 199 and 201 kPa, against the difference of the logarithms: 1e-5."""
     arguments = ["--from-kPa", "199", "--to-kPa", "201", "--steps", "3", "--no-pictures"]
     assert run("sweep-pressure", CASE, "--output", str(tmp_path), *arguments, "--json") == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found == result(tmp_path) and found["slopes"] == "exact"
+    sweep = json.loads(capsys.readouterr().out)
+    assert sweep == result(tmp_path) and sweep["slopes"] == "exact"
     assert not (tmp_path / "pressure_sweep.png").exists()
-    below, at, above = ({key(m): m for m in row["modes"]} for row in found["rows"])
+    below, at, above = ({key(m): m for m in row["modes"]} for row in sweep["rows"])
     for text, mode in at.items():
         rise = math.log(above[text]["frequency_Hz"] / below[text]["frequency_Hz"])
         assert mode["d_ln_f_d_ln_p"] == pytest.approx(rise / math.log(201 / 199), rel=1e-5), text
@@ -121,7 +121,7 @@ def test_a_solver_in_three_dimensions_without_slopes(
     coarse: Callable[..., Path], tmp_path: Path
 ) -> None:
     """Shapes on rings, pairs apart and turned; slopes by differences near the exact ones."""
-    case, found = str(coarse()), {}
+    case, sweeps = str(coarse()), {}
     for solver in ("abaqus", "bundled"):
         out = tmp_path / solver
         assert (
@@ -142,16 +142,16 @@ def test_a_solver_in_three_dimensions_without_slopes(
             )
             == 0
         )
-        found[solver] = result(out)
-    assert (found["abaqus"]["slopes"], found["bundled"]["slopes"]) == ("differences", "exact")
-    for theirs, ours in zip(found["abaqus"]["rows"], found["bundled"]["rows"], strict=True):
+        sweeps[solver] = result(out)
+    assert (sweeps["abaqus"]["slopes"], sweeps["bundled"]["slopes"]) == ("differences", "exact")
+    for theirs, ours in zip(sweeps["abaqus"]["rows"], sweeps["bundled"]["rows"], strict=True):
         modes = {key(mode): mode for mode in theirs["modes"]}
         for mode in ours["modes"]:
             other = modes[key(mode)]
             assert other["frequency_Hz"] == pytest.approx(mode["frequency_Hz"], rel=1e-6)
             assert other["d_ln_f_d_ln_p"] == pytest.approx(mode["d_ln_f_d_ln_p"], rel=0.02)
             assert other["multiplicity"] == mode["multiplicity"]
-    (findings,) = found["abaqus"]["findings"]
+    (findings,) = sweeps["abaqus"]["findings"]
     assert findings["disagreements"] == [] and findings["least_mac"] > 0.99
 
 
@@ -190,9 +190,9 @@ def test_a_pressure_that_fails_costs_no_other(
     out = tmp_path / "out"
     ends = ["--from-kPa", "100", "--to-kPa", "400", "--steps", "3", "--jobs", jobs]
     assert run("sweep-pressure", CASE, "--output", str(out), *SOFT, *ends) == 3
-    printed, found = capsys.readouterr(), result(out)
-    assert [row["pressure_kPa"] for row in found["rows"]] == [100, 250]
-    (failed,) = found["failed"]
+    printed, sweep = capsys.readouterr(), result(out)
+    assert [row["pressure_kPa"] for row in sweep["rows"]] == [100, 250]
+    (failed,) = sweep["failed"]
     assert (failed["pressure_kPa"], failed["cause"]) == (400, "no_equilibrium")
     (kept,) = (out / "runs").iterdir()
     assert re.search(r"error: initial, 400 kPa: inflation stopped at 35\d\.", printed.err)
@@ -215,12 +215,12 @@ def test_a_failure_amid_the_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(Evaluator, "evaluate", moody)
     arguments = ["--output", str(tmp_path), "--to-kPa", "180", "--steps", "5", "--quiet"]
     assert run("sweep-pressure", CASE, *arguments) == 3
-    found = result(tmp_path)
-    assert [row["pressure_kPa"] for row in found["rows"]] == [100, 120, 160, 180]
-    assert found["failed"] == [
+    sweep = result(tmp_path)
+    assert [row["pressure_kPa"] for row in sweep["rows"]] == [100, 120, 160, 180]
+    assert sweep["failed"] == [
         {"design": "initial", "pressure_kPa": 140, "cause": "timed_out", "words": "ran out of time"}
     ]
-    assert {mode["curvature"] for mode in found["findings"][0]["modes"]} == {"concave"}
+    assert {mode["curvature"] for mode in sweep["findings"][0]["modes"]} == {"concave"}
 
 
 @pytest.mark.slow
@@ -299,10 +299,10 @@ def test_a_fit_is_taken_as_it_is_written(tmp_path: Path) -> None:
     )
     fit = json.loads((tmp_path / "fit.json").read_text())
     last = result(tmp_path)["rows"][-1]
-    found = {key(mode): mode["frequency_Hz"] for mode in last["modes"]}
+    frequencies = {key(mode): mode["frequency_Hz"] for mode in last["modes"]}
     assert (last["design"], last["pressure_kPa"]) == ("fitted", 240)
     for mode in fit["modes"]:
-        assert found[key(mode)] == pytest.approx(mode["fitted_Hz"], rel=1e-9)
+        assert frequencies[key(mode)] == pytest.approx(mode["fitted_Hz"], rel=1e-9)
     assert result(tmp_path)["designs"]["fitted"]["A_belt"] == fit["fixed"]["A_belt"]
 
 

@@ -30,7 +30,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def fit(folder: Path, case: Path, started: str, good: bool = True) -> None:
-    """What tells a fit: its entry in run.json, and that it converged."""
+    """Write the traces of a fit: its entry in run.json, and whether it converged."""
     folder.mkdir(exist_ok=True)
     loaded = load_case(case) if case.exists() else None
     entry = {**owner(folder, case, loaded), "command": "fit", "started": started, "finished": True}
