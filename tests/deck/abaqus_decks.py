@@ -30,7 +30,7 @@ Names = dict[str, Any]
 
 @cache
 def names_of(effects: str = "plain", element: str = "CGAX8R") -> Names:
-    """What the templates are given of a design."""
+    """Names that the templates receive for a design."""
     case = with_values(CASE, EFFECTS[effects])
     mesh = case.case.mesh.model_copy(update={"element": element, "hourglass_stiffness_Pa": 3e4})
     few = mesh.levels["default"].model_copy(update={"elements": dict.fromkeys(COARSE, 1)})

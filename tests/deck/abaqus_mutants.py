@@ -161,8 +161,8 @@ def misspelt_word(lines: list[str], random: Random) -> list[str]:
     words = r"(?<==)(YES|LONG TERM|PRONY|TABULAR|STIFFNESS|ELEMENT|LANCZOS|MASS|NEW|LINEAR)$"
     words = words.replace("$", r"(?=,|$)")
     k = random.choice([k for k in keywords(lines) if re.search(words, lines[k])])
-    found = random.choice(list(re.finditer(words, lines[k])))
-    text = lines[k][: found.start()] + misspelt(found[0], random) + lines[k][found.end() :]
+    match = random.choice(list(re.finditer(words, lines[k])))
+    text = lines[k][: match.start()] + misspelt(match[0], random) + lines[k][match.end() :]
     return [*lines[:k], text, *lines[k + 1 :]]
 
 
@@ -252,30 +252,30 @@ def dangling(lines: list[str], random: Random) -> list[str]:
     uses = r"\*(SOLID SECTION|SURFACE SECTION|RIGID|CONTACT|MASS|SPRING|ROTARY|NODE FILE)"
     named = r"(?<==)[A-Z_][A-Z_0-9]*(?=,|$)"
     places = [
-        (k, found)
+        (k, match)
         for k in keywords(lines)
         if re.match(uses, lines[k])
-        for found in re.finditer(
+        for match in re.finditer(
             rf"(?:SET|MATERIAL|INTERACTION|SLAVE|MASTER|SURFACE|CONTROLS){named}", lines[k]
         )
     ] or [
-        (k, found)
+        (k, match)
         for k in keywords(lines)
         if re.match(uses, lines[k])
-        for found in re.finditer(named, lines[k])
-        if not lines[k][: found.start()].endswith("TYPE=")
+        for match in re.finditer(named, lines[k])
+        if not lines[k][: match.start()].endswith("TYPE=")
     ]
     for j, line in enumerate(lines):
         if not line.startswith("*") and (
-            found := re.match(r"(CAVITY|TREAD|ROAD|INNER_ROW)\b", line)
+            match := re.match(r"(CAVITY|TREAD|ROAD|INNER_ROW)\b", line)
         ):
-            places.append((j, found))
-    k, found = random.choice(places)
-    return [*lines[:k], f"{lines[k][: found.end()]}_X{lines[k][found.end() :]}", *lines[k + 1 :]]
+            places.append((j, match))
+    k, match = random.choice(places)
+    return [*lines[:k], f"{lines[k][: match.end()]}_X{lines[k][match.end() :]}", *lines[k + 1 :]]
 
 
 def wrong_element(lines: list[str], random: Random) -> list[str]:
-    """Of another type, with a node too few or one that is not there."""
+    """Give an element another type, a node too few, or a node that does not exist."""
     k = random.choice([k for k in keywords(lines, ("ELEMENT",)) if "GAX" in lines[k]])
     j = random.randrange(k + 1, end(lines, k))
     how = random.randrange(3)
@@ -312,20 +312,20 @@ def caught(job: str, lines: list[str]) -> bool:
     """Whether the grammar finds anything in it, or in what goes on from it; a text that is no deck
     is caught by its reader."""
     try:
-        found = read_keywords("\n".join(lines))
+        blocks = read_keywords("\n".join(lines))
     except DeckError:
         return True
     before = next((first for first, jobs in AFTER.items() if job in jobs), None)
     if before:
-        return bool(findings(found, read_keywords(decks()[before][-1])))
+        return bool(findings(blocks, read_keywords(decks()[before][-1])))
     after = [decks()[other][0] for other in AFTER[job]]
-    return bool(findings(found) or any(findings(read_keywords(text), found) for text in after))
+    return bool(findings(blocks) or any(findings(read_keywords(text), blocks) for text in after))
 
 
 def draw(count: int, seed: int) -> list[tuple[str, bool, list[str]]]:
     """Kind, whether it is caught, and what it changed."""
-    random, found = Random(seed), list[tuple[str, bool, list[str]]]()
-    while len(found) < count:
+    random, results = Random(seed), list[tuple[str, bool, list[str]]]()
+    while len(results) < count:
         kind, job = random.choice(list(KINDS)), random.choice(list(decks()))
         lines = [line for line in random.choice(decks()[job]).splitlines() if line.strip()]
         try:
@@ -334,8 +334,8 @@ def draw(count: int, seed: int) -> list[tuple[str, bool, list[str]]]:
             continue
         if wrong != lines:
             change = list(unified_diff(lines, wrong, job, kind, n=0, lineterm=""))
-            found.append((kind, caught(job, wrong), change))
-    return found
+            results.append((kind, caught(job, wrong), change))
+    return results
 
 
 def main() -> None:
@@ -343,13 +343,13 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
-    found = draw(given.count, given.seed)
-    drawn, seen = Counter(k for k, *_ in found), Counter(k for k, ok, _ in found if ok)
+    results = draw(given.count, given.seed)
+    drawn, seen = Counter(k for k, *_ in results), Counter(k for k, ok, _ in results if ok)
     print("| mutants | drawn | caught |\n|---|---|---|")
     for kind in KINDS:
         print(f"| {kind} | {drawn[kind]} | {seen[kind]} |")
-    print(f"| all | {len(found)} | {sum(seen.values())} |")
-    for kind, ok, change in found:
+    print(f"| all | {len(results)} | {sum(seen.values())} |")
+    for kind, ok, change in results:
         if not ok:
             print(kind, *change, sep="\n  ")
 

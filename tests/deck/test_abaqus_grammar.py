@@ -1,4 +1,4 @@
-"""What we write against what ABAQUS' manual says, and mutants of it."""
+"""Keywords of our decks against ABAQUS' manual, and mutants of them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from . import abaqus_decks, abaqus_mutants
 
 def said(keywords: list[Block], before: list[Block]) -> list[str]:
     """Findings in words."""
-    return [f"*{found.block.name} {found.words}" for found in findings(keywords, before)]
+    return [f"*{finding.block.name} {finding.words}" for finding in findings(keywords, before)]
 
 
 @pytest.mark.slow
@@ -46,11 +46,11 @@ def test_what_the_grammar_does_not_know_is_a_doubt() -> None:
     """Neither it nor the options after it are refused for it; ABAQUS has more keywords."""
     text = next(abaqus_decks.inflations())
     for old, new in (("*DENSITY", "*PLASTIC\n1.0E6, 0.0\n*DENSITY"), ("*STATIC", "*DYNAMITE")):
-        found = findings(read_keywords(text.replace(old, new, 1)))
-        assert found and not any(each.sure for each in found)
+        faults = findings(read_keywords(text.replace(old, new, 1)))
+        assert faults and not any(each.sure for each in faults)
 
 
 def test_mutants_of_our_decks_are_caught(request: pytest.FixtureRequest) -> None:
     """All of them."""
-    found = abaqus_mutants.draw(60, request.config.getoption("--seed"))
-    assert not [(kind, lines) for kind, caught, lines in found if not caught]
+    mutants = abaqus_mutants.draw(60, request.config.getoption("--seed"))
+    assert not [(kind, lines) for kind, caught, lines in mutants if not caught]

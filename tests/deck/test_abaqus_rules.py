@@ -1,4 +1,4 @@
-"""What ABAQUS' manual asks of where keywords stand: held by decks of every kind, and by the bundled
+"""Places that ABAQUS' manual requires for keywords: kept by decks of every kind, and by the bundled
 solver, which refuses them elsewhere."""
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""What decks begin with: the tyre they are of, and nothing that would part equal questions."""
+"""First lines of decks: the tyre that they describe, and nothing that would part equal
+questions."""
 
 from __future__ import annotations
 

@@ -24,15 +24,15 @@ LOADS = (500.0, 1234.5)
 
 def blocks(text: str) -> list[tuple[str, list[str]]]:
     """Keyword lines with their data lines."""
-    found: list[tuple[str, list[str]]] = []
+    result: list[tuple[str, list[str]]] = []
     for line in text.splitlines():
         if line.startswith("**"):
             continue
         if line.startswith("*"):
-            found.append((line, []))
+            result.append((line, []))
         else:
-            found[-1][1].append(line)
-    return found
+            result[-1][1].append(line)
+    return result
 
 
 def data(text: str, keyword: str) -> list[str]:
