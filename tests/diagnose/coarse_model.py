@@ -33,9 +33,9 @@ X = MODEL.start + np.array((0.2, -0.1, 0.15))
 
 
 def asked(point: Query) -> Answer:
-    (found,) = MODEL.answers([point])
-    assert isinstance(found, Answer), found
-    return found
+    (result,) = MODEL.answers([point])
+    assert isinstance(result, Answer), result
+    return result
 
 
 def written(path: Path, eta: np.ndarray, rows: list = ROWS, noise: float = 1e-3) -> Path:

@@ -1,4 +1,4 @@
-"""What a diagnosis says of the calibrated variables, and what it says where there is no gap."""
+"""Calibrated variables in a diagnosis, and the result where there is no gap."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ X = np.array((0.3, -0.2, 0.1))
 
 
 def exact(toy: Toy, effects: dict[str, float]) -> Diagnosis:
-    """Of data at X without scatter."""
+    """Diagnosis of data at X without scatter."""
     base, (answer,) = problem(toy), toy.answers([Query(X, effects)])
     assert isinstance(answer, Answer)
     seen = base.measured(answer.eta[base.places]).observations
@@ -51,14 +51,14 @@ def plain(toy: Toy) -> Diagnosis:
 def test_the_variables_with_the_effect_are_the_truth(toy: Toy, named: Diagnosis) -> None:
     """As near as a standard error: the data have no scatter, the prior and the grid of sizes pull
     a little; a logarithm's scatter is the variable's share."""
-    found = calibrated_variables(named, toy)  # type: ignore[arg-type]
-    assert named.leading == "e0" and set(found) == {"without", "with"}
-    for variable, truth in zip(found["with"].values(), 2 * np.exp(X), strict=True):
+    calibrated = calibrated_variables(named, toy)  # type: ignore[arg-type]
+    assert named.leading == "e0" and set(calibrated) == {"without", "with"}
+    for variable, truth in zip(calibrated["with"].values(), 2 * np.exp(X), strict=True):
         assert variable["unit"] == "Pa" and 0 < variable["standard_error"] < 0.05 * truth
         assert abs(variable["value"] - truth) < variable["standard_error"]
-    assert found["without"].keys() == found["with"].keys() == set(toy.variables)
+    assert calibrated["without"].keys() == calibrated["with"].keys() == set(toy.variables)
     assert "calibrated" not in diagnosis_result(named).content()
-    assert diagnosis_result(named, None, found).content()["calibrated"] == found
+    assert diagnosis_result(named, None, calibrated).content()["calibrated"] == calibrated
 
 
 def test_the_page_has_them_with_units(toy: Toy, named: Diagnosis) -> None:
@@ -67,9 +67,9 @@ def test_the_page_has_them_with_units(toy: Toy, named: Diagnosis) -> None:
     assert "| variable | without an effect | with `e0` |" in words
     rows = re.findall(r"^\| ([ABC]) \| (\S+) MPa ± \S+ % \| (\S+) MPa ± \S+ % \|$", words, re.M)
     assert [name for name, *_ in rows] == list(toy.variables)
-    found = calibrated_variables(named, toy)  # type: ignore[arg-type]
+    calibrated = calibrated_variables(named, toy)  # type: ignore[arg-type]
     for name, _, value in rows:
-        assert float(value) == pytest.approx(1e-6 * found["with"][name]["value"], rel=1e-3)
+        assert float(value) == pytest.approx(1e-6 * calibrated["with"][name]["value"], rel=1e-3)
 
 
 def test_where_there_is_no_gap_nothing_explains_it(toy: Toy, plain: Diagnosis) -> None:

@@ -35,13 +35,13 @@ class Sloped(Toy):
 def test_what_goes_with_x_to_first_order_is_carried_exactly(toy: Toy) -> None:
     known, there = expand(toy, np.zeros(3)), expand(toy, X)
     before = toy.asked
-    found = carried(known, toy, X)
+    expansion = carried(known, toy, X)
     assert toy.asked == before + 1
-    assert found.eta == pytest.approx(there.eta) and found.x0 == pytest.approx(X)
+    assert expansion.eta == pytest.approx(there.eta) and expansion.x0 == pytest.approx(X)
     for id, nodes in there.nodes.items():
-        assert found.nodes[id].shift == pytest.approx(nodes.shift, abs=1e-13)
-        assert found.nodes[id].slope == pytest.approx(nodes.slope, abs=1e-12)
-        assert found.nodes[id].tilt == pytest.approx(nodes.tilt, abs=1e-13)
+        assert expansion.nodes[id].shift == pytest.approx(nodes.shift, abs=1e-13)
+        assert expansion.nodes[id].slope == pytest.approx(nodes.slope, abs=1e-12)
+        assert expansion.nodes[id].tilt == pytest.approx(nodes.tilt, abs=1e-13)
 
 
 def test_derivatives_of_a_polynomial() -> None:
@@ -54,19 +54,19 @@ def test_the_fit_begins_with_what_is_known() -> None:
     toy = Toy(bend=0.1)
     p = problem(toy, toy.base + toy.J @ X + toy.bend * (X @ X))
     known = expand(toy, np.zeros(3))
-    counts, found = [], []
+    counts, fits = [], []
     for each in (None, known):
         toy.asked = 0
-        found.append(plain_fit(toy, p.observations, p.places, 0.001, each))
+        fits.append(plain_fit(toy, p.observations, p.places, 0.001, each))
         counts.append(toy.asked)
-    assert found[1] == pytest.approx(found[0], abs=0.02)
+    assert fits[1] == pytest.approx(fits[0], abs=0.02)
     assert counts[1] < counts[0]
 
 
 @pytest.mark.slow
 def test_a_diagnosis_with_known_effects_says_the_same() -> None:
-    """Of a tyre with an effect that moves along with x, as its likeliest effects are asked again;
-    probabilities within 0.01."""
+    """The tyre has an effect that moves along with x, and its likeliest effects are evaluated
+    again; probabilities agree within 0.01."""
     toy = Toy(effects=3, bend=0.05)
     truth = toy.answers([Query(X, {"e1": 0.8})])[0]
     assert isinstance(truth, Answer)

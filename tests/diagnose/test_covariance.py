@@ -38,8 +38,8 @@ def test_material_laws_are_off_in_all_modes_by_family_and_by_mode_smoothly() -> 
     rows = (*p.observations.rows, mass)
     added = (model_form(rows, 0.03) - model_form(rows, 0.0)) / 0.03**2
     n, near = len(LABELS), np.exp(-(0.4**2) / (2 * 0.8**2))
-    said = [str(label) for label in LABELS]
-    torsional, lateral, vertical = map(said.index, ("[0,0] torsional", "[1,1]", "[1,0]"))
+    names = [str(label) for label in LABELS]
+    torsional, lateral, vertical = map(names.index, ("[0,0] torsional", "[1,1]", "[1,0]"))
     assert added[0, 0] == added[n, n] == pytest.approx(3.0)
     assert added[0, n] == pytest.approx(3 * near)
     assert added[vertical, torsional] == added[0, lateral] == pytest.approx(2.0)

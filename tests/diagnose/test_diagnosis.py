@@ -68,17 +68,17 @@ def test_the_section_map_finds_the_part_and_joins_what_looks_alike(chance: Chanc
     ]
     base = problem(toy)
     y = drawn(toy, base, chance.random, {}, 0.3) + 0.05 * soft
-    found = diagnose(
+    diagnosis = diagnose(
         toy, toy.rows, base.measured(y).observations, assumed=base.assumed, parts=lambda x: parts
     )
-    best = found.parts[0]
+    best = diagnosis.parts[0]
     assert best.region in ("sidewall", "bead") and set(best.same_as) == {"sidewall", "bead"} - {
         best.region
     }
     chance.normal([(best.stiffness_percent - 5) / best.stiffness_sigma])
-    (nothing,) = [p for p in found.parts if p.region == "nowhere"]
+    (nothing,) = [p for p in diagnosis.parts if p.region == "nowhere"]
     assert nothing.evidence == 0 and nothing.stiffness_sigma == pytest.approx(20)
-    assert 2 <= found.effective_rank <= 6
+    assert 2 <= diagnosis.effective_rank <= 6
 
 
 class OtherUnits(Toy):
@@ -93,14 +93,14 @@ class OtherUnits(Toy):
 
     def _answer(self, point: Query) -> Answer:
         effects = {id: e / self.effect for id, e in point.effects.items()}
-        found = super()._answer(Query(point.x / self.x, effects, point.constants))
-        return replace(found, jacobian=found.jacobian / self.x)
+        answer = super()._answer(Query(point.x / self.x, effects, point.constants))
+        return replace(answer, jacobian=answer.jacobian / self.x)
 
 
 @pytest.mark.parametrize("seed", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_a_diagnosis_does_not_depend_on_units(seed: int) -> None:
-    """Of effects and of design variables: the same probabilities, gap, errors held out and gains,
-    and sizes in the other unit."""
+    """Units of effects and of design variables change no probability, gap, error held out or gain;
+    sizes are in the other unit."""
     toys = [
         kind(effects=3, size=0.02, pressures=(200.0, 240.0), bend=0.0) for kind in (Toy, OtherUnits)
     ]
@@ -123,24 +123,24 @@ def test_a_diagnosis_does_not_depend_on_units(seed: int) -> None:
         ).content()
         for toy in toys
     )
-    for told, scale, unit in ((one, 1.0, np.ones(3)), (other, OtherUnits.effect, OtherUnits.x)):
-        for sizes in (told["parameter"], *told["parameters"].values()):
+    for content, scale, unit in ((one, 1.0, np.ones(3)), (other, OtherUnits.effect, OtherUnits.x)):
+        for sizes in (content["parameter"], *content["parameters"].values()):
             for key in ("value", "low", "high"):
                 sizes[key] /= scale
         for key in ("judged_at", "smallest_visible"):
-            told[key] = {id: e if e is None else e / scale for id, e in told[key].items()}
-        for by, width in zip(told["bias_percent"].values(), unit, strict=True):
+            content[key] = {id: e if e is None else e / scale for id, e in content[key].items()}
+        for by, width in zip(content["bias_percent"].values(), unit, strict=True):
             by |= {id: float(np.log1p(change / 100)) / width for id, change in by.items()}
-    flat = [list(numbers(told)) for told in (one, other)]
+    flat = [list(numbers(content)) for content in (one, other)]
     assert [place for place, _ in flat[0]] == [place for place, _ in flat[1]]
     values = [np.array([value for _, value in each]) for each in flat]
     assert len(values[0]) > 150
     assert values[1] == pytest.approx(values[0], rel=1e-4, abs=1e-6)
 
 
-def numbers(told: Any, place: str = "") -> Iterator[tuple[str, float]]:
+def numbers(data: Any, place: str = "") -> Iterator[tuple[str, float]]:
     """Every number of a result, and where it stands."""
-    inner = told.items() if isinstance(told, dict) else enumerate(told)
+    inner = data.items() if isinstance(data, dict) else enumerate(data)
     for key, value in inner:
         if isinstance(value, dict | list):
             yield from numbers(value, f"{place}.{key}")

@@ -21,10 +21,10 @@ pytestmark = pytest.mark.numbers
 def test_a_pair_is_told_with_both_sizes() -> None:
     toy = Toy(effects=3, size=0.05)
     d = diagnosed(toy, {"e0": 0.8, "e1": 0.6}, 7)
-    told = diagnosis_result(d).content()
-    assert told["effect"] == "e0+e1" and set(told["parameters"]) == {"e0", "e1"}
+    content = diagnosis_result(d).content()
+    assert content["effect"] == "e0+e1" and set(content["parameters"]) == {"e0", "e1"}
     words = page(DiagnosedCase(d, (), False, {}, (), toy), "tyre", "a.csv")  # type: ignore[arg-type]
-    for size in told["parameters"].values():
+    for size in content["parameters"].values():
         assert size["low"] < size["value"] < size["high"]
         number = f"{size['value']:.3g}"
         assert f"is {number}, 90 %" in words and f"{number} ({size['low']:.3g}" in words
@@ -32,26 +32,30 @@ def test_a_pair_is_told_with_both_sizes() -> None:
 
 def test_the_result_says_what_was_found() -> None:
     d = diagnosed(Toy(effects=3, pressures=(200.0, 240.0)), {"e1": 0.8}, 7)
-    told = diagnosis_result(d).content()
-    assert [(g["name"], g["p_value"], g["holm"]) for g in told["gap"]["groups"]] == [
+    content = diagnosis_result(d).content()
+    assert [(g["name"], g["p_value"], g["holm"]) for g in content["gap"]["groups"]] == [
         (g.name, g.p_value, g.corrected) for g in d.gap.groups
     ]
-    assert any(g["holm"] > g["p_value"] for g in told["gap"]["groups"])
-    by = {**told["gap"]["by_family"], **told["gap"]["by_harmonic"], **told["gap"]["by_pressure"]}
+    assert any(g["holm"] > g["p_value"] for g in content["gap"]["groups"])
+    by = {
+        **content["gap"]["by_family"],
+        **content["gap"]["by_harmonic"],
+        **content["gap"]["by_pressure"],
+    }
     assert by == {g.name: g.rms_percent for g in d.gap.groups}
-    rows = told["gap"]["residuals"]
+    rows = content["gap"]["residuals"]
     assert [row["percent"] for row in rows] == pytest.approx(100 * d.gap.residuals)
     assert [row["sigma_percent"] for row in rows] == pytest.approx(100 * d.gap.spread)
-    assert told["shrinkage"] == {
+    assert content["shrinkage"] == {
         name: getattr(d.shrinkage, name)
         for name in d.shrinkage.__dataclass_fields__  # type: ignore[union-attr]
     }
-    shares = list(told["probabilities"].values())
+    shares = list(content["probabilities"].values())
     assert shares == sorted(shares, reverse=True) and {"none", "outside"} <= set(
-        told["probabilities"]
+        content["probabilities"]
     )
     kept = {key for key, p in d.probabilities.items() if p > 1e-6}
-    assert set(told["probabilities"]) == kept | {"none", "outside"} != set(d.probabilities)
+    assert set(content["probabilities"]) == kept | {"none", "outside"} != set(d.probabilities)
 
 
 def test_the_result_says_what_was_measured_under_load() -> None:
@@ -62,12 +66,12 @@ def test_the_result_says_what_was_measured_under_load() -> None:
     mode = LoadedRow("frequency_Hz", member, 220.0, 1e3, 80.0, 0.5, {"none": 0.02, "e1": 0.0})
     lost = LoadedRow("contact_area_m2", None, 240.0, 2e3, 0.02, 1e-4, {"none": 0.5})
     rows = (area, mode, lost)
-    told = diagnosis_result(d, UnderLoad(rows, ("none", "e1"), ("e1, 240 kPa: no",))).content()
-    assert list(told["gap"]["by_load"].items()) == [
+    content = diagnosis_result(d, UnderLoad(rows, ("none", "e1"), ("e1, 240 kPa: no",))).content()
+    assert list(content["gap"]["by_load"].items()) == [
         ("1000", pytest.approx(2.0)),
         ("3000", pytest.approx(3.0)),
     ]
-    under = told["under_load"]
+    under = content["under_load"]
     assert under["effect"] == "e1" and under["failed"] == ["e1, 240 kPa: no"]
     assert under["calibrated_rms_percent"] == pytest.approx(100 * np.hypot(0.03, 0.02) / 2**0.5)
     assert under["effect_rms_percent"] == pytest.approx(1 / 2**0.5)
@@ -94,8 +98,8 @@ def test_the_result_says_what_was_measured_under_load() -> None:
 def test_the_result_is_plain_data_with_the_promised_keys() -> None:
     import json
 
-    told = diagnosis_result(diagnosed(Toy(effects=3), {}, 7)).content()
-    json.dumps(told, allow_nan=False)
+    content = diagnosis_result(diagnosed(Toy(effects=3), {}, 7)).content()
+    json.dumps(content, allow_nan=False)
     assert {
         "verdict",
         "effect",
@@ -110,10 +114,12 @@ def test_the_result_is_plain_data_with_the_promised_keys() -> None:
         "rung",
         "bias_percent",
         "next_measurements",
-    } <= set(told)
-    assert {"p_value", "rms_percent", "by_family", "by_harmonic", "by_pressure"} <= set(told["gap"])
-    assert set(told["gap"]["by_family"]) == {"in-plane", "lateral", "[0,0]"}
-    assert set(told["bias_percent"]) == {"A", "B", "C"}
+    } <= set(content)
+    assert {"p_value", "rms_percent", "by_family", "by_harmonic", "by_pressure"} <= set(
+        content["gap"]
+    )
+    assert set(content["gap"]["by_family"]) == {"in-plane", "lateral", "[0,0]"}
+    assert set(content["bias_percent"]) == {"A", "B", "C"}
     assert {
         "held_out",
         "before_percent",
@@ -122,5 +128,5 @@ def test_the_result_is_plain_data_with_the_promised_keys() -> None:
         "low",
         "high",
         "placebo_95",
-    } <= set(told["shrinkage"])
-    assert sum(told["probabilities"].values()) == pytest.approx(1, abs=1e-4)
+    } <= set(content["shrinkage"])
+    assert sum(content["probabilities"].values()) == pytest.approx(1, abs=1e-4)

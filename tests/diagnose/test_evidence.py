@@ -42,10 +42,10 @@ def test_what_an_effects_law_may_be_off_is_scatter_of_its_own() -> None:
     loose = problem(toy, assumed=Assumed(form=0.001, law=0.1)).measured(toy.base + toy.g["e0"])
     strict = replace(loose, assumed=Assumed(form=0.001, law=0.0))
     e = np.array([0.4, 1.0])
-    found = refit(loose, {"e0": e}, 2)
+    result = refit(loose, {"e0": e}, 2)
     for i, more in enumerate(loose.law(loose.added({"e0": e}, 2))):
         own = refit(strict, {"e0": e[i : i + 1]}, 1, more)
-        assert more.any() and found.ln_evidence[i] == pytest.approx(own.ln_evidence[0])
+        assert more.any() and result.ln_evidence[i] == pytest.approx(own.ln_evidence[0])
     assert refit(loose, {}, 1).ln_evidence == pytest.approx(refit(strict, {}, 1).ln_evidence)
 
 
@@ -54,19 +54,19 @@ def test_what_else_an_effect_is_is_integrated_over() -> None:
     asked for at the ends of the range alone; laws of two effects are off by themselves."""
     toy, more = flat(pressures=(160.0, 240.0)), generator(7).normal(0, 0.01, 18)
     toy.spans["e0"] = Span(-1.0, 0.5, second=True)
-    asked, plain = [], toy._answer
+    sizes, plain = [], toy._answer
 
     def told(point: Query) -> Answer:
         if not point.beside:
             return plain(point)
-        asked.append(point.effects["e0"])
+        sizes.append(point.effects["e0"])
         return replace(plain(point), beside=2 * point.effects["e0"] * more)
 
     toy._answer = told  # type: ignore[method-assign]
     p = problem(toy, assumed=Assumed(form=0.001)).measured(toy.base + 0.4 * toy.g["e0"])
-    assert sorted(asked) == [-1.0, 0.5]
+    assert sorted(sizes) == [-1.0, 0.5]
     e = np.array([-0.5, 0.4])
-    found = refit(p, {"e0": e}, 2)
+    result = refit(p, {"e0": e}, 2)
     for i in range(2):
         shift, beside = 0.04 * e[i] * toy.g["e0"], 2 * e[i] * more
         extra = np.outer(shift, shift) * p._alike + np.outer(beside, beside)
@@ -74,7 +74,7 @@ def test_what_else_an_effect_is_is_integrated_over() -> None:
         nodes = {**p.expansion.nodes, "e0": replace(p.expansion.nodes["e0"], beside={})}
         bare = replace(bare, expansion=replace(p.expansion, nodes=nodes))
         own = refit(bare, {"e0": e[i : i + 1]}, 1, extra)
-        assert found.ln_evidence[i] == pytest.approx(own.ln_evidence[0])
+        assert result.ln_evidence[i] == pytest.approx(own.ln_evidence[0])
     both, one, other = (
         p.law(p.added(effects, 2)) for effects in ({"e0": e, "e1": e**2}, {"e0": e}, {"e1": e**2})
     )
@@ -146,8 +146,10 @@ def test_the_interval_of_the_parameter_covers(chance: Chance) -> None:
     base, inside = problem(toy), []
     for _ in range(300):
         e = chance.random.uniform(0, 1)
-        found = explain(base.measured(drawn(toy, base, chance.random, {"e0": e}, 1.0)), ["e0"], 1.0)
-        inside.append(found.quantile("e0", 0.05) <= e <= found.quantile("e0", 0.95))
+        hypothesis = explain(
+            base.measured(drawn(toy, base, chance.random, {"e0": e}, 1.0)), ["e0"], 1.0
+        )
+        inside.append(hypothesis.quantile("e0", 0.05) <= e <= hypothesis.quantile("e0", 0.95))
     chance.often(inside, 0.89, 0.91)
 
 
@@ -157,7 +159,7 @@ def test_narrow_peaks_are_integrated() -> None:
     toy.tilt["e0"] *= 0
     base = problem(toy)
     p = base.measured(toy.base + 0.4321 * toy.g["e0"])
-    found = explain(p, ["e0"], 1.0)
+    hypothesis = explain(p, ["e0"], 1.0)
     S = np.linalg.inv(p.sigma + toy.J @ toy.J.T)
     grid = (np.arange(200_001) + 0.5) / 200_001
     a = toy.g["e0"] @ S @ toy.g["e0"]
@@ -165,9 +167,9 @@ def test_narrow_peaks_are_integrated() -> None:
     _, ln_det = np.linalg.slogdet(p.sigma + toy.J @ toy.J.T)
     wanted = np.log(np.mean(np.exp(ln))) - (ln_det + len(p.places) * np.log(2 * np.pi)) / 2
     assert a > 1e3
-    assert found.ln_evidence == pytest.approx(wanted, abs=0.02)
-    assert found.mean()["e0"] == pytest.approx(0.4321, abs=1e-3)
-    width = found.quantile("e0", 0.95) - found.quantile("e0", 0.05)
+    assert hypothesis.ln_evidence == pytest.approx(wanted, abs=0.02)
+    assert hypothesis.mean()["e0"] == pytest.approx(0.4321, abs=1e-3)
+    width = hypothesis.quantile("e0", 0.95) - hypothesis.quantile("e0", 0.05)
     assert width == pytest.approx(2 * 1.645 / np.sqrt(a), rel=0.15)
 
 
@@ -194,7 +196,7 @@ def test_the_intervals_of_a_pair_cover(chance: Chance) -> None:
 
 
 def test_sizes_on_the_grid_have_a_density_of_one_over_the_range() -> None:
-    """Of polynomials the weighted sum is the mean over the range, wherever that lies."""
+    """The weighted sum of a polynomial is its mean over the range, wherever the range lies."""
     nodes = expand(Toy(effects=1), np.zeros(3)).nodes["e0"]
     for low, high in ((0.0, 1.0), (-3.0, 1.0), (2.0, 7.0)):
         e, ln = grid(replace(nodes, reach=(low, high)))

@@ -49,14 +49,14 @@ def test_an_effect_reaches_as_far_as_there_are_solutions() -> None:
     plain = Expansion(np.zeros(2), np.zeros(n), none, np.zeros((n, 2, 2)), np.zeros(n), none, {})
     failed = ValueError("no such tyre")
     span = Span(-1.0, 1.0)
-    asked = {-1.0: answer(-1), -0.5: failed, 0.5: answer(0.5), 1.0: answer(1), 1.5: answer(1.5)}
-    made = _nodes("e0", plain, span, asked)
+    answers = {-1.0: answer(-1), -0.5: failed, 0.5: answer(0.5), 1.0: answer(1), 1.5: answer(1.5)}
+    made = _nodes("e0", plain, span, answers)
     assert made and made.values.tolist() == [0.0, 0.5, 1.0, 1.5] and made.reach == (0.0, 1.0)
     shift, tilt, split = made.at(np.array([0.25, 1.25]))
     assert shift[:, 0] == pytest.approx([0.25, 1.25])
     assert tilt[:, 0, 0] == pytest.approx([0.75, 3.75])
     assert split[:, 0] == pytest.approx([0.25, 1.25])
-    assert _nodes("e0", plain, span, dict.fromkeys(asked, failed)) is None
+    assert _nodes("e0", plain, span, dict.fromkeys(answers, failed)) is None
     assert isinstance(made, Nodes)
 
 
@@ -93,8 +93,8 @@ def test_two_sizes_and_their_slopes_make_a_quartic(
     assert nodes.values.tolist() == pytest.approx(wanted)
     e = np.linspace(span.low, span.high, 7)
     assert nodes.at(e)[0][:, 0] == pytest.approx(toy.curve(e), abs=1e-12)
-    asked = [q for q in toy.points if q.slopes]
-    assert [q.constants for q in asked] == ([True] if at_0 else [False, False])
+    queries = [q for q in toy.points if q.slopes]
+    assert [q.constants for q in queries] == ([True] if at_0 else [False, False])
     by_values = lagrange(nodes.values, e) @ toy.curve(nodes.values)
     assert nodes.at(e)[0][:, -1] == pytest.approx(by_values, abs=1e-12)
 
@@ -124,8 +124,8 @@ def test_a_nearer_size_is_asked_where_the_far_end_has_no_solution() -> None:
     nodes = expand(toy, np.zeros(3), splits=False).nodes["e0"]
     assert nodes.values.tolist() == [0, 0.25] and nodes.reach == (0.0, 0.25)
     toy.far = 0.1
-    found = expand(toy, np.zeros(3), splits=False)
-    assert not found.nodes and found.failed == {"e0": "no such tyre"}
+    expansion = expand(toy, np.zeros(3), splits=False)
+    assert not expansion.nodes and expansion.failed == {"e0": "no such tyre"}
 
 
 def test_an_effect_is_not_asked_again_where_it_was_asked() -> None:
@@ -175,9 +175,9 @@ def test_more_nodes_where_a_cubic_is_not_enough() -> None:
         plain = toy._answer
 
         def bent(point: Query, size: float = size, plain: Any = plain) -> Answer:
-            found = plain(point)
+            answer = plain(point)
             e = point.effects.get("e0", 0.0)
-            return replace(found, eta=found.eta + size * e * (e - 0.25) * (e - 0.75))
+            return replace(answer, eta=answer.eta + size * e * (e - 0.25) * (e - 0.75))
 
         toy._answer = bent  # type: ignore[method-assign]
         nodes = expand(toy, np.zeros(3)).nodes["e0"].values
@@ -191,18 +191,18 @@ def test_where_a_far_node_has_no_solution_the_rest_may_bend_too() -> None:
     answer = lambda e: Answer(np.full(n, e * e), none, np.zeros(n))
     plain = Expansion(np.zeros(1), np.zeros(n), none, np.zeros((n, 1, 1)), np.zeros(n), none, {})
     failed, span = ValueError("no such tyre"), Span(0.0, 1.0)
-    found = {0.25: answer(0.25), 0.75: answer(0.75), 1.0: failed}
-    more = lambda span, found: _more(_nodes("e0", plain, span, found))
-    assert more(span, found) == pytest.approx([0.75 * 0.08, 0.75 * 0.5])
-    assert more(span, {**found, 0.75: failed}) == []
-    back = {-e: each for e, each in found.items()}
+    answers = {0.25: answer(0.25), 0.75: answer(0.75), 1.0: failed}
+    more = lambda span, known: _more(_nodes("e0", plain, span, known))
+    assert more(span, answers) == pytest.approx([0.75 * 0.08, 0.75 * 0.5])
+    assert more(span, {**answers, 0.75: failed}) == []
+    back = {-e: each for e, each in answers.items()}
     assert more(Span(-1.0, 0.0), back) == pytest.approx([-0.75 * 0.08, -0.75 * 0.5])
 
 
 def test_curvature_is_that_of_two_slopes() -> None:
     toy = Toy(effects=0, bend=0.1)
-    found = expand(toy, np.array([0.2, -0.1, 0.3]))
-    assert found.hessian == pytest.approx(2 * toy.bend[:, None, None] * np.eye(3), abs=1e-9)
+    expansion = expand(toy, np.array([0.2, -0.1, 0.3]))
+    assert expansion.hessian == pytest.approx(2 * toy.bend[:, None, None] * np.eye(3), abs=1e-9)
 
 
 def test_a_change_beyond_the_range_is_asked_where_it_was_measured() -> None:
@@ -224,20 +224,20 @@ def test_an_anchor_is_exact_where_it_was_asked_and_absent_without_the_effect() -
     bare = expand(toy, np.zeros(3))
     x = np.array([0.4, -0.3, 0.2])
     toy.bend = toy.bend * 1.5  # the model at hand departs from what was expanded
-    found = anchored(bare, toy, [Query(x, {"e0": 0.6})])
+    expansion = anchored(bare, toy, [Query(x, {"e0": 0.6})])
     (answer,) = toy.answers([Query(x, {"e0": 0.6})])
     assert isinstance(answer, Answer)
-    eta, J = found.plain(x)
+    eta, J = expansion.plain(x)
     for e, wanted in ((0.6, answer), (0.0, None)):
-        a, B, _ = found.nodes["e0"].at(np.array([e]))
+        a, B, _ = expansion.nodes["e0"].at(np.array([e]))
         if wanted:
             assert eta + a[0] + B[0] @ x == pytest.approx(wanted.eta, abs=1e-9)
             assert J + B[0] == pytest.approx(wanted.jacobian, abs=1e-9)
         else:
             assert abs(a).max() == 0 and abs(B).max() == 0
-    far, _, _ = found.nodes["e0"].at(np.array([1.0]))
+    far, _, _ = expansion.nodes["e0"].at(np.array([1.0]))
     near, _, _ = bare.nodes["e0"].at(np.array([1.0]))
-    assert abs(far - near).max() <= abs(found.nodes["e0"].anchor.shift).max() * 3  # type: ignore[union-attr]
+    assert abs(far - near).max() <= abs(expansion.nodes["e0"].anchor.shift).max() * 3  # type: ignore[union-attr]
 
 
 def test_what_two_effects_do_together_is_asked() -> None:
@@ -246,20 +246,22 @@ def test_what_two_effects_do_together_is_asked() -> None:
 
     class Product(Toy):
         def _answer(self, point: Query) -> Answer:
-            found = super()._answer(point)
+            answer = super()._answer(point)
             both = point.effects.get("e0", 0.0) * point.effects.get("e1", 0.0)
-            return replace(found, eta=found.eta + 0.02 * both)
+            return replace(answer, eta=answer.eta + 0.02 * both)
 
     toy, d = Product(effects=3, bend=0.0), np.array([0.2, -0.1, 0.1])
     bare = expand(toy, np.zeros(3))
     met = anchored(bare, toy, [Query(d, {"e0": 0.8, "e1": 0.5})])
-    asked = replace(problem(toy), expansion=met)
+    with_joint = replace(problem(toy), expansion=met)
     for e in ((0.8, 0.5), (0.4, 0.25), (0.8, 0.0), (0.0, 0.5)):
         effects = dict(zip(("e0", "e1"), e, strict=True))
         (answer,) = toy.answers([Query(d, effects)])
         assert isinstance(answer, Answer)
         at = {id: np.array([size]) for id, size in effects.items()}
-        assert asked.predicted(at, d[None])[0] == pytest.approx(answer.eta, abs=1e-9)
-    without = asked.added({"e0": np.array([0.8]), "e2": np.array([0.3])}, 1)[0]
-    plain = replace(asked, expansion=bare).added({"e0": np.array([0.8]), "e2": np.array([0.3])}, 1)
+        assert with_joint.predicted(at, d[None])[0] == pytest.approx(answer.eta, abs=1e-9)
+    without = with_joint.added({"e0": np.array([0.8]), "e2": np.array([0.3])}, 1)[0]
+    plain = replace(with_joint, expansion=bare).added(
+        {"e0": np.array([0.8]), "e2": np.array([0.3])}, 1
+    )
     assert without == pytest.approx(plain[0])

@@ -48,8 +48,8 @@ def test_what_laws_do_falls_into_what_is_shared_and_what_is_not() -> None:
     own = np.zeros(len(labels))
     own[np.flatnonzero(inside)[:2]] = 1e-3, -1e-3
     d = all_modes + 1e-3 * family + own
-    found = material_laws.parts(d, labels)
-    for part, made in zip(found, (all_modes + 0 * family, 1e-3 * family, own), strict=True):
+    parts = material_laws.parts(d, labels)
+    for part, made in zip(parts, (all_modes + 0 * family, 1e-3 * family, own), strict=True):
         assert part == pytest.approx(np.broadcast_to(made, d.shape), abs=1e-12)
 
 

@@ -37,7 +37,7 @@ def test_the_mass_is_in_no_contrast() -> None:
 
 
 def test_contrasts_are_means_and_slopes() -> None:
-    """Of residuals that grow linearly with c and ln p, with a step of the lateral modes."""
+    """Residuals that grow linearly with c and ln p, with a step of the lateral modes."""
     lateral = np.array([family(row) == "lateral" for row in ROWS])
     plane = np.array([family(row) == "in-plane" for row in ROWS])
     c = np.array([row.label.c for row in ROWS if row.label])

@@ -63,7 +63,7 @@ def test_explanations_are_averages_over_labelings(p: float) -> None:
     toy = linear()
     y = toy.base + 0.7 * toy.g["e0"] + toy.J @ np.array([0.1, -0.2, 0.05])
     readings = both(toy, y, p)
-    found = diagnose(toy, toy.rows, readings, assumed=SINGLE)
+    diagnosis = diagnose(toy, toy.rows, readings, assumed=SINGLE)
     prior = {"none": PRIOR_NONE, **dict.fromkeys(toy.spans, priors(3, 0.0)[1])}
     ln = []
     for reading in readings:
@@ -74,8 +74,8 @@ def test_explanations_are_averages_over_labelings(p: float) -> None:
     table = np.array([[*own.values()] for own in ln]) + np.log([p, 1 - p])[:, None]
     table = np.exp(table - table.max())
     expected = dict(zip(ln[0], (table / table.sum()).sum(0), strict=True))
-    assert found.probabilities == pytest.approx(expected, abs=1e-4)
-    assert found.readings == pytest.approx((table / table.sum()).sum(1), abs=1e-4)
+    assert diagnosis.probabilities == pytest.approx(expected, abs=1e-4)
+    assert diagnosis.readings == pytest.approx((table / table.sum()).sum(1), abs=1e-4)
 
 
 def test_an_effect_makes_a_labeling_likelier() -> None:
@@ -84,9 +84,9 @@ def test_an_effect_makes_a_labeling_likelier() -> None:
     toy = linear()
     y = toy.base + 0.9 * toy.g["e0"]
     plain = with_exchanged(problem(toy, y, assumed=SINGLE).observations, A, B).y
-    found = diagnose(toy, toy.rows, both(toy, plain, 0.9), assumed=SINGLE)
-    assert found.readings[1] > 0.99 and found.verdict.key == "e0"
-    assert found.problem.observations.y == pytest.approx(y)
+    diagnosis = diagnose(toy, toy.rows, both(toy, plain, 0.9), assumed=SINGLE)
+    assert diagnosis.readings[1] > 0.99 and diagnosis.verdict.key == "e0"
+    assert diagnosis.problem.observations.y == pytest.approx(y)
 
 
 @pytest.mark.slow
@@ -106,11 +106,11 @@ def test_several_effects_are_weighed_under_every_labeling() -> None:
     toy = Toy(effects=6, pressures=(240.0,))
     first = problem(toy, toy.base + 0.9 * toy.g["e1"])
     second = replace(first, observations=with_exchanged(first.observations, A, B))
-    found = [weigh(each) for each in (first, second)]
-    sets = [{h.key for h in each} for each in found]
+    weighed = [weigh(each) for each in (first, second)]
+    sets = [{h.key for h in each} for each in weighed]
     assert sets[0] != sets[1]  # else it shows nothing
-    for own, there in zip(found, (first, second), strict=True):
-        every = {h.key: h for h in with_sets(there, own, [*found[0], *found[1]])}
+    for own, there in zip(weighed, (first, second), strict=True):
+        every = {h.key: h for h in with_sets(there, own, [*weighed[0], *weighed[1]])}
         assert {*every} == sets[0] | sets[1]
         assert all(every[h.key] is h for h in own)
         for key in sorted({*every} - {h.key for h in own})[:1]:
@@ -127,16 +127,16 @@ def test_a_verdict_hangs_on_a_label() -> None:
     sign = np.array([(label == A) - float(label == B) for label, _ in toy.rows])
     toy.g["e0"] = apart / 0.9 * sign  # 0.9 of it exchanges them
     half = diagnose(toy, toy.rows, both(toy, plain, 0.5), assumed=SINGLE).readings[1]
-    found = diagnose(toy, toy.rows, both(toy, plain, half), assumed=SINGLE)
-    assert found.readings == pytest.approx((0.5, 0.5), abs=1e-3)
-    assert found.verdict.kind == "undecided" and not found.robustness.robust
+    diagnosis = diagnose(toy, toy.rows, both(toy, plain, half), assumed=SINGLE)
+    assert diagnosis.readings == pytest.approx((0.5, 0.5), abs=1e-3)
+    assert diagnosis.verdict.kind == "undecided" and not diagnosis.robustness.robust
     (lower, _), (upper, _) = both(toy, plain, half)[0].labels
     hertz = f"the label of {lower}, {upper}"
-    assert found.robustness.hangs_on == (
+    assert diagnosis.robustness.hangs_on == (
         f"{hertz} ([3,0], [3,1], 0.50 probable, then no gap)",
         f"{hertz} ([3,1], [3,0], 0.50 probable, then e0 named)",
     )
-    assert found.robustness.low < 0.05 and found.robustness.high > 0.95
+    assert diagnosis.robustness.low < 0.05 and diagnosis.robustness.high > 0.95
     for p, verdict in ((1 - 1e-15, "no_gap"), (1e-15, "named")):
         sure = diagnose(toy, toy.rows, both(toy, plain, p), assumed=SINGLE)
         assert sure.verdict.kind == verdict

@@ -24,7 +24,7 @@ pytestmark = pytest.mark.numbers
 def test_probabilities_are_calibrated_where_the_truth_is_drawn_from_the_prior(
     chance: Chance,
 ) -> None:
-    """Of all that is given a probability p, the share p is true, in each of ten bins; and the truth
+    """The share p is true of all that is given a probability p, in each of ten bins; and the truth
     is given more than beforehand in 7 of 10 tyres at least.
 
     False failures: 1.1e-6.
@@ -62,14 +62,14 @@ def test_false_alarms_and_hits(chance: Chance) -> None:
     P, _, _ = projection(base, np.zeros(3))
     alarms, right = [], []
     for _ in range(40):
-        found = weigh(base.measured(drawn(toy, base, random, {}, 0.3)), pairs=False)
-        verdict = decide(found, probabilities(found), len(base.places), 3)
+        hypotheses = weigh(base.measured(drawn(toy, base, random, {}, 0.3)), pairs=False)
+        verdict = decide(hypotheses, probabilities(hypotheses), len(base.places), 3)
         alarms.append(verdict.kind == "named")
         id, e = f"e{random.integers(8)}", random.uniform(0.2, 1)
         while separate(base, P, {id: e}).lambdas[id] < 25:
             id, e = f"e{random.integers(8)}", random.uniform(0.2, 1)
-        found = weigh(base.measured(drawn(toy, base, random, {id: e}, 0.3)), pairs=False)
-        p = probabilities(found)
+        hypotheses = weigh(base.measured(drawn(toy, base, random, {id: e}, 0.3)), pairs=False)
+        p = probabilities(hypotheses)
         right.append(max(p, key=lambda key: p[key]) == id)
     chance.often(alarms, 0.0, 0.02)
     chance.often(right, 0.93)
@@ -106,13 +106,13 @@ def test_twins_that_nothing_tells_apart_share_their_probability() -> None:
     toy.tilt["twin"] = 0.98 * toy.tilt["e0"]
     base = problem(toy)
     p = base.measured(drawn(toy, base, generator(10), {"e0": 0.6}, 0.3))
-    found = weigh(p, pairs=False)
-    share = probabilities(found)
+    hypotheses = weigh(p, pairs=False)
+    share = probabilities(hypotheses)
     assert share["twin"] / share["e0"] == pytest.approx(1 / 0.98, rel=2e-3)
     P, _, _ = projection(p, np.zeros(3))
     groups = separate(p, P, {"e0": 0.6, "twin": 0.6}).groups(["e0", "twin", "e1"])
     assert ["e0", "twin"] in groups
-    verdict = decide(found, share, len(p.places), 3)
+    verdict = decide(hypotheses, share, len(p.places), 3)
     assert verdict.kind == "undecided" and {"e0", "twin"} <= set(verdict.candidates)
 
 
@@ -128,10 +128,10 @@ def test_near_twins_have_the_probability_together(chance: Chance) -> None:
     together, one = [], []
     for _ in range(20):
         p = base.measured(drawn(toy, base, chance.random, {"e0": 0.6}, 0.3))
-        found = weigh(p, pairs=False)
-        share = probabilities(found)
+        hypotheses = weigh(p, pairs=False)
+        share = probabilities(hypotheses)
         together.append(share["e0"] + share["twin"] > 0.8)
-        verdict = decide(found, share, len(p.places), 3)
+        verdict = decide(hypotheses, share, len(p.places), 3)
         one.append({verdict.key, *verdict.candidates[:1]} & {"e0", "twin"})
     chance.often(together, 0.95)
     chance.often([bool(each) for each in one], 0.95)
@@ -143,13 +143,13 @@ def test_an_effect_is_found_with_values_missing(chance: Chance) -> None:
     False failures: 1e-7.
     """
     toy = Toy()
-    base, found = problem(toy), []
+    base, right = problem(toy), []
     for _ in range(20):
         p = base.measured(drawn(toy, base, chance.random, {"e1": 0.7}, 0.3))
         p = p.only(chance.random.random(len(p.places)) > 0.15)
         share = probabilities(weigh(p, pairs=False))
-        found.append(max(share, key=lambda key: share[key]) == "e1")
-    chance.often(found, 0.95)
+        right.append(max(share, key=lambda key: share[key]) == "e1")
+    chance.often(right, 0.95)
 
 
 def test_an_effect_at_the_bound_of_its_range_is_not_named() -> None:
@@ -158,8 +158,8 @@ def test_an_effect_at_the_bound_of_its_range_is_not_named() -> None:
     toy = Toy(size=0.04, effects=3)
     base = problem(toy, assumed=Assumed(form=0.001, law=0.3))
     for e, kind in ((1.3, "undecided"), (0.8, "named"), (3.0, "outside")):
-        found = weigh(base.measured(toy.base + e * toy.g["e1"]), pairs=False)
-        verdict = decide(found, probabilities(found), len(toy.base), 3)
+        hypotheses = weigh(base.measured(toy.base + e * toy.g["e1"]), pairs=False)
+        verdict = decide(hypotheses, probabilities(hypotheses), len(toy.base), 3)
         assert verdict.kind == kind and verdict.best == "e1"
         assert verdict.candidates[0] == ("outside" if kind == "outside" else "e1")
         assert ("e1 at the bound of its range" in verdict.words) == (kind != "named")
@@ -186,9 +186,9 @@ def test_a_toggled_run_cancels_what_both_share(chance: Chance) -> None:
         e = chance.random.uniform(0, 1)
         y = drawn(toy, both, chance.random, {}, 1.0)
         y[: len(toy.base)] += e * toy.g["e0"]
-        found = explain(both.measured(y), ["e0"], 1.0)
-        inside.append(found.quantile("e0", 0.05) <= e <= found.quantile("e0", 0.95))
-        close.append(abs(found.mean()["e0"] - e) < 0.1)
+        hypothesis = explain(both.measured(y), ["e0"], 1.0)
+        inside.append(hypothesis.quantile("e0", 0.05) <= e <= hypothesis.quantile("e0", 0.95))
+        close.append(abs(hypothesis.mean()["e0"] - e) < 0.1)
     chance.often(inside, 0.88, 0.92)
     chance.often(close, 0.8)
 
@@ -206,10 +206,10 @@ def test_an_effects_law_that_is_off_is_still_the_effect(chance: Chance) -> None:
     for _ in range(20):
         real = np.tile(1 + 0.1 * chance.random.normal(size=len(LABELS)), 3)
         y = toy.base + real * toy.g["e0"]
-        for law, told in ((0.0, outside), (0.1, named)):
+        for law, verdicts in ((0.0, outside), (0.1, named)):
             p = replace(strict, assumed=Assumed(form=0.001, law=law)).measured(y)
-            found = weigh(p, pairs=False)
-            verdict = decide(found, probabilities(found), len(y), 3)
-            told.append((verdict.kind, verdict.key))
+            hypotheses = weigh(p, pairs=False)
+            verdict = decide(hypotheses, probabilities(hypotheses), len(y), 3)
+            verdicts.append((verdict.kind, verdict.key))
     chance.often([kind == "outside" for kind, _ in outside], 0.9)
     chance.often([each == ("named", "e0") for each in named], 0.9)

@@ -1,4 +1,4 @@
-"""What to measure next: the menu, gains by their formula, information."""
+"""Next measurements: the menu, gains by their formula, information."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ Array = np.ndarray
 
 
 def test_the_menu_of_measurements() -> None:
-    """What is offered, at which price: pressures far from those measured, the next harmonics, the
-    mass where it is not known; a likely effect switched off, sources by themselves."""
+    """The menu with its prices: pressures far from those measured, the next harmonics, the mass
+    where it is not known; a likely effect switched off, sources by themselves."""
     toy = Toy(effects=3, pressures=(200.0, 250.0))
     p = problem(toy)
     sizes = {id: {id: np.array([0.4, 0.6])} for id in toy.spans}
@@ -48,7 +48,7 @@ def test_the_menu_of_measurements() -> None:
         answers = lambda points: [answer, *map(moved, points[1:])]
         return SimpleNamespace(answers=answers, sloped_at_0=())
 
-    found = rank(
+    candidates = rank(
         p,
         np.zeros(3),
         likely,
@@ -56,7 +56,7 @@ def test_the_menu_of_measurements() -> None:
         ("rubber_density", "section gauge 1"),
         OtherStates(further, 240.0),
     )
-    assert {c.what: c.hours for c in found} == {
+    assert {c.what: c.hours for c in candidates} == {
         "measure by itself: rubber density": 1.0,
         "cut the tyre and measure its section": 8.0,
         "dismount the tyre, mount it again and measure all once more": 3.0,
@@ -68,8 +68,8 @@ def test_the_menu_of_measurements() -> None:
         "measure [5,0] and [5,1], too": 1.0,
         "weigh the tyre": 0.1,
     }
-    assert [c.gain for c in found] == sorted((c.gain for c in found), reverse=True)
-    assert all(c.gain > -1e-9 for c in found)
+    assert [c.gain for c in candidates] == sorted((c.gain for c in candidates), reverse=True)
+    assert all(c.gain > -1e-9 for c in candidates)
     few = rank(p, np.zeros(3), {**likely, "e1": 0.295, "e2": 0.005}, sizes, ())
     assert not any("e2" in c.what for c in few)
     assert rank(p, np.zeros(3), {"e0": 0.995, "none": 0.005}, sizes, ()) == []
@@ -86,19 +86,19 @@ def test_what_further_rows_gain_from_an_effect_whose_slope_at_0_is_known() -> No
     p = problem(toy)
     likely = {"none": 0.4, "e0": 0.3, "e0+e1": 0.3}
     sizes = {"e0": {"e0": np.array([0.5])}, "e0+e1": {"e0": np.array([1.0]), "e1": np.array([0.5])}}
-    asked: list[Query] = []
+    queries: list[Query] = []
 
     def ranked(model: Any) -> float:
-        found = rank(
+        candidates = rank(
             p, np.zeros(3), likely, sizes, (), OtherStates(lambda rows: model(len(rows)), 240.0)
         )
-        return next(c.gain for c in found if "[5,0]" in c.what)
+        return next(c.gain for c in candidates if "[5,0]" in c.what)
 
     def answered(count: int, straight: bool) -> Any:
         zero, J = np.zeros(count), np.tile([0.1, 0.2, 0.3], (count, 1))
 
         def answer(point: Query) -> Answer:
-            asked.append(point)
+            queries.append(point)
             e0, e1 = (point.effects.get(id, 0.0) for id in ("e0", "e1"))
             eta = zero + 3 * toy.curve(e0) + 0.004 * e1
             slopes = dict.fromkeys(point.slopes, zero + 3 * toy.curve.deriv()(0.0))
@@ -108,11 +108,11 @@ def test_what_further_rows_gain_from_an_effect_whose_slope_at_0_is_known() -> No
         return SimpleNamespace(answers=lambda q: [*map(answer, q)], sloped_at_0=known)
 
     whole = ranked(lambda count: answered(count, False))
-    assert any(q.effects.get("e0") for q in asked)
-    asked.clear()
+    assert any(q.effects.get("e0") for q in queries)
+    queries.clear()
     assert ranked(lambda count: answered(count, True)) == pytest.approx(whole, rel=1e-9)
-    assert [dict(q.effects) for q in asked] == [{}, {}, {}, {"e1": 0.5}]
-    assert asked[0].slopes == ("e0",) and asked[0].constants
+    assert [dict(q.effects) for q in queries] == [{}, {}, {}, {"e1": 0.5}]
+    assert queries[0].slopes == ("e0",) and queries[0].constants
 
 
 def informed(p: Sequence[float], squared: Array) -> float:
@@ -128,7 +128,7 @@ def test_the_gains_of_what_is_switched_and_checked_by_their_formula() -> None:
     toy.tilt = {id: 0 * tilt for id, tilt in toy.tilt.items()}
     p = problem(toy)
     sizes, likely = {id: {id: np.ones(1)} for id in ("e0", "e1")}, {"e0": 0.5, "e1": 0.3}
-    found = {c.what: c for c in rank(p, np.zeros(3), likely, sizes, toy.sources)}
+    candidates = {c.what: c for c in rank(p, np.zeros(3), likely, sizes, toy.sources)}
 
     def apart(S: Array, J: Array, off: Array) -> float:
         whole = S + J @ np.diag(toy.spread**2) @ J.T
@@ -141,7 +141,7 @@ def test_the_gains_of_what_is_switched_and_checked_by_their_formula() -> None:
     now = apart(p.sigma, toy.J, off)
     left = CHECKED**2 / (1 + CHECKED**2)  # of its variance
     S = p.sigma - (1 - left) * np.outer(toy.constants[:, 1], toy.constants[:, 1])
-    checked = found["measure by itself: gauge"]
+    checked = candidates["measure by itself: gauge"]
     assert checked.gain == pytest.approx(bound(apart(S, toy.J, off) - now), rel=1e-6)
     both = problem(toy, changes=(Toggle("e0", 0.0),))
     twice = np.vstack([toy.J, toy.J])
@@ -150,7 +150,7 @@ def test_the_gains_of_what_is_switched_and_checked_by_their_formula() -> None:
         ("dismount the tyre, mount it again and measure all once more", off, 3.0),
     ):
         squared = apart(both.sigma, twice, np.concatenate([off, moved])) - now
-        assert found[words].gain == pytest.approx(bound(squared) / hours, rel=1e-6)
+        assert candidates[words].gain == pytest.approx(bound(squared) / hours, rel=1e-6)
 
 
 def test_information_is_none_of_what_is_known_and_at_most_what_is_open() -> None:
@@ -161,14 +161,14 @@ def test_information_is_none_of_what_is_known_and_at_most_what_is_open() -> None
     for off in (1e-6, 0.5, 1.0, 2.0, 4.0, 8.0, 20.0):
         shifts = {"a": np.zeros((1, 2)), "b": np.array([[0.0, off]])}
         one = Look(np.eye(2), np.zeros((2, 1)), shifts)
-        found = one.information(1, {"a": 0.6, "b": 0.4}, np.ones(1))
+        gain = one.information(1, {"a": 0.6, "b": 0.4}, np.ones(1))
         normal = lambda m: np.exp(-((y - m) ** 2) / 2) / np.sqrt(2 * np.pi)
         both = 0.6 * normal(0) + 0.4 * normal(off)
         left = lambda p, both=both: -p * np.log(np.maximum(p / both, 1e-300))
         rest = trapezoid(left(0.6 * normal(0)) + left(0.4 * normal(off)), y)
-        assert before <= found <= open_ - rest + 1e-9
-        before = found
-    assert found == pytest.approx(open_, rel=1e-9)
+        assert before <= gain <= open_ - rest + 1e-9
+        before = gain
+    assert gain == pytest.approx(open_, rel=1e-9)
     known = Look(
         np.array([[1.0, 1.0], [1.0, 1.0 + 1e-9]]),
         np.zeros((2, 1)),
@@ -197,45 +197,45 @@ def test_tools_of_a_laboratory_are_offered_for_what_they_show() -> None:
     p = problem(toy)
     sizes = {id: {id: np.array([0.4, 0.5, 0.6])} for id in toy.spans}
     likely = {"none": 0.4, "rim_width": 0.2, "spindle_tilt": 0.15, "wheel_free": 0.15}
-    found = rank(p, np.zeros(3), likely, sizes, ())
-    assert {c.what: c.hours for c in found} == {
+    candidates = rank(p, np.zeros(3), likely, sizes, ())
+    assert {c.what: c.hours for c in candidates} == {
         "measure the rim between its flanges": 0.2,
         "clamp the rim rigidly in place of the spindle and measure again": 3.0,
         "dismount the tyre, mount it again and measure all once more": 3.0,
     }
-    assert "rim" in found[0].what
+    assert "rim" in candidates[0].what
     air = rank(p, np.zeros(3), {"none": 0.5, "cavity_air": 0.3, "belt_angle": 0.2}, sizes, ())
     assert {c.what: c.hours for c in air} == {
         "cut the tyre and measure its section": 8.0,
         "inflate with helium and measure again": 1.0,
         "dismount the tyre, mount it again and measure all once more": 3.0,
     }
-    assert all(c.gain > 0 for c in (*found, *air))
+    assert all(c.gain > 0 for c in (*candidates, *air))
 
 
 def test_cosines_and_distances_by_their_formula() -> None:
-    """Of shifts at the sizes that effects are judged at, in the metric P."""
+    """Shifts at the sizes at which effects are judged, in the metric P."""
     toy = Toy(effects=3, size=0.02, bend=0.0, pressures=(240.0,))
     toy.tilt = {id: 0 * tilt for id, tilt in toy.tilt.items()}
     p = problem(toy)
     P = np.diag(generator("metric").uniform(1e5, 4e5, len(p.places)))
     sizes = {"e0": 0.5, "e1": 0.75}  # e2 has none: it is judged at full size
-    found = separate(p, P, sizes)
+    separability = separate(p, P, sizes)
     at = {**sizes, "e2": 1.0}
-    g = np.array([at[id] * toy.g[id] for id in found.ids])
+    g = np.array([at[id] * toy.g[id] for id in separability.ids])
     gram = g @ P @ g.T
-    assert found.sizes == pytest.approx(at)
-    assert [found.lambdas[id] for id in found.ids] == pytest.approx(np.diag(gram))
-    whole = [toy.g[id] @ P @ toy.g[id] for id in found.ids]
-    assert [found.full[id] for id in found.ids] == pytest.approx(whole)
+    assert separability.sizes == pytest.approx(at)
+    assert [separability.lambdas[id] for id in separability.ids] == pytest.approx(np.diag(gram))
+    whole = [toy.g[id] @ P @ toy.g[id] for id in separability.ids]
+    assert [separability.full[id] for id in separability.ids] == pytest.approx(whole)
     root = np.sqrt(np.diag(gram))
-    assert found.cosines == pytest.approx(gram / np.outer(root, root))
+    assert separability.cosines == pytest.approx(gram / np.outer(root, root))
     grid = np.linspace(0, 1, 81)
-    for i, a in enumerate(found.ids):
-        for j, b in enumerate(found.ids):
+    for i, a in enumerate(separability.ids):
+        for j, b in enumerate(separability.ids):
             off = grid[:, None] * toy.g[b] - at[a] * toy.g[a]
             wanted = np.einsum("qn,nm,qm->q", off, P, off).min() if i != j else 0.0
-            assert found.distances[i, j] == pytest.approx(wanted)
+            assert separability.distances[i, j] == pytest.approx(wanted)
 
 
 def test_the_gains_of_further_rows_by_their_formula() -> None:
@@ -263,11 +263,14 @@ def test_the_gains_of_further_rows_by_their_formula() -> None:
         answers = lambda points: [answer(point) for point in points]
         return SimpleNamespace(answers=answers, sloped_at_0=())
 
-    found = {
+    candidates = {
         c.what: c for c in rank(p, np.zeros(3), likely, sizes, (), OtherStates(further, 240.0))
     }
-    assert len(found) == 8  # repeats, two toggles, 100, 160 and 320 kPa, harmonics, the mass
-    assert found.keys() > {"measure the same modes at 160 kPa", "measure the same modes at 320 kPa"}
+    assert len(candidates) == 8  # repeats, two toggles, 100, 160 and 320 kPa, harmonics, the mass
+    assert candidates.keys() > {
+        "measure the same modes at 160 kPa",
+        "measure the same modes at 320 kPa",
+    }
 
     def apart(at: list[int], form: float) -> Array:
         whole = np.vstack([toy.J, J[at]])
@@ -305,7 +308,7 @@ def test_the_gains_of_further_rows_by_their_formula() -> None:
         ),
     ):
         gain = informed(list(likely.values()), apart(at, form) - now) / hours
-        assert found[what].gain == pytest.approx(gain, rel=1e-6), what
+        assert candidates[what].gain == pytest.approx(gain, rel=1e-6), what
 
 
 def test_what_is_not_asked_twice_or_has_no_answer_is_not_offered() -> None:
@@ -315,10 +318,10 @@ def test_what_is_not_asked_twice_or_has_no_answer_is_not_offered() -> None:
     p = problem(toy)
     sizes = {id: {id: np.array([0.5])} for id in toy.spans}
     likely = {id: 0.07 + 0.001 * i for i, id in enumerate(sizes)}
-    asked: list = []
+    requests: list = []
 
     def further(wanted: list) -> Any:
-        asked.append(wanted)
+        requests.append(wanted)
         return SimpleNamespace(answers=lambda q: [ValueError("no")] * len(q), sloped_at_0=())
 
     words = [c.what for c in rank(p, np.zeros(3), likely, sizes, (), OtherStates(further, 240.0))]
@@ -326,14 +329,14 @@ def test_what_is_not_asked_twice_or_has_no_answer_is_not_offered() -> None:
         *(f"measure again without e{i}" for i in (10, 11, *range(2, 10)))
     ]
     assert len(words) == 11  # and mounted again
-    (rows,) = asked
+    (rows,) = requests
     assert {pressure for _, pressure in rows} == {100.0, 160.0, 320.0, 220.0, 260.0, 0.0}
     o = p.observations
     weighed = replace(
         p, observations=replace(o, rows=(*o.rows[:-1], Observable("mass_kg", None, 0.0)))
     )
     rank(weighed, np.zeros(3), likely, sizes, (), OtherStates(further, 240.0))
-    assert (None, 0.0) not in asked[1]
+    assert (None, 0.0) not in requests[1]
 
 
 def test_pressures_that_are_offered_are_the_tyres() -> None:

@@ -21,9 +21,9 @@ def test_a_pair_is_a_mean_and_a_split_whichever_comes_first(tmp_path: Path) -> N
     low, high = "frequency_Hz,2,0,,{},240,0,79.0,0.2", "frequency_Hz,2,0,,{},240,0,80.0,0.3"
     one = observe(read(tmp_path, low.format(1), high.format(2)))
     other = observe(read(tmp_path, high.format(1), low.format(2)))
-    for found in (one, other):
-        assert found.y == pytest.approx([np.log(79.0 * 80.0) / 2])
-        assert found.split == pytest.approx([np.log(80 / 79)])
+    for observations in (one, other):
+        assert observations.y == pytest.approx([np.log(79.0 * 80.0) / 2])
+        assert observations.split == pytest.approx([np.log(80 / 79)])
     sa, sb = 0.2 / 79, 0.3 / 80
     assert one.scatter == pytest.approx([np.hypot(sa, sb) / 2])
     assert one.split_scatter == pytest.approx([np.hypot(sa, sb)])
@@ -62,9 +62,9 @@ def test_repeats_tell_the_scatter_and_what_a_run_shares(chance: Chance) -> None:
                     for x in labels
                 ]
             )
-        found = observe(runs[0], runs[1:])
-        own.append(np.mean(found.scatter**2) * 3 / 0.002**2)
-        shared.append(found.common**2 * 3 / 0.004**2)
+        observations = observe(runs[0], runs[1:])
+        own.append(np.mean(observations.scatter**2) * 3 / 0.002**2)
+        shared.append(observations.common**2 * 3 / 0.004**2)
     chance.mean(own, 0.96, 1.04)
     chance.mean(shared, 0.96, 1.04)
 
@@ -76,10 +76,12 @@ def test_what_is_not_used_is_said(tmp_path: Path) -> None:
         "frequency_Hz,1,0,,symmetric,240,4000,70,0.5",
     ]
     run = read(tmp_path, *lines)
-    found = observe(run, [], [run])  # of the first run it is compared, not left out
-    assert len(found.rows) == 2 and len(found.left_out) == 2
-    assert "contact_area_m2" in found.left_out[0] and "under load" in found.left_out[1]
-    assert all(words.startswith("measured.csv, line ") for words in found.left_out)
+    observations = observe(run, [], [run])  # of the first run it is compared, not left out
+    assert len(observations.rows) == 2 and len(observations.left_out) == 2
+    assert (
+        "contact_area_m2" in observations.left_out[0] and "under load" in observations.left_out[1]
+    )
+    assert all(words.startswith("measured.csv, line ") for words in observations.left_out)
 
 
 def test_repeats_that_cannot_be_used_are_said(tmp_path: Path) -> None:
@@ -89,9 +91,9 @@ def test_repeats_that_cannot_be_used_are_said(tmp_path: Path) -> None:
         "frequency_Hz,4,0,,,240,0,116.3,0.2",
         "frequency_Hz,1,0,,,240,0,58,0.2",
     ]
-    found = observe(read(tmp_path, *both), [read(tmp_path, *again)])
-    assert len(found.rows) == 3 and found.y[0] == pytest.approx(np.log(79.5))
-    assert found.left_out == (
+    observations = observe(read(tmp_path, *both), [read(tmp_path, *again)])
+    assert len(observations.rows) == 3 and observations.y[0] == pytest.approx(np.log(79.5))
+    assert observations.left_out == (
         "repeats of [2,0] at 240 kPa: not in every file, the first one's value and sigma hold",
         "[1,0] at 240 kPa: in repeats only",
     )
@@ -111,13 +113,13 @@ def test_a_toggled_run_is_no_repeat(tmp_path: Path) -> None:
     run, repeat = read(tmp_path, *lines), read(tmp_path, *again)
     toggled = read(tmp_path, lines[0], "frequency_Hz,1,0,,,240,0,40,0.3")
     for repeats in ([], [repeat]):
-        alone, found = observe(run, repeats), observe(run, repeats, [toggled])
-        assert not found.left_out and found.common == alone.common
-        assert found.y[:3] == pytest.approx(alone.y)
-        assert found.scatter[:3] == pytest.approx(alone.scatter)
-        assert found.y[3:] == pytest.approx(np.log([40, 79.5]))
-        assert found.scatter[3:] == pytest.approx([0.3 / 40, 0.2 / 79.5])
-        assert [row.run for row in found.rows] == [0, 0, 0, 1, 1]
+        alone, observations = observe(run, repeats), observe(run, repeats, [toggled])
+        assert not observations.left_out and observations.common == alone.common
+        assert observations.y[:3] == pytest.approx(alone.y)
+        assert observations.scatter[:3] == pytest.approx(alone.scatter)
+        assert observations.y[3:] == pytest.approx(np.log([40, 79.5]))
+        assert observations.scatter[3:] == pytest.approx([0.3 / 40, 0.2 / 79.5])
+        assert [row.run for row in observations.rows] == [0, 0, 0, 1, 1]
 
 
 def test_the_scatter_of_repeats_by_the_analysis_of_variance() -> None:
@@ -131,7 +133,7 @@ def test_the_scatter_of_repeats_by_the_analysis_of_variance() -> None:
         ]
         for column in table.T
     ]
-    found = observe(runs[0], runs[1:])
+    observations = observe(runs[0], runs[1:])
     rest = [
         [y - table[i].mean() - table[:, k].mean() + table.mean() for k, y in enumerate(row)]
         for i, row in enumerate(table)
@@ -139,6 +141,6 @@ def test_the_scatter_of_repeats_by_the_analysis_of_variance() -> None:
     squares = np.sum(np.square(rest), axis=1)
     pooled = squares.sum() / ((4 - 1) * (3 - 1))
     between_runs = 4 * np.sum((table.mean(0) - table.mean()) ** 2) / (3 - 1)
-    assert found.y == pytest.approx(np.log(50) + table.mean(1))
-    assert found.common**2 == pytest.approx((between_runs - pooled) / 4 / 3)
-    assert found.scatter**2 == pytest.approx((4 * pooled + squares) / (4 + 2) / 3)
+    assert observations.y == pytest.approx(np.log(50) + table.mean(1))
+    assert observations.common**2 == pytest.approx((between_runs - pooled) / 4 / 3)
+    assert observations.scatter**2 == pytest.approx((4 * pooled + squares) / (4 + 2) / 3)

@@ -1,4 +1,5 @@
-"""What no effect of the catalogue explains: misread and exchanged labels, strange modes, trends."""
+"""Gaps that no effect of the catalogue explains: misread and exchanged labels, strange modes,
+trends."""
 
 from __future__ import annotations
 
@@ -23,14 +24,14 @@ def test_a_misread_label_is_outside_and_named(chance: Chance) -> None:
     False failures: 1e-7.
     """
     toy = Toy()
-    base, told = problem(toy), []
+    base, named = problem(toy), []
     for _ in range(20):
         y = drawn(toy, base, chance.random, {}, 0.03)
         y[6 :: len(LABELS)] += 0.08
-        found = weigh(base.measured(y), pairs=False)
-        verdict = decide(found, probabilities(found), len(y), 3)
-        told.append(verdict.kind == "outside" and f"{LABELS[6]} is misread" in verdict.words)
-    chance.often(told, 0.95)
+        hypotheses = weigh(base.measured(y), pairs=False)
+        verdict = decide(hypotheses, probabilities(hypotheses), len(y), 3)
+        named.append(verdict.kind == "outside" and f"{LABELS[6]} is misread" in verdict.words)
+    chance.often(named, 0.95)
 
 
 def test_exchanged_labels_are_found_whatever_else_is_there(chance: Chance) -> None:
@@ -39,19 +40,19 @@ def test_exchanged_labels_are_found_whatever_else_is_there(chance: Chance) -> No
     False failures: 2e-7.
     """
     toy = Toy(effects=3)  # to weigh three and their pairs costs a quarter of weighing six
-    base, quiet, found = problem(toy), [], []
+    base, quiet, right = problem(toy), [], []
     for effects in ({}, {"e1": 0.9}) * 6:
         plain = base.measured(drawn(toy, base, chance.random, effects, 0.03))
         y = plain.observations.y
         swapped = replace(plain, observations=with_exchanged(plain.observations, *LABELS[6:8]))
         quiet.append(exchanged(plain, weigh(plain), toy.rows) is None)
-        found.append(
+        right.append(
             exchanged(swapped, weigh(swapped), toy.rows) == tuple(sorted(LABELS[6:8], key=str))
         )
         back = with_exchanged(swapped.observations, *LABELS[6:8])
         assert np.array_equal(back.y, y)
     chance.often(quiet, 0.99)
-    chance.often(found, 0.99)
+    chance.often(right, 0.99)
 
 
 @pytest.mark.slow
@@ -65,8 +66,8 @@ def test_a_shift_of_modes_in_no_catalogue_is_not_named(chance: Chance) -> None:
     for _ in range(40):
         strange = np.tile(chance.random.normal(0, 0.02, len(LABELS)), 3)
         y = drawn(toy, base, chance.random, {}, 0.3) + strange
-        found = weigh(base.measured(y), pairs=False)
-        verdict = decide(found, probabilities(found), len(y), 3)
+        hypotheses = weigh(base.measured(y), pairs=False)
+        verdict = decide(hypotheses, probabilities(hypotheses), len(y), 3)
         seen.append(verdict.kind != "no_gap")
         outside.append(verdict.kind == "outside")
     chance.often(seen, 0.99)
@@ -87,11 +88,11 @@ def test_a_trend_in_no_catalogue_is_not_named(chance: Chance) -> None:
     for _ in range(30):
         y = drawn(toy, base, chance.random, {}, 0.3)
         y += np.tile(chance.random.choice([-1, 1]) * slope, 3)
-        found = weigh(base.measured(y), pairs=False)
-        verdict = decide(found, probabilities(found), len(y), 3)
+        hypotheses = weigh(base.measured(y), pairs=False)
+        verdict = decide(hypotheses, probabilities(hypotheses), len(y), 3)
         seen.append(verdict.kind != "no_gap")
         named.append(verdict.kind == "named")
-        (other,) = (h for h in found if h.key == "outside")
+        (other,) = (h for h in hypotheses if h.key == "outside")
         trend.append("smoothly over" in other.words)
     chance.often(seen, 0.99)
     chance.often(named, 0.0, 0.05)

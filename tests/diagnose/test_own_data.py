@@ -47,16 +47,16 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> InverseProblem:
 
 @pytest.mark.slow
 def test_the_expansion_is_the_model_at_its_nodes_and_close_between(plain: InverseProblem) -> None:
-    found = plain.expansion
+    expansion = plain.expansion
     there = X + np.array((0.15, -0.15, 0.1))
-    eta, _ = found.plain(there)
+    eta, _ = expansion.plain(there)
     assert eta == pytest.approx(asked(Query(there)).eta, abs=5e-4)
     for id in EFFECTS:
-        nodes = found.nodes[id]
+        nodes = expansion.nodes[id]
         high = nodes.reach[1]
         for e, near in ((high, 1e-9), (0.6 * high, 3e-4), (0.1 * high, 5e-4)):
             a, B, _ = nodes.at(np.array([e]))
-            assert found.eta + a[0] == pytest.approx(asked(Query(X, {id: e})).eta, abs=near)
+            assert expansion.eta + a[0] == pytest.approx(asked(Query(X, {id: e})).eta, abs=near)
             moved = asked(Query(there, {id: e})).eta
             assert eta + a[0] + B[0] @ (there - X) == pytest.approx(moved, abs=2e-3)
 
@@ -65,15 +65,17 @@ def test_the_expansion_is_the_model_at_its_nodes_and_close_between(plain: Invers
 def test_an_effect_in_the_models_own_data_is_named_with_its_size(tmp_path: Path) -> None:
     truth = 0.8 * MODEL.spans["bead_filler"].high
     path = written(tmp_path / "a.csv", asked(Query(X, {"bead_filler": truth})).eta)
-    found = study(CASE, Evaluator(TyreDesign(CASE)), path, effects=EFFECTS)
-    d = found.diagnosis
+    result = study(CASE, Evaluator(TyreDesign(CASE)), path, effects=EFFECTS)
+    d = result.diagnosis
     assert d.verdict.kind == "named" and d.verdict.key == "bead_filler"
     size = d.parameter("bead_filler")
     assert size["low"] < truth < size["high"]
-    told = diagnosis_result(d).content()
-    assert told["effect"] == "bead_filler" and told["rung"] in (1, 2)
-    assert told["shrinkage"]["fraction"] > 0.3 and told["section_map"]  # unless it is left out
-    assert sum(told["probabilities"].values()) == pytest.approx(1, abs=1e-4)
+    content = diagnosis_result(d).content()
+    assert content["effect"] == "bead_filler" and content["rung"] in (1, 2)
+    assert (
+        content["shrinkage"]["fraction"] > 0.3 and content["section_map"]
+    )  # unless it is left out
+    assert sum(content["probabilities"].values()) == pytest.approx(1, abs=1e-4)
 
 
 @pytest.mark.slow
@@ -88,9 +90,9 @@ def test_a_plain_tyre_has_no_gap(plain: InverseProblem, chance: Chance) -> None:
     factor, named, quarter = np.linalg.cholesky(plain.sigma), [], []
     for _ in range(25):
         y = plain.observations.y + factor @ chance.random.normal(size=len(ROWS))
-        found = weigh(plain.measured(y))
-        p = probabilities(found)
-        named.append(decide(found, p, len(ROWS), len(X)).kind not in ("no_gap", "undecided"))
+        hypotheses = weigh(plain.measured(y))
+        p = probabilities(hypotheses)
+        named.append(decide(hypotheses, p, len(ROWS), len(X)).kind not in ("no_gap", "undecided"))
         quarter.append(p["none"] > 0.25)
     chance.often(named, 0.0, 0.02)
     chance.often(quarter, 0.85)
@@ -108,13 +110,13 @@ def test_the_mass_gives_the_hidden_away(plain: InverseProblem) -> None:
     ]
     _, J = plain.plain(np.zeros(len(X)))
     whole = plain.sigma + J * plain.spread**2 @ J.T  # of measurements, were nothing calibrated
-    told = np.linalg.solve(whole[light][:, light], whole[light][:, ~light])[:, 0]
-    variance = (whole[~light][:, ~light] - told @ whole[light][:, ~light]).item()
+    gain = np.linalg.solve(whole[light][:, light], whole[light][:, ~light])[:, 0]
+    variance = (whole[~light][:, ~light] - gain @ whole[light][:, ~light]).item()
     gained = {id: lambdas[0][id] - lambdas[1][id] for id in EFFECTS}
     for id in EFFECTS:
         full = np.array([max(plain.expansion.nodes[id].reach, key=abs)])
         shift = plain.added({id: full}, 1)[0][0]
-        surprise = (shift[~light] - told @ shift[light]).item()
+        surprise = (shift[~light] - gain @ shift[light]).item()
         assert gained[id] == pytest.approx(surprise**2 / variance, rel=1e-6)
     assert (
         find_gap(plain, np.zeros(len(X)), tuple(MODEL.variables)).absorbed["tread_density"] < 0.99

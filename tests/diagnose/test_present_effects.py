@@ -55,8 +55,8 @@ def test_splits_count_from_what_the_case_has() -> None:
     spans, _ = spans_of(case, evaluator, ("point_mass", "rim_width"))
     own = TyreModel(case, evaluator, rows, [], spans)
     none = np.full(len(rows), np.nan)
-    told = tuple(Observable("frequency_Hz", label, p) for label, p in rows)
-    observations = Observations(told, np.zeros(len(rows)), none, 0.0, none, none)
+    observables = tuple(Observable("frequency_Hz", label, p) for label, p in rows)
+    observations = Observations(observables, np.zeros(len(rows)), none, 0.0, none, none)
     problem = InverseProblem(observations, expand(own, X), spans, np.arange(len(rows)), X, X)
     for id, e in (("point_mass", 0.03), ("point_mass", -0.04), ("rim_width", 5e-3)):
         (there,) = own.answers([Query(X, {id: e})])
@@ -78,9 +78,9 @@ def test_a_source_of_error_steps_from_what_the_case_has() -> None:
     columns = []
     for case in (CASE, wide):
         own = TyreModel(case, Evaluator(TyreDesign(case)), ROWS, sources(case)[0], {})
-        (found,) = own.answers([Query(X, constants=True)])
-        assert isinstance(found, Answer) and found.constants is not None
-        columns.append(found.constants[:, own.sources.index("rim_width")])
+        (answer,) = own.answers([Query(X, constants=True)])
+        assert isinstance(answer, Answer) and answer.constants is not None
+        columns.append(answer.constants[:, own.sources.index("rim_width")])
     assert columns[1] == pytest.approx(columns[0], rel=0.3, abs=2e-4)
     assert columns[0] @ columns[1] > 0
 
@@ -130,7 +130,7 @@ def test_a_run_switched_beyond_the_range_is_asked_there(tmp_path: Path) -> None:
     far = 1.5 * MODEL.spans["bead_filler"].high
     one = written(tmp_path / "a.csv", asked(Query(X)).eta)
     other = written(tmp_path / "b.csv", asked(Query(X, {"bead_filler": far})).eta)
-    found = study(
+    result = study(
         CASE,
         Evaluator(TyreDesign(CASE)),
         one,
@@ -138,11 +138,11 @@ def test_a_run_switched_beyond_the_range_is_asked_there(tmp_path: Path) -> None:
         effects=EFFECTS,
         section_map=False,
     )
-    d = found.diagnosis
+    d = result.diagnosis
     nodes, own = d.bare.expansion.nodes["bead_filler"], d.bare.expansion
     assert nodes.reach[1] == MODEL.spans["bead_filler"].high
     shift, _, _ = nodes.at(np.array([far]))
-    (there,) = found.model.answers([Query(own.x0, {"bead_filler": far})])
+    (there,) = result.model.answers([Query(own.x0, {"bead_filler": far})])
     assert isinstance(there, Answer)
     assert shift[0] == pytest.approx(there.eta - own.eta, abs=1e-9)
     assert d.verdict.kind in ("no_gap", "undecided") and d.probabilities["none"] > 0.25
@@ -173,11 +173,11 @@ def test_an_effect_that_a_variable_sets_is_no_candidate(tmp_path: Path) -> None:
     variables = {**CASE.case.variables, "filler": variable}
     case = replace(CASE, case=CASE.case.model_copy(update={"variables": variables}))
     path = written(tmp_path / "a.csv", asked(Query(X)).eta)
-    found = study(case, Evaluator(TyreDesign(case)), path, effects=EFFECTS, section_map=False)
-    assert found.calibrated == ("bead_filler",)
-    assert not found.diagnosis.problem.expansion.failed
-    assert "bead_filler" not in found.diagnosis.probabilities
-    words = page(found, "tyre", "a.csv")
+    result = study(case, Evaluator(TyreDesign(case)), path, effects=EFFECTS, section_map=False)
+    assert result.calibrated == ("bead_filler",)
+    assert not result.diagnosis.problem.expansion.failed
+    assert "bead_filler" not in result.diagnosis.probabilities
+    words = page(result, "tyre", "a.csv")
     assert "Not considered, being calibrated by a variable of the case: `bead_filler`." in words
     assert "Considered, as asked: only `tread_density`, `pressure_offset` of the catalogue" in words
     variable = variable.model_copy(

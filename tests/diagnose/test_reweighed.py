@@ -51,8 +51,8 @@ def made_anew(other: Changed, extra: np.ndarray | None = None) -> tuple[np.ndarr
 
 @pytest.mark.parametrize(("bend", "tolerance"), [(0.0, 1e-6), (0.02, 2e-3)])
 def test_the_evidence_about_a_fit_is_that_of_a_fit_made_anew(bend: float, tolerance: float) -> None:
-    """Of a model linear in x, but for what an effect does to its slopes, exactly; of a bent one to
-    second order in how far the fit moves."""
+    """The evidence is exact for a model linear in x, except for what an effect does to its slopes;
+    for a bent model it holds to second order in how far the fit moves."""
     toy = Toy(effects=2, bend=bend)
     p = problem(toy, assumed=Assumed(form=0.001, law=0.1))
     p = p.measured(drawn(toy, p, generator("reweighed"), {"e0": 0.4}, 0.2))
@@ -60,11 +60,11 @@ def test_the_evidence_about_a_fit_is_that_of_a_fit_made_anew(bend: float, tolera
     extra = np.array([each.extra for each in families(p)])
     unknown = lines(p, {}, refit(p, {}, len(extra), extra).d, extra=extra)
     for other in changes(p):
-        for found, wanted in zip(reweighed(fits, other), made_anew(other), strict=True):
-            assert found == pytest.approx(wanted, abs=tolerance, rel=tolerance), other.words
-        found, _ = reweighed(unknown, other, extra=extra)
+        for evidence, wanted in zip(reweighed(fits, other), made_anew(other), strict=True):
+            assert evidence == pytest.approx(wanted, abs=tolerance, rel=tolerance), other.words
+        evidence, _ = reweighed(unknown, other, extra=extra)
         wanted, _ = made_anew(other, extra)
-        assert found == pytest.approx(wanted, abs=tolerance, rel=tolerance), other.words
+        assert evidence == pytest.approx(wanted, abs=tolerance, rel=tolerance), other.words
 
 
 @pytest.mark.parametrize("among", [None, {2: 0.5, 4: 0.3}])

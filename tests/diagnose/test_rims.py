@@ -51,8 +51,8 @@ def test_each_row_is_of_its_own_rim() -> None:
     own, step = model(), 1e-4
     x = own.start
     d = np.array([0, 0, step])
-    asked = [Query(x, constants=True), Query(x + d), Query(x - d)]
-    plain, above, below, held = own.answers([*asked, Query(x, {"spindle_lateral": 2e-7})])
+    queries = [Query(x, constants=True), Query(x + d), Query(x - d)]
+    plain, above, below, held = own.answers([*queries, Query(x, {"spindle_lateral": 2e-7})])
     assert all(isinstance(each, Answer) for each in (plain, above, below, held))
     free = with_values(CASE, {"rim.free": True})
     alone = TyreModel(free, Evaluator(TyreDesign(free)), ROWS[:5], [], {})
@@ -78,8 +78,8 @@ def test_an_observation_says_its_rim(tmp_path: Path) -> None:
     assert same[0, 5] == same[4, 9] == BETWEEN_SUPPORTS and same[0, 6] == 0
     assert str(rows[9]) == "[2,0] at 240 kPa, rim free"
     for row in rows:
-        told = Residual(row=str(row), run=0, percent=1.0, sigma_percent=1.0).of
-        assert told and (told.label, told.state) == (row.label, row.state)
+        observable = Residual(row=str(row), run=0, percent=1.0, sigma_percent=1.0).of
+        assert observable and (observable.label, observable.state) == (row.label, row.state)
     assert Observable.of(rows[9].row) == rows[9]
 
 
@@ -108,16 +108,16 @@ def test_a_spindle_is_named_from_both_rims(tmp_path: Path) -> None:
     with path.open("a") as file:
         file.write("frequency_Hz,2,0,,symmetric,240,4000,88,0.4,free\n")
     evaluator = Evaluator(TyreDesign(CASE))
-    found = study(CASE, evaluator, path, effects=list(EFFECTS), section_map=False)
-    told = diagnosis_result(found.diagnosis)
-    assert told.verdict == "named" and told.effect == "spindle_lateral"
-    size = told.parameter
+    result = study(CASE, evaluator, path, effects=list(EFFECTS), section_map=False)
+    diagnosis = diagnosis_result(result.diagnosis)
+    assert diagnosis.verdict == "named" and diagnosis.effect == "spindle_lateral"
+    size = diagnosis.parameter
     assert size and abs(size.value - 1e-7) < 4 * (size.high - size.low) / (2 * 1.645)
-    assert told.left_out == [
+    assert diagnosis.left_out == [
         "rims.csv: what was measured under load with the rim free: not compared"
     ]
-    assert set(told.gap.by_rim) == {"as the case", "free"}
-    assert "5 modes at 240 kPa, rim as the case and free" in page(found, "tyre", path.name)
-    gap, rows = found.diagnosis.gap, found.diagnosis.problem.observations.rows
+    assert set(diagnosis.gap.by_rim) == {"as the case", "free"}
+    assert "5 modes at 240 kPa, rim as the case and free" in page(result, "tyre", path.name)
+    gap, rows = result.diagnosis.gap, result.diagnosis.problem.observations.rows
     legend = draw_residuals(rows, gap.residuals, gap.spread).legends[0]
     assert [text.get_text() for text in legend.texts] == ["240 kPa", "240 kPa, rim free"]

@@ -97,8 +97,8 @@ def test_a_part_of_the_section_by_its_formula() -> None:
         SectionPart("b", 0 * k, m, ""),
         SectionPart("c", 3 * k, 1e-9 * m, ""),
     ]
-    found, rank_ = section_map(p, P, r, parts)
-    at = {place.region: place for place in found}
+    places, rank_ = section_map(p, P, r, parts)
+    at = {place.region: place for place in places}
     for g, s, part in ((k, 0.2, "a"), (m, 0.1, "b")):
         a, b = g @ P @ g, g @ P @ r
         change = b / (a + 1 / s**2)
@@ -109,7 +109,9 @@ def test_a_part_of_the_section_by_its_formula() -> None:
         assert getattr(at[part], f"{kind}_sigma") == pytest.approx(sigma)
         assert at[part].evidence == pytest.approx(max(ln, 0.0))
     assert at["a"].mass_percent == at["b"].stiffness_percent == 0.0
-    assert [place.evidence for place in found] == sorted((q.evidence for q in found), reverse=True)
+    assert [place.evidence for place in places] == sorted(
+        (q.evidence for q in places), reverse=True
+    )
     assert section_map(p, P, r, []) == ([], 0)
     assert rank_ == 2  # a and c are one direction, b the other
 
@@ -122,8 +124,8 @@ def test_parts_look_alike_from_a_cosine_of_095_on() -> None:
     near = lambda cosine: cosine * one + np.sqrt(1 - cosine**2) * other
     for cosine, same in ((0.96, True), (0.94, False), (-0.96, True)):
         parts = [SectionPart("a", one, 0 * one, ""), SectionPart("b", near(cosine), 0 * one, "")]
-        found, _ = section_map(p, 1e4 * np.eye(n), one, parts)
-        assert [bool(place.same_as) for place in found] == [same, same]
+        places, _ = section_map(p, 1e4 * np.eye(n), one, parts)
+        assert [bool(place.same_as) for place in places] == [same, same]
 
 
 def test_outside_is_half_unknown_effects_and_half_errors_of_reading() -> None:
@@ -158,9 +160,9 @@ def test_outside_is_half_unknown_effects_and_half_errors_of_reading() -> None:
         hit = np.array([row.label == label for row in rows])
         misread.append(ln(0.04 * same * np.outer(hit, hit)))
     kinds = [np.logaddexp.reduce(each) - np.log(len(each)) for each in (unknown, misread)]
-    found = outside(p)
-    assert found.prior == 0.1
-    assert found.ln_evidence == pytest.approx(np.logaddexp(*kinds) - np.log(2), abs=1e-6)
+    hypothesis = outside(p)
+    assert hypothesis.prior == 0.1
+    assert hypothesis.ln_evidence == pytest.approx(np.logaddexp(*kinds) - np.log(2), abs=1e-6)
     assert (UNKNOWN, INFLATION) == ((0.005, 0.01, 0.02, 0.04), (2.0, 4.0))
 
 
@@ -181,9 +183,9 @@ def test_peaks_of_a_pair_are_integrated() -> None:
     ln = -np.einsum("iab,ij,jab->ab", off, A, off) / 2
     scale = -(np.linalg.slogdet(whole)[1] + n * np.log(2 * np.pi)) / 2
     wanted = np.log(np.mean(np.exp(ln))) + scale
-    found = explain(p, ["e0", "e1"], 1.0)
-    assert found.ln_evidence == pytest.approx(wanted, abs=0.2)
-    assert found.mean()["e0"] == pytest.approx(0.4321, abs=0.01)
+    hypothesis = explain(p, ["e0", "e1"], 1.0)
+    assert hypothesis.ln_evidence == pytest.approx(wanted, abs=0.2)
+    assert hypothesis.mean()["e0"] == pytest.approx(0.4321, abs=0.01)
 
 
 def test_prior_probabilities_are_one_together() -> None:
@@ -191,10 +193,10 @@ def test_prior_probabilities_are_one_together() -> None:
     twentieth of what one less has, over all sets, tried or not."""
     toy = Toy(effects=9, pressures=(240.0,))
     base = problem(toy)
-    found = {h.key: h for h in weigh(base.measured(drawn(toy, base, generator(1), {}, 0.3)))}
-    assert found["none"].prior == 0.25 and found["outside"].prior == 0.1
-    singles = [h for key, h in found.items() if key in toy.spans]
-    pairs = [h for key, h in found.items() if "+" in key]
+    by_key = {h.key: h for h in weigh(base.measured(drawn(toy, base, generator(1), {}, 0.3)))}
+    assert by_key["none"].prior == 0.25 and by_key["outside"].prior == 0.1
+    singles = [h for key, h in by_key.items() if key in toy.spans]
+    pairs = [h for key, h in by_key.items() if "+" in key]
     assert sum(h.prior for h in singles) == pytest.approx(0.65 / 1.0525)
     pairs = [h for h in pairs if h.key.count("+") == 1]
     assert [h.prior for h in pairs] == pytest.approx([0.0325 / 1.0525 / 36] * 30)
@@ -214,20 +216,22 @@ def test_prior_probabilities_are_one_together() -> None:
 
 
 def test_the_plain_fit_ends_near_the_minimum_and_takes_no_leaps() -> None:
-    """Of a model that bends, from afar; no step beyond 0.7 in any x."""
+    """The model bends and the fit starts from afar; no step goes beyond 0.7 in any x."""
     toy = Toy(effects=0, bend=0.02)
     p = problem(toy)
     (there,) = toy.answers([Query(np.array([1.5, -1.2, 0.8]))])
     assert isinstance(there, Answer)
-    asked: list[Array] = []
+    visited: list[Array] = []
     answers = toy.answers
-    toy.answers = lambda points: [asked.append(q.x) for q in points] and answers(points)  # type: ignore[func-returns-value, method-assign, assignment]
+    toy.answers = lambda points: [visited.append(q.x) for q in points] and answers(points)  # type: ignore[func-returns-value, method-assign, assignment]
     x = plain_fit(toy, p.measured(there.eta).observations, p.places, 0.001)
-    steps = np.abs(np.diff(asked, axis=0)).max(1)
-    assert steps[0] == pytest.approx(0.7) and steps.max() < 0.7 + 1e-9 and len(asked) <= 10
+    steps = np.abs(np.diff(visited, axis=0)).max(1)
+    assert steps[0] == pytest.approx(0.7) and steps.max() < 0.7 + 1e-9 and len(visited) <= 10
     value = lambda x: float(np.sum((toy._answer(Query(x)).eta - there.eta) ** 2))
-    assert np.array_equal(x, asked[-1]) and np.array_equal(x, asked[-2])  # for the covariance again
-    assert abs(x - [1.5, -1.2, 0.8]).max() < 0.05 and value(x) < value(asked[-3]) / 2
+    assert np.array_equal(x, visited[-1]) and np.array_equal(
+        x, visited[-2]
+    )  # for the covariance again
+    assert abs(x - [1.5, -1.2, 0.8]).max() < 0.05 and value(x) < value(visited[-3]) / 2
 
 
 @pytest.mark.parametrize("wall", [0.1, 0.59])
@@ -266,7 +270,8 @@ def test_labels_far_apart_are_not_taken_for_each_other() -> None:
 
 
 def test_the_guide_says_what_is_assumed() -> None:
-    """Of an effect's law, of splits, and that the form's error is the one on record."""
+    """The guide gives the errors of an effect's law and of splits, and the form's error is the one
+    on record."""
     guide = (CASES / "diagnosis.md").read_text()
     assumed = Assumed()
     laws = [100 * effect.law for effect in catalogue().values()]

@@ -54,13 +54,13 @@ def test_a_case_that_does_not_say_what_its_section_is_known_from_has_it_from_a_d
     """And its words say so; an exact one has no fields."""
     assert not fields(CASE) and not any(source.field for source in sources(CASE)[0])
     silent = changed(CASE, section=with_part(CASE.case.section, known_from=None))
-    said, unsaid = (
+    stated, unsaid = (
         [source for source in sources(case)[0] if source.field] for case in (STATED, silent)
     )
-    assert "drawing: meridian 0.8 mm" in said[0].words
+    assert "drawing: meridian 0.8 mm" in stated[0].words
     assert "drawing, as the case does not say: meridian 0.8 mm" in unsaid[0].words
-    assert not any(source.words for source in (*said[1:], *unsaid[1:]))
-    for a, b in zip(said, unsaid, strict=True):
+    assert not any(source.words for source in (*stated[1:], *unsaid[1:]))
+    for a, b in zip(stated, unsaid, strict=True):
         assert a.field and b.field and a.name == b.name
         np.testing.assert_array_equal(a.field.values, b.field.values)
 
@@ -174,11 +174,11 @@ def test_slopes_of_fields_are_the_model_s_own() -> None:
     """Meridian and gauge: central differences, whose own error, of second order, is taken out by
     half the step (Richardson): 1e-5 of the largest. Compounds: all densities up by one per cent are
     the rubber's density."""
-    found = sources(STATED)[0]
-    model = TyreModel(STATED, Evaluator(TyreDesign(STATED)), ROWS, found, {})
+    own_sources = sources(STATED)[0]
+    model = TyreModel(STATED, Evaluator(TyreDesign(STATED)), ROWS, own_sources, {})
     (at_0,) = model.answers([Query(model.start, constants=True)])
     assert isinstance(at_0, Answer) and at_0.constants is not None
-    column = {source.name: at_0.constants[:, k] for k, source in enumerate(found)}
+    column = {source.name: at_0.constants[:, k] for k, source in enumerate(own_sources)}
 
     def eta(amount: float) -> np.ndarray:
         off = moved(STATED, field, amount)
@@ -213,29 +213,29 @@ def test_the_statement_is_none_of_the_tyre() -> None:
 
 @pytest.mark.slow
 def test_what_is_told_of_the_section_holds_within_its_standard_deviation(chance: Chance) -> None:
-    """Of drawn fields on the toy, whose sources are those of the case with slopes by chance.
+    """Fields drawn on the toy, whose sources are those of the case with slopes by chance.
 
     False failures: 1e-7.
     """
-    found = sources(STATED)[0]
+    own_sources = sources(STATED)[0]
     toy, own = Toy(effects=1, bend=0.0), fields(STATED)
-    toy.sources = tuple(source.name for source in found)  # type: ignore[assignment]
-    toy.constants = np.random.default_rng(5).normal(0, 0.005, (len(toy.rows), len(found)))
+    toy.sources = tuple(source.name for source in own_sources)  # type: ignore[assignment]
+    toy.constants = np.random.default_rng(5).normal(0, 0.005, (len(toy.rows), len(own_sources)))
     base, off = problem(toy), []
     for _ in range(10):
-        z = chance.random.normal(size=len(found))
+        z = chance.random.normal(size=len(own_sources))
         y = toy.base + toy.constants @ z + chance.random.normal(0, 0.00224, len(toy.base))
         seen = base.measured(y).observations
         stated = Assumed(form=0.001, law=0.0)
         d = diagnose(toy, toy.rows, seen, assumed=stated)  # type: ignore[arg-type]
-        told = section_told(STATED, found, d)
-        assert {v.field for v in told} == {"meridian", "hold", "gauge", "stiffness", "density"}
-        assert all(0 < v.sigma <= v.before for v in told)
-        value = next(v for v in told if v.field == "meridian")
+        posterior = section_told(STATED, own_sources, d)
+        assert {v.field for v in posterior} == {"meridian", "hold", "gauge", "stiffness", "density"}
+        assert all(0 < v.sigma <= v.before for v in posterior)
+        value = next(v for v in posterior if v.field == "meridian")
         place = sum(stations(STATED.section, value.place)) // 2
         true = 1e3 * sum(
             own[source.name].values[place] * amount
-            for source, amount in zip(found, z, strict=True)
+            for source, amount in zip(own_sources, z, strict=True)
             if source.field and source.field.kind == "meridian"
         )
         off.append((value.value - true) / value.sigma)
@@ -270,6 +270,6 @@ def test_a_bead_that_yields_is_held_further_down(tmp_path: Path) -> None:
 
 def frequencies(case: LoadedCase) -> Array:
     """Hz by label."""
-    found = Evaluator(TyreDesign(case)).evaluate(Question(start_values(case)))
-    labels = modes_result(case, start_values(case), found)[0].modes
+    evaluation = Evaluator(TyreDesign(case)).evaluate(Question(start_values(case)))
+    labels = modes_result(case, start_values(case), evaluation)[0].modes
     return np.array([m.frequency_Hz for m in sorted(labels, key=lambda m: (m.c, m.m, str(m.kind)))])

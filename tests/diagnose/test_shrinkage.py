@@ -58,11 +58,11 @@ def test_an_effect_shrinks_the_held_out_error(chance: Chance) -> None:
 
 @pytest.mark.slow
 def test_an_effect_is_told_with_the_rung_that_its_shrinkage_gives() -> None:
-    found = diagnosed(Toy(size=0.02, pressures=(160.0, 200.0, 240.0)), {"e1": 0.9}, 1)
-    s = found.shrinkage
+    diagnosis = diagnosed(Toy(size=0.02, pressures=(160.0, 200.0, 240.0)), {"e1": 0.9}, 1)
+    s = diagnosis.shrinkage
     assert s is not None
-    named = found.verdict.kind == "named"
-    assert found.rung == 2 or not (named and s.effect == "e1" and s.fraction > s.placebo_95)
+    named = diagnosis.verdict.kind == "named"
+    assert diagnosis.rung == 2 or not (named and s.effect == "e1" and s.fraction > s.placebo_95)
 
 
 @pytest.mark.slow
@@ -130,5 +130,5 @@ def test_the_placebo_is_what_tyres_without_an_effect_would_show() -> None:
         shift, tilt, *_ = out.added(e, 1)
         after = each[hold] - shift[0] - (out.plain(np.zeros(3))[1] + tilt[0]) @ d
         shares.append(1 - np.sqrt(np.mean(after**2) / np.mean(before**2)))
-    found = _placebo(p, hold, np.random.default_rng(7))
-    assert found == pytest.approx(np.quantile(shares, 0.95), rel=1e-6)
+    placebo = _placebo(p, hold, np.random.default_rng(7))
+    assert placebo == pytest.approx(np.quantile(shares, 0.95), rel=1e-6)

@@ -94,11 +94,11 @@ def test_a_split_that_is_the_same_everywhere_is_no_threefold_evidence() -> None:
 def test_splits_count_as_many_as_they_are_on_the_mean(chance: Chance) -> None:
     """400 tyres of two pairs in three states. False failures: 1e-7."""
     width, tau = 3e-3, 2e-3
-    found = []
+    values = []
     for _ in range(400):
         own, noise = chance.random.normal(size=(2, 1)), chance.random.normal(size=(2, 3))
-        found.append(Splits.of(observed(abs(width * own + tau * noise), tau), width).chi2())
-    chance.mean(found, 6.0, 6.0)
+        values.append(Splits.of(observed(abs(width * own + tau * noise), tau), width).chi2())
+    chance.mean(values, 6.0, 6.0)
 
 
 def test_pairs_of_which_one_member_was_measured_say_nothing() -> None:

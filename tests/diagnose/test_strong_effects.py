@@ -163,17 +163,17 @@ def test_what_an_exchange_of_labels_does_stands_beside_the_constants() -> None:
     toy = Toy(effects=0, bend=0.0)
     toy.base[3 :: len(LABELS)] = toy.base[2 :: len(LABELS)] + 0.05
     p = problem(toy, toy.base + toy.J @ X)
-    found = exchange_shifts(p.observations)
-    assert len(found) == len(p.places) and np.all((abs(found) > 0).sum(0) == 2 * 3)
-    assert found.sum(0) == pytest.approx(0.0, abs=1e-12)  # what one gains the other loses
-    half = p.observations.y + found @ np.full(found.shape[1], 0.5)
+    shifts = exchange_shifts(p.observations)
+    assert len(shifts) == len(p.places) and np.all((abs(shifts) > 0).sum(0) == 2 * 3)
+    assert shifts.sum(0) == pytest.approx(0.0, abs=1e-12)  # what one gains the other loses
+    half = p.observations.y + shifts @ np.full(shifts.shape[1], 0.5)
     there = replace(p.observations, y=half)
-    with_, without = (plain_fit(toy, there, p.places, 0.001, moved=m) for m in (found, None))
+    with_, without = (plain_fit(toy, there, p.places, 0.001, moved=m) for m in (shifts, None))
     assert abs(with_ - X).max() < 0.05 < abs(without - X).max()
 
 
 def test_an_effect_s_range_as_a_constant_has_its_mean_square() -> None:
-    """Of a shift in proportion to an effect uniform over 0 to 1, or -0.5 to 1."""
+    """A shift in proportion to an effect that is uniform over 0 to 1, or -0.5 to 1."""
     for low in (0.0, -0.5):
         toy = Toy(effects=1, bend=0.0)
         toy.spans = {"e0": Span(low, 1.0)}

@@ -1,4 +1,4 @@
-"""What a study refuses before anything is judged, and changes of a run as they are written."""
+"""Refusals of a study before anything is judged, and changes of a run as they are written."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_what_is_not_even_near_the_model_is_refused() -> None:
 
 
 def test_a_model_without_an_answer_says_why_before_anything_is_judged() -> None:
-    """Of the plain tyre its own failure; of a switched one what was switched."""
+    """A plain tyre gives its own failure; a switched one gives what was switched."""
     rows = [(Label(2, 0), 240.0)]
     answer = Answer(np.log([80.0]), np.zeros((1, 1)), np.zeros(1))
     failure, asked_for = DeckRefused("no such tyre"), []
@@ -72,8 +72,8 @@ def test_a_model_without_an_answer_says_why_before_anything_is_judged() -> None:
     seen = Observations((Observable("frequency_Hz", *rows[0]),), answer.eta, none, 0.0, none, none)
 
     def check(answers: list, *changes: Toggle) -> None:
-        told = lambda points: asked_for.append([dict(p.effects) for p in points]) or answers
-        model: Any = SimpleNamespace(rows=rows, start=np.zeros(1), answers=told)
+        answering = lambda points: asked_for.append([dict(p.effects) for p in points]) or answers
+        model: Any = SimpleNamespace(rows=rows, start=np.zeros(1), answers=answering)
         check_units(model, seen, ["a.csv"], changes)
 
     with pytest.raises(DeckRefused, match="no such tyre"):

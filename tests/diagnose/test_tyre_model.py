@@ -46,9 +46,9 @@ def test_slopes_against_differences() -> None:
             if path == "pressure_kPa":
                 rows = [(label, p + side * size if label else p) for label, p in ROWS]
             other = TyreModel(there, Evaluator(TyreDesign(there)), rows, [], {})
-            (found,) = other.answers([Query(x)])
-            assert isinstance(found, Answer)
-            shifted.append(found.eta)
+            (answer,) = other.answers([Query(x)])
+            assert isinstance(answer, Answer)
+            shifted.append(answer.eta)
         wanted = (shifted[0] - shifted[1]) / 0.2
         assert own.constants[:-1, k] == pytest.approx(wanted[:-1], abs=2e-5)
         assert own.constants[-1, k] == pytest.approx(wanted[-1], rel=0.02, abs=1e-9)
@@ -113,11 +113,11 @@ def test_a_denied_licence_ends_the_study_and_is_no_answer_about_an_effect(
     own = TyreModel(CASE, Evaluator(TyreDesign(CASE)), ROWS, [], {})
     failures = [EvaluationFailed("no_equilibrium", "of 1 N 1 is left")]
     monkeypatch.setattr(own._fit, "modes_of", lambda wanted: failures * len(wanted))
-    asked = [Query(X, {"point_mass": 0.05})]
-    assert own.answers(asked) == failures
+    queries = [Query(X, {"point_mass": 0.05})]
+    assert own.answers(queries) == failures
     failures[:] = [EvaluationFailed("licence", "all tokens are in use")]
     with pytest.raises(SolverUnavailable, match="all tokens are in use"):
-        own.answers(asked)
+        own.answers(queries)
 
 
 @pytest.mark.slow
@@ -127,14 +127,14 @@ def test_an_effect_without_slopes_takes_the_plain_tyres() -> None:
     splice = Query(X, {"stiffness_splice": 1.0})
     spans, _ = spans_of(CASE, evaluator, ("bead_filler", "stiffness_splice"))
     own = TyreModel(CASE, evaluator, ROWS[:9], [], spans)
-    found = own.answers([splice, Query(X, {"bead_filler": 1.0})])
+    answers = own.answers([splice, Query(X, {"bead_filler": 1.0})])
     assert evaluator.counts.runs == 4  # the nominal one first, the plain one with these two
     (plain,) = own.answers([Query(X)])
-    assert isinstance(plain, Answer) and isinstance(found[0], Answer)
-    assert found[0].jacobian == pytest.approx(plain.jacobian, abs=1e-12)
+    assert isinstance(plain, Answer) and isinstance(answers[0], Answer)
+    assert answers[0].jacobian == pytest.approx(plain.jacobian, abs=1e-12)
     assert plain.constants is None  # they were not asked for
-    assert (found[0].eta > plain.eta).all() and found[0].split[-1] > 0
-    assert isinstance(found[1], Answer) and abs(found[1].jacobian - plain.jacobian).max() > 1e-3
+    assert (answers[0].eta > plain.eta).all() and answers[0].split[-1] > 0
+    assert isinstance(answers[1], Answer) and abs(answers[1].jacobian - plain.jacobian).max() > 1e-3
 
 
 SPLICE = "stiffness_splice"
@@ -156,36 +156,39 @@ def test_slopes_by_effects_against_differences() -> None:
     assert own.sloped_at_0 == {SPLICE}
     for id, e, step in (("bead_filler", 0.5, 5e-4), ("rim_width", 6e-3, 1e-5)):
         points = [Query(X, {id: e + side * step}) for side in (1, -1)]
-        above, below, found = own.answers([*points, Query(X, {id: e}, slopes=(id,))])
-        assert isinstance(above, Answer) and isinstance(below, Answer) and isinstance(found, Answer)
+        above, below, answer = own.answers([*points, Query(X, {id: e}, slopes=(id,))])
+        assert (
+            isinstance(above, Answer) and isinstance(below, Answer) and isinstance(answer, Answer)
+        )
         two = (above.eta - below.eta)[:-1] / (2 * step)
-        assert found.slopes[id][:-1] == pytest.approx(two, rel=1e-4, abs=1e-6)
-        assert np.isnan(found.slopes[id][-1]) and above.slopes == {}
+        assert answer.slopes[id][:-1] == pytest.approx(two, rel=1e-4, abs=1e-6)
+        assert np.isnan(answer.slopes[id][-1]) and above.slopes == {}
 
 
 @pytest.mark.slow
 def test_the_slope_by_a_splice_against_differences_of_spliced_tyres() -> None:
     own, step = with_slopes(WIDE, (SPLICE,)), 0.02
     points = [Query(X, slopes=(SPLICE,)), Query(X, {SPLICE: step}), Query(X, {SPLICE: -step})]
-    found, above, below = own.answers(points)
-    assert isinstance(found, Answer) and isinstance(above, Answer) and isinstance(below, Answer)
+    answer, above, below = own.answers(points)
+    assert isinstance(answer, Answer) and isinstance(above, Answer) and isinstance(below, Answer)
     two = (above.eta - below.eta)[:-1] / (2 * step)
-    assert found.slopes[SPLICE][:-1] == pytest.approx(two, rel=2e-3)
+    assert answer.slopes[SPLICE][:-1] == pytest.approx(two, rel=2e-3)
     assert (two > 0.01).all()
 
 
 def test_sources_that_are_effects_step_once_and_fail_alone() -> None:
-    """What the step moves is added to the slope; where it has no solution the point has none."""
+    """The shift by the step is added to the slope; where the step has no solution, the point has
+    none."""
     n = len(ROWS)
     answer = Answer(np.zeros(n), np.zeros((n, 3)), np.zeros(n), np.full((n, 2), 0.5))
     moved = replace(answer, eta=np.arange(float(n)), constants=None)
     point, stepped = Query(X, constants=True), Query(X, {"rim_width": 1e-3})
     steps = [(1, "rim_width", 1e-3)]
     known: dict[Any, Any] = {_key(point): answer, _key(stepped): moved}
-    found = MODEL._completed(point, known, steps)
-    assert isinstance(found, Answer) and found.constants is not None
-    assert found.constants[:, 0] == pytest.approx(np.full(n, 0.5))
-    assert found.constants[:, 1] == pytest.approx(0.5 + np.arange(n))
+    completed = MODEL._completed(point, known, steps)
+    assert isinstance(completed, Answer) and completed.constants is not None
+    assert completed.constants[:, 0] == pytest.approx(np.full(n, 0.5))
+    assert completed.constants[:, 1] == pytest.approx(0.5 + np.arange(n))
     assert answer.constants is not None and (answer.constants == 0.5).all()  # its own stays
     failure = DeckRefused("no such rim")
     assert MODEL._completed(point, {**known, _key(stepped): failure}, steps) is failure

@@ -26,8 +26,8 @@ def test_sources_of_error_are_those_of_the_case_or_assumed_and_never_calibrated(
     assert words["belt_1_angle"] == "belt 1 angle 1 degrees"
     assert words["sidewall_gauge"] == "sidewall gauge 0.03"
     bare = replace(CASE, case=CASE.case.model_copy(update={"uncertainties": {}}))
-    found, assumed = sources(bare)
-    assumed_words = {s.name: s.words for s in found}
+    own_sources, assumed = sources(bare)
+    assumed_words = {s.name: s.words for s in own_sources}
     assert assumed and assumed_words["rubber_density"] == f"rubber density {DENSITY_PERCENT:g} %"
     assert set(assumed_words) == {
         "pressure",
@@ -37,7 +37,7 @@ def test_sources_of_error_are_those_of_the_case_or_assumed_and_never_calibrated(
         *(f"{layer}_{what}" for layer in CASE.case.rebar_layers for what in ("spacing", "angle")),
     }
     assert assumed_words["pressure"] == f"pressure {PRESSURE_kPa:g} kPa"
-    paths = {path for s in (*found, *stated) for path in s.steps}
+    paths = {path for s in (*own_sources, *stated) for path in s.steps}
     assert not paths & {path for v in CASE.case.variables.values() for path in v.sets}
     variable = CASE.case.variables["C10"].model_copy(update={"sets": ["pressure_kPa"]})
     moved = CASE.case.model_copy(update={"variables": {"p": variable}})
@@ -54,10 +54,10 @@ def test_what_is_assumed_of_constants_is_what_the_guide_says() -> None:
     gauge = Gauge(between=["bead", "upper_sidewall"], factor=2.0)
     section = case.case.section.model_copy(update={"gauges": [gauge]})
     bare = case.case.model_copy(update={"uncertainties": {}, "section": section})
-    found, assumed = sources(replace(case, case=bare))
+    own_sources, assumed = sources(replace(case, case=bare))
     relative = {"density": 0.015, "modulus": 0.03, "spacing": 0.01}
-    assert assumed and len(found) >= 9
-    for source in found:
+    assert assumed and len(own_sources) >= 9
+    for source in own_sources:
         ((path, step),) = source.steps.items()
         kind = source.name.rpartition("_")[2]
         if kind in relative:
@@ -82,10 +82,10 @@ def test_a_stated_source_moves_its_numbers_as_it_says() -> None:
         "rim": Uncertainty(sets=["effects.rim_width"], percent=5.0),
     }
     case = replace(CASE, case=CASE.case.model_copy(update={"uncertainties": stated}))
-    found, assumed = sources(case)
-    told = {source.name: (source.words, source.steps) for source in found}
-    assert not assumed and list(told) == ["both_angles", "air", "stuff", "rim"]
-    assert told["both_angles"] == (
+    own_sources, assumed = sources(case)
+    by_name = {source.name: (source.words, source.steps) for source in own_sources}
+    assert not assumed and list(by_name) == ["both_angles", "air", "stuff", "rim"]
+    assert by_name["both_angles"] == (
         "both angles 2 %",
         pytest.approx(
             {
@@ -94,11 +94,11 @@ def test_a_stated_source_moves_its_numbers_as_it_says() -> None:
             }
         ),
     )
-    assert told["air"] == ("air 3 kPa", {"pressure_kPa": -3.0})
+    assert by_name["air"] == ("air 3 kPa", {"pressure_kPa": -3.0})
     rho = CASE.case.materials["rubber"].density_kg_per_m3
-    assert told["stuff"] == ("stuff 1 %", pytest.approx({density: 0.01 * rho}))
-    assert told["rim"] == ("rim 5 %", {"effects.rim_width": 0.0})  # of what the case has not
-    assert values_of(case, found) == {
+    assert by_name["stuff"] == ("stuff 1 %", pytest.approx({density: 0.01 * rho}))
+    assert by_name["rim"] == ("rim 5 %", {"effects.rim_width": 0.0})  # of what the case has not
+    assert values_of(case, own_sources) == {
         **{path: layers[path.split(".")[1]].angle_deg for path in angles},
         "pressure_kPa": CASE.case.pressure_kPa,
         density: rho,

@@ -1,4 +1,4 @@
-"""What was measured on the road, against tyres that were fitted without it."""
+"""Measurements on the road, against tyres that were fitted without them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def case(tmp_path_factory: pytest.TempPathFactory) -> LoadedCase:
 
 
 def true_values(case: LoadedCase) -> dict[str, float]:
-    """What the tyre that is measured has."""
+    """Values of the tyre that is measured."""
     return {**start_values(case), "C10": SOFTER * start_values(case)["C10"], "pressure_kPa": 220.0}
 
 
@@ -42,31 +42,33 @@ def readings(case: LoadedCase) -> list[Measurement]:
     pressed = Evaluator(TyreDesign(case)).press(true_values(case), LOADS)
     low, high = (footprint_row(pressed, each, resolved(case).mesh) for each in pressed.footprints)
     (first, last), area = LOADS, low["area_m2"]
-    found = [
+    rows = [
         (AREA, first, 1.01 * area),
         (AREA, first, 0.99 * area),
         (AREA, last, high["area_m2"]),
         (STIFFNESS, last, high[STIFFNESS]),
     ]
-    return [Measurement(q, None, "", 220.0, load, x, 0.02 * x) for q, load, x in found]
+    return [Measurement(q, None, "", 220.0, load, x, 0.02 * x) for q, load, x in rows]
 
 
 @pytest.mark.slow
 def test_the_tyre_itself_is_found(case: LoadedCase, readings: list[Measurement]) -> None:
     tyres = {"none": start_values(case), "it": true_values(case)}
-    found = compare(case, Evaluator(TyreDesign(case)), readings, tyres)
-    assert not found.failed
-    assert [(row.quantity, row.load_N) for row in found.rows] == [
+    comparison = compare(case, Evaluator(TyreDesign(case)), readings, tyres)
+    assert not comparison.failed
+    assert [(row.quantity, row.load_N) for row in comparison.rows] == [
         (AREA, LOADS[0]),
         (AREA, LOADS[1]),
         (STIFFNESS, LOADS[1]),
     ]
-    assert found.rms_percent("it") == pytest.approx(0, abs=1e-6)
-    at_last = found.rms_percent("none", LOADS[1])
+    assert comparison.rms_percent("it") == pytest.approx(0, abs=1e-6)
+    at_last = comparison.rms_percent("none", LOADS[1])
     assert at_last and at_last > 0.5
-    stiffness = found.rows[-1]
+    stiffness = comparison.rows[-1]
     assert stiffness.off["none"] < 0  # what was measured is softer
-    assert found.rows[0].sigma == pytest.approx(0.02 / np.sqrt(2) * found.rows[0].value, rel=1e-3)
+    assert comparison.rows[0].sigma == pytest.approx(
+        0.02 / np.sqrt(2) * comparison.rows[0].value, rel=1e-3
+    )
 
 
 @pytest.mark.slow
@@ -87,8 +89,8 @@ def test_modes_under_load(case: LoadedCase) -> None:
         )
         for m in wanted
     ]
-    found = compare(case, Evaluator(TyreDesign(case)), read, {"none": start_values(case)})
-    off = {row.member: row.off for row in found.rows}
+    comparison = compare(case, Evaluator(TyreDesign(case)), read, {"none": start_values(case)})
+    off = {row.member: row.off for row in comparison.rows}
     assert [off[m]["none"] for m in wanted[:2]] == pytest.approx([0, 0], abs=1e-6)
     assert not off[wanted[2]]
 
@@ -99,11 +101,11 @@ def test_what_cannot_be_pressed_is_said(case: LoadedCase, readings: list[Measure
     beyond = replace(readings[0], load_N=1e6)
     spliced = {**true_values(case), "effects.stiffness_splice": 0.1}
     tyres = {"none": start_values(case), "it": spliced}
-    found = compare(case, Evaluator(TyreDesign(case)), [*readings[:2], beyond], tyres)
-    first, second = found.rows
+    comparison = compare(case, Evaluator(TyreDesign(case)), [*readings[:2], beyond], tyres)
+    first, second = comparison.rows
     assert set(first.off) == {"none"} and not second.off
-    assert found.rms_percent("it") is None and found.rms_percent("none")
-    splice, load = sorted(found.failed)
+    assert comparison.rms_percent("it") is None and comparison.rms_percent("none")
+    splice, load = sorted(comparison.failed)
     assert "it, 220 kPa: " in splice and "splice" in splice
     assert "none, 220 kPa: " in load and "no equilibrium" in load
 
@@ -113,6 +115,8 @@ def test_tyres_are_compared_on_the_same_rows() -> None:
         LoadedRow(AREA, None, 240.0, load, 0.01, 1e-4, off)
         for load, off in ((1e3, {"a": 0.03, "b": 0.01}), (2e3, {"a": 0.5}))
     ]
-    found = UnderLoad(tuple(rows), ("a", "b"), ("b, 240 kPa: no",))
-    assert found.rms_percent("a") == pytest.approx(3) and found.rms_percent("b") == pytest.approx(1)
-    assert found.rms_percent("a", 2e3) is None
+    comparison = UnderLoad(tuple(rows), ("a", "b"), ("b, 240 kPa: no",))
+    assert comparison.rms_percent("a") == pytest.approx(3) and comparison.rms_percent(
+        "b"
+    ) == pytest.approx(1)
+    assert comparison.rms_percent("a", 2e3) is None

@@ -47,18 +47,20 @@ def test_what_is_expected_is_the_conditional_distribution_in_closed_form() -> No
     T = S + toy.J @ toy.J.T
     gain = T[np.ix_(out, kept)] @ np.linalg.inv(T[np.ix_(kept, kept)])
     p = without(base.measured(y), kept)
-    found = expected_by(p, plain(p), toy.rows, out)
-    assert found.mean == pytest.approx(toy.base[out] + gain @ (y - toy.base)[kept], abs=1e-7)
+    prediction = expected_by(p, plain(p), toy.rows, out)
+    assert prediction.mean == pytest.approx(toy.base[out] + gain @ (y - toy.base)[kept], abs=1e-7)
     variance = np.diag(T)[out] - np.einsum("ij,ji->i", gain, T[np.ix_(kept, out)])
-    assert found.deviation == pytest.approx(np.sqrt(variance), rel=1e-5)
-    low, high = found.interval()
-    assert norm.cdf((high - found.mean) / found.deviation) == pytest.approx(0.95, abs=1e-4)
-    assert low + high == pytest.approx(2 * found.mean)
+    assert prediction.deviation == pytest.approx(np.sqrt(variance), rel=1e-5)
+    low, high = prediction.interval()
+    assert norm.cdf((high - prediction.mean) / prediction.deviation) == pytest.approx(
+        0.95, abs=1e-4
+    )
+    assert low + high == pytest.approx(2 * prediction.mean)
 
 
 def test_intervals_hold_what_they_say(chance: Chance) -> None:
-    """Of tyres with an effect of a size that was drawn like its prior: what is off over its own
-    standard deviation, one row of each, has no bias and the right size. False failures: 2e-7."""
+    """Tyres with an effect whose size was drawn like its prior: the error over its own standard
+    deviation, one row of each tyre, has no bias and the right size. False failures: 2e-7."""
     toy = Toy(effects=2, bend=0.0, size=0.01)
     base, random = problem(toy), chance.random
     out, kept = parted(toy)
@@ -66,9 +68,9 @@ def test_intervals_hold_what_they_say(chance: Chance) -> None:
     for i in range(150):
         y = drawn(toy, base, random, {"e0": random.uniform(0, 1)}, 1.0)
         p = without(base.measured(y), kept)
-        found = expected_by(p, explain(p, ["e0"], 1.0), toy.rows, out)
+        prediction = expected_by(p, explain(p, ["e0"], 1.0), toy.rows, out)
         row, scatter = i % len(out), base.observations.scatter[out]
-        off.append(((y[out] - found.mean) / np.hypot(found.deviation, scatter))[row])
+        off.append(((y[out] - prediction.mean) / np.hypot(prediction.deviation, scatter))[row])
         inside.append(abs(off[-1]) < 1.645)
     chance.often(inside, 0.88, 0.92)
     chance.mean(off, -0.1, 0.1)
@@ -84,10 +86,10 @@ def test_explanations_are_pooled_by_their_probabilities_and_outside_says_nothing
     share = np.exp(ln - np.logaddexp.reduce(ln))
     each = [expected_by(p, h, toy.rows, out) for h in known]
     mean = share @ np.array([one.mean for one in each])
-    found = expected(p, [*known, outside(p)], toy.rows, out)
+    pooled = expected(p, [*known, outside(p)], toy.rows, out)
     assert np.sort(share)[-2] > 0.01  # more than one explains it
-    assert found.mean == pytest.approx(mean, abs=2e-5)
-    assert np.all(found.deviation**2 > share @ np.array([one.deviation**2 for one in each]) - 1e-9)
+    assert pooled.mean == pytest.approx(mean, abs=2e-5)
+    assert np.all(pooled.deviation**2 > share @ np.array([one.deviation**2 for one in each]) - 1e-9)
 
 
 def test_near_modes_that_were_not_measured_are_coupled_as_those_that_were() -> None:
@@ -97,10 +99,10 @@ def test_near_modes_that_were_not_measured_are_coupled_as_those_that_were() -> N
     y = toy.coupled(2.0)
     out, kept = parted(toy)
     p = without(problem(toy, y), kept)
-    found = expected_by(p, plain(p), toy.rows, out)
-    low, high = found.interval()
+    prediction = expected_by(p, plain(p), toy.rows, out)
+    low, high = prediction.interval()
     assert np.all((low < y[out]) & (y[out] < high))
-    assert found.mean[:2] == pytest.approx(y[out][:2], abs=1.5e-3)
+    assert prediction.mean[:2] == pytest.approx(y[out][:2], abs=1.5e-3)
     assert abs(likeliest(p, plain(p), toy.rows, out)[:2] - y[out][:2]).max() < 3e-3
     assert abs(toy.base[out][:2] - y[out][:2]).min() > 7e-3
 
@@ -113,8 +115,8 @@ def test_near_modes_that_an_effect_lets_cross_have_the_order_that_it_gives_them(
     out, kept = parted(toy)
     p = without(problem(toy, toy.base + up), kept)
     h = explain(p, ["e0"], 1.0)
-    for found in (expected_by(p, h, toy.rows, out).mean, likeliest(p, h, toy.rows, out)):
-        assert found[:2] == pytest.approx((toy.base + up)[out][:2], abs=3e-3)
+    for mean in (expected_by(p, h, toy.rows, out).mean, likeliest(p, h, toy.rows, out)):
+        assert mean[:2] == pytest.approx((toy.base + up)[out][:2], abs=3e-3)
 
 
 def test_near_modes_none_of_which_was_measured_may_be_coupled_as_ever() -> None:
@@ -124,12 +126,12 @@ def test_near_modes_none_of_which_was_measured_may_be_coupled_as_ever() -> None:
     kept = np.array([i for i in kept if toy.mates[i] < 0])
     p = without(problem(toy), kept)
     assert not p.integrand
-    found = expected_by(p, plain(p), toy.rows, out)
+    prediction = expected_by(p, plain(p), toy.rows, out)
     bare = replace(p, expansion=replace(p.expansion, coupling=None))
     alone = expected_by(bare, plain(bare), toy.rows, out)
-    more = np.sqrt(found.deviation**2 - alone.deviation**2)[:2]
+    more = np.sqrt(prediction.deviation**2 - alone.deviation**2)[:2]
     assert np.all(more > 1e-3) and np.all(more < 6e-3)
-    assert found.deviation[2:] == pytest.approx(alone.deviation[2:], rel=1e-6)
+    assert prediction.deviation[2:] == pytest.approx(alone.deviation[2:], rel=1e-6)
 
 
 def test_an_error_of_the_whole_run_is_no_part_of_the_tyre() -> None:

@@ -57,9 +57,9 @@ def test_coupled_modes_are_eigenvalues_and_their_slopes(side: float, zeta: float
     off = 0.02 * zeta * (np.ones((2, 2)) - np.eye(2))
     values, vectors = np.linalg.eigh(np.diag(np.exp(2 * eta[0])) + off)
     of_first = 1 if side > 0 else 0  # the upper or the lower
-    ln_f, own, part, told = pair.mixed(eta, zeta)
+    ln_f, own, part, ln_label = pair.mixed(eta, zeta)
     assert ln_f[0] == pytest.approx(np.log(values[[of_first, 1 - of_first]]) / 2, rel=1e-12)
-    assert np.exp(told[0]) == pytest.approx(0.01 + 0.99 * vectors[0, of_first] ** 2, rel=1e-9)
+    assert np.exp(ln_label[0]) == pytest.approx(0.01 + 0.99 * vectors[0, of_first] ** 2, rel=1e-9)
     for i in range(2):
         moved = eta + 1e-6 * np.eye(2)[[i]]
         slope = (pair.mixed(moved, zeta)[0] - ln_f)[0] / 1e-6
@@ -70,8 +70,8 @@ def test_rows_without_a_pair_say_nothing_of_labels() -> None:
     """As those that are held out."""
     alone = Veering(*np.zeros((3, 2)), np.full(2, -1), np.zeros(2), np.ones(2))
     with np.errstate(all="raise"):
-        _, own, part, told = alone.mixed(np.array([[0.3, 0.5]]), 1.0)
-    assert told.tolist() == [0.0] and own.tolist() == [[1.0, 1.0]] and not part.any()
+        _, own, part, ln_label = alone.mixed(np.array([[0.3, 0.5]]), 1.0)
+    assert ln_label.tolist() == [0.0] and own.tolist() == [[1.0, 1.0]] and not part.any()
 
 
 def test_only_modes_of_one_harmonic_are_partners() -> None:
@@ -114,10 +114,10 @@ class Near(Toy):
         self.mates[1::n] = self.mates[::n] - 1
 
     def _answer(self, point: Query) -> Answer:
-        found = super()._answer(point)
+        answer = super()._answer(point)
         size = np.where(self.mates >= 0, self.size, 0.0)
         coupling = Coupling(self.mates, size, 0 * size)
-        return replace(found, coupling=coupling if point.coupled else None)
+        return replace(answer, coupling=coupling if point.coupled else None)
 
     def coupled(self, z: float) -> np.ndarray:
         """ln f with that much of the constant, by eigenvalues."""

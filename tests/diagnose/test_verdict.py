@@ -27,7 +27,7 @@ def explained(p_value: float, rows: int, variables: int, parameters: int = 1) ->
 
 
 def judged(a: float, none: float, outside: float = 0.0, p_value: float = 0.5, **of: int) -> Any:
-    """What is decided where the effects a and b, none and outside have these probabilities."""
+    """Verdict where the effects a and b, none and outside have these probabilities."""
     rows, variables = of.get("rows", 20), of.get("variables", 3)
     h = explained(p_value, rows, variables, of.get("parameters", 1))
     other = Hypothesis("outside", 0.1, 0.0, {}, np.zeros(1), h.fitted, "strange")

@@ -113,12 +113,12 @@ class Sloped(Toy):
         return super().answers(points)
 
     def _answer(self, point: Query) -> Answer:
-        found, e = super()._answer(point), point.effects.get("e0", 0.0)
+        answer, e = super()._answer(point), point.effects.get("e0", 0.0)
         assert not point.slopes or (e == 0) == self.at_0
-        slope = np.full(len(found.eta), self.curve.deriv()(e))
+        slope = np.full(len(answer.eta), self.curve.deriv()(e))
         slope[-1] = np.nan  # the last row has none
-        eta = found.eta + self.curve(e)
-        return replace(found, eta=eta, slopes=dict.fromkeys(point.slopes, slope))
+        eta = answer.eta + self.curve(e)
+        return replace(answer, eta=eta, slopes=dict.fromkeys(point.slopes, slope))
 
 
 def flat(**keys: object) -> Toy:
