@@ -1,4 +1,4 @@
-"""What holds for every effect: absent at 0, smooth, exact slopes, refusals in one sentence."""
+"""Properties of every effect: absent at 0, smooth, exact slopes, refusals in one sentence."""
 
 from __future__ import annotations
 
@@ -131,10 +131,10 @@ def test_a_fit_ends_where_an_effect_is_absent(method: str, start: float) -> None
     changed = CASE.case.model_copy(update={"targets": targets, "variables": {"filler": filler}})
     case = replace(CASE, case=changed)
     result = calibrate(case, Evaluator(TyreDesign(case)), method).result
-    found = result["variables"]["filler"]
-    assert result["converged"] and found["at_bound"] and 0 <= found["value"] < 1e-3
+    variable = result["variables"]["filler"]
+    assert result["converged"] and variable["at_bound"] and 0 <= variable["value"] < 1e-3
     assert result["moved"] == (start > 0)
-    assert (found["lower"], found["upper"]) == (0.0, 3.0)
+    assert (variable["lower"], variable["upper"]) == (0.0, 3.0)
 
 
 @each

@@ -199,8 +199,8 @@ def test_a_bead_that_does_not_sit_is_one_whose_table_says_so() -> None:
     )
     lengths = length(table.points[PLY])[RIM:] - length(table.points[PLY])[RIM]
     share = (float(lengths[free] / lengths[-1]) - LEAST) / (1 - LEAST)
-    found, expected = frequencies(bead_seat=share), frequencies(by_hand)
-    assert list(found.values()) == pytest.approx(list(expected.values()), rel=1e-6)
+    computed, expected = frequencies(bead_seat=share), frequencies(by_hand)
+    assert list(computed.values()) == pytest.approx(list(expected.values()), rel=1e-6)
 
 
 @pytest.mark.slow
@@ -251,8 +251,8 @@ def test_dynamic_stiffening_of_an_unstressed_tyre_is_a_stiffer_rubber() -> None:
     s = Evaluator(TyreDesign(stiff)).evaluate(Question(values))
     # of omega^2 round-off leaves the same in all modes, 1e-16 of the stiffest one's: a slack tyre's
     # first, of 6 Hz, has a hundredth of the highest's
-    found, expected = ([m.frequency_Hz**2 for m in answer.modes] for answer in (e, s))
-    assert found == pytest.approx(expected, rel=2e-9, abs=2e-9 * max(expected) / 5)
+    computed, expected = ([m.frequency_Hz**2 for m in answer.modes] for answer in (e, s))
+    assert computed == pytest.approx(expected, rel=2e-9, abs=2e-9 * max(expected) / 5)
 
 
 @pytest.mark.parametrize("moduli", ["long_term", "instantaneous"])
@@ -332,10 +332,10 @@ def test_layer_ends_with_its_regions() -> None:
     short = layer.model_copy(update={"regions": ["crown", "upper_sidewall"]})
     layers = {**CASE.case.rebar_layers, "carcass": short}
     long = data(Decks(TyreDesign(CASE)))["inflate.inp"]
-    found = edited(rebar_layers=layers)["inflate.inp"]
-    gone = set(long.splitlines()) - set(found.splitlines())
+    deck = edited(rebar_layers=layers)["inflate.inp"]
+    gone = set(long.splitlines()) - set(deck.splitlines())
     assert len(gone) == 2 * (3 + 1)  # the lower sidewall's and the bead's elements, both sides
-    assert set(found.splitlines()) < set(long.splitlines())
+    assert set(deck.splitlines()) < set(long.splitlines())
 
 
 @pytest.mark.parametrize(("id", "value"), [("tread_wear", 0.4), ("tread_density", -0.2)])

@@ -41,8 +41,8 @@ def evaluated(id: str = "", value: float = 0.0, case: LoadedCase | None = None) 
     return Evaluator(TyreDesign(case or few())).evaluate(Question({**START, **effect}))
 
 
-def by_label(found: Evaluation) -> dict[Label, dict]:
-    _, modes = modes_result(CASE, START, found)
+def by_label(evaluation: Evaluation) -> dict[Label, dict]:
+    _, modes = modes_result(CASE, START, evaluation)
     return {mode.label: mode for mode in modes}
 
 
@@ -50,10 +50,10 @@ def by_label(found: Evaluation) -> dict[Label, dict]:
 def test_doublets_split_and_the_mean_stands_for_both(id: str) -> None:
     """modes.json has two entries of multiplicity 1, the lower first, for every doublet, and the
     evaluation one mode at their mean; singles and labels are the plain tyre's."""
-    found, plain = evaluated(id, SMALL[id]), evaluated()
-    assert by_label(found).keys() == by_label(plain).keys()
-    entries = modes_result(CASE, START, found)[0].content()["modes"]
-    for label, mode in by_label(found).items():
+    evaluation, plain = evaluated(id, SMALL[id]), evaluated()
+    assert by_label(evaluation).keys() == by_label(plain).keys()
+    entries = modes_result(CASE, START, evaluation)[0].content()["modes"]
+    for label, mode in by_label(evaluation).items():
         own = [e for e in entries if (e["c"], e["m"], e["kind"]) == (label.c, label.m, label.kind)]
         assert [e["multiplicity"] for e in own] == ([1, 1] if label.c else [1])
         assert [e.get("member") for e in own] == ([1, 2] if label.c else [None])
@@ -76,8 +76,8 @@ def test_vanishes_with_its_parameter(id: str) -> None:
     plain = by_label(evaluated())
 
     def moved(value: float) -> np.ndarray:
-        found = by_label(evaluated(id, value))
-        both = {label: m.raw.members or (m.frequency_Hz,) for label, m in found.items()}
+        modes = by_label(evaluated(id, value))
+        both = {label: m.raw.members or (m.frequency_Hz,) for label, m in modes.items()}
         return np.concatenate(
             [np.array(f) / plain[label].frequency_Hz - 1 for label, f in both.items()]
         )
