@@ -1,4 +1,4 @@
-"""What is evaluated: a case's tyre, resolved once, or whatever else writes decks."""
+"""Designs that are evaluated: a case's tyre, resolved once, or any other writer of decks."""
 
 from __future__ import annotations
 
@@ -63,10 +63,10 @@ def test_somebodys_decks_are_evaluated_without_a_case() -> None:
         file: text.replace(format(START["C10"], ".13g"), "$C10") for file, text in texts.items()
     }
     assert any("$C10" in text for text in marked.values())
-    asked = Question({"C10": 1.1 * START["C10"]}, ("C10",))
+    question = Question({"C10": 1.1 * START["C10"]}, ("C10",))
     text = DeckText(marked, {"C10": START["C10"]}, design.request)
-    own = Evaluator(text, "bundled").evaluate(asked)
-    of_case = Evaluator(TyreDesign(with_values(CASE, START))).evaluate(asked)
+    own = Evaluator(text, "bundled").evaluate(question)
+    of_case = Evaluator(TyreDesign(with_values(CASE, START))).evaluate(question)
     assert [m.frequency_Hz for m in own.modes] == pytest.approx(
         [m.frequency_Hz for m in of_case.modes], rel=1e-10
     )

@@ -37,11 +37,11 @@ Edit = Callable[[dict[str, Any]], Any]
 
 def test_a_run_that_went_well_is_kept_where_that_is_asked(tmp_path: Path) -> None:
     """With a word on what came of it, as those of failures always are."""
-    asked = evaluator(tmp_path)
-    ask(asked)
+    subject = evaluator(tmp_path)
+    ask(subject)
     assert not list((tmp_path / "runs").iterdir())
-    asked.keep = True
-    ask(asked, 2e6)
+    subject.keep = True
+    ask(subject, 2e6)
     (kept,) = (tmp_path / "runs").iterdir()
     assert (kept / "outcome.txt").read_text() == "finished\n" and (kept / "deck.inp").exists()
     failing = evaluator(tmp_path, StandIn("unstable"))
@@ -78,11 +78,11 @@ def test_time_limits_grow_with_loads_and_modes(tmp_path: Path) -> None:
     solver.capabilities = solver.capabilities | {"loaded_modes"}  # type: ignore[misc]
     limits: list[float] = []
     solver.run = lambda folder, limit: limits.append(limit)  # type: ignore[method-assign]
-    asked = Evaluator(TyreDesign(CASE), folder=tmp_path, _solver=solver)
+    subject = Evaluator(TyreDesign(CASE), folder=tmp_path, _solver=solver)
     one = CASE.case.solver.time_limit_s
-    asked.press({}, [500.0, 900.0])
+    subject.press({}, [500.0, 900.0])
     with pytest.raises(EvaluationFailed, match="not 2 modes"):
-        asked.press({}, [500.0, 900.0], modes=2)
+        subject.press({}, [500.0, 900.0], modes=2)
     assert limits == [2 * one, 6 * one]
     alone = StandIn()
     alone.run = lambda folder, limit: limits.append(limit)  # type: ignore[method-assign]
@@ -123,42 +123,42 @@ def test_of_several_questions_each_is_heard_counted_and_may_fail(
                     EvaluationFailed("crashed", "it died") if place == 2 else function(task),
                 )
 
-    monkeypatch.setattr(door_module, "executor", lambda *asked: nullcontext(Workers()))
-    told: list[tuple[int, int]] = []
-    asked = replace(evaluator(tmp_path), on_progress=lambda *done: told.append(done))
+    monkeypatch.setattr(door_module, "executor", lambda *arguments: nullcontext(Workers()))
+    progress: list[tuple[int, int]] = []
+    subject = replace(evaluator(tmp_path), on_progress=lambda *done: progress.append(done))
 
     def worker() -> Evaluator:
-        other = Evaluator.worker(asked)
-        other._solver = asked.solver
+        other = Evaluator.worker(subject)
+        other._solver = subject.solver
         return other
 
-    asked.worker = worker  # type: ignore[method-assign]
+    subject.worker = worker  # type: ignore[method-assign]
     questions = [Question({"C10": value}) for value in (1e6, 2e6, 3e6)]
-    answers = list(asked.answer_all(questions, jobs))
-    assert told == [(0, 3), (1, 3), (2, 3), (3, 3)]
+    answers = list(subject.answer_all(questions, jobs))
+    assert progress == [(0, 3), (1, 3), (2, 3), (3, 3)]
     lost = [isinstance(answer, EvaluationFailed) for answer in answers]
     assert lost == [False, False, jobs == 2] and len(given) == (3 if jobs == 2 else 0)
     if jobs == 2:
         assert answers[2].cause == "crashed"  # type: ignore[union-attr]
-    assert asked.counts.runs >= (2 if jobs == 2 else 3)
-    list(asked.answer_all(questions[:1], jobs))
-    assert asked.counts.recorded == 1 and len(given) == (3 if jobs == 2 else 0)
+    assert subject.counts.runs >= (2 if jobs == 2 else 3)
+    list(subject.answer_all(questions[:1], jobs))
+    assert subject.counts.recorded == 1 and len(given) == (3 if jobs == 2 else 0)
 
 
 def test_a_worker_has_counts_of_its_own_another_case_has_not(tmp_path: Path) -> None:
-    asked = evaluator(tmp_path)
-    asked.keep, asked.command, asked.scheduler = True, ("a",), "tcp://there"
-    other = asked.worker()
-    assert other.counts is not asked.counts and other.folder == asked.folder and other.keep
-    assert other.store is asked.store and other.command == ("a",) and not other.scheduler
-    same = asked.of(TyreDesign(CASE))
-    assert same.counts is asked.counts and same.on_progress is asked.on_progress
+    subject = evaluator(tmp_path)
+    subject.keep, subject.command, subject.scheduler = True, ("a",), "tcp://there"
+    other = subject.worker()
+    assert other.counts is not subject.counts and other.folder == subject.folder and other.keep
+    assert other.store is subject.store and other.command == ("a",) and not other.scheduler
+    same = subject.of(TyreDesign(CASE))
+    assert same.counts is subject.counts and same.on_progress is subject.on_progress
 
 
 def footprint(load: float, **changes: Any) -> dict[str, Any]:
-    """What a solver tells of one load, of a patch of two nodes."""
+    """Answer of a solver about one load, with a patch of two nodes."""
     two = np.ones(2)
-    told: dict[str, Any] = {
+    plain: dict[str, Any] = {
         "load_N": load,
         "road_N": load,
         "rim_N": np.array([load, 0.0, 0.0]),
@@ -173,7 +173,7 @@ def footprint(load: float, **changes: Any) -> dict[str, Any]:
         "traction_Pa": np.ones((2, 2)),
         "displacement": np.zeros((4, 3, 3)),
     }
-    return {**told, **changes}
+    return {**plain, **changes}
 
 
 def modes_told(count: int, lowest: float = 30.0) -> dict[str, Any]:
@@ -186,7 +186,7 @@ def modes_told(count: int, lowest: float = 30.0) -> dict[str, Any]:
 
 def road(*footprints: dict[str, Any], **changes: Any) -> dict[str, Any]:
     """A solver's answer of a tyre of 4 rings of 3 nodes."""
-    told = {
+    plain = {
         "pressure_Pa": 240e3,
         "mass_kg": 12.0,
         "nodes": np.arange(3),
@@ -196,7 +196,7 @@ def road(*footprints: dict[str, Any], **changes: Any) -> dict[str, Any]:
         "footprints": list(footprints),
         "failure": "",
     }
-    return {**told, **changes}
+    return {**plain, **changes}
 
 
 def test_loads_are_those_that_were_asked_for() -> None:
@@ -217,12 +217,14 @@ def test_loads_are_those_that_were_asked_for() -> None:
 
 
 def test_modes_on_the_road_are_as_many_as_were_asked_for() -> None:
-    asked = lambda told, modes: pressed(road(footprint(500.0, **told)), [500.0], None, modes)
-    assert asked(modes_told(3), 3).footprints[0].mode_frequency_Hz is not None
-    assert asked(modes_told(4), 3) and asked({}, 0)
-    for told in (modes_told(2), modes_told(3, 0.0), modes_told(3, -1.0), {}):
+    footprints = lambda changes, modes: pressed(
+        road(footprint(500.0, **changes)), [500.0], None, modes
+    )
+    assert footprints(modes_told(3), 3).footprints[0].mode_frequency_Hz is not None
+    assert footprints(modes_told(4), 3) and footprints({}, 0)
+    for wrong in (modes_told(2), modes_told(3, 0.0), modes_told(3, -1.0), {}):
         with pytest.raises(EvaluationFailed, match="not 3 modes at 500 N"):
-            asked(told, 3)
+            footprints(wrong, 3)
 
 
 PLAIN: dict[str, tuple[Edit, str]] = {
@@ -264,9 +266,9 @@ PLAIN: dict[str, tuple[Edit, str]] = {
 
 def solid(answer: dict[str, Any], displacement: Any = None, **more: Any) -> None:
     shape = np.ones((3, 3)) if displacement is None else displacement
-    told = {"frequency_Hz": 50.0, "multiplicity": 1, "displacement": shape}
+    entry = {"frequency_Hz": 50.0, "multiplicity": 1, "displacement": shape}
     answer.update(
-        {"modes": [told], "points": np.arange(9.0).reshape(3, 3), "gradients": {}, **more}
+        {"modes": [entry], "points": np.arange(9.0).reshape(3, 3), "gradients": {}, **more}
     )
 
 

@@ -48,8 +48,8 @@ def knows(module: str) -> bool:
 
 
 def test_workers_begin_with_what_they_need() -> None:
-    asked = ["tyrecal.batch.case", "tyrecal_solvers.bundled.adapter", "tyrecal.nothing"]
-    assert list(in_order(Processes(2).each(knows, asked))) == [True, True, False]
+    names = ["tyrecal.batch.case", "tyrecal_solvers.bundled.adapter", "tyrecal.nothing"]
+    assert list(in_order(Processes(2).each(knows, names))) == [True, True, False]
 
 
 def test_in_order_of_anything() -> None:

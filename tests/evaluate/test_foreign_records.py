@@ -36,15 +36,15 @@ def rewritten(path: Path, line: bytes, stored: bytes | None = None) -> None:
 
 def edited(edit: Callable[[Content], Any]) -> Callable[[Path], None]:
     def apply(path: Path) -> None:
-        told = json.loads(path.read_bytes()[65:].partition(b"\n")[0])
-        told = edit(told) or told
-        rewritten(path, json.dumps(told).encode())
+        record = json.loads(path.read_bytes()[65:].partition(b"\n")[0])
+        record = edit(record) or record
+        rewritten(path, json.dumps(record).encode())
 
     return apply
 
 
-def mode(told: Content) -> Content:
-    first: Content = told["content"]["answer"]["modes"][0]
+def mode(record: Content) -> Content:
+    first: Content = record["content"]["answer"]["modes"][0]
     return first
 
 
@@ -61,10 +61,10 @@ def zipped(member: bytes, method: int = zipfile.ZIP_STORED, members: int = 6) ->
 
 
 def header(count: int) -> bytes:
-    """Of an array that says it holds ``count`` numbers."""
+    """Header of an array that claims to hold ``count`` numbers."""
     buffer = io.BytesIO()
-    told = {"descr": "<f8", "fortran_order": False, "shape": (count,)}
-    np.lib.format.write_array_header_1_0(buffer, told)
+    fields = {"descr": "<f8", "fortran_order": False, "shape": (count,)}
+    np.lib.format.write_array_header_1_0(buffer, fields)
     return buffer.getvalue()
 
 
@@ -102,12 +102,12 @@ def special(make: Callable[[Path], Any]) -> Callable[[Path], None]:
 KINDS: dict[str, Callable[[Path], None]] = {
     "no JSON": lambda path: rewritten(path, b"{nope"),
     "not text": lambda path: rewritten(path, b"\xff\xfe{}"),
-    "a list": edited(lambda told: [1, 2]),
-    "no keys": edited(lambda told: {"a": 1}),
+    "a list": edited(lambda record: [1, 2]),
+    "no keys": edited(lambda record: {"a": 1}),
     "nested too deep": lambda path: rewritten(path, b"[" * 100_000),
     "thousands of digits": lambda path: rewritten(path, b'{"content": ' + b"9" * 5000 + b"}"),
-    "about a list": edited(lambda told: {**told, "about": [1]}),
-    "about nothing": edited(lambda told: {**told, "about": {}}),
+    "about a list": edited(lambda record: {**record, "about": [1]}),
+    "about nothing": edited(lambda record: {**record, "about": {}}),
     "too much text": lambda path: rewritten(path, b"[" + b"[]," * (LONGEST_TEXT // 3) + b"[]]"),
     "too many arrays": arrays(zipped(b"", members=MOST_ARRAYS + 1)),
     "no arrays": arrays(b""),
@@ -116,30 +116,36 @@ KINDS: dict[str, Callable[[Path], None]] = {
     "a huge shape": arrays(zipped(header(10**15))),
     "too short": arrays(zipped(header(100) + bytes(80))),
     "pickled": arrays(objects()),
-    "no content": edited(lambda told: {**told, "content": None}),
-    "content is text": edited(lambda told: {**told, "content": "x"}),
-    "an empty answer": edited(lambda told: {**told, "content": {"answer": {}}}),
-    "the answer is a list": edited(lambda told: {**told, "content": {"answer": []}}),
-    "a frequency of NaN": edited(lambda told: mode(told).update(frequency_Hz=float("nan"))),
-    "a frequency in words": edited(lambda told: mode(told).update(frequency_Hz="31")),
-    "no frequency": edited(lambda told: mode(told).update(frequency_Hz=0.0)),
-    "three of a pair": edited(lambda told: mode(told).update(members=[1.0, 2.0, 3.0])),
-    "no shape": edited(lambda told: mode(told).pop("amplitude")),
-    "a mass of NaN": edited(lambda told: told["content"]["answer"].update(mass_kg=float("nan"))),
-    "slopes of none": edited(lambda told: told["content"]["answer"].update(gradients={"A": []})),
+    "no content": edited(lambda record: {**record, "content": None}),
+    "content is text": edited(lambda record: {**record, "content": "x"}),
+    "an empty answer": edited(lambda record: {**record, "content": {"answer": {}}}),
+    "the answer is a list": edited(lambda record: {**record, "content": {"answer": []}}),
+    "a frequency of NaN": edited(lambda record: mode(record).update(frequency_Hz=float("nan"))),
+    "a frequency in words": edited(lambda record: mode(record).update(frequency_Hz="31")),
+    "no frequency": edited(lambda record: mode(record).update(frequency_Hz=0.0)),
+    "three of a pair": edited(lambda record: mode(record).update(members=[1.0, 2.0, 3.0])),
+    "no shape": edited(lambda record: mode(record).pop("amplitude")),
+    "a mass of NaN": edited(
+        lambda record: record["content"]["answer"].update(mass_kg=float("nan"))
+    ),
+    "slopes of none": edited(
+        lambda record: record["content"]["answer"].update(gradients={"A": []})
+    ),
     "another harmonic": edited(lambda record: mode(record).update(n=99)),
     "a billion waves": edited(lambda record: mode(record).update(n=10**9)),
     "three modes of a harmonic": edited(
         lambda record: record["content"]["answer"].update(modes=3 * [mode(record)], gradients={})
     ),
     "half precision": lambda path: arrays(halved(path.read_bytes()[65:].partition(b"\n")[2]))(path),
-    "another pressure": edited(lambda told: told["content"]["answer"].update(pressure_Pa=150e3)),
-    "a failure without words": edited(lambda told: {**told, "content": {"cause": "unstable"}}),
-    "a failure of numbers": edited(
-        lambda told: {**told, "content": {"cause": 3, "words": 4, "folder": 5}}
+    "another pressure": edited(
+        lambda record: record["content"]["answer"].update(pressure_Pa=150e3)
     ),
-    "another key": edited(lambda told: {**told, "key": "ab" * 32}),
-    "no key": edited(lambda told: {"about": told["about"], "content": told["content"]}),
+    "a failure without words": edited(lambda record: {**record, "content": {"cause": "unstable"}}),
+    "a failure of numbers": edited(
+        lambda record: {**record, "content": {"cause": 3, "words": 4, "folder": 5}}
+    ),
+    "another key": edited(lambda record: {**record, "key": "ab" * 32}),
+    "no key": edited(lambda record: {"about": record["about"], "content": record["content"]}),
     "a pipe": special(os.mkfifo),
     "a link": special(lambda path: path.symlink_to("/dev/zero")),
     "a folder": special(Path.mkdir),
@@ -180,7 +186,7 @@ SECTION = np.array([[0.35, -0.1], [0.36, 0.0], [0.35, 0.1]])
 
 
 def of_modes() -> Content:
-    """What is recorded of two modes on three points of a section, and their slopes by A."""
+    """Recorded answer about two modes on three points of a section, and their slopes by A."""
     one = {"frequency_Hz": 50.0, "multiplicity": 2, "n": 1, "amplitude": np.ones((3, 3), complex)}
     two = {"frequency_Hz": 60.0, "multiplicity": 1, "displacement": np.ones((3, 3))}
     return {
@@ -195,7 +201,8 @@ def of_modes() -> Content:
 
 
 def of_footprints() -> Content:
-    """Of a load: a patch of a point at each of three nodes, on two rings, with one mode."""
+    """Recorded answer about one load: a patch of a point at each of three nodes, on two rings, with
+    one mode."""
     patch = {
         "load_N": 4e3,
         "road_N": 4e3,
@@ -388,7 +395,7 @@ def test_a_failures_words_and_folder_are_not_believed(tmp_path: Path) -> None:
         ask(evaluator(tmp_path, StandIn("unstable")))
     (path,) = records(tmp_path)
     words, elsewhere = "\x1b]0;title\x07\x1b[31mred", str(tmp_path / "elsewhere")
-    edited(lambda told: told["content"].update(words=words, folder=elsewhere))(path)
+    edited(lambda record: record["content"].update(words=words, folder=elsewhere))(path)
     with pytest.raises(EvaluationFailed) as failure:
         ask(evaluator(tmp_path, StandIn("unstable")))
     kept = failure.value.folder

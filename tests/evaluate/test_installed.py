@@ -1,4 +1,4 @@
-"""What is told of each registered solver."""
+"""Command of each registered solver, and who set it."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from tyrecal.simulate.evaluate import solver
 
 
 @pytest.mark.parametrize(
-    ("told", "wanted"),
+    ("started_by", "wanted"),
     [
         (([], ""), ("ccx", "default")),
         ((["ccx_2.21", "-i"], "settings.toml"), (["ccx_2.21", "-i"], "settings.toml")),
     ],
 )
 def test_a_command_and_who_set_it(
-    told: tuple[list[str], str], wanted: tuple[object, str], monkeypatch: pytest.MonkeyPatch
+    started_by: tuple[list[str], str], wanted: tuple[object, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(solver, "command_of", lambda name: told)
+    monkeypatch.setattr(solver, "command_of", lambda name: started_by)
     monkeypatch.setenv("PATH", "")  # whether ccx is installed here must not matter
     facts = {each["name"]: each for each in solver.installed()}
     calculix, bundled = facts["calculix"], facts["bundled"]

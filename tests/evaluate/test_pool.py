@@ -151,15 +151,15 @@ def test_stopped_in_the_middle_of_large_answers_it_ends(tmp_path: Path) -> None:
 
 def test_a_busy_worker_ends_with_its_parent(tmp_path: Path) -> None:
     (tmp_path / "parent.py").write_text(PARENT)
-    said = tmp_path / "pid"
+    pid_file = tmp_path / "pid"
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    parent = subprocess.Popen([sys.executable, tmp_path / "parent.py", said], env=environment)
-    while not (said.exists() and said.read_text()) and parent.poll() is None:
+    parent = subprocess.Popen([sys.executable, tmp_path / "parent.py", pid_file], env=environment)
+    while not (pid_file.exists() and pid_file.read_text()) and parent.poll() is None:
         time.sleep(0.02)
     parent.kill()
     parent.wait()
     for _ in range(100):
-        status = Path(f"/proc/{said.read_text()}/stat")
+        status = Path(f"/proc/{pid_file.read_text()}/stat")
         if not status.exists() or status.read_text().rpartition(")")[2].split()[0] == "Z":
             return
         time.sleep(0.1)

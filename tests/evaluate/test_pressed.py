@@ -96,11 +96,11 @@ def test_answers_that_are_not_whole(change: Any, words: str, tmp_path: Path) -> 
 
 
 def test_each_load_has_the_time_of_a_run(tmp_path: Path) -> None:
-    asked = evaluator(tmp_path)
+    subject = evaluator(tmp_path)
     limits: list[float] = []
-    asked.solver.run = lambda folder, limit: limits.append(limit)  # type: ignore[method-assign]
-    asked.press({}, LOADS)
-    asked.press({}, LOADS[:1])
+    subject.solver.run = lambda folder, limit: limits.append(limit)  # type: ignore[method-assign]
+    subject.press({}, LOADS)
+    subject.press({}, LOADS[:1])
     assert limits == [600.0, 300.0] == [n * CASE.case.solver.time_limit_s for n in (2, 1)]
 
 
@@ -119,16 +119,16 @@ def test_unless_asked_otherwise_all_is_done_in_this_process(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "tyrecal.simulate.evaluate.evaluator.executor", lambda *asked: pytest.fail("elsewhere")
+        "tyrecal.simulate.evaluate.evaluator.executor", lambda *arguments: pytest.fail("elsewhere")
     )
-    asked = evaluator(tmp_path)
+    subject = evaluator(tmp_path)
     assert (
-        len(list(asked.press_all([PressQuestion({}, LOADS), PressQuestion({"C10": 9e5}, LOADS)])))
-        == asked.counts.runs
+        len(list(subject.press_all([PressQuestion({}, LOADS), PressQuestion({"C10": 9e5}, LOADS)])))
+        == subject.counts.runs
         == 2
     )
     assert (
-        len(list(asked.press_all([PressQuestion({}, LOADS)], jobs=2))) == 1
+        len(list(subject.press_all([PressQuestion({}, LOADS)], jobs=2))) == 1
     )  # one design needs no other
     questions = [Question({"C10": value}) for value in (1e6, 2e6)]
     plain = stand_in.evaluator(tmp_path / "plain")

@@ -51,14 +51,16 @@ def test_along_all_variables_at_once_they_are_differences(
     case = load_case(small_case(tmp_path))
     start = {name: case.case.variables[name].start for name in ALONG}
     evaluator = Evaluator(TyreDesign(case), store=Store(tmp_path / "record"))
-    found, again = (evaluator.press(start, loads, gradients=tuple(start)) for _ in range(2))
+    pressed, again = (evaluator.press(start, loads, gradients=tuple(start)) for _ in range(2))
     assert (evaluator.counts.runs, evaluator.counts.recorded) == (1, 1)
-    assert [each.slopes for each in again.footprints] == [each.slopes for each in found.footprints]
+    assert [each.slopes for each in again.footprints] == [
+        each.slopes for each in pressed.footprints
+    ]
     above, below = (
         evaluator.press({v: x * np.exp(step * ALONG[v]) for v, x in start.items()}, loads)
         for step in (STEP, -STEP)
     )
-    states = zip(found.footprints, above.footprints, below.footprints, strict=True)
+    states = zip(pressed.footprints, above.footprints, below.footprints, strict=True)
     for at, up, down in states:
         for name in NAMES:
             each = [at.slopes[v][name] * start[v] * ALONG[v] for v in start]

@@ -29,12 +29,12 @@ def ask(evaluator: Evaluator, values: dict[str, float], *gradients: str) -> byte
     return numbers(evaluator.evaluate(Question(values, gradients)))
 
 
-def numbers(found: Evaluation | Exception) -> bytes:
-    assert isinstance(found, Evaluation)
-    shapes = [mode.shape.amplitude for mode in found.modes]
+def numbers(evaluation: Evaluation | Exception) -> bytes:
+    assert isinstance(evaluation, Evaluation)
+    shapes = [mode.shape.amplitude for mode in evaluation.modes]
     return b"".join(
         np.asarray(part).tobytes()
-        for part in (found.displacement, [m.frequency_Hz for m in found.modes], *shapes)
+        for part in (evaluation.displacement, [m.frequency_Hz for m in evaluation.modes], *shapes)
     )
 
 

@@ -194,14 +194,14 @@ def test_another_version_or_reader_is_another_question(
     ask(evaluator(tmp_path, solver))
     ask(evaluator(tmp_path, solver))
     assert solver.runs == 3
-    found = Store(tmp_path / "record").summary(verify=True)
-    assert found["solvers"] == {"stand-in 1": 1, "stand-in 2": 2} and found["records"] == 3
+    summary = Store(tmp_path / "record").summary(verify=True)
+    assert summary["solvers"] == {"stand-in 1": 1, "stand-in 2": 2} and summary["records"] == 3
 
 
 def test_an_adapter_is_known_by_the_text_of_its_package(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of any module of it, not of the adapter's alone."""
+    """A change of any module of the package counts, not of the adapter's alone."""
     (tmp_path / "reader.py").write_text("FACTOR = 1\n")
     (tmp_path / "an_adapter.py").write_text("class Adapter:\n    pass\n")
     monkeypatch.syspath_prepend(tmp_path)
@@ -267,8 +267,8 @@ def test_a_full_disc_does_not_spoil_an_evaluation(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Path, "write_bytes", full)
-    asked = evaluator(tmp_path)
-    assert ask(asked).modes and ask(asked, 2e6).modes
+    subject = evaluator(tmp_path)
+    assert ask(subject).modes and ask(subject, 2e6).modes
     assert [r.levelno for r in caplog.records] == [logging.WARNING]  # said once
     assert "No space left" in caplog.text and "not recorded" in caplog.text
     assert not list((tmp_path / "record").glob("*/*"))
