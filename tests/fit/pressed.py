@@ -50,10 +50,13 @@ class Elastic(Hertz):
 
     def footprint(self, load: float) -> dict[str, Any]:
         """One load."""
-        found = super().footprint(load)
-        found["stiffness_N_per_m"] *= self.factor
+        footprint = super().footprint(load)
+        footprint["stiffness_N_per_m"] *= self.factor
         scale = (load / 4e3) ** (1 / 3)
-        return found | {"contact_length_m": scale * self.long, "contact_width_m": scale * self.wide}
+        return footprint | {
+            "contact_length_m": scale * self.long,
+            "contact_width_m": scale * self.wide,
+        }
 
 
 class Roadless(Bundled):

@@ -78,15 +78,15 @@ def test_fixed_variables_stay_and_others_move() -> None:
 
 def test_bounds_that_hold_too_few_tyres_end_the_drawing_of_starts() -> None:
     """Twenty are replaced for each that is asked for."""
-    asked: list[tuple[int, int]] = []
+    progress: list[tuple[int, int]] = []
     with pytest.raises(EvaluationFailed, match="the bounds hold too few") as failure:
         calibrate(
             CASE,
             evaluator(fails=lambda values: values != START),  # type: ignore[arg-type]
             starts=4,
-            finished=lambda *done: asked.append(done),
+            finished=lambda *done: progress.append(done),
         )
-    assert failure.value.words.startswith("63 drawn starts") and asked == [(1, 4)]
+    assert failure.value.words.startswith("63 drawn starts") and progress == [(1, 4)]
 
 
 class Counting(FakeEvaluator):
@@ -113,8 +113,8 @@ def test_starts_of_other_processes_tell_how_often_the_solver_ran(
         def each(self, function: Any, tasks: Any) -> Any:
             return super().each(function, map(deepcopy, tasks))  # type: ignore[arg-type]
 
-    monkeypatch.setattr(calibrate_module, "executor", lambda *asked: nullcontext(Elsewhere()))
-    told: list[tuple[int, int]] = []
+    monkeypatch.setattr(calibrate_module, "executor", lambda *arguments: nullcontext(Elsewhere()))
+    progress: list[tuple[int, int]] = []
     results, counts = [], []
     for jobs in (1, 2):
         tyre = Counting(evaluator().base, POWERS, START).worker()
@@ -123,12 +123,12 @@ def test_starts_of_other_processes_tell_how_often_the_solver_ran(
             tyre,  # type: ignore[arg-type]
             starts=3,
             jobs=jobs,
-            finished=lambda *done: told.append(done),
+            finished=lambda *done: progress.append(done),
         )
         results.append(fit.result)
         counts.append(tyre.counts)
     assert results[0] == results[1] and counts[0] == counts[1]
-    assert counts[0].runs == len(fit.history) and told == [(1, 3), (2, 3), (3, 3)] * 2
+    assert counts[0].runs == len(fit.history) and progress == [(1, 3), (2, 3), (3, 3)] * 2
 
 
 def test_a_start_whose_process_dies_ends_the_fit(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -139,7 +139,7 @@ def test_a_start_whose_process_dies_ends_the_fit(monkeypatch: pytest.MonkeyPatch
                 for i in range(len(tasks))
             )
 
-    monkeypatch.setattr(calibrate_module, "executor", lambda *asked: nullcontext(Dying()))
+    monkeypatch.setattr(calibrate_module, "executor", lambda *arguments: nullcontext(Dying()))
     tyre = Counting(evaluator().base, POWERS, START)
     with pytest.raises(EvaluationFailed, match="its process died, twice") as failure:
         calibrate(CASE, tyre, starts=3, jobs=2)  # type: ignore[arg-type]
@@ -147,9 +147,9 @@ def test_a_start_whose_process_dies_ends_the_fit(monkeypatch: pytest.MonkeyPatch
 
 
 def test_one_start_is_nothing_to_count() -> None:
-    told: list[tuple[int, int]] = []
-    fit = calibrate(CASE, evaluator(), finished=lambda *done: told.append(done))  # type: ignore[arg-type]
-    assert told == [] and len(fit.result["starts"]) == 1 and fit.result["replaced_starts"] == 0
+    progress: list[tuple[int, int]] = []
+    fit = calibrate(CASE, evaluator(), finished=lambda *done: progress.append(done))  # type: ignore[arg-type]
+    assert progress == [] and len(fit.result["starts"]) == 1 and fit.result["replaced_starts"] == 0
 
 
 def test_starts_are_drawn_replaced_and_reproducible() -> None:

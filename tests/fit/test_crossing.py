@@ -56,15 +56,15 @@ def test_the_difference_without_coupling_is_found_on_either_side(torsional: floa
     problem = Problem(CASE, tyre)  # type: ignore[arg-type]
     at = np.log([4e-7, 1.5e-7, 4.5e5])
     point = problem.evaluate(at)
-    found = crossing(problem, [point], point)
-    assert found
+    edge = crossing(problem, [point], point)
+    assert edge
     alone = FakeEvaluator(tyre.base, tyre.powers, START).evaluate(Question(point.values)).modes[:2]
     f = np.array([mode.frequency_Hz for mode in alone])
     assert pair_clarity(point) < 1 and abs(gap(point, AS_THE_CASE)) > 2 * COUPLING
-    assert found.at(at) == pytest.approx(f[0] - f[1], rel=1e-9)
+    assert edge.at(at) == pytest.approx(f[0] - f[1], rel=1e-9)
     assert order(problem, point) == {AS_THE_CASE: np.sign(f[0] - f[1])}
     slopes = [f @ (np.array([1, -1]) * tyre.powers[name][:2]) for name in START]
-    assert found.slopes == pytest.approx(slopes, rel=1e-6)
+    assert edge.slopes == pytest.approx(slopes, rel=1e-6)
 
 
 @pytest.mark.parametrize("factors", [(1.07, 0.955), (1.08, 0.966)])

@@ -35,10 +35,10 @@ def test_a_secant_holds_and_changes_as_little_as_it_must() -> None:
 def test_curvatures_of_quadratics_are_found_after_as_many_steps_as_variables() -> None:
     """Conjugate to none, along the axes: each step tells a column for good."""
     _, _, C = drawn(0)
-    found = np.zeros_like(C)
+    curvature = np.zeros_like(C)
     for s in np.eye(3):
-        found = with_secant(found, s, C @ s)
-    assert found == pytest.approx(C)
+        curvature = with_secant(curvature, s, C @ s)
+    assert curvature == pytest.approx(C)
 
 
 def test_a_step_without_curvature_is_the_damped_one() -> None:

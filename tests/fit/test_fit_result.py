@@ -50,32 +50,32 @@ def test_the_result_says_what_happened() -> None:
     """Points, failures, when the objective was near its end, and deviations, from the history."""
     fails = lambda values: values["A_belt"] > 1.005 * TRUTH["A_belt"]
     fit = calibrate(CASE, evaluator(fails=fails), starts=3, seed=1)  # type: ignore[arg-type]
-    told, history = fit.result, fit.history
+    result, history = fit.result, fit.history
     objectives = [row["objective_Hz"] for row in history]
     assert [row["point"] for row in history] == list(range(1, len(history) + 1))
     assert [row["start"] for row in history] == sorted(row["start"] for row in history)
     assert {row["start"] for row in history} == {1, 2, 3}
-    assert [s["evaluations"] for s in told["starts"]] == [
+    assert [s["evaluations"] for s in result["starts"]] == [
         sum(row["start"] == k for row in history) for k in (1, 2, 3)
     ]
     failed = [row for row in history if row["objective_Hz"] is None]
-    assert told["failed_evaluations"] == len(failed) > 0 and told["replaced_starts"] > 0
-    assert told["gradient_evaluations"] == len(history) - len(failed)
+    assert result["failed_evaluations"] == len(failed) > 0 and result["replaced_starts"] > 0
+    assert result["gradient_evaluations"] == len(history) - len(failed)
     assert all((row["failure"] is None) == (row["objective_Hz"] is not None) for row in history)
-    near = [f is not None and f < told["objective_Hz"] + 0.05 for f in objectives]
-    assert told["evaluations_to_0.05_Hz"] == near.index(True) + 1 > 2
-    assert told["objective_Hz"] == min(s["objective_Hz"] for s in told["starts"])
-    assert told["objective_Hz"] == fit.fitted.objective < told["initial_objective_Hz"]
-    assert told["initial_objective_Hz"] == fit.initial.objective == objectives[0]
-    for mode, label in zip(told["modes"], LABELS, strict=True):
+    near = [f is not None and f < result["objective_Hz"] + 0.05 for f in objectives]
+    assert result["evaluations_to_0.05_Hz"] == near.index(True) + 1 > 2
+    assert result["objective_Hz"] == min(s["objective_Hz"] for s in result["starts"])
+    assert result["objective_Hz"] == fit.fitted.objective < result["initial_objective_Hz"]
+    assert result["initial_objective_Hz"] == fit.initial.objective == objectives[0]
+    for mode, label in zip(result["modes"], LABELS, strict=True):
         assert (mode["c"], mode["m"], mode["kind"]) == (label.c, label.m, label.kind)
         share = mode["fitted_Hz"] / mode["target_Hz"] - 1
         assert mode["deviation_percent"] == pytest.approx(100 * share)
         assert mode["initial_Hz"] == fit.initial.modes[label].frequency_Hz
         assert mode["fitted_Hz"] == mode["frequency_Hz"] == fit.fitted.modes[label].frequency_Hz
-    for i, a in enumerate(told["variables"]):
-        assert told["correlations"][a][a] == pytest.approx(1)
-        one = told["variables"][a]
+    for i, a in enumerate(result["variables"]):
+        assert result["correlations"][a][a] == pytest.approx(1)
+        one = result["variables"][a]
         assert one["initial"] == START[a] and one["value"] == fit.fitted.values[a]
         assert (one["lower"], one["upper"]) == (
             CASE.case.variables[a].lower,
@@ -99,8 +99,8 @@ def test_a_variable_is_at_a_bound_to_a_millionth(gap: float, at_bound: bool, sid
     point = problem.evaluate(x)
     report = StartReport({}, point, "", True, [])
     history = [{"objective_Hz": point.objective, "values": {}}]
-    found = fit_result(problem, point, report, [report], history, 0, "slsqp").variables
-    assert [one.at_bound for one in found.values()] == [False, False, at_bound]
+    variables = fit_result(problem, point, report, [report], history, 0, "slsqp").variables
+    assert [one.at_bound for one in variables.values()] == [False, False, at_bound]
 
 
 @pytest.mark.parametrize(("change", "moved"), [(1.1e-6, True), (-1.1e-6, True), (0.9e-6, False)])

@@ -40,12 +40,14 @@ START_X = np.log(list(START.values()))
 
 def exact_modes(sigma_Hz: float | None) -> list:
     """The case's target modes with the frequencies that the model has at TRUTH."""
-    found = {
+    by_label = {
         m.label: m.frequency_Hz
         for m in paired_labels(Evaluator(TyreDesign(CASE)).evaluate(Question(TRUTH)).modes)
     }
     return [
-        t.model_copy(update={"frequency_Hz": found[Label(t.c, t.m, t.kind)], "sigma_Hz": sigma_Hz})
+        t.model_copy(
+            update={"frequency_Hz": by_label[Label(t.c, t.m, t.kind)], "sigma_Hz": sigma_Hz}
+        )
         for t in MODES
     ]
 

@@ -1,4 +1,5 @@
-"""What each state adds to a fit, and which states would add most if they were measured next."""
+"""Contribution of each state to a fit, and the states that would add most if they were measured
+next."""
 
 from __future__ import annotations
 
@@ -36,20 +37,20 @@ def test_each_state_adds_what_a_fit_without_it_lacks() -> None:
     problem, point = point_of(case_with(measured(noise=1.0)), TRUTH)
     known = uncertainty(problem, point)
     fit = fitted(case_with(measured(noise=1.0)))
-    for state, told in zip(STATES, fit.result["states"], strict=True):
+    for state, entry in zip(STATES, fit.result["states"], strict=True):
         rest = [s for s in STATES if s != state]
         fewer, there = point_of(case_with(measured(rest)), dict(fit.fitted.values))
         expected = uncertainty(fewer, there).standard_errors
-        assert list(told["standard_errors_without"].values()) == pytest.approx(expected, rel=1e-9)
+        assert list(entry["standard_errors_without"].values()) == pytest.approx(expected, rel=1e-9)
     assert all(e and e > 0 for e in known.standard_errors)
     alone = uncertainty(*point_of(case_with(measured([AS_THE_CASE])), TRUTH)).standard_errors
     repeated = measured([AS_THE_CASE], sigma=SIGMA / sqrt(6))
     again = uncertainty(*point_of(case_with(repeated), TRUTH)).standard_errors
     assert np.array(again) * sqrt(6) == pytest.approx(np.array(alone), rel=1e-9)
-    for place, told in enumerate(fit.result["states"]):
+    for place, entry in enumerate(fit.result["states"]):
         own = fit.result["modes"][9 * place : 9 * place + 9]
         off = [(m["fitted_Hz"] - m["target_Hz"]) / m["sigma_Hz"] for m in own]
-        assert told["rms_sigmas"] == pytest.approx(np.sqrt(np.mean(np.square(off))), rel=1e-9)
+        assert entry["rms_sigmas"] == pytest.approx(np.sqrt(np.mean(np.square(off))), rel=1e-9)
 
 
 @pytest.mark.numbers
@@ -57,13 +58,13 @@ def test_the_next_state_is_the_one_whose_fit_would_be_best() -> None:
     """Its standard errors are those of a fit that has it; the most telling is named first."""
     have = STATES[:2]
     fit = fitted(case_with(measured(have)))
-    told = fit.found.next_states
-    asked = {(each.pressure_kPa, each.rim) for each in told}
-    assert asked == {(p, rim) for p in (190.0, 300.0) for rim in ("fixed", "free")}
-    assert [each.ratio for each in told] == sorted(each.ratio for each in told)  # type: ignore[type-var]
+    proposals = fit.found.next_states
+    states = {(each.pressure_kPa, each.rim) for each in proposals}
+    assert states == {(p, rim) for p in (190.0, 300.0) for rim in ("fixed", "free")}
+    assert [each.ratio for each in proposals] == sorted(each.ratio for each in proposals)  # type: ignore[type-var]
     x = dict(fit.fitted.values)
     before = list(uncertainty(*point_of(case_with(measured(have)), x)).standard_errors)
-    for each in told:
+    for each in proposals:
         more = measured([*have, TyreState(each.pressure_kPa, 0.0, each.rim)])  # type: ignore[arg-type]
         like = {(t.c, t.m, t.kind): t.sigma_Hz / t.frequency_Hz for t in more[:9]}  # type: ignore[operator]
         scaled = [
@@ -79,7 +80,7 @@ def test_the_next_state_is_the_one_whose_fit_would_be_best() -> None:
 def test_modes_under_a_load_are_like_those_of_a_next_state() -> None:
     """Each once, where no unloaded state was measured; the tyre's own is then one to propose."""
     at_load = TyreState(None, 4000.0)
-    told = [
+    targets = [
         ValueTarget("frequency_Hz", 80.0, 0.4, state=at_load, member=Member(Label(2, 0), side))
         for side in ("symmetric", "antisymmetric")
     ]
@@ -89,9 +90,9 @@ def test_modes_under_a_load_are_like_those_of_a_next_state() -> None:
     sigma = np.array([0.4, 0.6, 1e-4, 0.5])
     some = lambda *rows: SimpleNamespace(measured=list(rows))
     known = lambda *which: SimpleNamespace(sigma=sigma[list(which)])
-    ((mode, relative),) = _best_measured(some(*told, area), known(0, 1, 2))  # type: ignore[arg-type]
+    ((mode, relative),) = _best_measured(some(*targets, area), known(0, 1, 2))  # type: ignore[arg-type]
     assert (mode.label, mode.multiplicity, relative) == (Label(2, 0), 2, 0.4 / 80.0)
-    ((mode, relative),) = _best_measured(some(*told, hung), known(0, 1, 3))  # type: ignore[arg-type]
+    ((mode, relative),) = _best_measured(some(*targets, hung), known(0, 1, 3))  # type: ignore[arg-type]
     assert (mode, relative) == (hung, 0.005)
     assert _best_measured(some(area), known(2)) == []  # type: ignore[arg-type]
 
@@ -101,9 +102,9 @@ def test_no_state_is_proposed_that_cannot_be_computed() -> None:
     tyre.solver.capabilities = set()
     problem = Problem(case_with(measured([TyreState(160.0), AS_THE_CASE])), tyre)  # type: ignore[arg-type]
     point = problem.evaluate(problem.start())
-    found = next_states(problem, point, uncertainty(problem, point))
-    told = [each.state.told(CASE) for each in found]
-    assert {(s.pressure_kPa, s.rim) for s in told} == {(130.0, "fixed"), (300.0, "fixed")}
+    proposals = next_states(problem, point, uncertainty(problem, point))
+    states = [each.state.told(CASE) for each in proposals]
+    assert {(s.pressure_kPa, s.rim) for s in states} == {(130.0, "fixed"), (300.0, "fixed")}
     tyre.has_gradients = False
     bare = Problem(problem.case, tyre)  # type: ignore[arg-type]
     assert next_states(bare, point, uncertainty(problem, point)) == []

@@ -33,13 +33,13 @@ def test_a_linear_problem_in_a_box_is_solved_in_a_few_steps(method: str, box: fl
     counts = []
     for key in range(5):
         problem = linear(key, box)
-        found = minimise(method, problem, np.zeros(3), 1e-3)
+        end = minimise(method, problem, np.zeros(3), 1e-3)
         exact = lsq_linear(problem.J, problem.y, (problem.lower, problem.upper), method="bvls").x
-        assert found.message == "converged"
-        assert found.point.x == pytest.approx(exact, abs=2e-3)
+        assert end.message == "converged"
+        assert end.point.x == pytest.approx(exact, abs=2e-3)
         lowest = np.linalg.norm(problem.J @ exact - problem.y)
-        assert found.point.objective == pytest.approx(lowest, abs=1e-6)
-        assert search.projected_gradient(problem, found.point) <= 1e-3
+        assert end.point.objective == pytest.approx(lowest, abs=1e-6)
+        assert search.projected_gradient(problem, end.point) <= 1e-3
         counts.append(len(problem.asked))
     assert max(counts) <= 15, counts
 
@@ -59,9 +59,9 @@ def test_where_nothing_is_lower_the_search_ends_and_says_so(method: str) -> None
     began."""
     problem = linear()
     problem.added = lambda x: 1e3 * bool(x.any())
-    found = minimise(method, problem, np.zeros(3), 1e-6)
-    assert "no lower objective along" in found.message
-    assert not found.point.x.any()
+    end = minimise(method, problem, np.zeros(3), 1e-6)
+    assert "no lower objective along" in end.message
+    assert not end.point.x.any()
     assert min(np.linalg.norm(x) for x in problem.asked if x.any()) < 1e-3  # however short
 
 
@@ -71,8 +71,8 @@ def test_what_is_as_high_as_before_is_not_lower(method: str) -> None:
     problem = linear()
     answer = problem.evaluate
     problem.evaluate = lambda x: replace(answer(x), residuals=-problem.y)
-    found = minimise(method, problem, np.zeros(3), 1e-6)
-    assert "no lower objective along" in found.message and not found.point.x.any()
+    end = minimise(method, problem, np.zeros(3), 1e-6)
+    assert "no lower objective along" in end.message and not end.point.x.any()
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -80,9 +80,9 @@ def test_a_step_beyond_what_has_a_solution_is_taken_back(method: str) -> None:
     """To its sixteenth at least: the wall stands at a tenth of the way."""
     problem: Any = Linear(np.eye(3), np.array([0.8, 0.4, 0.2]))
     problem.wall = lambda x: x[0] > 0.08
-    found = minimise(method, problem, np.zeros(3), 1e-6)
-    assert 0 < found.point.x[0] <= 0.08
-    assert found.point.objective < np.linalg.norm(problem.y) - 0.04
+    end = minimise(method, problem, np.zeros(3), 1e-6)
+    assert 0 < end.point.x[0] <= 0.08
+    assert end.point.objective < np.linalg.norm(problem.y) - 0.04
 
 
 def test_the_first_step_is_gauss_and_newtons_damped() -> None:
@@ -102,8 +102,8 @@ def test_a_step_that_promised_too_much_is_taken_shorter(method: str) -> None:
     """Were it taken whole, it would be far worse than a part of it."""
     problem: Any = Linear(np.eye(1), np.array([1.0]))
     problem.added = lambda x: 20 * x * abs(x)
-    found = minimise(method, problem, np.zeros(1), 1e-3)
-    assert 0 < found.point.x[0] < 0.3 and found.point.objective < 1
+    end = minimise(method, problem, np.zeros(1), 1e-3)
+    assert 0 < end.point.x[0] < 0.3 and end.point.objective < 1
 
 
 def test_steps_learn_the_curvature() -> None:
@@ -124,8 +124,8 @@ def test_steps_learn_the_curvature() -> None:
         ends = []
         for method in METHODS:
             problem: Any = Curved(J, y)
-            found = minimise(method, problem, np.zeros(3), 1e-6)
-            ends.append(found.point.objective)
+            end = minimise(method, problem, np.zeros(3), 1e-6)
+            ends.append(end.point.objective)
             designs[method].append(len(problem.asked))
         assert ends[0] == pytest.approx(ends[1], rel=1e-9)
     assert sum(designs["gauss-newton"]) < 0.7 * sum(designs["slsqp"]), designs

@@ -85,9 +85,9 @@ def test_designs_beyond_a_crossing_are_reached_by_the_least_change_of_the_residu
         problem: Any = Paired(linear().J, np.zeros(7))
         at = point([0.1, 0.2, 0.3], np.ones(7), problem.J, pair(3 * side, 0.1))
         edge = Crossing(np.zeros(3), 2.5 * side, np.array([1.0, -2.0, 3.0]))
-        found = list(_designs_beyond(problem, at, edge))
-        assert [side * edge.at(x) for x in found] == pytest.approx([-1.0, -2.0, -4.0])
-        for x in found:
+        designs = list(_designs_beyond(problem, at, edge))
+        assert [side * edge.at(x) for x in designs] == pytest.approx([-1.0, -2.0, -4.0])
+        for x in designs:
             push = problem.J.T @ problem.J @ (x - at.x)
             cosine = push @ edge.slopes / np.linalg.norm(push) / np.linalg.norm(edge.slopes)
             assert abs(cosine) > 1 - 1e-4
@@ -106,9 +106,9 @@ def test_slopes_are_taken_from_where_labels_are_clear() -> None:
         for x, clarity in ((0.1, 0.29), (0.5, 0.31), (-0.7, 0.9))
     )
     assert crossing(problem, [near], near) is None
-    found = crossing(problem, [farther, near, far], near)
-    assert found and found.x is far.x and found.value == pytest.approx(0.31)
-    assert found.slopes == pytest.approx(np.array([0.5, -1.0]) / 0.31)
+    edge = crossing(problem, [farther, near, far], near)
+    assert edge and edge.x is far.x and edge.value == pytest.approx(0.31)
+    assert edge.slopes == pytest.approx(np.array([0.5, -1.0]) / 0.31)
 
 
 def test_no_crossing_is_looked_for_where_the_pair_has_no_weight() -> None:
@@ -118,18 +118,19 @@ def test_no_crossing_is_looked_for_where_the_pair_has_no_weight() -> None:
 
 @pytest.mark.parametrize("weights", [[1.0] * 9, [4.0, 0.25, *[1.0] * 7]])
 def test_slopes_at_a_crossing_are_those_of_the_difference(weights: list[float]) -> None:
-    """Of axial less torsional frequency in Hz, whatever the targets weigh, on distinct modes."""
+    """The difference is axial less torsional frequency in Hz, whatever the targets weigh, on
+    distinct modes."""
     problem = Problem(with_targets(weight=weights), evaluator())  # type: ignore[arg-type]
     far, point = problem.evaluate(START_X + 0.2), problem.evaluate(START_X)
-    found = crossing(problem, [far, point], point)
-    assert found is not None and found.x is point.x
-    assert found.value == pytest.approx(gap(point, AS_THE_CASE), rel=1e-6)
+    edge = crossing(problem, [far, point], point)
+    assert edge is not None and edge.x is point.x
+    assert edge.value == pytest.approx(gap(point, AS_THE_CASE), rel=1e-6)
     h = 1e-4
     for k, e in enumerate(h * np.eye(len(START_X))):
         wanted = gap(problem.evaluate(START_X + e), AS_THE_CASE) - gap(
             problem.evaluate(START_X - e), AS_THE_CASE
         )
-        assert found.slopes[k] == pytest.approx(wanted / (2 * h), rel=1e-5)
-    assert found.at(point.x + e) == pytest.approx(
+        assert edge.slopes[k] == pytest.approx(wanted / (2 * h), rel=1e-5)
+    assert edge.at(point.x + e) == pytest.approx(
         gap(problem.evaluate(point.x + e), AS_THE_CASE), abs=1e-6
     )

@@ -47,8 +47,8 @@ def test_one_design_is_found_from_all_states(method: str) -> None:
     for name, truth in TRUTH.items():
         assert result["variables"][name]["value"] == pytest.approx(truth, rel=1e-4)
     assert len(result["modes"]) == 54 and result["pressure_kPa"] == 240.0
-    told = [(s["pressure_kPa"], s["rim"], s["values"]) for s in result["states"]]
-    assert told == [(p, rim, 9) for p in (240.0, 160.0, 320.0) for rim in ("fixed", "free")]
+    states = [(s["pressure_kPa"], s["rim"], s["values"]) for s in result["states"]]
+    assert states == [(p, rim, 9) for p in (240.0, 160.0, 320.0) for rim in ("fixed", "free")]
     assert len(fit.fitted.states) == 6 and fit.found.is_good
 
 
@@ -135,17 +135,17 @@ def test_crossings_are_those_of_each_state() -> None:
     case = case_with(measured(STATES[:3]))
     problem, point = point_of(case)
     assert order(problem, point) == dict.fromkeys(STATES[:3], -1.0)
-    found = crossing(problem, [point], point)
-    assert found and found.state in STATES
+    edge = crossing(problem, [point], point)
+    assert edge and edge.state in STATES
     states = dict(point.states)
     mixed = {k: replace(m, clarity=0.5) for k, m in states[STATES[1]].items()}
     near = replace(point, states={**states, STATES[1]: mixed})
     assert pair_clarity(near) == 0.5 == pair_clarity(near, STATES[1])
     assert pair_clarity(near, STATES[0]) == pair_clarity(point)
-    found = crossing(problem, [near], near)
-    assert found and found.state == STATES[1]
+    edge = crossing(problem, [near], near)
+    assert edge and edge.state == STATES[1]
     apart = mixed[AXIAL].frequency_Hz - mixed[TORSIONAL].frequency_Hz
-    assert found.value == pytest.approx(0.5 * apart)
+    assert edge.value == pytest.approx(0.5 * apart)
 
 
 def test_tables_and_files_show_states_side_by_side() -> None:
@@ -194,16 +194,16 @@ def test_areas_at_two_pressures_are_pressed_in_their_states() -> None:
     there = pressed.area_target(0.0125, 1e-4, 6000.0).model_copy(update={"pressure_kPa": 160.0})
     case = pressed.case_with([], [plain, there])
     tyre = pressed.evaluator(case)
-    asked: list[tuple[float | None, list[float]]] = []
+    presses: list[tuple[float | None, list[float]]] = []
     press_all = tyre.press_all
 
     def asking(questions: Any, jobs: int) -> Any:
-        asked.append((questions[0].values.get("pressure_kPa"), list(questions[0].loads_N)))
+        presses.append((questions[0].values.get("pressure_kPa"), list(questions[0].loads_N)))
         return press_all(questions, jobs)
 
     tyre.press_all = asking  # type: ignore[assignment, method-assign]
     point = Problem(case, tyre).evaluate(np.log(list(pressed.START.values())))
-    assert dict(asked) == {None: [4000.0], 160.0: [6000.0]}
+    assert dict(presses) == {None: [4000.0], 160.0: [6000.0]}
     assert point.others[1] / point.others[0] == pytest.approx(1.5 ** (2 / 3), rel=0.1)
     assert (point.jacobian[:, 0] != 0).all()
 
@@ -213,14 +213,14 @@ def test_the_bundled_solver_tells_the_mass_and_its_slopes() -> None:
     tyre = Evaluator(TyreDesign(CASE))
     names = ("A_belt", "materials.rubber.density_kg_per_m3")
     own = {**START, names[1]: 1200.0}
-    found = tyre.evaluate(Question(own, names))
+    evaluation = tyre.evaluate(Question(own, names))
     for name in names:
         up, down = (
             tyre.evaluate(Question({**own, name: own[name] * factor})).mass_kg
             for factor in (1.01, 0.99)
         )
         rise = (up - down) / (0.02 * own[name])
-        assert found.mass_gradients[name] == pytest.approx(rise, rel=1e-6)
+        assert evaluation.mass_gradients[name] == pytest.approx(rise, rel=1e-6)
 
 
 @pytest.mark.slow
@@ -231,8 +231,8 @@ def test_a_real_tyre_is_found_from_four_states() -> None:
     labels = target_labels(CASE)
     targets = []
     for state in states:
-        ((_, found),) = find_modes(tyre, [Question(state.design(CASE, TRUTH))], labels)
-        for label, mode in found.wanted.items():  # type: ignore[union-attr]
+        ((_, labelled),) = find_modes(tyre, [Question(state.design(CASE, TRUTH))], labels)
+        for label, mode in labelled.wanted.items():  # type: ignore[union-attr]
             targets.append(
                 TargetMode(
                     c=label.c,

@@ -30,18 +30,18 @@ def test_uncertainty_by_its_formula() -> None:
     )
     J, y = scale[:, None] * slopes, random.normal(size=5)
     at = Point({"a": 3.0, "b": 0.5}, np.zeros(2), scale * y, J, {}, 1.0, 1.0, np.empty(0))
-    found = uncertainty(problem, at)
+    result = uncertainty(problem, at)
     B = np.linalg.inv(J.T @ J) @ J.T * scale
     covariance = (B * np.append(sigmas, 0.05) ** 2) @ B.T
     spread = np.sqrt(np.diag(covariance))
-    assert found.standard_errors == pytest.approx(spread * [3.0, 4.0])
-    assert found.correlations == pytest.approx(covariance / np.outer(spread, spread))
-    assert found.singular_values == pytest.approx(np.linalg.svd(J, compute_uv=False))
-    assert found.noise_Hz == pytest.approx(np.sqrt(np.mean(sigmas[:3] ** 2)))
+    assert result.standard_errors == pytest.approx(spread * [3.0, 4.0])
+    assert result.correlations == pytest.approx(covariance / np.outer(spread, spread))
+    assert result.singular_values == pytest.approx(np.linalg.svd(J, compute_uv=False))
+    assert result.noise_Hz == pytest.approx(np.sqrt(np.mean(sigmas[:3] ** 2)))
 
 
 def test_noise_is_what_is_left_over_the_freedom_that_is_left() -> None:
-    """Of four frequencies without sigma and two variables: two degrees; a fifth, known one takes
+    """Four frequencies without sigma and two variables leave two degrees; a fifth, known one takes
     its leverage. Weights are none of the noise."""
     random = generator("noise")
     J, y = random.normal(size=(5, 2)), random.normal(size=5)
@@ -52,12 +52,12 @@ def test_noise_is_what_is_left_over_the_freedom_that_is_left() -> None:
         {"a": 3.0, "b": 3.0}, np.zeros(2), (scale * y)[:n], J[:n], {}, 1.0, 1.0, np.empty(0)
     )
     none = [SimpleNamespace(sigma_Hz=None)] * 4
-    told: dict[str, Any] = {"variables": variables, "others": []}
-    problem: Any = SimpleNamespace(scale=scale[:4], targets=none, **told)
-    found = uncertainty(problem, point_of(4))
-    assert found.noise_Hz == pytest.approx(np.linalg.norm(y[:4]) / np.sqrt(2))
+    common: dict[str, Any] = {"variables": variables, "others": []}
+    problem: Any = SimpleNamespace(scale=scale[:4], targets=none, **common)
+    result = uncertainty(problem, point_of(4))
+    assert result.noise_Hz == pytest.approx(np.linalg.norm(y[:4]) / np.sqrt(2))
     known = [*none, SimpleNamespace(sigma_Hz=0.3)]
-    problem = SimpleNamespace(scale=scale, targets=known, **told)
+    problem = SimpleNamespace(scale=scale, targets=known, **common)
     leverage = J[4] @ np.linalg.inv(J.T @ J) @ J[4]
     noise = np.linalg.norm(y[:4]) / np.sqrt(4 - (2 - leverage))
     sigma = np.sqrt((4 * noise**2 + 0.3**2) / 5)
@@ -83,14 +83,14 @@ def test_standard_errors_are_those_of_the_fit_that_was_made(chance: Chance) -> N
     sigma = np.array([0.05, 0.3, 0.1, 0.2, 0.1, 0.3, 0.05, 0.2, 0.4])
     exact = [t.frequency_Hz for t in CASE.case.targets.modes]
     for weights in ([1.0] * 9, [100.0, 1.0, 1.0, 0.0, 1.0, 5.0, 1.0, 0.2, 1.0]):
-        found, stated = [], []
+        fitted, stated = [], []
         for _ in range(200):
             noisy = list(exact + sigma * chance.random.normal(size=9))
             case = with_targets(frequency_Hz=noisy, sigma_Hz=list(sigma), weight=weights)
             variables = calibrate(case, evaluator()).result["variables"].values()  # type: ignore[arg-type]
-            found.append([np.log(v["value"]) for v in variables])
+            fitted.append([np.log(v["value"]) for v in variables])
             stated.append([v["standard_error"] / v["value"] for v in variables])
-        for values, error in zip(np.transpose(found), np.mean(stated, axis=0), strict=True):
+        for values, error in zip(np.transpose(fitted), np.mean(stated, axis=0), strict=True):
             chance.scatter(values, error)
 
 

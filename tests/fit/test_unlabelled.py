@@ -66,10 +66,10 @@ def every_labeling(
         within = norm.cdf((given.y.max() - mean) / np.sqrt(np.diag(P)))
         views = []
         for sees, p in VIEWS.items():
-            found = [1 - MISSED if sees[each.m] else UNSEEN for each in modes.labels]
+            seen = [1 - MISSED if sees[each.m] else UNSEEN for each in modes.labels]
             lost = [MISSED if sees[each.m] else 1 - UNSEEN for each in modes.labels]
             terms = [
-                np.log(found[j]) if j in used else np.log(1 - within[j] * (1 - lost[j]))
+                np.log(seen[j]) if j in used else np.log(1 - within[j] * (1 - lost[j]))
                 for j in range(n)
             ]
             views.append(np.log(p) + sum(terms))
@@ -86,7 +86,7 @@ def test_every_labeling_has_the_probability_of_its_joint_density() -> None:
     allowed[2] = [False, False, False, True]
     y = np.log([51.0, 54.0, 74.0])
     given = Frequencies(y, np.full(3, 0.01), np.zeros(3, int), allowed, np.array([0, 0, 1], bool))
-    found = labelings(given, modes)
+    result = labelings(given, modes)
     total: dict[Any, float] = {}
     evidence: dict[Any, float] = {}
     for tau in DISCREPANCIES:
@@ -94,23 +94,23 @@ def test_every_labeling_has_the_probability_of_its_joint_density() -> None:
             total[own] = total.get(own, 0.0) + np.exp(ln)
             evidence[own] = evidence.get(own, 0.0) + np.exp(of_labelled)
     whole = sum(total.values())
-    told = dict(zip(map(tuple, found.modes.tolist()), found.probabilities, strict=True))
+    by_modes = dict(zip(map(tuple, result.modes.tolist()), result.probabilities, strict=True))
     assert len(total) == 10
     for own, value in total.items():
-        assert told.get(own, 0.0) == pytest.approx(value / whole, rel=1e-6, abs=1e-8)
-    assert found.each.sum(1) == pytest.approx(1.0)
-    for own, ln_prior in zip(map(tuple, found.modes[:3].tolist()), found.ln_prior, strict=False):
+        assert by_modes.get(own, 0.0) == pytest.approx(value / whole, rel=1e-6, abs=1e-8)
+    assert result.each.sum(1) == pytest.approx(1.0)
+    for own, ln_prior in zip(map(tuple, result.modes[:3].tolist()), result.ln_prior, strict=False):
         assert ln_prior == pytest.approx(np.log(total[own] / evidence[own]), abs=1e-6)
-    anew = found.weighed_anew(np.array([0.2, 0.8]))
-    first = found.probabilities[:2].sum()
-    expected = [0.2 * first, 0.8 * first, *found.probabilities[2:]]
+    anew = result.weighed_anew(np.array([0.2, 0.8]))
+    first = result.probabilities[:2].sum()
+    expected = [0.2 * first, 0.8 * first, *result.probabilities[2:]]
     assert anew.probabilities == pytest.approx(np.sort(expected)[::-1])
     shares = dict(zip(map(tuple, anew.modes.tolist()), anew.probabilities, strict=True))
-    assert [shares[tuple(own)] for own in found.modes.tolist()] == pytest.approx(expected)
+    assert [shares[tuple(own)] for own in result.modes.tolist()] == pytest.approx(expected)
     assert anew.each.sum(1) == pytest.approx(1.0)
     for i, j in ((0, 1), (1, -1), (2, 3)):
-        share = sum(p for own, p in told.items() if own[i] == j)
-        assert found.each[i, j] == pytest.approx(share)
+        share = sum(p for own, p in by_modes.items() if own[i] == j)
+        assert result.each[i, j] == pytest.approx(share)
 
 
 @pytest.mark.numbers
@@ -132,9 +132,9 @@ def test_expansions_go_on_until_the_design_is_found() -> None:
         return Frequencies(y, np.full(5, 0.005), np.zeros(5, int), every, np.zeros(5, bool))
 
     prior = Prior(np.zeros(1), np.array([[0.5]]), np.array([-2.0]), np.array([2.0]))
-    found = find_labels(expand, given, prior)
-    assert found.settled and found.labels() == list(labels)
-    assert found.x == pytest.approx(0.9, abs=0.02)
+    search = find_labels(expand, given, prior)
+    assert search.settled and search.labels() == list(labels)
+    assert search.x == pytest.approx(0.9, abs=0.02)
 
 
 STATES = [TyreState(), TyreState(160.0, 0.0, "free")]
@@ -150,7 +150,7 @@ class Tyre(TyreInStates):
 
 def with_labels() -> list[Measurement]:
     """The nine modes of TRUTH in two states, less two."""
-    told = [
+    rows = [
         Measurement(
             "frequency_Hz",
             Label(t.c, t.m, t.kind),
@@ -163,7 +163,7 @@ def with_labels() -> list[Measurement]:
         )
         for t in measured(STATES)
     ]
-    return [each for i, each in enumerate(told) if i not in (3, 12)]
+    return [each for i, each in enumerate(rows) if i not in (3, 12)]
 
 
 def without_labels() -> list[Measurement]:
@@ -174,22 +174,22 @@ def without_labels() -> list[Measurement]:
 
 
 @pytest.fixture(scope="module")
-def told() -> Labelled:
+def labelled() -> Labelled:
     tyre: Any = Tyre()
     return label(case_with([]), tyre, without_labels())
 
 
 @pytest.mark.numbers
-def test_readings_get_the_labels_of_the_tyre(told: Labelled) -> None:
-    """In two states together; the one that is no mode is left out, and told."""
-    assert told.readings == with_labels()
-    left = [own for own, x in zip(told.frequencies, told.labels, strict=True) if x is None]
+def test_readings_get_the_labels_of_the_tyre(labelled: Labelled) -> None:
+    """In two states together; the one that is no mode is left out and reported."""
+    assert labelled.readings == with_labels()
+    left = [own for own, x in zip(labelled.frequencies, labelled.labels, strict=True) if x is None]
     assert [each.value for (each,) in left] == [FOREIGN_Hz]
-    second = [label for label in told.found.labels(1) if label]
-    in_order = sorted(told.under(1), key=lambda each: each.value)
-    assert [each.label for each in in_order] == second != [x for x in told.labels if x]
-    assert told.found.settled
-    labels = labels_told(CASE, told)
+    second = [label for label in labelled.found.labels(1) if label]
+    in_order = sorted(labelled.under(1), key=lambda each: each.value)
+    assert [each.label for each in in_order] == second != [x for x in labelled.labels if x]
+    assert labelled.found.settled
+    labels = labels_told(CASE, labelled)
     assert len(labels.frequencies) == 16 and not labels.doubts()
     (foreign,) = [each for each in labels.frequencies if each.label is None]
     assert foreign.frequency_Hz == FOREIGN_Hz and foreign.said == FOREIGN_WORDS
@@ -222,12 +222,12 @@ def test_what_a_fit_leaves_open_is_the_prior_of_the_next() -> None:
     case = case_with(measured(STATES))
     fit = calibrate(case, tyre).found
     prior = fitted_prior(case, fit)
-    found = prior.root @ prior.root.T
+    covariance = prior.root @ prior.root.T
     for i, (name, v) in enumerate(fit.variables.items()):
         assert np.exp(prior.mean[i]) == pytest.approx(v.value)
-        assert np.sqrt(found[i, i]) == pytest.approx(v.standard_error / v.value)  # type: ignore[operator]
+        assert np.sqrt(covariance[i, i]) == pytest.approx(v.standard_error / v.value)  # type: ignore[operator]
         other = list(fit.variables)[i - 1]
-        alike = found[i, i - 1] / np.sqrt(found[i, i] * found[i - 1, i - 1])
+        alike = covariance[i, i - 1] / np.sqrt(covariance[i, i] * covariance[i - 1, i - 1])
         assert alike == pytest.approx(fit.correlations[name][other], abs=1e-9)
     unseen = fit.variables["C10"].model_copy(update={"standard_error": None})
     open_ = fit.model_copy(update={"variables": {**fit.variables, "C10": unseen}})
@@ -241,8 +241,8 @@ def test_files_without_labels(tmp_path: Path) -> None:
     under load; the CSV that is written reads back."""
     path = tmp_path / "measured.csv"
     path.write_text("frequency_Hz,sigma_Hz,pressure_kPa,rim\n114,0.5,160,free\n137,0.5,160,free\n")
-    found = read_measurements(path, labelled=False)
-    assert [(each.value, each.label, each.rim) for each in found] == [
+    rows = read_measurements(path, labelled=False)
+    assert [(each.value, each.label, each.rim) for each in rows] == [
         (114.0, None, "free"),
         (137.0, None, "free"),
     ]

@@ -47,10 +47,10 @@ class TyreInStates(FakeEvaluator):
         self.asked: list[list[tuple[float, bool]]] = []
 
     def answer_all(self, questions: Any, jobs: int = 1) -> Iterator[Any]:
-        told = [Question(q.values, q.gradients) for q in questions]
+        plain = [Question(q.values, q.gradients) for q in questions]
         state = lambda v: (v.get("pressure_kPa", 240.0), bool(v.get("rim.free", False)))
-        self.asked.append([state(q.values) for q in told])
-        return super().answer_all(told, jobs)
+        self.asked.append([state(q.values) for q in plain])
+        return super().answer_all(plain, jobs)
 
     def evaluate(self, question: Question) -> Evaluation:
         values = dict(question.values)
@@ -84,11 +84,11 @@ def measured(
 ) -> list[TargetMode]:
     """The frequencies of TRUTH in every state, off by ``noise`` sigmas."""
     tyre, drawn = TyreInStates(), generator("states", seed)
-    found = []
+    rows = []
     for state in states:
         at = tyre.evaluate(Question(state.design(CASE, TRUTH)))
         for label, mode in zip(LABELS, at.modes, strict=True):
-            found.append(
+            rows.append(
                 TargetMode(
                     c=label.c,
                     m=label.m,
@@ -99,7 +99,7 @@ def measured(
                     rim=state.rim,
                 )
             )
-    return found
+    return rows
 
 
 def fitted(case: LoadedCase, tyre: Any = None, **options: Any) -> Fit:
