@@ -75,7 +75,7 @@ def test_a_file_is_no_repeat_of_itself(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_two_references_and_geometry_of_its_own(tmp_path: Path) -> None:
-    """What a file has beyond that is passed over, and told."""
+    """Further contents of a file are passed over and reported."""
     where = write(tmp_path / "where.uff", nodes())
     coherence = function(np.ones(len(F)), F, func_type=6)
     more = [[coherence, coherence], []]
@@ -83,11 +83,13 @@ def test_two_references_and_geometry_of_its_own(tmp_path: Path) -> None:
         write(tmp_path / f"{k}.uff", *functions(101, k), *functions(102, k + 9), *more[k - 1])
         for k in (1, 2)
     ]
-    found = gather([where, *files], 240.0, LAYOUT)
-    assert {row.label: row.value for row in found.rows} == pytest.approx(MODES, rel=1e-3)
-    assert len(found.runs) == 2 and found.notes == [f"{files[0]}: not used: coherence (2 times)"]
-    assert all(run.explained > 0.99 for run in found.runs)
-    assert all(mode["confidence"] > 0.97 for mode in result(found)["modes"])
+    gathered = gather([where, *files], 240.0, LAYOUT)
+    assert {row.label: row.value for row in gathered.rows} == pytest.approx(MODES, rel=1e-3)
+    assert len(gathered.runs) == 2 and gathered.notes == [
+        f"{files[0]}: not used: coherence (2 times)"
+    ]
+    assert all(run.explained > 0.99 for run in gathered.runs)
+    assert all(mode["confidence"] > 0.97 for mode in result(gathered)["modes"])
     with pytest.raises(InputError, match="node 1 has no coordinates"):
         gather(files, 240.0, LAYOUT)
 
@@ -101,9 +103,9 @@ def test_shapes_leave_nothing_to_explain() -> None:
 
 def test_a_reference_need_not_have_every_signal(tmp_path: Path) -> None:
     path = write(tmp_path / "f.uff", nodes(), *functions(101, 1), *functions(102, 2, range(9)))
-    found = gather([path], 240.0, LAYOUT)
-    assert {row.label: row.value for row in found.rows} == pytest.approx(MODES, rel=1e-3)
-    assert not found.notes
+    gathered = gather([path], 240.0, LAYOUT)
+    assert {row.label: row.value for row in gathered.rows} == pytest.approx(MODES, rel=1e-3)
+    assert not gathered.notes
 
 
 def test_files_must_agree_on_where_a_node_is(tmp_path: Path) -> None:
@@ -129,9 +131,9 @@ def test_a_mode_is_told_with_digits_that_mean_something() -> None:
     """And None where a number is not known."""
     mode = MeasuredMode(66.1234567, np.ones(3))
     judged = Judged(None, {Label(1, 0): 0.87654321}, "mixed")
-    told: Any = SimpleNamespace(mode=mode, judged=judged, collinearity=0.12345678, member="1")
+    labelled: Any = SimpleNamespace(mode=mode, judged=judged, collinearity=0.12345678, member="1")
     run: Any = SimpleNamespace(name="a.uff")
-    assert _entry(run, told) == {
+    assert _entry(run, labelled) == {
         "file": "a.uff",
         "frequency_Hz": 66.1234567,
         "sigma_Hz": None,

@@ -31,21 +31,21 @@ SIGNALS = [(node, k) for node in range(1, 13) for k in (1, 2, 3)]
 def test_the_axle_is_where_they_spread_least(axle: int) -> None:
     """Theta from the next axis in the order x, y, z, x; directions 1, 2, 3 along x, y, z are turned
     with it."""
-    found = sensors_of(SIGNALS, ring(axle=axle))
-    assert found.points[::3, 0] == pytest.approx(0.35)
-    assert np.degrees(found.points[::3, 1]) % 360 == pytest.approx(np.degrees(ANGLES))
-    assert found.points[::3, 2] == pytest.approx(0.05 * (-1) ** np.arange(12))
+    sensors = sensors_of(SIGNALS, ring(axle=axle))
+    assert sensors.points[::3, 0] == pytest.approx(0.35)
+    assert np.degrees(sensors.points[::3, 1]) % 360 == pytest.approx(np.degrees(ANGLES))
+    assert sensors.points[::3, 2] == pytest.approx(0.05 * (-1) ** np.arange(12))
     x, y = (axle + 1) % 3, (axle + 2) % 3
     for k, angle in enumerate(ANGLES):
-        three = found.directions[3 * k : 3 * k + 3]
+        three = sensors.directions[3 * k : 3 * k + 3]
         assert three[axle] == pytest.approx([0, 0, 1])
         assert three[x] == pytest.approx([np.cos(angle), -np.sin(angle), 0])
         assert three[y] == pytest.approx([np.sin(angle), np.cos(angle), 0])
 
 
 def test_directions_may_be_the_sensors_own_and_turned_round() -> None:
-    found = sensors_of([(1, 1), (1, -2), (1, 3)], ring(), cylindrical=True)
-    assert found.directions.tolist() == [[1, 0, 0], [0, -1, 0], [0, 0, 1]]
+    sensors = sensors_of([(1, 1), (1, -2), (1, 3)], ring(), cylindrical=True)
+    assert sensors.directions.tolist() == [[1, 0, 0], [0, -1, 0], [0, 0, 1]]
     plain = sensors_of([(1, 1), (1, -1)], ring())
     assert plain.directions[1].tolist() == (-plain.directions[0]).tolist()
 

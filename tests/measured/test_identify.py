@@ -45,10 +45,10 @@ def test_frequencies_are_off_by_what_they_state(chance: Chance) -> None:
     """
     standardised = []
     for _ in range(8):
-        found = identify(functions(int(chance.random.integers(1 << 30)))[0], 28.0, 125.0).modes
-        assert len(found) == len(HERTZ)
-        hertz = np.array([mode.frequency_Hz for mode in found])
-        sigma = np.array([mode.sigma_Hz for mode in found])
+        modes = identify(functions(int(chance.random.integers(1 << 30)))[0], 28.0, 125.0).modes
+        assert len(modes) == len(HERTZ)
+        hertz = np.array([mode.frequency_Hz for mode in modes])
+        sigma = np.array([mode.sigma_Hz for mode in modes])
         assert hertz == pytest.approx(HERTZ, rel=2e-3)
         standardised.append((hertz - HERTZ) / sigma)
     chance.often(np.ravel(np.abs(standardised) < 2), 0.95)
@@ -58,15 +58,15 @@ def test_frequencies_are_off_by_what_they_state(chance: Chance) -> None:
 @pytest.mark.parametrize("form", list(OMEGA))
 def test_shapes_and_damping_come_out_whatever_was_measured(form: str) -> None:
     measured, phi = functions(0, 0.002, form)
-    found = identify(measured, 28.0, 125.0)
-    assert [mode.frequency_Hz for mode in found.modes] == pytest.approx(HERTZ, rel=1e-3)
-    assert [mode.damping for mode in found.modes] == pytest.approx(RATIOS, rel=0.05)
-    for k, mode in enumerate(found.modes):
+    result = identify(measured, 28.0, 125.0)
+    assert [mode.frequency_Hz for mode in result.modes] == pytest.approx(HERTZ, rel=1e-3)
+    assert [mode.damping for mode in result.modes] == pytest.approx(RATIOS, rel=0.05)
+    for k, mode in enumerate(result.modes):
         u = mode.amplitude
         mac = abs(np.vdot(u, phi[:, k])) ** 2 / np.vdot(u, u).real / (phi[:, k] @ phi[:, k])
         assert mac > 0.99
-    band = np.isfinite(found.fitted[0])
-    rest = np.abs(found.fitted - measured.values)[:, band]
+    band = np.isfinite(result.fitted[0])
+    rest = np.abs(result.fitted - measured.values)[:, band]
     assert np.mean(rest**2) < 1e-3 * np.mean(np.abs(measured.values[:, band]) ** 2)
     assert not band[F < 28.0].any() and not band[F > 125.0].any()
 
@@ -119,25 +119,25 @@ def test_uneven_or_few_frequencies_are_refused() -> None:
 
 def test_two_sensors_leave_sigma_unknown() -> None:
     measured, _ = functions(0, 0.002, signals=6)
-    found = identify(measured, 28.0, 125.0).modes
-    assert found and all(np.isnan(mode.sigma_Hz) for mode in found)
+    modes = identify(measured, 28.0, 125.0).modes
+    assert modes and all(np.isnan(mode.sigma_Hz) for mode in modes)
 
 
 def test_the_lines_at_both_ends_belong_to_the_band(monkeypatch: pytest.MonkeyPatch) -> None:
     """150 lines with both ends give an order of 30, one for every 5; one line fewer 29."""
-    asked = set()
+    orders = set()
 
     def triangle(H: np.ndarray, order: int) -> np.ndarray:
-        asked.add(order)
+        orders.add(order)
         return plain(H, order)
 
     plain = module._triangle
     monkeypatch.setattr(module, "_triangle", triangle)
     for high, order in ((F[160], 30), (F[157], 30), (F[156], 29)):
-        asked.clear()
-        found = identify(functions(0, 0.002)[0], F[8], high)
-        assert asked == {order}
-        fitted = np.isfinite(found.fitted[0])
+        orders.clear()
+        result = identify(functions(0, 0.002)[0], F[8], high)
+        assert orders == {order}
+        fitted = np.isfinite(result.fitted[0])
         np.testing.assert_array_equal(fitted, (F[8] <= F) & (high >= F))
 
 
@@ -196,9 +196,9 @@ def test_the_jackknifes_deviation_by_its_formula() -> None:
     """(g - 1) / g times the sum of squares, of the groups that saw the mode within 2 %; of two
     groups it says nothing."""
     again = [np.array([[f, 0.02, 0.0], [50.0, 0.02, 0.0]]) for f in (79.9, 80.1, 80.3, 81.7, 79.7)]
-    (found, other) = module._jackknife(again, np.array([80.0, 60.0]))
+    (deviation, other) = module._jackknife(again, np.array([80.0, 60.0]))
     kept = np.array([79.9, 80.1, 80.3, 79.7])
-    assert found == pytest.approx(np.sqrt(3 / 4 * np.sum((kept - kept.mean()) ** 2)))
+    assert deviation == pytest.approx(np.sqrt(3 / 4 * np.sum((kept - kept.mean()) ** 2)))
     assert np.isnan(other)
     assert np.isnan(module._jackknife(again[:2], np.array([80.0]))).all()
     assert np.isfinite(module._jackknife(again[:3], np.array([80.0]))).all()

@@ -45,20 +45,20 @@ def waves(sensors: Sensors, c: int, phase: float = 0.3) -> np.ndarray:
 
 @pytest.mark.slow
 def test_random_layouts_give_the_true_labels(chance: Chance) -> None:
-    """Of modes on layouts of their own: told in 24 of 25, wrong in 1 of 200 at most.
+    """Modes on random layouts: a label is given in 24 of 25, a wrong one in 1 of 200 at most.
 
     False failures: 6e-7.
     """
     for tread, side, noise in ((9, 0, 0.05), (9, 5, 0.05), (12, 6, 0.2)):
-        told, wrong = [], []
+        given, wrong = [], []
         for i in range(28):
             mode, rng = modes()[i % 14], chance.random
             sensors, nodes = layout(rng, tread, side)
             shape, _ = real_part(measured(mode, sensors, nodes, rng, noise))
             label = Labeller(noted(sensors, rng), HIGHEST + 2).judge(shape).label
-            told.append(label is not None)
+            given.append(label is not None)
             wrong.append(label not in (None, mode.label))
-        chance.often(told, 0.96)
+        chance.often(given, 0.96)
         chance.often(wrong, 0.0, 0.005)
 
 
@@ -104,8 +104,8 @@ def test_poor_layouts_are_as_sure_as_they_are_right(chance: Chance) -> None:
     chance.often(p >= MIN_LABEL_PROBABILITY, 0.1, 0.9)
     chance.often(hit[p >= MIN_LABEL_PROBABILITY], 0.96)
     middle = (p > 0.5) & (p < MIN_LABEL_PROBABILITY)
-    said = float(np.mean(p[middle]))
-    chance.often(hit[middle], said - 0.15, min(said + 0.15, 1.0))
+    stated = float(np.mean(p[middle]))
+    chance.often(hit[middle], stated - 0.15, min(stated + 0.15, 1.0))
     chance.often(hit[p < 0.5], 0.0, 0.6)
 
 
@@ -130,10 +130,10 @@ def test_what_cannot_be_in_the_band_aliases_nothing(c: int) -> None:
 
 @pytest.mark.parametrize("m", range(4))
 def test_motions_that_are_not_the_labels_are_small_and_smaller_of_the_other_parity(m: int) -> None:
-    """Of [2,m], on sensors that determine all motions: the variances of the belt's polynomials
-    r P_k, theta P_k, z P_k-1, and of the sidewalls' over their height, alike on both sides (even
-    m: r and theta; odd m: z) or opposite. Own motions, others of the parity, and those of the
-    other parity have mean squares of 1, 0.08 and 0.01 on the sensors."""
+    """Modes [2,m], on sensors that determine all motions: the variances of the belt's polynomials r
+    P_k, theta P_k, z P_k-1, and of the sidewalls' over their height, alike on both sides (even m: r
+    and theta; odd m: z) or opposite. Own motions, others of the parity, and those of the other
+    parity have mean squares of 1, 0.08 and 0.01 on the sensors."""
     tread = ring(9, across=tuple(np.linspace(-0.09, 0.09, 7)))
     rows = [
         (R, 2 * np.pi * a / 9, z, d)
@@ -165,8 +165,8 @@ def test_motions_that_are_not_the_labels_are_small_and_smaller_of_the_other_pari
     wanted = size * [share[k] / whole[k] for k in kind]
     inverse = np.linalg.pinv(np.transpose(motion) * np.cos(2 * angle)[:, None])
     S = every[2, m]
-    found = np.diag(inverse @ S @ inverse.T)
-    assert found / found[kind.index("own")] == pytest.approx(
+    variances = np.diag(inverse @ S @ inverse.T)
+    assert variances / variances[kind.index("own")] == pytest.approx(
         wanted / wanted[kind.index("own")], rel=0.1
     )
 
@@ -243,8 +243,8 @@ def test_doublets_have_two_members_and_overtones_no_label() -> None:
         told(80.0, Label(2, 0)),
         told(85.0, None),
     ]
-    found = [(t.mode.frequency_Hz, t.judged.label, t.member) for t in settled(given)]
-    assert found == [
+    rows = [(t.mode.frequency_Hz, t.judged.label, t.member) for t in settled(given)]
+    assert rows == [
         (30.0, axial, ""),
         (30.4, None, ""),
         (66.1, Label(2, 1), "1"),
@@ -300,9 +300,9 @@ def test_probabilities_are_those_of_normal_signals_of_any_size() -> None:
         Label(2, 2),
     ]
     p[alike] = p[alike].sum() * np.where(bends, 0.02, 1.0)[alike] / 1.02
-    found = labeller.judge(u).probabilities
-    assert found == pytest.approx(dict(zip(labeller.labels, p, strict=True)), abs=1e-9)
-    assert list(found.values())[1] > 1e-6
+    by_label = labeller.judge(u).probabilities
+    assert by_label == pytest.approx(dict(zip(labeller.labels, p, strict=True)), abs=1e-9)
+    assert list(by_label.values())[1] > 1e-6
     above = labeller.judge(u, [Label(2, 0)]).probabilities
     assert above[Label(2, 2)] == above[Label(2, 0)] > 0.4
 
@@ -325,7 +325,7 @@ def belt_and_walls() -> Sensors:
 
 
 def told_of(amplitude: np.ndarray) -> LabelledMode:
-    """What is told of a shape that the labels are sure of."""
+    """Labelled mode of a shape about whose label the labeller is sure."""
     sensors = belt_and_walls()
     sure = SimpleNamespace(
         sensors=sensors, judge=lambda shape, below, hertz: Judged(Label(2, 0), {}, "")
@@ -346,19 +346,19 @@ def test_a_shape_is_told_with_its_largest_value_1() -> None:
 def test_a_mode_of_the_sidewalls_has_no_label(part: float, label: bool) -> None:
     """The mean square of the belt's motion is below a tenth of all sensors'."""
     wall = np.sqrt((3 / part - 1) / 2)
-    told = told_of(np.repeat([1.0, wall, wall], 9) + 0j)
-    assert (told.judged.label is not None) == label
-    assert label or "the belt hardly moves" in told.judged.why
+    labelled = told_of(np.repeat([1.0, wall, wall], 9) + 0j)
+    assert (labelled.judged.label is not None) == label
+    assert label or "the belt hardly moves" in labelled.judged.why
 
 
 @pytest.mark.parametrize(("collinear", "label"), [(0.51, True), (0.49, False)])
 def test_a_complex_shape_has_no_label(collinear: float, label: bool) -> None:
     size = np.sqrt((1 - collinear) / (1 + collinear))
     turn = 2 * np.pi * np.arange(9) * 2 / 9
-    told = told_of(np.tile(np.cos(turn) + 1j * size * np.sin(turn), 3))
-    assert told.collinearity == pytest.approx(collinear)
-    assert (told.judged.label is not None) == label
-    assert label or "collinearity 0.49" in told.judged.why
+    labelled = told_of(np.tile(np.cos(turn) + 1j * size * np.sin(turn), 3))
+    assert labelled.collinearity == pytest.approx(collinear)
+    assert (labelled.judged.label is not None) == label
+    assert label or "collinearity 0.49" in labelled.judged.why
 
 
 @pytest.mark.parametrize(("rings", "directions"), [((-0.085, 0.085), "rtz"), ((0.0,), "rtz")])
@@ -374,8 +374,8 @@ def test_alike_orders_share_their_probability_and_the_lower_comes_first(
     assert alone.label == Label(2, 0)
     assert alone.probabilities[Label(2, 2)] == pytest.approx(0.02 / 1.02, abs=0.002)
     modes = [(MeasuredMode(hertz, u), labeller, "") for hertz in (240.0, 80.0, 80.4)]
-    found = [(t.mode.frequency_Hz, t.judged.label, t.member) for t in label_in_turn(modes)]
-    assert found == [(80.0, Label(2, 0), "1"), (80.4, Label(2, 0), "2"), (240.0, None, "")]
+    rows = [(t.mode.frequency_Hz, t.judged.label, t.member) for t in label_in_turn(modes)]
+    assert rows == [(80.0, Label(2, 0), "1"), (80.4, Label(2, 0), "2"), (240.0, None, "")]
 
 
 def test_a_belt_is_as_wide_as_known_or_as_tyres_are() -> None:

@@ -153,10 +153,10 @@ def test_a_value_carries_its_state(tmp_path: Path) -> None:
     as another laboratory writes it, too."""
     (plain,) = read(tmp_path, GOOD)
     assert plain.state == TyreState(240.0, 0.0, None)
-    told = {"": "fixed", "fixed": "fixed", "Free": "free", "springs": "springs", "case": None}
-    lines = [f"frequency_Hz,2,0,,,{200 + k},0,79.5,0.2,{x}" for k, x in enumerate(told)]
+    states = {"": "fixed", "fixed": "fixed", "Free": "free", "springs": "springs", "case": None}
+    lines = [f"frequency_Hz,2,0,,,{200 + k},0,79.5,0.2,{x}" for k, x in enumerate(states)]
     rows = read(tmp_path, *lines, header=RIMS)
-    assert [each.rim for each in rows] == list(told.values())
+    assert [each.rim for each in rows] == list(states.values())
     lines = [
         '"[2,0]",79.5,0.2,240,,free',
         '"[2,0]",79.1,0.2,240,0,',

@@ -1,4 +1,4 @@
-"""What repeats make of values: the mean, and how far it may be off."""
+"""Combination of repeats: the mean of their values, and how far it may be off."""
 
 from __future__ import annotations
 

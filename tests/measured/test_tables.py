@@ -49,10 +49,10 @@ def read(tmp_path: Path, text: str | bytes, pressure: float | None = None) -> li
     ],
 )
 def test_one_table_in_many_spellings(tmp_path: Path, text: str | bytes) -> None:
-    found = read(tmp_path, text)
-    assert [(v.label, v.member) for v in found] == [(AXIAL, ""), (Label(2, 1), "")]
-    assert [v.value for v in found] == pytest.approx([31.7, 66.1])
-    assert [v.pressure_kPa for v in found] == pytest.approx([240, 240])
+    values = read(tmp_path, text)
+    assert [(v.label, v.member) for v in values] == [(AXIAL, ""), (Label(2, 1), "")]
+    assert [v.value for v in values] == pytest.approx([31.7, 66.1])
+    assert [v.pressure_kPa for v in values] == pytest.approx([240, 240])
 
 
 def test_own_measurements_come_back(tmp_path: Path) -> None:
@@ -64,15 +64,15 @@ def test_own_measurements_come_back(tmp_path: Path) -> None:
 
 
 def test_other_quantities_and_loads(tmp_path: Path) -> None:
-    found = read(
+    values = read(
         tmp_path,
         "load [kN];pressure [bar];contact area [cm²];vertical stiffness [N/mm];mass [lb]\n"
         "4;2,4;180;210;\n;;;;30\n",
     )
-    told = {v.quantity: (v.value, v.load_N) for v in found}
-    assert told["contact_area_m2"] == pytest.approx((0.018, 4000))
-    assert told["vertical_stiffness_N_per_m"] == pytest.approx((2.1e5, 4000))
-    assert told["mass_kg"] == pytest.approx((13.6078, 0), rel=1e-5)
+    by_quantity = {v.quantity: (v.value, v.load_N) for v in values}
+    assert by_quantity["contact_area_m2"] == pytest.approx((0.018, 4000))
+    assert by_quantity["vertical_stiffness_N_per_m"] == pytest.approx((2.1e5, 4000))
+    assert by_quantity["mass_kg"] == pytest.approx((13.6078, 0), rel=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -110,8 +110,8 @@ def test_a_length_has_a_unit_and_a_mode_none(tmp_path: Path) -> None:
 
 def test_loaded_modes_have_a_symmetry(tmp_path: Path) -> None:
     head = "c,m,member,load [N],pressure [kPa],frequency [Hz]\n"
-    (found,) = read(tmp_path, f"{head}2,0,symmetric,4000,240,85\n")
-    assert (found.member, found.load_N) == ("symmetric", 4000)
+    (row,) = read(tmp_path, f"{head}2,0,symmetric,4000,240,85\n")
+    assert (row.member, row.load_N) == ("symmetric", 4000)
     with pytest.raises(InputError, match="line 2: member is '1', must be symmetric or"):
         read(tmp_path, f"{head}2,0,1,4000,240,85\n")
 
@@ -122,16 +122,16 @@ def test_lines_that_repeat_are_runs(tmp_path: Path) -> None:
         PLAIN + "0,0,axial,240,31.9\n2,1,,240,66.3\n",
         named + "2,0,0,axial,240,31.9\n2,2,1,,240,66.3\n",
     ):
-        found = read(tmp_path, text)
-        assert len({v.run for v in found}) == 2
-        rows = combined(found)
+        values = read(tmp_path, text)
+        assert len({v.run for v in values}) == 2
+        rows = combined(values)
         assert [(v.label, v.member) for v in rows] == [(AXIAL, ""), (Label(2, 1), "")]
         assert [v.value for v in rows] == pytest.approx([31.8, 66.2])
 
 
 def test_two_of_a_label_with_waves_are_a_doublet(tmp_path: Path) -> None:
-    found = read(tmp_path, PLAIN + "2,1,,240,66.4\n")
-    assert [(v.label, v.member) for v in found] == [
+    values = read(tmp_path, PLAIN + "2,1,,240,66.4\n")
+    assert [(v.label, v.member) for v in values] == [
         (AXIAL, ""),
         (Label(2, 1), "1"),
         (Label(2, 1), "2"),
@@ -144,8 +144,8 @@ def test_sigma_is_that_of_its_unit_or_of_all_in_percent(tmp_path: Path) -> None:
     heading, line = "c,m,pressure [bar],f [Hz],mass [kg],sigma [{}]\n", "2,1,2.4,66,12,{}\n"
 
     def sigmas(unit: str, sigma: str) -> dict[str, float]:
-        found = read(tmp_path, heading.format(unit) + line.format(sigma))
-        return {value.quantity: value.sigma for value in found}
+        values = read(tmp_path, heading.format(unit) + line.format(sigma))
+        return {value.quantity: value.sigma for value in values}
 
     same = partial(pytest.approx, rel=0, abs=0, nan_ok=True)
     assert sigmas("Hz", "0.5") == same({"frequency_Hz": 0.5, "mass_kg": nan})

@@ -108,10 +108,14 @@ def test_functions_come_back(tmp_path: Path, binary: int, double: bool, spacing:
     given = function(
         H, f, binary=binary, abscissa_spacing=spacing, ord_data_type=6 if double else 5
     )
-    (found,) = read_universal(write(tmp_path / "f.uff", given, double=double)).functions
-    assert found.values == pytest.approx(H, rel=1e-9 if double else 1e-4, abs=1e-4)
-    assert found.frequency_Hz == pytest.approx(f)
-    assert (found.response, found.reference, found.form) == ((1, 3), (9, -1), "accelerance")
+    (read_back,) = read_universal(write(tmp_path / "f.uff", given, double=double)).functions
+    assert read_back.values == pytest.approx(H, rel=1e-9 if double else 1e-4, abs=1e-4)
+    assert read_back.frequency_Hz == pytest.approx(f)
+    assert (read_back.response, read_back.reference, read_back.form) == (
+        (1, 3),
+        (9, -1),
+        "accelerance",
+    )
 
 
 def test_functions_state_their_unit(tmp_path: Path) -> None:

@@ -35,8 +35,8 @@ def modes() -> tuple[Mode, ...]:
         },
     )
     starts = {name: v.start for name, v in case.case.variables.items()}
-    found = paired_labels(Evaluator(TyreDesign(case)).evaluate(Question(starts)).modes)
-    return tuple(m for m in found if m.label.m < 2)
+    paired = paired_labels(Evaluator(TyreDesign(case)).evaluate(Question(starts)).modes)
+    return tuple(m for m in paired if m.label.m < 2)
 
 
 def shape_of(mode: Mode) -> HarmonicShape:
