@@ -34,16 +34,16 @@ class FewModes(FakeEvaluator):
 def test_a_lost_label_is_asked_for_with_more_modes(enough: int | None) -> None:
     evaluator = FewModes(TARGETS, POWERS, START)
     evaluator.enough = enough
-    ((place, found),) = find_modes(evaluator, [Question(START)], [LABELS[-1]])
+    ((place, labelled),) = find_modes(evaluator, [Question(START)], [LABELS[-1]])
     assert place == 0
     wanted = [None, *MORE_MODES]
     assert evaluator.asked == wanted[: wanted.index(enough) + 1 if enough in wanted else None]
     if enough == 99:
-        assert isinstance(found, EvaluationFailed) and found.cause == "lost_label"
-        assert str(LABELS[-1]) in str(found)
+        assert isinstance(labelled, EvaluationFailed) and labelled.cause == "lost_label"
+        assert str(LABELS[-1]) in str(labelled)
     else:
-        assert isinstance(found, Found) and list(found.wanted) == [LABELS[-1]]
-        assert len(found.modes) == len(LABELS) and 0 < found.clarity <= 1
+        assert isinstance(labelled, Found) and list(labelled.wanted) == [LABELS[-1]]
+        assert len(labelled.modes) == len(LABELS) and 0 < labelled.clarity <= 1
 
 
 def test_each_has_its_place_those_that_wait_the_last_ones() -> None:
@@ -52,20 +52,20 @@ def test_each_has_its_place_those_that_wait_the_last_ones() -> None:
     evaluator.enough = 4
     soft, stiff = ({**START, "C10": START["C10"] * factor} for factor in (0.5, 2.0))
     # the plain one alone wants the mode that is not there at first
-    told = list(
+    answers = list(
         find_modes(evaluator, [Question(START), Question(soft), Question(stiff)], [LABELS[-1]])
     )
-    assert [place for place, _ in told] == [1, 2, 0]
-    kinds = [type(answer) for _, answer in told]
+    assert [place for place, _ in answers] == [1, 2, 0]
+    kinds = [type(answer) for _, answer in answers]
     assert kinds == [EvaluationFailed, DeckRefused, Found]
 
 
 def test_labels_may_hang_on_the_modes() -> None:
     evaluator = FakeEvaluator(TARGETS, POWERS, START)
-    ((_, found),) = find_modes(
+    ((_, labelled),) = find_modes(
         evaluator, [Question(START)], lambda _, modes: [m.label for m in modes if m.label.c == 2]
     )
-    assert isinstance(found, Found) and set(found.wanted) == {x for x in LABELS if x.c == 2}
+    assert isinstance(labelled, Found) and set(labelled.wanted) == {x for x in LABELS if x.c == 2}
 
 
 def test_modes_rise_in_frequency() -> None:

@@ -35,17 +35,17 @@ def test_a_sample_gives_its_harmonic_shape_back(n, phase):
     ring = on_rings(made, NODES, ANGLES, phase)
     mixed = RNG.permutation(len(ring.points))
     ring = type(ring)(ring.points[mixed], ring.displacement[mixed])
-    found = harmonic_of(ring, n)
+    recovered = harmonic_of(ring, n)
     order = np.lexsort(POINTS.T[::-1])
-    assert found.points == pytest.approx(POINTS[order])
-    assert found.amplitude == pytest.approx(made.amplitude[order] * np.exp(1j * phase))
+    assert recovered.points == pytest.approx(POINTS[order])
+    assert recovered.amplitude == pytest.approx(made.amplitude[order] * np.exp(1j * phase))
 
 
 def test_a_component_that_was_not_measured_is_zero():
     ring = on_rings(shape(2), NODES, ANGLES)
     ring.displacement[:, 1] = np.nan
-    found = harmonic_of(ring, 2).amplitude
-    assert not found[:, 1].any() and found[:, [0, 2]].all()
+    amplitude = harmonic_of(ring, 2).amplitude
+    assert not amplitude[:, 1].any() and amplitude[:, [0, 2]].all()
 
 
 @pytest.mark.parametrize("turns", [(None, None), (0.3, 1.9)])

@@ -60,7 +60,7 @@ def mode(frequency, *args, **kwargs):
 
 
 def labels(modes):
-    return [found.label for found in label_modes(modes)]
+    return [labelled.label for labelled in label_modes(modes)]
 
 
 def rings(made, rng, noise=0.0, nodes=RINGS, angles=ANGLES):
@@ -79,10 +79,10 @@ def rings(made, rng, noise=0.0, nodes=RINGS, angles=ANGLES):
 @pytest.mark.parametrize("c", range(1, 8))
 @pytest.mark.parametrize("m", ORDERS)
 def test_a_belt_moving_on_one_order_has_that_label(c, m):
-    (found,) = label_modes([mode(50.0, c, [ORDERS[m]])])
-    assert found.label == Label(c, m)
-    assert found.clarity > 0.7
-    assert (found.frequency_Hz, found.multiplicity, found.position) == (50.0, 2, 0)
+    (labelled,) = label_modes([mode(50.0, c, [ORDERS[m]])])
+    assert labelled.label == Label(c, m)
+    assert labelled.clarity > 0.7
+    assert (labelled.frequency_Hz, labelled.multiplicity, labelled.position) == (50.0, 2, 0)
 
 
 @pytest.mark.parametrize(
@@ -125,9 +125,9 @@ def test_two_modes_that_share_both_rigid_motions_are_told_apart_together():
 def test_an_even_tie_still_gives_both_labels_and_no_clarity():
     both = [{"z": [1.0]}, {"t": [1.0]}]
     modes = [mode(36.0, 0, both, (1.0, 1.0)), mode(36.2, 0, both, (1.0, -1.0))]
-    found = label_modes(modes)
-    assert {one.label for one in found} == {AXIAL, TORSIONAL}
-    assert max(one.clarity for one in found) < 1e-6
+    labelled = label_modes(modes)
+    assert {one.label for one in labelled} == {AXIAL, TORSIONAL}
+    assert max(one.clarity for one in labelled) < 1e-6
 
 
 @pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 2, 0)])
@@ -156,9 +156,9 @@ def test_what_nothing_claims_has_the_first_free_order_of_its_parity():
 
 def test_no_label_twice_among_many_overtones():
     modes = [mode(50.0 + i, c, [ORDERS[i % 3]]) for c in (0, 1, 4) for i in range(9)]
-    found = labels(modes)
-    assert len(set(found)) == len(found)
-    assert sum(label.c == label.m == 0 for label in found) <= 2
+    all_labels = labels(modes)
+    assert len(set(all_labels)) == len(all_labels)
+    assert sum(label.c == label.m == 0 for label in all_labels) <= 2
 
 
 @settings(max_examples=25, deadline=None)
@@ -216,8 +216,8 @@ def test_halves_of_pairs_find_each_other_where_four_modes_meet(seed):
     ]
     joined = pair_rings([halves[i] for i in rng.permutation(6)])
     assert [one.multiplicity for one in joined] == [2, 2, 2]
-    found = {one.label: one.frequency_Hz for one in label_modes(joined)}
-    assert found == pytest.approx({Label(2, 0): 48.21, Label(2, 1): 48.31, Label(3, 0): 48.26})
+    by_label = {one.label: one.frequency_Hz for one in label_modes(joined)}
+    assert by_label == pytest.approx({Label(2, 0): 48.21, Label(2, 1): 48.31, Label(3, 0): 48.26})
 
 
 def test_a_lone_half_and_a_single_mode_stay_as_they_are():
@@ -249,7 +249,7 @@ def test_labels_cost_little():
 
 
 def weights_for(share):
-    """Of the orders 0 and 1, so that the first has that share of the belt's energy."""
+    """Weights of the orders 0 and 1 by which the first has that share of the belt's energy."""
     low, high = 0.0, 1.0
     for _ in range(60):
         middle = (low + high) / 2
@@ -278,7 +278,8 @@ def with_sidewalls(part):
 
 @pytest.mark.parametrize("part, label", [(0.09, Label(3, 2)), (0.11, Label(3, 0))])
 def test_an_order_is_claimed_with_a_tenth_of_the_belts_part(part, label):
-    """Of the mean square motion; below that a mode of the sidewalls claims nothing."""
+    """The part is that of the mean square motion; below a tenth a mode of the sidewalls claims
+    nothing."""
     made = with_sidewalls(part)
     assert belt_motion(made).participation == pytest.approx(part)
     assert labels([RawMode(50.0, made, 2)]) == [label]
@@ -300,18 +301,20 @@ def test_halves_are_joined_to_half_a_per_cent():
 
 def test_harmonics_are_looked_for_up_to_twelve():
     angles = np.arange(40) / 40 * 2 * np.pi
-    for c, found in ((11, 11), (12, 12)):
+    for c, expected in ((11, 11), (12, 12)):
         half = rings(shape(c, [ORDERS[0]]), generator(0), angles=angles)[0]
-        assert belt_motion(half).c == found
+        assert belt_motion(half).c == expected
     beyond = rings(shape(13, [ORDERS[0]]), generator(0), angles=angles)[0]
     assert belt_motion(beyond).c <= 12
 
 
 def test_clarity_is_the_lead_over_the_next_order():
     weights = weights_for(0.7)
-    (found,) = label_modes([mode(50.0, 3, [ORDERS[0], ORDERS[1]], weights)])
+    (labelled,) = label_modes([mode(50.0, 3, [ORDERS[0], ORDERS[1]], weights)])
     shares = sorted(belt_motion(shape(3, [ORDERS[0], ORDERS[1]], weights)).shares)
-    assert found.label == Label(3, 0) and found.clarity == pytest.approx(shares[-1] - shares[-2])
+    assert labelled.label == Label(3, 0) and labelled.clarity == pytest.approx(
+        shares[-1] - shares[-2]
+    )
 
 
 def test_the_next_free_overtone_of_its_parity_is_taken():
@@ -326,8 +329,8 @@ def test_the_next_free_overtone_of_its_parity_is_taken():
 
 @pytest.mark.parametrize("motion, m", [({"r": [1.0]}, 0), ({"r": [0, 1.0]}, 1)])
 def test_two_rings_carry_a_plane_and_no_higher_degree(motion, m):
-    """What is constant over the width, or linear, is nothing else, though a parabola or a cubic
-    through two places might be as well."""
+    """A motion that is constant or linear over the width is nothing else, though a parabola or a
+    cubic through two places would fit as well."""
     theta, z = np.tile(ANGLES, 2), np.repeat([-0.06, 0.06], len(ANGLES))
     u = legval(z / 0.06, motion["r"]) * np.cos(2 * theta)
     ring = RingShape(

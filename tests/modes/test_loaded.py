@@ -52,11 +52,11 @@ def test_areas_are_the_bands() -> None:
 
 def test_a_ring_has_half_of_the_way_to_either_neighbour() -> None:
     angles = np.array([0.0, 0.1, 0.4, 1.0, 3.0, 5.0])
-    found = rings(angles, NODES, NODES, POINTS).areas
+    areas = rings(angles, NODES, NODES, POINTS).areas
     arcs = [(0.1 + 2 * np.pi - 5.0) / 2, 0.2, 0.45, 1.3, 2.0, (2 * np.pi - 3.0) / 2]
-    np.testing.assert_allclose(found[:, 1] / found.sum(0)[1], np.array(arcs) / (2 * np.pi))
+    np.testing.assert_allclose(areas[:, 1] / areas.sum(0)[1], np.array(arcs) / (2 * np.pi))
     order = np.array([2, 0, 1])  # whatever the order of the nodes
-    np.testing.assert_allclose(rings(angles, NODES[order], NODES, POINTS).areas, found[:, order])
+    np.testing.assert_allclose(rings(angles, NODES[order], NODES, POINTS).areas, areas[:, order])
 
 
 def test_members_of_a_doublet_stand_by_the_patch() -> None:
@@ -157,9 +157,9 @@ def test_a_spring_that_exchanges_shapes_keeps_the_order() -> None:
     K = np.diag(np.array([40.0, 60.0, 80.0, 100.0, 120.0]) ** 2)
     held = np.ones(5)
     free, tight = solved(K, basis), solved(K + 1e6 * np.outer(held, held), basis)
-    found = follow(free, tight, WIDE)
-    np.testing.assert_array_equal(found.position, np.arange(5))
-    np.testing.assert_allclose(found.spanned, 1.0)
+    followed = follow(free, tight, WIDE)
+    np.testing.assert_array_equal(followed.position, np.arange(5))
+    np.testing.assert_allclose(followed.spanned, 1.0)
     likest = WIDE.overlaps(free.shapes, tight.shapes).argmax(1)
     assert (likest < np.arange(5)).any()  # by the likest shape they would have other names
 
@@ -172,20 +172,21 @@ def test_a_curve_that_crosses_others_goes_on() -> None:
     after = ModesAtLoad(np.array([70.0, 52.0, 62.0, 99.0]), -basis[[0, 1, 2, 3]], np.arange(4) < 3)
     order = np.array([2, 0, 3, 1])
     mixed = ModesAtLoad(after.frequencies[order], after.shapes[order], after.symmetric[order])
-    found = follow(before, mixed, WIDE)
-    np.testing.assert_array_equal(order[found.position], np.arange(4))
+    followed = follow(before, mixed, WIDE)
+    np.testing.assert_array_equal(order[followed.position], np.arange(4))
 
 
 def test_a_mode_that_left_is_not_named() -> None:
-    """What the next load's modes do not hold has no place there; a kind that is missing neither."""
+    """A mode that the next load's modes do not hold has no place there; nor has a kind that is
+    missing."""
     basis = waves(4)
     before = ModesAtLoad(
         np.array([40.0, 50.0, 45.0]), basis[[0, 1, 4]], np.array([True, True, False])
     )
     after = ModesAtLoad(np.array([41.0, 60.0]), basis[[0, 2]], np.array([True, True]))
-    found = follow(before, after, WIDE)
-    assert found.position[0] == 0 and found.position[2] == -1
-    assert found.spanned[0] == pytest.approx(1) and found.spanned[1] < 0.1
+    followed = follow(before, after, WIDE)
+    assert followed.position[0] == 0 and followed.position[2] == -1
+    assert followed.spanned[0] == pytest.approx(1) and followed.spanned[1] < 0.1
 
 
 def test_what_is_not_known_lies_above() -> None:
@@ -206,8 +207,8 @@ def test_the_nearest_orthonormal_columns_do_not_depend_on_sizes() -> None:
     v (v^T v)^-1/2 of columns of length 1."""
     v = np.linalg.qr(np.random.default_rng(2).standard_normal((9, 3)))[0]
     v = v + 0.2 * np.roll(v, 1, axis=1)
-    found = _nearest_orthonormal(v * [1.0, 30.0, 0.01])
-    np.testing.assert_allclose(found.T @ found, np.eye(3), atol=1e-12)
+    columns = _nearest_orthonormal(v * [1.0, 30.0, 0.01])
+    np.testing.assert_allclose(columns.T @ columns, np.eye(3), atol=1e-12)
     unit = v / np.linalg.norm(v, axis=0)
     values, vectors = np.linalg.eigh(unit.T @ unit)
-    np.testing.assert_allclose(found, unit @ (vectors / np.sqrt(values)) @ vectors.T, atol=1e-12)
+    np.testing.assert_allclose(columns, unit @ (vectors / np.sqrt(values)) @ vectors.T, atol=1e-12)
