@@ -12,5 +12,5 @@ from .watched import every_text_readable
 @pytest.fixture(autouse=True)
 def written(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
     """All that pictures say in this test."""
-    with every_text_readable(monkeypatch) as said:
-        yield said
+    with every_text_readable(monkeypatch) as texts:
+        yield texts

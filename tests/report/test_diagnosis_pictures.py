@@ -29,7 +29,7 @@ NUMBER = "0123456789.+\N{MINUS SIGN} "
 
 
 @pytest.fixture(scope="module")
-def found() -> Diagnosis:
+def named() -> Diagnosis:
     return diagnosed(Toy(effects=3), {"e0": 0.8}, 7)
 
 
@@ -48,47 +48,47 @@ def words(figure: Figure) -> str:
     for text in figure.findobj(Text):
         assert isinstance(text, Text)
         place = text.get_window_extent()
-        said = text.get_text()
-        if text.get_visible() and said.strip(NUMBER):  # ticks beyond an axis are not drawn
-            written.append(said)
+        string = text.get_text()
+        if text.get_visible() and string.strip(NUMBER):  # ticks beyond an axis are not drawn
+            written.append(string)
             assert place.x0 > -1 and place.y0 > -1, text
             assert place.x1 < box.x1 + 1 and place.y1 < box.y1 + 1, text
     return "\n".join(written)
 
 
-def test_residuals(found: Diagnosis, tmp_path: Path) -> None:
-    figure = drawn(found, tmp_path)[0]
+def test_residuals(named: Diagnosis, tmp_path: Path) -> None:
+    figure = drawn(named, tmp_path)[0]
     panels = figure.axes
     assert [axes.get_title("left") for axes in panels] == ["[0,0]", "in-plane", "out-of-plane"]
     shown = [bar.lines[0].get_ydata() for axes in panels for bar in axes.containers]
-    assert sorted(np.concatenate(shown)) == pytest.approx(sorted(100 * found.gap.residuals))
+    assert sorted(np.concatenate(shown)) == pytest.approx(sorted(100 * named.gap.residuals))
     assert len(shown) == 3 * 3  # pressures
     assert [list(axes.get_xticks()) for axes in panels] == [[0, 1], [1, 2, 3, 4], [1, 2, 3]]
     for axes in panels:
         low, high = axes.get_xlim()
         places = np.concatenate([line.get_xdata() for bar in axes.containers for line in bar[:1]])
         assert low + 0.2 < places.min() and places.max() < high - 0.2
-    told = words(figure)
-    assert "one standard deviation" in told and f"hollow: with {found.best}" in told
+    text = words(figure)
+    assert "one standard deviation" in text and f"hollow: with {named.best}" in text
 
 
-def test_probabilities_and_held_out(found: Diagnosis, tmp_path: Path) -> None:
-    _, bars, held = drawn(found, tmp_path)
+def test_probabilities_and_held_out(named: Diagnosis, tmp_path: Path) -> None:
+    _, bars, held = drawn(named, tmp_path)
     widths = [bar.get_width() for bar in bars.axes[0].patches]
     assert widths == sorted(widths, reverse=True)
-    assert widths[0] == pytest.approx(max(found.probabilities.values()))
+    assert widths[0] == pytest.approx(max(named.probabilities.values()))
     assert "No effect" in words(bars) and "90 % range" in words(held)
-    assert found.shrinkage is not None
+    assert named.shrinkage is not None
     heights = [bar.get_height() for bar in held.axes[0].patches]
-    assert heights == [found.shrinkage.before_percent, found.shrinkage.after_percent]
+    assert heights == [named.shrinkage.before_percent, named.shrinkage.after_percent]
 
 
 @pytest.mark.slow
-def test_long_names_are_laid_out(found: Diagnosis, tmp_path: Path) -> None:
-    """Of one family, of one pressure, with the catalogue's longest name; see `conftest`."""
+def test_long_names_are_laid_out(named: Diagnosis, tmp_path: Path) -> None:
+    """Modes of one family at one pressure, with the catalogue's longest name; see `conftest`."""
     long = "temperature drift over the run of pressures, as the longest of titles"
-    spans = {id: replace(span, title=long) for id, span in found.problem.spans.items()}
-    d = replace(found, problem=replace(found.problem, spans=spans))
+    spans = {id: replace(span, title=long) for id, span in named.problem.spans.items()}
+    d = replace(named, problem=replace(named.problem, spans=spans))
     few = [row.label is not None and row.label.m == 1 for row in d.problem.observations.rows]
     alone = replace(
         d,
@@ -166,11 +166,11 @@ def test_section_map_of_many_parts_is_readable_and_as_wide_as_its_picture(tmp_pa
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [0, 2])
 def test_the_limit_of_a_named_effect_is_no_text_on_a_bar(
-    found: Diagnosis, count: int, tmp_path: Path
+    named: Diagnosis, count: int, tmp_path: Path
 ) -> None:
     """With one bar its words stood on the bar: they are in the legend."""
-    few = tuple(h for h in found.hypotheses if h.key in ("none", "outside", "e0")[-1 - count :])
-    d = replace(found, hypotheses=few)
+    few = tuple(h for h in named.hypotheses if h.key in ("none", "outside", "e0")[-1 - count :])
+    d = replace(named, hypotheses=few)
     figure = pictures.draw_probabilities(d)
     save(figure, tmp_path / "bars.png")
     (axes,), (legend,) = figure.axes, figure.legends

@@ -98,7 +98,7 @@ def test_one_design_and_one_load(tmp_path: Path) -> None:
 
 
 def test_marks_of_one_load_are_whole() -> None:
-    """Of designs that hardly differ, too."""
+    """Marks are whole for designs that hardly differ, too."""
     row = {"load_N": 2e3, "area_m2": 8.3e-3, "deflection_m": 0.011}
     row |= {"vertical_stiffness_N_per_m": 2e5, "mean_pressure_Pa": 3e5, "peak_pressure_Pa": 4e5}
     row |= {"length_m": 0.1, "width_m": 0.1}
@@ -145,18 +145,20 @@ def test_between_rings_far_apart_points_are_added(
 
 
 def test_table_and_csv(designs: dict[str, Pressed]) -> None:
-    found = result(designs)
-    lines = found.csv().splitlines()
+    sweep = result(designs)
+    lines = sweep.csv().splitlines()
     assert lines[0] == (
         "design,load_N,deflection_m,area_m2,length_m,width_m,mean_pressure_Pa,"
         "peak_pressure_Pa,vertical_stiffness_N_per_m"
     )
     assert len(lines) == 1 + 9
-    assert [float(x) for x in lines[4].split(",")[1:]] == list(found.rows[3].model_dump().values())[
+    assert [float(x) for x in lines[4].split(",")[1:]] == list(sweep.rows[3].model_dump().values())[
         1:
     ]
     console = Console(width=110)
     with console.capture() as text:
-        console.print(shown(*found.tables()))
-    told = text.get()
-    assert "area cm²" in told and "20.00" in told and "125.7" in told and "300.0" in told
+        console.print(shown(*sweep.tables()))
+    printed = text.get()
+    assert (
+        "area cm²" in printed and "20.00" in printed and "125.7" in printed and "300.0" in printed
+    )

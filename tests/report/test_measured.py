@@ -20,8 +20,8 @@ def test_names_are_no_markup(name: str) -> None:
     label = Label(2, 1)
     judged = Judged(label, {label: 1.0}, f"like {label}")
     mode = MeasuredMode(66.1, np.ones(1), 0.02, 0.1)
-    told = LabelledMode(mode, sensors, np.ones(1), 1.0, judged, "", "1")
+    labelled = LabelledMode(mode, sensors, np.ones(1), 1.0, judged, "", "1")
     console = Console(width=100)
     with console.capture() as text:
-        console.print(measured_table([ModalTest(name, (told,))]))
+        console.print(measured_table([ModalTest(name, (labelled,))]))
     assert name in text.get() and "[2,1] member 1" in text.get() and "like [2,1]" in text.get()

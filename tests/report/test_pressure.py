@@ -19,7 +19,7 @@ LABELS = [(0, 0, "axial"), (0, 0, "torsional"), (1, 0, None), (1, 1, None), (2, 
 
 
 def rows(labels=LABELS, designs=("initial", "fitted"), pressures=(100.0, 200.0, 320.0), slope=0.4):
-    found = [
+    entries = [
         {
             "design": design,
             "pressure_kPa": p,
@@ -38,7 +38,7 @@ def rows(labels=LABELS, designs=("initial", "fitted"), pressures=(100.0, 200.0, 
         for k, design in enumerate(designs)
         for p in pressures
     ]
-    return [PressureRow.model_validate(row) for row in found]
+    return [PressureRow.model_validate(row) for row in entries]
 
 
 @pytest.mark.slow
@@ -91,7 +91,7 @@ def test_names_that_would_touch_are_moved_apart():
 
 def test_table_and_csv():
     given = rows(designs=("initial",))
-    found = {
+    fields = {
         "design": "initial",
         "from_kPa": 100.0,
         "to_kPa": 320.0,
@@ -108,7 +108,7 @@ def test_table_and_csv():
         ],
     }
     console = Console(width=110, record=True)
-    sweep = PressureSweep(rows=given, findings=[PressureFindings(**found, words=[])])
+    sweep = PressureSweep(rows=given, findings=[PressureFindings(**fields, words=[])])
     console.print(shown(*sweep.tables()))
     text = console.export_text()
     line = next(line for line in text.splitlines() if line.startswith("[2,0]"))

@@ -1,4 +1,4 @@
-"""What is kept for the page: the same shapes, section and patches, from fewer numbers."""
+"""Data kept for the page: the same shapes, section and patches, from fewer numbers."""
 
 from __future__ import annotations
 
@@ -110,16 +110,16 @@ def test_the_section_is_whole(tyre) -> None:
     """Areas of the polygons and of the outline agree (shoelace); cords stand once per layer."""
     case, *_ = tyre
     mesh = resolved(case).mesh
-    found = section_data(case, mesh, {})
+    section = section_data(case, mesh, {})
 
     def area(flat: list[float]) -> float:
         z, r = np.reshape(flat, (-1, 2)).T
         return 0.5 * float(abs(z @ np.roll(r, 1) - r @ np.roll(z, 1)))
 
-    cells = [cell for cells in found.areas.values() for cell in cells]
+    cells = [cell for cells in section.areas.values() for cell in cells]
     assert len(cells) == len(mesh.solids)
-    assert sum(map(area, cells)) == pytest.approx(area(found.outline), rel=0.02)
-    assert set(found.cords) == set(case.case.rebar_layers) and found.inflated is None
+    assert sum(map(area, cells)) == pytest.approx(area(section.outline), rel=0.02)
+    assert set(section.cords) == set(case.case.rebar_layers) and section.inflated is None
 
 
 def test_patches_keep_all_that_touches(tyre, monkeypatch: pytest.MonkeyPatch) -> None:

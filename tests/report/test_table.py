@@ -160,9 +160,11 @@ def test_tables_load_no_drawing_packages():
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-@pytest.mark.parametrize(("off", "said"), [((-80.0, -70.0, 2.0), True), ((-80.0, 3.0, 2.0), False)])
+@pytest.mark.parametrize(
+    ("off", "expected"), [((-80.0, -70.0, 2.0), True), ((-80.0, 3.0, 2.0), False)]
+)
 def test_a_fit_that_is_far_off_most_modes_asks_for_the_unit(
-    off: tuple[float, ...], said: bool
+    off: tuple[float, ...], expected: bool
 ) -> None:
     modes = [{"deviation_percent": percent} for percent in off]
     result = {
@@ -174,7 +176,7 @@ def test_a_fit_that_is_far_off_most_modes_asks_for_the_unit(
         "modes": modes,
         "singular_values": [1.0],
     }
-    assert any("in Hz" in doubt for doubt in fit_doubts(result)) is said
+    assert any("in Hz" in doubt for doubt in fit_doubts(result)) is expected
 
 
 def test_a_tyre_that_is_none_is_doubted() -> None:

@@ -64,9 +64,9 @@ def test_a_headline_takes_the_lines_that_it_needs(width: float, tmp_path: Path) 
     figure.add_subplot()
     headline(figure, words)
     save(figure, tmp_path / "headline.png")
-    said = figure.get_suptitle()
-    assert said.split() == words.split()
-    assert ("\n" in said) == (width < 8)
+    title = figure.get_suptitle()
+    assert title.split() == words.split()
+    assert ("\n" in title) == (width < 8)
 
 
 @pytest.mark.parametrize(
@@ -77,10 +77,10 @@ def test_signatures(id: str, pressures: tuple[float, ...], tmp_path: Path) -> No
     assert id in catalogue()
     shape = len(pressures), len(LABELS)
     before = np.linspace(-27.5, 24.2, shape[0] * shape[1]).reshape(shape)
-    found = Signature(
+    signature = Signature(
         id, -1.234567e-6, pressures, tuple(LABELS), before, before / 3, 0.886, {}, 0.0
     )
-    save(draw_signature(found), tmp_path / "effect.png")
+    save(draw_signature(signature), tmp_path / "effect.png")
 
 
 @pytest.mark.parametrize(

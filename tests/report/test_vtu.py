@@ -65,7 +65,7 @@ def test_hexahedra_fill_the_tyre_and_none_is_inverted(tmp_path, mesh):
 
 
 def volume(corners: np.ndarray) -> float:
-    """Of hexahedra with plane faces: six tetrahedra each, all on the diagonal 0-6."""
+    """Volume of hexahedra with plane faces: six tetrahedra each, all on the diagonal 0-6."""
     walk = [1, 2, 3, 7, 4, 5, 1]
     total = 0.0
     for a, b in itertools.pairwise(walk):

@@ -1,4 +1,4 @@
-"""What a fit amounts to, in sentences: each follows from the numbers that it is about."""
+"""Sentences about a fit: each follows from the numbers that it is about."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def fit(**changes: Any) -> dict[str, Any]:
     mode = {"c": 2, "m": 1, "kind": None, "multiplicity": 2, "deviation_percent": 1.0}
     lateral = {"c": 0, "m": 0, "kind": "axial", "multiplicity": 1, "deviation_percent": -4.0}
     variable = {"initial": 1.0, "value": 2.0, "standard_error": 0.2, "at_bound": False}
-    found: dict[str, Any] = {
+    content: dict[str, Any] = {
         "pressure_kPa": 240.0,
         "mass_kg": 12.4,
         "objective_Hz": 3.0,
@@ -28,7 +28,7 @@ def fit(**changes: Any) -> dict[str, Any]:
         "modes": [dict(mode), lateral],
         "starts": [start()],
     }
-    return {**found, **changes}
+    return {**content, **changes}
 
 
 def start(objective: float = 3.0, A: float = 2.0) -> dict[str, Any]:

@@ -31,7 +31,7 @@ def every_text_readable(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
     that was written.
     """
     drawn: dict[Text, None] = {}
-    said: list[str] = []
+    texts: list[str] = []
     draw_text, draw_figure = Text.draw, FigureCanvasAgg.draw
 
     def text(self: Text, *rest: object, **more: object) -> None:
@@ -42,22 +42,22 @@ def every_text_readable(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
     def figure(canvas: FigureCanvasAgg) -> None:
         drawn.clear()
         draw_figure(canvas)
-        said.extend(each.get_text() for each in drawn)
-        assert not any("\\math" in words for words in said)
+        texts.extend(each.get_text() for each in drawn)
+        assert not any("\\math" in words for words in texts)
         check(canvas.figure, list(drawn))
 
     monkeypatch.setattr(Text, "draw", text)
     monkeypatch.setattr(FigureCanvasAgg, "draw", figure)
-    yield said
+    yield texts
 
 
 def check(figure: Figure, texts: list[Text]) -> None:
     """Every text inside the figure, and none on another."""
     boxes = [(each.get_text(), Text.get_window_extent(each)) for each in texts]
     edge = figure.bbox
-    for said, box in boxes:
+    for string, box in boxes:
         inside = min(box.x0, box.y0, edge.x1 - box.x1, edge.y1 - box.y1)
-        assert inside >= -SLACK, f"cut by {-inside:.0f} pixels: {said!r}"
+        assert inside >= -SLACK, f"cut by {-inside:.0f} pixels: {string!r}"
     for (one, a), (other, b) in combinations(boxes, 2):
         across = min(a.x1, b.x1) - max(a.x0, b.x0)
         up = min(a.y1, b.y1) - max(a.y0, b.y0)

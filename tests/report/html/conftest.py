@@ -22,11 +22,11 @@ _picture, _draw_corner = page._picture, sample.draw_corner
 @pytest.fixture(autouse=True)
 def drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
     def picture(
-        found: Any, prefix: str, name: str, words: str, file: str, draw: partial[Any]
+        result: Any, prefix: str, name: str, words: str, file: str, draw: partial[Any]
     ) -> Markup:
         key = name, words, repr(draw.args)
         if key not in _drawn:
-            _drawn[key] = _picture(found, ANY_CHAPTER, name, words, file, draw)
+            _drawn[key] = _picture(result, ANY_CHAPTER, name, words, file, draw)
         return Markup(_drawn[key].replace(ANY_CHAPTER, prefix))
 
     def corner(sampled: SampleResult) -> Figure:

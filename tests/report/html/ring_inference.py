@@ -1,4 +1,4 @@
-"""What is inferred of the ring: a sample, effects on it, and a diagnosis."""
+"""Inference about the ring: a sample, effects on it, and a diagnosis."""
 
 from __future__ import annotations
 

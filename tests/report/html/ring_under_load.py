@@ -98,12 +98,12 @@ def footprint() -> dict[str, Any]:
 
 def patches(name: str) -> dict[str, Any]:
     x, y = np.meshgrid(np.linspace(-80, 80, 17), np.linspace(-120, 120, 25))
-    found = []
+    entries = []
     for design in ("initial", "fitted"):
         for load in (1000.0, 4000.0):
             size = (load / 4000) ** (1 / 3)
             p = 500 * np.sqrt(np.maximum(0, 1 - (x / 50 / size) ** 2 - (y / 80 / size) ** 2))
-            found.append(
+            entries.append(
                 {
                     "design": design,
                     "load_N": load,
@@ -112,4 +112,4 @@ def patches(name: str) -> dict[str, Any]:
                     "pressure_kPa": p.tolist(),
                 }
             )
-    return {"format": 1, "case": name, "patches": found}
+    return {"format": 1, "case": name, "patches": entries}

@@ -63,10 +63,10 @@ class Nesting(HTMLParser):
         self.words: list[str] = []
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        found = dict(attrs)
-        assert len(found) == len(attrs), (tag, attrs)
-        self.ids += [found["id"] or ""] if "id" in found else []
-        self.links += [found["href"] or ""] if "href" in found else []
+        attributes = dict(attrs)
+        assert len(attributes) == len(attrs), (tag, attrs)
+        self.ids += [attributes["id"] or ""] if "id" in attributes else []
+        self.links += [attributes["href"] or ""] if "href" in attributes else []
         if tag not in VOID:
             self.open.append(tag)
 
@@ -80,10 +80,10 @@ class Nesting(HTMLParser):
 
 
 def parsed(text: str) -> Nesting:
-    found = Nesting()
-    found.feed(text)
-    assert not found.open
-    return found
+    parser = Nesting()
+    parser.feed(text)
+    assert not parser.open
+    return parser
 
 
 def words_of(text: str) -> str:
@@ -274,9 +274,9 @@ def test_a_damaged_file_is_named(copy: Path, content: str) -> None:
             continue  # an empty list is whole: no effect had an answer
         before = file.read_bytes()
         file.write_bytes(content.encode("utf-8", "surrogatepass"))
-        with pytest.raises(InputError, match=re.escape(file.name)) as told:
+        with pytest.raises(InputError, match=re.escape(file.name)) as error:
             text_of(copy)
-        assert "\n" not in str(told.value)
+        assert "\n" not in str(error.value)
         file.write_bytes(before)
 
 
@@ -376,7 +376,7 @@ def test_a_page_too_large_and_places_not_to_write_to(
 
 
 def _luminance(colour: str) -> float:
-    """Of sRGB (WCAG 2.2)."""
+    """Relative luminance of an sRGB colour (WCAG 2.2)."""
     parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
@@ -407,7 +407,7 @@ def test_contrast_is_aa() -> None:
 
 def test_the_page_says_what_its_results_are_of(copy: Path) -> None:
     words = words_of(text_of(copy))
-    for told in (
+    for entry in (
         "01234567",
         "rim.mass_kg = 12.5",
         "200",
@@ -418,7 +418,7 @@ def test_the_page_says_what_its_results_are_of(copy: Path) -> None:
         "a drum",
         "fedcba98",
     ):
-        assert told in words, told
+        assert entry in words, entry
     assert "not all of one tyre" not in words and "did not finish" not in words
     modes = json.loads((copy / "modes.json").read_text())
     modes["provenance"]["tyre_sha256"] = "f" * 64
