@@ -19,7 +19,7 @@ MARKED = "{{ C10 }}"
 
 
 def number(i: int, j: int) -> int:
-    """Of the node in row i (0 to 2) through the thickness, column j along the arc."""
+    """Number of the node in row i (0 to 2) through the thickness, column j along the arc."""
     return 1000 * i + j + 1
 
 

@@ -49,7 +49,7 @@ def run_press(folder: Path, command: Sequence[str], time_limit_s: float) -> None
 
 
 def read_press(folder: Path) -> list[Pressed]:
-    """What stands in the results, a row per deflection of the deck.
+    """Read the results, a row per deflection of the deck.
 
     Raises RunFailed (``no_results``) where one is missing, is not a number or does not balance.
     """
@@ -60,16 +60,16 @@ def read_press(folder: Path) -> list[Pressed]:
         (folder / f"{JOB}.inp").read_text(encoding="utf-8"),
         path.read_text(encoding="utf-8", errors="replace"),
     )
-    asked = [float(value) for value in re.findall(r"^\*\* deflection (\S+) m", deck, re.M)]
+    deflections = [float(value) for value in re.findall(r"^\*\* deflection (\S+) m", deck, re.M)]
     halves = 2 if "*EQUATION" in (folder / WHEEL).read_text(encoding="utf-8") else 1
     patterns = (REACTION.replace("NAME", "ROAD"), REACTION.replace("NAME", "RIM"), CONTACT)
     tables = [_rows(pattern, text, path.name) for pattern in patterns]
-    times = [float(k) for k in range(1, len(asked) + 1)]
-    if not asked or any([time for time, _ in rows] != times for rows in tables):
-        found = min(len(rows) for rows in tables)
-        raise RunFailed("no_results", f"{path.name} has {found} of {len(asked)} deflections")
+    times = [float(k) for k in range(1, len(deflections) + 1)]
+    if not deflections or any([time for time, _ in rows] != times for rows in tables):
+        count = min(len(rows) for rows in tables)
+        raise RunFailed("no_results", f"{path.name} has {count} of {len(deflections)} deflections")
     pressed = []
-    for deflection, *rows in zip(asked, *tables, strict=True):
+    for deflection, *rows in zip(deflections, *tables, strict=True):
         (_, road), (_, rim), (_, (area, _, shear)) = rows
         one = Pressed(
             deflection,
@@ -103,11 +103,11 @@ def read_pressures(folder: Path) -> list[np.ndarray]:
     Of half the patch where half the tyre ran. Raises RunFailed (``no_results``).
     """
     path = folder / f"{JOB}.frd"
-    fields, found = read_fields(path), PATCH.findall(path.read_text(encoding="utf-8"))
-    if len(found) != len(fields.blocks):
-        raise RunFailed("no_results", f"{path.name} has {len(found)} patches")
+    fields, patch_texts = read_fields(path), PATCH.findall(path.read_text(encoding="utf-8"))
+    if len(patch_texts) != len(fields.blocks):
+        raise RunFailed("no_results", f"{path.name} has {len(patch_texts)} patches")
     patches = []
-    for lines, (_, _, moved) in zip(found, fields.blocks, strict=True):
+    for lines, (_, _, moved) in zip(patch_texts, fields.blocks, strict=True):
         known = {int(line[3:13]): float(line[49:61]) for line in lines.splitlines()}
         pressure = np.array([known.get(int(n), 0.0) for n in fields.nodes])
         patches.append(np.column_stack([(fields.points + moved)[:, 1:], pressure])[pressure > 0])

@@ -39,8 +39,8 @@ def _modes(inflation: str, step: str) -> None:
     from tyrecal.tyre.load import load_case
     from tyrecal.tyre.own_deck.own_deck import read_own_deck
 
-    asked = ["*NODE FILE, NSET=CROWN", "U, COORD", "*MODAL FILE", "*END STEP"]
-    assert step.splitlines()[-4:] == asked
+    expected = ["*NODE FILE, NSET=CROWN", "U, COORD", "*MODAL FILE", "*END STEP"]
+    assert step.splitlines()[-4:] == expected
     assert "*FILE FORMAT, ASCII\n*STEP" in inflation and "FILE FORMAT" not in step
     c10 = float(re.findall(r"NEO HOOKE\n([^,]+),", inflation)[0])
     pressure = float(re.findall(r"RUBBER, P6, (\S+)", inflation)[0])

@@ -43,13 +43,13 @@ def _modes() -> None:
     Path("own.yaml").write_text(own_case(deck, flat, "P235/75R17", None))
     design = TyreDesign(load_case("own.yaml", allow_unusual=True))
     answer = Evaluator(design, "bundled").evaluate(Question({}, modes_per_harmonic=3))
-    asked = read_keywords(Path("modes.inp").read_text())
-    transfer = next(k for k in asked if k.name == "SYMMETRIC RESULTS TRANSFER")
+    blocks = read_keywords(Path("modes.inp").read_text())
+    transfer = next(k for k in blocks if k.name == "SYMMETRIC RESULTS TRANSFER")
     assert transfer.get("STEP") == "1"
-    (load,) = (k for k in asked if k.name == "DSLOAD")
+    (load,) = (k for k in blocks if k.name == "DSLOAD")
     assert float(load.rows[0].text(2)) * mass / length == flat.pressure_Pa
-    wanted = next(k for k in asked if k.name == "FREQUENCY").rows[0].integer(0)
-    name = next(k for k in asked if k.name == "NODE FILE").get("NSET")
+    wanted = next(k for k in blocks if k.name == "FREQUENCY").rows[0].integer(0)
+    name = next(k for k in blocks if k.name == "NODE FILE").get("NSET")
     numbers = {n: k for k, n in enumerate(sorted(flat.model.nodes), start=1)}
     crown = [numbers[n] for n in flat.model.node_sets[name]]
     angles = 2 * np.pi * np.arange(SECTORS) / SECTORS

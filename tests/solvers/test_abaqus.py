@@ -73,9 +73,9 @@ def test_modes_are_those_of_the_bundled_solver(coarse: Callable[..., Path], tmp_
     assert tyrecal("modes", case, "--output", tmp_path / "b", *common) == 0
     ours, theirs = (json.loads((tmp_path / d / "modes.json").read_text()) for d in "ab")
     label = lambda mode: (mode["c"], mode["m"], mode["kind"], mode["multiplicity"])
-    found = {label(mode): mode["frequency_Hz"] for mode in ours["modes"]}
+    hertz = {label(mode): mode["frequency_Hz"] for mode in ours["modes"]}
     for mode in theirs["modes"][:9]:
-        assert found[label(mode)] == pytest.approx(mode["frequency_Hz"], rel=1e-9)
+        assert hertz[label(mode)] == pytest.approx(mode["frequency_Hz"], rel=1e-9)
     assert ours["pressure_kPa"] == 200
     assert ours["mass_kg"] == pytest.approx(theirs["mass_kg"], rel=1e-6)
 
@@ -99,7 +99,7 @@ def test_a_fit_ends_where_the_bundled_solver_ends(
 def test_slopes_and_record_are_the_same_with_any_number_of_jobs(
     coarse: Callable[..., Path], tmp_path: Path
 ) -> None:
-    """Of a design whose neighbours, from which the slopes come, are evaluated in parallel."""
+    """A design whose neighbours, from which the slopes come, are evaluated in parallel."""
     case, points, records = load_case(coarse()), [], []
     command = (sys.executable, str(STANDIN))  # workers may be older than the environment is
     for jobs in (1, 2):
@@ -109,8 +109,8 @@ def test_slopes_and_record_are_the_same_with_any_number_of_jobs(
         problem = Problem(case, evaluator, {"A_belt": 2.2e-7}, jobs=jobs)
         points.append(problem.evaluate(problem.start()))
         assert (evaluator.counts.runs, evaluator.counts.recorded) == (3, 0)
-        found = evaluator.store.folder.rglob("*.record") if evaluator.store else ()
-        records.append({path.name: path.read_bytes() for path in found})
+        paths = evaluator.store.folder.rglob("*.record") if evaluator.store else ()
+        records.append({path.name: path.read_bytes() for path in paths})
     assert (points[0].jacobian == points[1].jacobian).all()
     assert (points[0].residuals == points[1].residuals).all()
     assert records[0] == records[1] and len(records[0]) == 3
@@ -138,7 +138,7 @@ QUICK = ("crash",)
 
 
 @pytest.mark.parametrize(
-    ("fault", "cause", "said"),
+    ("fault", "cause", "message"),
     [pytest.param(*fault, marks=[] if fault[0] in QUICK else pytest.mark.slow) for fault in FAULTS],
 )
 def test_no_fault_becomes_a_number(
@@ -147,7 +147,7 @@ def test_no_fault_becomes_a_number(
     monkeypatch: pytest.MonkeyPatch,
     fault: str,
     cause: str,
-    said: str,
+    message: str,
 ) -> None:
     monkeypatch.setenv("STANDIN_FAULT", fault)
     evaluator = Evaluator(
@@ -155,7 +155,7 @@ def test_no_fault_becomes_a_number(
         "abaqus",
         tmp_path / "runs",
     )
-    with pytest.raises(EvaluationFailed, match=said) as failure:
+    with pytest.raises(EvaluationFailed, match=message) as failure:
         evaluator.evaluate(Question({}))
     assert failure.value.cause == cause
     assert failure.value.folder and (failure.value.folder / "modes.inp").exists()
@@ -222,9 +222,9 @@ def test_a_missing_command(
 ) -> None:
     case = coarse(["no-such-abaqus"])
     assert tyrecal("modes", case, "--solver", "abaqus", "--output", tmp_path / "out") == 3
-    said = capsys.readouterr().err
-    assert "no folder of PATH holds the program 'no-such-abaqus'; install it or give" in said
-    assert said.count("\n") == 1 and not list(tmp_path.glob("out/runs/*"))
+    message = capsys.readouterr().err
+    assert "no folder of PATH holds the program 'no-such-abaqus'; install it or give" in message
+    assert message.count("\n") == 1 and not list(tmp_path.glob("out/runs/*"))
 
 
 def test_options_that_are_wrong(

@@ -90,12 +90,12 @@ def test_modes_shapes_and_coordinates(tmp_path: Path, participation: int) -> Non
     assert all(len(line) == 80 for line in text.splitlines())
     path = tmp_path / "modes.fil"
     path.write_text(text)
-    found = read_fil(path)
-    assert found.eigenvalues.tolist() == list(VALUES)
-    assert found.masses.tolist() == [2.0, 2.0]
-    assert found.nodes.tolist() == [8, 1000007]
-    assert found.coordinates.tolist() == [[0.3, 0.05, 0.0], [0.0, -0.05, -0.3]]
-    assert np.array_equal(found.displacement, SHAPES)
+    modes = read_fil(path)
+    assert modes.eigenvalues.tolist() == list(VALUES)
+    assert modes.masses.tolist() == [2.0, 2.0]
+    assert modes.nodes.tolist() == [8, 1000007]
+    assert modes.coordinates.tolist() == [[0.3, 0.05, 0.0], [0.0, -0.05, -0.3]]
+    assert np.array_equal(modes.displacement, SHAPES)
 
 
 def test_forms_that_other_releases_may_write(tmp_path: Path) -> None:
@@ -111,7 +111,7 @@ def test_forms_that_other_releases_may_write(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("spoil", "said"),
+    ("spoil", "message"),
     [
         (lambda text: text[: len(text) // 2], "cut short|not given at the same nodes"),
         (lambda text: text[: -81 - 81], "does not end|cut short"),
@@ -126,10 +126,12 @@ def test_forms_that_other_releases_may_write(tmp_path: Path) -> None:
         (lambda text: "x" * 81, "longer than 80"),
     ],
 )
-def test_a_file_that_is_not_whole(tmp_path: Path, spoil: Callable[[str], str], said: str) -> None:
+def test_a_file_that_is_not_whole(
+    tmp_path: Path, spoil: Callable[[str], str], message: str
+) -> None:
     path = tmp_path / "modes.fil"
     path.write_text(spoil(whole()))
-    with pytest.raises(RunFailed, match=said) as failure:
+    with pytest.raises(RunFailed, match=message) as failure:
         read_fil(path)
     assert failure.value.cause == "no_results"
 

@@ -48,11 +48,11 @@ def test_modes_are_those_of_the_bundled_solver(
     value = 1.2 * load_case(case).case.variables[name].start
     given = ("--set", f"{name}={value!r}", "--pressure-kPa", "180", "--json", "--no-store")
     command = ("--solver", "abaqus", "--solver-command", f"{sys.executable} {STANDIN}")
-    found = []
+    results = []
     for folder, more in (("a", command), ("b", ())):
         assert run("modes", str(case), *given, *more, "--output", str(tmp_path / folder)) == 0
-        found.append(json.loads(capsys.readouterr().out))
-    ours, theirs = found
+        results.append(json.loads(capsys.readouterr().out))
+    ours, theirs = results
     assert ours["mass_kg"] == pytest.approx(theirs["mass_kg"], rel=1e-5)
     label = lambda mode: (mode["c"], mode["m"], mode["kind"])
     hertz = {label(mode): mode["frequency_Hz"] for mode in ours["modes"]}
@@ -84,7 +84,7 @@ def test_the_text_is_the_users_but_for_the_marks(tmp_path: Path) -> None:
     assert plain["inflate.inp"] == text.replace("{{ A_belt }}", "2.1e-07")
     assert plain["parts/mesh.inp"] == mesh + RESTART + CROWN
     first = read_keywords(plain["parts/mesh.inp"] + plain["inflate.inp"].split("mesh.inp\n")[1])
-    assert not [found for found in findings(first) if found.sure]
+    assert not [finding for finding in findings(first) if finding.sure]
     assert not findings(read_keywords(plain["modes.inp"]), first)
     other = written({"deck.numbers.A_belt": 3e-7, "material RUBBER / HYPERELASTIC / C10": 9e5})
     lines = zip(plain["inflate.inp"].splitlines(), other["inflate.inp"].splitlines(), strict=True)

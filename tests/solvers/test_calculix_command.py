@@ -81,7 +81,7 @@ def test_of_an_error_three_lines_are_told(tmp_path: Path) -> None:
 
 
 def test_paths_that_ccx_copes_with() -> None:
-    """Of 100 characters at most, without a blank, in ASCII."""
+    """Safe paths have 100 characters at most, no blank, and only ASCII."""
     assert _is_safe(Path("/" + 99 * "x")) and not _is_safe(Path("/" + 100 * "x"))
     assert not _is_safe(Path("/a b")) and not _is_safe(Path("/\u00fc"))
 

@@ -100,7 +100,7 @@ def test_rubber_that_is_none_is_not_left_to_ccx(tmp_path: Path, row: str, stable
 
 
 def test_decks_have_one_diameter_each_and_half_the_pressure() -> None:
-    """What three silent traps of ccx 2.20 demand, and the plies' stiffness and mass."""
+    """Demands of three silent traps of ccx 2.20, and the plies' stiffness and mass."""
     texts = Decks(TyreDesign(main_case(), {}), modes_per_harmonic=3).texts("calculix")
     assert list(texts) == ["sector.inp", "inflate.inp", *(f"modes_{n}.inp" for n in range(5))]
     assert "CAVITY, P6, 240000\n" in texts["inflate.inp"]

@@ -152,8 +152,8 @@ def test_shapes_have_the_tyres_modal_mass(n: int, multiplicity: int) -> None:
     fields = lambda size: Fields(
         np.array([1, 2]), np.zeros((2, 3)), [(1, "DISP", 0 * shape), (1, "DISPI", size * shape)]
     )
-    (found,) = _shapes(fields(1.0), 1, n, 60, "modes")
-    assert found == pytest.approx(shape * np.sqrt(multiplicity / 60))
+    (scaled,) = _shapes(fields(1.0), 1, n, 60, "modes")
+    assert scaled == pytest.approx(shape * np.sqrt(multiplicity / 60))
     with pytest.raises(RunFailed, match="mode 1 is no shape"):
         _shapes(fields(0.0), 1, n, 60, "modes")
 

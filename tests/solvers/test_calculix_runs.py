@@ -92,7 +92,8 @@ def test_a_deck_that_is_not_there_or_is_named_with_its_ending(tmp_path: Path, jo
 
 
 def test_two_runs_in_one_file(tmp_path: Path) -> None:
-    """Of the same job in the same folder at the same time; the runner cannot keep others out."""
+    """Two runs of the same job in the same folder at the same time; the runner cannot keep others
+    out."""
     write_ring(tmp_path)
     run_job(tmp_path, "inflate", ["sector.inp"], ["ccx"], 20.0)
     written = (tmp_path / "inflate.frd").read_text()

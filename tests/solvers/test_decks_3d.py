@@ -57,7 +57,7 @@ def twin(folder: Path, c10: float, pressure: float, capsys: Any) -> dict[str, fl
 
 
 def frequencies(capsys: Any, *command: str) -> dict[str, float]:
-    """Of a command's modes, by label."""
+    """Frequencies of a command's modes, by label."""
     assert run(*command) == 0
     modes = json.loads(capsys.readouterr().out)["modes"]
     return {f"{m['c']},{m['m']} {m['kind'] or ''}".strip(): m["frequency_Hz"] for m in modes}
@@ -86,20 +86,21 @@ def test_a_ring_is_labelled_wherever_its_axle_is(lines: int) -> None:
     if lines > 1:
         shapes["[2,2]"] = [wave(2, 2, i) * radial * (3 * across**2 - 1)[:, None] for i in (0, 1)]
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    told = [(name, u @ turn.T) for name, halves in shapes.items() for u in halves]
+    components = [(name, u @ turn.T) for name, halves in shapes.items() for u in halves]
     hertz = 10.0 * (1 + np.repeat(np.arange(len(shapes)), [len(u) for u in shapes.values()]))
     local, frame = about_axle(points @ turn.T + rng.normal(size=3))
-    vectors = np.array([u for _, u in told]) @ frame.T
+    vectors = np.array([u for _, u in components]) @ frame.T
     places, modes = ring_modes((2 * np.pi * hertz) ** 2, local, vectors)
     assert places[:, 0] == pytest.approx(np.full(len(theta), 0.3), rel=1e-9)
     raw = [RawMode(m["frequency_Hz"], RingShape(places, m["displacement"]), 1) for m in modes]
-    found = {str(mode.label): mode for mode in paired_labels(raw)}
-    assert list(found) == list(shapes)
-    assert [mode.multiplicity for mode in found.values()] == [len(u) for u in shapes.values()]
+    by_label = {str(mode.label): mode for mode in paired_labels(raw)}
+    assert list(by_label) == list(shapes)
+    assert [mode.multiplicity for mode in by_label.values()] == [len(u) for u in shapes.values()]
 
 
 def test_waves_that_few_nodes_cannot_tell_apart_are_the_fewer_ones() -> None:
-    """Of 12 round the tyre, 2 and 10 waves are the same, also as printed with six digits."""
+    """With 12 nodes round the tyre, 2 and 10 waves are the same, also as printed with six
+    digits."""
     theta = 2 * np.pi * np.arange(12) / 12 + 0.1
     points = 0.3 * np.stack([np.cos(theta), np.sin(theta), 0 * theta], -1)
     shapes = np.array([np.cos(2 * theta + phase)[:, None] * points for phase in (0.4, 1.2)])
@@ -251,10 +252,10 @@ def test_what_abaqus_refuses_of_decks_is_said_by_file_and_line(
     for solver, code in (("abaqus", 2), ("calculix", 0)):
         case = case_of(tmp_path, decks_3d.CASE.replace("calculix", solver), inflate=text)
         assert run("deck", "--check", str(case), "--json") == code
-        found = json.loads(capsys.readouterr().out)
-        (said,) = found["abaqus"]["refuses"]
-        assert said.startswith("inflate.inp, line 7: *REBAR LAYER: needs an ORIENTATION")
-        assert found["calculix"] == [
+        report = json.loads(capsys.readouterr().out)
+        (refusal,) = report["abaqus"]["refuses"]
+        assert refusal.startswith("inflate.inp, line 7: *REBAR LAYER: needs an ORIENTATION")
+        assert report["calculix"] == [
             "inflate.inp, line 6: *SURFACE SECTION: it has no rebar: cords are solids of a stiff"
             " direction there"
         ]
@@ -262,8 +263,8 @@ def test_what_abaqus_refuses_of_decks_is_said_by_file_and_line(
 
 def test_no_pressure_is_found(tmp_path: Path) -> None:
     text = TEXTS["inflate.inp"].replace("P6", "BX")
-    (found,) = validate(case_of(tmp_path, inflate=text, modes=decks_3d.modes(calculix=False)))
-    assert "no pressure is found" in found.message and "{{ pressure }}" in found.message
+    (mistake,) = validate(case_of(tmp_path, inflate=text, modes=decks_3d.modes(calculix=False)))
+    assert "no pressure is found" in mistake.message and "{{ pressure }}" in mistake.message
 
 
 @pytest.mark.slow
@@ -273,10 +274,10 @@ def test_modes_on_abaqus_are_the_twins(tmp_path: Path, capsys: pytest.CaptureFix
     command = ("--solver", "abaqus", "--solver-command", f"{sys.executable} {STANDIN}")
     given = ("--set", "C10=4e6", "--pressure-kPa", "60", "--json", "--no-store")
     where = ("--output", str(tmp_path / "modes"))
-    found = frequencies(capsys, "modes", str(case), *given, *where, *command)
+    by_label = frequencies(capsys, "modes", str(case), *given, *where, *command)
     expected = twin(tmp_path, 4e6, 6e4, capsys)
-    assert {*found} >= {"0,0 axial", "0,0 torsional", "1,1", "2,1", "3,1"}
-    for label, hertz in found.items():
+    assert {*by_label} >= {"0,0 axial", "0,0 torsional", "1,1", "2,1", "3,1"}
+    for label, hertz in by_label.items():
         assert hertz == pytest.approx(expected[label], rel=1e-9)
 
 
@@ -312,17 +313,17 @@ def test_a_check_says_what_is_known_and_added(
     inflate = TEXTS["inflate.inp"].replace("mesh.inp", "parts/mesh.inp")
     case = str(case_of(tmp_path, inflate=inflate))
     assert run("deck", "--check", case, "--json") == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["jobs"] == [["inflate", ""], ["modes", "inflate"]]
-    assert (told["modes"], told["crown"]) == (10, "CROWN")
+    report = json.loads(capsys.readouterr().out)
+    assert report["jobs"] == [["inflate", ""], ["modes", "inflate"]]
+    assert (report["modes"], report["crown"]) == (10, "CROWN")
     line = line_of(inflate, "RUBBER, P6")
-    assert told["pressure"] == [f"inflate.inp, line {line}", "modes.inp, line 7"]
-    assert told["numbers"] == {
+    assert report["pressure"] == [f"inflate.inp, line {line}", "modes.inp, line 7"]
+    assert report["numbers"] == {
         "C10": 4.5e6,
         "material RUBBER / HYPERELASTIC / D1": 1e-8,
         "material RUBBER / DENSITY / density": 1100.0,
     }
-    assert set(told["added"]) == {"abaqus", "calculix"}
+    assert set(report["added"]) == {"abaqus", "calculix"}
     assert run("deck", case, "--solver", "abaqus", "--output", str(tmp_path / "out")) == 0
     written = (tmp_path / "out" / "parts" / "mesh.inp").read_bytes()
     assert without_header(written).decode() == TEXTS["mesh.inp"]

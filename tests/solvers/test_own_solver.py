@@ -38,10 +38,10 @@ def test_the_example_gives_the_bundled_solvers_frequencies(site: Path, tmp_path:
         str(tmp_path / "out"),
     )
     assert done.returncode == 0, done.stderr
-    found = [mode["frequency_Hz"] for mode in json.loads(done.stdout)["modes"]]
+    computed = [mode["frequency_Hz"] for mode in json.loads(done.stdout)["modes"]]
     case = load_case(path)
     expected = Evaluator(TyreDesign(case)).evaluate(Question(start_values(case))).modes
-    assert found == pytest.approx(sorted(m.frequency_Hz for m in expected), rel=1e-12)
+    assert computed == pytest.approx(sorted(m.frequency_Hz for m in expected), rel=1e-12)
 
 
 @pytest.mark.slow

@@ -85,11 +85,11 @@ from pathlib import Path
 from tyrecal_solvers.process import run_command
 {call}"""
     process = subprocess.Popen([sys.executable, "-c", tool], cwd=tmp_path)
-    said = tmp_path / "pid"
-    while not (said.exists() and said.read_text().endswith(".")):
+    pid_file = tmp_path / "pid"
+    while not (pid_file.exists() and pid_file.read_text().endswith(".")):
         assert process.poll() is None
         time.sleep(0.05)
-    pid = int(said.read_text()[:-1])
+    pid = int(pid_file.read_text()[:-1])
     assert _alive(pid)
     process.kill()
     process.wait()
