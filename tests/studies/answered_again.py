@@ -52,8 +52,8 @@ def weighed(answers: Path) -> list[str]:
     """Effects that the answers on record weighed."""
     keys: set[str] = set()
     for path in answers.glob("*.json"):
-        told = json.loads(path.read_text())["diagnosis"]["probabilities"]
-        keys.update(id for key in told for id in key.split("+"))
+        probabilities = json.loads(path.read_text())["diagnosis"]["probabilities"]
+        keys.update(id for key in probabilities for id in key.split("+"))
     return sorted(keys - {NONE, OUTSIDE})
 
 
@@ -77,9 +77,9 @@ def answered(study: Path, folder: Path, origin: str, jobs: int, every: int) -> s
     case, protocol = case_of(trials), read_protocol(trials)
     evaluator = Evaluator(TyreDesign(case), store=Store((folder / "record").resolve()))
     model = tyre_model(case, evaluator, protocol, jobs, json.loads(marked.read_text()))
-    told = lambda done, all: print(f"{done} of {all}", file=sys.stderr, flush=True)
+    on_progress = lambda done, all: print(f"{done} of {all}", file=sys.stderr, flush=True)
     more = further(protocol.counts)
-    return answer(trials, emulate(model), rows_of(case, protocol), jobs, told, more)
+    return answer(trials, emulate(model), rows_of(case, protocol), jobs, on_progress, more)
 
 
 def compared(study: Path, folder: Path) -> dict[str, list[Scored]]:
@@ -88,17 +88,17 @@ def compared(study: Path, folder: Path) -> dict[str, list[Scored]]:
     if not recorded.exists():
         unpacked(study, recorded)
     sealed = recorded.with_name("trials-truth")
-    found = {"recorded": score(recorded, sealed)}
+    by_origin = {"recorded": score(recorded, sealed)}
     for origin in ORIGINS:
         trials = folder / origin / "trials"
         if (trials / ANSWERS).exists():
-            found[origin] = rescored(recorded, sealed, check_answers(trials))
-    common = set.intersection(*({t.id for t in those} for those in found.values()))
-    return {name: [t for t in those if t.id in common] for name, those in found.items()}
+            by_origin[origin] = rescored(recorded, sealed, check_answers(trials))
+    common = set.intersection(*({t.id for t in those} for those in by_origin.values()))
+    return {name: [t for t in those if t.id in common] for name, those in by_origin.items()}
 
 
 def figures(of: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """What a study is judged by, in words."""
+    """Figures by which a study is judged, in words."""
     for band in of["by_band"][1:]:
         here = f"{band['low']:g} to {band['high']:g}" if band["high"] else f"{band['low']:g} on"
         yield f"top 1 by group, band {here}", _share(band["top_1_group"])
@@ -129,8 +129,8 @@ def main(folder: Path, study: str, origin: str | None, jobs: int, every: int) ->
     if origin:
         print(answered(own, folder, origin, jobs, every))
         return
-    found = compared(own, folder / study)
-    columns = {name: dict(figures(summary(trials))) for name, trials in found.items()}
+    by_origin = compared(own, folder / study)
+    columns = {name: dict(figures(summary(trials))) for name, trials in by_origin.items()}
     print(f"| {study} | {' | '.join(columns)} |\n{'|---' * (1 + len(columns))}|")
     for row in columns["recorded"]:
         print(f"| {row} | {' | '.join(each[row] for each in columns.values())} |")

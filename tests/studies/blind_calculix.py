@@ -129,11 +129,11 @@ def _solved(case: LoadedCase, labels: list[Label]) -> tuple[dict[str, float], fl
         for count in (None, 4):
             answer = Evaluator(TyreDesign(case), "bundled").evaluate(Question({}, (), count))
             try:
-                found = match(label_modes(answer.modes), labels)
+                matched = match(label_modes(answer.modes), labels)
             except EvaluationFailed as lost:
                 failure = lost
                 continue
-            return {str(x): float(np.log(found[x].frequency_Hz)) for x in labels}, answer.mass_kg
+            return {str(x): float(np.log(matched[x].frequency_Hz)) for x in labels}, answer.mass_kg
     raise failure
 
 
@@ -176,7 +176,7 @@ def train(count: int) -> None:
 
 
 def laws_confirmed() -> dict[str, EffectLaw]:
-    """What CalculiX is asked: all laws and families but errors of reading."""
+    """Laws that CalculiX confirms: all laws and families except errors of reading."""
     known = {**other_laws(frozenset({"modes"})), **OUTSIDE_FAMILIES}
     return {name: law for name, law in known.items() if not law.read}
 
@@ -185,25 +185,25 @@ def confirm(count: int) -> None:
     """Make runs with effects and families, of drawn size, on drawn tyres, those first that have
     the fewest, until there are ``count``."""
     case, laws = base(), laws_confirmed()
-    found, _ = sources(case)
+    own_sources, _ = sources(case)
     names = [e["law"] for e in recorded("confirm")]
     done = {name: names.count(name) for name in sorted(laws)}
     for i in range(len(names), len(names) + max(0, count - sum(done.values()))):
         name = min(done, key=lambda name: (done[name], name))
         done[name] += 1
         rules = Protocol("", "", {"effect": 1})
-        (truth,) = draw(rules, case, found, {name: laws[name]}, {}, 1000 + i)
+        (truth,) = draw(rules, case, own_sources, {name: laws[name]}, {}, 1000 + i)
         pressure = float(np.random.default_rng(i).choice(rules.pressures_kPa))
         about = {"about": "confirm", "law": name, "size": truth.size, "pressure_kPa": pressure}
         about["variables"], about["constants"] = truth.variables, truth.constants
-        run(tyre(truth, case, found, pressure, laws[name]), about)
+        run(tyre(truth, case, own_sources, pressure, laws[name]), about)
 
 
 def again() -> None:
     """Solve the common problem of every run on record anew, after a change to it."""
     entries = [json.loads(line) for line in RECORD.read_text(encoding="utf-8").splitlines()]
     case, laws = base(), laws_confirmed()
-    found, _ = sources(case)
+    own_sources, _ = sources(case)
     for entry in (entry for entry in entries if "failed" not in entry):
         if entry["about"] == "train":
             made = with_values(case, entry["values"])
@@ -218,7 +218,7 @@ def again() -> None:
                 0,
                 False,
             )
-            made = tyre(truth, case, found, entry["pressure_kPa"], laws[entry["law"]])
+            made = tyre(truth, case, own_sources, entry["pressure_kPa"], laws[entry["law"]])
         entry["common"] = bundled(made, targets(made))[0]
     RECORD.write_text("".join(json.dumps(e) + "\n" for e in entries), encoding="utf-8")
 
@@ -294,7 +294,7 @@ class EmulatedCalculix:
 
 
 def table() -> None:
-    """What was reached, in Markdown."""
+    """Print the results in Markdown."""
     runs, out = usual(recorded("train"))
     a = fitted(runs)
     print(f"{len(runs)} runs of training; left out: {', '.join(out) or 'none'}.\n")
@@ -341,13 +341,13 @@ def main() -> None:
         case = base()
         protocol = Protocol(maker.about, case.path.name, counts)
         seed = int(rest[4]) if len(rest) > 4 else None
-        told = lambda done, all: print(f"{done} of {all}", file=sys.stderr)
+        on_progress = lambda done, all: print(f"{done} of {all}", file=sys.stderr)
         sealed = folder.with_name(f"{folder.name}-truth")
         plain = load_case(case.path)
         ruler = lambda: measure(
             tyre_model(plain, Evaluator(TyreDesign(plain)), protocol), rows_of(plain, protocol)
         )
-        print(make(folder, sealed, case, protocol, maker, ruler, JOBS, seed, told))
+        print(make(folder, sealed, case, protocol, maker, ruler, JOBS, seed, on_progress))
 
 
 if __name__ == "__main__":

@@ -57,19 +57,19 @@ def errors(folder: Path, trials: Sequence[Scored]) -> dict[str, Array]:
     protocol, labels = read_protocol(folder), labels_of(case_of(folder))
     ruler = read_ruler(folder, labels)
     scored = {each.id: each for each in trials}
-    found: dict[str, list[list[float]]] = {"effect": [], "none": []}
+    by_kind: dict[str, list[list[float]]] = {"effect": [], "none": []}
     for truth in open_truth(folder, folder.with_name("trials-truth"))["trials"]:
         own = scored[truth["id"]]
         proven = own.verdict == "named" and own.band >= DETECTED
-        if own.swapped or own.kind not in found or (own.kind == "effect" and not proven):
+        if own.swapped or own.kind not in by_kind or (own.kind == "effect" and not proven):
             continue
-        told = json.loads((folder / "answers" / f"{own.id}.json").read_text())["diagnosis"]
-        key = (told["effect"] or told["likeliest"]).split("+")[0]
+        diagnosis = json.loads((folder / "answers" / f"{own.id}.json").read_text())["diagnosis"]
+        key = (diagnosis["effect"] or diagnosis["likeliest"]).split("+")[0]
         y, places, _ = means(read_measurements(folder / "trials" / f"{own.id}.csv"), ruler)
         out = held_out(truth, ruler, protocol, labels)
         error = partial(held_out_rms, ruler, y, places, out)
-        found[own.kind].append([error({}), error({key: told["parameter"]["value"]})])
-    return {kind: np.array(rows) for kind, rows in found.items()}
+        by_kind[own.kind].append([error({}), error({key: diagnosis["parameter"]["value"]})])
+    return {kind: np.array(rows) for kind, rows in by_kind.items()}
 
 
 def held_out(
@@ -129,9 +129,11 @@ def main() -> None:
         with TemporaryDirectory() as place:
             unpacked(study, Path(place) / "trials")
             folder = Path(place) / "trials"
-            found = errors(folder, score(folder, folder.with_name("trials-truth")))
-        before, after = 100 * np.median(found["effect"], 0)
-        shrinks, chance = (1 - found[kind][:, 1] / found[kind][:, 0] for kind in ("effect", "none"))
+            by_kind = errors(folder, score(folder, folder.with_name("trials-truth")))
+        before, after = 100 * np.median(by_kind["effect"], 0)
+        shrinks, chance = (
+            1 - by_kind[kind][:, 1] / by_kind[kind][:, 0] for kind in ("effect", "none")
+        )
         print(
             f"| {study.name} | {len(shrinks)} | {before:.2f} | {after:.2f} |"
             f" {np.median(shrinks):.2f} | {np.quantile(chance, 0.95):.2f} |"

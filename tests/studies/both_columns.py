@@ -103,12 +103,12 @@ class BothColumns:
 
     def _column(self, values: Mapping[str, float], own: Mapping[str, float]) -> tuple[Array, Array]:
         question = Question(values, tuple(own))
-        ((_, found),) = find_modes(self.evaluator, [question], self.labels)
-        assert isinstance(found, Found), found
-        hertz = np.array([found.wanted[label].frequency_Hz for label in self.labels])
-        places = [found.wanted[label].position for label in self.labels]
+        ((_, labelled),) = find_modes(self.evaluator, [question], self.labels)
+        assert isinstance(labelled, Found), labelled
+        hertz = np.array([labelled.wanted[label].frequency_Hz for label in self.labels])
+        places = [labelled.wanted[label].position for label in self.labels]
         rows = [
-            np.asarray(found.evaluation.gradients[v.name])[places] * v.slope(own[v.name]) / hertz
+            np.asarray(labelled.evaluation.gradients[v.name])[places] * v.slope(own[v.name]) / hertz
             for v in self.free
         ]
         return np.log(hertz), np.array(rows).T
@@ -118,9 +118,9 @@ class BothColumns:
         turned = self.start.copy()
         for i, v in enumerate(self.free):
             turned[i] = v.scaled(TURNED_UP.get(v.name, v.start))
-        found = [self._fitted_from(start, target) for start in (self.start, turned)]
+        fits = [self._fitted_from(start, target) for start in (self.start, turned)]
         return min(
-            found, key=lambda x: float(np.linalg.norm(self.weight * (self.at(x)[0] - target)))
+            fits, key=lambda x: float(np.linalg.norm(self.weight * (self.at(x)[0] - target)))
         )
 
     def _fitted_from(self, start: Array, target: Array) -> Array:

@@ -224,7 +224,7 @@ def at(name: str, values: tuple[float, ...], pressure: float) -> LoadedCase:
 
 
 def switches(values: tuple[float, ...]) -> list[tuple[str, float, float]]:
-    """What one change does to the bundled solver: its name, least and largest %, 240 kPa."""
+    """Effect of single changes on the bundled solver: name, least and largest %, 240 kPa."""
     case = at(CASES[0], values, 240.0)
     plain = modes_of(case, "bundled")
     rows = []

@@ -37,11 +37,11 @@ def main(case_file: str, fit_file: str) -> None:
     print_shares(several, single, values, small)
 
 
-def print_all(found: list[Signature]) -> None:
+def print_all(signatures: list[Signature]) -> None:
     """Every mode at every pressure: per cent as it comes, and after the re-fit."""
-    print("| effect | size | kPa |", " | ".join(map(str, found[0].labels)), "|")
-    print("|---" * (3 + len(found[0].labels)) + "|")
-    for each in found:
+    print("| effect | size | kPa |", " | ".join(map(str, signatures[0].labels)), "|")
+    print("|---" * (3 + len(signatures[0].labels)) + "|")
+    for each in signatures:
         size = f"{each.value:g} {catalogue()[each.id].unit}".strip()
         for k, pressure in enumerate(each.pressures_kPa):
             pairs = zip(each.before[k], each.after[k], strict=True)
@@ -55,7 +55,8 @@ def print_shares(
     values: dict[str, float],
     small: list[list[Signature]],
 ) -> None:
-    """What the re-fit absorbs, with three pressures and with one, and what looks the same then."""
+    """Print the share that the re-fit absorbs, with three pressures and with one, and the effects
+    that look alike then."""
     print("\n| effect | kg | before % | after % | absorbed % | with one pressure |", end="")
     print(" | ".join(["", *values])[2:], "| left alike | with one pressure |")
     print("|---" * (8 + len(values)) + "|")
@@ -67,15 +68,15 @@ def print_shares(
         print("| " + " | ".join(cells) + " |")
 
 
-def _alike(found: list[Signature], place: int) -> str:
+def _alike(signatures: list[Signature], place: int) -> str:
     """Effects whose rest points the same way, with the cosine, the nearest first."""
-    rests = np.array([np.nan_to_num(s.after).ravel() for s in found])
+    rests = np.array([np.nan_to_num(s.after).ravel() for s in signatures])
     norms = np.linalg.norm(rests, axis=1)
     if norms[place] < 1e-9:
         return "-"
     cosines = rests @ rests[place] / np.maximum(norms * norms[place], 1e-12)
     near = [j for j in np.argsort(-abs(cosines)) if j != place and abs(cosines[j]) > ALIKE]
-    return ", ".join(f"{found[j].id} {cosines[j]:+.2f}" for j in near) or "-"
+    return ", ".join(f"{signatures[j].id} {cosines[j]:+.2f}" for j in near) or "-"
 
 
 if __name__ == "__main__":

@@ -75,9 +75,9 @@ def common_problem(case: LoadedCase) -> dict[str, Any]:
         ]
         for first, *_, last in mesh.cords[layer.line].values():
             cords.append([place[first], place[last], *data])
-    told = tyre_told(case)
+    tyre_data = tyre_told(case)
     return {
-        **{key: told[key] for key in ("pressure", "C10", "C01", "D1", "density")},
+        **{key: tyre_data[key] for key in ("pressure", "C10", "C01", "D1", "density")},
         **{"element": ["S", 2], "quadrature": 3, "full_quadrature": 5, **LAWS, **NUMERICS},
         "nodes": list(mesh.nodes.values()),
         "quads": [[place[n] for n in solid] for solid in mesh.solids.values()],
@@ -97,13 +97,15 @@ def ask(folder: Path, problem: dict[str, Any]) -> dict[str, Any]:
     """FEniCSx's answer, from the folder where it is known. Raises CalledProcessError."""
     text = json.dumps(problem, sort_keys=True)
     name = hashlib.sha256(text.encode()).hexdigest()[:16]
-    told, found = (folder.resolve() / f"{name}{end}" for end in (".problem.json", ".json"))
-    if not found.exists():
+    problem_file, answer_file = (
+        folder.resolve() / f"{name}{end}" for end in (".problem.json", ".json")
+    )
+    if not answer_file.exists():
         folder.mkdir(parents=True, exist_ok=True)
-        told.write_text(text, encoding="utf-8")
-        command = [PYTHON, "-m", "tests.studies.judge_fenics", str(told), str(found)]
+        problem_file.write_text(text, encoding="utf-8")
+        command = [PYTHON, "-m", "tests.studies.judge_fenics", str(problem_file), str(answer_file)]
         subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
-    answer: dict[str, Any] = json.loads(found.read_text(encoding="utf-8"))
+    answer: dict[str, Any] = json.loads(answer_file.read_text(encoding="utf-8"))
     return answer
 
 
@@ -173,16 +175,16 @@ class Row:
 
 def compare(case: LoadedCase, folder: Path) -> tuple[list[Row], float]:
     """The case's target modes, and the largest distance of the inflated states, m."""
-    found = on_common(case, folder)
+    solved = on_common(case, folder)
     own = [
         labelled(ask(folder, own_problem(case, laws)), targets(case))
         for laws in (OWN_LAWS, OTHER_LAWS)
     ]
     rows = []
-    for key, mode in found.ours.items():
-        shares = [off(mode, judge[key]) for judge in (found.theirs, *own)]
-        rows.append(Row(key, mode.frequency_Hz, shares[0], found.mac(key), *shares[1:]))
-    return rows, found.apart_m
+    for key, mode in solved.ours.items():
+        shares = [off(mode, judge[key]) for judge in (solved.theirs, *own)]
+        rows.append(Row(key, mode.frequency_Hz, shares[0], solved.mac(key), *shares[1:]))
+    return rows, solved.apart_m
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""What sets CalculiX apart from the bundled solver, one thing switched at a time in FEniCSx.
+"""Differences between CalculiX and the bundled solver, one thing switched at a time in FEniCSx.
 
     python -m tests.studies.fenics_switches FOLDER RECORD > table.md
 
@@ -57,10 +57,10 @@ def deck_problem(case: LoadedCase) -> dict[str, Any]:
             stiffness = cord.youngs_modulus_Pa * share
             cell = cells.index(strip.element)
             plies.append([cell, stiffness, *map(float, along), cord.density_kg_per_m3 * share])
-    told = tyre_told(case)
+    tyre_data = tyre_told(case)
     sides = {pair for q in quads.values() for pair in pairwise((*q[:4], q[0]))}
     return {
-        **{key: told[key] for key in ("pressure", "C10", "C01", "D1", "density")},
+        **{key: tyre_data[key] for key in ("pressure", "C10", "C01", "D1", "density")},
         **{"element": ["S", 2], "quadrature": 3, "full_quadrature": 5, **LAWS, **NUMERICS},
         "cord_law": "Green",
         "nodes": [where[number] for number in sector.section],
@@ -87,9 +87,9 @@ def in_deck(case: LoadedCase, sectors: int = 180, ply_m: float = PLY_THICKNESS_M
     return replace(case, case=c.model_copy(update={"analysis": analysis, "solver": solver}))
 
 
-def between(found: dict[str, Mode], before: dict[str, Mode]) -> str:
+def between(after: dict[str, Mode], before: dict[str, Mode]) -> str:
     """Least and largest difference of all modes, %."""
-    by = [off(found[key], before[key]) for key in before]
+    by = [off(after[key], before[key]) for key in before]
     return f"{min(by):+.4f} to {max(by):+.4f}"
 
 
@@ -111,10 +111,10 @@ def worst_row(folder: Path, record: Store) -> None:
         steps.append((f"CalculiX, {n} sectors", modes_of(in_deck(case, n), "calculix", record)))
     print("| switched | [2,1], % | nine modes, % |\n|---|---|---|")
     before = ours
-    for name, found in steps:
-        print(f"| {name} | {off(found['[2,1]'], before['[2,1]']):+.4f}", end="")
-        print(f" | {between(found, before)} |", flush=True)
-        before = found
+    for name, changed in steps:
+        print(f"| {name} | {off(changed['[2,1]'], before['[2,1]']):+.4f}", end="")
+        print(f" | {between(changed, before)} |", flush=True)
+        before = changed
     print(f"| all | {off(before['[2,1]'], ours['[2,1]']):+.4f} | {between(before, ours)} |\n")
 
 
@@ -122,8 +122,8 @@ def refused() -> LoadedCase:
     """The tyre with wider belts whose state CalculiX calls unstable."""
     (e,) = (entry for entry in recorded("confirm") if "failed" in entry)
     truth = Truth("", "", e["law"], e["size"], e["variables"], e["constants"], 0, False)
-    found, _ = sources(base())
-    return tyre(truth, base(), found, e["pressure_kPa"], laws_confirmed()[e["law"]])
+    own_sources, _ = sources(base())
+    return tyre(truth, base(), own_sources, e["pressure_kPa"], laws_confirmed()[e["law"]])
 
 
 def refused_state(folder: Path, record: Store) -> None:
@@ -131,8 +131,8 @@ def refused_state(folder: Path, record: Store) -> None:
     case = refused()
     filled = {**deck_problem(case), "filler": FILLER}
     waves = {**filled, "harmonics": [*range(5), *range(20, 201, 20)], "target": BELOW}
-    found = ask(folder, waves)["modes"]
-    least = min(found, key=lambda mode: mode["eigenvalue"])
+    modes = ask(folder, waves)["modes"]
+    least = min(modes, key=lambda mode: mode["eigenvalue"])
     print(f"FEniCSx, n = 0 to 4, 20, 40 ... 200: the eigenvalue nearest to {BELOW:g} 1/s2", end="")
     print(f" is {least['eigenvalue']:.6g}, of n = {least['n']}\n")
     more = with_values(case, {"pressure_kPa": case.case.pressure_kPa + 1})

@@ -188,8 +188,8 @@ def solve(run: Run, folder: Path, limit_s: float) -> dict[str, Any]:
         deck(run, run.deflections_m, radius, folder)
         run_press(folder, ["ccx"], limit_s)
         kept, gaps = sunk_in(folder, run.road.normal), areas_of_gap(folder)
-        told = areas_below(folder, *GAUSS), areas_below(folder, *FINE)
-        rows = zip(read_press(folder), kept, gaps, *told, strict=True)
+        areas = areas_below(folder, *GAUSS), areas_below(folder, *FINE)
+        rows = zip(read_press(folder), kept, gaps, *areas, strict=True)
     except RunFailed as failure:
         return {"failed": f"{failure.cause}: {failure}"}
     used = resource.getrusage(resource.RUSAGE_CHILDREN)

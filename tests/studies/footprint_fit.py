@@ -97,10 +97,12 @@ def main(folder: Path, mesh: str) -> None:
         print(f"  from the record, {seconds:.1f} s; converged {result['converged']}:")
         print(f"  {result['message']}; objective", result["initial_objective_Hz"], "to")
         print(f"  {result['objective_Hz']:.2e} sigma")
-        for name, found in result["variables"].items():
-            error = 100 * found["standard_error"] / found["value"]
-            off = 100 * (found["value"] / TRUTH[name] - 1)
-            print(f"  {name} {found['value']:.6e}, off {off:+.4f} %, standard error {error:.2f} %")
+        for name, variable in result["variables"].items():
+            error = 100 * variable["standard_error"] / variable["value"]
+            off = 100 * (variable["value"] / TRUTH[name] - 1)
+            print(
+                f"  {name} {variable['value']:.6e}, off {off:+.4f} %, standard error {error:.2f} %"
+            )
         for row in result.get("footprint", ()):
             print("  ", row)
         print("   singular values", [f"{s:.3g}" for s in result["singular_values"]])

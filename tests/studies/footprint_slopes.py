@@ -36,11 +36,11 @@ def main(level: str, loads: list[float], step: float) -> None:
 
     for gradients in ((), tuple(start)):
         began = time.process_time()
-        found = press("C10", 0.0, gradients)
+        pressed = press("C10", 0.0, gradients)
         print(f"{len(gradients)} slopes: {time.process_time() - began:.1f} s", flush=True)
     for name in start:
         sides = zip(*(press(name, side * step).footprints for side in (1, -1)), strict=True)
-        for at, (above, below) in zip(found.footprints, sides, strict=True):
+        for at, (above, below) in zip(pressed.footprints, sides, strict=True):
             for q in QUANTITIES:
                 value = getattr(at, q)
                 exact = at.slopes[name][q] * start[name] / value

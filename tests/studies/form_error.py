@@ -69,9 +69,9 @@ def answer(case: LoadedCase, labels: Sequence[Label], design: Mapping[str, float
     """The model's answer at a design."""
     rows = [(label, share * case.case.pressure_kPa) for share in PRESSURES for label in labels]
     model = TyreModel(case, Evaluator(TyreDesign(case)), rows, [], {})
-    (found,) = model.answers([Query(np.log([design[name] for name in model.variables]))])
-    assert isinstance(found, Answer), found
-    return found
+    (result,) = model.answers([Query(np.log([design[name] for name in model.variables]))])
+    assert isinstance(result, Answer), result
+    return result
 
 
 def main(sizes: Sequence[str]) -> None:
@@ -84,8 +84,8 @@ def main(sizes: Sequence[str]) -> None:
         case = by_size(size)
         labels = [label for label in LABELS if label.c <= case.case.analysis.highest_harmonic]
         own, _ = left(case, labels, start_values(case), print)
-        told = (f"{label} {100 * sigma:.2f}" for label, sigma in zip(labels, own, strict=True))
-        print(size, ", ".join(told))
+        shares = (f"{label} {100 * sigma:.2f}" for label, sigma in zip(labels, own, strict=True))
+        print(size, ", ".join(shares))
 
 
 def computed(tell: Callable[[str], None] = lambda line: None) -> tuple[dict[str, float], float]:
@@ -101,7 +101,7 @@ def left(
     design: Mapping[str, float],
     tell: Callable[[str], None],
 ) -> tuple[Array, list[Array]]:
-    """What calibration leaves of ln f: rms by mode, and by variant (pressures, labels)."""
+    """Rest of ln f after calibration: rms by mode, and by variant (pressures, labels)."""
     plain = answer(case, labels, design)
     J, errors = plain.jacobian, []
     n, v = J.shape

@@ -23,14 +23,14 @@ BALLS: list[dict[str, float]] = [
 NAMES = ("peak", "radius", "mean")
 
 
-def line(what: str, options: dict[str, float], found: Found) -> str:
+def line(what: str, options: dict[str, float], press: Found) -> str:
     """Deviations from the theory in percent."""
-    shares = [100 * (getattr(found, n) - 1) for n in NAMES]
+    shares = [100 * (getattr(press, n) - 1) for n in NAMES]
     words = ", ".join(f"{k} {v:g}" for k, v in options.items())
     return (
         f"| {what}: {words} | "
         + " | ".join(f"{s:+.2f}" for s in shares)
-        + (f" | {found.deflection:.4f} | {found.traction:.3f} | {found.elements} | {found.nodes} |")
+        + (f" | {press.deflection:.4f} | {press.traction:.3f} | {press.elements} | {press.nodes} |")
     )
 
 

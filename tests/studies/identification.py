@@ -61,7 +61,7 @@ def found(values: Responses, low: float, high: float) -> list[list[float]]:
 
 
 def child(folder: Path, shaken: bool) -> list[list[list[float]]]:
-    """What is found in each file of a folder."""
+    """Modes that are identified in each file of a folder."""
     result, random = [], np.random.default_rng(1)
     for path in sorted(folder.glob("*.npz")):
         a = np.load(path)

@@ -61,7 +61,7 @@ def tyre_told(case: LoadedCase) -> dict[str, Any]:
 
 
 def problem(options: argparse.Namespace) -> dict[str, Any]:
-    """What GetFEM is told."""
+    """Problem that GetFEM solves."""
     return {
         **tyre_told(load_case(CASE)),
         "along": options.along,
@@ -79,16 +79,16 @@ def problem(options: argparse.Namespace) -> dict[str, Any]:
 def at_deflection(evaluator: Evaluator, depth: float, load: float) -> dict[str, float]:
     """The bundled solver's answer at a deflection (m), from a load (N) near it."""
     for _ in range(4):
-        (found,) = evaluator.press({}, [load]).footprints
-        lack = depth - found.deflection_m
+        (footprint,) = evaluator.press({}, [load]).footprints
+        lack = depth - footprint.deflection_m
         if abs(lack) < CLOSE:
             break
-        load += lack * found.stiffness_N_per_m
-    assert found.contact_area_m2
+        load += lack * footprint.stiffness_N_per_m
+    assert footprint.contact_area_m2
     return {
         "force_N": load,
-        "area_m2": found.contact_area_m2,
-        "stiffness_N_per_m": found.stiffness_N_per_m,
+        "area_m2": footprint.contact_area_m2,
+        "stiffness_N_per_m": footprint.stiffness_N_per_m,
     }
 
 
@@ -102,18 +102,21 @@ def main() -> None:
     parser.add_argument("--angles-deg", type=float, nargs="+", default=ANGLES)
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
-    told, found = options.folder / "problem.json", options.folder / "getfem.json"
-    if not found.exists():
-        told.write_text(json.dumps(problem(options), indent=1))
+    problem_file, answer_file = options.folder / "problem.json", options.folder / "getfem.json"
+    if not answer_file.exists():
+        problem_file.write_text(json.dumps(problem(options), indent=1))
         command = [
             PYTHON,
             "-m",
             "tests.studies.judge_getfem",
-            *map(str, map(Path.resolve, (told, found))),
+            *map(str, map(Path.resolve, (problem_file, answer_file))),
         ]
         subprocess.run(command, cwd=ROOT, check=True)
-    judge = json.loads(found.read_text())
-    road = {"road.friction": 0.0, "road.stiffness_Pa_per_m": json.loads(told.read_text())["road"]}
+    judge = json.loads(answer_file.read_text())
+    road = {
+        "road.friction": 0.0,
+        "road.stiffness_Pa_per_m": json.loads(problem_file.read_text())["road"],
+    }
     evaluator = Evaluator(TyreDesign(with_values(load_case(CASE), road)))
     for each in judge["loads"]:
         print(f"{1e3 * each['deflection_m']:g} mm")

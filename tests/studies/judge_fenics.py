@@ -119,9 +119,9 @@ class Section:
         self.held = np.array([facet(each) for each in held], np.int32)
 
     def _by_cell(self, values: np.ndarray) -> fem.Function:
-        found = fem.Function(fem.FunctionSpace(self.mesh, ("DG", 0)))
-        found.x.array[:] = np.asarray(values, float)[self.cell]
-        return found
+        function = fem.Function(fem.FunctionSpace(self.mesh, ("DG", 0)))
+        function.x.array[:] = np.asarray(values, float)[self.cell]
+        return function
 
     def _edges(self) -> dict[frozenset[int], int]:
         """Facets by the problem's numbers of their two ends."""
@@ -232,7 +232,7 @@ class Tyre:
         return work + self.help * ufl.inner(ufl.grad(moved), ufl.grad(test)) * self.R * self.dx
 
     def energy(self, u: Any, g: Any) -> Any:
-        """Of rubber and cords, J per radian."""
+        """Energy of rubber and cords, J per radian."""
         F, s = gradient(u, g, self.R), self.s
         inside = rubber(F, s.rubber, self.p["volume_law"])
         if s.plies:
@@ -269,7 +269,7 @@ class Tyre:
         return self.pressure * ufl.dot(v, area) * self.R * self.ds(2)
 
     def inertia(self, u: Any, v: Any) -> Any:
-        """Of rubber and cords, kg m2 per radian."""
+        """Inertia form of rubber and cords, kg m2 per radian."""
         s, product = self.s, ufl.inner(u, v)
         inside = s.rubber["density"] + (s.plies[4] if s.plies else 0)
         return inside * product * self.R * self.dx_mass + self.on_lines(s.cords[2] * product)
@@ -321,11 +321,11 @@ class Tyre:
         by_factors(solver.getST().getKSP())
         solver.solve()
         values = np.array([solver.getEigenvalue(i).real for i in range(solver.getConverged())])
-        vector, found = fem.Function(self.s.W), []
+        vector, result = fem.Function(self.s.W), []
         for i in np.argsort(values)[:wanted:2]:  # (a, b) and (-b, a) are one vibration
             solver.getEigenvector(i, vector.vector)
             pair = self.at_corners(vector)
-            found.append(
+            result.append(
                 {
                     "n": n,
                     "eigenvalue": float(values[i]),
@@ -334,7 +334,7 @@ class Tyre:
                     "asymmetry": other.norm() / K.norm(),
                 }
             )
-        return found
+        return result
 
     def at_corners(self, field: fem.Function) -> np.ndarray:
         """Values (k, 6) at the elements' corners, in the order of `Section.vertices`."""
@@ -349,7 +349,7 @@ class Tyre:
         return at.x.array.reshape(-1, 6)[place]
 
     def mass_kg(self) -> float:
-        """Of the whole tyre, what the rim holds included."""
+        """Mass of the whole tyre, kg, including the part that the rim holds."""
         one = ufl.as_vector([1.0, 0, 0])
         return 2 * np.pi * fem.assemble_scalar(self.compiled(self.inertia(one, one)))
 

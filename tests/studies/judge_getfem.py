@@ -103,8 +103,8 @@ class Tyre:
         name = {}
         for face in range(6):
             own = self.mesh.pid_in_faces(np.array([[convex], [face]]))
-            found = self.mesh.pts(own)
-            same = {int(k) for p in found.T for k in np.flatnonzero(abs(pts.T - p).max(1) < 1e-12)}
+            points = self.mesh.pts(own)
+            same = {int(k) for p in points.T for k in np.flatnonzero(abs(pts.T - p).max(1) < 1e-12)}
             name[frozenset(same)] = face
         places = np.rint(2 * gf.GeoTrans("GT_Q2_INCOMPLETE(3)").pts()).astype(int)
         where = lambda axis, value: frozenset(map(int, np.flatnonzero(places[axis] == value)))
@@ -204,10 +204,10 @@ class Tyre:
         return as_csc(self.assembled(2, im, expression, region))
 
 
-def as_csc(found: gf.Spmat) -> csc_matrix:
+def as_csc(matrix: gf.Spmat) -> csc_matrix:
     """A matrix of GetFEM's."""
-    columns, rows = found.csc_ind()
-    return csc_matrix((found.csc_val(), rows, columns), shape=found.size())
+    columns, rows = matrix.csc_ind()
+    return csc_matrix((matrix.csc_val(), rows, columns), shape=matrix.size())
 
 
 def main() -> None:
@@ -250,11 +250,11 @@ def pressed(tyre: Tyre, problem: dict) -> dict:
     free[tyre.mfu.basic_dof_on_region(tyre.regions["rim"])] = False
     follows = gf.linsolve_mumps(md.tangent_matrix(), np.where(free, -by_height, 0.0)).ravel()
     stiffness = tyre.on_tread(f"k*{TOUCHES}") + float(by_height @ follows)
-    found = {"force_N": force, "area_m2": area, "stiffness_N_per_m": stiffness}
+    result = {"force_N": force, "area_m2": area, "stiffness_N_per_m": stiffness}
     if problem["modes"]:
-        found["sliding_Hz"] = modes(tyre, free, False)
-        found["stuck_Hz"] = modes(tyre, free, True)
-    return found
+        result["sliding_Hz"] = modes(tyre, free, False)
+        result["stuck_Hz"] = modes(tyre, free, True)
+    return result
 
 
 def modes(tyre: Tyre, free: np.ndarray, stuck: bool) -> list[float]:

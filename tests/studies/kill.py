@@ -50,19 +50,19 @@ def finished(out: Path) -> int:
 
 def left(session: int) -> list[str]:
     """Processes of a session that are still there."""
-    found = []
+    commands = []
     for path in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError):  # it has ended
             state, _, _, own = path.read_text().rpartition(")")[2].split()[:4]
             if int(own) == session and state != "Z":
-                found.append(path.with_name("cmdline").read_text().replace("\0", " "))
-    return found
+                commands.append(path.with_name("cmdline").read_text().replace("\0", " "))
+    return commands
 
 
 def rubbish(out: Path) -> bool:
     """Whether run folders or half-written files are there."""
     left = (".new-*", "runs", "*.partial")
-    return any(found for each in left for found in out.rglob(each))
+    return any(path for each in left for path in out.rglob(each))
 
 
 def stopped(

@@ -22,7 +22,7 @@ SIGMA = np.array([0.01, 0.02, 0.015])
 def posterior(
     box: Array, eta: Callable[[Array], Array] | None = None, y: Array | None = None
 ) -> Posterior:
-    """Of a tyre with ln f = 4 + J x, or another, measured at x = (0, 0.5)."""
+    """Posterior of a tyre with ln f = 4 + J x, or another, measured at x = (0, 0.5)."""
     t = spread(14, 2)
     centre, half = box.mean(1), np.ptp(box, axis=1) / 2
     if eta is None:

@@ -151,9 +151,9 @@ def main(designs: int) -> None:
                 unlike[count] += one.get(label) != three[label]
                 lost[count] += label not in one
                 wrong[count] += one.get(label) != two.get(label)
-                found = one.get(label), two.get(label), three[label]
-                if len(set(found)) > 1:
-                    print(f"{label} {found}: {values} {pressure:.0f}")
+                places = one.get(label), two.get(label), three[label]
+                if len(set(places)) > 1:
+                    print(f"{label} {places}: {values} {pressure:.0f}")
         for mode in labelled:
             if mode.label in clarity:
                 clarity[mode.label][done] = mode.clarity

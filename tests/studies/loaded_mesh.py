@@ -40,7 +40,8 @@ Table = dict[tuple[float, Member], tuple[float, float]]  # sticks, slides, Hz
 
 
 def frequencies(case: LoadedCase, loads_N: list[float], finer: str = "") -> Table:
-    """Of every named mode at every load, on the case's own mesh or on one of `FINER`."""
+    """Frequencies of every named mode at every load, on the case's own mesh or on one of
+    `FINER`."""
     around = lambda lengths: (
         half_circle(np.radians(FINER[finer]), WAVES) if finer else waves_beyond(lengths)
     )

@@ -1,4 +1,5 @@
-"""What material laws other than the model's do to modes, and over which pressures that is alike.
+"""Shifts of modes by material laws other than the model's, and the pressures over which they are
+alike.
 
     python -m tests.studies.material_laws
 
@@ -46,8 +47,8 @@ def with_law(
 ) -> Callable[[str], str]:
     """A deck's text with another law of rubber: its name and constants, from C10 + C01 and D1."""
 
-    def other(found: re.Match[str]) -> str:
-        start, more, *numbers = found.groups()
+    def other(match: re.Match[str]) -> str:
+        start, more, *numbers = match.groups()
         C10, C01, D1 = map(float, numbers)
         line = ", ".join(f"{x:.15g}" for x in constants(C10 + C01, D1))
         return f"{start}{law}{more}\n{line}\n"
@@ -75,7 +76,8 @@ def values(case: LoadedCase, labels: Sequence[Label], design: Mapping[str, float
 
 
 def parts(d: Array, labels: Sequence[Label]) -> list[Array]:
-    """What all modes share of d (pressures, modes), what a family has beside, and a mode."""
+    """The part of d (pressures, modes) that all modes share, the further part of a family, and that
+    of a mode."""
     shared = np.broadcast_to(d.mean(1, keepdims=True), d.shape)
     families = np.zeros_like(d)
     for family in {label.family for label in labels}:
@@ -90,7 +92,7 @@ def computed(tell: Callable[[str], None] = lambda line: None) -> tuple[list[floa
         "P235/75R17, fitted": (load_case(CASES / "p235_75r17.yaml"), FITTED)
     }
     tyres |= {size: (with_compression(by_size(size), True), {}) for size in SIZES_OF_LAWS}
-    found: list[list[Array]] = []
+    all_parts: list[list[Array]] = []
     tell(f"| tyre | law | all, family, mode, % | length |\n{4 * '|---'}|")
     for name, (case, design) in tyres.items():
         labels = [label for label in LABELS if label.c <= case.case.analysis.highest_harmonic]
@@ -98,9 +100,9 @@ def computed(tell: Callable[[str], None] = lambda line: None) -> tuple[list[floa
         for words, other in others().items():
             with other:
                 d = values(case, labels, design) - plain
-            found.append(parts(d, labels))
-            tell(f"| {name} | {words} | {_told(found[-1])} | {alike_over(d):.1f} |")
-    whole = [np.concatenate(each, axis=1) for each in zip(*found, strict=True)]
+            all_parts.append(parts(d, labels))
+            tell(f"| {name} | {words} | {_told(all_parts[-1])} | {alike_over(d):.1f} |")
+    whole = [np.concatenate(each, axis=1) for each in zip(*all_parts, strict=True)]
     length = alike_over(sum(whole))
     tell(f"| all | all | {_told(whole)} | {length:.1f} |")
     return [_percent(part) for part in whole], length

@@ -86,7 +86,7 @@ def area_of(file: str) -> str:
 
 def drawn(tree: Path, seed: int, count: int, areas: Sequence[str] = ()) -> list[Mutant]:
     """``count`` mutants, ``areas`` (none: all) in the proportions of QUOTA, mixed."""
-    chance, found = random.Random(seed), []
+    chance, chosen = random.Random(seed), []
     quota = {area: share for area, share in QUOTA.items() if not areas or area in areas}
     for area, share in quota.items():
         lines: dict[tuple[str, int], list[Mutant]] = defaultdict(list)
@@ -97,9 +97,9 @@ def drawn(tree: Path, seed: int, count: int, areas: Sequence[str] = ()) -> list[
         wanted = round(share * count / sum(quota.values()))
         for place in chance.sample(sorted(lines), wanted):
             source = (tree / place[0]).read_bytes()
-            found.append(chance.choice([m for m in lines[place] if m.compiles(source)]))
-    chance.shuffle(found)
-    return found
+            chosen.append(chance.choice([m for m in lines[place] if m.compiles(source)]))
+    chance.shuffle(chosen)
+    return chosen
 
 
 class Cover:
@@ -154,8 +154,9 @@ class Cover:
         return tests
 
     def _who(self, mutant: Mutant) -> set[str]:
-        """Of a line in a function those that execute it; of one that is executed on import those
-        that execute the function it heads, or a line with a name that it sets."""
+        """Tests that execute a mutant: for a line in a function those that execute it; for one that
+        is executed on import those that execute the function it heads, or a line with a name that
+        it sets."""
         lines = self.lines[mutant.file]
         function, names = place_of(mutant, (self.tree / mutant.file).read_bytes())
         if function:
@@ -166,12 +167,12 @@ class Cover:
             return lines[max(before)] if before else set()
         if not names:
             return set().union(*lines.values())
-        named, found = re.compile(r"\b(" + "|".join(map(re.escape, names)) + r")\b"), set()
+        named, running = re.compile(r"\b(" + "|".join(map(re.escape, names)) + r")\b"), set()
         for file, tests in self.lines.items():
             for number, text in enumerate((self.tree / file).read_text().splitlines(), 1):
                 if named.search(text):
-                    found |= tests.get(number, set())
-        return found
+                    running |= tests.get(number, set())
+        return running
 
 
 def place_of(mutant: Mutant, source: bytes) -> tuple[ast.FunctionDef | None, set[str]]:
@@ -281,8 +282,8 @@ class Runner:
                         }
                         with self.given.record.open("a") as out:
                             out.write(json.dumps(row) + "\n")
-                        told = number, mutant.file, mutant.line, row["outcome"], row["by"]
-                        print(*told, f"{row['seconds']} s", file=sys.__stdout__, flush=True)
+                        fields = number, mutant.file, mutant.line, row["outcome"], row["by"]
+                        print(*fields, f"{row['seconds']} s", file=sys.__stdout__, flush=True)
                         free.append(slot)
         finally:
             for process in busy:
@@ -361,18 +362,18 @@ def forked(slot: Path, run: Callable[[], Watch], seconds: float) -> int:
 
 
 def outcome(slot: Path, process: int, code: int, began: float) -> dict[str, Any]:
-    """Of one mutant, with its processes ended."""
+    """Outcome of one mutant, with its processes ended."""
     with suppress(ProcessLookupError):
         os.killpg(process, signal.SIGKILL)
     written = Path(f"{slot}.json")
-    told = json.loads(written.read_text()) if written.exists() else {}
+    report = json.loads(written.read_text()) if written.exists() else {}
     seconds = round(time.monotonic() - began, 1)
-    if not told:
+    if not report:
         why = "it does not end" if os.WIFSIGNALED(code) else "it ends Python"
         return {"outcome": "killed", "by": why, "seconds": seconds}
-    if told["failed"]:
-        return {"outcome": "killed", "by": told["failed"], "seconds": seconds}
-    return {"outcome": "survived", "by": f"{told['ran']} tests", "seconds": seconds}
+    if report["failed"]:
+        return {"outcome": "killed", "by": report["failed"], "seconds": seconds}
+    return {"outcome": "survived", "by": f"{report['ran']} tests", "seconds": seconds}
 
 
 def copy_of(commit: str) -> Path:

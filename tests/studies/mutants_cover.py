@@ -78,8 +78,10 @@ def pytest_sessionfinish() -> None:
     lines: dict[str, dict[int, list[int]]] = {}
     for path in sorted(data.measured_files()):
         lines[str(Path(path).relative_to(ROOT))] = {
-            line: sorted({number[t] for c in found for t in ([c] if c in number else fixtures[c])})
-            for line, found in sorted(data.contexts_by_lineno(path).items())
+            line: sorted(
+                {number[t] for c in contexts for t in ([c] if c in number else fixtures[c])}
+            )
+            for line, contexts in sorted(data.contexts_by_lineno(path).items())
         }
     Path(os.environ["MUTANTS_COVER"]).write_text(
         json.dumps(

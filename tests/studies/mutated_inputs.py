@@ -173,7 +173,7 @@ def mutated_json(content: Any, chance: Random) -> Any:
 def extreme(text: str, chance: Random) -> str:
     """A case with one or two of its numbers at an end of what can be."""
     for _ in range(chance.choice([1, 1, 2])):
-        old = chance.choice([found for found in NUMBER.finditer(text) if float(found[0])])
+        old = chance.choice([match for match in NUMBER.finditer(text) if float(match[0])])
         power = chance.choice([1, 1, 2, 3, 6, 12, 30, 100, 300]) * chance.choice([1, -1])
         new = chance.choice(
             [repr(float(old[0]) * 10.0**power), f"1.0e{power}", f"-{old[0]}", "0.0"]
@@ -184,17 +184,17 @@ def extreme(text: str, chance: Random) -> str:
 
 def sane(result: Any) -> None:
     """Raises ValueError where a result holds what no tyre has."""
-    told = json.dumps(result)
+    text = json.dumps(result)
     for name, low, high in (
         ("mass_kg", 0.1, 1e3),
         ("frequency_Hz", 1.0, 1e5),
         ("area_m2", 1e-6, 1.0),
         ("deflection_m", 0.0, 1.0),
     ):
-        for value in map(float, re.findall(rf'"{name}": ([^,}}\n]+)', told)):
+        for value in map(float, re.findall(rf'"{name}": ([^,}}\n]+)', text)):
             if not low <= value <= high:
                 raise ValueError(f"silent nonsense: {name} = {value:g}")
-    if re.search("NaN|Infinity", told):
+    if re.search("NaN|Infinity", text):
         raise ValueError("silent nonsense: not finite")
 
 
@@ -388,7 +388,7 @@ class Kinds:
         return self._solve(folder)
 
     def requests(self, here: Path, chance: Random) -> int:
-        """What stands beside a deck."""
+        """Mutate the request file next to a deck, and solve."""
         folder = Path(shutil.copytree(self.base / "decks", here / "decks"))
         change_file(folder / "modes.request.json", self.outside, chance)
         return self._solve(folder)
@@ -430,14 +430,14 @@ def trial(kinds: Kinds, kind: str, number: int, seed: int) -> dict[str, Any]:
             fault = f"traceback: {type(error).__name__}: {error} ({where})"
         finally:
             signal.setitimer(signal.ITIMER_PROF, 0)
-    said = err.getvalue()
+    message = err.getvalue()
     if kind == "universal" and resource.getrusage(resource.RUSAGE_SELF).ru_maxrss > MEASURED_kB:
         fault = fault or "more than 1 GB"
     if not fault and code not in CODES:
         fault = f"code {code}"
-    elif not fault and code and not said.strip():
+    elif not fault and code and not message.strip():
         fault = f"code {code} without a word"
-    elif "\x1b" in said or "\x07" in said:
+    elif "\x1b" in message or "\x07" in message:
         fault = fault or "a control character reached the terminal"
     if kinds.state() != before:
         fault = "FILES OUTSIDE WERE CHANGED " + fault
@@ -448,7 +448,7 @@ def trial(kinds: Kinds, kind: str, number: int, seed: int) -> dict[str, Any]:
         "code": code,
         "seconds": seconds,
         "fault": fault[:300],
-        **({"said": (out.getvalue()[:300], said[-600:])} if kind in LONG else {}),
+        **({"said": (out.getvalue()[:300], message[-600:])} if kind in LONG else {}),
     }
 
 
@@ -508,11 +508,11 @@ def main() -> int:
             if given.only is not None:
                 numbers = [given.only]
             with given.output.open("a", encoding="utf-8") as file:
-                for found in trials(kinds, kind, numbers, given.seed):
-                    done.append(found)
-                    print(json.dumps(found), file=file, flush=True)
-                    if found["fault"] or given.only is not None:
-                        print(json.dumps(found), flush=True)
+                for result in trials(kinds, kind, numbers, given.seed):
+                    done.append(result)
+                    print(json.dumps(result), file=file, flush=True)
+                    if result["fault"] or given.only is not None:
+                        print(json.dumps(result), flush=True)
     for kind in given.kind or NAMES:
         own = [each for each in done if each["kind"] == kind]
         codes = Counter(each["code"] for each in own)

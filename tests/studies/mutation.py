@@ -95,7 +95,7 @@ def mutants_of(file: str, source: bytes) -> Iterator[Mutant]:
 
 
 def _changes(node: Any, text: Callable[[ast.AST], str]) -> Iterator[tuple[Any, str, str]]:
-    """What to replace of a node, the kind of the change, and by what."""
+    """Changes of a node: the part to replace, the kind of the change, and the replacement."""
     if isinstance(node, ast.BinOp):
         left, right = text(node.left), text(node.right)
         if not {"'", '"'} & {*left, *right}:
@@ -137,22 +137,22 @@ def _changes(node: Any, text: Callable[[ast.AST], str]) -> Iterator[tuple[Any, s
 
 def functions_of(code: CodeType) -> dict[str, list[CodeType]]:
     """Code of every function below a module's, by its qualified name, in the order of the text."""
-    found: dict[str, list[CodeType]] = defaultdict(list)
+    codes: dict[str, list[CodeType]] = defaultdict(list)
     for inner in code.co_consts:
         if isinstance(inner, CodeType):
-            found[inner.co_qualname].append(inner)
+            codes[inner.co_qualname].append(inner)
             for name, more in functions_of(inner).items():
-                found[name] += more
-    return found
+                codes[name] += more
+    return codes
 
 
 def functions(modules: set[str]) -> dict[str, list[FunctionType]]:
     """All functions that there are of modules whose top package is one of ``modules``."""
-    found: dict[str, list[FunctionType]] = defaultdict(list)
+    by_module: dict[str, list[FunctionType]] = defaultdict(list)
     for one in gc.get_objects():
         if isinstance(one, FunctionType) and (one.__module__ or "").partition(".")[0] in modules:
-            found[one.__module__].append(one)
-    return found
+            by_module[one.__module__].append(one)
+    return by_module
 
 
 def exchange(known: list[FunctionType], before: bytes, after: bytes) -> bool:

@@ -63,12 +63,12 @@ def measured(evaluator: Evaluator, effect: dict[str, float], path: Path) -> None
     rows = ["quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma"]
     for kPa in PRESSURES_kPa:
         design = {**effect, "A_CORD": 4e-7, "C10": 9e5, "pressure_kPa": kPa}
-        found = evaluator.evaluate(Question(design))
-        for mode in paired_labels(found.modes):
+        evaluation = evaluator.evaluate(Question(design))
+        for mode in paired_labels(evaluation.modes):
             f = mode.frequency_Hz * (1 + SCATTER * noise.standard_normal())
             label = f"{mode.label.c},{mode.label.m},{mode.label.kind or ''}"
             rows += [f"frequency_Hz,{label},,{kPa},0,{f!r},{SCATTER * f!r}"] * (mode.label.m < 2)
-    rows.append(f"mass_kg,,,,,{PRESSURES_kPa[-1]},0,{found.mass_kg!r},{MASS_SIGMA_kg}")
+    rows.append(f"mass_kg,,,,,{PRESSURES_kPa[-1]},0,{evaluation.mass_kg!r},{MASS_SIGMA_kg}")
     path.write_text("\n".join(rows) + "\n")
 
 

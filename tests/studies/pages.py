@@ -38,63 +38,63 @@ OPTIMUM = "--set A_belt=3.64826e-7 --set A_carcass=8.01133e-8 --set C10=1000000.
 Figures = dict[str, float]
 
 
-def of_fit(told: Mapping[str, Any]) -> Figures:
+def of_fit(content: Mapping[str, Any]) -> Figures:
     """fit.json"""
     keys = ("objective_Hz", "evaluations", "evaluations_to_0.05_Hz", "mass_kg")
-    found = {key: told[key] for key in keys}
-    for name, v in told["variables"].items():
-        found |= {name: v["value"], f"{name} %": 100 * v["standard_error"] / v["value"]}
-    for mode in told["modes"]:
-        found[f"off {label_of(mode)}"] = mode["deviation_percent"]
-    for each in told.get("footprint", []):
-        found[f"off {each['quantity']} {each['pressure_kPa']:g}"] = each["deviation_percent"]
-    if "labels" in told:
-        found["labels %"] = 100 * told["labels"]["labelings"][0]["probability"]
-        rows = sum(mode["multiplicity"] for mode in told["modes"]) - len(told["variables"])
-        found["chi2"] = told["objective_Hz"] ** 2 / rows
-    return found
+    figures = {key: content[key] for key in keys}
+    for name, v in content["variables"].items():
+        figures |= {name: v["value"], f"{name} %": 100 * v["standard_error"] / v["value"]}
+    for mode in content["modes"]:
+        figures[f"off {label_of(mode)}"] = mode["deviation_percent"]
+    for each in content.get("footprint", []):
+        figures[f"off {each['quantity']} {each['pressure_kPa']:g}"] = each["deviation_percent"]
+    if "labels" in content:
+        figures["labels %"] = 100 * content["labels"]["labelings"][0]["probability"]
+        rows = sum(mode["multiplicity"] for mode in content["modes"]) - len(content["variables"])
+        figures["chi2"] = content["objective_Hz"] ** 2 / rows
+    return figures
 
 
-def of_modes(told: Mapping[str, Any]) -> Figures:
+def of_modes(content: Mapping[str, Any]) -> Figures:
     """modes.json"""
-    return {"mass_kg": told["mass_kg"]} | {
-        label_of(mode): mode["frequency_Hz"] for mode in told["modes"]
+    return {"mass_kg": content["mass_kg"]} | {
+        label_of(mode): mode["frequency_Hz"] for mode in content["modes"]
     }
 
 
-def of_footprint(told: Mapping[str, Any]) -> Figures:
+def of_footprint(content: Mapping[str, Any]) -> Figures:
     """footprint.json: cm2, N/mm, mm"""
-    found: Figures = {}
-    for row in told["rows"]:
-        found[f"cm2 at {row['load_N']:g}"] = 1e4 * row["area_m2"]
-        found[f"N/mm at {row['load_N']:g}"] = row["vertical_stiffness_N_per_m"] / 1e3
+    figures: Figures = {}
+    for row in content["rows"]:
+        figures[f"cm2 at {row['load_N']:g}"] = 1e4 * row["area_m2"]
+        figures[f"N/mm at {row['load_N']:g}"] = row["vertical_stiffness_N_per_m"] / 1e3
         for name in ("length", "width"):
-            found[f"{name} at {row['load_N']:g}"] = 1e3 * row[f"{name}_m"]
-    return found
+            figures[f"{name} at {row['load_N']:g}"] = 1e3 * row[f"{name}_m"]
+    return figures
 
 
-def of_labels(told: Mapping[str, Any]) -> Figures:
+def of_labels(content: Mapping[str, Any]) -> Figures:
     """labels.json: probabilities, %"""
-    found = {
+    figures = {
         f"labeling {k}": 100 * each["probability"]
-        for k, each in enumerate(told["labels"]["labelings"])
+        for k, each in enumerate(content["labels"]["labelings"])
     }
-    for each in told["labels"]["frequencies"]:
+    for each in content["labels"]["frequencies"]:
         for one in (each, *each["rivals"]):
             if one["c"] is not None:
-                found[f"{each['frequency_Hz']:g} {label_of(one)}"] = 100 * one["probability"]
-    return found
+                figures[f"{each['frequency_Hz']:g} {label_of(one)}"] = 100 * one["probability"]
+    return figures
 
 
-def of_diagnosis(told: Mapping[str, Any]) -> Figures:
+def of_diagnosis(content: Mapping[str, Any]) -> Figures:
     """diagnosis.json"""
-    part, gap = told["section_map"][0], told["gap"]
-    effects = [p for key, p in told["probabilities"].items() if key not in ("none", "outside")]
+    part, gap = content["section_map"][0], content["gap"]
+    effects = [p for key, p in content["probabilities"].items() if key not in ("none", "outside")]
     return {
         "rms %": gap["rms_percent"],
         "p": gap["p_value"],
-        "none %": 100 * told["probabilities"]["none"],
-        "outside %": 100 * told["probabilities"]["outside"],
+        "none %": 100 * content["probabilities"]["none"],
+        "outside %": 100 * content["probabilities"]["outside"],
         "effect %": 100 * max(effects, default=0.0),
         "part %": part["stiffness_percent"],
         "part sigma %": part["stiffness_sigma"],
@@ -103,7 +103,7 @@ def of_diagnosis(told: Mapping[str, Any]) -> Figures:
 
 def of_table(text: str) -> Figures:
     """Numbers of a study's tables, by table, row and column; of other lines by place."""
-    found: Figures = {}
+    figures: Figures = {}
     tables, within = 0, False
     for place, line in enumerate(text.splitlines()):
         tables += line.startswith("|") and not within
@@ -111,11 +111,11 @@ def of_table(text: str) -> Figures:
         if within:
             name, *cells = (cell.strip() for cell in line.strip("|").split("|"))
             numbers = {k: cell for k, cell in enumerate(cells) if re.fullmatch(NUMBER, cell)}
-            found |= {f"{tables}: {name} {k}": float(cell) for k, cell in numbers.items()}
+            figures |= {f"{tables}: {name} {k}": float(cell) for k, cell in numbers.items()}
         else:
-            told = re.findall(r"(?<![\w.])[+\-]?\d+(?:\.\d+)?(?:e[+\-]?\d+)?", line)
-            found |= {f"line {place} {k}": float(x) for k, x in enumerate(told)}
-    return found
+            printed = re.findall(r"(?<![\w.])[+\-]?\d+(?:\.\d+)?(?:e[+\-]?\d+)?", line)
+            figures |= {f"line {place} {k}": float(x) for k, x in enumerate(printed)}
+    return figures
 
 
 def label_of(mode: Mapping[str, Any]) -> str:
@@ -454,8 +454,8 @@ def differences(record: Record) -> Iterator[str]:
     nothing of a command that is not on record."""
     for page, words, figures in CLAIMS:
         pattern = NUMBER.join(re.escape(part) for part in words.split("{}"))
-        found = re.search(pattern, plain(page))
-        if not found:
+        match = re.search(pattern, plain(page))
+        if not match:
             yield f"{page}: not there: {words}"
             continue
         try:
@@ -464,16 +464,16 @@ def differences(record: Record) -> Iterator[str]:
             if error.args[0] not in STEPS:
                 raise
             continue  # a command that was not run, which `main` tells
-        for printed, value in zip(found.groups(), values, strict=True):
+        for printed, value in zip(match.groups(), values, strict=True):
             digits = len(printed.partition(".")[2])
             if abs(float(printed) - value) > 0.5 * 10.0**-digits * (1 + 1e-3):
                 yield f"{page}: {words}: printed {printed}, recorded {value:.6g}"
 
 
 def recorded() -> dict[str, Figures]:
-    """What the commands gave, by step."""
-    told = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {}
-    return {step: each["figures"] for step, each in told.items()}
+    """Recorded figures of the commands, by step."""
+    record = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {}
+    return {step: each["figures"] for step, each in record.items()}
 
 
 def with_exact_section(folder: Path) -> Path:
@@ -528,25 +528,25 @@ def main() -> int:
     parser.add_argument(
         "--check", action="store_true", help="compare pages and record, run nothing"
     )
-    asked = parser.parse_args()
-    if not asked.check and not asked.folder:
+    options = parser.parse_args()
+    if not options.check and not options.folder:
         parser.error("FOLDER, or --check")
-    for name in [] if asked.check else asked.steps or STEPS:
-        figures = run(name, asked.folder.resolve())
-        told = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {}
-        told[name] = {
+    for name in [] if options.check else options.steps or STEPS:
+        figures = run(name, options.folder.resolve())
+        record = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {}
+        record[name] = {
             "command": STEPS[name].command,
             "date": date.today().isoformat(),
             "figures": {key: float(f"{value:.6g}") for key, value in figures.items()},
         }
-        order = {each: told[each] for each in STEPS if each in told}
+        order = {each: record[each] for each in STEPS if each in record}
         RECORD.write_text(json.dumps(order, indent=1) + "\n", encoding="utf-8")
         print(f"{name}: {len(figures)} figures", flush=True)
-    found = list(differences(recorded()))
-    print("\n".join(found) or f"all {len(CLAIMS)} statements agree")
+    wrong = list(differences(recorded()))
+    print("\n".join(wrong) or f"all {len(CLAIMS)} statements agree")
     if missing := [name for name in STEPS if name not in recorded()]:
         print(f"not on record: {', '.join(missing)}")
-    return int(bool(found))
+    return int(bool(wrong))
 
 
 if __name__ == "__main__":

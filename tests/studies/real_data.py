@@ -72,15 +72,15 @@ def predicted(case: LoadedCase) -> None:
     analysis = case.case.analysis.model_copy(update={"highest_harmonic": LABELS[-1].c})
     wide = changed(case, analysis=analysis)
     question = Question(STATE.design(wide, fit.fitted.values))
-    ((_, found),) = find_modes(Evaluator(TyreDesign(wide)), [question], LABELS)
-    assert isinstance(found, Found), found
-    hertz = np.array([found.wanted[label].frequency_Hz for label in LABELS])
+    ((_, labelled),) = find_modes(Evaluator(TyreDesign(wide)), [question], LABELS)
+    assert isinstance(labelled, Found), labelled
+    hertz = np.array([labelled.wanted[label].frequency_Hz for label in LABELS])
     off = np.log(hertz / [each.value for each in MEASURED])
-    told = " | ".join(f"{100 * np.expm1(x):+.1f}" for x in off)
+    cells = " | ".join(f"{100 * np.expm1(x):+.1f}" for x in off)
     rms, beside = 100 * np.sqrt(np.mean(off**2)), 100 * np.std(off)
     C10 = fit.fitted.values["C10"] / 1e6
     print(
-        f" {fit.found.objective_Hz:.2f} | {C10:.2f} | {fit.found.mass_kg:.2f} | {told} |"
+        f" {fit.found.objective_Hz:.2f} | {C10:.2f} | {fit.found.mass_kg:.2f} | {cells} |"
         f" {rms:.1f} | {beside:.1f} |",
         flush=True,
     )

@@ -28,24 +28,24 @@ QUICK = ["--mesh", "coarse", "--quiet"]
 
 def commands(folder: Path) -> list[list[str]]:
     """The commands of each case, one after another."""
-    told = []
+    result = []
     for name, measured in CASES.items():
         case, out = str(ROOT / "cases" / f"{name}.yaml"), folder / name
         for solver in ("bundled", "calculix"):
-            told.append(["deck", case, "--solver", solver, "--output", f"{out}/decks_{solver}"])
-        told.append(["deck", case, "--loads-N", "3000", "--output", f"{out}/decks_pressed"])
+            result.append(["deck", case, "--solver", solver, "--output", f"{out}/decks_{solver}"])
+        result.append(["deck", case, "--loads-N", "3000", "--output", f"{out}/decks_pressed"])
         study = ["--no-store", "--no-pictures", "--output", str(out), *QUICK]
-        told += [[command, case, *study] for command in ("modes", "fit", "sweep-pressure")]
-        told.append(["footprint", case, "--loads-N", "2000,5000", *study])
-        told.append(["modes", case, "--load-N", "4000", *study])
+        result += [[command, case, *study] for command in ("modes", "fit", "sweep-pressure")]
+        result.append(["footprint", case, "--loads-N", "2000,5000", *study])
+        result.append(["modes", case, "--load-N", "4000", *study])
         if measured:
             data = str(ROOT / "cases" / measured)
-            told.append(["diagnose", case, "--measured", data, *study])
-    return told
+            result.append(["diagnose", case, "--measured", data, *study])
+    return result
 
 
 def run(arguments: list[str]) -> str:
-    """What a command complained of; '' where it went well."""
+    """Complaint of a command; '' where it went well."""
     command = [sys.executable, "-m", "tyrecal", *arguments]
     ended = subprocess.run(
         command, env={**os.environ, **ALONE}, capture_output=True, text=True, check=False

@@ -62,7 +62,7 @@ def box(reach: float) -> Array:
 
 
 def errors(count: int) -> None:
-    """Of fresh designs."""
+    """Print the errors of emulators at fresh designs."""
     evaluator, random = Evaluator(TyreDesign(CASE)), np.random.default_rng(1)
     for reach in (0.3, 0.7):
         x = random.uniform(*box(reach).T, (count, len(VARIABLES)))
@@ -87,7 +87,7 @@ def exact(evaluator: Evaluator, x: Array) -> dict[Label, float]:
 
 
 def coverage(count: int, seed: int) -> None:
-    """Of 90 % intervals."""
+    """Print the coverage of 90 % intervals."""
     evaluator, random = Evaluator(TyreDesign(CASE)), np.random.default_rng(seed)
     pressure = DesignVariable("pressure_kPa", 240.0, PRESSURES[0], PRESSURES[-1])
     states = np.log(PRESSURES)[:, None]
@@ -98,8 +98,8 @@ def coverage(count: int, seed: int) -> None:
     every = tuple(Observable("frequency_Hz", x, p) for p in PRESSURES for x in made.labels)
     others = tuple(row for row in every if row not in measured)
     rows = measured + others
-    found, _ = sources(CASE)
-    model = TyreModel(CASE, evaluator, [(r.label, r.pressure_kPa) for r in rows], found, {})
+    own_sources, _ = sources(CASE)
+    model = TyreModel(CASE, evaluator, [(r.label, r.pressure_kPa) for r in rows], own_sources, {})
     g = _answer(model, np.log(list(start_values(CASE).values()))).constants
     assert g is not None
     n, scatter = len(measured), np.full(len(measured), RELATIVE_SIGMA)
@@ -152,21 +152,21 @@ def cost(times: int) -> None:
     readings = read_measurements(CASES / "p235_75r17_wheeler.csv")
     evaluator = Evaluator(TyreDesign(CASE))
     names = (*(v.name for v in VARIABLES), "pressure_kPa")
-    asked = Question({**start_values(CASE), "pressure_kPa": 240.0}, names)
+    question = Question({**start_values(CASE), "pressure_kPa": 240.0}, names)
     ratios, one = [], []
     answer_all = Evaluator.answer_all
     for _ in range(times):
         began = time.process_time()
-        evaluator.evaluate(asked)
+        evaluator.evaluate(question)
         one.append(time.process_time() - began)
         spent = 0.0
 
         def timed(self: Evaluator, *given: object, **more: object) -> object:
             nonlocal spent
             began = time.process_time()
-            found = list(answer_all(self, *given, **more))  # type: ignore[arg-type]
+            answers = list(answer_all(self, *given, **more))  # type: ignore[arg-type]
             spent += time.process_time() - began
-            return iter(found)
+            return iter(answers)
 
         Evaluator.answer_all = timed  # type: ignore[assignment,method-assign]
         began = time.process_time()
@@ -174,7 +174,7 @@ def cost(times: int) -> None:
         rest = time.process_time() - began - spent
         Evaluator.answer_all = answer_all  # type: ignore[method-assign]
         began = time.process_time()
-        evaluator.evaluate(asked)
+        evaluator.evaluate(question)
         one.append(time.process_time() - began)
         ratios.append(rest / statistics.mean(one[-2:]))
         print(

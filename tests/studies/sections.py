@@ -80,12 +80,12 @@ def main(tyres: int, seed: int) -> None:
     case = changed(case, section=with_part(case.case.section, known_from=None))
     rows: list[ModelRow] = [(label, p) for p in PRESSURES_kPa for label in target_labels(case)]
     evaluator = Evaluator(TyreDesign(case))
-    found = sources(case)[0]
-    model = TyreModel(case, evaluator, rows, found, spans_of(case, evaluator)[0])
+    own_sources = sources(case)[0]
+    model = TyreModel(case, evaluator, rows, own_sources, spans_of(case, evaluator)[0])
     stated = replace(expand(model, model.start, False), coupling=None)
-    fields = np.array([source.field is not None for source in found])
+    fields = np.array([source.field is not None for source in own_sources])
     exact = replace(stated, constants=np.where(fields, 0.0, stated.constants), material_laws=0.0)
-    turned = [any(path.endswith("angle_deg") for path in source.steps) for source in found]
+    turned = [any(path.endswith("angle_deg") for path in source.steps) for source in own_sources]
     constants = stated.constants[:, ~fields & ~np.array(turned)]
     parts = [part for part in regions(model, model.start) if part.rubber]
     compounds = np.array([[part.stiffness for part in parts], [part.mass for part in parts]])
@@ -123,7 +123,7 @@ def main(tyres: int, seed: int) -> None:
         low, high = stated.nodes[id].reach
         e = random.uniform(0.6, 1.0) * float(random.choice([end for end in (low, high) if end]))
         shift, tilt, _ = stated.nodes[id].at(np.array([e]))
-        told: dict[str, object] = {"tyre": tyre, "effect": id, "size": e}
+        record: dict[str, object] = {"tyre": tyre, "effect": id, "size": e}
         for kind, measured in (("sound", y), ("effect", y + shift[0] + tilt[0] @ d)):
             for name in ("default", "exact")[: 1 + (tyre % EXACT_EACH == 0)]:
                 problem = asked(measured, name)
@@ -133,14 +133,14 @@ def main(tyres: int, seed: int) -> None:
                     hypotheses = weigh(problem)
                     p = probabilities(hypotheses)
                 verdict = decide(hypotheses, p, len(rows), 3)
-                told[f"{kind} {name}"] = [verdict.kind, verdict.key or ""]
+                record[f"{kind} {name}"] = [verdict.kind, verdict.key or ""]
                 at = separate(problem, projection(problem, d)[0], {id: e}).lambdas[id]
                 word: str = verdict.kind
                 if kind == "effect":
                     right = "right" if verdict.key == id else "wrong" if verdict.key else word
                     word = f"{right}, lambda {'from' if at >= DETECTABLE else 'below'} 25"
                 count[kind, name, word] += 1
-        lines.append(json.dumps(told))
+        lines.append(json.dumps(record))
         print(lines[-1], flush=True)
     for key, n in sorted(count.items()):
         print(*key, n)

@@ -1,4 +1,5 @@
-"""What to measure next, in a closed loop: hours to a verdict of 0.9, by `next` and by a fixed plan.
+"""Choice of the next measurement in a closed loop: hours to a verdict of 0.9, by `next` and by a
+fixed plan.
 
     python -m tests.studies.sequential [--tyres 600] [--seed 1] [--hindsight 60]
 
@@ -96,22 +97,26 @@ class Laboratory:
 
     def judged(self, done: Sequence[str]) -> tuple[list[Hypothesis], dict[str, float]]:
         """The diagnosis of what was measured."""
-        found = weigh(self.problem.only(np.isin(self.item, done)), pairs=False)
-        return found, probabilities(found)
+        hypotheses = weigh(self.problem.only(np.isin(self.item, done)), pairs=False)
+        return hypotheses, probabilities(hypotheses)
 
     def information(
-        self, found: Sequence[Hypothesis], p: Mapping[str, float], done: Sequence[str], name: str
+        self,
+        hypotheses: Sequence[Hypothesis],
+        p: Mapping[str, float],
+        done: Sequence[str],
+        name: str,
     ) -> float:
-        """Of a measurement, as `next` has it."""
+        """Information of a measurement, as `next` has it."""
         likely = {k: p[k] for k in sorted(p, key=lambda k: -p[k]) if p[k] > MIN_PROBABILITY}
-        keys = [h.key for h in found if h.key in likely and (h.values or h.key == NONE)]
+        keys = [h.key for h in hypotheses if h.key in likely and (h.values or h.key == NONE)]
         keys = sorted(keys, key=lambda key: -likely[key])[:MAX_EXPLANATIONS]
         if len(keys) < 2:
             return 0.0
         here = np.flatnonzero(np.isin(self.item, done))
         order = np.append(here, np.flatnonzero(self.item == name))
         shifts = {}
-        for h in found:
+        for h in hypotheses:
             if h.key in keys:
                 sizes = h.typical(SIZES) if h.values else {}
                 added = self.problem.added(sizes, SIZES if sizes else 1)
@@ -124,7 +129,7 @@ class Laboratory:
 
 @dataclass(frozen=True)
 class Course:
-    """What a laboratory did."""
+    """Measurements of a laboratory, and their result."""
 
     hours: float  # to a verdict; infinite: there was none
     verdict: str  # the likeliest explanation at the end
@@ -132,7 +137,7 @@ class Course:
 
 
 def offered(done: Sequence[str]) -> list[str]:
-    """What may be measured beside these."""
+    """Measurements that remain in addition to these."""
     measured = [PRESSURE_kPa[name] for name in done if name in PRESSURE_kPa]
     near = set(PRESSURE_kPa.values()) - set(offered_kPa(OWN_kPa, measured))
     return [name for name in MENU if name not in done and PRESSURE_kPa.get(name) not in near]
@@ -142,14 +147,14 @@ def by_next(tyre: Laboratory) -> Course:
     """The most information per hour first."""
     done, hours = [FIRST], COST[FIRST]
     while True:
-        found, p = tyre.judged(done)
+        hypotheses, p = tyre.judged(done)
         top = max(p, key=lambda key: p[key])
         if p[top] >= SURE:
             return Course(hours, top, tuple(done))
         left = [name for name in offered(done) if hours + COST[name] <= LIMIT]
         if not left:
             return Course(np.inf, top, tuple(done))
-        gain = {name: tyre.information(found, p, done, name) / COST[name] for name in left}
+        gain = {name: tyre.information(hypotheses, p, done, name) / COST[name] for name in left}
         done.append(max(gain, key=lambda name: gain[name]))
         hours += COST[done[-1]]
 
@@ -187,16 +192,16 @@ def in_hindsight(tyre: Laboratory) -> Course:
 
 
 def laboratory() -> Laboratory:
-    """Of the case: everything asked once, nothing measured yet."""
+    """Laboratory of the case: everything evaluated once, nothing measured yet."""
     case = coarse()
     case = changed(case, section=with_part(case.case.section, known_from=None))
     evaluator, labels = Evaluator(TyreDesign(case)), target_labels(case)
     rows: list[ModelRow] = [(label, p) for p in PRESSURE_kPa.values() for label in labels]
     rows += [(label, TyreState(OWN_kPa, 0.0, "fixed")) for label in labels]
     rows.append((None, 0.0))
-    found, spans = sources(case)[0], spans_of(case, evaluator)[0]
-    model = TyreModel(case, evaluator, rows, found, spans)
-    asked = replace(expand(model, model.start, False), coupling=None)
+    own_sources, spans = sources(case)[0], spans_of(case, evaluator)[0]
+    model = TyreModel(case, evaluator, rows, own_sources, spans)
+    expanded = replace(expand(model, model.start, False), coupling=None)
     items, observables, places = [], [], []
 
     def measured(name: str, observable: Observable, place: int) -> None:
@@ -210,17 +215,17 @@ def laboratory() -> Laboratory:
     for place in own:
         measured("mount", Observable.of(rows[place]), place)
         measured("helium", replace(Observable.of(rows[place]), run=1), place)
-    readings = [(tool, id) for tool, (_, ids) in READ.items() for id in asked.nodes if id in ids]
+    readings = [(tool, id) for tool, (_, ids) in READ.items() for id in expanded.nodes if id in ids]
     fields = [k for k, name in enumerate(model.sources) if name.startswith(SECTION)]
-    shows = np.zeros((len(readings) + len(fields), len(found)))
-    far = {id: max(abs(spans[id].low), abs(spans[id].high)) for id in asked.nodes}
+    shows = np.zeros((len(readings) + len(fields), len(own_sources)))
+    far = {id: max(abs(spans[id].low), abs(spans[id].high)) for id in expanded.nodes}
     for i, (_, id) in enumerate(readings):
-        shows[i] = [source.steps.get(EFFECT_PATH + id, 0.0) / far[id] for source in found]
+        shows[i] = [source.steps.get(EFFECT_PATH + id, 0.0) / far[id] for source in own_sources]
     shows[range(len(readings), len(shows)), fields] = 1.0
     for i, tool in enumerate([*(tool for tool, _ in readings), *("cut" for _ in fields)]):
         measured(tool, Observable(f"reading {i}", None, 0.0), len(rows) + i)
     ids = [id for _, id in readings]
-    expansion = _with_readings(asked, shows, ids, far)
+    expansion = _with_readings(expanded, shows, ids, far)
     scatter = [MASS_PERCENT / 100 if name == "weigh" else NOISE for name in items]
     scatter[-len(shows) :] = [READING] * len(readings) + [CHECKED] * len(fields)
     none = np.full(len(items), np.nan)
@@ -235,10 +240,10 @@ def laboratory() -> Laboratory:
 
 
 def _with_readings(
-    asked: Expansion, shows: Array, ids: Sequence[str], far: Mapping[str, float]
+    expanded: Expansion, shows: Array, ids: Sequence[str], far: Mapping[str, float]
 ) -> Expansion:
     """With rows more: readings of effects' sizes, over their ranges, and of sources."""
-    m, v = len(shows), len(asked.x0)
+    m, v = len(shows), len(expanded.x0)
 
     def of(id: str, nodes: Nodes) -> Nodes:
         size = np.zeros((len(nodes.values), m))
@@ -254,13 +259,13 @@ def _with_readings(
         )
 
     return replace(
-        asked,
-        eta=np.append(asked.eta, np.zeros(m)),
-        jacobian=np.vstack([asked.jacobian, np.zeros((m, v))]),
-        hessian=np.concatenate([asked.hessian, np.zeros((m, v, v))]),
-        split=np.append(asked.split, np.zeros(m)),
-        constants=np.vstack([asked.constants, shows]),
-        nodes={id: of(id, nodes) for id, nodes in asked.nodes.items()},
+        expanded,
+        eta=np.append(expanded.eta, np.zeros(m)),
+        jacobian=np.vstack([expanded.jacobian, np.zeros((m, v))]),
+        hessian=np.concatenate([expanded.hessian, np.zeros((m, v, v))]),
+        split=np.append(expanded.split, np.zeros(m)),
+        constants=np.vstack([expanded.constants, shows]),
+        nodes={id: of(id, nodes) for id, nodes in expanded.nodes.items()},
     )
 
 
@@ -296,12 +301,12 @@ def main(tyres: int, seed: int, hindsight: int) -> None:
         }
         if len(courses["next"].done) > 1 and tyre < hindsight:
             courses["hindsight"] = in_hindsight(drawn_tyre)
-        told = {
+        results = {
             name: {"hours": c.hours if np.isfinite(c.hours) else None, "verdict": c.verdict}
             for name, c in courses.items()
         }
-        told["next"]["measured"] = list(courses["next"].done)
-        line = {"tyre": tyre, "effect": id, "size": round(e, 12), "all": max(p.values()), **told}
+        results["next"]["measured"] = list(courses["next"].done)
+        line = {"tyre": tyre, "effect": id, "size": round(e, 12), "all": max(p.values()), **results}
         lines.append(json.dumps(line))
         print(lines[-1], flush=True)
     tell([json.loads(line) for line in lines])
@@ -340,13 +345,13 @@ def tell(lines: list[dict]) -> None:
                 for mean in (np.mean, np.median)
             ]
             ratios = [mean(hours) / mean(plan) for mean in (np.mean, np.median)]
-            told = [
+            cells = [
                 f"{ratio:.2f} ({low:.2f} to {high:.2f})"
                 for ratio, (low, high) in zip(ratios, bounds, strict=True)
             ]
             print(
                 f"| {words} | {len(own)} | {name} | {len(reached)} | {sum(right)} |"
-                f" {hours.mean():.1f}, {np.median(hours):.1f} | {told[0]} | {told[1]} |"
+                f" {hours.mean():.1f}, {np.median(hours):.1f} | {cells[0]} | {cells[1]} |"
             )
 
 

@@ -79,10 +79,10 @@ def main(tyres: int, seed: int) -> None:
     case = changed(case, section=with_part(case.case.section, known_from="exact"))
     rows: list[ModelRow] = [(label, p) for p in PRESSURES_kPa for label in target_labels(case)]
     evaluator = Evaluator(TyreDesign(case))
-    found = sources(case)[0]
-    model = TyreModel(case, evaluator, rows, found, spans_of(case, evaluator)[0])
+    own_sources = sources(case)[0]
+    model = TyreModel(case, evaluator, rows, own_sources, spans_of(case, evaluator)[0])
     known = expand(model, model.start, False)
-    turned = [any(path.endswith("angle_deg") for path in source.steps) for source in found]
+    turned = [any(path.endswith("angle_deg") for path in source.steps) for source in own_sources]
     constants = known.constants[:, ~np.array(turned)]
     random, count = np.random.default_rng(seed), Counter[tuple[int, str, str]]()
     observables = tuple(Observable("frequency_Hz", *row) for row in rows)
@@ -115,10 +115,10 @@ def main(tyres: int, seed: int) -> None:
         count[len(truth), "in the 90 % set", str(in_set)] += 1
         if v.kind == "named":
             count[len(truth), "robust" if d.robustness.robust else "hangs", now] += 1
-        told = {"effects": effects, "verdict": v.kind, "named": v.key, "before": then}
-        told |= {"also": {each.id: round(each.probability, 3) for each in v.also}}
-        told |= {"candidates": v.candidates[:6], "robust": d.robustness.robust}
-        lines.append(json.dumps(told))
+        record = {"effects": effects, "verdict": v.kind, "named": v.key, "before": then}
+        record |= {"also": {each.id: round(each.probability, 3) for each in v.also}}
+        record |= {"candidates": v.candidates[:6], "robust": d.robustness.robust}
+        lines.append(json.dumps(record))
         print(lines[-1], flush=True)
         if tyre % 5 == 4:
             print(*(f"{key}: {n}" for key, n in sorted(count.items())), sep="\n", flush=True)

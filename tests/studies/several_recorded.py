@@ -55,7 +55,7 @@ def again(trial: Scored, check: float, singles: float, pairs: float) -> Scored:
 
 
 def figures(trials: list[Scored]) -> dict[str, str]:
-    """What the tables of the studies show."""
+    """Figures that the tables of the studies show."""
     share = lambda hits: f"{sum(hits)} of {len(hits)}"
     by = lambda low, high: [t for t in trials if t.kind == "effect" and low <= t.band < high]
     of = lambda kind: [t for t in trials if t.kind == kind]
@@ -94,11 +94,11 @@ def main(further: float) -> None:
             folder = Path(place) / "trials"
             unpacked(study, folder)
             recorded = score(folder, folder.with_name("trials-truth"))
-            told = {
+            diagnoses = {
                 t.id: json.loads((folder / "answers" / f"{t.id}.json").read_text())["diagnosis"]
                 for t in recorded
             }
-        checks = {id: each["fit_p_value"] for id, each in told.items()}
+        checks = {id: each["fit_p_value"] for id, each in diagnoses.items()}
         ways = [
             recorded,
             [again(t, checks[t.id], 1.0, 1.0) for t in recorded],

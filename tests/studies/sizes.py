@@ -96,7 +96,7 @@ def kind(size: TyreSize) -> str:
 
 
 def extent(size: TyreSize) -> float:
-    """What the mass of a kind of tyre is a power of."""
+    """Extent of a tyre, of which the mass of its kind is a power."""
     if size.truck:
         return size.overall_diameter * size.width**2
     width = size.section_width(size.measuring_rim)

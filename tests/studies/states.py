@@ -105,9 +105,9 @@ def case_with(case: LoadedCase, hertz: Hertz, area_m2: float | None = None) -> L
 def frequencies(evaluator: Evaluator, state: TyreState, values: Mapping[str, float]) -> list[float]:
     """By the model, Hz, of `LABELS`."""
     question = Question(state.design(CASE, values))
-    ((_, found),) = find_modes(evaluator, [question], LABELS)
-    assert isinstance(found, Found)
-    return [found.wanted[label].frequency_Hz for label in LABELS]
+    ((_, labelled),) = find_modes(evaluator, [question], LABELS)
+    assert isinstance(labelled, Found)
+    return [labelled.wanted[label].frequency_Hz for label in LABELS]
 
 
 def pressed_area(evaluator: Evaluator, values: Mapping[str, float]) -> float:
@@ -192,7 +192,7 @@ class EmulatedEvaluator:
 
 
 def coverage(count: int, seed: int) -> None:
-    """Of 90 % intervals."""
+    """Print the coverage of 90 % intervals."""
     random = np.random.default_rng(seed)
     variables = read_variables(CASE)
     start = np.log(list(START.values()))
@@ -214,8 +214,8 @@ def coverage(count: int, seed: int) -> None:
         names: Sequence[str],
         *_: Any,
     ) -> tuple[Array, Array]:
-        found, slopes = area.at(values)
-        return np.array([found]), slopes[None, [list(START).index(name) for name in names]]
+        value, slopes = area.at(values)
+        return np.array([value]), slopes[None, [list(START).index(name) for name in names]]
 
     problem_module.press_with_slopes = press
     held, alone = np.zeros(len(START), int), np.zeros(len(START), int)
@@ -232,11 +232,11 @@ def coverage(count: int, seed: int) -> None:
         for chosen, hits in ((noisy, held), ({AS_THE_CASE: noisy[AS_THE_CASE]}, alone)):
             result = calibrate(case_with(CASE, chosen, measured), tyre).result
             unconverged += not result["converged"]
-            found = result["variables"]
+            fitted = result["variables"]
             for j, name in enumerate(START):
-                off = abs(found[name]["value"] - values[name])
-                hits[j] += off <= NORMAL_90 * found[name]["standard_error"]
-            errors.append(found["A_carcass"]["standard_error"] / found["A_carcass"]["value"])
+                off = abs(fitted[name]["value"] - values[name])
+                hits[j] += off <= NORMAL_90 * fitted[name]["standard_error"]
+            errors.append(fitted["A_carcass"]["standard_error"] / fitted["A_carcass"]["value"])
         ratios.append(errors[0] / (errors[1] / np.sqrt(len(STATES))))
         if (i + 1) % 50 == 0:
             print(f"{i + 1}: all states {held}, one {alone}", flush=True)
@@ -251,15 +251,15 @@ def coverage(count: int, seed: int) -> None:
 
 
 def errors() -> None:
-    """What states add, at the start design, by the model."""
+    """Print what states add, at the start design, by the model."""
     evaluator = Evaluator(TyreDesign(CASE))
     hertz = {state: frequencies(evaluator, state, START) for state in STATES}
     x = np.log(list(START.values()))
 
     def of(chosen: Hertz) -> Array:
         problem = Problem(case_with(CASE, chosen), evaluator)
-        found = uncertainty(problem, problem.evaluate(x)).standard_errors
-        return np.array(found, float) / list(START.values())
+        deviations = uncertainty(problem, problem.evaluate(x)).standard_errors
+        return np.array(deviations, float) / list(START.values())
 
     one, every = of({AS_THE_CASE: hertz[AS_THE_CASE]}), of(hertz)
     repeats = one / np.sqrt(len(STATES))
@@ -290,9 +290,9 @@ def cost(with_area: bool) -> None:
     spent({AS_THE_CASE: hertz[AS_THE_CASE]}, None)  # modules, templates
     alone = [spent({s: f}, area if s == AS_THE_CASE else None) for s, f in hertz.items()]
     together, points = spent(hertz, area)
-    told = ", ".join(f"{seconds:.2f} s ({count})" for seconds, count in alone)
+    cells = ", ".join(f"{seconds:.2f} s ({count})" for seconds, count in alone)
     print(
-        f"alone {told}; together {together:.2f} s ({points} design points):"
+        f"alone {cells}; together {together:.2f} s ({points} design points):"
         f" {together / sum(seconds for seconds, _ in alone):.2f} of their sum"
     )
 
@@ -302,11 +302,11 @@ def loaded(folder: Path) -> None:
     case, truth = str(CASES / "p235_75r17.yaml"), {"A_carcass": 4e-7, "C10": 9e5}
     sets = [word for name, value in truth.items() for word in ("--set", f"{name}={value}")]
     common = ["--mesh", "coarse", "--no-store", "--quiet"]
-    asked = ["--load-N", f"{LOAD_N:g}", *sets, *common, "--output", str(folder / "truth")]
-    subprocess.run([sys.executable, "-m", "tyrecal", "modes", case, *asked], check=True)
-    told = json.loads((folder / "truth" / "modes.json").read_text(encoding="utf-8"))
+    command = ["--load-N", f"{LOAD_N:g}", *sets, *common, "--output", str(folder / "truth")]
+    subprocess.run([sys.executable, "-m", "tyrecal", "modes", case, *command], check=True)
+    modes = json.loads((folder / "truth" / "modes.json").read_text(encoding="utf-8"))
     rows, scatter = ["quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma"], Random(1)
-    for mode in (mode for mode in told["modes"] if mode["c"] <= 4 and mode["m"] <= 1):
+    for mode in (mode for mode in modes["modes"] if mode["c"] <= 4 and mode["m"] <= 1):
         sigma = RELATIVE_SIGMA * mode["frequency_Hz"]
         place = f"{mode['c']},{mode['m']},{mode['kind'] or ''},{mode['symmetry']},240,{LOAD_N:g}"
         value = mode["frequency_Hz"] + sigma * scatter.gauss(0, 1)
@@ -315,14 +315,14 @@ def loaded(folder: Path) -> None:
     table.write_text("\n".join(rows) + "\n", encoding="utf-8")
     options = ["--measured", str(table), *common, "--no-pictures", "--output", str(folder / "fit")]
     subprocess.run([sys.executable, "-m", "tyrecal", "fit", case, *options], check=True)
-    found = json.loads((folder / "fit" / "fit.json").read_text(encoding="utf-8"))
-    count, left = len(rows) - 1, found["objective_Hz"]
-    print(f"{count} modes, {found['evaluations']} design points, {left:.2f} sigmas left")
-    for name, v in found["variables"].items():
+    fit = json.loads((folder / "fit" / "fit.json").read_text(encoding="utf-8"))
+    count, left = len(rows) - 1, fit["objective_Hz"]
+    print(f"{count} modes, {fit['evaluations']} design points, {left:.2f} sigmas left")
+    for name, v in fit["variables"].items():
         off = (v["value"] - truth.get(name, v["initial"])) / v["standard_error"]
         percent = 100 * v["standard_error"] / v["value"]
         print(f"{name}: {v['value']:.4g} +- {percent:.0f} %, off by {off:+.1f} standard errors")
-    for each in found["next_states"]:
+    for each in fit["next_states"]:
         print(each)
     print(f"{resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime:.0f} s of both commands")
 

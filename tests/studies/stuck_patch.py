@@ -91,10 +91,10 @@ def vibration_of(case: Any) -> tuple[Vibration, Array]:
 
 
 def compliances(vibration: Vibration, rows: Array) -> list[Compliance]:
-    """Of all harmonics, at nodes with all three components."""
+    """Compliances of all harmonics, at nodes with all three components."""
     force = np.zeros((*vibration.numbering.free.shape, 3 * len(rows)))
     force[np.repeat(rows, 3), np.tile(range(3), len(rows)), range(3 * len(rows))] = 1.0
-    Phi, found = vibration.numbering.gather(force), []
+    Phi, result = vibration.numbering.gather(force), []
     for n in range(HIGHEST + 1):
         factor = vibration.factor(n)
         x = factor.solve(Phi if n else Phi.astype(float))
@@ -102,8 +102,8 @@ def compliances(vibration: Vibration, rows: Array) -> list[Compliance]:
         if n <= WITH_MODES:
             modes = vibration.modes(n, 6, factor)
             values, at = modes.eigenvalues, modes.shapes[:, rows].reshape(6, -1).T
-        found.append(Compliance(Phi.T @ x, x.conj().T @ vibration.times_mass(x), values, at))
-    return found
+        result.append(Compliance(Phi.T @ x, x.conj().T @ vibration.times_mass(x), values, at))
+    return result
 
 
 class Patch:
@@ -118,7 +118,7 @@ class Patch:
         self.places = self.strip * (np.arange(STRIPS) - (STRIPS - 1) / 2)
 
     def matrix(self, value: float) -> Array:
-        """Of u by f at omega^2, over strips and components."""
+        """Compliance of u by f at omega^2, over strips and components."""
         away = self.places[:, None] - self.places
         size = len(self.dofs)
         total = np.zeros((STRIPS, size, STRIPS, size))
@@ -151,23 +151,23 @@ class Patch:
             negative = int((np.linalg.eigvalsh(self.matrix(value) + H) < 0).sum())
             return int((free < value).sum()) - negative
 
-        found = []
+        roots = []
         spans = [(LOWEST_HZ, count(LOWEST_HZ), up_to_Hz, count(up_to_Hz))]
         while spans:
             a, before, b, after = spans.pop()
             if before == after:
                 continue
             if b - a < 0.02:
-                found.append((a + b) / 2)
+                roots.append((a + b) / 2)
                 continue
             middle = (a + b) / 2
             there = count(middle)
             spans += [(a, before, middle, there), (middle, there, b, after)]
-        return sorted((hertz, self.shares(hertz, H)) for hertz in found)
+        return sorted((hertz, self.shares(hertz, H)) for hertz in roots)
 
     def shares(self, hertz: float, H: Array | float) -> dict[str, float]:
-        """Of the modes of `LABELS` in the stuck tyre's mode, by the forces that hold it, times how
-        far it has their symmetry."""
+        """Shares of the modes of `LABELS` in the stuck tyre's mode, by the forces that hold it,
+        times how far it has their symmetry."""
         value = (2 * np.pi * hertz) ** 2
         values, vectors = np.linalg.eigh(self.matrix(value) + H)
         f = vectors[:, np.argmin(abs(values))].reshape(STRIPS, -1)

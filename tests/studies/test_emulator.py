@@ -70,13 +70,13 @@ def test_polynomials_are_found_from_fewer_designs_than_terms(
     assert count < len(degrees) == comb(v + degree, v) <= count * (1 + v)
     centre, half = random.normal(size=v), random.uniform(0.1, 1.0, v)
     samples = lambda count: polynomial(degrees, a, spread(count, v), centre, half)
-    found = fitted((), MODES, centre, half, samples(count))
+    emulated = fitted((), MODES, centre, half, samples(count))
     t = random.uniform(-1, 1, (50, v))
     x = centre + half * t
-    assert np.allclose(found.ln_f(x), products(degrees, t) @ a, rtol=0, atol=1e-9)
+    assert np.allclose(emulated.ln_f(x), products(degrees, t) @ a, rtol=0, atol=1e-9)
     rise = np.stack([products(degrees, t, j) @ a for j in range(v)], 2) / half
-    assert np.allclose(found.slopes(x), rise, rtol=0, atol=1e-7)
-    assert found.evaluations == count and not found.failed
+    assert np.allclose(emulated.slopes(x), rise, rtol=0, atol=1e-7)
+    assert emulated.evaluations == count and not emulated.failed
     surer = fitted((), MODES, centre, half, samples(3 * count))
     assert surer.stated_error < 1e-9
 
@@ -111,16 +111,16 @@ def test_a_design_left_out_is_as_if_it_had_not_been_evaluated() -> None:
     t, degrees = spread(12, 2), up_to(2, 3)
     rows = np.concatenate([products(degrees, t), *(products(degrees, t, j) for j in range(2))])
     equations = random.normal(size=(36, 3))
-    a, found = module._left_out(rows, equations, 12)
+    a, residuals = module._left_out(rows, equations, 12)
     assert np.allclose(a, np.linalg.lstsq(rows, equations, None)[0])
     for i in range(12):
         others = np.arange(36) % 12 != i
         without = np.linalg.lstsq(rows[others], equations[others], None)[0]
-        assert np.allclose(found[i], equations[i] - products(degrees, t[i : i + 1]) @ without)
+        assert np.allclose(residuals[i], equations[i] - products(degrees, t[i : i + 1]) @ without)
 
 
 def test_the_bound_is_a_tolerance_limit(chance: Chance) -> None:
-    """Of log-normal errors it holds for 99 % of designs with a confidence of 95 %, which the
+    """For log-normal errors it holds for 99 % of designs with a confidence of 95 %, which the
     closed form comes close to. False failures: 1e-7."""
     drawn = np.exp(chance.random.normal(-9.0, 1.5, (2000, 30)))
     quantile = np.exp(-9.0 + 2.3263 * 1.5)
@@ -133,13 +133,13 @@ def test_the_bound_is_a_tolerance_limit(chance: Chance) -> None:
 def test_fresh_designs_keep_the_stated_error(chance: Chance) -> None:
     """Where the two modes cross, too. False failures: 1e-7."""
     tyre, kept = meeting(), []
-    found = made(tyre)
-    assert 1e-9 < found.median_error < found.stated_error < 1e-3
-    assert (found.stated_errors <= found.stated_error).all()
+    emulated = made(tyre)
+    assert 1e-9 < emulated.median_error < emulated.stated_error < 1e-3
+    assert (emulated.stated_errors <= emulated.stated_error).all()
     x = np.array([chance.random.uniform(*ends, 200) for ends in box(0.3)]).T
     for each in x:
-        error = abs(found.ln_f(each[None])[0] - exact(tyre, each))
-        kept.append(bool((error <= found.stated_error).all()))
+        error = abs(emulated.ln_f(each[None])[0] - exact(tyre, each))
+        kept.append(bool((error <= emulated.stated_error).all()))
     chance.often(kept, 0.95)
 
 
@@ -182,50 +182,50 @@ def exact(tyre: FakeEvaluator, x: Array) -> Array:
 def test_the_two_modes_change_names_where_they_meet() -> None:
     """The names follow, frequencies are of the order of their gap's square as exact as others."""
     tyre = meeting()
-    found, random = made(tyre), generator("meet")
+    emulated, random = made(tyre), generator("meet")
     x = np.array([random.uniform(*ends, 300) for ends in box(0.3)]).T
-    truth, said = np.array([exact(tyre, each) for each in x]), found.ln_f(x)
+    truth, predicted = np.array([exact(tyre, each) for each in x]), emulated.ln_f(x)
     above = truth[:, 0] > truth[:, 1]
     assert 30 < above.sum() < 270
     clear = abs(truth[:, 0] - truth[:, 1]) > 5e-3
-    assert clear.sum() > 200 and abs(said - truth)[clear].max() < 1e-5
-    upper, lower = np.sort(said[:, :2]).T[::-1]
+    assert clear.sum() > 200 and abs(predicted - truth)[clear].max() < 1e-5
+    upper, lower = np.sort(predicted[:, :2]).T[::-1]
     assert abs(upper - truth[:, :2].max(1)).max() < 2e-4 > abs(lower - truth[:, :2].min(1)).max()
 
 
 def test_slopes_of_the_two_modes_are_those_of_differences() -> None:
-    found, random = made(meeting()), generator("slopes")
-    assert set(PAIR) <= set(found.labels)
+    emulated, random = made(meeting()), generator("slopes")
+    assert set(PAIR) <= set(emulated.labels)
     x = np.array([random.uniform(*ends, 40) for ends in box(0.28)]).T
-    x = x[abs(np.diff(found.ln_f(x)[:, :2])[:, 0]) > 1e-3]
+    x = x[abs(np.diff(emulated.ln_f(x)[:, :2])[:, 0]) > 1e-3]
     steps = 1e-6 * np.eye(3)
-    rise = np.stack([(found.ln_f(x + e) - found.ln_f(x - e)) / 2e-6 for e in steps], 2)
-    assert len(x) > 20 and np.allclose(found.slopes(x), rise, rtol=0, atol=1e-6)
+    rise = np.stack([(emulated.ln_f(x + e) - emulated.ln_f(x - e)) / 2e-6 for e in steps], 2)
+    assert len(x) > 20 and np.allclose(emulated.slopes(x), rise, rtol=0, atol=1e-6)
 
 
 def test_frequencies_of_a_design_and_what_is_refused() -> None:
     tyre = evaluator()
-    found = made(tyre, 0.2, 6)
+    emulated = made(tyre, 0.2, 6)
     values = {"C10": 1.1 * START["C10"]}
-    hertz = found.frequencies(values)
+    hertz = emulated.frequencies(values)
     truth = np.exp(exact(tyre, np.log([{**START, **values}[name] for name in START])))
     assert list(hertz) == LABELS and np.allclose(list(hertz.values()), truth, rtol=1e-9)
     low, high = (START["C10"] * np.exp(each) for each in (-0.2, 0.2))
     for edge in (low, high):
-        found.frequencies({"C10": edge})
+        emulated.frequencies({"C10": edge})
     with pytest.raises(ValueError, match=r"C10 is 1\.3e\+06: the emulator knows 818731 to"):
-        found.frequencies({"C10": 1.3e6})
+        emulated.frequencies({"C10": 1.3e6})
     with pytest.raises(ValueError, match="C10 is 700000: the"):
-        found.frequencies({"C10": 7e5})
+        emulated.frequencies({"C10": 7e5})
     with pytest.raises(ValueError, match="no variable 'C1', only A_belt, A_carcass, C10"):
-        found.frequencies({"C1": 1e6})
+        emulated.frequencies({"C1": 1e6})
 
 
 def test_designs_that_fail_are_left_out_and_all_of_them_are_told() -> None:
     belt = START["A_belt"]
-    found = made(evaluator(fails=lambda values: values["A_belt"] < 0.9 * belt), 0.3, 20)
-    assert found.failed == sum(t < np.log(0.9) / 0.3 for t in spread(20, 3)[:, 0]) > 3
-    assert found.evaluations == 20 - found.failed and found.stated_error < 1e-9
+    emulated = made(evaluator(fails=lambda values: values["A_belt"] < 0.9 * belt), 0.3, 20)
+    assert emulated.failed == sum(t < np.log(0.9) / 0.3 for t in spread(20, 3)[:, 0]) > 3
+    assert emulated.evaluations == 20 - emulated.failed and emulated.stated_error < 1e-9
     with pytest.raises(EvaluationFailed, match="inflation stopped"):
         made(evaluator(fails=lambda values: True), 0.3, 20)
 
@@ -257,26 +257,26 @@ def test_a_larger_box_asks_for_what_is_new_in_it() -> None:
     assert grown.designs[: first.evaluations] == first.designs and grown.stated_error < 1e-9
     assert np.allclose(grown.ln_f(x), [exact(plain, each) for each in x], rtol=0, atol=1e-9)
     same = emulator(tyre, VARIABLES, larger, LABELS, 20, before=grown)
-    asked = len(tyre.asked)
-    assert same.designs == grown.designs and asked == 20 + outside.sum()
-    emulator(tyre, VARIABLES, larger, LABELS, asked + 3, before=grown)
-    further = larger.mean(1) + np.ptp(larger, axis=1) / 2 * spread(asked + 3, 3)[asked:]
-    assert np.allclose(tyre.asked[asked:], further)
+    count = len(tyre.asked)
+    assert same.designs == grown.designs and count == 20 + outside.sum()
+    emulator(tyre, VARIABLES, larger, LABELS, count + 3, before=grown)
+    further = larger.mean(1) + np.ptp(larger, axis=1) / 2 * spread(count + 3, 3)[count:]
+    assert np.allclose(tyre.asked[count:], further)
 
 
 def test_where_the_last_variables_are_known_fewer_are_left() -> None:
     """The same frequencies and slopes by those that are left."""
-    found, random = made(meeting()), generator("restricted")
+    emulated, random = made(meeting()), generator("restricted")
     last = box(0.3)[1:].mean(1) + np.array([0.1, -0.2])
-    fewer = found.restricted(last)
+    fewer = emulated.restricted(last)
     low, high = box(0.28)[0]
     x = random.uniform(low, high, (20, 1))
     whole = np.hstack([x, np.tile(last, (20, 1))])
-    assert np.allclose(fewer.ln_f(x), found.ln_f(whole), rtol=0, atol=1e-12)
-    assert np.allclose(fewer.slopes(x), found.slopes(whole)[:, :, :1], rtol=0, atol=1e-10)
-    assert len(fewer.degrees) == found.degrees.max() + 1 and len(fewer.box) == 1
-    nothing = found.restricted(np.zeros(0))
-    assert np.allclose(nothing.ln_f(whole), found.ln_f(whole), rtol=0, atol=1e-12)
+    assert np.allclose(fewer.ln_f(x), emulated.ln_f(whole), rtol=0, atol=1e-12)
+    assert np.allclose(fewer.slopes(x), emulated.slopes(whole)[:, :, :1], rtol=0, atol=1e-10)
+    assert len(fewer.degrees) == emulated.degrees.max() + 1 and len(fewer.box) == 1
+    nothing = emulated.restricted(np.zeros(0))
+    assert np.allclose(nothing.ln_f(whole), emulated.ln_f(whole), rtol=0, atol=1e-12)
 
 
 def test_solvers_without_slopes_and_too_few_evaluations_are_refused() -> None:

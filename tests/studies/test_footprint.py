@@ -73,9 +73,9 @@ def test_extents_end_half_way_to_the_next_node() -> None:
 
 def test_both_designs_and_what_they_say() -> None:
     designs = {"initial": START, "fitted": {"A_belt": 0.5 * BELT}}
-    told: list[str] = []
-    outcomes = press(evaluator(), designs, LOADS, notify=lambda name, outcome: told.append(name))
-    assert told == ["initial", "fitted"]
+    names: list[str] = []
+    outcomes = press(evaluator(), designs, LOADS, notify=lambda name, outcome: names.append(name))
+    assert names == ["initial", "fitted"]
     result = footprint_result(designs, LOADS, outcomes, {name: MESH for name in designs}).content()
     assert [(row["design"], row["load_N"]) for row in result["rows"]] == [
         ("initial", 500),
@@ -84,15 +84,15 @@ def test_both_designs_and_what_they_say() -> None:
         ("fitted", 4000),
     ]
     assert result["failed"] == [] and result["pressure_kPa"] == {"initial": 240, "fitted": 240}
-    found = result["findings"]
+    content = result["findings"]
     ratio = 2 ** (2 * 0.05)
-    assert [x["ratio"] for x in found["fitted_over_initial"]] == pytest.approx([ratio, ratio])
-    assert found["words"][0] == (
+    assert [x["ratio"] for x in content["fitted_over_initial"]] == pytest.approx([ratio, ratio])
+    assert content["words"][0] == (
         "the fitted tyre's area is larger than the initial one's at every load:"
         " +7.2 % at 500 N, +7.2 % at 4000 N"
     )
     mean = 4000 / (np.pi * 0.08 * 0.05) / 240e3
-    assert found["mean_over_inflation"]["initial"][1]["ratio"] == pytest.approx(mean)
+    assert content["mean_over_inflation"]["initial"][1]["ratio"] == pytest.approx(mean)
 
 
 @pytest.mark.parametrize(
@@ -110,10 +110,12 @@ def test_areas_that_do_not_grow_are_said(areas: tuple[float, ...], words: str) -
         for design, own in (("initial", (1.0, 1.0, 1.0)), ("fitted", areas))
         for load, area in zip((1e3, 2e3, 3e3), own, strict=True)
     ]
-    found = findings(rows, {"initial": 240.0, "fitted": 120.0}).model_dump()
-    assert words in found["words"][0]
-    assert found["words"][1].endswith("1.00 of the inflation pressure, within the usual 0.8 to 1.6")
-    assert "outside the usual 0.8 to 1.6 at 1000 N (2.00), 2000 N" in found["words"][2]
+    content = findings(rows, {"initial": 240.0, "fitted": 120.0}).model_dump()
+    assert words in content["words"][0]
+    assert content["words"][1].endswith(
+        "1.00 of the inflation pressure, within the usual 0.8 to 1.6"
+    )
+    assert "outside the usual 0.8 to 1.6 at 1000 N (2.00), 2000 N" in content["words"][2]
     assert findings(rows[:3], {"initial": 0.0}).model_dump() == {
         "fitted_over_initial": [],
         "mean_over_inflation": {},

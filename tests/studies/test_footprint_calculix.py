@@ -1,4 +1,4 @@
-"""What the comparison of footprints with CalculiX computes by itself."""
+"""Computations of the comparison of footprints with CalculiX."""
 
 from __future__ import annotations
 

@@ -105,21 +105,22 @@ def loaded(load_N: float, symmetric: float, antisymmetric: float, overlap: float
 
 
 def test_findings_in_words() -> None:
-    """What grows, what does not, what falls, what could not be named."""
+    """Splits and frequencies that grow, that do not and that fall, and modes that could not be
+    named."""
     loads = [
         loaded(0.0, 80.0, 80.0, 1.0),
         loaded(500.0, 82.0, 84.0),
         loaded(900.0, 85.0, 92.0, 0.3),
     ]
-    found = findings("initial", loads).model_dump()
-    assert [x["split"] for x in found["splits"][0]["split_Hz"]] == pytest.approx([0, 2, 7])
-    assert found["words"][0] == (
+    content = findings("initial", loads).model_dump()
+    assert [x["split"] for x in content["splits"][0]["split_Hz"]] == pytest.approx([0, 2, 7])
+    assert content["words"][0] == (
         "every doublet's split grows with the load; antisymmetric less symmetric at the last, Hz:"
         " [2,0] +7.0"
     )
-    assert found["words"][1] == "every frequency rises with the load"
-    assert "0.30, [2,0] symmetric at 900 N (a low one says that the load" in found["words"][2]
-    assert found["least_overlap"] == 0.3
+    assert content["words"][1] == "every frequency rises with the load"
+    assert "0.30, [2,0] symmetric at 900 N (a low one says that the load" in content["words"][2]
+    assert content["least_overlap"] == 0.3
     back = findings("initial", [*loads, loaded(2000.0, 90.0, 91.0)]).words
     assert "but for [2,0] (900 N) from the load named on" in back[0]
     assert back[1] == "every frequency rises with the load, but for [2,0] antisymmetric"
@@ -239,6 +240,6 @@ def test_the_cavitys_first_mode_stands_with_the_tyres() -> None:
         assert len(lines) == 2 * count
         if lines:
             assert lines[-1].startswith("a,500.0,0.0025,1,,cavity vertical,,187.0")
-        told = [w for w in (*sweep.sentences(), *one.sentences()) if "cavity" in w]
-        assert len(told) == count
-        assert all("fore-aft 185.1, vertical 187.0 Hz, split +1.9" in each for each in told)
+        sentences = [w for w in (*sweep.sentences(), *one.sentences()) if "cavity" in w]
+        assert len(sentences) == count
+        assert all("fore-aft 185.1, vertical 187.0 Hz, split +1.9" in each for each in sentences)

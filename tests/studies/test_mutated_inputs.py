@@ -11,7 +11,7 @@ from .mutated_inputs import NAMES, Kinds, trials
 
 @pytest.fixture(scope="module")
 def kinds(tmp_path_factory: pytest.TempPathFactory) -> Kinds:
-    """What is mutated."""
+    """Inputs that are mutated."""
     return Kinds(tmp_path_factory.mktemp("mutated") / "inputs")
 
 
@@ -22,8 +22,8 @@ SLOW = {"folders", "records", "requests", "cases", "universal"}
     "kind", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in NAMES]
 )
 def test_no_mutated_input_breaks_anything(kind: str, kinds: Kinds) -> None:
-    found = list(trials(kinds, kind, list(range(12)), seed=2))
-    assert [each for each in found if each["fault"]] == [] and len(found) == 12
+    results = list(trials(kinds, kind, list(range(12)), seed=2))
+    assert [each for each in results if each["fault"]] == [] and len(results) == 12
 
 
 def test_a_fault_is_seen(kinds: Kinds, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,15 +25,15 @@ twice = lambda x: 2 * x
 
 
 def test_changes_are_python_and_none_is_in_words() -> None:
-    found = list(mutants_of("a.py", SOURCE))
-    assert all(m.compiles(SOURCE) and m.of(SOURCE) != SOURCE for m in found)
-    assert {m.line for m in found} == {4, 6, 8, 10, 12}  # no docstring, import or message
-    said = {(m.kind, m.old, m.new) for m in found}
-    assert ("constant", "3", "2") in said
-    assert ("branch never", "r < 0 and not cut > 1", "False") in said
-    assert ("comparison", "r < 0", "r <= 0") in said
-    assert ("part dropped", "pi * r**2 - cut", "(pi * r**2)") in said
-    assert ("operator", "r**2", "((r) * (2))") in said
+    mutants = list(mutants_of("a.py", SOURCE))
+    assert all(m.compiles(SOURCE) and m.of(SOURCE) != SOURCE for m in mutants)
+    assert {m.line for m in mutants} == {4, 6, 8, 10, 12}  # no docstring, import or message
+    changes = {(m.kind, m.old, m.new) for m in mutants}
+    assert ("constant", "3", "2") in changes
+    assert ("branch never", "r < 0 and not cut > 1", "False") in changes
+    assert ("comparison", "r < 0", "r <= 0") in changes
+    assert ("part dropped", "pi * r**2 - cut", "(pi * r**2)") in changes
+    assert ("operator", "r**2", "((r) * (2))") in changes
 
 
 @pytest.mark.parametrize(

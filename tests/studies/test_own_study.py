@@ -101,8 +101,8 @@ def test_it_has_files_tables_figures_and_a_chapter(tmp_path: Path) -> None:
         assert done.returncode == 0, done.stderr
     assert "mass kg" in done.stdout and "the initial tyre weighs 12.8 kg" in done.stdout
     assert {"weigh.json", "weigh.csv", "weigh.png"} <= {path.name for path in out.iterdir()}
-    found = json.loads((out / "weigh.json").read_text())
-    assert found["provenance"]["solver"] == "bundled" and found["rows"][0]["mass_kg"] > 12
+    result = json.loads((out / "weigh.json").read_text())
+    assert result["provenance"]["solver"] == "bundled" and result["rows"][0]["mass_kg"] > 12
     assert (out / "weigh.csv").read_text().startswith("design,mass_kg\ninitial,12.79")
     page = (out / "report.html").read_text()
     assert "<h2>Masses</h2>" in page and ">mass, kg</text>" in page and ">12.80</td>" in page

@@ -44,10 +44,10 @@ pytestmark = pytest.mark.numbers
 def test_a_linear_tyre_has_the_normal_posterior_of_the_closed_form(chance: Chance) -> None:
     """Draws ten autocorrelation times apart, made independent standard normal ones by the closed
     form: mean, scatter and distribution. False failures: 7e-7."""
-    found = drawn(posterior(WIDE), BOUNDS, 100_000, int(chance.random.integers(2**31)))
-    assert np.allclose(found.covariance, COVARIANCE, rtol=1e-6)
-    assert np.allclose(found.optima, CENTRE[None], atol=1e-6 * WIDTH)
-    chains = found.chains
+    draws = drawn(posterior(WIDE), BOUNDS, 100_000, int(chance.random.integers(2**31)))
+    assert np.allclose(draws.covariance, COVARIANCE, rtol=1e-6)
+    assert np.allclose(draws.optima, CENTRE[None], atol=1e-6 * WIDTH)
+    chains = draws.chains
     assert chains.enough and 0.2 < chains.acceptance < 0.6 and (chains.tau > 1).all()
     apart = chains.draws[:: int(10 * chains.tau.max())].reshape(-1, 2)
     z = np.linalg.solve(np.linalg.cholesky(COVARIANCE), (apart - CENTRE).T)
@@ -81,13 +81,13 @@ def test_what_each_rim_tells_adds_up() -> None:
 
 
 def test_draws_are_worth_as_many_as_their_autocorrelation_says() -> None:
-    found = drawn(posterior(WIDE), BOUNDS, 40_000, 3).chains
-    flat, tau = found.flat, found.tau.max()
-    assert len(flat) == found.draws.shape[0] * found.draws.shape[1]
-    assert found.effective == pytest.approx(len(flat) / tau)
+    chains = drawn(posterior(WIDE), BOUNDS, 40_000, 3).chains
+    flat, tau = chains.flat, chains.tau.max()
+    assert len(flat) == chains.draws.shape[0] * chains.draws.shape[1]
+    assert chains.effective == pytest.approx(len(flat) / tau)
     apart = max(1, int(tau / 2))
-    assert len(found.thinned) == -(-found.draws.shape[0] // apart) * found.draws.shape[1]
-    assert found.dropped + len(found.draws) == 400 and 20 < found.dropped < 100
+    assert len(chains.thinned) == -(-chains.draws.shape[0] // apart) * chains.draws.shape[1]
+    assert chains.dropped + len(chains.draws) == 400 and 20 < chains.dropped < 100
     assert drawn(posterior(WIDE), BOUNDS, 2000, 3).chains.enough  # more are drawn by itself
 
 
@@ -103,8 +103,8 @@ def test_more_draws_have_more_walkers_until_their_steps_tell_tau() -> None:
 
 
 def test_tau_is_known_as_well_as_said(chance: Chance) -> None:
-    """Of 400 and of 100 walkers over 20 tau of x(t + 1) = a x(t) + noise, tau = 9: to 5 and 10 %,
-    by which `ENOUGH` was chosen. False failures: 2e-7."""
+    """With 400 and 100 walkers over 20 tau of x(t + 1) = a x(t) + noise, tau = 9, it is known to 5
+    and 10 %, by which `ENOUGH` was chosen. False failures: 2e-7."""
     a, tau = 0.8, 9.0
     for number, share in ((400, 0.05), (100, 0.10)):
         noise = chance.random.normal(size=(int(ENOUGH * tau), number, 40))
@@ -115,8 +115,8 @@ def test_tau_is_known_as_well_as_said(chance: Chance) -> None:
 
 
 def test_the_autocorrelation_time_is_that_of_the_closed_form() -> None:
-    """Of x(t + 1) = a x(t) + noise it is (1 + a) / (1 - a), of independent draws 1; walkers that
-    stay apart from each other have a long one."""
+    """The time of x(t + 1) = a x(t) + noise is (1 + a) / (1 - a), that of independent draws 1;
+    walkers that stay apart from each other have a long one."""
     random, times = generator("autocorrelation"), []
     for a in (0.0, 0.5, 0.9):
         x = [random.normal(size=(50, 1))]

@@ -48,8 +48,8 @@ def states(curves, mixing=lambda p: 0.0):
 def test_slopes_by_differences_are_exact_for_a_power_of_the_pressure_with_a_bend():
     """ln f quadratic in ln p: second-order differences have no error, at uneven steps and ends."""
     f = lambda p: 20 * np.exp(0.3 * np.log(p) + 0.02 * np.log(p) ** 2)
-    found = slopes(states({Label(2, 0): f}), [Label(2, 0)])[Label(2, 0)]
-    assert found == pytest.approx([0.3 + 0.04 * np.log(p) for p in P], rel=1e-9)
+    rises = slopes(states({Label(2, 0): f}), [Label(2, 0)])[Label(2, 0)]
+    assert rises == pytest.approx([0.3 + 0.04 * np.log(p) for p in P], rel=1e-9)
 
 
 def test_slopes_of_few_pressures():
@@ -66,21 +66,21 @@ def test_findings_name_every_exception():
         Label(2, 0): lambda p: 80 + 3 * np.sqrt(p),
         Label(3, 0): lambda p: 90 + 2 * np.sqrt(p),  # rises less than [2,0]
     }
-    found = findings(states(curves), list(curves)).model_dump()
-    by_label = {(m["c"], m["m"], m["kind"]): m for m in found["modes"]}
-    assert [m["curvature"] for m in found["modes"]] == ["convex", "neither"] + ["concave"] * 3
-    assert [m["rises"] for m in found["modes"]] == [True, False, True, True, True]
+    content = findings(states(curves), list(curves)).model_dump()
+    by_label = {(m["c"], m["m"], m["kind"]): m for m in content["modes"]}
+    assert [m["curvature"] for m in content["modes"]] == ["convex", "neither"] + ["concave"] * 3
+    assert [m["rises"] for m in content["modes"]] == [True, False, True, True, True]
     assert by_label[2, 0, None]["rise_Hz"] == pytest.approx(3 * (np.sqrt(320) - 10))
     assert by_label[0, 0, "axial"]["convex_at_kPa"] == [130.0, 200.0]
-    inner, outer = found["families"]
+    inner, outer = content["families"]
     assert inner["members"] == ["[0,0] torsional", "[1,0]", "[2,0]", "[3,0]"]
     assert not inner["grows_with_c"] and inner["exceptions"] == ["[3,0]"]
     assert outer["members"] == ["[0,0] axial"] and outer["grows_with_c"]
-    text = "\n".join(found["words"])
+    text = "\n".join(content["words"])
     assert "every mode rises, but for [0,0] torsional from 100 to 320 kPa" in text
     assert "the rise grows with c, but for [3,0]" in text
     assert "but for [0,0] lateral (convex), [0,0] torsional (neither)" in text
-    assert found["disagreements"] == [] and found["least_mac"] == pytest.approx(1.0)
+    assert content["disagreements"] == [] and content["least_mac"] == pytest.approx(1.0)
     assert "labels stay with the shapes" in text and "three pressures" not in text
     two = findings(states(curves)[:2], list(curves)).model_dump()
     assert {m["curvature"] for m in two["modes"]} == {"unknown"}
@@ -99,9 +99,9 @@ def test_modes_that_cross_keep_their_labels_and_modes_that_mix_are_told():
     mixing = findings(
         states(curves, lambda p: np.pi / 2 * P.index(p) / 3), [AXIAL, TORSIONAL]
     ).model_dump()
-    told = mixing["disagreements"]
-    assert {(d["from_kPa"], d["to_kPa"]) for d in told} == {(130.0, 200.0)}
-    assert {(d["label"], d["followed_to"]) for d in told} == {
+    disagreements = mixing["disagreements"]
+    assert {(d["from_kPa"], d["to_kPa"]) for d in disagreements} == {(130.0, 200.0)}
+    assert {(d["label"], d["followed_to"]) for d in disagreements} == {
         (str(AXIAL), str(TORSIONAL)),
         (str(TORSIONAL), str(AXIAL)),
     }
@@ -123,13 +123,13 @@ def test_more_modes_are_asked_for_where_a_target_is_lost() -> None:
 
     short = replace(case, case=case.case.model_copy(update={"analysis": few}))
     evaluator = Evaluator(TyreDesign(short))
-    found = sweep(short, evaluator, {"initial": start_values(case)}, [200.0])
+    outcomes = sweep(short, evaluator, {"initial": start_values(case)}, [200.0])
     assert evaluator.counts.runs == 3  # the nominal tyre, this one, and again with more modes
     (whole,) = sweep(case, Evaluator(TyreDesign(case)), {"initial": start_values(case)}, [200.0])
-    (state,) = found
+    (state,) = outcomes
     for label in LABELS:
         assert state.frequencies[label] == pytest.approx(whole.frequencies[label], rel=1e-9)
-    result = sweep_result(short, {"initial": {}}, found).content()
+    result = sweep_result(short, {"initial": {}}, outcomes).content()
     assert result["findings"] == [] and len(result["rows"]) == 1
 
 

@@ -48,16 +48,16 @@ def test_a_tyre_on_two_rims_is_sampled_and_predicted_on_both() -> None:
             Measurement("frequency_Hz", label, "", 240.0, 0.0, hertz, 0.005 * hertz, rim=rim)
         )
     sample = run(case, evaluator, readings, 2000, at_kPa=(240.0,))
-    told = result(sample, 0)
-    assert told.variables["C10"].low < 1e6 < told.variables["C10"].high
-    at = {(row.label, row.rim): row for row in told.predicted}
+    summary = result(sample, 0)
+    assert summary.variables["C10"].low < 1e6 < summary.variables["C10"].high
+    at = {(row.label, row.rim): row for row in summary.predicted}
     clamped, hung = at[label, None], at[label, "free"]
     assert hung.frequency_Hz > 1.8 * clamped.frequency_Hz
     for row, reading in zip((clamped, hung), readings, strict=True):
         assert row.measured_Hz == pytest.approx(reading.value)
     waves = [at[Label(3, 0), rim] for rim in (None, "free")]
     assert waves[0].frequency_Hz == pytest.approx(waves[1].frequency_Hz, rel=1e-3)
-    titles = [table.title for table in told.tables()[1:]]
+    titles = [table.title for table in summary.tables()[1:]]
     assert titles == ["Hz at 240 kPa", "Hz at 240 kPa, rim free"]
     spindle = {"s": case.case.variables["C10"].model_copy(update={"sets": [SPRINGS[0]]})}
     held = replace(case, case=case.case.model_copy(update={"variables": spindle}))
@@ -85,14 +85,16 @@ def test_predictions_are_the_conditional_of_the_joint_normal_distribution() -> N
     whole += 0.002**2 * np.kron(near, shared + np.eye(3))
     whole += np.vstack([g, other]) @ np.vstack([g, other]).T
     whole[:3, :3] += scatter
-    found = conditional(here, whole[:3, :3], g, there, other, 0.002)
+    prediction = conditional(here, whole[:3, :3], g, there, other, 0.002)
     precision = np.linalg.inv(whole)
-    assert np.allclose(found.covariance, np.linalg.inv(precision[3:, 3:]), rtol=1e-6, atol=1e-15)
-    assert np.allclose(found.pull, -found.covariance @ precision[3:, :3], atol=1e-8)
+    assert np.allclose(
+        prediction.covariance, np.linalg.inv(precision[3:, 3:]), rtol=1e-6, atol=1e-15
+    )
+    assert np.allclose(prediction.pull, -prediction.covariance @ precision[3:, :3], atol=1e-8)
     C, A, B = np.diag([0.01, 0.04]), random.normal(size=(3, 2)), random.normal(size=(6, 2))
-    rest = B - found.pull @ A
-    expected = np.sqrt(np.diag(rest @ C @ rest.T + found.covariance))
-    assert np.allclose(found.sigma(A, B, C), expected)
+    rest = B - prediction.pull @ A
+    expected = np.sqrt(np.diag(rest @ C @ rest.T + prediction.covariance))
+    assert np.allclose(prediction.sigma(A, B, C), expected)
 
 
 def test_drawn_predictions_have_that_mean_and_covariance(chance: Chance) -> None:
@@ -100,13 +102,13 @@ def test_drawn_predictions_have_that_mean_and_covariance(chance: Chance) -> None
     here, there = rows((240.0,)), rows((200.0, 280.0))
     g, other = chance.random.normal(0, 0.01, (3, 2)), chance.random.normal(0, 0.01, (6, 2))
     sigma = g @ g.T + 1e-4 * np.eye(3)
-    found = conditional(here, sigma, g, there, other, 0.0)
+    prediction = conditional(here, sigma, g, there, other, 0.0)
     eta, off = np.tile(np.arange(6.0), (2000, 1)), np.tile([0.01, -0.02, 0.03], (2000, 1))
-    x = found.drawn(eta, off, int(chance.random.integers(2**31)))
-    middle = eta[0] + found.pull @ off[0]
+    x = prediction.drawn(eta, off, int(chance.random.integers(2**31)))
+    middle = eta[0] + prediction.pull @ off[0]
     for j in range(6):
         chance.mean(x[:, j] - middle[j], 0.0, 0.0)
-        chance.scatter(x[:, j], float(np.sqrt(found.covariance[j, j])))
+        chance.scatter(x[:, j], float(np.sqrt(prediction.covariance[j, j])))
 
 
 def test_targets_are_read_with_their_sigma_or_what_the_fit_leaves() -> None:
@@ -124,19 +126,19 @@ def test_targets_are_read_with_their_sigma_or_what_the_fit_leaves() -> None:
 def sampled(draws: int = 20_000) -> Sample:
     """As `study.run` gives it, of the linear tyre."""
     density = posterior(WIDE)
-    found = drawn(density, BOUNDS, draws, 5)
+    drawing = drawn(density, BOUNDS, draws, 5)
     observations = Observations(rows((240.0,)), density.y, SIGMA, 0.0, SIGMA * np.nan, SIGMA)
-    x = found.chains.thinned
+    x = drawing.chains.thinned
     eta = density.ln_f(x, density.rows)
     return Sample(
-        VARIABLES, ("m2", ""), observations, (), found, rows((240.0,)), eta, SIGMA, 0.01, None
+        VARIABLES, ("m2", ""), observations, (), drawing, rows((240.0,)), eta, SIGMA, 0.01, None
     )
 
 
 def test_the_result_says_what_the_draws_are() -> None:
     sample = sampled()
-    found, flat = result(sample, 5), sample.drawn.chains.flat
-    A, B = found.variables["A"], found.variables["B"]
+    summary, flat = result(sample, 5), sample.drawn.chains.flat
+    A, B = summary.variables["A"], summary.variables["B"]
     a, b = np.exp(flat[:, 0]), -50 + 101 * flat[:, 1]
     for v, values in ((A, a), (B, b)):
         assert v.mean == pytest.approx(values.mean())
@@ -146,22 +148,22 @@ def test_the_result_says_what_the_draws_are() -> None:
     assert A.standard_error == pytest.approx(WIDTH[0] * A.best, rel=1e-6)
     assert B.standard_error == pytest.approx(WIDTH[1] * 101, rel=1e-6)
     assert A.box == pytest.approx(np.exp(WIDE[0])) and B.box == pytest.approx(-50 + 101 * WIDE[1])
-    assert found.correlations["A"]["B"] == pytest.approx(np.corrcoef(flat.T)[0, 1])
-    (pair,) = found.pairs
+    assert summary.correlations["A"]["B"] == pytest.approx(np.corrcoef(flat.T)[0, 1])
+    (pair,) = summary.pairs
     thin = sample.drawn.chains.thinned
     assert (pair.a, pair.b) == ("B", "A") and np.sum(pair.counts) == len(thin)
     half = len(pair.counts) // 2  # rows are steps of B
     assert np.sum(pair.counts[:half]) == (thin[:, 1] < WIDE[1].mean()).sum()
-    row, hertz = found.predicted[0], np.exp(sample.ln_f[:, 0])
+    row, hertz = summary.predicted[0], np.exp(sample.ln_f[:, 0])
     assert (row.low, row.frequency_Hz) == pytest.approx(np.quantile(hertz, (0.05, 0.5)))
     assert row.measured_Hz == pytest.approx(np.exp(sample.observations.y[0]))
     assert row.sigma_Hz == pytest.approx(0.01 * row.measured_Hz)
     assert row.standard_error == pytest.approx(0.01 * row.frequency_Hz)
     table = np.array([line.split(",") for line in draws_csv(sample).splitlines()[1:]], float)
     assert np.allclose(table, np.column_stack([np.exp(thin[:, 0]), -50 + 101 * thin[:, 1]]))
-    assert draws_csv(sample).startswith("A,B\n") and len(table) == found.chains.kept
-    assert found.csv().splitlines()[1].startswith("1,0,,240.0,")
-    assert found.chains.enough or found.doubts()
+    assert draws_csv(sample).startswith("A,B\n") and len(table) == summary.chains.kept
+    assert summary.csv().splitlines()[1].startswith("1,0,,240.0,")
+    assert summary.chains.enough or summary.doubts()
 
 
 def test_doubts_of_a_result() -> None:
@@ -185,6 +187,6 @@ def test_the_corner_picture_says_names_units_and_lines(
 
     assert isinstance(tmp_path, Path)
     (name, figure), *_ = figures(result(sampled(), 0)).items()
-    with every_text_readable(monkeypatch) as said:
+    with every_text_readable(monkeypatch) as texts:
         save(figure, tmp_path / f"{name}.png")
-    assert {"A", "B", "A, m2", "draws", "linear", "median", "90 %"} <= set(said)
+    assert {"A", "B", "A, m2", "draws", "linear", "median", "90 %"} <= set(texts)

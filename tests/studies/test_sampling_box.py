@@ -24,23 +24,23 @@ Array = np.ndarray
 
 
 def test_the_box_grows_until_it_holds_the_posterior() -> None:
-    asked: list[Array] = []
+    boxes: list[Array] = []
 
     def ask(box: Array) -> Posterior:
-        asked.append(box)
+        boxes.append(box)
         return posterior(box)
 
     begun: list[bool] = []
     first = np.stack([CENTRE - 2 * WIDTH, CENTRE + 1.5 * WIDTH], 1)
-    found = grown(ask, first, BOUNDS, np.ones(3), 20_000, 1, begun.append)
-    assert found.at_edge.sum() < AT_EDGE and not found.stopped
-    assert found.boxes == len(asked) >= 2 and found.evaluations == 14
-    assert begun == [False, True] * len(asked)
-    for before, after in pairwise(asked):
+    result = grown(ask, first, BOUNDS, np.ones(3), 20_000, 1, begun.append)
+    assert result.at_edge.sum() < AT_EDGE and not result.stopped
+    assert result.boxes == len(boxes) >= 2 and result.evaluations == 14
+    assert begun == [False, True] * len(boxes)
+    for before, after in pairwise(boxes):
         assert (after[:, 0] <= before[:, 0]).all() and (after[:, 1] >= before[:, 1]).all()
-    tails = np.abs(found.posterior.box - CENTRE[:, None]) / WIDTH[:, None]
+    tails = np.abs(result.posterior.box - CENTRE[:, None]) / WIDTH[:, None]
     assert tails.min() > 3  # 1e-3 of a normal distribution lie beyond 3.3
-    assert found.chains.flat.std(0) == pytest.approx(WIDTH, rel=0.05)
+    assert result.chains.flat.std(0) == pytest.approx(WIDTH, rel=0.05)
 
 
 def test_a_box_that_cannot_grow_says_why() -> None:
@@ -50,9 +50,9 @@ def test_a_box_that_cannot_grow_says_why() -> None:
     def failing(box: Array) -> Posterior:
         raise EvaluationFailed("no_equilibrium", "inflation stopped at 12 kPa")
 
-    found = grown(small, first, BOUNDS, np.ones(3), 3000, 1)
-    assert found.boxes == 1 and found.at_edge.sum() > AT_EDGE
-    assert found.stopped == "a larger box has no emulator: inflation stopped at 12 kPa"
+    result = grown(small, first, BOUNDS, np.ones(3), 3000, 1)
+    assert result.boxes == 1 and result.at_edge.sum() > AT_EDGE
+    assert result.stopped == "a larger box has no emulator: inflation stopped at 12 kPa"
     with pytest.raises(EvaluationFailed, match="inflation"):
         grown(failing, first, BOUNDS, np.ones(3), 3000, 1)
 
@@ -61,54 +61,54 @@ def test_a_box_that_cannot_grow_says_why() -> None:
         errors = np.full(3, 0.02 if not np.allclose(box, first) else 0.5)
         return replace(made, emulators=(replace(made.emulators[0], stated_errors=errors),))
 
-    found = grown(rough, first, BOUNDS, np.array([0.03, 0.01, 0.03]), 3000, 1)
-    assert found.stopped == "the emulator of a larger box may be 2 % off"
-    assert found.boxes == 1 and found.evaluations == 14
+    result = grown(rough, first, BOUNDS, np.array([0.03, 0.01, 0.03]), 3000, 1)
+    assert result.stopped == "the emulator of a larger box may be 2 % off"
+    assert result.boxes == 1 and result.evaluations == 14
     assert grown(rough, first, BOUNDS, np.full(3, 0.03), 3000, 1).boxes > 1
 
 
 def test_a_box_does_not_grow_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(box_module, "GROWTHS", 1)
     first = np.stack([CENTRE - 0.1 * WIDTH, CENTRE + 0.1 * WIDTH], 1)
-    found = grown(posterior, first, BOUNDS, np.ones(3), 3000, 1)
-    assert found.boxes == 2 and found.stopped == "it was made larger 1 times"
+    result = grown(posterior, first, BOUNDS, np.ones(3), 3000, 1)
+    assert result.boxes == 2 and result.stopped == "it was made larger 1 times"
 
 
 def test_bounds_are_no_edges() -> None:
     box, bounds = np.array([[0.0, 1.0], [0.0, 1.0]]), np.array([[0.0, 5.0], [-3.0, 1.0]])
     x = np.column_stack([np.linspace(0, 1, 1001), np.linspace(0, 1, 1001)])
-    found = shares_at_edge(x, box, bounds)
-    assert found == pytest.approx(np.array([[0.0, 0.025], [0.025, 0.0]]), abs=1e-3)
-    assert larger(box, bounds, found).tolist() == [[0.0, 1.25], [-0.25, 1.0]]
+    shares = shares_at_edge(x, box, bounds)
+    assert shares == pytest.approx(np.array([[0.0, 0.025], [0.025, 0.0]]), abs=1e-3)
+    assert larger(box, bounds, shares).tolist() == [[0.0, 1.25], [-0.25, 1.0]]
     assert larger(box, bounds, np.full((2, 2), 1e-5)).tolist() == box.tolist()
     near = np.array([[0.0, 1.1], [-0.1, 1.0]])
-    assert larger(box, near, found).tolist() == near.tolist()
+    assert larger(box, near, shares).tolist() == near.tolist()
 
 
 def test_a_box_is_tried_by_the_shares_that_draws_from_it_will_have(chance: Chance) -> None:
-    """Of a normal posterior cut by its box: by the closed form of the first variable.
-    False failures: 1e-6."""
+    """A normal posterior cut by its box, by the closed form of the first variable. False failures:
+    1e-6."""
     box = np.stack([CENTRE - [3, 7] * WIDTH, CENTRE + [2, 7] * WIDTH], 1)
     density = posterior(box)
-    found = np.array(
+    shares = np.array(
         [probed(density, BOUNDS, int(s)) for s in chance.random.integers(10**9, size=50)]
     )
     whole = norm.cdf(2) - norm.cdf(-3)
     near = 0.05 * 2.5
     expected = [norm.cdf(near - 3) - norm.cdf(-3), norm.cdf(2) - norm.cdf(2 - near)]
-    assert found.mean(0)[0] == pytest.approx(np.array(expected) / whole, rel=0.2)
-    assert found[:, 1].max() < 1e-6
+    assert shares.mean(0)[0] == pytest.approx(np.array(expected) / whole, rel=0.2)
+    assert shares[:, 1].max() < 1e-6
 
 
 def test_a_box_with_two_optima_is_tried_about_both() -> None:
     """The same shares as walkers come to, of which fewer are at the farther edge."""
     box = np.array([[-0.54, 0.55], [0.2, 0.8]])
     density = posterior(box, two_valleys, two_valleys(np.array([0.5, 0.5])))
-    found = probed(density, BOUNDS, 1)
+    shares = probed(density, BOUNDS, 1)
     x = drawn(density, BOUNDS, 100_000, 0).chains.flat
     by_walkers = shares_at_edge(x, box, BOUNDS)
     assert by_walkers[0].min() > 1e-3
-    assert found[0] == pytest.approx(by_walkers[0], rel=0.3)
+    assert shares[0] == pytest.approx(by_walkers[0], rel=0.3)
 
 
 def test_weights_of_draws_count_at_the_edge() -> None:

@@ -27,7 +27,7 @@ def test_compliance_of_a_single_mode() -> None:
 @pytest.mark.slow
 def test_bounds_rise_with_the_load() -> None:
     """The free frequency below the lower bound, that below the upper; a larger patch holds more."""
-    found = table([100.0, 1000.0], with_level(load_case(CASE), "coarse"))
-    for label, (free, lower, upper) in found[100.0].items():
+    bounds = table([100.0, 1000.0], with_level(load_case(CASE), "coarse"))
+    for label, (free, lower, upper) in bounds[100.0].items():
         assert free < lower < upper
-        assert lower < found[1000.0][label][1] and upper < found[1000.0][label][2]
+        assert lower < bounds[1000.0][label][1] and upper < bounds[1000.0][label][2]

@@ -43,15 +43,15 @@ def on_faces(folder: Path, places: Array, weights: Array) -> list[tuple[Array, A
     place = {int(n): i for i, n in enumerate(fields.nodes)}
     faces = np.array([[place[n] for n in face] for face in tread_faces(folder)])
     N, by_a, by_b = serendipity(*(x.ravel() for x in np.meshgrid(places, places)))
-    found = []
+    result = []
     for height, (_, _, moved) in zip(road_heights(folder), fields.blocks, strict=True):
         corners = (fields.points + moved)[faces]
         if faces.shape[1] == 4:
             corners = np.concatenate([corners, (corners + np.roll(corners, -1, 1)) / 2], 1)
         x = N @ corners
         area = np.linalg.norm(np.cross(by_a @ corners, by_b @ corners), axis=-1)
-        found.append((x, x[..., 0] - height, area * np.outer(weights, weights).ravel()))
-    return found
+        result.append((x, x[..., 0] - height, area * np.outer(weights, weights).ravel()))
+    return result
 
 
 def areas_below(folder: Path, places: Array, weights: Array) -> list[float]:
@@ -81,8 +81,8 @@ def _edge(place: Array, over: Array) -> float:
     one, other = -over[last + 1 : last + 3]
     growth = (other / max(one, 1e-12)) ** (2 / 3)
     step = place[last + 2] - place[last + 1]
-    found = place[last + 1] - step / (growth - 1) if growth > 1 else place[last + 1]
-    return float(np.clip(found, place[last], place[last + 1]))
+    edge = place[last + 1] - step / (growth - 1) if growth > 1 else place[last + 1]
+    return float(np.clip(edge, place[last], place[last + 1]))
 
 
 def outside(pressed: Pressed, row: Footprint, side: int) -> tuple[Array, Array, Array]:

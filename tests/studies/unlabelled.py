@@ -82,12 +82,12 @@ def main(count: int, seed: int, discrepant: bool) -> None:
             truth.append(-1)
         order = np.argsort(y)
         y_, truth_ = np.array(y)[order], np.array(truth)[order]
-        found = find_labels(expand, partial(without_labels, y_), prior).labelings
-        right.append(bool((found.modes[0] == truth_).all()))
-        stated.append(found.probabilities[0])
-        best = found.each.argmax(1)
+        result = find_labels(expand, partial(without_labels, y_), prior).labelings
+        right.append(bool((result.modes[0] == truth_).all()))
+        stated.append(result.probabilities[0])
+        best = result.each.argmax(1)
         each_right += list(np.where(best == len(labels), -1, best) == truth_)
-        each_stated += list(found.each.max(1))
+        each_stated += list(result.each.max(1))
         top = max(y) + FOREIGN_MARGIN
         every = np.sort([*ln_f[ln_f < top], *y_[truth_ < 0]])
         apart.append(bool(np.diff(every).min() > APART))

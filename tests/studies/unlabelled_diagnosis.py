@@ -82,17 +82,17 @@ def judged(whole: InverseProblem, readings: Sequence[Reading], effect: str) -> d
     rows = [row.row for row in whole.observations.rows]
     seen = [each.observations for each in readings]
     there = [replace(whole, observations=o, places=places(o, rows)) for o in seen]
-    found = [weigh(each, pairs=False) for each in there]
-    share = shares(readings, found)
-    best, p = int(np.argmax(share)), averaged(share, found)
-    verdict = decide(found[best], p, len(there[best].places), len(whole.centre))
+    weighed = [weigh(each, pairs=False) for each in there]
+    share = shares(readings, weighed)
+    best, p = int(np.argmax(share)), averaged(share, weighed)
+    verdict = decide(weighed[best], p, len(there[best].places), len(whole.centre))
     top = max(p, key=lambda key: p[key])
-    told = {"p": round(p.get(effect, 0.0), 4), "likeliest": top, "top": round(p[top], 4)}
-    return {**told, "said": verdict.key or verdict.kind, "readings": share.round(4).tolist()}
+    record = {"p": round(p.get(effect, 0.0), 4), "likeliest": top, "top": round(p[top], 4)}
+    return {**record, "said": verdict.key or verdict.kind, "readings": share.round(4).tolist()}
 
 
 def observed(rows: Sequence[Observable], y: Array, own: Array) -> Observations:
-    """Of ln f and the rows that they are, those left out that are none."""
+    """Observations of ln f and their rows, without those that are no mode."""
     kept = np.flatnonzero(own >= 0)
     kept = kept[np.argsort(own[kept])]
     none = np.full(len(kept), np.nan)
@@ -152,11 +152,11 @@ def labelled(
 
     wide = np.full(v, np.inf)
     prior = Prior(whole.centre, START_SPREAD * np.eye(v), -wide, wide)
-    found = find_labels(at, measured, prior).labelings
-    count = max(1, int((found.probabilities[:MOST_READINGS] >= LEAST_PROBABLE).sum()))
-    own = list(found.modes[:count])
+    result = find_labels(at, measured, prior).labelings
+    count = max(1, int((result.probabilities[:MOST_READINGS] >= LEAST_PROBABLE).sum()))
+    own = list(result.modes[:count])
     see = partial(observed, rows, tyre.y)
-    return [Reading(see(own[k]), float(found.ln_prior[k])) for k in range(count)], own
+    return [Reading(see(own[k]), float(result.ln_prior[k])) for k in range(count)], own
 
 
 @click.command()
@@ -179,19 +179,19 @@ def main(tyres: int, seed: int) -> None:
     for tyre in range(tyres):
         id, own = drawn(whole, random, tyre % 4 == 3)
         readings, rows_of = labelled(whole, own)
-        told: dict[str, object] = {"tyre": tyre, "effect": id}
-        told[WAYS[1]] = judged(whole, readings, id)
+        record: dict[str, object] = {"tyre": tyre, "effect": id}
+        record[WAYS[1]] = judged(whole, readings, id)
         partly, rows_partly = labelled(whole, own, 1)
-        told[WAYS[3]] = judged(whole, partly, id)
+        record[WAYS[3]] = judged(whole, partly, id)
         certain = [observed(observables, own.y, own.truth), readings[0].observations]
         for way, o in zip((WAYS[0], WAYS[2]), certain, strict=True):
             there = replace(whole, observations=o, places=places(o, rows))
             swapped = exchanged(there, weigh(there))
             o = with_exchanged(o, *swapped) if swapped else o
-            told[way] = judged(whole, [Reading(o)], id)
-        for key, found in (("right", rows_of), ("right, partly", rows_partly)):
-            told[key] = [bool((each == own.truth).all()) for each in found]
-        lines.append(json.dumps(told))
+            record[way] = judged(whole, [Reading(o)], id)
+        for key, labelings in (("right", rows_of), ("right, partly", rows_partly)):
+            record[key] = [bool((each == own.truth).all()) for each in labelings]
+        lines.append(json.dumps(record))
         print(lines[-1], flush=True)
     tell([json.loads(line) for line in lines])
     if tyres >= 60:
@@ -222,19 +222,19 @@ def tell(lines: list[dict]) -> None:
             own = [(each["effect"], each[way]) for each in of]
             effects = [(id, one["said"]) for id, one in own if id != NONE]
             sound = [one["said"] for id, one in own if id == NONE]
-            right = sum(id == said for id, said in effects)
+            right = sum(id == verdict for id, verdict in effects)
             low, high = clopper_pearson(right, len(effects))
-            outside = sum(said == OUTSIDE for _, said in effects)
-            open_ = sum(said in ("undecided", "no_gap") for _, said in effects)
+            outside = sum(verdict == OUTSIDE for _, verdict in effects)
+            open_ = sum(verdict in ("undecided", "no_gap") for _, verdict in effects)
             stated = np.array([one["top"] for _, one in own])
             hit = np.array([one["likeliest"] == id for id, one in own])
             error, bound = calibration_error(stated, hit), calibration_quantile(stated)
-            accused = sum(said not in ("undecided", "no_gap", OUTSIDE) for said in sound)
+            accused = sum(verdict not in ("undecided", "no_gap", OUTSIDE) for verdict in sound)
             print(
                 f"| {words} | {way} | {right} of {len(effects)} ({low:.2f} to {high:.2f}) |"
                 f" {len(effects) - right - outside - open_} | {outside} | {open_} |"
                 f" {np.mean([one['p'] for _, one in own]):.3f} | {error:.3f} ({bound:.3f}) |"
-                f" {accused}, {sum(said == OUTSIDE for said in sound)} of {len(sound)} |"
+                f" {accused}, {sum(verdict == OUTSIDE for verdict in sound)} of {len(sound)} |"
             )
 
 

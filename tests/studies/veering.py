@@ -56,11 +56,13 @@ def made(model: TyreModel, x: np.ndarray, random: np.random.Generator) -> tuple[
         for path, step in source.steps.items():
             values[path] = values.get(path, 0.0) + z * step
     own = values["pressure_kPa"] - model.case.case.pressure_kPa
-    asked = [{**values, "pressure_kPa": p + own} for p in PRESSURES_kPa]
-    found = dict(zip(PRESSURES_kPa, model._modes([(each, ()) for each in asked]), strict=True))
+    designs = [{**values, "pressure_kPa": p + own} for p in PRESSURES_kPa]
+    by_pressure = dict(
+        zip(PRESSURES_kPa, model._modes([(each, ()) for each in designs]), strict=True)
+    )
     ln_f = []
     for label, p in model.rows:
-        answer = found[p]
+        answer = by_pressure[p]
         assert isinstance(answer, Found) and label, answer
         ln_f.append(np.log(answer.wanted[label].frequency_Hz))
     return np.array(ln_f), drawn
@@ -100,22 +102,22 @@ def main(tyres: int, seed: int) -> None:
         ln_f, drawn = made(model, x, random)
         y = ln_f + random.normal(0, NOISE, len(rows))
         seen = Observations(observables, y, scatter, 0.0, unknown, unknown)
-        told = {"tyre": tyre, "drawn": drawn, "apart": round(abs(y[0] - y[1]), 4)}
+        record = {"tyre": tyre, "drawn": drawn, "apart": round(abs(y[0] - y[1]), 4)}
         for name, known in (("now", expansion), ("slopes", replace(expansion, coupling=None))):
             problem = InverseProblem(
                 seen, known, model.spans, places(seen, rows), model.start, model.spread
             )
-            found = weigh(problem, pairs=False)
-            p = probabilities(found)
+            hypotheses = weigh(problem, pairs=False)
+            p = probabilities(hypotheses)
             if p["none"] < DOUBTED:
-                found = weigh(problem)
-                p = probabilities(found)
-            verdict = decide(found, p, len(rows), len(x))
+                hypotheses = weigh(problem)
+                p = probabilities(hypotheses)
+            verdict = decide(hypotheses, p, len(rows), len(x))
             count[name, verdict.kind] += 1
             chances = round(p["none"], 4), round(p["outside"], 4)
-            told[name] = [verdict.kind, verdict.key or "", *chances]
-        print(json.dumps(told), flush=True)
-        lines.append(json.dumps(told))
+            record[name] = [verdict.kind, verdict.key or "", *chances]
+        print(json.dumps(record), flush=True)
+        lines.append(json.dumps(record))
     for name in ("now", "slopes"):
         kinds = {kind: n for (which, kind), n in sorted(count.items()) if which == name}
         print(f"{name}: {kinds}")

@@ -60,8 +60,12 @@ def with_compression(case: LoadedCase, bears: bool) -> LoadedCase:
 def frequencies(case: LoadedCase, pressure_kPa: float) -> dict[tuple, float]:
     """Hz by c, m and kind. Raises EvaluationFailed."""
     values = start_values(case)
-    found = Evaluator(TyreDesign(case)).evaluate(Question(values | {"pressure_kPa": pressure_kPa}))
-    return {(m.c, m.m, m.kind): m.frequency_Hz for m in modes_result(case, values, found)[0].modes}
+    evaluation = Evaluator(TyreDesign(case)).evaluate(
+        Question(values | {"pressure_kPa": pressure_kPa})
+    )
+    return {
+        (m.c, m.m, m.kind): m.frequency_Hz for m in modes_result(case, values, evaluation)[0].modes
+    }
 
 
 def told(case: LoadedCase, pressure_kPa: float) -> str:
@@ -73,7 +77,7 @@ def told(case: LoadedCase, pressure_kPa: float) -> str:
 
 
 def by_size(code: str) -> LoadedCase:
-    """What `tyrecal init` writes."""
+    """Case that `tyrecal init` writes for a size code."""
     draft = from_size(parse_size(code), {}, None, "tyre")
     with TemporaryDirectory() as folder:
         Path(folder, draft.file).write_bytes(draft.content)
