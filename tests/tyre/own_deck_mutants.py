@@ -232,22 +232,22 @@ def judged(folder: Path, text: str, flat: str) -> str:
     path = folder / "tyre.inp"
     path.write_text(text, encoding="utf-8")
     try:
-        found = read_own_deck(path, "m").flat({})
-        trial(found)
+        deck = read_own_deck(path, "m").flat({})
+        trial(deck)
     except OwnDeckError as error:
         return "refused" if error.place.line else "no line"
     except Exception as error:
         return f"{type(error).__name__}: {error}"
-    return "same" if found.text == flat and found.pressure_Pa == 2e5 else "COMPUTED OTHERWISE"
+    return "same" if deck.text == flat and deck.pressure_Pa == 2e5 else "COMPUTED OTHERWISE"
 
 
 def draw(count: int, seed: int) -> list[tuple[str, str, str, str]]:
     """Kind, style, judgement and text of each mutant."""
-    random, found = Random(seed), list[tuple[str, str, str, str]]()
+    random, results = Random(seed), list[tuple[str, str, str, str]]()
     styles = {"plain": own_decks.plain, **own_decks.STYLES}
     del styles["millimetres"], styles["free_format"]  # of the same words as others
     with TemporaryDirectory() as folder:
-        while len(found) < count:
+        while len(results) < count:
             style = random.choice(list(styles))
             text = styles[style]()
             (Path(folder) / "right.inp").write_text(text)
@@ -258,8 +258,8 @@ def draw(count: int, seed: int) -> list[tuple[str, str, str, str]]:
             except (IndexError, ValueError):  # the style has nothing of the kind
                 continue
             if wrong != text:
-                found.append((kind, style, judged(Path(folder), wrong, right), wrong))
-    return found
+                results.append((kind, style, judged(Path(folder), wrong, right), wrong))
+    return results
 
 
 def main() -> None:
@@ -268,9 +268,9 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--keep", type=Path)
     given = parser.parse_args()
-    found = draw(given.count, given.seed)
-    print(Counter((kind, how) for kind, _, how, _ in found))
-    for n, (kind, style, how, text) in enumerate(found):
+    results = draw(given.count, given.seed)
+    print(Counter((kind, how) for kind, _, how, _ in results))
+    for n, (kind, style, how, text) in enumerate(results):
         if how not in ("refused", "same"):
             print(n, kind, style, how)
         if given.keep and how != "refused":

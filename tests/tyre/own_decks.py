@@ -35,7 +35,7 @@ MM = {"C10": 0.8, "C01": 0.2, "D1": 0.05, "rho": 1.1e-9, "E": 1e4, "cord": 1.5e-
 
 
 def number(i: int, j: int) -> int:
-    """Of the node in row i from the inner surface and column j from the bead at -z."""
+    """Number of the node in row i from the inner surface and column j from the bead at -z."""
     return 1000 * (i + 1) + j + 1
 
 

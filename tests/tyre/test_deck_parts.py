@@ -39,7 +39,7 @@ def case(tmp_path_factory: pytest.TempPathFactory) -> LoadedCase:
 
 
 def radii(case: LoadedCase, **values: float) -> np.ndarray:
-    """Of the nodes about the section's centre (row, column)."""
+    """Radii of the nodes about the section's centre (row, column)."""
     paths = {name.replace("__", "."): value for name, value in values.items()}
     nodes = resolved(with_values(case, paths)).flat.mesh.nodes
     place = {n: k for k, n in enumerate(sorted(own_decks.Tyre().nodes), start=1)}
@@ -111,17 +111,18 @@ def test_what_a_deck_cannot_have_is_refused_by_name(case: LoadedCase) -> None:
 
 @pytest.mark.slow
 def test_an_effect_withheld_from_a_deck_is_named(case: LoadedCase, tmp_path: Path) -> None:
-    """Of a tyre drawn with it; those that a deck has no numbers for are said, with the reason."""
+    """A tyre drawn with an effect has that effect named; effects for which a deck has no numbers
+    are reported with the reason."""
     evaluator, noise = Evaluator(TyreDesign(case)), np.random.default_rng(1)
     rows = ["quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma"]
     for kPa in (160.0, 240.0):
         drawn = {"effects.sidewall_gauge": 0.12, "A_CORD": 4e-7, "pressure_kPa": kPa}
-        found = evaluator.evaluate(Question(drawn))
-        for mode in paired_labels(found.modes):
+        evaluation = evaluator.evaluate(Question(drawn))
+        for mode in paired_labels(evaluation.modes):
             c, m, kind = mode.label.c, mode.label.m, mode.label.kind or ""
             f = mode.frequency_Hz * (1 + 5e-4 * noise.standard_normal())
             rows += [f"frequency_Hz,{c},{m},{kind},,{kPa},0,{f!r},{5e-4 * f!r}"] * (m < 2)
-    rows.append(f"mass_kg,,,,,240,0,{found.mass_kg!r},0.01")
+    rows.append(f"mass_kg,,,,,240,0,{evaluation.mass_kg!r},0.01")
     measured = tmp_path / "measured.csv"
     measured.write_text("\n".join(rows) + "\n")
     of_all = [f"material {name} / HYPERELASTIC / C10" for name in ("TREAD", "SIDEWALL", "BODY")]
@@ -130,14 +131,19 @@ def test_an_effect_withheld_from_a_deck_is_named(case: LoadedCase, tmp_path: Pat
     own["variables"] = {name: own["variables"][name] for name in ("A_CORD", "C10_BODY")}
     path = case.path.with_name("one_rubber.yaml")
     path.write_text(json.dumps(own))
-    asked = ["sidewall_gauge", "bead_filler", "cap_ply"]
-    words = [word for id in asked for word in ("--effect", id)]
+    effects = ["sidewall_gauge", "bead_filler", "cap_ply"]
+    words = [word for id in effects for word in ("--effect", id)]
     out = ["--output", str(tmp_path / "out"), "--no-store", "--quiet", "--no-pictures"]
     with pytest.raises(SystemExit) as ended:
         main(["diagnose", str(path), "--measured", str(measured), *words, *out])
     assert not ended.value.code
-    told = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
-    assert told["verdict"] == "named" and told["effect"] == "sidewall_gauge"
+    diagnosis = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert diagnosis["verdict"] == "named" and diagnosis["effect"] == "sidewall_gauge"
     page = (tmp_path / "out" / "diagnosis.md").read_text()
     assert "Not considered, changes lines or regions of a section or a law" in page
-    assert {part["region"] for part in told["section_map"]} == {"TREAD", "SIDEWALL", "BODY", "CORD"}
+    assert {part["region"] for part in diagnosis["section_map"]} == {
+        "TREAD",
+        "SIDEWALL",
+        "BODY",
+        "CORD",
+    }

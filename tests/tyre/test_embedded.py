@@ -49,7 +49,8 @@ def test_a_reflected_half_is_the_whole(tmp_path: Path) -> None:
 
 
 def test_slopes_by_places_are_exact(tmp_path: Path) -> None:
-    """Of an embedded node, whose host's weights change with it, and of what it carries."""
+    """An embedded node is moved: its host's weights change with it, and what it carries moves
+    too."""
     text = plain(apart(18).mesh() + EMBEDDED)
     line = next(row for row in text.splitlines() if row.startswith("50011, "))
     n, r, z = line.split(", ")

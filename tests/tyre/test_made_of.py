@@ -1,4 +1,4 @@
-"""What a section from a size code is made of, and what effects change of it."""
+"""Parts of a section from a size code, and the changes that effects make."""
 
 from __future__ import annotations
 

@@ -93,8 +93,8 @@ def test_a_ring_of_constant_thickness(tmp_path: Path) -> None:
         belt_step=0.01,
     )
     for line, radius in zip(section.points, (0.05, 0.052, 0.053, 0.054, 0.06), strict=True):
-        found = np.hypot(*(line - [0.25, 0.0]).T)
-        assert found[~np.isnan(found)] == pytest.approx(radius, abs=3e-5)
+        radii = np.hypot(*(line - [0.25, 0.0]).T)
+        assert radii[~np.isnan(radii)] == pytest.approx(radius, abs=3e-5)
     ends = [np.flatnonzero(~np.isnan(section.points[k, :, 0]))[-1] for k in (2, 3)]
     angles = [np.arctan2(*(section.points[1, e] - [0.25, 0.0])[::-1]) for e in ends]
     assert 0.052 * np.array(angles) == pytest.approx([0.04, 0.035], abs=1e-4)
@@ -174,8 +174,8 @@ def test_gauges_are_distances_along_the_normal() -> None:
     line = np.stack([0.25 + 0.05 * np.cos(t), 0.05 * np.sin(t)], -1)
     gauges = np.array([-1e-3, 0.0, 8e-3])[:, None] * np.ones(len(t))
     for points, radius in zip(from_gauges(line, gauges), (0.049, 0.05, 0.058), strict=True):
-        found = np.hypot(*(points - [0.25, 0.0]).T)
-        assert found[:-3] == pytest.approx(radius, abs=2e-6)  # the spline's end is straight
+        radii = np.hypot(*(points - [0.25, 0.0]).T)
+        assert radii[:-3] == pytest.approx(radius, abs=2e-6)  # the spline's end is straight
 
 
 @pytest.mark.parametrize(

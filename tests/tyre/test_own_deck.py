@@ -39,13 +39,13 @@ def write(folder: Path, text: str) -> Path:
 
 
 def frequencies(case: Path) -> np.ndarray:
-    """Of the tyre's first modes, and its mass."""
+    """Mass and frequencies of the tyre's first modes."""
     loaded = load_case(case)
     analysis = loaded.case.analysis.model_copy(update={"highest_harmonic": 2})
     plain = loaded.case.model_copy(update={"analysis": analysis})
     object.__setattr__(loaded, "case", plain)
-    found = Evaluator(TyreDesign(loaded)).evaluate(Question({}))
-    return np.array([found.mass_kg, *(mode.frequency_Hz for mode in found.modes)])
+    evaluation = Evaluator(TyreDesign(loaded)).evaluate(Question({}))
+    return np.array([evaluation.mass_kg, *(mode.frequency_Hz for mode in evaluation.modes)])
 
 
 @pytest.fixture(scope="module")
@@ -59,9 +59,9 @@ def test_what_abaqus_would_refuse(tmp_path: Path, capsys: pytest.CaptureFixture[
     for style in (own_decks.plain, *own_decks.STYLES.values()):
         path.write_text(style())
         deck = read_own_deck(path, "m")
-        asked = asked_by_abaqus(deck.with_numbers({}))
-        assert not asked["refuses"]
-        assert all("more than the 20 characters" in doubt for doubt in asked["unknown"])
+        report = asked_by_abaqus(deck.with_numbers({}))
+        assert not report["refuses"]
+        assert all("more than the 20 characters" in doubt for doubt in report["unknown"])
     text = own_decks.plain().replace("*REBAR LAYER\nCAR", "*ELASTIC\n1e9, 0.3\n*REBAR LAYER\nCAR")
     path.write_text(text.replace("*END STEP", "*CLOAD\n900001, 1\n*END STEP"))
     with pytest.raises(SystemExit) as ended:
@@ -82,8 +82,8 @@ def test_what_abaqus_would_refuse(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 @pytest.mark.parametrize("style", own_decks.STYLES)
 def test_only_the_writing_differs(style: str, reference: np.ndarray, tmp_path: Path) -> None:
-    found = frequencies(write(tmp_path, own_decks.STYLES[style]()))
-    assert found == pytest.approx(reference, rel=1e-9)
+    values = frequencies(write(tmp_path, own_decks.STYLES[style]()))
+    assert values == pytest.approx(reference, rel=1e-9)
 
 
 def test_cords_that_bear_no_compression(reference: np.ndarray, tmp_path: Path) -> None:
@@ -101,8 +101,8 @@ def test_included_files(reference: np.ndarray, tmp_path: Path) -> None:
     at = text.index("*SOLID SECTION")
     (tmp_path / "parts").mkdir()
     (tmp_path / "parts" / "mesh.inp").write_text(text[:at])
-    found = frequencies(write(tmp_path, "*include, Input=parts/mesh.inp\n" + text[at:]))
-    assert found == pytest.approx(reference, rel=1e-12)
+    values = frequencies(write(tmp_path, "*include, Input=parts/mesh.inp\n" + text[at:]))
+    assert values == pytest.approx(reference, rel=1e-12)
     (tmp_path / "tyre.inp").write_text(text)
     whole = read_own_deck(tmp_path / "tyre.inp").flat({}).text
     head, data = text[: text.index("1001,")], text[text.index("1001,") : text.index("*NODE\n")]
@@ -264,7 +264,7 @@ def test_laws_and_elements_in_either_units(tmp_path: Path) -> None:
 
 
 def numbers_of(flat: Flat) -> list[list[float]]:
-    """Of the data lines of the materials, and the nodes' coordinates."""
+    """Numbers in the data lines of the materials, and the nodes' coordinates."""
     lines = flat.lines[flat.lines.index("*MATERIAL, NAME=RUBBER") :]
     rows = [line.split(",") for line in lines if not line.startswith("*")]
     nodes = [x for point in flat.mesh.nodes.values() for x in point]
@@ -273,10 +273,12 @@ def numbers_of(flat: Flat) -> list[list[float]]:
 
 def test_wrong_decks_are_refused_by_line_or_are_the_same(request: pytest.FixtureRequest) -> None:
     """None is computed otherwise."""
-    found = own_deck_mutants.draw(25, request.config.getoption("--seed"))
-    wrong = [(kind, style, how) for kind, style, how, _ in found if how not in ("refused", "same")]
+    mutants = own_deck_mutants.draw(25, request.config.getoption("--seed"))
+    wrong = [
+        (kind, style, how) for kind, style, how, _ in mutants if how not in ("refused", "same")
+    ]
     assert not wrong
-    assert sum(how == "refused" for _, _, how, _ in found) >= 20
+    assert sum(how == "refused" for _, _, how, _ in mutants) >= 20
 
 
 def test_a_tyre_is_the_same_however_its_paths_are_written(tmp_path: Path) -> None:
@@ -292,16 +294,16 @@ def test_a_tyre_is_the_same_however_its_paths_are_written(tmp_path: Path) -> Non
 
 
 def test_validate_reads_a_deck_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    case, asked = write(tmp_path, own_decks.plain()), list[Path]()
+    case, paths = write(tmp_path, own_decks.plain()), list[Path]()
 
     def reading(path: Path, units: Units | None = None) -> OwnDeck:
-        asked.append(path)
+        paths.append(path)
         return read_own_deck(path, units)
 
     monkeypatch.setattr("tyrecal.tyre.case.deck_file.read_own_deck", reading)
     with pytest.raises(SystemExit) as ended:
         main(["validate", str(case)])
-    assert not ended.value.code and len(asked) == 1
+    assert not ended.value.code and len(paths) == 1
 
 
 def test_what_stays_the_same_is_built_once(tmp_path: Path) -> None:
@@ -372,10 +374,10 @@ def test_effects_of_named_parts_change_their_numbers(tmp_path: Path) -> None:
             {f"{of}{name}": 0.85 for of in (of_rubber, of_tread) for name in ("C10", "C01")},
         ),
     ):
-        found = resolved(with_values(case, {f"effects.{effect}": value})).case.deck
-        assert found
+        deck = resolved(with_values(case, {f"effects.{effect}": value})).case.deck
+        assert deck
         by_hand = {path: factor * plain[path] for path, factor in expected.items()}
-        assert found.numbers == pytest.approx({**plain, **by_hand}, rel=1e-12)
+        assert deck.numbers == pytest.approx({**plain, **by_hand}, rel=1e-12)
     with pytest.raises(ValueError, match="cap_ply changes lines or regions of a section"):
         resolved(with_values(case, {"effects.cap_ply": 1e-5}))
 

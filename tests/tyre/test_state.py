@@ -103,11 +103,11 @@ def test_a_free_rim_is_set_by_the_command_line_and_told(tmp_path: Path) -> None:
         folder = tmp_path / name
         case = [str(CASES / "p235_75r17.yaml"), "--mesh", "coarse", "--no-pictures"]
         assert run("modes", *case, *given, "--output", str(folder)) == 0
-        found = json.loads((folder / "modes.json").read_text())
-        of = found["provenance"]
+        result = json.loads((folder / "modes.json").read_text())
+        of = result["provenance"]
         assert of["state"]["rim"] == ("free" if given else "fixed")
         assert of["overrides"] == ({"rim.free": True} if given else {})
-        hertz[name] = {(m["c"], m["m"], m["kind"]): m["frequency_Hz"] for m in found["modes"]}
+        hertz[name] = {(m["c"], m["m"], m["kind"]): m["frequency_Hz"] for m in result["modes"]}
         hertz[name]["tyre"] = of["tyre_sha256"]
     assert hertz["free"].pop("tyre") == hertz["held"].pop("tyre")
     for label, f in hertz["held"].items():

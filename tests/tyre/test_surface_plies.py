@@ -31,11 +31,11 @@ def test_a_ply_on_the_inner_surface_is_the_limit_of_one_just_inside() -> None:
     """Frequencies differ by the liner's thickness, at first order."""
     apart = []
     for liner in (0.02, 0.01):
-        found = [
+        evaluations = [
             Evaluator(TyreDesign(with_carcass_on(line, liner))).evaluate(Question(START))
             for line in ("ply", "inner")
         ]
-        inside, on = ([m.frequency_Hz for m in each.modes] for each in found)
+        inside, on = ([m.frequency_Hz for m in each.modes] for each in evaluations)
         apart.append(np.array(on) / np.array(inside) - 1)
     assert (apart[1] != 0).all()
     # terms of second order: a fiftieth, the liner's share of itself
@@ -67,9 +67,9 @@ def test_plies_on_surfaces_have_elements_of_their_own() -> None:
 def test_a_region_of_one_station_has_an_interval(
     labels: str, rigid: str, regions: dict[str, int]
 ) -> None:
-    found = dict(regions_of(list(labels), [flag == "1" for flag in rigid]))
+    by_region = dict(regions_of(list(labels), [flag == "1" for flag in rigid]))
     if len(regions) < len(set(labels)):  # no interval for each: refused where the table is read
-        assert min(found.values()) < 1
+        assert min(by_region.values()) < 1
     else:
-        assert found == regions
-    assert sum(found.values()) == len(labels) - 1
+        assert by_region == regions
+    assert sum(by_region.values()) == len(labels) - 1
