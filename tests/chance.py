@@ -43,7 +43,7 @@ class Chance:
         self.seen: list[tuple[int, int, float, float]] = []  # hits, trials, low, high
 
     def often(self, hits: Sequence[bool] | Array, low: float, high: float = 1.0) -> None:
-        """Of independent trials, each a hit with a probability between low and high.
+        """Check independent trials, each a hit with a probability between low and high.
 
         Exact: binomial tails of RATE together.
         """
@@ -107,13 +107,13 @@ class Chance:
 
 def stated(words: str | None) -> float:
     """The false-failure rate that a docstring states; 0 where it states none."""
-    found = STATED.search(words or "")
-    return float(found[1]) if found else 0.0
+    match = STATED.search(words or "")
+    return float(match[1]) if match else 0.0
 
 
 def budget() -> dict[str, float]:
     """Every test that claims, with the rate that it states."""
-    found = {}
+    rates = {}
     for path in sorted(Path(__file__).parent.rglob("test_*.py")):
         text = path.read_text()
         for node in ast.walk(ast.parse(text)) if "chance" in text else ():
@@ -121,9 +121,9 @@ def budget() -> dict[str, float]:
                 continue
             if any(argument.arg == "chance" for argument in node.args.args):
                 name = f"{path.relative_to(Path(__file__).parent)}::{node.name}"
-                found[name] = stated(ast.get_docstring(node))
+                rates[name] = stated(ast.get_docstring(node))
                 assert not any("parametrize" in ast.dump(d) for d in node.decorator_list), name
-    return found
+    return rates
 
 
 if __name__ == "__main__":

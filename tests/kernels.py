@@ -38,13 +38,14 @@ def run(words: list[str], kernel: str, threads: int = 1) -> subprocess.Completed
 
 
 def kernels(usual: str) -> dict[str, str]:
-    """What to run under, and what the libraries call it; says what is not run, and why."""
+    """Kernels to run under, with the libraries' names for them; prints which are not run, and
+    why."""
     taken: dict[str, str] = {}
     for name in KERNELS:
-        asked = run(["-c", ASK], name)
-        core = asked.stdout.strip()
-        if asked.returncode:
-            print(f"{name}: not run, this processor cannot: {asked.stderr.strip()[-200:]}")
+        probe = run(["-c", ASK], name)
+        core = probe.stdout.strip()
+        if probe.returncode:
+            print(f"{name}: not run, this processor cannot: {probe.stderr.strip()[-200:]}")
         elif core in taken.values():
             print(f"{name}: not run again, the libraries take {core} for it")
         else:
@@ -76,10 +77,10 @@ def tested(kernel: str, core: str, threads: int, more: list[str]) -> bool:
 def main(more: list[str]) -> int:
     own = run(["-c", ASK], "").stdout.strip()
     every, more = "--every" in more, [each for each in more if each != "--every"]
-    found = sorted(kernels(own).items(), key=lambda kernel: kernel[1] == own)  # its own last
-    turns = {core: THREADS[(len(found) - i) % 2] for i, (_, core) in enumerate(found)}
+    chosen = sorted(kernels(own).items(), key=lambda kernel: kernel[1] == own)  # its own last
+    turns = {core: THREADS[(len(chosen) - i) % 2] for i, (_, core) in enumerate(chosen)}
     jobs = [
-        (name, core, n, more) for name, core in found for n in THREADS if every or n == turns[core]
+        (name, core, n, more) for name, core in chosen for n in THREADS if every or n == turns[core]
     ]
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         return not all([*pool.map(lambda job: tested(*job), jobs)])  # a failure stops no other

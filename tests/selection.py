@@ -26,7 +26,7 @@ class LeftOut:
     packages: str = ""
 
     def missing(self) -> str:
-        """What is to be said where a program is not installed; empty where all are."""
+        """Message where a program is not installed; empty where all are."""
         if all(map(shutil.which, self.programs)):
             return ""
         return f"{self.name} is not installed here (apt-get install {self.packages})"
@@ -85,8 +85,8 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node: Any) -> None:
     """Each worker collected the same tests: any of them may tell."""
-    if told := getattr(node, "workeroutput", {}).get("left_out"):
-        node.config.stash[COUNTS] = told
+    if counts := getattr(node, "workeroutput", {}).get("left_out"):
+        node.config.stash[COUNTS] = counts
 
 
 def pytest_terminal_summary(

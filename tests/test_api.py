@@ -1,4 +1,4 @@
-"""What ``import tyrecal`` offers: light, typed, and every example of it runs."""
+"""Contents of ``import tyrecal``: light, typed, and every example of it runs."""
 
 from __future__ import annotations
 
@@ -273,9 +273,9 @@ tyrecal.fit_everything(case)  # WRONG
     )
     lines = program.read_text().splitlines()
     wrong = [f"program.py:{i}" for i, line in enumerate(lines, 1) if line.endswith("# WRONG")]
-    told = done.stdout.splitlines()
-    assert [line.partition(": error:")[0] for line in told if ": error:" in line] == [
+    output = done.stdout.splitlines()
+    assert [line.partition(": error:")[0] for line in output if ": error:" in line] == [
         str(program.with_name(place)) for place in wrong
     ], done.stdout
-    types = [line.partition("Revealed type is ")[2] for line in told if "Revealed" in line]
+    types = [line.partition("Revealed type is ")[2] for line in output if "Revealed" in line]
     assert len(types) == len(tyrecal.__all__) and '"Any"' not in types

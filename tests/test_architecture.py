@@ -109,7 +109,7 @@ def test_files_of_the_map(file: str) -> None:
 
 def test_names_of_the_map() -> None:
     """A name in backticks behind a file, before the next one, is defined there."""
-    told = 0
+    count = 0
     for line in MAP.replace("\n   ", " ").splitlines():
         marks = re.findall(r"`([^`]+)`", line)
         files = [mark for mark in marks if re.fullmatch(r"[\w/]+\.py", mark)]
@@ -121,8 +121,8 @@ def test_names_of_the_map() -> None:
             follows = marks[marks.index(file) + 1 :][:1]
             if follows and re.fullmatch(r"[A-Za-z_]+", follows[0]) and follows[0] not in ("deck",):
                 assert follows[0] in defined, f"{file} has no {follows[0]}"
-                told += 1
-    assert told >= 15
+                count += 1
+    assert count >= 15
 
 
 def test_a_constants_name_means_one_thing() -> None:
@@ -135,5 +135,5 @@ def test_a_constants_name_means_one_thing() -> None:
             for each in (x for target in targets if target for x in ast.walk(target)):
                 if isinstance(each, ast.Name) and each.id.isupper():
                     files.setdefault(each.id, set()).add(module)
-    twice = {name: sorted(found) for name, found in files.items() if len(found) > 1}
+    twice = {name: sorted(values) for name, values in files.items() if len(values) > 1}
     assert len(twice) <= 10, twice

@@ -21,16 +21,16 @@ BUILTIN = {name for name, kind in vars(builtins).items() if isinstance(kind, typ
 
 def drawn(text: str) -> dict[str, tuple[str, str]]:
     """Name to parent and exit code, as a drawing has them; a child has its parent's code."""
-    found: dict[str, tuple[str, str]] = {}
+    result: dict[str, tuple[str, str]] = {}
     above: list[tuple[int, str]] = []
     for indent, name, code in re.findall(
         r"^( {4,})([A-Z]\w+)(?:, (\d))?(?: {2,}|$)", text, re.MULTILINE
     ):
         above = [(depth, parent) for depth, parent in above if depth < len(indent)]
         parent = above[-1][1] if above else ""
-        found[name] = parent, code or found.get(parent, ("", "2"))[1]
+        result[name] = parent, code or result.get(parent, ("", "2"))[1]
         above.append((len(indent), name))
-    return found
+    return result
 
 
 @cache
@@ -41,15 +41,17 @@ def exceptions() -> dict[str, tuple[str, str]]:
         for node in ast.walk(tree(path)):
             if isinstance(node, ast.ClassDef) and node.bases:
                 classes[node.name] = module, ast.unparse(node.bases[0])
-    found: dict[str, tuple[str, str]] = {}
+    result: dict[str, tuple[str, str]] = {}
     while new := {
         name: (module, base)
         for name, (module, base) in classes.items()
-        if name not in found
-        and (base in found or (base in BUILTIN and issubclass(vars(builtins)[base], BaseException)))
+        if name not in result
+        and (
+            base in result or (base in BUILTIN and issubclass(vars(builtins)[base], BaseException))
+        )
     }:
-        found |= new
-    return found
+        result |= new
+    return result
 
 
 def test_all_exceptions_are_drawn() -> None:

@@ -132,8 +132,10 @@ def test_the_command_ends_as_interrupted(
     monkeypatch.setattr(Store, "read", read)
     command = ["sweep-pressure", CASE, *COARSE, "--steps", "3", "--output", str(tmp_path)]
     assert run(*command) == 130
-    said = capsys.readouterr().err
-    assert "interrupted: " in said and "same command goes on" in said and "error" not in said
+    message = capsys.readouterr().err
+    assert (
+        "interrupted: " in message and "same command goes on" in message and "error" not in message
+    )
     assert len(list(tmp_path.glob("record/*/*.record"))) == (met == "swallowed")
 
 

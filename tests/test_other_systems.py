@@ -83,7 +83,7 @@ def test_studies_with_what_windows_has(command: list[str], processes: int, tmp_p
     (tmp_path / "site" / "sitecustomize.py").write_text(BLOCKED)
     started = tmp_path / "started"
     blocked = {"PYTHONPATH": str(tmp_path / "site"), "BLOCKED": str(started)}
-    said = []
+    outputs = []
     for name, environment in (("plain", {}), ("blocked", blocked)):
         done = subprocess.run(
             [sys.executable, "-m", "tyrecal", *command, "--output", "out"],
@@ -94,8 +94,8 @@ def test_studies_with_what_windows_has(command: list[str], processes: int, tmp_p
         )
         assert done.returncode == 0, done.stderr
         assert "Traceback" not in done.stderr
-        said.append(done.stdout)
-    assert said[0] == said[1]
-    found = results(tmp_path / "blocked" / "out")
-    assert found == results(tmp_path / "plain" / "out") and len(found) >= 2
+        outputs.append(done.stdout)
+    assert outputs[0] == outputs[1]
+    without = results(tmp_path / "blocked" / "out")
+    assert without == results(tmp_path / "plain" / "out") and len(without) >= 2
     assert len(started.read_text().split()) >= processes  # all of them went without

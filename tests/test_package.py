@@ -1,4 +1,5 @@
-"""What ships: every package of the tree and all its files; size and licences of what it needs."""
+"""Contents of the package: every package of the tree and all its files; size and licences of its
+requirements."""
 
 from __future__ import annotations
 
@@ -58,31 +59,33 @@ def test_every_file_of_a_package_ships() -> None:
 
 def core() -> list[metadata.Distribution]:
     """The packages that `pip install .` installs: tyrecal, all it needs, all that those need."""
-    found: dict[str, metadata.Distribution] = {}
+    needed: dict[str, metadata.Distribution] = {}
     waiting = [Requirement("tyrecal")]
     while waiting:
         requirement = waiting.pop()
         name = requirement.name.lower().replace("_", "-")
-        if name in found or (requirement.marker and not requirement.marker.evaluate({"extra": ""})):
+        if name in needed or (
+            requirement.marker and not requirement.marker.evaluate({"extra": ""})
+        ):
             continue
-        found[name] = metadata.distribution(requirement.name)
-        waiting += map(Requirement, found[name].requires or [])
-    return list(found.values())
+        needed[name] = metadata.distribution(requirement.name)
+        waiting += map(Requirement, needed[name].requires or [])
+    return list(needed.values())
 
 
 def licence(distribution: metadata.Distribution) -> str:
     """As the package states it: an expression, else classifiers, else the first line of a text."""
-    told = distribution.metadata
-    classifiers = [c for c in told.get_all("Classifier") or [] if c.startswith("License ::")]
-    text = (told["License"] or "").strip().partition("\n")[0]
-    return told["License-Expression"] or "; ".join(classifiers) or text
+    fields = distribution.metadata
+    classifiers = [c for c in fields.get_all("Classifier") or [] if c.startswith("License ::")]
+    text = (fields["License"] or "").strip().partition("\n")[0]
+    return fields["License-Expression"] or "; ".join(classifiers) or text
 
 
 @pytest.mark.parametrize("distribution", core(), ids=lambda d: str(d.name))
 def test_no_part_of_the_core_is_under_the_gpl(distribution: metadata.Distribution) -> None:
-    said = licence(distribution)
-    assert said, distribution.name
-    assert not re.search(r"\bA?GPL|(?<!Lesser )General Public License", said), said
+    words = licence(distribution)
+    assert words, distribution.name
+    assert not re.search(r"\bA?GPL|(?<!Lesser )General Public License", words), words
 
 
 def test_no_text_installs_tyrecal_by_its_name() -> None:
@@ -127,20 +130,24 @@ def test_heavy_packages_of_the_tests_are_not_in_the_core() -> None:
 
 def test_the_citation_is_one() -> None:
     """The fields that CFF 1.2.0 requires, and the facts of pyproject.toml."""
-    told = YAML(typ="safe").load((ROOT / "CITATION.cff").read_text())
-    assert told["cff-version"] == "1.2.0" and told["message"] and told["type"] == "software"
-    assert told["title"].startswith(PROJECT["name"] + ":")
-    assert told["version"] == PROJECT["version"] == tyrecal.__version__
-    assert told["license"] == "MIT" == PROJECT["license"]["text"]
+    citation = YAML(typ="safe").load((ROOT / "CITATION.cff").read_text())
+    assert (
+        citation["cff-version"] == "1.2.0"
+        and citation["message"]
+        and citation["type"] == "software"
+    )
+    assert citation["title"].startswith(PROJECT["name"] + ":")
+    assert citation["version"] == PROJECT["version"] == tyrecal.__version__
+    assert citation["license"] == "MIT" == PROJECT["license"]["text"]
     assert (ROOT / "LICENSE").read_text().startswith("MIT License\n")
-    assert told["abstract"] and told["keywords"]
-    for work in [told, *told["references"]]:
+    assert citation["abstract"] and citation["keywords"]
+    for work in [citation, *citation["references"]]:
         assert work["title"] and work["authors"]
         assert all(
             set(a) in ({"name"}, {"family-names"}, {"family-names", "given-names"})
             for a in work["authors"]
         )
-    for work in told["references"]:
+    for work in citation["references"]:
         assert work["type"] in ("article", "conference-paper") and 1990 < work["year"] < 2100
 
 

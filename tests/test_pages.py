@@ -37,13 +37,13 @@ def rows(page: str, start: str) -> list[list[str]]:
 
 def figure(cell: str) -> float:
     """The first number."""
-    found = NUMBER.search(cell)
-    assert found, cell
-    return float(found[0])
+    match = NUMBER.search(cell)
+    assert match, cell
+    return float(match[0])
 
 
 def frequencies(values: Mapping[str, float]) -> dict[Label, float]:
-    """Of the paper's tyre."""
+    """Frequencies of the paper's tyre."""
     case = load_case(CASES / "p235_75r17.yaml")
     answer = Evaluator(TyreDesign(case)).evaluate(Question(values))
     return {mode.label: mode.frequency_Hz for mode in paired_labels(answer.modes)}
@@ -54,8 +54,8 @@ def test_table_2_of_the_page_on_the_paper() -> None:
     targets = read_targets(load_case(CASES / "p235_75r17.yaml"))
     start = start_values(load_case(CASES / "p235_75r17.yaml"))
     hertz = [frequencies({**start, **column}) for column in COLUMNS]
-    told = rows("paper.md", r"\[\d,\d\]")
-    for target, cells, paper in zip(targets, told, np.transpose(PAPER_HZ), strict=True):
+    printed = rows("paper.md", r"\[\d,\d\]")
+    for target, cells, paper in zip(targets, printed, np.transpose(PAPER_HZ), strict=True):
         ours = [each[target.label] for each in hertz]
         assert cells[0].split()[0] == f"[{target.label.c},{target.label.m}]"
         expected = [
@@ -76,24 +76,24 @@ def test_table_2_of_the_page_on_the_paper() -> None:
 
 
 def test_every_figure_is_the_recorded_one_rounded() -> None:
-    """Of what `python -m tests.studies.pages FOLDER` found last."""
+    """The record is that of the last run of `python -m tests.studies.pages FOLDER`."""
     assert not list(differences(recorded()))
 
 
 @pytest.mark.slow
 @pytest.mark.numbers
 def test_labels_of_the_page_on_real_data() -> None:
-    """What the fitted 205/60R15 says of six frequencies without labels."""
+    """Labels that the fitted 205/60R15 gives to six frequencies without labels."""
     case = load_case(CASES / "205_60r15.yaml")
     evaluator = Evaluator(TyreDesign(case))
     fixed = {"A_belt": case.case.variables["A_belt"].start}
     fit = calibrate(case, evaluator, fixed=fixed).found
     readings = read_measurements(CASES / "205_60r15_vervoort.csv", labelled=False)
-    told = label(case, evaluator, readings, fitted_prior(case, fit), fixed=fixed)
+    labelled = label(case, evaluator, readings, fitted_prior(case, fit), fixed=fixed)
     table = rows("real_data.md", r"\d{3}")
-    for cells, found in zip(table, labels_told(case, told).frequencies, strict=True):
-        assert figure(cells[0]) == found.frequency_Hz and cells[1] == found.said
-        assert figure(cells[2]) == pytest.approx(found.expected_Hz, abs=0.06)
-        off = 100 * (found.expected_Hz or 0.0) / found.frequency_Hz - 100
+    for cells, frequency in zip(table, labels_told(case, labelled).frequencies, strict=True):
+        assert figure(cells[0]) == frequency.frequency_Hz and cells[1] == frequency.said
+        assert figure(cells[2]) == pytest.approx(frequency.expected_Hz, abs=0.06)
+        off = 100 * (frequency.expected_Hz or 0.0) / frequency.frequency_Hz - 100
         assert figure(cells[3]) == pytest.approx(off, abs=0.06)
-        assert figure(cells[4]) == pytest.approx(100 * found.probability, abs=1.0)
+        assert figure(cells[4]) == pytest.approx(100 * frequency.probability, abs=1.0)

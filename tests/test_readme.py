@@ -52,8 +52,8 @@ QUICK = [  # first words of blocks of the README that the quick set runs; they n
 
 def blocks(guide: str) -> list[str]:
     """The guide's ```sh blocks, but for those that set themselves up."""
-    found = re.findall(r"```sh\n(.*?)```", (ROOT / guide).read_text(), re.S)
-    return [block for block in found if OWN_SETUP not in block]
+    texts = re.findall(r"```sh\n(.*?)```", (ROOT / guide).read_text(), re.S)
+    return [block for block in texts if OWN_SETUP not in block]
 
 
 def makes(guide: str, block: str) -> bool:
@@ -62,9 +62,9 @@ def makes(guide: str, block: str) -> bool:
 
 def marks(guide: str, block: str) -> list[pytest.MarkDecorator]:
     needs = {"calculix": pytest.mark.ccx, "--scheduler cases": pytest.mark.cluster}
-    found = [mark for word, mark in needs.items() if word in block]
+    chosen = [mark for word, mark in needs.items() if word in block]
     quick = guide == "README.md" and block.startswith(tuple(QUICK))
-    return [*found, *([] if quick else [pytest.mark.guide])]
+    return [*chosen, *([] if quick else [pytest.mark.guide])]
 
 
 def parameters() -> list[object]:

@@ -1,4 +1,4 @@
-"""What `pytest` runs where nothing is chosen, and that it says what it left out, and why."""
+"""Default selection of `pytest`, and the report of what it left out, and why."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ def pytest_of(folder: Path, *arguments: str, **environment: str) -> tuple[set[st
 
 @pytest.mark.parametrize("workers", [[], pytest.param(["-n", "2"], marks=pytest.mark.slow)])
 def test_the_quick_set_is_run_and_the_rest_is_said(tests: Path, workers: list[str]) -> None:
-    ran, said = pytest_of(tests, *workers, str(tests), PATH="")
+    ran, report = pytest_of(tests, *workers, str(tests), PATH="")
     assert ran == {"test_quick"}
-    lines = said.splitlines()
-    counts = dict(re.findall(r"^ +(\d+ \w+): (.*)$", said, re.M))
-    assert list(counts) == [f"{1 + (m == 'guide')} {m}" for m in LEFT_OUT], said
+    lines = report.splitlines()
+    counts = dict(re.findall(r"^ +(\d+ \w+): (.*)$", report, re.M))
+    assert list(counts) == [f"{1 + (m == 'guide')} {m}" for m in LEFT_OUT], report
     assert "CalculiX is not installed here (apt-get install calculix-ccx)" in counts["1 ccx"]
     assert "Chromium is not installed here" in counts["1 browser"]
     assert counts["1 slow"] == f"{LEFT_OUT['slow'].reason}; pytest -m slow"
@@ -66,14 +66,14 @@ def test_the_quick_set_is_run_and_the_rest_is_said(tests: Path, workers: list[st
     ],
 )
 def test_what_is_chosen_is_run(tests: Path, arguments: list[str], expected: set[str]) -> None:
-    ran, said = pytest_of(tests, *arguments)
-    assert ran == expected and not said
+    ran, report = pytest_of(tests, *arguments)
+    assert ran == expected and not report
 
 
 @pytest.mark.slow
 def test_words_choose_in_the_quick_set(tests: Path) -> None:
-    ran, said = pytest_of(tests, "-k", "quick or slow")
-    assert ran == {"test_quick"} and " 1 slow: " in said and "lint" not in said
+    ran, report = pytest_of(tests, "-k", "quick or slow")
+    assert ran == {"test_quick"} and " 1 slow: " in report and "lint" not in report
 
 
 @pytest.mark.slow
@@ -86,8 +86,8 @@ def test_each_marker_has_its_reason() -> None:
     registered = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["pytest"]
     names = {line.partition(":")[0] for line in registered["ini_options"]["markers"]}
     assert names == {*LEFT_OUT, "quick", "numbers"}
-    told = set(re.findall(r"^\| `(\w+)` \|", (ROOT / "tests/README.md").read_text(), re.M))
-    assert told == {*LEFT_OUT, "numbers"}
+    named = set(re.findall(r"^\| `(\w+)` \|", (ROOT / "tests/README.md").read_text(), re.M))
+    assert named == {*LEFT_OUT, "numbers"}
     assert all(why.reason for why in LEFT_OUT.values())
 
 

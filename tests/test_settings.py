@@ -1,4 +1,4 @@
-"""What belongs to the user: which programs solvers start, and defaults. A case says none of it."""
+"""Settings of the user: programs that solvers start, and defaults. A case says none of it."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ def test_a_case_runs_no_program_of_its_own(
     solver: str, case_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     case = case_folder / "p235_75r17.yaml"
-    told = json.dumps({"command": command_that_touches(tmp_path / "pwned")})
+    options = json.dumps({"command": command_that_touches(tmp_path / "pwned")})
     text = case.read_text().replace("name: bundled", f"name: {solver}")
-    case.write_text(text.replace("options: {}", f"options: {told}"))
+    case.write_text(text.replace("options: {}", f"options: {options}"))
     for command in (["validate"], ["modes", "--output", str(tmp_path / "out")]):
         assert run(command[0], str(case), *command[1:]) == 2
         (line,) = capsys.readouterr().err.splitlines()
@@ -110,8 +110,8 @@ def test_a_wrong_file_is_one_sentence(
 ) -> None:
     file.write_text(text)
     assert run("validate", CASE) == 2
-    said = capsys.readouterr().err
-    assert words in said and str(file) in said and said.count("\n") == 1
+    message = capsys.readouterr().err
+    assert words in message and str(file) in message and message.count("\n") == 1
     assert run("solvers") == 0  # which says it, too
     assert words in " ".join(capsys.readouterr().out.split())
 
@@ -140,13 +140,13 @@ def test_solvers_and_doctor_say_what_is_in_force(
 ) -> None:
     file.write_text("commands: {calculix: [/opt/ccx, -x]}\n")
     assert run("solvers") == 0
-    said = " ".join(capsys.readouterr().out.split())
-    assert f"calculix starts '/opt/ccx -x', from {file}" in said
-    assert "abaqus starts 'abaqus', its default" in said and f"settings: {file}" in said
+    output = " ".join(capsys.readouterr().out.split())
+    assert f"calculix starts '/opt/ccx -x', from {file}" in output
+    assert "abaqus starts 'abaqus', its default" in output and f"settings: {file}" in output
     assert run("doctor", "--json") == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["settings"] == {"file": str(file), "there": True, "problem": None}
-    assert {s["name"]: s["command"] for s in found["solvers"]}["calculix"] == ["/opt/ccx", "-x"]
+    report = json.loads(capsys.readouterr().out)
+    assert report["settings"] == {"file": str(file), "there": True, "problem": None}
+    assert {s["name"]: s["command"] for s in report["solvers"]}["calculix"] == ["/opt/ccx", "-x"]
 
 
 def test_the_place_is_the_platforms(monkeypatch: pytest.MonkeyPatch) -> None:
