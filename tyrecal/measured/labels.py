@@ -103,7 +103,7 @@ class Labeller:
     def _probabilities(
         self, shapes: Array, below: Collection[Label] = (), frequency_Hz: float | None = None
     ) -> Array:
-        """Of each label (labels, n), of shapes (k, n)."""
+        """Probability of each label for shapes (k, n): (labels, n)."""
         evidence = np.array([_evidence(*spectrum, shapes) for spectrum in self._spectra])
         prior = self._prior(below)
         if self.case and frequency_Hz:
@@ -139,7 +139,7 @@ class Labeller:
         return odds
 
     def looks_like(self) -> dict[Label, list[Label]]:
-        """Of each label the other ones that its shapes look like on these sensors, the likeliest
+        """For each label the other labels that its shapes look like on these sensors, the likeliest
         first; none where at least `MIN_LABELLED` of the shapes drawn of it get it, in a file in
         which the mode that has to be below it was found."""
         k, random = len(self.sensors.points), np.random.default_rng(0)
@@ -203,7 +203,7 @@ def _lower(label: Label) -> Label | None:
 
 
 def _missing(sensors: Sensors) -> str:
-    """What a layout lacks to tell orders apart."""
+    """Measurements that a layout lacks to distinguish orders."""
     names = ("radial", "tangential", "axial")
     R, _, Z = sensors.points.T
     belt = R / R.max() > BELT

@@ -1,4 +1,4 @@
-"""What one line of a table measures."""
+"""Measured values in one line of a table."""
 
 from __future__ import annotations
 
@@ -84,8 +84,8 @@ class Line:
 
     def _quantities(self) -> list[str]:
         if not self.cell("value"):
-            if found := [quantity for quantity in QUANTITIES if self.cell(quantity)]:
-                return found
+            if quantities := [quantity for quantity in QUANTITIES if self.cell(quantity)]:
+                return quantities
             raise ValueError(
                 "nothing was measured: the cell of the value is empty; write n.a. if that is meant"
             )

@@ -38,13 +38,13 @@ class Measurement:
 
     @property
     def key(self) -> MeasurementKey:
-        """What is measured."""
+        """Identity of the measured value: quantity, label, member and state."""
         state = (self.pressure_kPa, self.load_N, self.rim)
         return (self.quantity, self.label, self.member, *state)
 
     @property
     def state(self) -> TyreState:
-        """What the tyre was in."""
+        """State of the tyre when it was measured."""
         return TyreState(self.pressure_kPa or None, self.load_N, self.rim)
 
     @property
@@ -54,7 +54,7 @@ class Measurement:
 
     @property
     def name(self) -> str:
-        """What is measured, in words."""
+        """Name of the measured value, in words."""
         return self.label.said if self.label else self.quantity
 
     @property

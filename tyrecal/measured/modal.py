@@ -363,7 +363,7 @@ def _unit(mode: MeasuredMode) -> tuple[Array, float]:
     return shape / (np.abs(shape).max() or 1.0), collinearity
 
 
-def settled(told: list[LabelledMode]) -> list[LabelledMode]:
+def settled(labelled: list[LabelledMode]) -> list[LabelledMode]:
     """Each label once in a run, or twice where both members of a doublet were found.
 
     As in ``modes.label``, the lowest mode on an order has its label; what comes above is an
@@ -372,7 +372,7 @@ def settled(told: list[LabelledMode]) -> list[LabelledMode]:
     hertz = lambda each: each.mode.frequency_Hz
     result: list[LabelledMode] = []
     by_label: dict[Label | None, list[LabelledMode]] = {}
-    for each in sorted(told, key=hertz):
+    for each in sorted(labelled, key=hertz):
         by_label.setdefault(each.judged.label, []).append(each)
     for label, group in by_label.items():
         if label is None:

@@ -1,4 +1,4 @@
-"""What repeats make of single values: their mean with its standard deviation.
+"""Combination of repeated single values: their mean with its standard deviation.
 
 The value is the mean over n runs, and sigma that of the mean:
 
@@ -86,9 +86,9 @@ def one_for_both(values: Sequence[Measurement]) -> list[Measurement]:
         places.setdefault(place, {}).setdefault(each.run, []).append(each)
     result = []
     for runs in places.values():
-        told = [{each.member for each in run} for run in runs.values()]
+        per_run = [{each.member for each in run} for run in runs.values()]
         for run in runs.values():
-            if run[0].load_N or all(members == told[0] for members in told):
+            if run[0].load_N or all(members == per_run[0] for members in per_run):
                 result += run
             elif {each.member for each in run} == {"1", "2"}:
                 mean = sum(each.value for each in run) / len(run)

@@ -98,7 +98,7 @@ class Function:
 
 @dataclass(frozen=True)
 class Universal:
-    """What a universal file holds.
+    """Contents of a universal file.
 
     axes: of nodes with a coordinate system of their own, unit vectors (3, 3) of the directions 1,
     2, 3 in the global system, a row each; all others measure along its x, y, z.
