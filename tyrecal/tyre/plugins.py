@@ -16,12 +16,12 @@ _ENTRY = re.compile(r'^ +id="(\w+)",\n +place=(\d+),$', re.MULTILINE)
 
 def _own() -> dict[str, str]:
     """Id to module of each effect of the folder, by rising place."""
-    found = [
+    modules = [
         (int(place), id, path.stem)
         for path in (Path(__file__).parent / "effects").glob("*.py")
         for id, place in _ENTRY.findall(path.read_text(encoding="utf-8"))
     ]
-    return {id: module for _, id, module in sorted(found)}
+    return {id: module for _, id, module in sorted(modules)}
 
 
 OWN = _own()

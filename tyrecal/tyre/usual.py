@@ -52,26 +52,27 @@ class Usual:
         return self.low <= value <= self.high and (value == 0 or abs(value) >= self.least)
 
     def refusal(self, value: float) -> str | None:
-        """What is usual instead of ``value``, and what was probably meant; None where it is."""
+        """Sentence with the range that is usual instead of ``value``, and what was probably meant;
+        None where the value is usual."""
         if self.holds(value):
             return None
         low = f"0, or {self.least:g}" if self.least and self.low == 0 else f"{self.low:g}"
         unit = f" {self.unit}" if self.unit else ""
         least = f", of a size of at least {self.least:g} or 0" if self.low < 0 < self.least else ""
-        found = self._meant(value, unit)
-        asked = f"; did you mean {' or '.join(found)}?" if found else ""
-        return f"usual is {low} to {self.high:g}{unit}{least}{self.reason}{asked}"
+        meant = self._meant(value, unit)
+        question = f"; did you mean {' or '.join(meant)}?" if meant else ""
+        return f"usual is {low} to {self.high:g}{unit}{least}{self.reason}{question}"
 
     def _meant(self, value: float, unit: str) -> list[str]:
         """At most two readings of ``value`` that would be usual, in words; of those that are almost
         the same, the first."""
-        found: dict[float, str] = {}
+        readings: dict[float, str] = {}
         for name, slip in self.slips.items():
             right = slip(value) if callable(slip) else slip * value
-            alike = any(abs(right - other) <= READING_RTOL * abs(other) for other in found)
+            alike = any(abs(right - other) <= READING_RTOL * abs(other) for other in readings)
             if value and self.holds(right) and not alike:
-                found[right] = f"{value:g} {name}, {right:.4g}{unit}"
-        return list(found.values())[:2]
+                readings[right] = f"{value:g} {name}, {right:.4g}{unit}"
+        return list(readings.values())[:2]
 
 
 def inverse(of: float) -> Callable[[float], float]:
@@ -242,17 +243,17 @@ def refusal(
 def _ranges(
     data: Mapping[str, Any], section: Section | None, keys: Keys
 ) -> Iterator[tuple[Usual, str]]:
-    """What is usual at ``keys``, and words that go before."""
+    """Usual ranges at ``keys``, each with words that go before."""
     here, last = keys[0], str(keys[-1])
     if here == "variables":
         for path in entries(at(data, keys[:-1]), "sets") if last == "start" else ():
-            if isinstance(path, str) and (found := _keys(data, path)):
-                yield from ((usual, f"{path}: ") for usual, _ in _ranges(data, section, found))
+            if isinstance(path, str) and (path_keys := _keys(data, path)):
+                yield from ((usual, f"{path}: ") for usual, _ in _ranges(data, section, path_keys))
     elif here == "uncertainties" and last == "absolute":
         for path in entries(at(data, keys[:-1]), "sets"):
-            if isinstance(path, str) and (found := _keys(data, path)):
-                for usual, _ in _ranges(data, section, found):
-                    value = number({"": _value(data, found)}, "")
+            if isinstance(path, str) and (path_keys := _keys(data, path)):
+                for usual, _ in _ranges(data, section, path_keys):
+                    value = number({"": _value(data, path_keys)}, "")
                     most = abs(value) if value and usual.holds(value) else usual.high
                     yield Usual(0, most, usual.unit, usual.slips), f"{path}: "
     elif here == "effects" and len(keys) == 2 and last in IDS:

@@ -105,13 +105,13 @@ def unusual_value(loaded: LoadedCase, name: str, value: float) -> str | None:
     what was probably meant; None where it is usual. Raises ValueError for an unknown name."""
     paths = paths_of(loaded, name)
     data = loaded.case.plain()
-    found = [refusal(data, loaded.drawn, keys, value) for keys in _keys(loaded, name)]
+    messages = [refusal(data, loaded.drawn, keys, value) for keys in _keys(loaded, name)]
     if loaded.deck:
         names = [path.removeprefix("deck.numbers.") for path in paths]
-        found += [
+        messages += [
             message for _, message in unusual_numbers(loaded.deck, dict.fromkeys(names, value))
         ]
-    return next((message for message in found if message), None)
+    return next((message for message in messages if message), None)
 
 
 def paths_of(loaded: LoadedCase, name: str) -> list[str]:

@@ -1,5 +1,5 @@
-"""What must agree between the parts of a case, and between case and section: lines, regions, rows,
-and a mesh that fits.
+"""Rules between the parts of a case, and between case and section: lines, regions, rows, and a mesh
+that fits.
 
 All checks read plain data in which wrong values are WRONG, so that one mistake never hides
 another one, nor causes one.
@@ -90,9 +90,9 @@ def _names(data: Mapping[str, Any]) -> Problems:
             hint = suggestion(wanted, materials)
             yield (*keys, "material"), f"is not one of the materials{hint}"
         else:
-            found = table(materials, wanted).get("kind", kind)
-            if found not in (kind, WRONG):
-                yield (*keys, "material"), f"must be a {kind}, '{wanted}' is a {found}"
+            actual = table(materials, wanted).get("kind", kind)
+            if actual not in (kind, WRONG):
+                yield (*keys, "material"), f"must be a {kind}, '{wanted}' is a {actual}"
 
 
 def _targets(data: Mapping[str, Any]) -> Problems:

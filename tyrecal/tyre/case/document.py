@@ -116,7 +116,7 @@ def _text(path: Path, document: Document) -> str | None:
 
 
 class _Harmful(YAMLError):
-    """What YAML allows and a case does not need; line 0: where the first % begins one."""
+    """YAML that is valid but that no case needs; line 0: where the first % begins one."""
 
     def __init__(self, line: int, message: str):
         super().__init__(message)

@@ -1,4 +1,4 @@
-"""What the section of a new case is made of: rubbers, cords, where they are, and how well known."""
+"""Materials of the section of a new case: rubbers, cords, where they are, and how well known."""
 
 from __future__ import annotations
 
@@ -217,5 +217,5 @@ def _numbered(word: str, lines: list[str]) -> dict[str, str]:
 
 
 def _three(value: float) -> float:
-    """Of three digits."""
+    """Round to three significant digits."""
     return float(f"{value:.3g}")

@@ -124,7 +124,7 @@ def _place_named(file: Path) -> Iterator[None]:
 
 
 def _made_of(section: Section, size: TyreSize | None) -> MadeOf:
-    """Of compounds where the lines and regions are those that a size gives, else of one rubber."""
+    """Compounds where the lines and regions are those that a size gives, else one rubber."""
     regions = {name for name, _ in section.regions}
     for made in [construction(size)] if size else [PASSENGER, TRUCK]:
         if section.names == made.lines and regions.issuperset(BELOW):
@@ -137,7 +137,7 @@ def _is_outline(file: Path) -> bool:
 
 
 def _outline_keys(file: Path, size: TyreSize | None, belt: float | None) -> dict[str, float]:
-    """What the curves do not show, as far as it is known, else as is usual."""
+    """Keys of an outline that its curves do not show: as far as known, else usual values."""
     from ..section.outline import read_outline
 
     curves = read_outline(file)

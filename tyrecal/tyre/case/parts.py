@@ -52,7 +52,7 @@ def number(values: Mapping[str, Any], key: str) -> float | None:
 
 
 def one_of(values: Mapping[str, Any], first: str, second: str) -> Iterator[Disagreement]:
-    """What is wrong where not exactly one of two keys is given."""
+    """Disagreement where not exactly one of two keys is given."""
     if values.get(first) is None and values.get(second) is None:
         yield first, f"must be given, or {second}"
     elif values.get(first) is not None and values.get(second) is not None:
@@ -68,7 +68,7 @@ class Part(BaseModel):
 
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
-        """What is wrong between the keys of ``values``; those that are WRONG are not judged."""
+        """Disagreements between the keys of ``values``; those that are WRONG are not judged."""
         yield from ()
 
     @model_validator(mode="after")

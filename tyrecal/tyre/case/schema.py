@@ -52,7 +52,7 @@ Pressure = Annotated[Number, Field(ge=0, lt=2000)]  # kPa
 
 
 class Analysis(Part):
-    """What is computed: the inflation, then modes up to ``highest_harmonic``."""
+    """Steps of the computation: the inflation, then modes up to ``highest_harmonic``."""
 
     static_moduli: Moduli = "long_term"
     static_increments: Annotated[int, Field(ge=1, le=1000)] = 10
@@ -344,7 +344,8 @@ class Case(Part):
 
     @classmethod
     def _beside_decks(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
-        """What stands in decks in three dimensions, and not in the case."""
+        """Disagreements with decks in three dimensions: keys that belong in the decks, not in the
+        case."""
         for key in IN_DECKS:
             if cls._is_given(key, values.get(key)):
                 yield key, "must be absent with deck.decks, where it stands"
@@ -352,8 +353,8 @@ class Case(Part):
         spindle = part_values(rim.get("spindle"))
         if rim.get("free") is True or any(number(spindle, key) for key in spindle):
             yield "rim", "must be held: with deck.decks, what moves stands there"
-        usual, said = Analysis().__dict__, part_values(values.get("analysis"))
-        if any(said.get(key, usual[key]) != usual[key] for key in usual.keys() - {HIGHEST}):
+        usual, given = Analysis().__dict__, part_values(values.get("analysis"))
+        if any(given.get(key, usual[key]) != usual[key] for key in usual.keys() - {HIGHEST}):
             yield "analysis", f"must say {HIGHEST} alone: with deck.decks, all else stands there"
 
     @classmethod

@@ -26,7 +26,7 @@ class Sorted:
 
 def sort(blocks: Sequence[Block]) -> Sorted:
     """Blocks checked and sorted. Raises OwnDeckError for what is not honoured."""
-    found = Sorted()
+    deck = Sorted()
     steps: list[list[Block]] = []
     step: list[Block] | None = None
     part = assembly = instance = False
@@ -47,14 +47,14 @@ def sort(blocks: Sequence[Block]) -> Sorted:
                 step, after_a_step = None, True
             continue
         if name in OUTPUT_KEYWORDS:
-            found.passed.append(block)
+            deck.passed.append(block)
             continue
         if name in RULES and [*RULES[name].options_at] == ["deck step"]:
             raise block.refused("stands outside a step")
         if after_a_step:
             raise block.refused("stands after a step: the model's keywords stand before *STEP")
         check_honoured(block, "deck")
-        found.model.append(block)
+        deck.model.append(block)
         if name in MATERIAL_OPTIONS:
             if over is None or over.name != "MATERIAL":
                 raise block.refused("must follow a *MATERIAL")
@@ -88,13 +88,13 @@ def sort(blocks: Sequence[Block]) -> Sorted:
         raise blocks[-1].refused("is the last, but a *PART, *ASSEMBLY or *INSTANCE has no end")
     inflating = _last_that_raises_the_pressure(steps)
     for k, each in enumerate(steps[: len(steps) if inflating is None else inflating + 1]):
-        _step(each, found, is_inflation=k == inflating)
+        _step(each, deck, is_inflation=k == inflating)
     if inflating is None:
         raise blocks[-1].refused(
             "no *STATIC step of the deck inflates: one needs *DSLOAD or *DLOAD with a pressure"
         )
-    found.later = [each[0] for each in steps[inflating + 1 :]]
-    return found
+    deck.later = [each[0] for each in steps[inflating + 1 :]]
+    return deck
 
 
 def _last_that_raises_the_pressure(steps: Sequence[Sequence[Block]]) -> int | None:
@@ -127,12 +127,12 @@ def _pressures(loads: Sequence[Block]) -> dict[tuple[str, str], float] | None:
     return {(row.name(0), row.name(1)): row.number(2) for row in rows}
 
 
-def _step(step: list[Block], found: Sorted, is_inflation: bool) -> None:
+def _step(step: list[Block], deck: Sorted, is_inflation: bool) -> None:
     """A step up to the one that inflates: of those before it, what they hold stays held."""
     kept = []
     for block in step:
         if block.name in OUTPUT_KEYWORDS:
-            found.passed.append(block)
+            deck.passed.append(block)
         else:
             check_honoured(block, "deck step")
             kept.append(block)
@@ -140,14 +140,14 @@ def _step(step: list[Block], found: Sorted, is_inflation: bool) -> None:
     if new := [block for block in held if block.get("OP") == "NEW"]:
         if len(new) < len(held):
             raise new[0].refused("OP=NEW must stand at every *BOUNDARY of the step, or at none")
-        found.model = [block for block in found.model if block.name != "BOUNDARY"]  # released
+        deck.model = [block for block in deck.model if block.name != "BOUNDARY"]  # released
     procedures = [block for block in kept if block.name == "STATIC"]
     if len(procedures) != 1:
         raise step[0].refused("needs one *STATIC")
-    found.is_nonlinear |= "NLGEOM" in step[0].parameters
+    deck.is_nonlinear |= "NLGEOM" in step[0].parameters
     if not is_inflation:
-        found.model.extend(held)
+        deck.model.extend(held)
         return
-    if not found.is_nonlinear:
+    if not deck.is_nonlinear:
         raise step[0].refused("inflates: it needs NLGEOM=YES")
-    found.inflation = kept
+    deck.inflation = kept

@@ -23,7 +23,7 @@ Numbers = Mapping[str, float]
 
 def paths(blocks: Sequence[Block]) -> dict[str, tuple[int, int, int]]:
     """Path to block, row and field of the plain numbers of materials, layers and parameters."""
-    found: dict[str, tuple[int, int, int]] = {}
+    places: dict[str, tuple[int, int, int]] = {}
     material, section = "", ""
     layers = [row.name(0) for b in blocks if b.name == "REBAR LAYER" for row in b.rows]
     rebars = [b.get("NAME") for b in blocks if b.name == "REBAR" for _ in b.rows]
@@ -38,7 +38,7 @@ def paths(blocks: Sequence[Block]) -> dict[str, tuple[int, int, int]]:
             for i, row in enumerate(block.rows):
                 name, value = assigned(row)
                 if plain_number(value):
-                    found[f"parameter / {name}"] = place, i, -1
+                    places[f"parameter / {name}"] = place, i, -1
             continue
         for (name, *_), i, j in placed_fields(block) if block.name in IN_PATHS else ():
             row = block.rows[i]
@@ -58,9 +58,9 @@ def paths(blocks: Sequence[Block]) -> dict[str, tuple[int, int, int]]:
                     else ""
                 )
                 path = f"{material} / {block.name} / {line}{name}"
-            if path not in found:
-                found[path] = place, i, j
-    return found
+            if path not in places:
+                places[path] = place, i, j
+    return places
 
 
 def moduli(numbers: Iterable[str], material: str) -> dict[str, int]:
@@ -99,16 +99,16 @@ def plain(text: str) -> float:
 
 def marks(blocks: Sequence[Block]) -> dict[str, Block]:
     """The marks of a deck, each with a block that has it."""
-    found: dict[str, Block] = {}
+    by_mark: dict[str, Block] = {}
     for block in blocks:
         for row in block.rows:
             for field in row.fields:
                 for name in DECK_MARK.findall(field):
-                    found.setdefault(name, block)
+                    by_mark.setdefault(name, block)
         for value in block.parameters.values():
             if "{{" in value:
                 raise block.refused(f"a mark stands in data lines, not in {value}")
-    return found
+    return by_mark
 
 
 def marked_numbers(marks: Mapping[str, Block], given: Numbers, variable: Any) -> dict[str, float]:

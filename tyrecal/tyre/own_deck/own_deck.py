@@ -57,18 +57,18 @@ class OwnDeck:
     @cached_property
     def numbers(self) -> dict[str, float]:
         """Its plain numbers by path, as the text has them."""
-        found = {}
+        values = {}
         for path, (place, i, j) in self.places.items():
             row = self.blocks[place].rows[i]
             text = numbers_of.assigned(row)[1] if j < 0 else row.text(j)
-            found[path] = numbers_of.plain(text)
-        return found
+            values[path] = numbers_of.plain(text)
+        return values
 
     @cached_property
     def sha256(self) -> str:
         """Hash of all that it says but its plain numbers, however it is indented or commented."""
         numbers = set(self.places.values())
-        said = []
+        parts = []
         for k, block in enumerate(self.blocks):
             fields = [
                 "" if (k, i, j) in numbers or (k, i, -1) in numbers else text
@@ -76,8 +76,8 @@ class OwnDeck:
                 for j, text in enumerate(row.fields)
             ]
             if block.name not in OUTPUT_KEYWORDS:
-                said.append((block.name, sorted(block.parameters.items()), fields))
-        return sha256(json.dumps([self.units, said]).encode()).hexdigest()
+                parts.append((block.name, sorted(block.parameters.items()), fields))
+        return sha256(json.dumps([self.units, parts]).encode()).hexdigest()
 
     def with_numbers(self, numbers: Mapping[str, float]) -> list[Block]:
         """The blocks with all marks, parameters and numbers set. Raises OwnDeckError."""
@@ -107,22 +107,22 @@ class OwnDeck:
         self._filled[place] = last
         return last
 
-    def model(self, found: Sorted) -> Model:
+    def model(self, deck: Sorted) -> Model:
         """The section of sorted blocks, remembered while the mesh's own stay the same."""
-        key = tuple(b for b in (*found.model, *found.inflation) if b.name in TOPOLOGY)
+        key = tuple(b for b in (*deck.model, *deck.inflation) if b.name in TOPOLOGY)
         if key not in self._models:
             while len(self._models) > 3:
                 self._models.pop(next(iter(self._models)))
-            self._models[key] = build(found)
+            self._models[key] = build(deck)
         return self._models[key]
 
     def flat(self, numbers: Mapping[str, float], gauges: Gauges = ()) -> Flat:
         """The flat deck with numbers set and ``gauges`` of its parts, in SI units.
 
         Raises OwnDeckError."""
-        found = sort(self.with_numbers(numbers))
-        model = thickened(self.model(found), gauges) if gauges else self.model(found)
-        return flatten(found, model, UNIT_LENGTH[self.units], UNIT_MASS[self.units])
+        deck = sort(self.with_numbers(numbers))
+        model = thickened(self.model(deck), gauges) if gauges else self.model(deck)
+        return flatten(deck, model, UNIT_LENGTH[self.units], UNIT_MASS[self.units])
 
 
 def read_own_deck(path: Path, units: Units | None = None) -> OwnDeck:

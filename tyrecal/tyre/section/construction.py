@@ -1,4 +1,4 @@
-"""What tyres of a type are made of: compounds and cords with usual values, and where they are.
+"""Materials of tyres of a type: compounds and cords with usual values, and where they are.
 
 Compounds are known by their hardness. Gent (Rubber Chem. Technol. 31 (1958) 896) relates it to
 Young's modulus, MPa, of Shore A hardness S:
@@ -49,7 +49,7 @@ class Compound:
 
     @property
     def spread_percent(self) -> float:
-        """Of C10, a standard deviation."""
+        """Standard deviation of C10, per cent."""
         up, down = (gent_C10(self.hardness + d) for d in (HARDNESS_SPREAD, -HARDNESS_SPREAD))
         return 100 * (up - down) / (2 * self.C10_Pa)
 
@@ -120,7 +120,7 @@ class Construction:
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """Of the section, from the inner surface to the outer."""
+        """Lines of the section, from the inner surface to the outer."""
         belts = [TURN_UP, *(f"belt{i}" for i in range(2, len(self.belts) + 1))]
         return ("inner", "ply", *belts, *([CAP] if self.cap else []), BASE, "outer")
 

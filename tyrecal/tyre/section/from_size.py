@@ -54,7 +54,7 @@ class Gauges:
 
 
 def construction(size: TyreSize) -> Construction:
-    """What a tyre of this size is made of."""
+    """Construction of a tyre of this size."""
     return TRUCK if size.truck else LIGHT_TRUCK if size.light_truck else PASSENGER
 
 
@@ -131,15 +131,15 @@ def build(size: TyreSize, gauges: Gauges) -> GaugeTable:
 def _layers(g: Gauges, made: Construction) -> dict[str, tuple[float, float]]:
     """Distance from the carcass and half a width of every line under the tread, m."""
     belts = made.lines[2 : 2 + len(made.belts)]
-    found = {
+    layers = {
         name: (g.ply + i * g.belts, (belt.share * g.belt - belt.steps * g.step) / 2)
         for i, (name, belt) in enumerate(zip(belts, made.belts, strict=True))
     }
-    last = found[belts[-1]][0]
+    last = layers[belts[-1]][0]
     if made.cap:
         last += g.cap
-        found[CAP] = last, g.belt / 2
-    return {**found, BASE: (last + g.under_tread, g.belt / 2)}
+        layers[CAP] = last, g.belt / 2
+    return {**layers, BASE: (last + g.under_tread, g.belt / 2)}
 
 
 def _stations(ends: list[float]) -> tuple[Array, list[str]]:

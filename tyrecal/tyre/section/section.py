@@ -165,8 +165,8 @@ def fill_lines(section: Section) -> Array:
         start, end = points[k - 1, near], points[above, near]  # already made whole
         span = end - start
         fraction = (points[k, near] - start) @ span / (span @ span)
-        found: Array = points[k - 1, j] + fraction * (points[above, j] - points[k - 1, j])
-        return found
+        result: Array = points[k - 1, j] + fraction * (points[above, j] - points[k - 1, j])
+        return result
 
     for k in range(1, len(section.names) - 1):
         have = np.flatnonzero(present[k])

@@ -129,8 +129,8 @@ class TyreSize:
 
     @property
     def bead_seat_radius(self) -> float:
-        """Of the 5 degree drop centre rim, m: specified diameters of ISO 4000-2; of the 15 degree
-        rim the code's own, at the flange."""
+        """Bead seat radius of the 5 degree drop centre rim, m: specified diameters of ISO 4000-2;
+        of the 15 degree rim the code's own, at the flange."""
         if self.truck:
             return self.rim_code * INCH / 2
         return (self.rim_code * INCH + (4.8e-3 if self.rim_code > 16 else -0.8e-3)) / 2
@@ -150,12 +150,12 @@ def parse_size(text: str) -> TyreSize:
     code = re.sub(r"^(LT.+R ?\d{2}) ?(?=[B-F]\b)", r"\1/", code)  # LT245/75R16E: load range E
     if MOTORCYCLE.match(code):
         raise InputError(_motorcycle(text))
-    found = METRIC.match(code) or FLOTATION.match(code) or INCHES.match(code)
-    if not found or (found.re is INCHES and not _is_truck(found.groupdict())):
+    match = METRIC.match(code) or FLOTATION.match(code) or INCHES.match(code)
+    if not match or (match.re is INCHES and not _is_truck(match.groupdict())):
         raise InputError(f"'{text}' is not a tyre size that is known{_hint(code)}")
-    parts = found.groupdict()
-    name = found.group(0).replace(" ", "")
-    service = re.sub(r"LOAD RANGE ?|/(?=[B-L]\b)|LR ", "LR", code[found.end() :])
+    parts = match.groupdict()
+    name = match.group(0).replace(" ", "")
+    service = re.sub(r"LOAD RANGE ?|/(?=[B-L]\b)|LR ", "LR", code[match.end() :])
     service = re.sub(r"EXTRA LOAD|REINFORCED|REINF\b", "XL", service)
     if RUN_FLAT.search(service):
         raise InputError(_run_flat(name))
@@ -165,13 +165,13 @@ def parse_size(text: str) -> TyreSize:
                 f"'{text}': '{word}' after the size is no service description, as 91V is"
             )
     _check_build(name, parts["build"])
-    truck = _is_truck(parts) and found.re is not FLOTATION
+    truck = _is_truck(parts) and match.re is not FLOTATION
     if not truck and not (parts["rim"].isdigit() and int(parts["rim"]) in RIM_CODES):
         raise InputError(
             f"'{name}': no rim of code {parts['rim']}, known are {RIM_CODES[0]} to {RIM_CODES[-1]}"
             f" inches, 5 degree drop centre, and {', '.join(map(str, TRUCK_RIM_CODES))}, 15 degree"
         )
-    read = {METRIC: _metric, FLOTATION: _flotation, INCHES: _inches}[found.re]
+    read = {METRIC: _metric, FLOTATION: _flotation, INCHES: _inches}[match.re]
     return _with_service(read(name, parts), service)
 
 
