@@ -30,7 +30,7 @@ DeckSlopes = dict[str, list[tuple[str, int, int, float]]]
 
 
 class Design(Protocol):
-    """What is evaluated: a tyre with all its numbers, which can write itself as decks.
+    """A design to evaluate: a tyre with all its numbers, which can write itself as decks.
 
     `TyreDesign` is one, of a case; whatever has these is another.
     """
@@ -131,7 +131,7 @@ class Decks:
 
     @property
     def values(self) -> Mapping[str, float]:
-        """Of the design's variables, by name."""
+        """Values of the design's variables, by name."""
         return self.design.values
 
     @property
@@ -233,10 +233,10 @@ def header(case: LoadedCase) -> str:
 def refuse_outside(file: str, text: str) -> None:
     """Raises TemplateFailed where a deck of somebody's own templates would have the solver read or
     write elsewhere than in its run folder, compile a program or load a library."""
-    for found in LEADS_OUTSIDE.finditer(text):
-        line = text.count("\n", 0, found.start()) + 1
+    for match in LEADS_OUTSIDE.finditer(text):
+        line = text.count("\n", 0, match.start()) + 1
         raise TemplateFailed(
-            f"{file}, line {line}: '{found[0].strip():.60}' leads out of the run's folder"
+            f"{file}, line {line}: '{match[0].strip():.60}' leads out of the run's folder"
         )
 
 

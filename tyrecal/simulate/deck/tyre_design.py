@@ -72,7 +72,7 @@ class TyreDesign:
 
     @property
     def header(self) -> str:
-        """What the decks are of."""
+        """Comment lines that identify the tyre of the decks."""
         return header(self.case)
 
     @property
@@ -92,7 +92,8 @@ class TyreDesign:
 
     @property
     def needs(self) -> dict[str, str]:
-        """What its effects ask of a solver, and the tyre's own parts."""
+        """Capabilities that its effects, and the tyre's own parts, need of a solver, each with the
+        reason."""
         lacks = {}
         for id, value in self.case.case.effects.items():
             if value and (need := catalogue()[id].needs):

@@ -1,4 +1,4 @@
-"""What pressing a tyre on the road returns, whichever solver ran: the patch at each load."""
+"""Results of pressing a tyre on the road, whichever solver ran: the patch at each load."""
 
 from __future__ import annotations
 
@@ -93,14 +93,16 @@ def pressed(
     Raises EvaluationFailed where it does not hold the loads in their order, one at least, each
     borne by the road, or not their modes.
     """
-    found = tuple(
+    footprints = tuple(
         Footprint(**{k: _plain(v) for k, v in each.items()}) for each in answer["footprints"]
     )
-    words, reached = answer["failure"], [each.load_N for each in found]
-    asked = np.allclose(reached, loads_N[: len(found)], rtol=1e-9) if found else False
-    if not asked or bool(words) == (len(found) == len(loads_N)):
+    words, reached = answer["failure"], [each.load_N for each in footprints]
+    loads_agree = (
+        np.allclose(reached, loads_N[: len(footprints)], rtol=1e-9) if footprints else False
+    )
+    if not loads_agree or bool(words) == (len(footprints) == len(loads_N)):
         raise EvaluationFailed("no_results", f"footprints at {reached} N of {list(loads_N)} N")
-    for each in found:
+    for each in footprints:
         if not abs(each.road_N - each.load_N) <= BALANCE * each.load_N:
             raise EvaluationFailed(
                 "no_results", f"the road bears {each.road_N:g} N of {each.load_N:g} N"
@@ -115,7 +117,7 @@ def pressed(
         points=np.ascontiguousarray(answer["points"]),
         angles=np.ascontiguousarray(answer["angles"]),
         free_radius_m=answer["free_radius_m"],
-        footprints=found,
+        footprints=footprints,
         failed=EvaluationFailed(answer.get("cause", "no_equilibrium"), words, kept)
         if words
         else None,

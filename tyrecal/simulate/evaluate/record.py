@@ -35,8 +35,8 @@ def pack(key: str, about: dict[str, Any], content: Any) -> bytes:
     arrays than `unpack` reads.
     """
     arrays: list[np.ndarray] = []  # one that stands in several places is kept once
-    told = {"key": key, "about": about, "content": _plain(content, arrays)}
-    line = json.dumps(told, allow_nan=False) + "\n"
+    record = {"key": key, "about": about, "content": _plain(content, arrays)}
+    line = json.dumps(record, allow_nan=False) + "\n"
     if len(line) > LONGEST_TEXT or len(arrays) > MOST_ARRAYS:
         raise ValueError(f"an answer of {len(line)} bytes and {len(arrays)} arrays is too large")
     stored = io.BytesIO()
@@ -55,13 +55,13 @@ def unpack(data: bytes, key: str) -> tuple[dict[str, Any], Any]:
         line, _, stored = body.partition(b"\n")
         if len(line) > LONGEST_TEXT:
             raise Damaged(f"its text is longer than {LONGEST_TEXT / 1e6:g} MB")
-        told = json.loads(line, parse_constant=_not_finite)
-        about, content = told["about"], _filled(told["content"], _arrays(stored))
+        record = json.loads(line, parse_constant=_not_finite)
+        about, content = record["about"], _filled(record["content"], _arrays(stored))
     except Damaged:
         raise
     except Exception as error:  # whatever is in it, it is none that we wrote
         raise Damaged(f"it is not what tyrecal writes ({type(error).__name__})") from None
-    if told.get("key") != key:
+    if record.get("key") != key:
         raise Damaged("it does not answer the question that it is named by")
     if not isinstance(about, dict):
         raise Damaged("it does not say which solver answered")
@@ -74,9 +74,9 @@ def _not_finite(word: str) -> None:
 
 def _arrays(stored: bytes) -> dict[str, np.ndarray]:
     """The arrays by name, as many bytes as stand there: nothing is unpacked. Raises Damaged."""
-    found: dict[str, np.ndarray] = {}
+    arrays: dict[str, np.ndarray] = {}
     if not stored:
-        return found
+        return arrays
     with ZipFile(io.BytesIO(stored)) as archive:
         members = archive.infolist()
         if len(members) > MOST_ARRAYS:
@@ -93,8 +93,8 @@ def _arrays(stored: bytes) -> dict[str, np.ndarray]:
                     raise Damaged("an array has another size than it says")
             with archive.open(each) as file:
                 array = np.lib.format.read_array(file, allow_pickle=False)
-            found[each.filename.removesuffix(".npy")] = array
-    return found
+            arrays[each.filename.removesuffix(".npy")] = array
+    return arrays
 
 
 def _plain(value: Any, arrays: list[np.ndarray]) -> Any:

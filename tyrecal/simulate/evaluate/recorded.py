@@ -1,4 +1,4 @@
-"""What an answer may be: of a solver's run or of a record. Checked before it is believed.
+"""Form that an answer must have, of a solver's run or of a record; checked before it is believed.
 
 `check` judges an answer or a recorded failure by itself, `contradiction` an answer by what was
 asked. `Evaluator` makes a typed failure of a run's wrong answer, and sets a wrong record aside.
@@ -192,17 +192,17 @@ class _Pressed(_Tyre):
                 and set(map(int, each.node)) <= set(map(int, self.nodes))
             ):
                 raise ValueError("a patch is not on this tyre")
-            told = (each.mode_frequency_Hz, each.mode_node, each.mode_shape)
-            if any(part is not None for part in told):
-                if any(part is None for part in told):
+            parts = (each.mode_frequency_Hz, each.mode_node, each.mode_shape)
+            if any(part is not None for part in parts):
+                if any(part is None for part in parts):
                     raise ValueError("of modes under load a part is missing")
-                if _shape(told[2])[:3] != (*_shape(told[0]), rings, *_shape(told[1])):
+                if _shape(parts[2])[:3] != (*_shape(parts[0]), rings, *_shape(parts[1])):
                     raise ValueError("modes under load do not go together")
             free = (each.mode_traction_N, each.sliding_frequency_Hz, each.sliding_shape)
             if any(part is not None for part in free) and not (
-                all(part is not None for part in (*told, *free))
-                and _shape(free[0]) == _shape(told[0])
-                and _shape(free[2])[:3] == (*_shape(free[1]), *_shape(told[2])[1:3])
+                all(part is not None for part in (*parts, *free))
+                and _shape(free[0]) == _shape(parts[0])
+                and _shape(free[2])[:3] == (*_shape(free[1]), *_shape(parts[2])[1:3])
             ):
                 raise ValueError("modes of a sliding patch do not go together")
         return self

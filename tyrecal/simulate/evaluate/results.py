@@ -1,4 +1,4 @@
-"""What an evaluation returns, whichever solver ran: frequencies with shapes, and their slopes."""
+"""Results of an evaluation, whichever solver ran: frequencies with shapes, and their slopes."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ GROUP = "tyrecal.solvers"
 
 
 class Solver(Protocol):
-    """What a solver brings: one class, registered under the entry point group above.
+    """Interface of a solver: one class, registered under the entry point group above.
 
     version: of the program that runs, "unknown" where it is not found; part of every record's key.
     dialect: the template folder of its decks; capabilities: of ``modes``, ``gradients``,

@@ -36,7 +36,7 @@ log = logging.getLogger("tyrecal")
 
 
 def key_of(folder: Path, solver: Solver) -> str:
-    """What ``solver`` is asked by the files in ``folder``, as 64 hexadecimal digits."""
+    """Key of the question that the files in ``folder`` put to ``solver``, 64 hexadecimal digits."""
     digest = sha256()
     parts = [FORMAT, *solver_identity(solver)]
     pieces = [part.encode() for part in parts]
@@ -97,7 +97,7 @@ class Store:
         return self.folder / key[:2] / f"{key}.record"
 
     def read(self, key: str) -> Any:
-        """What was recorded, or None."""
+        """Read the content that was recorded, or None."""
         path = self.path(key)
         try:
             refuse_link(path.parent)
@@ -206,7 +206,7 @@ def _about(path: Path) -> dict[str, Any]:
 
 
 def _read(path: Path) -> tuple[dict[str, Any], Any]:
-    """What stands in a record, whole, of the question it is named by, and what such an answer is.
+    """Read a record whole: the question that it is named by, and an answer that passes the checks.
 
     Raises Damaged; OSError where there is none, or it may not be read.
     """

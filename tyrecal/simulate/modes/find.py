@@ -45,8 +45,8 @@ def find_modes(
     lost = dict.fromkeys(range(len(questions)), EvaluationFailed("lost_label", ""))
     for count in (None, *MORE_MODES):
         places, lost = list(lost), {}
-        asked = [replace(questions[place], modes_per_harmonic=count) for place in places]
-        answers = evaluator.answer_all(asked, min(jobs, len(asked)))
+        repeats = [replace(questions[place], modes_per_harmonic=count) for place in places]
+        answers = evaluator.answer_all(repeats, min(jobs, len(repeats)))
         for place, answer in zip(places, answers, strict=True):
             if not isinstance(answer, Evaluation):
                 yield place, answer

@@ -77,7 +77,7 @@ class Label:
 
     @property
     def motion(self) -> str:
-        """What the tyre does: that of [2,1] is 'first out-of-plane bending'."""
+        """Motion of the tyre, in words: that of [2,1] is 'first out-of-plane bending'."""
         if (self.c, self.m, self.kind) in KNOWN:
             return KNOWN[self.c, self.m, self.kind]
         if self.m > 1:
