@@ -59,8 +59,8 @@ Report = dict[str, Any]
 
 @dataclass(frozen=True)
 class CaseTask:
-    """What a worker is sent. path, folder (of the results), record: absolute, on a file system
-    that the worker sees too; mesh: level, empty for the case's own; command: of the solver."""
+    """Task of a worker. path, folder (of the results), record: absolute, on a file system that the
+    worker sees too; mesh: level, empty for the case's own; command: of the solver."""
 
     name: str
     path: Path
@@ -187,7 +187,7 @@ def _loaded(task: CaseTask) -> LoadedCase:
 
 
 def _failed(error: Exception) -> StudyOutcome:
-    """What an exception says of a study."""
+    """Outcome of a study that an exception ended."""
     if isinstance(error, EvaluationFailed):
         return StudyOutcome("error", error.cause, error.words)
     if isinstance(error, SolverUnavailable):
@@ -219,19 +219,19 @@ def _question(task: CaseTask, loaded: LoadedCase, evaluator: Evaluator) -> str:
     """Hash of all that the results depend on: the case and its files, what is asked, the tool."""
     files = [task.path, *loaded.files, *loaded.template_files]
     solver = [*solver_identity(evaluator.solver), sources()]
-    asked = [task.studies, asdict(task.asked), task.mesh, solver, [_digest(p) for p in files]]
-    return sha256(json.dumps(asked).encode()).hexdigest()
+    parts = [task.studies, asdict(task.asked), task.mesh, solver, [_digest(p) for p in files]]
+    return sha256(json.dumps(parts).encode()).hexdigest()
 
 
 def _finished(folder: Path, question: str) -> dict[str, Any] | None:
     """The entries of an earlier run that was asked the same and whose files are as it left them."""
     try:
-        found = read_json(folder / FINISHED, follow=False)
-        if found["question"] != question:
+        finished = read_json(folder / FINISHED, follow=False)
+        if finished["question"] != question:
             return None
-        if any(_digest(folder / file) != digest for file, digest in found["files"].items()):
+        if any(_digest(folder / file) != digest for file, digest in finished["files"].items()):
             return None
-        entries: dict[str, Any] = found["studies"]
+        entries: dict[str, Any] = finished["studies"]
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
     return entries
