@@ -326,8 +326,9 @@ def emulate(
 
 
 def list_effects() -> dict[str, Effect]:
-    """What a plain model leaves out, by id: ``title``, ``unit``, ``low`` and ``high`` of the
-    parameter, ``signature``, ``toggle``, ``aliases``. In a case it is the number ``effects.ID``.
+    """Effects that a plain model leaves out, by id: ``title``, ``unit``, ``low`` and ``high`` of
+    the parameter, ``signature``, ``toggle``, ``aliases``. In a case an effect is the number
+    ``effects.ID``.
 
     >>> filler = list_effects()["bead_filler"]
     >>> filler.title, filler.low, filler.high

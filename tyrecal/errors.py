@@ -1,4 +1,4 @@
-"""What is told to the user in one sentence: one tree, an exit code in each class.
+"""Errors that the user reads in one sentence: one tree, an exit code in each class.
 
     TyrecalError
         InputError, 2               what was given is wrong: a file, a folder, a name, a number
@@ -31,7 +31,7 @@ class TyrecalError(Exception):
 
 
 class InputError(TyrecalError, ValueError):
-    """What was given cannot be used; the sentence says where, and what would be right.
+    """Input that cannot be used; the sentence says where, and what would be right.
 
     line: the 1-based line of a table, where the sentence does not name it; else 0.
     """

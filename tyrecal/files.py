@@ -118,7 +118,7 @@ def write_runs(folder: Path, new: Mapping[str, Any], many_writers: bool = False)
 
 
 class NotAFile(TyrecalError, OSError):
-    """What should be a file or folder of ours is something else: a link, a pipe, a device."""
+    """A file or folder of ours that is something else: a link, a pipe, a device."""
 
     def __init__(self, path: Path, words: str):
         super().__init__(errno.EINVAL, words, str(path))

@@ -25,7 +25,7 @@ _heard, _at, _late, _depth = 0, 0.0, 0, 0
 
 
 def exit_code(number: int) -> int:
-    """Of a command that signal ``number`` ended, as a shell has it."""
+    """Exit code of a command that signal ``number`` ended, as a shell has it."""
     return 128 + number
 
 
