@@ -1,4 +1,4 @@
-"""What all pictures share: canvas, type, colours; and how they are written: PNG, SVG or PDF."""
+"""Canvas, type and colours of all pictures, and how they are written: PNG, SVG or PDF."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ class _Sheet:
 
 
 def _key(sheet: _Sheet, modes: Sequence[Mode], words_at: tuple[float, float]) -> None:
-    """What the colours are, at the foot, and the lines, in inches from the lower left corner."""
+    """Draw the key at the foot: the colours and the lines, in inches from the lower left corner."""
     left, right, low, high = 5.9, 8.3, 0.3, 0.38
     shades = np.linspace(0, 1, 65)
     x, y = np.meshgrid(left + shades * (right - left), [low, high])
