@@ -144,8 +144,8 @@ def difficulty(
     shift: Array,
     split: Array,
 ) -> Difficulty:
-    """Of a true effect that shifts the measured rows ``places`` by ``shift`` (n,), and pairs apart
-    by ``split`` (n,); d: the trial's design minus x0."""
+    """Difficulty of a true effect that shifts the measured rows ``places`` by ``shift`` (n,), and
+    pairs apart by ``split`` (n,); d: the trial's design minus x0."""
     P = ruler.projection(d, places, ruler.sigma(places, counts, protocol))
     tau2 = 2 * protocol.noise**2 + protocol.split**2
     pairs = counts == 2
@@ -189,8 +189,8 @@ def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> dict[str, Any]:
     hessian = (hessian + hessian.transpose(0, 2, 1)) / 2
     signatures = {}
     for id, each in sizes.items():
-        asked = list(islice(left, len(each)))
-        known = [(e, a) for e, a in zip(each, asked, strict=True) if isinstance(a, Answer)]
+        replies = list(islice(left, len(each)))
+        known = [(e, a) for e, a in zip(each, replies, strict=True) if isinstance(a, Answer)]
         zero = (0.0, Answer(first.eta, first.jacobian, 0 * first.split))
         known = sorted([*known, zero], key=lambda pair: pair[0])
         if len(known) > 1:

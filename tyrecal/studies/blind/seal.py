@@ -41,9 +41,9 @@ def open_truth(folder: Path, sealed: Path) -> dict[str, Any]:
 
 def refuse_open_truth(folder: Path) -> None:
     """Raises InputError where the truth can be read from the folder that is answered."""
-    found = sorted(folder.rglob(TRUTH))
-    if found:
-        raise InputError(f"{found[0]} lies open among the trials; move it elsewhere")
+    paths = sorted(folder.rglob(TRUTH))
+    if paths:
+        raise InputError(f"{paths[0]} lies open among the trials; move it elsewhere")
     read_json(folder / SEAL)
 
 
