@@ -24,8 +24,8 @@ SAME_DESIGN = 0.01  # of its prior standard deviations
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known of the variables' coordinates: mean (v,), a root (v, v) of the covariance, and
-    bounds (v,)."""
+    """Prior of the variables' coordinates: mean (v,), a root (v, v) of the covariance, and bounds
+    (v,)."""
 
     mean: Array
     root: Array
@@ -56,7 +56,7 @@ class Found:
     settled: bool
 
     def labels(self, place: int = 0) -> list[Label | None]:
-        """Of each measured frequency under the labeling at a place; None: foreign."""
+        """Label of each measured frequency under the labeling at a place; None: foreign."""
         own = self.labelings.modes[place]
         return [self.expansion.labels[j] if j >= 0 else None for j in own]
 
@@ -85,10 +85,10 @@ def find_labels(
         aim = np.clip(prior.mean + prior.root @ answer.z, prior.lower, prior.upper)
         step = np.clip(aim - x, -LONGEST_STEP, LONGEST_STEP)
         near = abs(np.linalg.lstsq(prior.root, step, None)[0]).max(initial=0.0) < SAME_DESIGN
-        found = Found(answer, at, x, round_, near)
-        if near and (not seen or found.labels() == seen[-1].labels()):
-            return found
-        seen.append(found)
+        result = Found(answer, at, x, round_, near)
+        if near and (not seen or result.labels() == seen[-1].labels()):
+            return result
+        seen.append(result)
         x = x + step
     last = seen[ROUNDS // 2 :]
     return replace(max(last, key=lambda each: each.labelings.probabilities[0]), settled=False)

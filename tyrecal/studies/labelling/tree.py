@@ -99,7 +99,7 @@ class Labelings:
 
 
 def labelings(measured: Frequencies, modes: Modes) -> Labelings:
-    """Of all labelings that are not cut."""
+    """All labelings that are not cut."""
     total: dict[tuple[int, ...], float] = {}
     evidence: dict[tuple[int, ...], float] = {}
     means: dict[tuple[int, ...], tuple[float, Array]] = {}
@@ -116,13 +116,13 @@ def labelings(measured: Frequencies, modes: Modes) -> Labelings:
     order = sorted(total, key=lambda key: (-total[key], key))
     ln = np.array([total[key] for key in order])
     probabilities = np.exp(ln - np.logaddexp.reduce(ln))
-    found = np.array(order).reshape(len(order), -1)
+    chosen_modes = np.array(order).reshape(len(order), -1)
     likely = np.exp(np.array(strata) - np.logaddexp.reduce(strata))
     v = modes.H.shape[1]
     return Labelings(
-        found,
+        chosen_modes,
         probabilities,
-        _of_each(found, probabilities, (len(measured.y), len(modes.mu) + 1)),
+        _of_each(chosen_modes, probabilities, (len(measured.y), len(modes.mu) + 1)),
         ln - [evidence[key] for key in order],
         means[order[0]][1][:v],
         float(likely @ DISCREPANCIES),
@@ -156,7 +156,7 @@ def _tree(measured: Frequencies, modes: Modes, tau: float) -> tuple[Array, Array
     (count, n), k = measured.allowed.shape, H.shape[1]
     family = np.array([FAMILIES.index(label.family or FAMILIES[0]) for label in modes.labels])
     sees = np.array(list(VIEWS))[:, family]  # (views, n)
-    found = np.where(sees, 1 - MISSED, UNSEEN)
+    detection = np.where(sees, 1 - MISSED, UNSEEN)
     width = float(np.ptp(measured.y)) + 2 * FOREIGN_MARGIN
 
     ln = np.log(list(VIEWS.values()))[None]  # (branches, views)
@@ -171,7 +171,7 @@ def _tree(measured: Frequencies, modes: Modes, tau: float) -> tuple[Array, Array
         foreign = -np.inf if measured.sure[i] else np.log(FOREIGN / width)
         grown = np.concatenate(
             [
-                ln[:, None] + score[:, :, None] + np.log(found.T),
+                ln[:, None] + score[:, :, None] + np.log(detection.T),
                 np.broadcast_to(ln[:, None] + foreign, (len(ln), 1, ln.shape[1])),
             ],
             axis=1,
