@@ -46,8 +46,8 @@ def drawn(posterior: Posterior, bounds: Array, count: int, seed: int) -> Drawn:
     likely = best[height > height[0] - LIKELY]
     chains = walk(posterior, likely, np.linalg.inv(information + flat), count, seed)
     edges = shares_at_edge(chains.flat, posterior.box, bounds)
-    asked = posterior.evaluations
-    return Drawn(posterior, best, height, covariance, chains, edges, 1, asked, "")
+    evaluations = posterior.evaluations
+    return Drawn(posterior, best, height, covariance, chains, edges, 1, evaluations, "")
 
 
 def _flat(box: Array) -> Array:
@@ -56,7 +56,7 @@ def _flat(box: Array) -> Array:
 
 
 def probed(posterior: Posterior, bounds: Array, seed: int) -> Array:
-    """What `shares_at_edge` of the posterior's draws will be, by importance sampling: draws of
+    """Forecast of `shares_at_edge` of the posterior's draws by importance sampling: draws of
     Student's t about the likely optima, each weighted by the posterior's density over theirs."""
     best, height = posterior.optima
     best = best[height > height[0] - LIKELY]
@@ -109,14 +109,14 @@ def grown(
         boxes, last = boxes + 1, posterior
         at_edge = probed(posterior, bounds, seed)
         if at_edge.sum() < AT_EDGE:
-            found = drawn(posterior, bounds, count, seed)
-            if found.at_edge.sum() < AT_EDGE:
-                return replace(found, boxes=boxes, evaluations=evaluations)
-            at_edge = found.at_edge
+            result = drawn(posterior, bounds, count, seed)
+            if result.at_edge.sum() < AT_EDGE:
+                return replace(result, boxes=boxes, evaluations=evaluations)
+            at_edge = result.at_edge
         box = larger(box, bounds, at_edge)
     assert last
-    found = drawn(last, bounds, count, seed)
-    return replace(found, boxes=boxes, evaluations=evaluations, stopped=stopped)
+    result = drawn(last, bounds, count, seed)
+    return replace(result, boxes=boxes, evaluations=evaluations, stopped=stopped)
 
 
 def shares_at_edge(x: Array, box: Array, bounds: Array, weights: Array | None = None) -> Array:

@@ -69,7 +69,7 @@ class Chains:
 
 
 def walkers(count: int, size: int) -> int:
-    """Of ``count`` draws of so many variables."""
+    """Number of walkers for ``count`` draws of so many variables."""
     fewest, most = WALKERS
     return max(min(count // STEPS, most), fewest, 4 * size)
 

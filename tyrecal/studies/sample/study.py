@@ -87,8 +87,8 @@ def run(
         readings = targets_as_readings(case, noise)
     observations = observe(modal(readings), split=Assumed().split)
     known = list(dict.fromkeys(row.row for row in observations.rows))
-    found, _ = sources(case)
-    model = TyreModel(case, evaluator, known, found, {}, jobs)
+    own_sources, _ = sources(case)
+    model = TyreModel(case, evaluator, known, own_sources, {}, jobs)
     check_units(model, observations, ["what was measured"])
     where = places(observations, known)
     x = plain_fit(model, observations, where)
@@ -117,9 +117,9 @@ def run(
         whole = np.vstack([box, *([[v.scaled(v.lower), v.scaled(v.upper)]] for v in others)])
         own = [row.label for row, here in zip(observations.rows, on_rim[rim], strict=True) if here]
         for each in EACH:
-            asked = (*variables, *others)
+            numbers = (*variables, *others)
             made = before[rim] = emulator(
-                tyres[rim], asked, whole, labels, each * len(asked), jobs, before[rim]
+                tyres[rim], numbers, whole, labels, each * len(numbers), jobs, before[rim]
             )
             errors = made.stated_errors[[made.labels.index(label) for label in own if label]]
             if (errors <= ROUGH * spread[on_rim[rim]]).all():
@@ -150,7 +150,7 @@ def run(
         for label in own
     )
     asked_of = [row.row for row in rows]
-    there = _answer(TyreModel(case, evaluator, asked_of, found, {}, jobs), best)
+    there = _answer(TyreModel(case, evaluator, asked_of, own_sources, {}, jobs), best)
     assert there.constants is not None
     given = conditional(
         observations.rows, sigma, constants, rows, there.constants, model.material_laws
@@ -163,7 +163,7 @@ def run(
         variables,
         tuple(map(model.unit, model.variables)),
         observations,
-        tuple(found),
+        tuple(own_sources),
         drawn,
         rows,
         given.drawn(posterior.ln_f(thin, at), off, seed),
@@ -283,6 +283,6 @@ def _answer(model: TyreModel, x: Array) -> Answer:
 
 
 def _pressures(case: LoadedCase, measured: Iterable[float], at_kPa: Sequence[float]) -> list[float]:
-    """Of the measurements, the case, and those asked for, rising."""
+    """Pressures of the measurements, of the case, and those requested, rising."""
     own = case.case.pressure_kPa
     return sorted({*measured, own, *(at_kPa or [factor * own for factor in OTHER_PRESSURES])})
