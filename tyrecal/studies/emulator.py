@@ -119,7 +119,7 @@ class Emulator:
 
     @property
     def evaluations(self) -> int:
-        """Of designs that could be evaluated."""
+        """Number of designs that could be evaluated."""
         return len(self.designs)
 
     @property
@@ -128,7 +128,8 @@ class Emulator:
         return np.stack([self.centre - self.half, self.centre + self.half], 1)
 
     def restricted(self, last: Array) -> Emulator:
-        """Of the first variables alone, the coordinates x of the others being ``last`` (s,)."""
+        """Emulator of the first variables alone, the coordinates x of the others being ``last``
+        (s,)."""
         v = len(self.half) - len(last)
         t = (last - self.centre[v:]) / self.half[v:]
         degrees, place = np.unique(self.degrees[:, :v], axis=0, return_inverse=True)
@@ -149,7 +150,8 @@ class Emulator:
         return self.ln_f_of(self.products(x))
 
     def products(self, x: Array) -> Array:
-        """What all polynomials are made of, (p, k) at designs x (p, v), at any `restricted`."""
+        """Products of which all polynomials consist, (p, k) at designs x (p, v), at any
+        `restricted`."""
         return products(self.degrees, (x - self.centre) / self.half)
 
     def ln_f_of(self, terms: Array) -> Array:
@@ -162,15 +164,15 @@ class Emulator:
         t = (x - self.centre) / self.half
         q = products(self.degrees, t) @ self.coefficients
         rise = [products(self.degrees, t, j) @ self.coefficients for j in range(len(self.half))]
-        found = np.stack(rise, 2)[:, :-1] / self.half
+        slopes = np.stack(rise, 2)[:, :-1] / self.half
         if self._pair is not None:
             # the slope of sqrt(s) is that of s over 2 sqrt(s); none where s is cut at 0
             a, b = self._pair
             root = np.sqrt(np.where(q[:, b] > SEEN**2, q[:, b], np.inf))
             root *= np.where(q[:, -1] < 0, -1.0, 1.0)
-            mean, gap = found[:, a].copy(), found[:, b] / (2 * root[:, None])
-            found[:, a], found[:, b] = mean + gap / 2, mean - gap / 2
-        return found
+            mean, gap = slopes[:, a].copy(), slopes[:, b] / (2 * root[:, None])
+            slopes[:, a], slopes[:, b] = mean + gap / 2, mean - gap / 2
+        return slopes
 
 
 def emulator(
@@ -299,7 +301,7 @@ def _left_out(matrix: Array, equations: Array, count: int) -> tuple[Array, Array
 
 
 def bound(errors: Array) -> float:
-    """What 99 % of designs keep, with a confidence of 95 %: the one-sided tolerance limit of
+    """Bound that 99 % of designs keep, with a confidence of 95 %: the one-sided tolerance limit of
     log-normal errors (n,) (NIST/SEMATECH e-Handbook, sec. 7.2.6.3), and no less than any seen.
 
         ln bound = mean + K sd,  K = (z_p + sqrt(z_p^2 - a b)) / a,
@@ -332,12 +334,12 @@ def paired(pair: tuple[int, int] | None, ln_f: Array, slopes: Array) -> tuple[Ar
 
 def unpaired(pair: tuple[int, int] | None, q: Array, apart: Array) -> Array:
     """ln f (p, n) of what is smooth, q (p, n); pair: the `places`; apart (p,): d."""
-    found = q.copy()
+    mixed = q.copy()
     if pair is not None:
         a, b = pair
         gap = np.where(apart < 0, -1.0, 1.0) * np.sqrt(np.maximum(q[:, b], 0.0))
-        found[:, a], found[:, b] = q[:, a] + gap / 2, q[:, a] - gap / 2
-    return found
+        mixed[:, a], mixed[:, b] = q[:, a] + gap / 2, q[:, a] - gap / 2
+    return mixed
 
 
 def up_to(count: int, degree: int) -> Array:
@@ -352,10 +354,10 @@ def up_to(count: int, degree: int) -> Array:
 def products(degrees: Array, t: Array, by: int = -1) -> Array:
     """P_k(t) (p, k) at t (p, v), or their slopes by one coordinate."""
     P = legendre(t, int(degrees.max(initial=0)))
-    found = np.ones((len(degrees), len(t)))
+    result = np.ones((len(degrees), len(t)))
     for j, own in enumerate(degrees.T):
-        found *= (_rates(P) if j == by else P)[own, j]
-    return found.T
+        result *= (_rates(P) if j == by else P)[own, j]
+    return result.T
 
 
 def legendre(t: Array, highest: int) -> Array:

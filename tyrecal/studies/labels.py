@@ -55,7 +55,7 @@ class Labeling(ResultPart):
 
 
 class Labels(ResultPart):
-    """Of all frequencies without a label."""
+    """Labels of all frequencies that came without one."""
 
     frequencies: list[LabelledFrequency]
     labelings: list[Labeling]  # the likeliest first
@@ -86,26 +86,26 @@ class Labels(ResultPart):
         return Table(heads, rows, title="Labels of frequencies that came without")
 
     def sentences(self) -> list[str]:
-        """What was told."""
+        """Sentences on the probability of the labels."""
         best = self.labelings[0]
-        told = [f"all these labels together are {best.probability:.1%} probable"]
+        sentences = [f"all these labels together are {best.probability:.1%} probable"]
         if len(self.labelings) > 1:
             other = self.labelings[1]
-            told.append(f"next are {', '.join(other.labels)}, {other.probability:.1%}")
-        return told
+            sentences.append(f"next are {', '.join(other.labels)}, {other.probability:.1%}")
+        return sentences
 
     def doubts(self) -> list[str]:
-        """What must not be overlooked."""
-        told = []
+        """Doubts about the labels that must not be overlooked."""
+        doubts = []
         if self.doubtful:
             where = ", ".join(f"{each.frequency_Hz:g} Hz" for each in self.doubtful)
-            told.append(f"labels less than {SURE_LABEL:.0%} probable: {where}")
+            doubts.append(f"labels less than {SURE_LABEL:.0%} probable: {where}")
         if not self.settled:
-            told.append(
+            doubts.append(
                 "several labelings each lead to a design at which another is likelier: give labels"
                 " that you know"
             )
-        return told
+        return doubts
 
 
 class LabelsResult(Result):

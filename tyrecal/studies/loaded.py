@@ -92,16 +92,16 @@ def load_tyres(
     loads = [load for load in loads_N if load]
     questions = [PressQuestion(designs[name], loads, _count(case)) for name in able]
     answers = evaluator.press_all(questions, jobs)
-    found: dict[str, LoadOutcome] = {}
+    outcomes: dict[str, LoadOutcome] = {}
     for name in designs:
         free = unloaded[name]
-        found[name] = (
+        outcomes[name] = (
             free
             if isinstance(free, EvaluationFailed)
             else _loaded_tyre(case, free, next(answers), 0.0 in loads_N)
         )
-        notify(name, found[name])
-    return found
+        notify(name, outcomes[name])
+    return outcomes
 
 
 def progress(outcome: LoadOutcome) -> tuple[int, EvaluationFailed | None]:
@@ -130,12 +130,12 @@ def _unloaded(
     """The unloaded tyre's modes with a few harmonics more, the wanted ones surely among them."""
     highest = case.case.analysis.highest_harmonic + EXTRA_HARMONICS
     question = Question({**values, "analysis.highest_harmonic": highest})
-    ((_, found),) = find_modes(
+    ((_, outcome),) = find_modes(
         evaluator, [question], lambda place, modes: labels or _wanted(case, modes)
     )
-    if isinstance(found, DeckRefused):
-        raise found
-    return found
+    if isinstance(outcome, DeckRefused):
+        raise outcome
+    return outcome
 
 
 def _loaded_tyre(
