@@ -1,4 +1,4 @@
-"""What the words of a command line mean: the case with what was set in it, loads, a fit."""
+"""Meaning of the words of a command line: the case with its settings, loads, a fit."""
 
 from __future__ import annotations
 

@@ -100,9 +100,9 @@ def power(
         evaluator.on_progress = bar.at
         model, rows = tyre_model(loaded, evaluator, rules, jobs), rows_of(loaded, rules)
         ruler = ruler_of(measure(model, rows), labels_of(loaded))
-    found = powers(ruler, rules)
-    terminal.result({"power": [asdict(each) for each in found]})
-    terminal.say(words(found, ruler, rules, model.spans))
+    effect_powers = powers(ruler, rules)
+    terminal.result({"power": [asdict(each) for each in effect_powers]})
+    terminal.say(words(effect_powers, ruler, rules, model.spans))
     return 0
 
 

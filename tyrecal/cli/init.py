@@ -289,9 +289,9 @@ def _from_deck(
     mass_kg = trial(flat)
     with whole(target) as partial:
         partial.write_text(text, encoding="utf-8")
-    found = contents(deck, flat)
-    terminal.result({"case": str(target), "mass_kg": mass_kg, **found})
-    for sentence in words(found, mass_kg):
+    content = contents(deck, flat)
+    terminal.result({"case": str(target), "mass_kg": mass_kg, **content})
+    for sentence in words(content, mass_kg):
         terminal.say(sentence)
     loaded = load_case(target, allow_unusual=True)
     if picture:

@@ -152,17 +152,17 @@ def cli(ctx: click.Context) -> None:
 
 
 def _defaults(command: str | None) -> dict[str, Any]:
-    """What the user's settings say in place of an option. Raises InputError, but not where the
+    """Values of the user's settings in place of options. Raises InputError, but not where the
     installation is looked at."""
     from ..simulate.settings import settings
 
     try:
-        found = settings()
+        chosen = settings()
     except InputError:
         if command in ("doctor", "solvers"):
             return {}
         raise
-    given = {k: v for k in ("jobs", "solver") if (v := getattr(found, k)) is not None}
+    given = {k: v for k in ("jobs", "solver") if (v := getattr(chosen, k)) is not None}
     parts = {part: given for part in ("make", "answer")}  # of blind
     return {name: {**given, **parts} for name in COMMANDS if name != "doctor"}
 

@@ -242,8 +242,8 @@ def _study(function: Callable[..., int], given: tuple[Any, ...]) -> Callable[...
     def command(*args: Any, **values: Any) -> int:
         terminal = _talk(values)
         own = [field.name for field in fields(Study) if field.name in values]
-        asked = Study(terminal, **{name: values.pop(name) for name in own})
-        return function(*args, study=asked, **values)
+        study = Study(terminal, **{name: values.pop(name) for name in own})
+        return function(*args, study=study, **values)
 
     result: Callable[..., int] = every(*given)(command)
     return result
@@ -336,20 +336,20 @@ class Study:
         else:
             self.terminal.detail(words)
 
-    def present(self, run: Run, found: Result, figures: Mapping[str, Figure]) -> int:
+    def present(self, run: Run, result: Result, figures: Mapping[str, Figure]) -> int:
         """Write a result with its figures by name, say what was found, and give the exit code."""
         from ..report.table import shown
         from .main import EXIT_SOLVER
 
-        found = run.write(found, figures)
+        result = run.write(result, figures)
         run.finish()
-        self.terminal.result(found.content())
-        for table in found.tables():
+        self.terminal.result(result.content())
+        for table in result.tables():
             self.terminal.show(shown(table))
-        for sentence in found.sentences():
+        for sentence in result.sentences():
             self.terminal.say(sentence)
-        if lost := found.doubts():
-            count = len(lost) + len(getattr(found, "rows", ()))
+        if lost := result.doubts():
+            count = len(lost) + len(getattr(result, "rows", ()))
             self.terminal.error(f"{len(lost)} of {count} evaluations failed; the others are kept")
         self.finish(run)
         return EXIT_SOLVER if lost else 0

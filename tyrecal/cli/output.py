@@ -176,13 +176,13 @@ class Run:
         resume(words)
         return self.store
 
-    def write(self, found: AnyResult, figures: Mapping[str, Figure] | None = None) -> AnyResult:
+    def write(self, result: AnyResult, figures: Mapping[str, Figure] | None = None) -> AnyResult:
         """Write a study's files and figures; returns the result with its provenance."""
-        found = found.stamped(self.provenance or {})
-        for name, text in found.texts().items():
+        result = result.stamped(self.provenance or {})
+        for name, text in result.texts().items():
             self.write_text(name, text)
         self.write_figures(figures or {})
-        return found
+        return result
 
     def write_figures(self, figures: Mapping[str, Figure]) -> None:
         """Write figures by name, as files of the run's format."""
@@ -256,7 +256,7 @@ class Run:
                 self._write_facts()
 
     def _drop_unfinished(self) -> None:
-        """What processes that were ended, now or in an earlier run, left of their runs."""
+        """Remove what processes that were ended, now or in an earlier run, left of their runs."""
         from ..simulate.evaluate.folders import drop_unfinished
 
         drop_unfinished(self.runs)

@@ -37,7 +37,7 @@ def command(folders: tuple[Path, ...], output: Path | None, terminal: Terminal) 
     path = output or (folders[0] / "report.html" if len(folders) == 1 else Path("report.html"))
     written = write_page(path, folders)
     terminal.result({"page": str(path), "bytes": written.size, "found": written.found})
-    for folder, found in written.found.items():
-        terminal.say(f"{folder}: {', '.join(found)}")
+    for folder, studies in written.found.items():
+        terminal.say(f"{folder}: {', '.join(studies)}")
     terminal.say(f"report in {path}")
     return 0

@@ -57,8 +57,8 @@ def command(
     output = study.run(loaded, "sweep-pressure", evaluator, pressure_kPa=pressures)
     with terminal.progress("sweep") as bar:
         evaluator.on_progress = bar.at
-        found = run(loaded, evaluator, designs, pressures, study.jobs, study.notify)
-    if not found.rows:
+        result = run(loaded, evaluator, designs, pressures, study.jobs, study.notify)
+    if not result.rows:
         return EXIT_SOLVER
     figures = {}
     if pictures:
@@ -71,8 +71,8 @@ def command(
             for each, state in measured
             if state.rim == rim
         ]
-        figures["pressure_sweep"] = draw_pressure_sweep(found.rows, targets)
-    return study.present(output, found, figures)
+        figures["pressure_sweep"] = draw_pressure_sweep(result.rows, targets)
+    return study.present(output, result, figures)
 
 
 def _pressures(

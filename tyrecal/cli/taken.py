@@ -1,4 +1,4 @@
-"""What a command takes that is given no CASE: the last fit of this folder, or its only case."""
+"""The case of a command that is given no CASE: the last fit of this folder, or its only case."""
 
 from __future__ import annotations
 

@@ -66,8 +66,8 @@ def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
 
 
 def _refused(loaded: LoadedCase) -> Mistake | None:
-    """What the solver that it is meant for refuses of a deck of one's own, if that is the bundled
-    one, or of decks in three dimensions."""
+    """Mistake for which the solver of the case refuses a user's deck, if it is the bundled one, or
+    decks in three dimensions."""
     from ..simulate.deck.own import trial
     from ..tyre.case.mistakes import Mistake
     from ..tyre.own_deck.text import OwnDeckError
