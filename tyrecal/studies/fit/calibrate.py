@@ -146,7 +146,7 @@ def _run(problem: Problem, start: Array, method: str) -> StartReport:
 
 
 def _tolerance(problem: Problem) -> float:
-    """What the projected gradient can be told from 0 by, given how exact the slopes are."""
+    """Largest projected gradient that counts as 0, given how exact the slopes are."""
     modal = SLOPE_NOISE_HZ * (problem.difference_step or 0.0)
     sigma = min((t.sigma_Hz or 1.0 for t in problem.targets), default=1.0)
     pressed = SLOPE_ERROR * float(np.linalg.norm([t.scale * t.value for t in problem.road]))

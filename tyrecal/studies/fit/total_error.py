@@ -46,7 +46,7 @@ class TotalError:
     def by_variable(
         self, problem: Problem, point: Point, chi2_per_dof: float | None
     ) -> dict[str, dict[str, Any]]:
-        """What fit.json says of the total by variable; standard errors in each one's unit."""
+        """Entries of fit.json about the total by variable; standard errors in each one's unit."""
         spread = self.of_coordinates * max(1.0, chi2_per_dof or 0.0)
         errors = standard_errors(problem, point, spread, self.is_determined)
         return {

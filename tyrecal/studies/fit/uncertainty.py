@@ -50,8 +50,8 @@ def uncertainty(problem: Problem, point: Point) -> FitUncertainty:
         correlations = covariance / np.outer(spread, spread)
         correlations[~seen] = correlations[:, ~seen] = np.nan
     values = np.zeros(J.shape[1])  # fewer data than variables leave some combinations unseen
-    found = np.linalg.svd(J, compute_uv=False)
-    values[: len(found)] = found
+    singular_values = np.linalg.svd(J, compute_uv=False)
+    values[: len(singular_values)] = singular_values
     modal = sigma[: int(counts[: len(problem.targets)].sum())]
     noise = float(np.sqrt(np.mean(modal**2))) if len(modal) else float("nan")
     every = np.full(len(problem.scale), np.nan)
@@ -78,7 +78,7 @@ def fit_response(J: Array, root: Array) -> tuple[Array, Array]:
 def standard_errors(
     problem: Problem, point: Point, covariance: Array, seen: Array
 ) -> list[float | None]:
-    """Of each variable in its own unit; None where the data do not tell."""
+    """Standard error of each variable in its own unit; None where the data do not determine it."""
     slopes = [v.slope(point.values[v.name]) for v in problem.variables]
     spread = np.sqrt(np.where(seen, np.diag(covariance), np.inf))
     return [float(s * k) if np.isfinite(s) else None for s, k in zip(spread, slopes, strict=True)]
