@@ -49,7 +49,7 @@ KNOWN_WITHIN = (
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What was found."""
+    """Result of a diagnosis, with the problem as it was solved."""
 
     problem: InverseProblem  # as it was solved
     bare: InverseProblem  # before effects were asked again, near modes coupled as without effects
@@ -152,20 +152,20 @@ def diagnose(
     kept = np.flatnonzero(share > REFUTED).tolist()
     settled = [_settled(bares[k], model, first[k]) for k in kept]
     every = [h for _, own in settled for h in own]
-    found = [with_sets(problem, own, every) for problem, own in settled]
+    per_reading = [with_sets(problem, own, every) for problem, own in settled]
     readings = [readings[k] for k in kept]
-    among = shares(readings, found)
+    among = shares(readings, per_reading)
     share[:], share[kept] = 0.0, among
     best = int(np.argmax(among))
-    bare, problem, hypotheses = bares[kept[best]], settled[best][0], found[best]
-    p = averaged(among, found)
+    bare, problem, hypotheses = bares[kept[best]], settled[best][0], per_reading[best]
+    p = averaged(among, per_reading)
     plain = next(h for h in hypotheses if h.key == NONE).fitted
     d, bare = plain.d[0], replace(bare, zeta=float(plain.zeta[0]))
     verdict = decide(hypotheses, p, len(bare.places), len(d))
     alone = decide(hypotheses, probabilities(hypotheses), len(bare.places), len(d))
     robust = robustness(problem, hypotheses, alone, tuple(model.sources))
     if len(readings) > 1:
-        robust = over_labels(robust, readings, found, among, verdict, len(d))
+        robust = over_labels(robust, readings, per_reading, among, verdict, len(d))
     gap = find_gap(bare, d, tuple(model.variables))
     P, _, _ = projection(replace(problem, zeta=bare.zeta), d)
     means = {h.key: h.mean() for h in hypotheses if h.values}
@@ -294,10 +294,11 @@ def _known(expansion: Expansion, size: Mapping[str, float], d: Array) -> bool:
         return small or bool(same and all(abs(e - at) < near[id] for (id, e), at in there))
     ((id, e),) = size.items()
     nodes = expansion.nodes[id]
-    asked = [(float(each), np.zeros_like(d)) for each in nodes.values]  # 0 among them
-    asked += [(nodes.anchor.e, nodes.anchor.d)] if nodes.anchor else []
+    evaluated = [(float(each), np.zeros_like(d)) for each in nodes.values]  # 0 among them
+    evaluated += [(nodes.anchor.e, nodes.anchor.d)] if nodes.anchor else []
     return any(
-        abs(e - at) < near[id] and (at == 0 or abs(d - x).max() < KNOWN_WITHIN) for at, x in asked
+        abs(e - at) < near[id] and (at == 0 or abs(d - x).max() < KNOWN_WITHIN)
+        for at, x in evaluated
     )
 
 

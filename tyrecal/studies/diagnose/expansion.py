@@ -55,7 +55,7 @@ class Joint:
     tilt: Array  # (n, v)
 
     def at(self, first: Array, second: Array) -> tuple[Array, Array]:
-        """What it adds to a (q, n) and B (q, n, v) at parameters (q,)."""
+        """Additions to a (q, n) and B (q, n, v) at parameters (q,)."""
         grown = np.clip(first / self.e[0], 0, 1) * np.clip(second / self.e[1], 0, 1)
         shift = grown[:, None] * (self.shift - self.tilt @ self.d)
         return shift, grown[:, None, None] * self.tilt
@@ -129,7 +129,7 @@ class Expansion:
         return self.eta + self.jacobian @ d + bent @ d / 2, self.jacobian + bent
 
     def range_shifts(self, places: Array) -> Array:
-        """What every effect may do to the rows ``places`` (n,) over its range, as so many more
+        """Shifts of the rows ``places`` (n,) by every effect over its range, as so many more
         constants (n, k)."""
         every = [each.range_shifts()[:, places] for each in self.nodes.values()]
         return np.vstack([np.zeros((0, len(places))), *every]).T
@@ -149,8 +149,8 @@ def expand(model: ResponseModel, x0: Array, splits: bool = True) -> Expansion:
     values = {id: node_values(model.spans[id], shares.get(id, ())) for id in ids}
     points = [Query(x0, constants=True, slopes=at_0, coupled=True)]
     points += [Query(x0 + side * step) for step in steps for side in (1, -1)]
-    asked = [(id, float(e)) for id in ids for e in values[id]]
-    points += [_with_effect(model, x0, id, e) for id, e in asked]
+    pairs = [(id, float(e)) for id in ids for e in values[id]]
+    points += [_with_effect(model, x0, id, e) for id, e in pairs]
     answers = model.answers(points)
     first = answers[0]
     if isinstance(first, Exception):
@@ -173,21 +173,23 @@ def expand(model: ResponseModel, x0: Array, splits: bool = True) -> Expansion:
         material_laws=model.material_laws,
     )
     nodes, failed = {}, {}
-    replies = dict(zip(asked, answers[1 + 2 * count :], strict=True))
-    found = {id: {float(e): replies[id, float(e)] for e in values[id]} | {0.0: first} for id in ids}
+    replies = dict(zip(pairs, answers[1 + 2 * count :], strict=True))
+    by_effect = {
+        id: {float(e): replies[id, float(e)] for e in values[id]} | {0.0: first} for id in ids
+    }
     more = [
         (id, e)
         for id in ids
-        for e in _more(_nodes(id, plain, model.spans[id], found[id]))
-        or _nearer(model.spans[id], found[id])
+        for e in _more(_nodes(id, plain, model.spans[id], by_effect[id]))
+        or _nearer(model.spans[id], by_effect[id])
     ]
     again = model.answers([_with_effect(model, x0, id, e) for id, e in more]) if more else []
     for (id, e), answer in zip(more, again, strict=True):
-        found[id][e] = answer
+        by_effect[id][e] = answer
     for id in ids:
-        made = _nodes(id, plain, model.spans[id], found[id])
+        made = _nodes(id, plain, model.spans[id], by_effect[id])
         if made is None:
-            failed[id] = str(next(a for a in found[id].values() if isinstance(a, Exception)))
+            failed[id] = str(next(a for a in by_effect[id].values() if isinstance(a, Exception)))
         else:
             nodes[id] = made
     return replace(plain, nodes=nodes, failed=failed, coupling=first.coupling)
@@ -237,8 +239,8 @@ def anchored(expansion: Expansion, model: ResponseModel, wanted: Sequence[Query]
     """The expansion with one or two effects asked again at each of these points; one that has no
     solution there stays as it was. What an effect alone gains, those with others know."""
     nodes, joint = dict(expansion.nodes), dict(expansion.joint)
-    asked = list(zip(wanted, model.answers(wanted), strict=True))
-    for point, answer in sorted(asked, key=lambda each: len(each[0].effects)):
+    answered = list(zip(wanted, model.answers(wanted), strict=True))
+    for point, answer in sorted(answered, key=lambda each: len(each[0].effects)):
         if not isinstance(answer, Answer):
             continue
         (id, e), *others = point.effects.items()
@@ -269,12 +271,12 @@ def _nodes(
     id: str, plain: Expansion, span: Span, replies: Mapping[float, Answer | Exception]
 ) -> Nodes | None:
     """Nodes from 0 outwards as far as there are solutions; None where there is none at all."""
-    asked = {0.0: Answer(plain.eta, plain.jacobian, plain.split), **replies}
+    known = {0.0: Answer(plain.eta, plain.jacobian, plain.split), **replies}
     good = [0.0]
     reach = [max(0.0, span.low), min(0.0, span.high)]  # 0, or the near end of the range
     for side in (1, -1):
         for e in sorted((e for e in replies if e * side > 0), key=abs):
-            if not isinstance(asked[e], Answer):
+            if not isinstance(known[e], Answer):
                 break
             good.append(e)
             if span.low <= e <= span.high:
@@ -283,7 +285,7 @@ def _nodes(
         return None
     low, high = sorted(reach)
     values = np.array(sorted(good))
-    answers = [answer for e in values if isinstance(answer := asked[float(e)], Answer)]
+    answers = [answer for e in values if isinstance(answer := known[float(e)], Answer)]
     return Nodes(
         values,
         np.array([each.eta - plain.eta for each in answers]),
@@ -355,9 +357,9 @@ def derivatives(nodes: Array) -> Array:
     """d l_j / d e (k, k) of Lagrange's polynomials l_j at the nodes (k,)."""
     apart = nodes[:, None] - nodes + np.eye(len(nodes))
     weights = np.prod(apart, axis=1)
-    found = weights[:, None] / weights / apart
-    np.fill_diagonal(found, 0.0)
-    return found - np.diag(found.sum(axis=1))
+    matrix = weights[:, None] / weights / apart
+    np.fill_diagonal(matrix, 0.0)
+    return matrix - np.diag(matrix.sum(axis=1))
 
 
 def lagrange(nodes: Array, e: Array) -> Array:

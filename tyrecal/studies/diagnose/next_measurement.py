@@ -108,14 +108,14 @@ def offered_kPa(inflation_kPa: float, measured: Sequence[float]) -> list[float]:
 
 @dataclass(frozen=True)
 class Look:
-    """What a set of rows shows, those that are there first."""
+    """Rows of a measurement, those that are there first, and what they show."""
 
     sigma: Array  # (n, n)
     jacobian: Array  # (n, v)
     shifts: Mapping[str, Array]  # (q, n) of each explanation at its sizes
 
     def information(self, known: int, likely: Mapping[str, float], spread: Array) -> float:
-        """Of what comes after the ``known`` rows, in nats; spread (v,): of x."""
+        """Information in the rows after the ``known`` ones, in nats; spread (v,): of x."""
         S = self.sigma + (self.jacobian * spread**2) @ self.jacobian.T
         foretold = np.linalg.solve(S[:known, :known], S[:known, known:])
         root = np.linalg.cholesky(S[known:, known:] - S[known:, :known] @ foretold)
@@ -201,7 +201,7 @@ def look(problem: InverseProblem, d: Array, sizes: Mapping[str, Sizes]) -> Look:
 
 
 def _shifts(problem: InverseProblem, sizes: Sizes, d: Array) -> Array:
-    """What an explanation adds (q, n) at x0 + d."""
+    """Shift (q, n) that an explanation adds at x0 + d."""
     added = problem.added(sizes, _count(sizes))
     return np.asarray(added.shift + added.tilt @ d)
 
@@ -261,8 +261,8 @@ def again(
 
 
 def _along(nodes: Nodes, e: float, slope: Array) -> Array:
-    """What an effect of parameter e adds to further rows (m,), whose slopes by it are known at 0:
-    they bend as those that it was asked for do, on the whole; 0 where there is no slope."""
+    """Shift of further rows (m,) by an effect of parameter e, whose slopes by it are known at 0:
+    they bend as the rows for which it was evaluated do, on the whole; 0 where there is no slope."""
     line, bent = nodes.slope[nodes.values == 0][0] * e, nodes.shift_at(np.array([e]))[0]
     known = np.isfinite(line)
     share = bent[known] @ line[known] / (line[known] @ line[known]) if line[known].any() else 1.0

@@ -69,9 +69,9 @@ def regions(model: Parted, x: Array) -> list[SectionPart]:
     own = model.values(x)
     taken = {path: own[name] for name, v in case.case.variables.items() for path in v.sets}
     design = {**numbers, **taken}
-    asked = [model.in_state(state, design, list(numbers)) for state in model.states]
+    designs = [model.in_state(state, design, list(numbers)) for state in model.states]
     at: dict[TyreState, Found] = {}
-    for state, each in zip(model.states, problem.modes_of(asked), strict=True):
+    for state, each in zip(model.states, problem.modes_of(designs), strict=True):
         if not isinstance(each, Found):
             raise each
         at[state] = each

@@ -64,11 +64,11 @@ class Residual(ResultPart):
 
     @property
     def of(self) -> Observable | None:
-        """What was measured, where it is a frequency."""
-        found = ROW_PATTERN.fullmatch(self.row)
-        if not found:
+        """Observable that was measured, where it is a frequency."""
+        match = ROW_PATTERN.fullmatch(self.row)
+        if not match:
             return None
-        c, m, kind, pressure, rim = found.groups()
+        c, m, kind, pressure, rim = match.groups()
         label = Label(int(c), int(m), kind)
         return Observable("frequency", label, float(pressure), self.run, rim)  # type: ignore[arg-type]
 
@@ -91,7 +91,7 @@ class ContrastPart(ResultPart):
 
 
 class GapPart(ResultPart):
-    """What calibration leaves; rms in per cent by group."""
+    """Gap that calibration leaves; rms in per cent by group."""
 
     p_value: float
     chi2: float
@@ -139,7 +139,7 @@ class NextMeasurement(ResultPart):
 
 
 class RobustPart(ResultPart):
-    """What the verdict hangs on."""
+    """Dependence of the verdict on the assumptions."""
 
     robust: bool
     hangs_on: list[str]
@@ -194,9 +194,9 @@ def diagnosis_result(
     section: Sequence[FieldValue] = (),
     labels: Labels | None = None,
 ) -> DiagnosisResult:
-    """What was found. ``calibrated``: see `calibrated_variables`."""
+    """Result of a diagnosis for its files. ``calibrated``: see `calibrated_variables`."""
     d, shown = diagnosis, diagnosis.verdict.key or diagnosis.best
-    found = DiagnosisResult(
+    result = DiagnosisResult(
         format=1,
         verdict=d.verdict.kind,
         words=d.verdict.words,
@@ -240,7 +240,7 @@ def diagnosis_result(
         left_out=list(d.problem.observations.left_out),
         not_evaluated=dict(d.problem.expansion.failed),
     )
-    return found.model_copy(update={"calibrated": calibrated}) if calibrated else found
+    return result.model_copy(update={"calibrated": calibrated}) if calibrated else result
 
 
 def _gap(diagnosis: Diagnosis, under_load: UnderLoad | None) -> GapPart:
@@ -276,10 +276,10 @@ def _gap(diagnosis: Diagnosis, under_load: UnderLoad | None) -> GapPart:
     )
 
 
-def _under_load(found: UnderLoad | None) -> UnderLoadPart | None:
-    if found is None:
+def _under_load(comparison: UnderLoad | None) -> UnderLoadPart | None:
+    if comparison is None:
         return None
-    effect = found.tyres[1] if len(found.tyres) > 1 else None
+    effect = comparison.tyres[1] if len(comparison.tyres) > 1 else None
     return UnderLoadPart(
         effect=effect,
         rows=[
@@ -293,11 +293,11 @@ def _under_load(found: UnderLoad | None) -> UnderLoadPart | None:
                 calibrated_percent=100 * row.off[NONE] if NONE in row.off else None,
                 effect_percent=100 * row.off[effect] if effect and effect in row.off else None,
             )
-            for row in found.rows
+            for row in comparison.rows
         ],
-        calibrated_rms_percent=found.rms_percent(NONE),
-        effect_rms_percent=found.rms_percent(effect) if effect else None,
-        failed=list(found.failed),
+        calibrated_rms_percent=comparison.rms_percent(NONE),
+        effect_rms_percent=comparison.rms_percent(effect) if effect else None,
+        failed=list(comparison.failed),
     )
 
 

@@ -78,23 +78,23 @@ def lines(
 ) -> list[Line]:
     """One for each point of the rule in what couples near modes, or one if none are, about re-fits
     that start from x - x0 = near (q, v); the rest as in `refit`."""
-    added, found = problem.added(effects, len(near)), []
+    added, result = problem.added(effects, len(near)), []
     places: list[int | None] = [*(among or range(len(problem.integrand)))]
     for k in places or [None]:
         at = problem if k is None else problem.integrand[k]
         d = refit_at(problem, at, added, extra, near, COUPLED_STEPS).d
-        found.append(line_about(problem, added, d, k))
-    return found
+        result.append(line_about(problem, added, d, k))
+    return result
 
 
 def line_about(problem: InverseProblem, added: Added, d: Array, place: int | None) -> Line:
     """About x - x0 = d (q, v), with what effects add."""
     at = problem if place is None else problem.integrand[place]
-    eta, J, told = model_of(problem, at, added)(d)
+    eta, J, ln_label = model_of(problem, at, added)(d)
     back = d - (problem.centre - problem.expansion.x0)
     residual = problem.observations.y - eta + (J @ back[:, :, None])[:, :, 0]
     laws = problem.laws(at.with_mixed_laws(added))
-    return Line(place, residual, J, *laws, told, added.split)
+    return Line(place, residual, J, *laws, ln_label, added.split)
 
 
 def reweighed(

@@ -1,4 +1,5 @@
-"""What a verdict hangs on: the same data, judged with other numbers than were assumed.
+"""Dependence of a verdict on the assumptions: the same data, judged with other numbers than were
+assumed.
 
 Every prior, every constant's standard deviation, what laws are off and how far variables may be
 from their start half and twice as large, the model's own form and the section beyond doubt, each
@@ -42,7 +43,7 @@ JUDGED = {UNDECIDED: "undecided", NO_GAP: "no gap", "outside": "outside the cata
 
 @dataclass(frozen=True)
 class Robustness:
-    """Of a verdict."""
+    """Robustness of a verdict against other assumptions."""
 
     robust: bool  # it is the same with all of these numbers
     hangs_on: tuple[str, ...]  # what changes it, and to what
@@ -56,14 +57,14 @@ def robustness(
     verdict: Verdict,
     sources: Sequence[str],
 ) -> Robustness:
-    """Of the verdict on these hypotheses. sources: names of the sources of error."""
+    """Robustness of the verdict on these hypotheses. sources: names of the sources of error."""
     kept = _weighty(hypotheses)
     p = [said(probabilities(hypotheses), verdict)]
     changes: list[str] = []
     for words, judged, rows in _variants(problem, kept, verdict, sources):
-        found = probabilities(judged)
-        p.append(said(found, verdict))
-        other = decide(judged, found, rows, len(problem.centre))
+        share = probabilities(judged)
+        p.append(said(share, verdict))
+        other = decide(judged, share, rows, len(problem.centre))
         if (other.kind, other.key) != (verdict.kind, verdict.key):
             changes.append(f"{words} ({in_words(other)})")
     return Robustness(not changes, tuple(changes), min(p), max(p))
@@ -81,16 +82,17 @@ def said(p: Mapping[str, float], verdict: Verdict) -> float:
 def _variants(
     problem: InverseProblem, kept: Sequence[Hypothesis], verdict: Verdict, sources: Sequence[str]
 ) -> Iterator[tuple[str, list[Hypothesis], int]]:
-    """What is other, the hypotheses then, and how many rows speak."""
+    """Variants of the assumptions: the change in words, the hypotheses then, and the number of rows
+    that count."""
     count = len(problem.places)
     for words, of in _priors(verdict):
         for factor, times in FACTORS.items():
-            found = [replace(h, prior=h.prior * factor ** of(h)) for h in kept]
-            yield f"the prior of {words} {times} as large", found, count
+            changed = [replace(h, prior=h.prior * factor ** of(h)) for h in kept]
+            yield f"the prior of {words} {times} as large", changed, count
     changes = list(_changes(problem, sources))
     again = [_again(problem, h, changes) for h in kept]
-    for other, *found in zip(changes, *again, strict=True):
-        yield other.words, found, int(other.keep.sum())
+    for other, *changed in zip(changes, *again, strict=True):
+        yield other.words, changed, int(other.keep.sum())
 
 
 def _priors(verdict: Verdict) -> Iterator[tuple[str, Callable[[Hypothesis], int]]]:
@@ -104,7 +106,7 @@ def _priors(verdict: Verdict) -> Iterator[tuple[str, Callable[[Hypothesis], int]
 
 
 def _changes(problem: InverseProblem, sources: Sequence[str]) -> Iterator[Changed]:
-    """What may be other."""
+    """Changes of the numbers that were assumed."""
     rows = problem.observations.rows
     every = np.ones(len(rows), bool)
     of_section = [k for k, name in enumerate(sources) if name.startswith(SECTION)]
@@ -158,7 +160,7 @@ def _again(problem: InverseProblem, h: Hypothesis, changes: Sequence[Changed]) -
     """A hypothesis weighed anew with each change."""
     if h.key == OUTSIDE:
         return _outside(problem, h, changes)
-    d, among, found = h.fitted.d, coupled_most([h]), []
+    d, among, result = h.fitted.d, coupled_most([h]), []
     fits = lines(problem, h.values, d, among)
     for other in changes:
         if other.parts_near_modes:
@@ -169,8 +171,8 @@ def _again(problem: InverseProblem, h: Hypothesis, changes: Sequence[Changed]) -
             ln, chi2 = reweighed(fits, other, among)
         total = float(np.logaddexp.reduce(ln + h.ln_weights))
         fitted = h.fitted._replace(ln_evidence=ln, chi2=chi2)
-        found.append(replace(h, ln_evidence=total, fitted=fitted))
-    return found
+        result.append(replace(h, ln_evidence=total, fitted=fitted))
+    return result
 
 
 def _outside(
@@ -181,7 +183,7 @@ def _outside(
     extra = np.array([family.extra for family in families(problem)])
     added, start = problem.added({}, len(extra)), np.zeros((len(extra), len(problem.centre)))
     near = refit_at(problem, problem, added, extra, start, REFIT_STEPS).d
-    fits, found = lines(problem, {}, near, extra=extra), []
+    fits, result = lines(problem, {}, near, extra=extra), []
     for other in changes:
         if other.parts_near_modes:
             total = outside(other.problem.only(other.keep)).ln_evidence
@@ -192,8 +194,8 @@ def _outside(
             there = np.array([each[np.ix_(other.keep, other.keep)].any() for each in more])
             shares = ln_shares([family for family, on in zip(now, there, strict=True) if on])
             total = float(np.logaddexp.reduce(ln[there] + shares))
-        found.append(replace(h, ln_evidence=total))
-    return found
+        result.append(replace(h, ln_evidence=total))
+    return result
 
 
 def in_words(verdict: Verdict) -> str:
