@@ -16,8 +16,8 @@ from ..errors import Refused
 from .element_types import NODES_AND_SECTION
 from .spelling import full_keyword, full_parameters, named
 
-MOST_BYTES = 100_000_000  # of a deck and all that it includes
-MOST_CHARACTERS = 4096  # with those that continue it; ABAQUS reads 256 of each
+MAX_DECK_BYTES = 100_000_000  # of a deck and all that it includes
+MAX_CHARACTERS = 4096  # with those that continue it; ABAQUS reads 256 of each
 DEEPEST_INCLUDE = 5  # files that include others
 COMPLEX_STEP = 1e-30  # so small that its square vanishes against every real part
 
@@ -161,7 +161,7 @@ class Reader:
 
     folder: Path | None  # None: nothing is included
     kind: type[Place] = Place
-    most_bytes: int = MOST_BYTES
+    most_bytes: int = MAX_DECK_BYTES
     blocks: list[Block] = field(default_factory=list)
     texts: dict[str, str] = field(default_factory=dict)  # by file
     _rows: list[Row] = field(default_factory=list)  # of the last block
@@ -211,8 +211,8 @@ class Reader:
                 if pending:
                     yield start, pending
                 start = self.kind(file, count)
-            if len(line) > MOST_CHARACTERS:
-                raise start.error(f"more than {MOST_CHARACTERS} characters in a line are not read")
+            if len(line) > MAX_CHARACTERS:
+                raise start.error(f"more than {MAX_CHARACTERS} characters in a line are not read")
             pending = ""
             if line.endswith(",") and (line.startswith("*") or self._is_short_element(line)):
                 pending = line
@@ -285,9 +285,9 @@ def read_deck(path: Path) -> str:
     if path.exists() and not path.is_file():
         raise DeckError(WHOLE_DECK, f"{path.name} is not a regular file")
     with path.open("rb") as file:
-        content = file.read(MOST_BYTES + 1)
-    if len(content) > MOST_BYTES:
-        raise DeckError(WHOLE_DECK, f"{path.name} is larger than {MOST_BYTES / 1e6:g} MB")
+        content = file.read(MAX_DECK_BYTES + 1)
+    if len(content) > MAX_DECK_BYTES:
+        raise DeckError(WHOLE_DECK, f"{path.name} is larger than {MAX_DECK_BYTES / 1e6:g} MB")
     try:
         return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError:
