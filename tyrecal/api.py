@@ -65,7 +65,7 @@ __all__ = [
     "sweep_pressure",
     "with_values",
 ]
-MOST_SHOWN = 60  # characters of a wrong argument
+MAX_SHOWN_CHARACTERS = 60  # characters of a wrong argument
 
 
 def load_case(path: Path | str, mesh: str = "", allow_unusual: bool = False) -> LoadedCase:
@@ -469,5 +469,5 @@ def _listed(name: str, values: Any, one: str) -> list[Any]:
 
 def _wrong(name: str, wanted: str, value: object) -> ValueError:
     text = printable(repr(value))
-    shown = text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
+    shown = text if len(text) <= MAX_SHOWN_CHARACTERS else f"{text[:MAX_SHOWN_CHARACTERS]}..."
     return ValueError(f"{name} must be {wanted}, got {shown}")

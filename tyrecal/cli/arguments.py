@@ -79,14 +79,14 @@ def parse_loads(text: str, option: str = "--loads-N", zero: bool = False) -> lis
     """Loads in N; ``zero``: 0 may be the first. Raises click.UsageError."""
     from itertools import pairwise
 
-    from ..tyre.case.schema import LARGEST_LOAD_N, LEAST_LOAD_N
+    from ..tyre.case.schema import MAX_CASE_LOAD_N, MIN_CASE_LOAD_N
 
     loads = parse_numbers(option, text, "numbers in N, as in 3000,5000")
     for place, load in enumerate(loads):
-        if not (LEAST_LOAD_N <= load <= LARGEST_LOAD_N or (zero and load == place == 0)):
+        if not (MIN_CASE_LOAD_N <= load <= MAX_CASE_LOAD_N or (zero and load == place == 0)):
             raise click.UsageError(
-                f"{option} {load:g}: must be a load above 0, of {LEAST_LOAD_N:g} to"
-                f" {LARGEST_LOAD_N:g} N"
+                f"{option} {load:g}: must be a load above 0, of {MIN_CASE_LOAD_N:g} to"
+                f" {MAX_CASE_LOAD_N:g} N"
             )
     for before, after in pairwise(loads):
         if after <= before:

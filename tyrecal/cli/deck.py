@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..tyre.own_deck.own_decks import OwnDecks
     from ..tyre.own_deck.text import Block
 
-MOST_SAID = 10  # doubts about a deck
+MAX_DECK_DOUBTS = 10  # doubts about a deck
 
 
 @click.command()
@@ -162,9 +162,9 @@ def _say_what_solvers_take(
     """Print the objections of ABAQUS and CalculiX to decks."""
     for sentence in report["refuses"]:
         terminal.error(f"ABAQUS refuses by its manual: {sentence}")
-    for sentence in report["unknown"][:MOST_SAID]:
+    for sentence in report["unknown"][:MAX_DECK_DOUBTS]:
         terminal.warn(f"not checked for ABAQUS: {sentence}")
-    if more := len(report["unknown"][MOST_SAID:]):
+    if more := len(report["unknown"][MAX_DECK_DOUBTS:]):
         terminal.warn(f"... and {more} more")
     for sentence in lacking:
         terminal.say(f"CalculiX does not honour: {sentence}")

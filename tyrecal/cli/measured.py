@@ -364,13 +364,13 @@ def _layout(
     response: str = "",
 ) -> Layout:
     from ..measured.modal import Layout
-    from ..simulate.modes.label import HIGHEST_HARMONIC
+    from ..simulate.modes.label import MAX_SAMPLED_HARMONIC
 
     x, y, z = _numbers("--centre", centre, 3)
     limits = _numbers("--band", band, 2) if band else None
     if limits and not 0 <= limits[0] < limits[1]:
         raise click.UsageError(f"--band {band}: must rise from 0 or more")
-    most = HIGHEST_HARMONIC if highest is None else highest
+    most = MAX_SAMPLED_HARMONIC if highest is None else highest
     within = (limits[0], limits[1]) if limits else None
     return Layout(axle or "", (x, y, z), directions or "", most, within, response)
 

@@ -26,9 +26,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..simulate.modes.label import AXIAL_COLUMN, BELT, HIGHEST_HARMONIC, Label
+from ..simulate.modes.label import AXIAL_COLUMN, BELT, MAX_SAMPLED_HARMONIC, Label
 from .case_modes import CaseModes
-from .covariance import HALF_WIDTHS, LEAST_SEEN, label_covariances
+from .covariance import HALF_WIDTHS, MIN_SEEN, label_covariances
 from .sensors import Sensors
 
 Array = np.ndarray
@@ -67,7 +67,7 @@ class Labeller:
     """
 
     def __init__(
-        self, sensors: Sensors, highest: int = HIGHEST_HARMONIC, case: CaseModes | None = None
+        self, sensors: Sensors, highest: int = MAX_SAMPLED_HARMONIC, case: CaseModes | None = None
     ):
         self.sensors, self.case = sensors, case
         every = label_covariances(sensors, highest, case.half_width if case else None)
@@ -76,7 +76,7 @@ class Labeller:
         if case:
             pairs = zip(self.labels, self.covariance, strict=True)
             self.covariance = [case.covariance(label, sensors, S) for label, S in pairs]
-        self.is_seen = np.array([seen >= LEAST_SEEN for *_, seen in every])
+        self.is_seen = np.array([seen >= MIN_SEEN for *_, seen in every])
         self._spectra = [np.linalg.eigh(S) for S in self.covariance]
         is_alike = self._odds() < MIN_LN_ODDS
         self._groups = [np.flatnonzero(row) for row in is_alike]  # each label, and its rivals

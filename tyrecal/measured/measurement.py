@@ -17,7 +17,7 @@ CSV_COLUMNS = ("quantity", "c", "m", "kind", "member", "pressure_kPa", "load_N",
 RIM_COLUMN = "rim"  # where some stand on another rim than the case's
 AS_CASE = "case"
 PRESSURE_USUAL = Usual(20, 2000, "kPa", PRESSURE)
-LEAST_CARRIED, MOST_CARRIED = 0.05, 3.0  # contact area times pressure, of the load
+MIN_CARRIED, MAX_CARRIED = 0.05, 3.0  # contact area times pressure, of the load
 MeasurementKey = tuple[str, Label | None, str, float, float, RimSupport | None]
 
 
@@ -72,7 +72,7 @@ class Measurement:
             return f"the load is 0, must be greater than 0 for {self.quantity}"
         if self.quantity == "contact_area_m2":
             share = self.value * 1e3 * self.pressure_kPa / self.load_N
-            if not LEAST_CARRIED <= share <= MOST_CARRIED:
+            if not MIN_CARRIED <= share <= MAX_CARRIED:
                 return (
                     f"{self.quantity} is {self.value:g} under {self.load_N:g} N: at"
                     f" {self.pressure_kPa:g} kPa it would carry {share * self.load_N:.3g} N; check"

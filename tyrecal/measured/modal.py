@@ -11,7 +11,7 @@ from itertools import compress
 import numpy as np
 
 from ..errors import InputError
-from ..simulate.modes.label import BELT, HIGHEST_HARMONIC, TAKES_PART, Label
+from ..simulate.modes.label import BELT, MAX_SAMPLED_HARMONIC, TAKES_PART, Label
 from .case_modes import CaseModes
 from .geometry import sensors_of
 from .identify import FORMS, Responses, identify
@@ -43,7 +43,7 @@ class Layout:
     axle: str = ""  # x, y or z; "": told by the sensors' places
     centre: Place = (0.0, 0.0, 0.0)  # m
     directions: str = ""
-    highest: int = HIGHEST_HARMONIC  # the largest c that is possible
+    highest: int = MAX_SAMPLED_HARMONIC  # the largest c that is possible
     band: tuple[float, float] | None = None  # Hz; None: all
     form: str = ""  # of functions that do not say theirs
     case: CaseModes | None = None  # by which shapes and frequencies are judged, too

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..simulate.modes.label import Label
-from ..tyre.usual import LARGEST_SIGMA
+from ..tyre.usual import MAX_SIGMA
 from .measurement import Measurement
 
 FLOOR = 0.001  # of the value
@@ -57,10 +57,10 @@ def combined(
                 " a column sigma, or --sigma-percent"
             )
         sigma = max(float(np.sqrt(max(variances))), floor * mean)
-        if sigma > LARGEST_SIGMA * mean:
+        if sigma > MAX_SIGMA * mean:
             raise InputError(
                 f"{runs[0].place}: sigma of {runs[0].name} comes to {sigma:.3g}, more than"
-                f" {LARGEST_SIGMA:.0%} of the value {mean:.4g}: is it a mistake, or another mode?"
+                f" {MAX_SIGMA:.0%} of the value {mean:.4g}: is it a mistake, or another mode?"
             )
         rows.append(replace(runs[0], value=mean, sigma=sigma))
     return sorted(rows, key=_order)

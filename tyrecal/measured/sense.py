@@ -36,9 +36,9 @@ SCALE_SD, OFFSET_SD, GROWTH_SD = 2.0, 0.06, 0.08  # of a, o_m, g
 SHAPE_SD = {0: 0.12, 1: 0.05}  # of t_label by c
 SHAPE_SD_ELSE, SHAPE_SD_FREE = 0.02, 0.2  # with more waves; on a free rim with fewer
 RISE, RISE_SD, OWN_RISE_SD = 0.33, 0.08, 0.05  # of s and s_label
-LEAST_NOISE = 0.003
+MIN_NOISE = 0.003
 EXCHANGED, OFF = 16.0, 25.0  # chi-squared that a doubt takes away
-MOST_DOUBTS = 5
+MAX_DOUBTS = 5
 
 
 def doubts_of_file(path: Path) -> list[str]:
@@ -58,7 +58,7 @@ def doubts(rows: Sequence[Measurement]) -> list[str]:
 
 def _of_one_rim(rows: list[Measurement]) -> Iterator[str]:
     rows = list(rows)
-    for _ in range(min(MOST_DOUBTS, len(rows) - 1)):
+    for _ in range(min(MAX_DOUBTS, len(rows) - 1)):
         weight, deviation = _pattern(rows)
         base = deviation @ weight @ deviation
 
@@ -163,7 +163,7 @@ def _pattern(rows: Sequence[Measurement]) -> tuple[Array, Array]:
     shape[free & (c < 2)] = SHAPE_SD_FREE
     growth = GROWTH_SD * np.log(np.maximum(c, 2) / 2)
     same = np.array([[a == b for b in labels] for a in labels])
-    noise = np.array([np.hypot(np.nan_to_num(row.sigma / row.value), LEAST_NOISE) for row in rows])
+    noise = np.array([np.hypot(np.nan_to_num(row.sigma / row.value), MIN_NOISE) for row in rows])
     covariance = (
         SCALE_SD**2
         + OFFSET_SD**2 * (m[:, None] == m)

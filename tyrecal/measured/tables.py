@@ -17,7 +17,7 @@ from pathlib import Path
 from ..errors import InputError
 from ..files import read_bytes
 from ..tyre.number_table import NumberMarks, cells_under, read_text_table
-from ..tyre.usual import LARGEST_SIGMA
+from ..tyre.usual import MAX_SIGMA
 from ..units import QUANTITIES
 from .columns import NUMBER_MEANINGS, TableColumn, is_unit, meaning_of, read_columns, unit_of
 from .formats import other_format
@@ -192,8 +192,8 @@ def is_gap(cell: str) -> bool:
 def _sigma_mistake(each: Measurement) -> str | None:
     if isnan(each.sigma):
         return "sigma is '', must be the standard deviation, greater than 0"
-    if each.sigma > LARGEST_SIGMA * each.value:
-        return f"sigma is {each.sigma:g}, more than {LARGEST_SIGMA:.0%} of the value {each.value:g}"
+    if each.sigma > MAX_SIGMA * each.value:
+        return f"sigma is {each.sigma:g}, more than {MAX_SIGMA:.0%} of the value {each.value:g}"
     return None
 
 

@@ -10,7 +10,7 @@ from rich import table as rich
 from rich.text import Text
 
 from ..simulate.modes.label import Label
-from ..studies.fit.verdict import DOES_NOT_FIT, MOST_CHI2_PER_DOF, FitReason, does_not_fit_words
+from ..studies.fit.verdict import DOES_NOT_FIT, MAX_CHI2_PER_DOF, FitReason, does_not_fit_words
 from ..studies.labels import Labels
 from ..studies.result import Cell, Column, Deviation, Table, state_words
 from ..tyre.usual import USUAL_MEASUREMENTS
@@ -50,7 +50,7 @@ def fit_verdict(result: Mapping[str, Any]) -> list[str]:
     if (per_dof := result.get("chi2_per_dof")) is not None:
         words.append(
             f"chi2 per degree of freedom is {per_dof:.3g}: about 1 if the stated uncertainty"
-            f" explains what is left, above {MOST_CHI2_PER_DOF:g} the model does not fit."
+            f" explains what is left, above {MAX_CHI2_PER_DOF:g} the model does not fit."
         )
     if len(result["starts"]) > 1:
         words.append(_starts(result))

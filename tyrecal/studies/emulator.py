@@ -45,7 +45,7 @@ from .fit.variable import DesignVariable
 Array = np.ndarray
 DEGREES = range(1, 9)
 SPARE_EQUATIONS = 1.3  # equations for each coefficient, at least
-LEAST_DESIGNS = 3  # designs that a bound can be told from
+MIN_DESIGNS = 3  # designs that a bound can be told from
 SIDE_DEGREE = 2  # of d, whose sign alone counts; from values, for the slopes of c are not known
 SEEN = 1e-12  # a relative error that rounding makes
 SHARE_Z, SURE_Z = 2.326, 1.645  # normal quantiles of 99 and 95 %
@@ -192,8 +192,8 @@ def emulator(
     where too few designs could be evaluated; DeckRefused.
     """
     needs_slopes(evaluator)
-    if count < LEAST_DESIGNS:
-        raise InputError(f"an emulator needs {LEAST_DESIGNS} evaluations at least, got {count}")
+    if count < MIN_DESIGNS:
+        raise InputError(f"an emulator needs {MIN_DESIGNS} evaluations at least, got {count}")
     centre, half = np.mean(box, 1), np.ptp(box, axis=1) / 2
     names = tuple(v.name for v in variables)
     x, samples, failed = centre + half * spread(count, len(names)), [], 0
@@ -213,7 +213,7 @@ def emulator(
             samples.append(_evaluated(x[place], answer, variables))
         else:
             failed += 1
-    if len(samples) < LEAST_DESIGNS:
+    if len(samples) < MIN_DESIGNS:
         raise next(a for a in answers.values() if isinstance(a, EvaluationFailed))
     shared = set.intersection(*(set(each.ln_f) for each in samples))
     more = {label for label in shared if label.m <= 1} - set(wanted)

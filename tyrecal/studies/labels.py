@@ -7,7 +7,10 @@ from ..simulate.modes.label import Label
 from .result import Column, PositiveNumber, Result, ResultPart, Table, csv_text, state_words
 
 FOREIGN_WORDS = "no mode of the tyre"
-MOST_RIVALS, LEAST_RIVAL = 4, 0.01  # labels, and labelings, beside the likeliest; probability
+MAX_RIVALS, MIN_RIVAL_PROBABILITY = (
+    4,
+    0.01,
+)  # labels, and labelings, beside the likeliest; probability
 SURE_LABEL = 0.9  # probability below which a label is in doubt
 
 

@@ -113,8 +113,8 @@ USUAL_MEASUREMENTS = {
     "vertical_stiffness_N_per_m": Usual(1e4, 1e7, "N/m", STIFFNESS),
     "mass_kg": Usual(0.5, 500, "kg", QUANTITIES["mass_kg"]),
 }
-LARGEST_SIGMA = 0.2  # of the value: such a number tells nothing
-SMALLEST_SIGMA = 1e-5  # of the value: nothing is measured so well
+MAX_SIGMA = 0.2  # of the value: such a number tells nothing
+MIN_SIGMA = 1e-5  # of the value: nothing is measured so well
 # of the numbers of a case, by path; * is any name or place in a list
 USUAL: dict[str, Usual] = {
     "pressure_kPa": Usual(50, 1200, "kPa", PRESSURE),
@@ -268,7 +268,7 @@ def _ranges(
             value = number(at(data, keys[:-1]), quantity)
             if value and value > 0:
                 whole = USUAL_MEASUREMENTS[quantity]
-                yield replace(whole, low=SMALLEST_SIGMA * value, high=LARGEST_SIGMA * value), ""
+                yield replace(whole, low=MIN_SIGMA * value, high=MAX_SIGMA * value), ""
     else:
         words = tuple(map(str, keys))
         load = last == "load_N" or words[:2] == ("road", "loads_N")

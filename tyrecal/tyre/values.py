@@ -24,7 +24,7 @@ from .state import with_states_kept
 from .usual import refusal
 from .usual_deck import unusual_numbers
 
-MOST_MEANT = 3  # paths that are offered for a name that is none
+MAX_MEANT = 3  # paths that are offered for a name that is none
 # numbers that stand alone: no other part of the case, and no mesh, depends on their values
 ALONE = {
     "pressure_kPa",
@@ -146,7 +146,7 @@ def _meant(loaded: LoadedCase, name: str) -> list[str]:
     dump = loaded.case.model_dump()
     numbers = dict.fromkeys([*_numbers(dump, ()), *(f"effects.{id}" for id in IDS)])
     if ends := [path for path in numbers if path.endswith(f".{name}")]:
-        return ends[:MOST_MEANT]
+        return ends[:MAX_MEANT]
     words = {path.rpartition(".")[2]: path for path in reversed(numbers)}
     words |= {name: name for name in (*loaded.case.variables, "pressure_kPa")}
     return [words[word] for word in get_close_matches(name, words, 1) if "." not in name]

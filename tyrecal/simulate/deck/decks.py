@@ -17,7 +17,7 @@ from ...tyre.case.identity import tyre_sha256
 from ...tyre.case.schema import SolverChoice
 from ...tyre.templates import TemplateFailed
 
-LONGEST_NAME = 200  # of a case, as a line of a deck has at most 256 characters
+MAX_NAME_LENGTH = 200  # of a case, as a line of a deck has at most 256 characters
 FIRST = b"** Written by tyrecal: "
 HEADER_LINES = 3
 UNITS_IN_WORDS = {"m": "SI units: m, kg, s, Pa", "mm": "units: mm, t, s, MPa"}
@@ -224,7 +224,7 @@ def header(case: LoadedCase) -> str:
     c = case.case
     units = case.decks.units if case.decks else "m"
     return (
-        f"{FIRST.decode()}{c.name[:LONGEST_NAME]}\n"
+        f"{FIRST.decode()}{c.name[:MAX_NAME_LENGTH]}\n"
         f"** tyre_sha256 {tyre_sha256(case)}, mesh {c.mesh.level}\n"
         f"** {UNITS_IN_WORDS[units]}; angles in degrees, of rebar layers from the meridian\n"
     )

@@ -17,8 +17,8 @@ import numpy as np
 from ...errors import InputError
 
 ARRAY = "__array__"
-LONGEST_TEXT = 2_000_000  # bytes of JSON: a hundred times what an answer's longest one has
-MOST_ARRAYS = 5000
+MAX_JSON_BYTES = 2_000_000  # bytes of JSON: a hundred times what an answer's longest one has
+MAX_ARRAYS = 5000
 DIGEST = 65  # bytes of the first line: 64 hexadecimal digits and its end
 
 
@@ -37,7 +37,7 @@ def pack(key: str, about: dict[str, Any], content: Any) -> bytes:
     arrays: list[np.ndarray] = []  # one that stands in several places is kept once
     record = {"key": key, "about": about, "content": _plain(content, arrays)}
     line = json.dumps(record, allow_nan=False) + "\n"
-    if len(line) > LONGEST_TEXT or len(arrays) > MOST_ARRAYS:
+    if len(line) > MAX_JSON_BYTES or len(arrays) > MAX_ARRAYS:
         raise ValueError(f"an answer of {len(line)} bytes and {len(arrays)} arrays is too large")
     stored = io.BytesIO()
     if arrays:
@@ -53,8 +53,8 @@ def unpack(data: bytes, key: str) -> tuple[dict[str, Any], Any]:
         raise Damaged("its checksum does not match")
     try:
         line, _, stored = body.partition(b"\n")
-        if len(line) > LONGEST_TEXT:
-            raise Damaged(f"its text is longer than {LONGEST_TEXT / 1e6:g} MB")
+        if len(line) > MAX_JSON_BYTES:
+            raise Damaged(f"its text is longer than {MAX_JSON_BYTES / 1e6:g} MB")
         record = json.loads(line, parse_constant=_not_finite)
         about, content = record["about"], _filled(record["content"], _arrays(stored))
     except Damaged:
@@ -79,8 +79,8 @@ def _arrays(stored: bytes) -> dict[str, np.ndarray]:
         return arrays
     with ZipFile(io.BytesIO(stored)) as archive:
         members = archive.infolist()
-        if len(members) > MOST_ARRAYS:
-            raise Damaged(f"it has more than {MOST_ARRAYS} arrays")
+        if len(members) > MAX_ARRAYS:
+            raise Damaged(f"it has more than {MAX_ARRAYS} arrays")
         packed = any(each.compress_type != ZIP_STORED for each in members)
         if packed or sum(each.file_size for each in members) > len(stored):
             raise Damaged("its arrays are larger than the file")

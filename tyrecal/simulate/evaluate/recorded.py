@@ -20,8 +20,8 @@ from ..deck.decks import Decks
 from .record import Damaged
 
 REAL = "fiu"  # NumPy's letters for kinds of number
-FEWEST_BYTES = 4  # of a number with decimals: half precision has three digits
-LEAST_HZ, MOST_HZ = 1e-3, 1e5  # of a tyre's vibrations, and far beyond
+MIN_NUMBER_BYTES = 4  # of a number with decimals: half precision has three digits
+MIN_ANSWER_HZ, MAX_ANSWER_HZ = 1e-3, 1e5  # of a tyre's vibrations, and far beyond
 NODE_TOLERANCE = 1e-4  # of the largest coordinate: solvers write six digits
 NODE_BLOCK = re.compile(
     r"^\*NODE *(?:,[^\n]*)?\n((?:[^*\n][^\n]*\n)+)", re.MULTILINE | re.IGNORECASE
@@ -41,7 +41,7 @@ def _shaped(
         array = np.asarray(value)
         if array.dtype.kind not in kinds or array.ndim != len(shape):
             raise ValueError("is not such a number or array")
-        if array.dtype.kind in "fc" and array.dtype.itemsize < FEWEST_BYTES:
+        if array.dtype.kind in "fc" and array.dtype.itemsize < MIN_NUMBER_BYTES:
             raise ValueError("has half precision only")
         if not all(n in (None, m) for n, m in zip(shape, array.shape, strict=True)):
             raise ValueError(f"has the shape {array.shape}")
@@ -58,9 +58,9 @@ def _shaped(
 
 Finite = Annotated[Any, _shaped(REAL)]
 PositiveFinite = Annotated[Any, _shaped(REAL, least=0.0)]
-Hertz = Annotated[Any, _shaped(REAL, least=LEAST_HZ, most=MOST_HZ)]
-HertzPair = Annotated[Any, _shaped(REAL, 2, least=LEAST_HZ, most=MOST_HZ)]
-HertzArray = Annotated[Any, _shaped(REAL, None, least=LEAST_HZ, most=MOST_HZ)]
+Hertz = Annotated[Any, _shaped(REAL, least=MIN_ANSWER_HZ, most=MAX_ANSWER_HZ)]
+HertzPair = Annotated[Any, _shaped(REAL, 2, least=MIN_ANSWER_HZ, most=MAX_ANSWER_HZ)]
+HertzArray = Annotated[Any, _shaped(REAL, None, least=MIN_ANSWER_HZ, most=MAX_ANSWER_HZ)]
 Points = Annotated[Any, _shaped(REAL, None, 3)]
 Triple = Annotated[Any, _shaped(REAL, None)]
 FiniteArray = Annotated[Any, _shaped("iu", None)]

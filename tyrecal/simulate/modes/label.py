@@ -40,7 +40,7 @@ Array = np.ndarray
 BELT = 0.94  # of the largest radius: a belt is nearly flat, a sidewall leaves this height at once
 DEGREE = 3
 CONDITION = 30.0  # of the polynomials on the points at hand; fewer rings carry a lower degree
-HIGHEST_HARMONIC = 12  # that is looked for in sampled shapes
+MAX_SAMPLED_HARMONIC = 12  # that is looked for in sampled shapes
 ALIASED = 1e-4  # of what a harmonic holds: solvers print angles and shapes with six digits
 SUBSTANTIAL = 0.2  # share of the belt's motion below which a mode cannot claim an order
 TAKES_PART = 0.1  # the belt's mean square motion over that of all points, likewise
@@ -288,8 +288,8 @@ def _section_fit(points: bytes) -> tuple[Array, Array]:
 def _ring_energy(shape: RingShape) -> tuple[int, Array]:
     """The harmonic that holds most of the motion, and |a|^2 (3, DEGREE + 1) on it."""
     points = np.ascontiguousarray(shape.points, float).tobytes()
-    held = np.zeros(HIGHEST_HARMONIC + 1)
-    energy = np.zeros((HIGHEST_HARMONIC + 1, 3, DEGREE + 1))
+    held = np.zeros(MAX_SAMPLED_HARMONIC + 1)
+    energy = np.zeros((MAX_SAMPLED_HARMONIC + 1, 3, DEGREE + 1))
     on_belt = False
     for k, u in enumerate(shape.displacement.T):
         for zone, (rows, fits) in enumerate(_ring_fits(points, np.isfinite(u).tobytes())):
@@ -327,7 +327,7 @@ def _ring_fits(points: bytes, measured: bytes) -> list[tuple[Array, list[tuple[A
         fits = []
         if len(rows) >= 4:
             P = _polynomials(x[rows])
-            for c in range(HIGHEST_HARMONIC + 1):
+            for c in range(MAX_SAMPLED_HARMONIC + 1):
                 angle = c * Theta[rows, None]
                 basis, size, right = np.linalg.svd(
                     np.hstack([P * np.cos(angle), P * np.sin(angle)]), full_matrices=False

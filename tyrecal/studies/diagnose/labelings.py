@@ -6,8 +6,8 @@ y_a: the frequencies with the labels of a, less those that are foreign under it;
 one covariance for all. So a labeling that an effect makes likelier counts under that effect. P(a):
 what of the tree's weight of a is not its own evidence of y_a (`labelling.tree`): modes that were
 missed, foreign frequencies, the views, about the plain tyre. Labelings are looked for about that
-too, its modes off smoothly; those that have `LEAST_PROBABLE` are weighed, the first
-`MOST_READINGS`.
+too, its modes off smoothly; those that have `MIN_READING_PROBABILITY` are weighed, the first
+`MAX_READINGS`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from .several import probabilities
 from .verdict import Verdict, decide
 
 Array = np.ndarray
-LEAST_PROBABLE, MOST_READINGS = 0.01, 5
+MIN_READING_PROBABILITY, MAX_READINGS = 0.01, 5
 REFUTED = 1e-6  # probability of a reading for which the model is not asked again
 
 
@@ -47,7 +47,7 @@ def likely(
 ) -> list[Reading]:
     """The readings to be weighed, the tree's likeliest first."""
     labelings = labelled.found.labelings
-    count = max(1, int((labelings.probabilities[:MOST_READINGS] >= LEAST_PROBABLE).sum()))
+    count = max(1, int((labelings.probabilities[:MAX_READINGS] >= MIN_READING_PROBABILITY).sum()))
     hertz = [None if own.label else f"{own.value:.4g} Hz" for own, *_ in labelled.frequencies]
     return [
         Reading(
@@ -94,12 +94,12 @@ def over_labels(
     variables: int,
 ) -> Robustness:
     """Robustness of a verdict over all readings: it depends on labels, too, where another verdict
-    holds under a reading that has `LEAST_PROBABLE`. alone: of the verdict under the likeliest
-    reading."""
+    holds under a reading that has `MIN_READING_PROBABILITY`. alone: of the verdict under the
+    likeliest reading."""
     best = int(np.argmax(p))
     same, changes = True, list[str]()
     between = [said(averaged(p, per_reading), verdict)]
-    for k in np.flatnonzero(p >= LEAST_PROBABLE).tolist():
+    for k in np.flatnonzero(p >= MIN_READING_PROBABILITY).tolist():
         here = probabilities(per_reading[k])
         between.append(said(here, verdict))
         other = decide(per_reading[k], here, len(readings[k].observations.rows), variables)

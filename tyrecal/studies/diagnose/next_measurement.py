@@ -75,7 +75,7 @@ CAVITY_GAS, HELIUM = "cavity_air", 0.14  # a seventh of the mass
 READING = 0.1  # of an effect's range, by which such a reading may be off
 CHECKED = 0.25  # of a constant's standard deviation, likewise
 OFFERED = (0.4, 2 / 3, 5 / 6, 1.0)  # of the tyre's inflation pressure
-LEAST_APART = 0.25  # of it, from every pressure measured so far, for a new one to be offered
+MIN_OFFERED_STEP = 0.25  # of it, from every pressure measured so far, for a new one to be offered
 ABOVE_kPa = (40.0, 80.0)  # it, offered too: as much as any tyre bears
 MASS_PERCENT = 0.5
 
@@ -102,7 +102,9 @@ def offered_kPa(inflation_kPa: float, measured: Sequence[float]) -> list[float]:
     there = [float(round(share * inflation_kPa, -1)) for share in OFFERED]
     there += [inflation_kPa + more for more in ABOVE_kPa]
     return [
-        p for p in there if all(abs(p - each) >= LEAST_APART * inflation_kPa for each in measured)
+        p
+        for p in there
+        if all(abs(p - each) >= MIN_OFFERED_STEP * inflation_kPa for each in measured)
     ]
 
 

@@ -31,7 +31,7 @@ ROW_PATTERN = re.compile(
     r"\[(\d{1,3}),(\d{1,3})\](?: (axial|torsional))? at ([\d.]{1,9}) kPa"
     r"(?:, rim (fixed|springs|free))?"
 )
-LEAST_PROBABILITY = 1e-6  # of an effect that is listed
+MIN_LISTED_PROBABILITY = 1e-6  # of an effect that is listed
 
 
 class EffectSize(ResultPart):
@@ -316,4 +316,4 @@ def _explained(diagnosis: Diagnosis, key: str | None) -> Explained | None:
 def _listed(probabilities: Mapping[str, float]) -> dict[str, float]:
     """Likeliest first; none and outside always."""
     order = sorted(probabilities.items(), key=lambda item: -item[1])
-    return {key: p for key, p in order if p > LEAST_PROBABILITY or key in (NONE, OUTSIDE)}
+    return {key: p for key, p in order if p > MIN_LISTED_PROBABILITY or key in (NONE, OUTSIDE)}

@@ -35,8 +35,8 @@ from .verdict import NAMED, NO_GAP, UNDECIDED, Verdict, decide, holds
 
 Array = np.ndarray
 FACTORS = {0.5: "half", 2.0: "twice"}
-LEAST_WEIGHED = 1e-5  # of the likeliest explanation's probability, from which one is weighed again
-MOST_WEIGHED = 20  # explanations
+MIN_WEIGHED = 1e-5  # of the likeliest explanation's probability, from which one is weighed again
+MAX_WEIGHED = 20  # explanations
 KEPT_BELOW = 8.0  # of ln posterior of a grid's points below the best, that are
 JUDGED = {UNDECIDED: "undecided", NO_GAP: "no gap", "outside": "outside the catalogue"}
 
@@ -141,9 +141,9 @@ def _scaled(problem: InverseProblem, places: Sequence[int], factor: float) -> In
 def _weighty(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Those that carry weight, none and outside always; of sets of effects the points that do."""
     ln = {h.key: h.ln_evidence + np.log(h.prior) for h in hypotheses}
-    least = max(ln.values()) + np.log(LEAST_WEIGHED)
+    least = max(ln.values()) + np.log(MIN_WEIGHED)
     likely = [h for h in hypotheses if h.values and ln[h.key] > least]
-    likely = sorted(likely, key=lambda h: -ln[h.key])[:MOST_WEIGHED]
+    likely = sorted(likely, key=lambda h: -ln[h.key])[:MAX_WEIGHED]
     kept = [h for h in hypotheses if not h.values]
     for h in likely:
         p = h.posterior

@@ -22,7 +22,7 @@ from .inverse_problem import InverseProblem
 
 Array = np.ndarray
 PRIOR_NONE: Final = 0.25
-MOST_EFFECTS = 3
+MAX_EFFECTS = 3
 COUPLED_POINTS = 3  # of the rule in what couples modes, that stand for all from two effects on
 PARTNERS = 4  # singles that are tried with every other
 BASES, BASES_WITHIN = 3, 3.0  # pairs that a third is added to; ln probability behind the best
@@ -40,7 +40,7 @@ def weigh(
     same problem with less asked of the model, whose other hypotheses stand."""
     stand = _standing(problem, *before) if before else {}
     ids = list(problem.expansion.nodes)
-    prior = priors(len(ids), problem.assumed.further, MOST_EFFECTS if pairs else 1)
+    prior = priors(len(ids), problem.assumed.further, MAX_EFFECTS if pairs else 1)
     plain = refit(problem, {}, 1)
     none = Hypothesis(NONE, PRIOR_NONE, float(plain.ln_evidence[0]), {}, np.zeros(1), plain)
     hypotheses = [none, outside(problem)]
@@ -65,7 +65,7 @@ def _standing(
     }
 
 
-def priors(effects: int, further: float, most: int = MOST_EFFECTS) -> dict[int, float]:
+def priors(effects: int, further: float, most: int = MAX_EFFECTS) -> dict[int, float]:
     """Prior of each set of 1, 2, ... of so many effects: they sum to 0.65 over all sets."""
     counts = range(1, min(most if further else 1, effects) + 1)
     total = sum(further ** (k - 1) for k in counts)

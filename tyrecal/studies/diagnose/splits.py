@@ -19,7 +19,7 @@ from .observations import Observations
 
 Array = np.ndarray
 FAR_OUT = 6.0  # standard deviations of u, beyond what the splits ask for
-LEAST_WIDTH = 1e-9  # of u
+MIN_SPLIT_WIDTH = 1e-9  # of u
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Splits:
         there = there.reshape(len(by_label), most)
         s = np.where(there, observations.split[places], 0.0)
         tau = np.where(there, observations.split_scatter[places], 1.0)
-        return cls(places, there, s, tau, max(width, LEAST_WIDTH))
+        return cls(places, there, s, tau, max(width, MIN_SPLIT_WIDTH))
 
     @property
     def count(self) -> int:

@@ -24,7 +24,7 @@ from .model import Coupling
 from .observations import Observations
 
 Array = np.ndarray
-LARGEST_ZETA = 4.0
+MAX_ZETA = 4.0
 ZETA_POINTS, ZETA_GRID = 8, 64  # Gauss and Legendre's up to there, and a finer grid between
 NEGLIGIBLE_SHIFT = 5e-4  # shift of ln f at 3 standard deviations of q
 MISLABELLED = 0.01  # of laboratories that give a mode to the label of which it has nothing
@@ -60,8 +60,8 @@ def rule() -> tuple[Array, Array, Array]:
     grid (m, k), by an even cubic spline; ln of weight times density (m,)."""
     from scipy.interpolate import CubicSpline
 
-    zeta = LARGEST_ZETA * (np.polynomial.legendre.leggauss(ZETA_POINTS)[0] + 1) / 2
-    fine = LARGEST_ZETA * (np.arange(ZETA_GRID) + 0.5) / ZETA_GRID
+    zeta = MAX_ZETA * (np.polynomial.legendre.leggauss(ZETA_POINTS)[0] + 1) / 2
+    fine = MAX_ZETA * (np.arange(ZETA_GRID) + 0.5) / ZETA_GRID
     even = np.vstack([np.eye(ZETA_POINTS)[::-1], np.eye(ZETA_POINTS)])
     between = CubicSpline(np.append(-zeta[::-1], zeta), even)(fine)
     return zeta, between, -(fine**2) / 2 - np.log(np.exp(-(fine**2) / 2).sum())

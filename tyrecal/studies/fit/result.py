@@ -47,7 +47,7 @@ ROAD_QUANTITIES = {  # targets that are no modes
     },
     "mass_kg": Column("mass, kg", ".2f"),
 }
-MOST_PROPOSED = 4  # states in a table
+MAX_PROPOSED = 4  # states in a table
 HERTZ, RESULT_DIGITS = Column("Hz"), Column("", ".4g")
 
 
@@ -325,7 +325,7 @@ class FitResult(Result):
             rows = [
                 [each.said, f"{100 * (each.ratio or 0.0):.0f} %"]
                 + [self._percent(n, each.standard_errors_with[n]) for n in own]
-                for each in self.next_states[:MOST_PROPOSED]
+                for each in self.next_states[:MAX_PROPOSED]
             ]
             tables.append(
                 Table(heads, rows, title="Which state would tell most next, of the same modes")

@@ -17,9 +17,9 @@ from .crossing import MIXED, TELLING, Crossing, crossing, gap, order, pair_clari
 from .problem import Point, Problem
 
 Array = np.ndarray
-MOST_DESIGNS = 100
+MAX_DESIGNS = 100
 EXACT = 1e-3  # Hz, an objective below every measurement's resolution
-LEAST_GAIN = 1e-9  # of the squared objective: a smaller gain is none
+MIN_OBJECTIVE_GAIN = 1e-9  # of the squared objective: a smaller gain is none
 NO_GAIN = 1e-6  # of the squared objective: half of this of the objective, below every resolution
 DAMPING = 0.01  # share of the mean diagonal of J^T J that is added to it at the start of a search
 ROOM = 0.1  # of the gap of the [0, 0] modes, between a bounded step and where labels change places

@@ -23,7 +23,7 @@ from .calibrate import Fit, FitNotify, calibrate, check
 from .problem import Problem
 from .targets import states_of
 
-MOST_FITS = 5  # to frequencies without labels
+MAX_FITS = 5  # to frequencies without labels
 
 
 class FitStudy:
@@ -145,7 +145,7 @@ class FitStudy:
     def _fit_with_labels(self, calibrated: Callable[[], Fit], jobs: int) -> Fit:
         case, evaluator, readings, fixed = self._plain, self.evaluator, self.readings, self.fixed
         likeliest = label(case, evaluator, readings, fixed=fixed, jobs=jobs)
-        for _ in range(MOST_FITS):
+        for _ in range(MAX_FITS):
             used = likeliest
             self._set_targets(used.readings)
             fit = calibrated()

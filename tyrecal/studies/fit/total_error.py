@@ -29,7 +29,7 @@ from .variable import read_variable
 
 Array = np.ndarray
 BY_MEASUREMENT, BY_MODEL, BY_SECTION = "measurement", "material laws and mesh", "section"
-LEAST_SHARE = 0.01  # of the variance, below which a cause is not listed
+MIN_VARIANCE_SHARE = 0.01  # of the variance, below which a cause is not listed
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class TotalError:
                 "variance_by_cause": {
                     cause: float(share[i])
                     for cause, share in self.shares.items()
-                    if share[i] >= LEAST_SHARE
+                    if share[i] >= MIN_VARIANCE_SHARE
                 },
             }
             for i, v in enumerate(problem.variables)

@@ -18,7 +18,7 @@ from .tree import Frequencies, Labelings, Modes, labelings
 Array = np.ndarray
 
 ROUNDS = 10
-LONGEST_STEP = 0.5  # of a variable's coordinate, between expansions
+MAX_EXPANSION_STEP = 0.5  # of a variable's coordinate, between expansions
 SAME_DESIGN = 0.01  # of its prior standard deviations
 
 
@@ -83,7 +83,7 @@ def find_labels(
         )
         answer = labelings(measured(at), modes)
         aim = np.clip(prior.mean + prior.root @ answer.z, prior.lower, prior.upper)
-        step = np.clip(aim - x, -LONGEST_STEP, LONGEST_STEP)
+        step = np.clip(aim - x, -MAX_EXPANSION_STEP, MAX_EXPANSION_STEP)
         near = abs(np.linalg.lstsq(prior.root, step, None)[0]).max(initial=0.0) < SAME_DESIGN
         result = Found(answer, at, x, round_, near)
         if near and (not seen or result.labels() == seen[-1].labels()):

@@ -26,7 +26,7 @@ from .tree import Frequencies
 Array = np.ndarray
 
 BAND_ABOVE = 1.25  # of the highest measured frequency, up to which modes are looked for
-MOST_HARMONICS = 20
+MAX_EXPANDED_HARMONICS = 20
 MODES_PER_HARMONIC = 3  # at least: both families, and one across the belt that comes between
 
 
@@ -174,10 +174,10 @@ class Model:
                 min((m.frequency_Hz for m in modes if m.label.c == self.harmonics), default=0.0)
                 for modes, _ in by_state
             ]
-            if min(tops) > self.top_Hz or self.harmonics == MOST_HARMONICS:
+            if min(tops) > self.top_Hz or self.harmonics == MAX_EXPANDED_HARMONICS:
                 break
             more = ceil(self.harmonics * self.top_Hz / max(min(tops), 0.5 * self.top_Hz))
-            self.harmonics = min(max(more, self.harmonics + 1), MOST_HARMONICS)
+            self.harmonics = min(max(more, self.harmonics + 1), MAX_EXPANDED_HARMONICS)
         every = [
             (i, mode, row)
             for i, (modes, rows) in enumerate(by_state)

@@ -12,8 +12,8 @@ from ...tyre.case import LoadedCase
 from ...tyre.state import TyreState
 from ..labels import (
     FOREIGN_WORDS,
-    LEAST_RIVAL,
-    MOST_RIVALS,
+    MAX_RIVALS,
+    MIN_RIVAL_PROBABILITY,
     Labeling,
     LabelledFrequency,
     LabelProbability,
@@ -46,7 +46,9 @@ def labels_told(case: LoadedCase, labelled: Labelled) -> Labels:
             for n in np.argsort(-all_labelings.each[i], kind="stable")
             if n != j % all_labelings.each.shape[1]
         ]
-        likely = [n for n in others[:MOST_RIVALS] if all_labelings.each[i, n] >= LEAST_RIVAL]
+        likely = [
+            n for n in others[:MAX_RIVALS] if all_labelings.each[i, n] >= MIN_RIVAL_PROBABILITY
+        ]
         name = lambda n: at.labels[n] if 0 <= n < len(at.labels) else None
         frequencies.append(
             LabelledFrequency(
@@ -65,7 +67,9 @@ def labels_told(case: LoadedCase, labelled: Labelled) -> Labels:
                 ],
             )
         )
-    kept = [k for k, p in enumerate(all_labelings.probabilities) if p >= LEAST_RIVAL or not k]
+    kept = [
+        k for k, p in enumerate(all_labelings.probabilities) if p >= MIN_RIVAL_PROBABILITY or not k
+    ]
     labelings = [
         Labeling(
             labels=[
@@ -73,7 +77,7 @@ def labels_told(case: LoadedCase, labelled: Labelled) -> Labels:
             ],
             probability=float(all_labelings.probabilities[k]),
         )
-        for k in kept[: 1 + MOST_RIVALS]
+        for k in kept[: 1 + MAX_RIVALS]
     ]
     return Labels(
         frequencies=frequencies,
@@ -94,7 +98,9 @@ def shape_labels_result(run: ModalTest, case_modes: CaseModes, state: TyreState)
     frequencies = []
     for each in run.modes:
         label, likely = each.judged.label, each.judged.probabilities
-        rivals = [(own, p) for own, p in likely.items() if own != label and p >= LEAST_RIVAL]
+        rivals = [
+            (own, p) for own, p in likely.items() if own != label and p >= MIN_RIVAL_PROBABILITY
+        ]
         sigma = each.mode.sigma_Hz
         frequencies.append(
             LabelledFrequency(
@@ -106,8 +112,7 @@ def shape_labels_result(run: ModalTest, case_modes: CaseModes, state: TyreState)
                 rim=state.rim or "",
                 expected_Hz=case_modes.expected_Hz(label),
                 rivals=[
-                    LabelProbability(**_entry(own), probability=p)
-                    for own, p in rivals[:MOST_RIVALS]
+                    LabelProbability(**_entry(own), probability=p) for own, p in rivals[:MAX_RIVALS]
                 ],
             )
         )

@@ -20,7 +20,7 @@ from .parts import WRONG
 
 MAX_TABLE_BYTES = 1_000_000  # of a table beside a case
 MAX_CASE_BYTES = 100_000  # bytes of YAML; shipped cases have 5000, and it is read at 30 kB/s
-MOST_EVENTS = 20_000
+MAX_EVENTS = 20_000
 DEEPEST = 20
 
 
@@ -134,8 +134,8 @@ class _Harmless(Parser):
         event = super().get_event()
         line = event.start_mark.line + 1
         self.events += 1
-        if self.events > MOST_EVENTS:
-            raise _Harmful(line, f"there are more than {MOST_EVENTS} keys and values")
+        if self.events > MAX_EVENTS:
+            raise _Harmful(line, f"there are more than {MAX_EVENTS} keys and values")
         if getattr(event, "version", None) or getattr(event, "tags", None):
             raise _Harmful(0, "a directive, as %YAML, must go: a case is plain YAML 1.2")
         self.depth += isinstance(event, CollectionStartEvent)

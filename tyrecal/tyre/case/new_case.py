@@ -26,7 +26,7 @@ from .stations import read_section_of
 FLANGE = 17.3e-3  # m, height of the rim's flange, contour J
 PRESSURE_KPA = 250.0  # where nothing says more
 LOAD_SHARES = (0.25, 0.5, 0.75, 1.0, 1.25)  # of what the tyre is rated for
-MOST_LOAD_N = 6e4  # usual on the road
+MAX_USUAL_LOAD_N = 6e4  # usual on the road
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def from_size(
         f"section from the size code, as {made.name} tyres are built:\n"
         f"# crown {mm['crown']}, sidewall {mm['sidewall']}, bead {mm['bead']} mm thick, belt"
         f" {mm['belt']} mm wide. An estimate to start from.",
-        loads_N=[_rounded(min(share * size.load_N, MOST_LOAD_N)) for share in LOAD_SHARES],
+        loads_N=[_rounded(min(share * size.load_N, MAX_USUAL_LOAD_N)) for share in LOAD_SHARES],
     )
     return Draft(text, f"{stem}.csv", table.csv().encode())
 

@@ -19,7 +19,7 @@ from pydantic_core import PydanticCustomError
 
 LEAST, LARGEST = 1e-30, 1e15  # beyond, products of numbers leave what a computer holds
 Moduli = Literal["long_term", "instantaneous"]
-MOST_RELAXED = 0.999  # of a modulus: what is left must be a tyre's
+MAX_RELAXED = 0.999  # of a modulus: what is left must be a tyre's
 Element = Literal["CGAX8R", "CGAX8", "CGAX4R"]
 WHOLE_BEAD: Literal["whole_bead"] = "whole_bead"
 RimSupport = Literal["fixed", "springs", "free"]
@@ -113,8 +113,8 @@ class Rubber(Part):
             terms = values.get("prony")
             terms = terms if isinstance(terms, list) else []
             total = sum(number(dict(term), share) or 0 for term in terms if term is not WRONG)
-            if total > MOST_RELAXED:
-                least = f"must have a sum of all {share} of at most {MOST_RELAXED:g}"
+            if total > MAX_RELAXED:
+                least = f"must have a sum of all {share} of at most {MAX_RELAXED:g}"
                 yield "prony", f"{least}, got {total:.9g}"
 
 

@@ -45,8 +45,8 @@ from .parts import (
     part_values,
 )
 
-LEAST_LOAD_N, LARGEST_LOAD_N = 1.0, 1e6  # outside, no tyre finds its balance on a road
-Load = Annotated[Positive, Field(ge=LEAST_LOAD_N, le=LARGEST_LOAD_N)]
+MIN_CASE_LOAD_N, MAX_CASE_LOAD_N = 1.0, 1e6  # outside, no tyre finds its balance on a road
+Load = Annotated[Positive, Field(ge=MIN_CASE_LOAD_N, le=MAX_CASE_LOAD_N)]
 Weight = Annotated[NotNegative, Field(le=1e6)]
 Pressure = Annotated[Number, Field(ge=0, lt=2000)]  # kPa
 

@@ -159,8 +159,8 @@ def _parameter(block: Block, parameters: Mapping[str, Any], name: str) -> str:
     raise block.refused(f"the parameter <{name}> is not defined above")
 
 
-LARGEST_RESULT = 1e300  # result of an expression
-LARGEST_BASE = 1e30  # of a power
+MAX_RESULT = 1e300  # result of an expression
+MAX_BASE = 1e30  # of a power
 OPERATORS: dict[type, Callable[..., Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -211,11 +211,11 @@ def _evaluate(node: ast.AST, known: Mapping[str, Any]) -> Any:
         whole = isinstance(left, int) and isinstance(right, int)
         if isinstance(node.op, ast.Div) and whole and left % right:
             raise ValueError(f"{left}/{right} of whole numbers: write {left}./{right}")
-        if isinstance(node.op, ast.Pow) and (abs(right) > 100 or abs(left) > LARGEST_BASE):
+        if isinstance(node.op, ast.Pow) and (abs(right) > 100 or abs(left) > MAX_BASE):
             raise ValueError("a power above 100, or of a large number")
         value = OPERATORS[type(node.op)](left, right)
-        if abs(value) > LARGEST_RESULT:
-            raise ValueError(f"a number above {LARGEST_RESULT:g}")
+        if abs(value) > MAX_RESULT:
+            raise ValueError(f"a number above {MAX_RESULT:g}")
         return value
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
         function = EXPRESSION_FUNCTIONS.get(node.func.id)
