@@ -21,7 +21,7 @@ LIKELY = 10.0  # below the highest ln p: optima that walkers start from
 
 
 @dataclass(frozen=True)
-class Drawn:
+class Draws:
     """A posterior with its draws. optima (o, v), ln p (o,) there; covariance (v, v): the linear one
     about the first; at_edge (v, 2): share of the draws at each edge of the box that is none of the
     bounds; boxes, evaluations: how many it took; stopped: why the box grew no more, "" where it
@@ -38,7 +38,7 @@ class Drawn:
     stopped: str
 
 
-def drawn(posterior: Posterior, bounds: Array, count: int, seed: int) -> Drawn:
+def sample_box(posterior: Posterior, bounds: Array, count: int, seed: int) -> Draws:
     """About ``count`` draws from all likely optima on; bounds (v, 2) of x."""
     best, height = posterior.optima
     information, flat = posterior.information(best[:1])[0], _flat(posterior.box)
@@ -47,7 +47,7 @@ def drawn(posterior: Posterior, bounds: Array, count: int, seed: int) -> Drawn:
     chains = walk(posterior, likely, np.linalg.inv(information + flat), count, seed)
     edges = shares_at_edge(chains.flat, posterior.box, bounds)
     evaluations = posterior.evaluations
-    return Drawn(posterior, best, height, covariance, chains, edges, 1, evaluations, "")
+    return Draws(posterior, best, height, covariance, chains, edges, 1, evaluations, "")
 
 
 def _flat(box: Array) -> Array:
@@ -55,7 +55,7 @@ def _flat(box: Array) -> Array:
     return np.diag((np.ptp(box, axis=1) / 2) ** -2.0)
 
 
-def probed(posterior: Posterior, bounds: Array, seed: int) -> Array:
+def edge_probability(posterior: Posterior, bounds: Array, seed: int) -> Array:
     """Forecast of `shares_at_edge` of the posterior's draws by importance sampling: draws of
     Student's t about the likely optima, each weighted by the posterior's density over theirs."""
     best, height = posterior.optima
@@ -73,7 +73,7 @@ def probed(posterior: Posterior, bounds: Array, seed: int) -> Array:
     return shares_at_edge(x, posterior.box, bounds, np.exp(ln_p - ln_p.max()) / theirs)
 
 
-def grown(
+def grow_box(
     ask: Callable[[Array], Posterior],
     box: Array,
     bounds: Array,
@@ -81,7 +81,7 @@ def grown(
     count: int,
     seed: int,
     stage: Callable[[bool], None] = lambda sampling: None,
-) -> Drawn:
+) -> Draws:
     """Draws from a box (v, 2) with less than `AT_EDGE` of them at its edges, or from the last one
     that could be had.
 
@@ -107,15 +107,15 @@ def grown(
             break
         stage(True)
         boxes, last = boxes + 1, posterior
-        at_edge = probed(posterior, bounds, seed)
+        at_edge = edge_probability(posterior, bounds, seed)
         if at_edge.sum() < AT_EDGE:
-            result = drawn(posterior, bounds, count, seed)
+            result = sample_box(posterior, bounds, count, seed)
             if result.at_edge.sum() < AT_EDGE:
                 return replace(result, boxes=boxes, evaluations=evaluations)
             at_edge = result.at_edge
         box = larger(box, bounds, at_edge)
     assert last
-    result = drawn(last, bounds, count, seed)
+    result = sample_box(last, bounds, count, seed)
     return replace(result, boxes=boxes, evaluations=evaluations, stopped=stopped)
 
 

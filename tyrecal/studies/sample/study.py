@@ -30,7 +30,7 @@ from ..emulator import Emulator, emulator, needs_slopes
 from ..fit.calibrate import calibrate
 from ..fit.targets import read_targets, rims_of
 from ..fit.variable import DesignVariable, read_variables
-from .box import Drawn, grown
+from .box import Draws, grow_box
 from .chains import needs_emcee
 from .posterior import Posterior
 from .predict import conditional
@@ -56,7 +56,7 @@ class Sample:
     units: tuple[str, ...]  # of theirs
     observations: Observations
     sources: tuple[Source, ...]  # of error
-    drawn: Drawn
+    drawn: Draws
     rows: tuple[Observable, ...]
     ln_f: Array
     linear: Array
@@ -132,7 +132,7 @@ def run(
         return Posterior(made, coordinates, at, observations.y, white, box)
 
     J = white @ answer.jacobian[where]
-    drawn = grown(
+    drawn = grow_box(
         ask,
         first_box(x, J.T @ J, variables, bounds),
         bounds,
