@@ -27,7 +27,7 @@ from tyrecal.studies.diagnose.section_fields import (
     sizes,
     with_fields,
 )
-from tyrecal.studies.diagnose.section_told import section_told
+from tyrecal.studies.diagnose.section_told import section_posterior
 from tyrecal.studies.diagnose.tyre_model import TyreModel
 from tyrecal.studies.diagnose.uncertainties import RIM_WIDTH, sources
 from tyrecal.studies.modes import modes_result
@@ -228,7 +228,7 @@ def test_what_is_told_of_the_section_holds_within_its_standard_deviation(chance:
         seen = base.measured(y).observations
         stated = Assumed(form=0.001, law=0.0)
         d = diagnose(toy, toy.rows, seen, assumed=stated)  # type: ignore[arg-type]
-        posterior = section_told(STATED, own_sources, d)
+        posterior = section_posterior(STATED, own_sources, d)
         assert {v.field for v in posterior} == {"meridian", "hold", "gauge", "stiffness", "density"}
         assert all(0 < v.sigma <= v.before for v in posterior)
         value = next(v for v in posterior if v.field == "meridian")

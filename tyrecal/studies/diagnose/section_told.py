@@ -23,7 +23,7 @@ Array = np.ndarray
 FIELD_UNITS = dict.fromkeys(("meridian", *ALONG_CARCASS), ("mm", 1e3))  # the others in per cent
 
 
-def section_told(
+def section_posterior(
     case: LoadedCase, sources: Sequence[Source], diagnosis: Diagnosis
 ) -> list[FieldValue]:
     """Meridian and gauges amid each region, the filler's tip, the rim's hold, compounds by part."""

@@ -18,7 +18,7 @@ from ...tyre.effects import Effect, catalogue
 from ..far_off import far_off
 from ..fit.targets import rims_of
 from ..labelling.label import label
-from ..labelling.result import labels_told
+from ..labelling.result import labels_posterior
 from ..labels import Labels
 from .calibrated import calibrated_variables
 from .diagnosis import Diagnosis, diagnose
@@ -31,7 +31,7 @@ from .next_measurement import OtherStates
 from .observations import Observations, observe
 from .regions import regions
 from .result import DiagnosisResult, diagnosis_result
-from .section_told import section_told
+from .section_told import section_posterior
 from .tyre_model import TyreModel
 from .uncertainties import EFFECT_PATH, Source, calibrated, sources
 from .under_load import UnderLoad, Values, compare
@@ -60,9 +60,9 @@ class DiagnosedCase:
 
     @property
     def section(self) -> list[FieldValue]:
-        """See `section_told`."""
+        """See `section_posterior`."""
         stated = any(source.field for source in self.sources)
-        return section_told(self.model.case, self.sources, self.diagnosis) if stated else []
+        return section_posterior(self.model.case, self.sources, self.diagnosis) if stated else []
 
     @property
     def result(self) -> DiagnosisResult:
@@ -158,7 +158,7 @@ def study(
         fitted,
         model,
         _under_load(case, evaluator, own, diagnosis, model),
-        labels_told(case, weighed_anew(labelled, diagnosis.readings)) if labelled else None,
+        labels_posterior(case, weighed_anew(labelled, diagnosis.readings)) if labelled else None,
     )
 
 

@@ -17,7 +17,7 @@ from ...simulate.provenance import provenance
 from ...tyre.case import LoadedCase, start_values
 from ...tyre.values import with_values
 from ..labelling.label import label
-from ..labelling.result import labels_told
+from ..labelling.result import labels_posterior
 from ..pressing_plan import DESIGNS_OF_FIT, PressedState, PressingPlan, plan_pressing
 from .calibrate import Fit, FitNotify, calibrate, check
 from .problem import Problem
@@ -154,6 +154,6 @@ class FitStudy:
             if same:
                 break
         last = replace(likeliest.found, settled=likeliest.found.settled and same)
-        labels = labels_told(case, replace(likeliest, found=last))
+        labels = labels_posterior(case, replace(likeliest, found=last))
         fit.found = fit.found.model_copy(update={"labels": labels})
         return fit

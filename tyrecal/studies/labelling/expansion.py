@@ -45,7 +45,7 @@ class Expansion:
 
 
 @dataclass(frozen=True)
-class Found:
+class LabelSearch:
     """Labelings about the model's ``expansion`` at x (v,), how many it took, and whether another
     would find the same; else it is the surest of those that take turns."""
 
@@ -71,10 +71,10 @@ def find_labels(
     measured: Measured,
     prior: Prior,
     first: Array | None = None,
-) -> Found:
+) -> LabelSearch:
     """first: where the model is expanded first, by default at the prior's mean. Raises what
     ``expand`` does."""
-    x, seen = prior.mean if first is None else first, list[Found]()
+    x, seen = prior.mean if first is None else first, list[LabelSearch]()
     for round_ in range(1, ROUNDS + 1):
         at = expand(x)
         slopes = at.slopes
@@ -85,7 +85,7 @@ def find_labels(
         aim = np.clip(prior.mean + prior.root @ answer.z, prior.lower, prior.upper)
         step = np.clip(aim - x, -MAX_EXPANSION_STEP, MAX_EXPANSION_STEP)
         near = abs(np.linalg.lstsq(prior.root, step, None)[0]).max(initial=0.0) < SAME_DESIGN
-        result = Found(answer, at, x, round_, near)
+        result = LabelSearch(answer, at, x, round_, near)
         if near and (not seen or result.labels() == seen[-1].labels()):
             return result
         seen.append(result)

@@ -20,7 +20,7 @@ from ...tyre.state import TyreState
 from ..fit.problem import Problem
 from ..fit.result import FitResult
 from ..fit.variable import DesignVariable, read_variable
-from .expansion import Expansion, Found, Prior, admissible, find_labels
+from .expansion import Expansion, LabelSearch, Prior, admissible, find_labels
 from .tree import Frequencies
 
 Array = np.ndarray
@@ -38,7 +38,7 @@ class Labelled:
 
     given: Sequence[Measurement]
     frequencies: list[list[Measurement]]
-    found: Found
+    found: LabelSearch
     start: Expansion
 
     @property

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ...measured.modal import ModalTest
 
 
-def labels_told(case: LoadedCase, labelled: Labelled) -> Labels:
+def labels_posterior(case: LoadedCase, labelled: Labelled) -> Labels:
     """Labels of the readings that came without one."""
     all_labelings, at = labelled.found.labelings, labelled.found.expansion
     own = [i for i, each in enumerate(labelled.frequencies) if each[0].label is None]
@@ -90,7 +90,7 @@ def labels_told(case: LoadedCase, labelled: Labelled) -> Labels:
 
 def labels_result(case: LoadedCase, labelled: Labelled) -> LabelsResult:
     """As a result of its own."""
-    return LabelsResult.model_validate({"format": 1, "labels": labels_told(case, labelled)})
+    return LabelsResult.model_validate({"format": 1, "labels": labels_posterior(case, labelled)})
 
 
 def shape_labels_result(run: ModalTest, case_modes: CaseModes, state: TyreState) -> LabelsResult:
