@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ..studies.diagnose.constants_told import constants_told
+from ..studies.diagnose.constants_told import constants_posterior
 from ..studies.diagnose.diagnosis import Diagnosis
 from ..studies.diagnose.evidence import COVERAGE, NONE, OUTSIDE, PRIOR_OUTSIDE
 from ..studies.diagnose.gap import OWN_RIM
@@ -178,7 +178,7 @@ def _robust(d: Diagnosis) -> str:
 
 def _constants(d: Diagnosis) -> Iterator[str]:
     """Constants that the data move, told and not named."""
-    moved = [each for each in constants_told(d) if abs(each.shift_in_sd) >= 1]
+    moved = [each for each in constants_posterior(d) if abs(each.shift_in_sd) >= 1]
     if moved:
         names = ", ".join(f"{e.name.replace('_', ' ')} {e.shift_in_sd:+.1f}" for e in moved[:SHOWN])
         yield (

@@ -27,7 +27,7 @@ class ConstantShift:
     shift_in_sd: float  # of the standard deviation that is stated or assumed
 
 
-def constants_told(diagnosis: Diagnosis) -> list[ConstantShift]:
+def constants_posterior(diagnosis: Diagnosis) -> list[ConstantShift]:
     """Every source of error but the section's fields, with what is named or leads in the model;
     the largest shift first."""
     hypothesis = diagnosis.hypothesis(diagnosis.leading or NONE)

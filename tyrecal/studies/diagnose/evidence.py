@@ -18,7 +18,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from .covariance import between_runs, of_one_mode
-from .expansion import Nodes
+from .expansion import EffectResponse
 from .gap import family
 from .inverse_problem import Added, InverseProblem
 from .observations import Observable
@@ -395,7 +395,7 @@ def _gauss_legendre(count: int) -> tuple[Array, Array]:
     return np.polynomial.legendre.leggauss(count)
 
 
-def grid(nodes: Nodes) -> tuple[Array, Array]:
+def grid(nodes: EffectResponse) -> tuple[Array, Array]:
     """Parameters over the reach and ln of weight times density, which sum to 1."""
     low, high = nodes.reach
     points, weights = _rule(low, high, RULE_POINTS[1])

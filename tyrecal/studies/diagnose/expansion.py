@@ -36,7 +36,7 @@ CURVATURE_STEP = 0.05  # of a logarithm, for H from two Jacobians
 
 
 @dataclass(frozen=True)
-class Anchor:
+class Refinement:
     """Where an effect was asked again, and what the expansion is off by there."""
 
     e: float
@@ -46,7 +46,7 @@ class Anchor:
 
 
 @dataclass(frozen=True)
-class Joint:
+class PairInteraction:
     """Where two effects were asked together, and what their sum is off by there."""
 
     e: tuple[float, float]
@@ -62,7 +62,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Nodes:
+class EffectResponse:
     """An effect where it was asked."""
 
     values: Array  # (k,) of its parameter
@@ -73,7 +73,7 @@ class Nodes:
     split: Array  # (k, n)
     reach: tuple[float, float]  # of the parameter, between nodes that have a solution
     beside: Mapping[float, Array] = field(default_factory=dict)  # (n,) at far ends, see `Answer`
-    anchor: Anchor | None = None
+    anchor: Refinement | None = None
 
     def at(self, e: Array) -> tuple[Array, Array, Array]:
         """a (q, n), B (q, n, v) and split (q, n) at parameters (q,)."""
@@ -116,10 +116,10 @@ class Expansion:
     hessian: Array  # (n, v, v)
     split: Array  # (n,)
     constants: Array  # (n, k)
-    nodes: Mapping[str, Nodes]  # of effects by id
+    nodes: Mapping[str, EffectResponse]  # of effects by id
     failed: Mapping[str, str] = field(default_factory=dict)  # why effects, by id, have no nodes
     coupling: Coupling | None = None  # of modes by the sources of error
-    joint: Mapping[tuple[str, ...], Joint] = field(default_factory=dict)  # of two effects
+    joint: Mapping[tuple[str, ...], PairInteraction] = field(default_factory=dict)  # of two effects
     material_laws: float = 0.0  # see `ResponseModel`
 
     def plain(self, x: Array) -> tuple[Array, Array]:
@@ -253,9 +253,9 @@ def anchored(expansion: Expansion, model: ResponseModel, wanted: Sequence[Query]
             shift, tilt = shift - a[0] - B[0] @ d, tilt - B[0]
         if others:
             ((other, size),) = others
-            joint[id, other] = Joint((e, size), d, shift, tilt)
+            joint[id, other] = PairInteraction((e, size), d, shift, tilt)
         else:
-            nodes[id] = replace(nodes[id], anchor=Anchor(e, d, shift, tilt))
+            nodes[id] = replace(nodes[id], anchor=Refinement(e, d, shift, tilt))
     return replace(expansion, nodes=nodes, joint=joint)
 
 
@@ -269,7 +269,7 @@ def _with_effect(model: ResponseModel, x: Array, id: str, e: float) -> Query:
 
 def _nodes(
     id: str, plain: Expansion, span: Span, replies: Mapping[float, Answer | Exception]
-) -> Nodes | None:
+) -> EffectResponse | None:
     """Nodes from 0 outwards as far as there are solutions; None where there is none at all."""
     known = {0.0: Answer(plain.eta, plain.jacobian, plain.split), **replies}
     good = [0.0]
@@ -286,7 +286,7 @@ def _nodes(
     low, high = sorted(reach)
     values = np.array(sorted(good))
     answers = [answer for e in values if isinstance(answer := known[float(e)], Answer)]
-    return Nodes(
+    return EffectResponse(
         values,
         np.array([each.eta - plain.eta for each in answers]),
         np.array([each.slopes.get(id, np.zeros_like(plain.eta)) for each in answers]),
@@ -302,7 +302,7 @@ def _nodes(
     )
 
 
-def _more(made: Nodes | None) -> list[float]:
+def _more(made: EffectResponse | None) -> list[float]:
     """Further parameters towards the far ends of the range, where the nodes do not follow the
     effect closely: where what the farthest says last, its slope or its value, matters."""
     if made is None or len(made.values) + sum(made.sloped) < 3:

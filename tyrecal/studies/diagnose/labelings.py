@@ -23,7 +23,7 @@ from ..labelling.label import Labelled
 from ..labels import FOREIGN_WORDS
 from .evidence import Hypothesis
 from .observations import Observations
-from .robustness import Robustness, in_words, said
+from .robustness import Robustness, in_words, verdict_probability
 from .several import probabilities
 from .verdict import Verdict, decide
 
@@ -98,10 +98,10 @@ def over_labels(
     likeliest reading."""
     best = int(np.argmax(p))
     same, changes = True, list[str]()
-    between = [said(averaged(p, per_reading), verdict)]
+    between = [verdict_probability(averaged(p, per_reading), verdict)]
     for k in np.flatnonzero(p >= MIN_READING_PROBABILITY).tolist():
         here = probabilities(per_reading[k])
-        between.append(said(here, verdict))
+        between.append(verdict_probability(here, verdict))
         other = decide(per_reading[k], here, len(readings[k].observations.rows), variables)
         if (other.kind, other.key) != (verdict.kind, verdict.key):
             same = same and k != best

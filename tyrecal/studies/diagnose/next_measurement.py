@@ -22,7 +22,7 @@ import numpy as np
 
 from ...simulate.modes.label import Label
 from .evidence import NONE, OUTSIDE
-from .expansion import Nodes
+from .expansion import EffectResponse
 from .inverse_problem import InverseProblem, Toggle
 from .model import Answer, ModelRow, Query, ResponseModel
 from .observations import Observable, Observations
@@ -32,7 +32,7 @@ Array = np.ndarray
 Sizes = Mapping[str, Array]  # equally probable parameters (q,) of an explanation's effects, by id
 MIN_PROBABILITY, MAX_EXPLANATIONS = 0.005, 10  # others do not count
 SIZES = 7  # of each explanation
-HOURS = dict(
+COST_HOURS = dict(
     weigh=0.1,
     rim=0.2,
     seat=0.2,
@@ -47,7 +47,7 @@ HOURS = dict(
     cut=8.0,
 )
 """Of a laboratory, as an orientation."""
-READ = {
+DIRECT_READINGS = {
     "rim": ("measure the rim between its flanges", {"rim_width"}),
     "seat": ("look how level the moulded line runs with the flange", {"bead_seat"}),
     "calliper": ("check gauges and widths with a calliper", {"tread_wear", "sidewall_gauge"}),
@@ -109,7 +109,7 @@ def offered_kPa(inflation_kPa: float, measured: Sequence[float]) -> list[float]:
 
 
 @dataclass(frozen=True)
-class Look:
+class CandidateRows:
     """Rows of a measurement, those that are there first, and what they show."""
 
     sigma: Array  # (n, n)
@@ -155,25 +155,25 @@ def rank(
         return []
     problem = replace(problem, zeta=0.0)
     of = {key: sizes.get(key, {}) for key in likely}
-    now = look(problem, d, of)
-    offered: list[tuple[str, float, Look]] = []
+    now = rows_shown(problem, d, of)
+    offered: list[tuple[str, float, CandidateRows]] = []
     of_section = [k for k, name in enumerate(sources) if name.startswith(SECTION)]
     for k, source in enumerate(sources):
         if k not in of_section:
             words = f"measure by itself: {source.replace('_', ' ')}"
-            offered.append((words, HOURS["check"], with_readings(problem, now, of, [], [k])))
+            offered.append((words, COST_HOURS["check"], with_readings(problem, now, of, [], [k])))
     ids = list(dict.fromkeys(id for each in of.values() for id in each))
-    for tool, (words, shown) in READ.items():
+    for tool, (words, shown) in DIRECT_READINGS.items():
         here, known = [id for id in ids if id in shown], of_section if tool == "cut" else []
         if here or known:
-            offered.append((words, HOURS[tool], with_readings(problem, now, of, here, known)))
+            offered.append((words, COST_HOURS[tool], with_readings(problem, now, of, here, known)))
     words = "dismount the tyre, mount it again and measure all once more"
-    offered.append((words, HOURS["mount"], again(problem, now, d, of)))
+    offered.append((words, COST_HOURS["mount"], again(problem, now, d, of)))
     if clamped := [id for id in ids if id in HELD_BY]:
         words = "clamp the rim rigidly in place of the spindle and measure again"
         changes = [_absent(problem, id) for id in clamped]
-        offered.append((words, HOURS["clamp"], again(problem, now, d, of, changes)))
-    every = HELD_BY.union(*(shown for _, shown in READ.values()))
+        offered.append((words, COST_HOURS["clamp"], again(problem, now, d, of, changes)))
+    every = HELD_BY.union(*(shown for _, shown in DIRECT_READINGS.values()))
     for id in (id for id in ids if id not in every):
         change, tool = _absent(problem, id), "toggle"
         toggle = problem.spans[id].toggle if id in problem.spans else ""
@@ -181,7 +181,7 @@ def rank(
         if id == CAVITY_GAS:
             words, tool = "inflate with helium and measure again", "helium"
             change = replace(change, value=HELIUM, times=True)
-        offered.append((words, HOURS[tool], again(problem, now, d, of, [change])))
+        offered.append((words, COST_HOURS[tool], again(problem, now, d, of, [change])))
     if further:
         offered += _more_rows(problem, now, d, of, further)
     there = len(now.sigma)
@@ -196,10 +196,10 @@ def _absent(problem: InverseProblem, id: str) -> Toggle:
     return Toggle(id, 0.0, base=problem.spans[id].base if id in problem.spans else 0.0)
 
 
-def look(problem: InverseProblem, d: Array, sizes: Mapping[str, Sizes]) -> Look:
+def rows_shown(problem: InverseProblem, d: Array, sizes: Mapping[str, Sizes]) -> CandidateRows:
     """At the rows that are there."""
     shifts = {key: _shifts(problem, each, d) for key, each in sizes.items()}
-    return Look(problem.sigma, problem.plain(d)[1], shifts)
+    return CandidateRows(problem.sigma, problem.plain(d)[1], shifts)
 
 
 def _shifts(problem: InverseProblem, sizes: Sizes, d: Array) -> Array:
@@ -214,11 +214,11 @@ def _count(sizes: Sizes) -> int:
 
 def with_readings(
     problem: InverseProblem,
-    now: Look,
+    now: CandidateRows,
     sizes: Mapping[str, Sizes],
     ids: Sequence[str],
     sources: Sequence[int],
-) -> Look:
+) -> CandidateRows:
     """With readings of effects' sizes, over their ranges, and of sources of error themselves."""
     n, m = len(now.sigma), len(ids) + len(sources)
     spans = [problem.spans[id] for id in ids]
@@ -235,16 +235,18 @@ def with_readings(
         for i, (id, end) in enumerate(zip(ids, far, strict=True)):
             more[:, i] = each.get(id, 0.0) / end
         shifts[key] = np.hstack([now.shifts[key], more])
-    return Look(sigma, np.vstack([now.jacobian, np.zeros((m, len(problem.centre)))]), shifts)
+    return CandidateRows(
+        sigma, np.vstack([now.jacobian, np.zeros((m, len(problem.centre)))]), shifts
+    )
 
 
 def again(
     problem: InverseProblem,
-    now: Look,
+    now: CandidateRows,
     d: Array,
     sizes: Mapping[str, Sizes],
     changes: Sequence[Toggle] = (),
-) -> Look:
+) -> CandidateRows:
     """With one run more, in which something was switched."""
     o, run = problem.observations, 1 + max(row.run for row in problem.observations.rows)
     first = np.array([row.run == 0 for row in o.rows])
@@ -259,10 +261,10 @@ def again(
         later = _shifts(problem, switched, d)[:, first]
         shifts[key] = np.hstack([now.shifts[key], later])
     sigma = problem.covariance(both, problem.constants[more])
-    return Look(sigma, now.jacobian[more], shifts)
+    return CandidateRows(sigma, now.jacobian[more], shifts)
 
 
-def _along(nodes: Nodes, e: float, slope: Array) -> Array:
+def _along(nodes: EffectResponse, e: float, slope: Array) -> Array:
     """Shift of further rows (m,) by an effect of parameter e, whose slopes by it are known at 0:
     they bend as the rows for which it was evaluated do, on the whole; 0 where there is no slope."""
     line, bent = nodes.slope[nodes.values == 0][0] * e, nodes.shift_at(np.array([e]))[0]
@@ -278,8 +280,12 @@ def _grown(shifts: Array, mean: Array) -> Array:
 
 
 def _more_rows(
-    problem: InverseProblem, now: Look, d: Array, sizes: Mapping[str, Sizes], further: OtherStates
-) -> list[tuple[str, float, Look]]:
+    problem: InverseProblem,
+    now: CandidateRows,
+    d: Array,
+    sizes: Mapping[str, Sizes],
+    further: OtherStates,
+) -> list[tuple[str, float, CandidateRows]]:
     """Other pressures, higher harmonics and the mass, as far as the model has an answer at the
     explanations' mean sizes."""
     o = problem.observations
@@ -288,14 +294,14 @@ def _more_rows(
     offered: list[tuple[str, float, list[ModelRow]]] = []
     for p in offered_kPa(further.inflation_kPa, pressures):
         more: list[ModelRow] = [(label, p) for label in labels]
-        offered.append((f"measure the same modes at {p:g} kPa", HOURS["pressure"], more))
+        offered.append((f"measure the same modes at {p:g} kPa", COST_HOURS["pressure"], more))
     top = max(label.c for label in labels)
     higher = [Label(top + 1, 0), Label(top + 1, 1)]
     measured_in = dict.fromkeys(row.row[1] for row in o.rows if row.label)
     more = [(label, where) for label in higher for where in measured_in]
-    offered.append((f"measure {higher[0]} and {higher[1]}, too", HOURS["harmonics"], more))
+    offered.append((f"measure {higher[0]} and {higher[1]}, too", COST_HOURS["harmonics"], more))
     if all(row.label for row in o.rows):
-        offered.append(("weigh the tyre", HOURS["weigh"], [(None, 0.0)]))
+        offered.append(("weigh the tyre", COST_HOURS["weigh"], [(None, 0.0)]))
     rows = list(dict.fromkeys(row for _, _, more in offered for row in more))
     model = further.model(rows)
     x = problem.expansion.x0 + d
@@ -339,5 +345,5 @@ def _more_rows(
         shifts = {key: np.hstack([now.shifts[key], added[key][:, at]]) for key in sizes}
         jacobian = np.vstack([now.jacobian, plain.jacobian[at]])
         sigma = problem.covariance(both, constants)
-        result.append((words, hours, Look(sigma, jacobian, shifts)))
+        result.append((words, hours, CandidateRows(sigma, jacobian, shifts)))
     return result

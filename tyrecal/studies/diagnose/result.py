@@ -15,7 +15,7 @@ from pydantic import Field
 from ...simulate.modes.label import Label
 from ..labels import Labels
 from ..result import Result, ResultPart
-from .constants_told import ConstantShift, constants_told
+from .constants_told import ConstantShift, constants_posterior
 from .evidence import NONE, OUTSIDE
 from .gap import projection
 from .observations import Observable
@@ -208,7 +208,7 @@ def diagnosis_result(
             if shown and holds(shown, id)
         },
         also=list(d.verdict.also),
-        constants=constants_told(d),
+        constants=constants_posterior(d),
         robust=RobustPart(
             robust=d.robustness.robust,
             hangs_on=list(d.robustness.hangs_on),

@@ -28,7 +28,7 @@ from .evidence import (
     refit_at,
 )
 from .inverse_problem import InverseProblem
-from .reweighed import Changed, lines, reweighed
+from .reweighed import Perturbation, lines, reweighed
 from .section_fields import SECTION
 from .several import coupled_most, present, probabilities
 from .verdict import NAMED, NO_GAP, UNDECIDED, Verdict, decide, holds
@@ -47,7 +47,7 @@ class Robustness:
 
     robust: bool  # it is the same with all of these numbers
     hangs_on: tuple[str, ...]  # what changes it, and to what
-    low: float  # range of the probability of what it says, see `said`
+    low: float  # range of the probability of what it says, see `verdict_probability`
     high: float
 
 
@@ -59,18 +59,18 @@ def robustness(
 ) -> Robustness:
     """Robustness of the verdict on these hypotheses. sources: names of the sources of error."""
     kept = _weighty(hypotheses)
-    p = [said(probabilities(hypotheses), verdict)]
+    p = [verdict_probability(probabilities(hypotheses), verdict)]
     changes: list[str] = []
     for words, judged, rows in _variants(problem, kept, verdict, sources):
         share = probabilities(judged)
-        p.append(said(share, verdict))
+        p.append(verdict_probability(share, verdict))
         other = decide(judged, share, rows, len(problem.centre))
         if (other.kind, other.key) != (verdict.kind, verdict.key):
             changes.append(f"{words} ({in_words(other)})")
     return Robustness(not changes, tuple(changes), min(p), max(p))
 
 
-def said(p: Mapping[str, float], verdict: Verdict) -> float:
+def verdict_probability(p: Mapping[str, float], verdict: Verdict) -> float:
     """The probability of what a verdict says: that what is named, or else likeliest, is there;
     that nothing is; that something outside is."""
     if verdict.kind in (NAMED, UNDECIDED):
@@ -105,7 +105,7 @@ def _priors(verdict: Verdict) -> Iterator[tuple[str, Callable[[Hypothesis], int]
         yield words, lambda h: int(bool(h.values) and holds(h.key, key))
 
 
-def _changes(problem: InverseProblem, sources: Sequence[str]) -> Iterator[Changed]:
+def _changes(problem: InverseProblem, sources: Sequence[str]) -> Iterator[Perturbation]:
     """Changes of the numbers that were assumed."""
     rows = problem.observations.rows
     every = np.ones(len(rows), bool)
@@ -117,20 +117,22 @@ def _changes(problem: InverseProblem, sources: Sequence[str]) -> Iterator[Change
         constants["all constants"] = [k for (k,) in constants.values()]
     if of_section:
         constants["the section"] = of_section
-        yield Changed("the section beyond doubt", _scaled(problem, of_section, 0.0), every)
+        yield Perturbation("the section beyond doubt", _scaled(problem, of_section, 0.0), every)
     for factor, times in FACTORS.items():
         for name, places in constants.items():
             words = f"the standard deviation of {name} {times} as large"
-            yield Changed(words, _scaled(problem, places, factor), every)
-        yield Changed(f"the allowance for effects' laws {times} as large", problem, every, factor)
+            yield Perturbation(words, _scaled(problem, places, factor), every)
+        yield Perturbation(
+            f"the allowance for effects' laws {times} as large", problem, every, factor
+        )
         looser = replace(problem, spread=factor * problem.spread)
-        yield Changed(f"what variables may be off their start {times} as large", looser, every)
+        yield Perturbation(f"what variables may be off their start {times} as large", looser, every)
     sure = replace(problem, assumed=replace(problem.assumed, form=0.0))
-    yield Changed("the model's own form beyond doubt", sure, every)
+    yield Perturbation("the model's own form beyond doubt", sure, every)
     for label in sorted({row.label for row in rows if row.label}, key=str):
         keep = np.array([row.label != label for row in rows])
         if keep.any():
-            yield Changed(f"without {label.said}", problem, keep)
+            yield Perturbation(f"without {label.said}", problem, keep)
 
 
 def _scaled(problem: InverseProblem, places: Sequence[int], factor: float) -> InverseProblem:
@@ -156,7 +158,9 @@ def _weighty(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
     return kept
 
 
-def _again(problem: InverseProblem, h: Hypothesis, changes: Sequence[Changed]) -> list[Hypothesis]:
+def _again(
+    problem: InverseProblem, h: Hypothesis, changes: Sequence[Perturbation]
+) -> list[Hypothesis]:
     """A hypothesis weighed anew with each change."""
     if h.key == OUTSIDE:
         return _outside(problem, h, changes)
@@ -176,7 +180,7 @@ def _again(problem: InverseProblem, h: Hypothesis, changes: Sequence[Changed]) -
 
 
 def _outside(
-    problem: InverseProblem, h: Hypothesis, changes: Sequence[Changed]
+    problem: InverseProblem, h: Hypothesis, changes: Sequence[Perturbation]
 ) -> list[Hypothesis]:
     """The same of what is outside the catalogue, but for families that say nothing of the rows that
     count, as that a label is misread which is left out."""

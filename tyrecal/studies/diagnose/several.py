@@ -121,11 +121,11 @@ def _with_one_more(
     fewer = sorted(fewer, key=lambda h: -h.ln_evidence)
     if count == 2:
         wanted = {frozenset((h.key, id)) for h in fewer[:PARTNERS] for id in order if id != h.key}
-        wanted |= {*together_most_like(problem, hypotheses[0], wanted)}
+        wanted |= {*hidden_pairs(problem, hypotheses[0], wanted)}
     else:
         ln = {h.key: h.ln_evidence + np.log(h.prior) for h in hypotheses if h.key != OUTSIDE}
         likely = [h for h in fewer[:BASES] if ln[h.key] > max(ln.values()) - BASES_WITHIN]
-        wanted = {frozenset((*h.values, id)) for h in likely for id in most_like(problem, h)}
+        wanted = {frozenset((*h.values, id)) for h in likely for id in next_candidates(problem, h)}
     sets = [[id for id in order if id in each] for each in wanted]
     most, result = max(h.ln_evidence + np.log(h.prior) for h in hypotheses), []
     for ids in sorted(sets, key=lambda ids: [order.index(id) for id in ids]):
@@ -159,13 +159,13 @@ def coupled_most(known: Sequence[Hypothesis]) -> dict[int, float]:
     return {int(k): float(share[k]) for k in np.argsort(-share)[:COUPLED_POINTS]}
 
 
-def most_like(problem: InverseProblem, base: Hypothesis) -> list[str]:
+def next_candidates(problem: InverseProblem, base: Hypothesis) -> list[str]:
     """Effects by what they would gain beside those of ``base``, the first `THIRDS`."""
     gains = {id: float(own.max()) for id, (own, *_) in _gains(problem, base).items()}
     return sorted(gains, key=lambda id: -gains[id])[:THIRDS]
 
 
-def together_most_like(
+def hidden_pairs(
     problem: InverseProblem, none: Hypothesis, tried: Container[frozenset[str]]
 ) -> list[frozenset[str]]:
     """Pairs that are not among ``tried`` by what both gain together, the first `HIDDEN_PAIRS`: two

@@ -21,7 +21,7 @@ from .evidence import OUTSIDE, Hypothesis
 from .inverse_problem import InverseProblem
 from .model import ModelRow
 from .observations import Observable, Observations
-from .reweighed import Line, line_about
+from .reweighed import LinearFit, line_about
 from .veering import ZETA_POINTS, rule
 
 Array = np.ndarray
@@ -119,7 +119,7 @@ def _coupled(coupled: Array) -> list[tuple[int | None, Array]]:
     return [(k, share[:, k]) for k in range(len(zeta)) if share[:, k].max() > WORTH_COUPLING]
 
 
-def _conditional(line: Line, problem: InverseProblem, count: int) -> tuple[Array, Array]:
+def _conditional(line: LinearFit, problem: InverseProblem, count: int) -> tuple[Array, Array]:
     """Mean and variance (q, m) of all rows but the first ``count``, which are known."""
     J = line.slopes * problem.spread
     T = line.covariance(problem) + J @ J.transpose(0, 2, 1)
