@@ -51,7 +51,7 @@ class TyrePart(ABC):
     def at_stations(self, nodes: int) -> AtStations:
         """The part in three dimensions, in a section of so many nodes."""
 
-    def growing(self, table: int) -> TyrePart | None:
+    def frequency_dependent_part(self, table: int) -> TyrePart | None:
         """The part of its stiffness that scales with the modulus of table number ``table``; None:
         no part."""
         return None
