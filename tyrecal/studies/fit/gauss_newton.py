@@ -31,7 +31,7 @@ from .search import (
 
 Array = np.ndarray
 MIN_DAMPING = 1e-6  # mu over the mean diagonal of J^T J, at last
-KEPT_WELL, KEPT_BADLY = 0.7, 0.25  # shares of a promised decrease: above mu falls, below it rises
+GOOD_GAIN, POOR_GAIN = 0.7, 0.25  # shares of a promised decrease: above mu falls, below it rises
 HALVINGS = 5  # of a step towards a design without a solution
 
 
@@ -62,9 +62,9 @@ def descend(
             watch.edge = crossing(problem, (point, there), reached) or watch.edge
         change, gain = there.x - point.x, point.objective**2 - there.objective**2
         wanted = promised(point, curvature, change)
-        if not gain >= KEPT_BADLY * wanted:
+        if not gain >= POOR_GAIN * wanted:
             damping *= 4
-        elif gain > KEPT_WELL * wanted:
+        elif gain > GOOD_GAIN * wanted:
             damping = max(0.1 * damping, MIN_DAMPING)
         curvature = with_secant(curvature, change, there.jacobian - point.jacobian)
         point = reached
