@@ -11,7 +11,7 @@ import pytest
 from tyrecal.errors import InputError
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
-from tyrecal.simulate.modes.find import Found, find_modes
+from tyrecal.simulate.modes.find import LabelledModes, find_modes
 from tyrecal.studies.diagnose.diagnosis import diagnose
 from tyrecal.studies.diagnose.inverse_problem import Assumed
 from tyrecal.studies.diagnose.model import Answer, Query
@@ -199,7 +199,7 @@ def test_slopes_of_fields_are_the_model_s_own() -> None:
     z = {name: 0.2 * (-1) ** i for i, name in enumerate(fields(STATED))}  # a tyre as it may be
     drawn = Evaluator(TyreDesign(with_fields(STATED, z)))
     ((_, tyre),) = find_modes(drawn, [Question({})], LABELS)
-    assert isinstance(tyre, Found)
+    assert isinstance(tyre, LabelledModes)
     ln_f = [np.log(tyre.wanted[label].frequency_Hz) for label in LABELS]
     own = np.append(ln_f, np.log(tyre.evaluation.mass_kg)) - at_0.eta
     by_slopes = sum(amount * column[name] for name, amount in z.items())

@@ -37,7 +37,7 @@ import numpy as np
 from ..errors import InputError
 from ..simulate.evaluate.evaluator import Evaluator, Question
 from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed
-from ..simulate.modes.find import Found, find_modes
+from ..simulate.modes.find import LabelledModes, find_modes
 from ..simulate.modes.label import Label
 from .fit.crossing import AXIAL, PAIR, TORSIONAL
 from .fit.variable import DesignVariable
@@ -209,7 +209,7 @@ def emulator(
     for place, answer in sorted(answers.items()):
         if isinstance(answer, DeckRefused):
             raise answer
-        if isinstance(answer, Found):
+        if isinstance(answer, LabelledModes):
             samples.append(_evaluated(x[place], answer, variables))
         else:
             failed += 1
@@ -221,7 +221,7 @@ def emulator(
     return fitted(tuple(variables), labels, centre, half, samples, failed)
 
 
-def _evaluated(x: Array, answer: Found, variables: Sequence[DesignVariable]) -> Evaluated:
+def _evaluated(x: Array, answer: LabelledModes, variables: Sequence[DesignVariable]) -> Evaluated:
     modes, gradients = {mode.label: mode for mode in answer.modes}, answer.evaluation.gradients
     per_x = [v.slope(v.value(float(xi))) for v, xi in zip(variables, x, strict=True)]
     by_name = np.array([gradients[v.name] for v in variables])  # (v, modes)

@@ -10,7 +10,7 @@ import numpy as np
 from ..simulate.evaluate.evaluator import Evaluator, PressQuestion, Question
 from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from ..simulate.evaluate.pressed import Footprint, Pressed
-from ..simulate.modes.find import Found, find_modes
+from ..simulate.modes.find import LabelledModes, find_modes
 from ..simulate.modes.label import Label, Mode
 from ..simulate.modes.loaded import Member, ModesAtLoad, Rings, follow, members, rings, state
 from ..tyre.case import LoadedCase
@@ -126,7 +126,7 @@ def _count(case: LoadedCase) -> int:
 
 def _unloaded(
     case: LoadedCase, evaluator: Evaluator, values: Mapping[str, float], labels: Sequence[Label]
-) -> Found | EvaluationFailed:
+) -> LabelledModes | EvaluationFailed:
     """The unloaded tyre's modes with a few harmonics more, the wanted ones surely among them."""
     highest = case.case.analysis.highest_harmonic + EXTRA_HARMONICS
     question = Question({**values, "analysis.highest_harmonic": highest})
@@ -139,7 +139,7 @@ def _unloaded(
 
 
 def _loaded_tyre(
-    case: LoadedCase, unloaded: Found, pressed: Pressed | EvaluationFailed, with_zero: bool
+    case: LoadedCase, unloaded: LabelledModes, pressed: Pressed | EvaluationFailed, with_zero: bool
 ) -> LoadOutcome:
     if isinstance(pressed, EvaluationFailed):
         return pressed

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from ..simulate.evaluate.evaluator import Evaluator, Question
 from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed
-from ..simulate.modes.find import Found, find_modes
+from ..simulate.modes.find import LabelledModes, find_modes
 from ..simulate.modes.follow import follow
 from ..simulate.modes.label import FAMILIES, Label, Mode, labelled
 from ..tyre.case import LoadedCase
@@ -86,7 +86,7 @@ def sweep(
 
 
 def _outcome(
-    design: str, pressure_kPa: float, answer: Found | EvaluationFailed, name: str
+    design: str, pressure_kPa: float, answer: LabelledModes | EvaluationFailed, name: str
 ) -> SweepOutcome:
     if isinstance(answer, EvaluationFailed):
         return Failure(design, pressure_kPa, answer)

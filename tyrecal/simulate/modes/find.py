@@ -16,7 +16,7 @@ Wanted = Callable[[int, Sequence[Mode]], Sequence[Label]]  # of a question's pla
 
 
 @dataclass(frozen=True)
-class Found:
+class LabelledModes:
     """An evaluated design with its modes by label."""
 
     evaluation: Evaluation
@@ -29,7 +29,7 @@ class Found:
         return margin(self.wanted)
 
 
-ModesAnswer = Found | EvaluationFailed | DeckRefused
+ModesAnswer = LabelledModes | EvaluationFailed | DeckRefused
 
 
 def find_modes(
@@ -54,7 +54,7 @@ def find_modes(
             modes = paired_labels(answer.modes)
             try:
                 labels = wanted(place, modes) if callable(wanted) else wanted
-                yield place, Found(answer, modes, match(modes, labels))
+                yield place, LabelledModes(answer, modes, match(modes, labels))
             except EvaluationFailed as error:
                 lost[place] = error
         if not lost:

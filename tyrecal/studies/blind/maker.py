@@ -10,7 +10,7 @@ from typing import Protocol
 from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator, Question
 from ...simulate.evaluate.store import Store
-from ...simulate.modes.find import Found, find_modes
+from ...simulate.modes.find import LabelledModes, find_modes
 from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase
 from .laws import EffectLaw, Frequencies, catalogue_laws
@@ -58,7 +58,7 @@ class SolverMaker:
         """Raises EvaluationFailed, also where a label is lost."""
         evaluator = Evaluator(TyreDesign(case), self.solver, store=self.store)
         ((_, labelled),) = find_modes(evaluator, [Question({})], labels)
-        if not isinstance(labelled, Found):
+        if not isinstance(labelled, LabelledModes):
             raise labelled
         ln_f = {}
         for label in labels:

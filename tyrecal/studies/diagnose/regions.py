@@ -10,7 +10,7 @@ import numpy as np
 
 from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator
-from ...simulate.modes.find import Found
+from ...simulate.modes.find import LabelledModes
 from ...tyre.case import LoadedCase, number_at
 from ...tyre.case.schema import Rubber, Solid
 from ...tyre.own_deck.numbers import moduli
@@ -70,9 +70,9 @@ def regions(model: Parted, x: Array) -> list[SectionPart]:
     taken = {path: own[name] for name, v in case.case.variables.items() for path in v.sets}
     design = {**numbers, **taken}
     designs = [model.in_state(state, design, list(numbers)) for state in model.states]
-    at: dict[TyreState, Found] = {}
+    at: dict[TyreState, LabelledModes] = {}
     for state, each in zip(model.states, problem.modes_of(designs), strict=True):
-        if not isinstance(each, Found):
+        if not isinstance(each, LabelledModes):
             raise each
         at[state] = each
     weighed = at[model.states[0]].evaluation

@@ -13,7 +13,7 @@ import numpy as np
 from ...simulate.deck.decks import Decks
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
-from ...simulate.modes.find import Found, ModesAnswer
+from ...simulate.modes.find import LabelledModes, ModesAnswer
 from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase, start_values
 from ...tyre.case.schema import TargetMode, Targets
@@ -149,7 +149,7 @@ class TyreModel:
         answers = []
         designs = [self.in_state(state, self.values(x))[0] for state in self.states]
         for each in self._modes([(design, ()) for design in designs]):
-            if not isinstance(each, Found):
+            if not isinstance(each, LabelledModes):
                 raise each
             answers.append(each)
         at = dict(zip(self.states, answers, strict=True))
@@ -297,11 +297,11 @@ class TyreModel:
     def _answer(
         self, point: Query, designs: list[dict[str, float]], answers: Sequence[ModesAnswer]
     ) -> Answer | Exception:
-        labelled: list[Found] = []
+        labelled: list[LabelledModes] = []
         for each in answers:
             if isinstance(each, DeckRefused) and not point.effects:
                 raise each
-            if not isinstance(each, Found):
+            if not isinstance(each, LabelledModes):
                 return each
             labelled.append(each)
         at = dict(zip(self.states, zip(designs, labelled, strict=True), strict=True))
@@ -361,7 +361,7 @@ class TyreModel:
             ln_f = [eta.copy(), eta.copy()]
             for side, state in product((0, 1), self.states):
                 answer = next(answers)
-                if not isinstance(answer, Found):
+                if not isinstance(answer, LabelledModes):
                     raise answer
                 for i, (label, where) in enumerate(self.rows):
                     if label and mates[i] >= 0 and state_of(where) == state:
@@ -372,7 +372,7 @@ class TyreModel:
         size = np.where(mates >= 0, np.sqrt(square), 0.0)
         return Coupling(mates, size, np.where(size > 0, rise / np.maximum(square, 1e-300), 0.0))
 
-    def _mass_slopes(self, x: Array, labelled: Sequence[Found]) -> tuple[Array, Array]:
+    def _mass_slopes(self, x: Array, labelled: Sequence[LabelledModes]) -> tuple[Array, Array]:
         """d ln mass by x (v,) and by the sources of error (k,). Raises DeckRefused where the solver
         does not tell them."""
         mass_kg, values, rates = labelled[0].evaluation.mass_kg, self.values(x), dict[str, float]()
@@ -395,7 +395,7 @@ class TyreModel:
         return design[name] if v.scale == "log" else v.upper - v.lower
 
 
-def _ln(label: Label, labelled: Found) -> float:
+def _ln(label: Label, labelled: LabelledModes) -> float:
     """ln f of a mode, of a pair the mean."""
     mode = labelled.wanted[label]
     members = mode.raw.members

@@ -23,7 +23,7 @@ import numpy as np
 
 from ...simulate.evaluate.evaluator import Evaluator, Question
 from ...simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
-from ...simulate.modes.find import Found, ModesAnswer, find_modes
+from ...simulate.modes.find import LabelledModes, ModesAnswer, find_modes
 from ...simulate.modes.label import Label, Mode
 from ...tyre.case import LoadedCase
 from ...tyre.state import AS_THE_CASE, TyreState, without
@@ -206,14 +206,14 @@ class Problem:
             quantities, slopes = np.append(quantities, more[0]), np.vstack([slopes, more[1]])
         return quantities, slopes
 
-    def _measured(self, by_state: Mapping[TyreState, Found]) -> Array:
+    def _measured(self, by_state: Mapping[TyreState, LabelledModes]) -> Array:
         """Frequencies (targets,) of a design, Hz, and behind them its mass where it is a target."""
         hertz = [by_state[t.state].wanted[t.label].frequency_Hz for t in self.targets]
         return np.array(hertz + [_mass_kg(by_state) for _ in self.mass])
 
     def slopes(
         self,
-        by_state: Mapping[TyreState, Found],
+        by_state: Mapping[TyreState, LabelledModes],
         targets: Sequence[Target],
         values: Mapping[str, float],
     ) -> Array:
@@ -224,7 +224,7 @@ class Problem:
         return slopes * [v.slope(values[v.name]) for v in self.variables]
 
     def _mass_slopes(
-        self, by_state: Mapping[TyreState, Found], values: Mapping[str, float]
+        self, by_state: Mapping[TyreState, LabelledModes], values: Mapping[str, float]
     ) -> Array:
         """d mass / d x (variables,), kg. Raises DeckRefused where the solver does not tell it."""
         known: dict[str, float] = {}
@@ -247,21 +247,21 @@ class Problem:
 
     def _in_states(
         self, designs: Sequence[Mapping[str, float]], names: tuple[str, ...] = ()
-    ) -> list[dict[TyreState, Found] | EvaluationFailed]:
+    ) -> list[dict[TyreState, LabelledModes] | EvaluationFailed]:
         """For each design its target modes in every state, or its first failure; all are requested
         at once. Raises DeckRefused."""
         wanted = [
             self.question(design, state, names) for design in designs for state in self.labels
         ]
         answers = iter(self.modes_of(wanted, [*self.labels.values()] * len(designs)))
-        results: list[dict[TyreState, Found] | EvaluationFailed] = []
+        results: list[dict[TyreState, LabelledModes] | EvaluationFailed] = []
         for _ in designs:
             here = {state: next(answers) for state in self.labels}
             for answer in here.values():
                 if isinstance(answer, DeckRefused):
                     raise answer
             failed = (each for each in here.values() if isinstance(each, EvaluationFailed))
-            modes = {state: each for state, each in here.items() if isinstance(each, Found)}
+            modes = {state: each for state, each in here.items() if isinstance(each, LabelledModes)}
             results.append(next(failed, modes))
         return results
 
@@ -287,12 +287,12 @@ class Problem:
         return [answers[place] for place in range(len(wanted))]
 
 
-def _mass_kg(by_state: Mapping[TyreState, Found]) -> float:
+def _mass_kg(by_state: Mapping[TyreState, LabelledModes]) -> float:
     """The tyre's, kg, the same in every state."""
     return next(iter(by_state.values())).evaluation.mass_kg
 
 
-def _slope(labelled: Found, name: str, place: int) -> float:
+def _slope(labelled: LabelledModes, name: str, place: int) -> float:
     """d f / d variable of the mode at a place, Hz per unit of it; 0 where it sets nothing there."""
     gradient = labelled.evaluation.gradients.get(name)
     return 0.0 if gradient is None else float(gradient[place])

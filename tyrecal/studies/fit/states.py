@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...simulate.modes.find import Found
+from ...simulate.modes.find import LabelledModes
 from ...simulate.modes.label import Label
 from ...tyre.state import RIMS, TyreState
 from ...tyre.usual import USUAL
@@ -82,7 +82,7 @@ def next_states(problem: Problem, point: Point, known: FitUncertainty) -> list[N
     J, root, sigma = point.jacobian[counts], problem.scale[counts], known.sigma[counts]
     proposals = []
     for state, answer in zip(states, answers, strict=True):
-        if not isinstance(answer, Found):
+        if not isinstance(answer, LabelledModes):
             continue
         hertz = np.array([answer.wanted[t.label].frequency_Hz for t, _ in like])
         scattered = hertz * [relative for _, relative in like]
