@@ -56,7 +56,7 @@ RESULTS = {  # of a study, by pattern: what a new run of it takes the place of
     "diagnose": ("diagnosis.json", "diagnosis.md", "diagnosis_*.json", "diagnosis_*.png"),
     "batch": ("batch.json",),
 }
-CHANGED = threading.Event()  # set once this process writes a file with `whole`
+CHANGED = threading.Event()  # set once this process writes a file with `atomic_write`
 RUN = "run.json"  # what differs from run to run, an entry a study
 PREVIOUS = "previous"  # folder for what a new run of the same study did not write again
 
@@ -77,7 +77,7 @@ def set_aside(folder: Path, study: str, written: Collection[str]) -> None:
     refuse_link(folder / PREVIOUS)
     for file in results(folder, study):
         if file.name not in written:
-            own_folder(folder / PREVIOUS)
+            private_dir(folder / PREVIOUS)
             file.replace(folder / PREVIOUS / file.name)
     for file in results(folder / PREVIOUS, study):
         if file.name in written:
@@ -165,7 +165,7 @@ def refuse_link(path: Path) -> None:
         raise NotAFile(path, "is a link, which is not followed: remove it")
 
 
-def own_folder(path: Path) -> Path:
+def private_dir(path: Path) -> Path:
     """``path``, made if need be, as one of our own folders. Raises NotAFile, NotWritten."""
     refuse_link(path)
     make_folder(path)
@@ -210,7 +210,7 @@ def read_json(path: Path, follow: bool = True) -> Any:
 
 
 @contextlib.contextmanager
-def whole(path: Path, many_writers: bool = False) -> Iterator[Path]:
+def atomic_write(path: Path, many_writers: bool = False) -> Iterator[Path]:
     """A path beside ``path`` to write to; it takes its place at the end, or is removed.
 
     Nobody can have laid a link there: its name is drawn, and the file is new. Leftovers of writers
@@ -236,11 +236,11 @@ def whole(path: Path, many_writers: bool = False) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str, many_writers: bool = False) -> None:
-    """Write ``text`` whole or not at all, the same bytes on every system; see `whole`.
+    """Write ``text`` whole or not at all, the same bytes on every system; see `atomic_write`.
 
     Raises OSError.
     """
-    with whole(path, many_writers) as partial:
+    with atomic_write(path, many_writers) as partial:
         partial.write_text(text, encoding="utf-8", newline="")
 
 

@@ -30,7 +30,7 @@ from ..errors import InputError
 from ..files import (
     json_text,
     os_words,
-    own_folder,
+    private_dir,
     read_bytes,
     read_json,
     set_aside,
@@ -120,7 +120,7 @@ def _studied(
     task: CaseTask, loaded: LoadedCase, evaluator: Evaluator, facts: dict[str, Any]
 ) -> tuple[dict[str, Any], list[str]]:
     """Every study's entry in the report, and the names of the result files."""
-    own_folder(task.folder)
+    private_dir(task.folder)
     _write_runs(task, loaded, facts, (), {})
     evaluator.store = Store(task.record) if task.record else None
     state = Studied(loaded, evaluator, {"initial": start_values(loaded)}, task.asked)
@@ -136,7 +136,7 @@ def _studied(
             outcome = _failed(error)
         place = task.folder
         if outcome.cause == NOT_CONVERGED and has_good(place / "fit.json"):
-            place, aside[name] = own_folder(place / NOT_CONVERGED), NOT_CONVERGED
+            place, aside[name] = private_dir(place / NOT_CONVERGED), NOT_CONVERGED
         for file, text in outcome.files.items():
             _write_text(place / file, text)
             files.append((place / file).relative_to(task.folder).as_posix())

@@ -72,7 +72,7 @@ FILE_PATH = Place(folder=False)
     options.no_store,
     options.allow_unusual,
 )
-@options.talking
+@options.with_terminal
 def command(
     cases: tuple[Path, ...],
     studies: str,

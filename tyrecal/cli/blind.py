@@ -61,7 +61,7 @@ def command() -> None:
     help="Scatter of every frequency.",
 )
 @options.every(options.mesh, options.jobs, options.store, options.allow_unusual)
-@options.talking
+@options.with_terminal
 def power(
     case: Path,
     pressures: tuple[float, ...],
@@ -131,7 +131,7 @@ def power(
 @option("--seed", type=Whole(0), metavar="N", help="Of all that is drawn (default: a secret one).")
 @truth
 @options.every(options.jobs, options.allow_unusual)
-@options.talking
+@options.with_terminal
 def make(
     folder: Path,
     case_path: Path,
@@ -216,7 +216,7 @@ def make(
     help="Consider these effects only; repeatable.",
 )
 @options.every(options.jobs, options.store)
-@options.talking
+@options.with_terminal
 def answer(
     folder: Path,
     emulated: bool,
@@ -262,7 +262,7 @@ def answer(
 @command.command()
 @folder
 @truth
-@options.talking
+@options.with_terminal
 def score(folder: Path, truth: Path | None, terminal: Terminal) -> int:
     """Open the truth and score the answers of DIR: score.json, score.md.
 

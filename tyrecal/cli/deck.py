@@ -40,7 +40,7 @@ MAX_DECK_DOUBTS = 10  # doubts about a deck
     options.output,
     options.allow_unusual,
 )
-@options.talking
+@options.with_terminal
 def command(
     case: Path,
     assignments: tuple[str, ...],
@@ -63,7 +63,7 @@ def command(
     """
     if check:
         return _check(case, mesh, assignments, terminal)
-    from ..files import own_folder, whole
+    from ..files import atomic_write, private_dir
     from ..simulate.deck.decks import Decks
     from ..simulate.deck.decks_design import design_of
     from ..simulate.evaluate.evaluator import Evaluator
@@ -95,9 +95,9 @@ def command(
         for path in written:
             place = run.folder / path.relative_to(fresh)  # what a deck includes may lie in folders
             for above in reversed(place.relative_to(run.folder).parents[:-1]):
-                own_folder(run.folder / above)
+                private_dir(run.folder / above)
             paths.append(str(place))
-            with whole(place) as partial:
+            with atomic_write(place) as partial:
                 shutil.copyfile(path, partial)
     run.finish()
     terminal.result(paths)

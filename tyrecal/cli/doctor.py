@@ -35,7 +35,7 @@ HINTS = {
     metavar="DIR",
     help="Record to look at (default: those of the results folders here; also from TYRECAL_STORE).",
 )
-@options.talking
+@options.with_terminal
 def command(solver: str, store: Path | None, terminal: Terminal) -> int:
     """Check the installation: packages, solvers, machine, records, and a known tyre's frequencies.
 

@@ -10,7 +10,7 @@ import click
 from . import arguments, options
 from .main import EXIT_SOLVER
 from .parameters import option
-from .taken import taken
+from .taken import default_case
 from .terminal import Terminal
 
 DESIGNS = ("initial", "fitted")
@@ -57,7 +57,7 @@ def command(
     from ..studies.pressing_plan import PressedState, plan_pressing
 
     terminal = study.terminal
-    case, fitted, study = taken(case, fitted, study)
+    case, fitted, study = default_case(case, fitted, study)
     if loads is not None:
         arguments.refuse_set(assignments, "road.loads_N", "--loads-N")
     loaded, values = study.load(case, assignments, pressure_kPa)

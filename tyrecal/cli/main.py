@@ -12,7 +12,7 @@ import click
 
 from ..errors import InputError, TyrecalError
 from ..files import CHANGED, os_words
-from ..interrupt import SIGNALS, exit_code, interrupt_heard, interrupts_remembered
+from ..interrupt import SIGNALS, exit_code, pending_interrupt, remember_interrupts
 from .terminal import RESUME, coloured, error, say
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ class Interrupted(TyrecalError):
     """A signal ended the command; the words say which, and how to go on."""
 
     def __init__(self, how_to_go_on: str = ""):
-        number = interrupt_heard() or signal.SIGINT
+        number = pending_interrupt() or signal.SIGINT
         super().__init__(": ".join(filter(None, (SIGNALS[number], how_to_go_on))))
         self.exit_code = exit_code(number)
 
@@ -103,7 +103,7 @@ class Commands(click.Group):
             return super().invoke(ctx)
         except (KeyboardInterrupt, Exception) as error:
             if isinstance(error, click.exceptions.Exit) or not (
-                isinstance(error, KeyboardInterrupt) or interrupt_heard()
+                isinstance(error, KeyboardInterrupt) or pending_interrupt()
             ):
                 raise
         # the error is forgotten by now, and with it what was under way: its processes have ended
@@ -170,7 +170,7 @@ def _defaults(command: str | None) -> dict[str, Any]:
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; never returns."""
     try:
-        with interrupts_remembered():
+        with remember_interrupts():
             try:
                 code = cli.main(arguments, prog_name="tyrecal", standalone_mode=False)
             except (KeyboardInterrupt, click.Abort):  # just before or after the command

@@ -116,7 +116,7 @@ def command() -> None:
 )
 @option("--pictures/--no-pictures", default=True, help="Draw functions and shapes beside the CSV.")
 @options.figure_format
-@options.talking
+@options.with_terminal
 def import_files(
     files: tuple[Path, ...],
     output: Path,
@@ -183,7 +183,7 @@ def import_files(
 @command.command()
 @click.argument("file", type=Place(exists=True, folder=False))
 @options.every(axle, centre, directions, highest, leave_out)
-@options.talking
+@options.with_terminal
 def sensors(
     file: Path,
     axle: str | None,

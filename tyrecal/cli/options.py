@@ -2,7 +2,7 @@
 
 1. A command is a module of this package with ``command``, named in ``main.COMMANDS``; heavy imports
    stand inside the function, so that --help and completion stay quick.
-2. ``@options.talking`` gives every command --json, --quiet and --verbose as ``terminal``
+2. ``@options.with_terminal`` gives every command --json, --quiet and --verbose as ``terminal``
    (`Terminal`): say and show for people, result for programs, detail for --verbose, warn, error.
 3. ``@options.study``, in its place, gives what evaluates designs --jobs, --mesh, --solver,
    --output, --store, --no-store and --report too, as ``study`` (`Study`): load, evaluator,
@@ -211,19 +211,28 @@ figure_format = option(
     show_default=True,
     help="Format of the pictures.",
 )
-TALK = (as_json, quiet, verbose)
-ONE_BY_ONE = (mesh, solver, solver_command, output, store, no_store, allow_unusual, *TALK)
-STUDY = (jobs, *ONE_BY_ONE[:-3], report, *TALK)
+OUTPUT_OPTIONS = (as_json, quiet, verbose)
+SERIAL_OPTIONS = (
+    mesh,
+    solver,
+    solver_command,
+    output,
+    store,
+    no_store,
+    allow_unusual,
+    *OUTPUT_OPTIONS,
+)
+STUDY = (jobs, *SERIAL_OPTIONS[:-3], report, *OUTPUT_OPTIONS)
 
 
-def talking(function: Callable[..., int]) -> Callable[..., int]:
+def with_terminal(function: Callable[..., int]) -> Callable[..., int]:
     """--json, --quiet and --verbose, as the argument ``terminal``."""
 
     @wraps(function)
     def command(*args: Any, **values: Any) -> int:
-        return function(*args, terminal=_talk(values), **values)
+        return function(*args, terminal=_terminal_of(values), **values)
 
-    result: Callable[..., int] = every(*TALK)(command)
+    result: Callable[..., int] = every(*OUTPUT_OPTIONS)(command)
     return result
 
 
@@ -234,13 +243,13 @@ def study(function: Callable[..., int]) -> Callable[..., int]:
 
 def study_one_by_one(function: Callable[..., int]) -> Callable[..., int]:
     """The same without --jobs and --report."""
-    return _study(function, ONE_BY_ONE)
+    return _study(function, SERIAL_OPTIONS)
 
 
 def _study(function: Callable[..., int], given: tuple[Any, ...]) -> Callable[..., int]:
     @wraps(function)
     def command(*args: Any, **values: Any) -> int:
-        terminal = _talk(values)
+        terminal = _terminal_of(values)
         own = [field.name for field in fields(Study) if field.name in values]
         study = Study(terminal, **{name: values.pop(name) for name in own})
         return function(*args, study=study, **values)
@@ -369,8 +378,8 @@ class Study:
             self.terminal.say(f"report in {path}")
 
 
-def _talk(values: dict[str, Any]) -> Terminal:
-    """Takes the options of `TALK` out of a command's values."""
+def _terminal_of(values: dict[str, Any]) -> Terminal:
+    """Takes the options of `OUTPUT_OPTIONS` out of a command's values."""
     terminal = Terminal(*(values.pop(name) for name in ("as_json", "quiet", "verbose")))
     if terminal.quiet and terminal.verbose:
         raise click.UsageError("give --quiet or --verbose, not both")
@@ -395,8 +404,8 @@ def fitted(text: str) -> Callable[[Any], Any]:
 
 
 def given(*without: str) -> list[str]:
-    """The options on the command line, ``without`` some and those of `TALK`; none that only the
-    environment or the settings give."""
+    """The options on the command line, ``without`` some and those of `OUTPUT_OPTIONS`; none that
+    only the environment or the settings give."""
     context = click.get_current_context()
     names = [
         [*([] if context.params[each.name] else each.secondary_opts), *each.opts][0]

@@ -27,7 +27,7 @@ from ..files import (
     json_text,
     make_folder,
     open_file,
-    own_folder,
+    private_dir,
     read_json,
     read_runs,
     refuse_link,
@@ -37,7 +37,7 @@ from ..files import (
     write_text,
     writing,
 )
-from ..interrupt import interrupts_put_off
+from ..interrupt import defer_interrupts
 from ..simulate.case_folder import belongs_to, named_case, owner
 from ..simulate.evaluate.solver import solver_facts
 from ..simulate.provenance import stamped
@@ -220,8 +220,8 @@ class Run:
         write run.json: command, times, host, versions, and what else is volatile."""
         if aside:
             self.placed = self.folder / aside
-            own_folder(self.placed)
-        with interrupts_put_off():
+            private_dir(self.placed)
+        with defer_interrupts():
             take_place(self.new, self.placed, self.study)
             self._finished = True
             self._write_facts(**({"results": aside} if aside else {}), **facts)
@@ -262,7 +262,7 @@ class Run:
         drop_unfinished(self.runs)
 
     def _close(self) -> None:
-        with interrupts_put_off():
+        with defer_interrupts():
             if hasattr(self, "new"):
                 shutil.rmtree(self.new, ignore_errors=True)
             if self.solver and self._lock and not self._finished:

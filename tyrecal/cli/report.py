@@ -19,7 +19,7 @@ from .terminal import Terminal
     metavar="FILE",
     help="The page (default: report.html in DIR, of several in the present folder).",
 )
-@options.talking
+@options.with_terminal
 def command(folders: tuple[Path, ...], output: Path | None, terminal: Terminal) -> int:
     """Tell the results in DIR (of fit, modes, sweep-pressure, footprint, diagnose: whatever is
     found) on one HTML page.

@@ -19,7 +19,7 @@ from .terminal import Terminal
     help="Write decks with expected frequencies, for somebody who has this program to run.",
 )
 @option("--output", type=Place(file=False), help="Folder of the selftest.")
-@options.talking
+@options.with_terminal
 def command(selftest: str | None, output: Path | None, terminal: Terminal) -> int:
     """List the installed solvers: version, what they can do, why one cannot be used, which program
     each starts, and the settings file that says so.

@@ -22,7 +22,7 @@ from .terminal import Terminal, resume
     metavar="SIZE_MB",
     help="Remove the least recently used until SIZE_MB are left.",
 )
-@options.talking
+@options.with_terminal
 def command(folder: Path, verify: bool, prune: float | None, terminal: Terminal) -> int:
     """Look at the record of evaluations in DIR, a results folder or a --store of several.
 

@@ -10,7 +10,7 @@ import click
 from . import arguments, options
 from .main import EXIT_SOLVER
 from .parameters import option
-from .taken import taken
+from .taken import default_case
 
 
 @click.command()
@@ -47,7 +47,7 @@ def command(
     from ..tyre.state import rim_of
 
     terminal = study.terminal
-    case, fitted, study = taken(case, fitted, study)
+    case, fitted, study = default_case(case, fitted, study)
     loaded, values = study.load(case, assignments)
     pressures = _pressures(loaded, assignments, from_kPa, to_kPa, steps, study.allow_unusual)
     evaluator = study.evaluator(loaded)

@@ -18,7 +18,9 @@ FIT = "fit.json"
 OF_A_CASE = {"size", "pressure_kPa", "solver"}  # keys that tell a case from other YAML
 
 
-def taken(case: Path | None, fitted: Path | None, study: Study) -> tuple[Path, Path | None, Study]:
+def default_case(
+    case: Path | None, fitted: Path | None, study: Study
+) -> tuple[Path, Path | None, Study]:
     """Case, fit.json to compare with and study: as given, else what lies in this folder, which is
     said; results go to the fit's folder. Raises click.UsageError where nothing, or too much, does.
     """

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @click.command()
 @options.case_argument
 @options.allow_unusual
-@options.talking
+@options.with_terminal
 def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
     """Check CASE and report every mistake: file, line, key, value, what would be right.
 

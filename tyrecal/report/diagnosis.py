@@ -14,7 +14,7 @@ from ..studies.diagnose.study import DiagnosedCase
 from ..studies.diagnose.under_load import LoadedRow
 from ..studies.diagnose.verdict import NAMED, NO_GAP, UNDECIDED, no_gap_words
 from ..tyre.footprint_quantities import FOOTPRINT_QUANTITIES
-from ..units import in_engineers_units, said
+from ..units import display_unit, in_engineers_units
 from .table import map_resolution
 
 RUNGS = {
@@ -193,7 +193,7 @@ def _sized(d: Diagnosis, key: str, id: str) -> str:
     whose = f"the size of `{id}`" if "+" in key else "its size"
     has = in_engineers_units(base, q["unit"])
     held = f", counting the {has} that the case has already" if base else ""
-    unit, factor = said(q["unit"])
+    unit, factor = display_unit(q["unit"])
     value, low, high = (f"{factor * q[key]:.3g}" for key in ("value", "low", "high"))
     sd = d.problem.spans[id].stated
     times = abs(q["value"] - base) / sd if sd else 0.0
@@ -356,7 +356,7 @@ def _which(study: DiagnosedCase) -> Iterator[str]:
 
 
 def _ranged(q: Mapping[str, Any]) -> str:
-    unit, factor = said(q["unit"])
+    unit, factor = display_unit(q["unit"])
     value, low, high = (f"{factor * q[key]:.3g}" for key in ("value", "low", "high"))
     return f"{value} ({low} to {high}) {unit}".rstrip()
 

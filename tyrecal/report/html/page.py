@@ -17,7 +17,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from ...errors import InputError
-from ...files import open_file, whole
+from ...files import atomic_write, open_file
 from ...studies import named, result_types
 from ...studies.fit.result import FitResult
 from ...studies.footprint import FootprintResult
@@ -71,7 +71,7 @@ def write_page(path: Path, folders: Sequence[Path]) -> Page:
         raise InputError(
             f"the page would have {size / 1e6:.1f} MB, more than 5: give fewer folders"
         )
-    with whole(path) as partial:
+    with atomic_write(path) as partial:
         partial.write_bytes(content)
     studies = {
         str(each.folder): [result_types()[name].command or name for name in each.studies]

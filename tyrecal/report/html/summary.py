@@ -13,7 +13,7 @@ from ...studies.effects import EffectResult, Effects
 from ...studies.fit.result import FitResult
 from ...studies.modes import ModesResult
 from ...studies.result import Result
-from ...units import said
+from ...units import display_unit
 from ..table import ended_words, nearness
 
 VERDICT_WORDS = {"named": "Named", "undecided": "Undecided", "outside": "Outside the catalogue"}
@@ -85,7 +85,7 @@ def diagnosis_words(result: DiagnosisResult) -> list[str]:
         )
     if result.effect and result.parameter:
         p = result.parameter
-        unit, factor = said(p.unit)
+        unit, factor = display_unit(p.unit)
         value, low, high = (f"{factor * x:.3g}" for x in (p.value, p.low, p.high))
         words.append(f"Its size is {value} {unit}".rstrip() + f", 90 % between {low} and {high}.")
     if result.shrinkage and gap:

@@ -29,7 +29,7 @@ TO_START = ("SYSTEMROOT", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "PYTHONHOME")
 _own = threading.local()
 
 
-class Apart:
+class TemplateProcess:
     """Templates of a dialect, the user's own in ``folder`` before the tool's."""
 
     auto_reload = True

@@ -18,7 +18,7 @@ from ...tyre.resolve import Tyre, resolved
 from ...tyre.templates import TemplateFailed, environment, render
 from ...tyre.values import set_values
 from .abaqus import aside, context
-from .apart import Apart
+from .apart import TemplateProcess
 from .calculix import calculix_context
 from .decks import HEADER_LINES, header, refuse_outside
 from .own import explained, own_jobs
@@ -161,7 +161,9 @@ class TyreDesign:
         """File name to text, without the header. Raises TemplateFailed."""
         own = self.case.case.templates
         shipped = "abaqus" if dialect == OWN_TEXT else dialect
-        env = Apart(dialect, self.case.folder / own) if own else environment(shipped, None)
+        env = (
+            TemplateProcess(dialect, self.case.folder / own) if own else environment(shipped, None)
+        )
         texts = DIALECTS[dialect](self.tyre, env, request)
         if own or dialect == OWN_TEXT:
             for file, text in texts.items():

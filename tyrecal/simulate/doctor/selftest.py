@@ -8,7 +8,7 @@ from math import degrees
 from pathlib import Path
 from typing import Any
 
-from ...files import make_folder, whole
+from ...files import atomic_write, make_folder
 from ...tyre.case import LoadedCase
 from ...tyre.load import load_case
 from ..deck.decks import Decks
@@ -125,6 +125,6 @@ def _with_carcass(case: LoadedCase, update: dict[str, Any]) -> LoadedCase:
 
 def _written(path: Path, text: str) -> Path:
     make_folder(path.parent)
-    with whole(path) as partial:
+    with atomic_write(path) as partial:
         partial.write_text(text, encoding="utf-8", newline="")
     return path

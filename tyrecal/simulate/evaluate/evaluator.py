@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from ...files import NotWritten, printable
-from ...interrupt import interrupts_put_off, raise_interrupt
+from ...interrupt import defer_interrupts, raise_interrupt
 from ..deck.decks import Decks, Design, DesignKey, PressedTyre
 from . import folders
 from .executor import executor, in_order
@@ -232,7 +232,7 @@ class Evaluator:
         raise_interrupt()
         folder: Path | None = None
         try:
-            with interrupts_put_off():  # it must not come between the folder and its name
+            with defer_interrupts():  # it must not come between the folder and its name
                 folder = folders.fresh(self.folder)
             return self._ask_in(folder, decks, typed)
         except KeyboardInterrupt:

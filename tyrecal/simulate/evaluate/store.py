@@ -21,7 +21,15 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from ...files import NotAFile, make_folder, open_file, own_folder, read_bytes, refuse_link, whole
+from ...files import (
+    NotAFile,
+    atomic_write,
+    make_folder,
+    open_file,
+    private_dir,
+    read_bytes,
+    refuse_link,
+)
 from ..deck.decks import without_header
 from ..program import program_identity
 from .record import DIGEST, Damaged, pack, unpack
@@ -119,8 +127,8 @@ class Store:
             if len(data) > MAX_RECORD_BYTES:
                 raise ValueError(f"an answer of {len(data) / 1e6:.0f} MB is too large")
             make_folder(self.folder)
-            own_folder(path.parent)
-            with whole(path, many_writers=True) as partial:
+            private_dir(path.parent)
+            with atomic_write(path, many_writers=True) as partial:
                 partial.write_bytes(data)
         except (OSError, TypeError, ValueError) as error:
             if not self._warned:

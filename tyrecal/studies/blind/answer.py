@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...files import own_folder
+from ...files import private_dir
 from ...measured.load import load_case
 from ...measured.tables import read_measurements
 from ...simulate.evaluate.evaluator import Evaluator
@@ -76,7 +76,7 @@ def answer(
     protocol = read_protocol(folder)
     trials = sorted((folder / "trials").glob("*.csv"))
     answers = folder / "answers"
-    own_folder(answers)
+    private_dir(answers)
     waiting = [t for t in trials if not (answers / f"{t.stem}.json").exists()]
     known = expand(model, model.start)
     work = partial(one_answer, model, list(rows), protocol, known, further)

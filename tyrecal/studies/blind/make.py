@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...files import make_folder, refuse_link, whole
+from ...files import atomic_write, make_folder, refuse_link
 from ...measured.measurement import CSV_COLUMNS
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.evaluate.pool import process_pool
@@ -213,7 +213,7 @@ def write_trials(folder: Path, protocol: Protocol, trials: list[Trial]) -> None:
         mass *= exp(protocol.mass * random.normal())
         lines.append(f"mass_kg,,,,,,,{mass:.3f},{protocol.mass * mass:.3f}")
         path = folder / "trials" / f"{trial.truth.id}.csv"
-        with whole(path) as partial:
+        with atomic_write(path) as partial:
             partial.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="")
     for path in (folder / "trials").iterdir():
         os.utime(path, (0, 0))

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import InputError
-from ...files import read_bytes, whole
+from ...files import atomic_write, read_bytes
 from .protocol import read_json, write_json
 
 SEAL, TRUTH, ANSWERS = "seal.json", "truth.json", "answers.json"
@@ -23,7 +23,7 @@ SEAL, TRUTH, ANSWERS = "seal.json", "truth.json", "answers.json"
 def seal(folder: Path, sealed: Path, content: dict[str, Any]) -> str:
     """Write the truth to ``sealed`` and its sha256 to ``folder``; returns the sha256."""
     text = json.dumps({"nonce": secrets.token_hex(32), **content}, indent=1, allow_nan=False)
-    with whole(sealed / TRUTH) as partial:
+    with atomic_write(sealed / TRUTH) as partial:
         partial.write_text(text + "\n", encoding="utf-8")
     mark = _sha256(sealed / TRUTH)
     write_json(folder / SEAL, {"sha256": mark})

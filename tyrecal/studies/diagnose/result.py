@@ -43,7 +43,7 @@ class EffectSize(ResultPart):
     unit: str
 
 
-class Explained(ResultPart):
+class EffectEstimate(ResultPart):
     """The size of the effect that a diagnosis names or likes best."""
 
     effect: str
@@ -154,7 +154,7 @@ class DiagnosisResult(Result):
     verdict: VerdictKind
     words: str
     effect: str | None
-    parameter: Explained | None
+    parameter: EffectEstimate | None
     parameters: dict[str, EffectSize] = Field(default={})  # of every effect of several
     also: list[Further] = Field(default=[])  # perhaps there too
     constants: list[ConstantShift] = Field(default=[])
@@ -301,7 +301,7 @@ def _under_load(comparison: UnderLoad | None) -> UnderLoadPart | None:
     )
 
 
-def _explained(diagnosis: Diagnosis, key: str | None) -> Explained | None:
+def _explained(diagnosis: Diagnosis, key: str | None) -> EffectEstimate | None:
     """``detectability``: lambda of all that ``key`` names, at its likeliest size."""
     if key is None:
         return None
@@ -310,7 +310,7 @@ def _explained(diagnosis: Diagnosis, key: str | None) -> Explained | None:
     shift = diagnosis.bare.added(effects, 1)[0][0] - diagnosis.bare.added({}, 1)[0][0]
     P, _, _ = projection(diagnosis.bare, hypothesis.fitted.d[hypothesis.best])
     size = {**diagnosis.parameter(key), "lambda": float(shift @ P @ shift)}
-    return Explained(effect=key.split("+")[0], **size)
+    return EffectEstimate(effect=key.split("+")[0], **size)
 
 
 def _listed(probabilities: Mapping[str, float]) -> dict[str, float]:

@@ -21,7 +21,7 @@ CARCASS_CORD = CordMaterial(9.87e9, 0.3, 1500.0, bears_compression=False)
 
 
 @dataclass(frozen=True)
-class MadeOf:
+class ConstructionParts:
     """Parts of a case by its keys; ``notes``: words beside a material; ``variables``: paths that
     each sets, start and bounds; ``modes_at_Hz``: where the rubber's modulus of the modes is taken,
     None as in the static step."""
@@ -35,7 +35,7 @@ class MadeOf:
     modes_at_Hz: float | None = None
 
 
-def one_rubber(section: Section, carcass_plies: int = 1) -> MadeOf:
+def one_rubber(section: Section, carcass_plies: int = 1) -> ConstructionParts:
     """A section of which only the lines are known, of the materials of Bekakos et al. (2016).
 
     Lines from the crown to the bead become the carcass (each of ``carcass_plies`` layers), lines
@@ -65,10 +65,10 @@ def one_rubber(section: Section, carcass_plies: int = 1) -> MadeOf:
         **({"belt_cord": _cord(BELT_CORD)} if belts else {}),
         "carcass_cord": _cord(CARCASS_CORD),
     }
-    return MadeOf(materials, [{"material": "rubber"}], layers, variables)
+    return ConstructionParts(materials, [{"material": "rubber"}], layers, variables)
 
 
-def constructed(made: Construction, section: Section) -> MadeOf:
+def constructed(made: Construction, section: Section) -> ConstructionParts:
     """A section with the lines and regions that `from_size` gives one of this type of tyre."""
     regions = [name for name, _ in section.regions]
     belted = regions[: regions.index("upper_sidewall")]
@@ -104,7 +104,7 @@ def constructed(made: Construction, section: Section) -> MadeOf:
         layers["cap_ply"] = _layer(CAP, made.cap)
     layers["bead_wire"] = _bead_wire(made, section)
     compounds = made.compounds
-    return MadeOf(
+    return ConstructionParts(
         materials={
             **{name: _rubber(compound) for name, compound in compounds.items()},
             **{name: _cord(cord) for name, cord in made.cords.items()},

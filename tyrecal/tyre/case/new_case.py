@@ -19,7 +19,7 @@ from ..section.from_size import BELOW, build, construction, usual
 from ..section.section import Section, SectionError
 from ..section.size import TyreSize
 from .case_text import new_case
-from .made_of import MadeOf, constructed, one_rubber
+from .made_of import ConstructionParts, constructed, one_rubber
 from .parts import Outline, SectionSource
 from .stations import read_section_of
 
@@ -123,7 +123,7 @@ def _place_named(file: Path) -> Iterator[None]:
         raise InputError(f"{file}{line}: {error}") from None
 
 
-def _made_of(section: Section, size: TyreSize | None) -> MadeOf:
+def _made_of(section: Section, size: TyreSize | None) -> ConstructionParts:
     """Compounds where the lines and regions are those that a size gives, else one rubber."""
     regions = {name for name, _ in section.regions}
     for made in [construction(size)] if size else [PASSENGER, TRUCK]:
