@@ -1,4 +1,4 @@
-"""A user's own decks in three dimensions: what is said of them beside their texts."""
+"""A user's own decks in three dimensions: the data about them that go with their texts."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ OWN_DECKS_FILE = "own_decks.json"
 
 @dataclass(frozen=True)
 class OwnDecks:
-    """jobs: each with the one that it goes on from, or ""; modes: asked of the last one, None where
-    a range of frequencies decides; length_m, mass_kg: the decks' units; mass_sets: element sets
-    that have a mass."""
+    """Own decks of a run. jobs: each with the one that it continues, or ""; modes: requested of the
+    last one, None where a range of frequencies decides; length_m, mass_kg: the decks' units;
+    mass_sets: element sets that have a mass."""
 
     jobs: list[tuple[str, str]]
     modes: int | None
@@ -31,7 +31,7 @@ class OwnDecks:
 
 
 def save(request: Mapping[str, Any], folder: Path) -> list[Path]:
-    """Write what a request says of own decks into a run folder; nothing where it is of none."""
+    """Write a request's data about own decks into a run folder; nothing where it has none."""
     if "own_decks" not in request:
         return []
     path = folder / OWN_DECKS_FILE

@@ -20,7 +20,7 @@ NO_EQUILIBRIUM = re.compile(r"increment size smaller|too many cutbacks|max\. # o
 def run_job(
     folder: Path, job: str, inputs: Sequence[str], command: Sequence[str], time_limit_s: float
 ) -> None:
-    """Run ``job``.inp of ``folder`` to its end; the results and ``job``.log stand beside it.
+    """Run ``job``.inp of ``folder`` to its end; the results and ``job``.log are next to it.
 
     ``inputs``: other files that it reads. One thread: two are slower, and results of one are
     the same to the last bit. Where ccx could not cope with the folder's path it runs elsewhere.

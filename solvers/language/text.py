@@ -23,7 +23,7 @@ COMPLEX_STEP = 1e-30  # so small that its square vanishes against every real par
 
 
 class Place(NamedTuple):
-    """A line (from 1) of a file; a subclass says which error a mistake there is."""
+    """A line (from 1) of a file; a subclass chooses the error that a mistake there raises."""
 
     file: str
     line: int
@@ -224,7 +224,8 @@ class Reader:
             yield start, pending
 
     def _is_short_element(self, line: str) -> bool:
-        """Whether an element's data line ends before its last node; its last comma says nothing."""
+        """Whether an element's data line ends before its last node; a comma at its end does not
+        count."""
         if not self.blocks or self.blocks[-1].name != "ELEMENT":
             return False
         nodes, _ = NODES_AND_SECTION.get(self.blocks[-1].get("TYPE"), (0, ""))
