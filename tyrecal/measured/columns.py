@@ -77,7 +77,7 @@ def is_unit(text: str) -> bool:
 def read_columns(
     headings: Sequence[str], place: str, pressure_kPa: float | None
 ) -> dict[str, TableColumn]:
-    """Columns by meaning, of those that have one; ``pressure_kPa``: where none says it.
+    """Columns by meaning, of those that have one; ``pressure_kPa``: where none gives it.
 
     Raises InputError at ``place``.
     """

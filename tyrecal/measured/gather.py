@@ -126,7 +126,7 @@ def _without_labels(
 
 
 def _refuse_unlabelled_repeats(values: Sequence[Measurement]) -> None:
-    """Raises InputError where frequencies without labels come from several runs: nothing says
+    """Raises InputError where frequencies without labels come from several runs: nothing shows
     which of them repeat each other."""
     runs: dict[TyreState, Measurement] = {}
     for each in values:

@@ -1,4 +1,4 @@
-"""Labels [c, m] of measured shapes: the probability of each label on the sensors at hand.
+"""Labels [c, m] of measured shapes: the probability of each label on the given sensors.
 
 The signals u (k,) of a mode are normal about 0,
 

@@ -51,7 +51,7 @@ class Line:
         return value * self.columns[meaning].factor
 
     def measurements(self, pressure_kPa: float, run: str) -> Iterator[Measurement]:
-        """One for each quantity; ``pressure_kPa`` where the line does not say it."""
+        """One for each quantity; ``pressure_kPa`` where the line does not give it."""
         pressure, load = self.number("pressure", pressure_kPa), self.number("load", 0.0)
         if load < 0:
             raise ValueError(f"load is {load:g}, must be at least 0")
@@ -97,7 +97,7 @@ class Line:
         return [quantity]
 
     def _rim(self) -> RimSupport | None:
-        """As the case has it where no column says it; fixed where its cell is empty."""
+        """Rim of the line: the case's where no column gives it; fixed where its cell is empty."""
         word = self.cell("rim").strip().lower() or RIMS[0]
         if "rim" not in self.columns or word == AS_CASE:
             return None

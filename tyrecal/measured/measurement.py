@@ -49,7 +49,7 @@ class Measurement:
 
     @property
     def is_unlabelled(self) -> bool:
-        """It is a frequency whose mode nobody told."""
+        """Whether it is a frequency whose mode is not given."""
         return self.quantity == "frequency_Hz" and self.label is None
 
     @property

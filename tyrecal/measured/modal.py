@@ -143,7 +143,7 @@ _ASK = "give --directions cartesian (along x, y, z) or cylindrical (radial, tang
 
 
 def _readings(signals: Sequence[Signal], geometry: Geometry, layout: Layout) -> dict[str, Labeller]:
-    """Judges of the signals by what the directions can mean: first what the user says, or else the
+    """Judges of the signals by what the directions can mean: first what the user gives, or else the
     file or the format. Where two meanings put the sensors in the same directions, one judge has
     both."""
     names = ["stated", "cartesian"] if geometry.axes else ["cartesian", "cylindrical"]

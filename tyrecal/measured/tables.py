@@ -185,7 +185,7 @@ def _move_unit(headings: list[str], rows: list[list[str]], column: int) -> None:
 
 
 def is_gap(cell: str) -> bool:
-    """Whether a cell says that nothing was measured."""
+    """Whether a cell marks a value that was not measured."""
     return cell.lower() in GAPS
 
 
