@@ -140,7 +140,7 @@ def _typed(document: Document, data: dict[str, Any]) -> Case | None:
 
 
 def _add(document: Document, mistakes: Iterable[tuple[Keys, str]]) -> None:
-    """Record what is found at keys of which nothing has been said yet."""
+    """Record mistakes at keys that have none yet."""
     reported = {mistake.key for mistake in document.mistakes}
     for keys, message in mistakes:
         if dotted(keys) not in reported:

@@ -1,4 +1,4 @@
-"""Numbers of a case that no tyre has, told before they are computed with: most are slips of unit.
+"""Implausible numbers of a case, reported before they are computed with: most are slips of unit.
 
 Usual values of what a user states reach from passenger cars' tyres to trucks'; a number outside its
 range stands most often in another unit. The ranges are wide: they hold what is built and tested,
@@ -324,7 +324,7 @@ def _value(data: Mapping[str, Any], keys: Keys) -> Any:
 
 
 def _keys(data: Mapping[str, Any], path: str) -> Keys:
-    """Where a path leads; nowhere where it is wrong, which is told elsewhere."""
+    """Keys to which a path leads; none where it is wrong, which is reported elsewhere."""
     effects = {**dict.fromkeys(IDS, 0.0), **table(data, "effects")}
     try:
         return find({**data, "effects": effects}, path)

@@ -54,7 +54,7 @@ def with_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
 
 
 def set_values(loaded: LoadedCase, values: Mapping[str, float]) -> LoadedCase:
-    """`with_values` of who resolves the case next: that its effects can be is not asked here."""
+    """Like `with_values`, without checking that the effects can be applied."""
     targets: dict[Keys, float] = {}
     tree: dict[Any, Any] = {}
     for name, value in values.items():

@@ -51,7 +51,7 @@ class Document:
 
 
 def read_document(path: Path) -> Document:
-    """Read a YAML file that holds a mapping; whatever is wrong stands in its mistakes."""
+    """Read a YAML file that holds a mapping; every fault is among its mistakes."""
     document = Document(str(path))
     text = _text(path, document)
     if text is None:
@@ -82,8 +82,8 @@ def _yaml() -> YAML:
 
 @lru_cache(maxsize=32)
 def _compose(text: str) -> Node | None:
-    """The nodes of a text, which nobody may change. Composing takes two thirds of the time to load
-    a case, and one command loads the same text several times. Raises YAMLError."""
+    """The nodes of a text, which must not be changed. Composing takes two thirds of the time to
+    load a case, and one command loads the same text several times. Raises YAMLError."""
     return _yaml().compose(text)
 
 

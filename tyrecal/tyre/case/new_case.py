@@ -31,7 +31,7 @@ MAX_USUAL_LOAD_N = 6e4  # usual on the road
 
 @dataclass(frozen=True)
 class Draft:
-    """A case's text and the file that its section is in: name beside the case, and content."""
+    """A case's text and the file that its section is in: name next to the case, and content."""
 
     text: str
     file: str

@@ -1,4 +1,4 @@
-"""The case of a user's deck, ready to be written beside it."""
+"""The case of a user's deck, ready to be written next to it."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def own_decks_case(
     pressure_kPa: float | None,
     numbers: Mapping[str, float] = NO_NUMBERS,
 ) -> str:
-    """The same of decks in three dimensions. Raises InputError where they do not tell the crown or
+    """The same for decks in three dimensions. Raises InputError where they do not give the crown or
     the pressure."""
     if decks.crown.rpartition(".")[2] not in decks.node_sets:
         known = ", ".join(decks.node_sets)

@@ -254,7 +254,7 @@ class Targets(Part):
 
 
 class Uncertainty(Part):
-    """A source of error: numbers nobody calibrates, all off together by a standard deviation.
+    """A source of error: uncalibrated numbers, all off together by a standard deviation.
 
     ``percent`` of each number or ``absolute``, in its unit; ``signs``: -1 for those that fall
     where the others rise.

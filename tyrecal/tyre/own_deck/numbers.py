@@ -251,7 +251,7 @@ def as_known(path: Any, known: Iterable[str]) -> Any:
 
 
 def canonical(path: str, known: Iterable[str]) -> str | None:
-    """The path of ``known`` that is meant, whatever the case and blanks."""
+    """The path of ``known`` that is meant, ignoring case and blanks."""
     wanted = _key(path)
     return next((each for each in known if _key(each) == wanted), None)
 

@@ -51,7 +51,7 @@ class OwnDeck:
 
     @cached_property
     def _marked(self) -> set[int]:
-        """Places of the blocks whose numbers hang on marks or parameters."""
+        """Places of the blocks whose numbers depend on marks or parameters."""
         return {k for k, block in enumerate(self.blocks) if numbers_of.is_marked(block)}
 
     @cached_property
@@ -66,7 +66,7 @@ class OwnDeck:
 
     @cached_property
     def sha256(self) -> str:
-        """Hash of all that it says but its plain numbers, however it is indented or commented."""
+        """Hash of all its content except plain numbers, independent of indentation and comments."""
         numbers = set(self.places.values())
         parts = []
         for k, block in enumerate(self.blocks):
@@ -99,7 +99,7 @@ class OwnDeck:
         return result
 
     def _same(self, place: int, block: Block) -> Block:
-        """A block, or the one that was there last where it says the same."""
+        """A block, or the one that was there last where it has the same content."""
         last = self._filled.get(place, block)
         rows = [[row.fields for row in each.rows] for each in (block, last)]
         if last.parameters != block.parameters or rows[0] != rows[1]:
@@ -126,8 +126,8 @@ class OwnDeck:
 
 
 def read_own_deck(path: Path, units: Units | None = None) -> OwnDeck:
-    """The deck, its units told by its densities where they are not given. Raises OwnDeckError,
-    OSError."""
+    """The deck, with units derived from its densities where they are not given. Raises
+    OwnDeckError, OSError."""
     blocks, texts = read_blocks(path)
     if not blocks:
         raise OwnDeckError(Place(path.name, 1), "there is no keyword in it")
@@ -135,7 +135,8 @@ def read_own_deck(path: Path, units: Units | None = None) -> OwnDeck:
 
 
 def recognised(blocks: Sequence[Block]) -> Units:
-    """The units that the densities are in. Raises OwnDeckError where these do not tell."""
+    """The units that the densities are in. Raises OwnDeckError where these do not determine
+    them."""
     rows = [(b, row) for b in blocks if b.name == "DENSITY" for row in b.rows[:1]]
     values = []
     for block, row in rows:

@@ -70,7 +70,7 @@ class OwnDecks:
 
     @cached_property
     def sha256(self) -> str:
-        """Hash of all that they say but plain numbers, and of the set that is the crown."""
+        """Hash of all their content except plain numbers, and of the set that is the crown."""
         parts = [*(deck.sha256 for deck in self.decks), self.crown]
         return sha256("\n".join(parts).encode()).hexdigest()
 
@@ -118,7 +118,7 @@ class OwnDecks:
 
     @cached_property
     def modes(self) -> int | None:
-        """How many are asked for; None where a range of frequencies decides."""
+        """Number of modes that are requested; None where a range of frequencies decides."""
         row = next(b for b in self.modes_step if b.name == "FREQUENCY").only_row()
         return None if row.text(1) or row.text(2) or not row.text(0) else row.integer(0)
 

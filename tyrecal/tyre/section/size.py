@@ -247,7 +247,7 @@ def _with_service(size: TyreSize, service: str) -> TyreSize:
 
 
 def _check_build(name: str, build: str) -> None:
-    """Radial, whatever speed symbol stands before the R."""
+    """Check that the build is radial, with any speed symbol before the R."""
     if build in ("D", "-", "B"):
         raise InputError(f"'{name}' is a bias-ply tyre: only radial ones (R) can be built")
     if build.endswith("RF"):
