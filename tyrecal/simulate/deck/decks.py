@@ -48,7 +48,8 @@ class Design(Protocol):
 
     @property
     def request(self) -> dict[str, Any]:
-        """``highest_harmonic`` and ``modes_per_harmonic`` that it wants, what decks cannot say."""
+        """``highest_harmonic`` and ``modes_per_harmonic`` that it wants, and requests that decks
+        cannot express."""
 
     @property
     def needs(self) -> dict[str, str]:
@@ -104,7 +105,7 @@ class PressedTyre:
 
 
 class Decks:
-    """Texts of a design's decks, written when asked for: what a solver's adapter is given."""
+    """Texts of a design's decks, written on request: the input of a solver's adapter."""
 
     def __init__(
         self,
@@ -231,7 +232,7 @@ def header(case: LoadedCase) -> str:
 
 
 def refuse_outside(file: str, text: str) -> None:
-    """Raises TemplateFailed where a deck of somebody's own templates would have the solver read or
+    """Raises TemplateFailed where a deck of a user's own templates would have the solver read or
     write elsewhere than in its run folder, compile a program or load a library."""
     for match in LEADS_OUTSIDE.finditer(text):
         line = text.count("\n", 0, match.start()) + 1
@@ -241,5 +242,5 @@ def refuse_outside(file: str, text: str) -> None:
 
 
 def without_header(text: bytes) -> bytes:
-    """A file of a run, a deck without what it is called: what the solver is asked."""
+    """A file of a run, a deck without its name: the part that determines the solver's answer."""
     return text.split(b"\n", HEADER_LINES)[-1] if text.startswith(FIRST) else text

@@ -147,8 +147,8 @@ def added_words(decks: OwnDecks, dialect: str) -> str:
 
 
 def _abaqus(decks: OwnDecks) -> Added:
-    """Eigenvalues beside the shapes, and the file that holds them as text: once in an analysis,
-    "and the format cannot be changed upon restart" (manual, *FILE FORMAT)."""
+    """Eigenvalues in addition to the shapes, and the file that holds them as text: once in an
+    analysis, "and the format cannot be changed upon restart" (manual, *FILE FORMAT)."""
     blocks = [block for deck in decks.restarted for block in deck.blocks]
     formats = [block for block in blocks if block.name == "FILE FORMAT"]
     if formats and "ASCII" not in formats[0].parameters:

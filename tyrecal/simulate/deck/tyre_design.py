@@ -82,7 +82,7 @@ class TyreDesign:
 
     @property
     def request(self) -> dict[str, Any]:
-        """The case's ``analysis``, and what no deck of keywords says."""
+        """The case's ``analysis``, and requests that no deck of keywords holds."""
         analysis = self.case.case.analysis
         return {
             "highest_harmonic": analysis.highest_harmonic,

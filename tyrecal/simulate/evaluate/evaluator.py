@@ -65,7 +65,7 @@ class Counts:
 
 
 def _unwatched(done: int, total: int) -> None:
-    """Nobody wants to know."""
+    """Ignore progress."""
 
 
 @dataclass
@@ -125,9 +125,9 @@ class Evaluator:
         return result
 
     def _start_of(self, design: Design) -> Array | None:
-        """Where a design's inflation starts: at the inflated shape of its nominal one, which is
-        asked for first, so that the answer hangs on no other question. None: at rest, as for that
-        one itself, and for all where it does not inflate."""
+        """Inflated shape from which a design's inflation starts: that of its nominal design, which
+        is evaluated first, so that the answer depends on no other question. None: at rest, as for
+        the nominal design itself, and for all where it does not inflate."""
         nominal = None if design.is_nominal else design.nominal
         return self._inflated(nominal) if nominal else None
 

@@ -108,7 +108,7 @@ def warm_up() -> None:
 
 
 def process_pool(jobs: int) -> Pool:
-    """``jobs`` worker processes, which end when the process that asked for them is killed."""
+    """``jobs`` worker processes, which end when their parent process is killed."""
     with defer_interrupts():  # half made, it would leave semaphores behind
         warm_up()
         with _deaf_children():

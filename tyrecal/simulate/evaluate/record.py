@@ -29,7 +29,7 @@ class Damaged(InputError):
 def pack(key: str, about: dict[str, Any], content: Any) -> bytes:
     """``content``, the answer to the question ``key``: dicts with text keys, lists, text, finite
     numbers, None and arrays, all kept to the last bit (tuples become lists, arrays of no dimension
-    numbers). ``about``: plain JSON, for whoever lists records.
+    numbers). ``about``: plain JSON, for lists of records.
 
     Raises TypeError for anything else, ValueError for a number that is not finite or more text or
     arrays than `unpack` reads.

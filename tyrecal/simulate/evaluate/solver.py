@@ -65,7 +65,7 @@ class Solver(Protocol):
 
 def find_solver(name: str, command: Sequence[str] = ()) -> Solver:
     """The installed solver of that name, with the program that the user has set, or ``command``;
-    whether it is there, `refuse_missing_program` says. Raises InputError."""
+    `refuse_missing_program` checks that it is there. Raises InputError."""
     entries = {entry.name: entry for entry in entry_points(group=GROUP)}
     if name not in entries:
         raise InputError(f"solver '{name}' is not installed{suggestion(name, sorted(entries))}")

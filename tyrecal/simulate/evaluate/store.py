@@ -1,4 +1,4 @@
-"""The record of evaluations: a folder of files named by what was asked of which solver.
+"""The evaluation store: a folder of files named by the question and the solver.
 
 A key is the hash of every file that was written for a run (names and contents, but for the comment
 that a deck begins with), of the solver's name and version, of the program that it starts, and of
@@ -194,7 +194,7 @@ class Store:
                     yield path, path.lstat()
 
     def set_aside(self, path: Path, why: str) -> None:
-        """Have a record be absent, and say why."""
+        """Set a record aside, so that it counts as absent, and report why."""
         log.warning("record '%s' is damaged and not used: %s", path, why)
         with contextlib.suppress(OSError):
             path.replace(path.with_suffix(".damaged"))

@@ -1,4 +1,4 @@
-"""Labelled modes of designs: more are asked for where a wanted label is not among them."""
+"""Labelled modes of designs; more modes are computed where a wanted label is not among them."""
 
 from __future__ import annotations
 

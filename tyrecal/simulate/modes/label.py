@@ -72,7 +72,7 @@ class Label:
 
     @property
     def said(self) -> str:
-        """As people say it; files and options have the label itself: ``axial`` is lateral."""
+        """Name for people; files and options have the label itself: ``axial`` is lateral."""
         return str(self).replace("axial", "lateral")
 
     @property
