@@ -177,7 +177,7 @@ def _robust(d: Diagnosis) -> str:
 
 
 def _constants(d: Diagnosis) -> Iterator[str]:
-    """Constants that the data move, told and not named."""
+    """Constants that the data move, reported and not named."""
     moved = [each for each in constants_posterior(d) if abs(each.shift_in_sd) >= 1]
     if moved:
         names = ", ".join(f"{e.name.replace('_', ' ')} {e.shift_in_sd:+.1f}" for e in moved[:SHOWN])

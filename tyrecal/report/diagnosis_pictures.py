@@ -138,7 +138,7 @@ def draw_probabilities(d: Diagnosis) -> Figure:
 
 @in_house_style
 def draw_held_out(d: Diagnosis) -> Figure:
-    """The error on held-out data without and, where there is a gap, with the effect, beside the
+    """The error on held-out data without and, where there is a gap, with the effect, next to the
     noise floor and what chance does."""
     s = d.shrinkage
     assert s is not None

@@ -112,8 +112,9 @@ def save(figure: Figure, path: Path) -> None:
 
 @in_house_style
 def svg(figure: Figure, words: str, key: str) -> Markup:
-    """The figure as part of a page, told in ``words`` to who does not see it. The same figure gives
-    the same text; ``key``: what its ids begin with, another one for each figure of a page."""
+    """The figure as part of a page, described in ``words`` for readers who do not see it. The same
+    figure gives the same text; ``key``: what its ids begin with, another one for each figure of a
+    page."""
     use_plain_numbers(figure)
     file = io.StringIO()
     nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))

@@ -53,7 +53,7 @@ def measured_table(runs: Sequence[ModalTest]) -> Table:
 
 
 def sensors_words(alike_labels: Mapping[Label, Sequence[Label]]) -> str:
-    """Which labels sensors tell apart, and which look like others: a line for each c."""
+    """Labels that sensors distinguish, and those that look like others: a line for each c."""
     lines = []
     for c in sorted({label.c for label in alike_labels}):
         mine = {label: alike for label, alike in alike_labels.items() if label.c == c}

@@ -21,8 +21,8 @@ def figures(result: SampleResult) -> dict[str, Figure]:
 
 @in_house_style
 def draw_corner(result: SampleResult) -> Figure:
-    """Corner picture: on the diagonal the shares of the draws with median, 90 % and, dashed, what
-    the linear standard errors say; below it each pair, darker where more draws lie."""
+    """Corner picture: on the diagonal the shares of the draws with median, 90 % and, dashed, the
+    linear standard errors; below it each pair, darker where more draws lie."""
     names, n = list(result.variables), len(result.variables)
     figure = new_figure(1.2 + 2.4 * n, 1.0 + 2.2 * n)
     grid = figure.subplots(n, n, squeeze=False)

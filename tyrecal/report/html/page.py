@@ -202,7 +202,7 @@ def _pictures(results: Results, result: Result, draw: Draw) -> Iterator[Markup]:
 def _picture(
     results: Results, prefix: str, name: str, words: str, file: str, draw: Callable[[], Figure]
 ) -> Markup:
-    """A figure of what stands in ``file``, told in words. Raises InputError."""
+    """A figure of the contents of ``file``, described in words. Raises InputError."""
     with _lists_of(results.folder / file):
         return svg(draw(), words, f"{prefix}{name}")
 
