@@ -54,7 +54,7 @@ def load(
 
 
 def refuse_unusual(loaded: Any, option: str, name: str, value: float, allowed: bool) -> None:
-    """Raises click.UsageError where nobody states such a value of the variable, or number by its
+    """Raises click.UsageError where no tyre has such a value of the variable, or number by its
     path, ``name``, unless it is ``allowed``. option: where it is stated."""
     from ..tyre.values import unusual_value
 
@@ -119,7 +119,7 @@ def parse_pressures(low: float, high: float, steps: int, allowed: bool) -> tuple
 
 
 def fitted_values(path: Path, loaded: Any, terminal: Terminal) -> dict[str, float]:
-    """The design of a fit.json, or of the one in a results folder; says how the fit was made
+    """The design of a fit.json, or of the one in a results folder; reports how the fit was made
     otherwise. Raises click.UsageError where it is not this case's."""
     from ..errors import InputError
     from ..studies.fitted import read_fitted

@@ -193,7 +193,7 @@ def _names(cases: Sequence[Path]) -> list[str]:
 
 
 def _studies(text: str) -> tuple[str, ...]:
-    """The studies asked for, in the order in which they are done. Raises click.UsageError."""
+    """The requested studies, in the order in which they are done. Raises click.UsageError."""
     names = [word.strip() for word in text.split(",")]
     for word in names:
         arguments.refuse_unknown("--studies", word, STUDY_NAMES, "study")

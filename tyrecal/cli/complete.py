@@ -18,7 +18,7 @@ MAX_DEPTH = 3  # folders below the one typed in which cases are looked for
 
 
 def cases(ctx: click.Context, param: click.Parameter, incomplete: str) -> Items:
-    """Case files, those in folders below too; without any, what the shell says."""
+    """Case files, those in folders below too; without any, the shell's own completion."""
     start = Path(incomplete).parent
     paths = [str(path) for path in _yaml(start, MAX_DEPTH) if str(path).startswith(incomplete)]
     if not paths or len(paths) > MAX_CASES:
@@ -85,7 +85,7 @@ def _yaml(folder: Path, depth: int) -> Iterator[Path]:
 
 
 def _case() -> dict[str, Any]:
-    """The case on the command line as plain data, judged by nobody."""
+    """The case on the command line as plain data, unchecked."""
     from ..tyre.case.document import read_document
 
     for word in split_arg_string(os.environ.get("COMP_WORDS", "")):

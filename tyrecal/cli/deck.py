@@ -108,8 +108,8 @@ def command(
 
 
 def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Terminal) -> int:
-    """Say what a user's deck holds, which of its numbers have paths, and what is wrong with it for
-    the bundled solver and for ABAQUS, and what CalculiX has nothing for."""
+    """Print what a user's deck holds, which of its numbers have paths, what is wrong with it for
+    the bundled solver and for ABAQUS, and what CalculiX lacks."""
     from ..simulate.deck.own import asked_by_abaqus, lacking_in_calculix, trial
     from ..tyre.own_deck.found import contents, words
     from ..tyre.own_deck.own_deck import read_own_deck
@@ -171,8 +171,8 @@ def _say_what_solvers_take(
 
 
 def known_of_decks(loaded: LoadedCase, decks: OwnDecks, terminal: Terminal) -> dict[str, Any]:
-    """Say what is known of decks in three dimensions, what is added to them, what ABAQUS refuses of
-    them by its manual, and what CalculiX has nothing for; the same as data."""
+    """Print what is known of decks in three dimensions, what is added to them, what ABAQUS refuses
+    of them by its manual, and what CalculiX lacks; returns the same as data."""
     from ..simulate.deck.decks_design import OUTPUT, added_words
     from ..simulate.deck.own import asked_by_abaqus, lacking_in_calculix
 

@@ -272,8 +272,8 @@ def _from_deck(
     allow_unusual: bool,
     terminal: Terminal,
 ) -> None:
-    """Write the case of a deck beside it, say what is in the deck, and draw it; ``suffix``: of the
-    picture, "" for none."""
+    """Write the case of a deck next to it, print what is in the deck, and draw it; ``suffix``: of
+    the picture, "" for none."""
     from ..files import atomic_write
     from ..simulate.deck.own import trial
     from ..tyre.case.own_case import own_case
@@ -308,7 +308,7 @@ def _from_decks(
     force: bool,
     terminal: Terminal,
 ) -> None:
-    """Write the case of decks in three dimensions beside them, and say what is known of them."""
+    """Write the case of decks in three dimensions next to them, and print what is known of them."""
     from ..files import atomic_write
     from ..tyre.case.own_case import own_decks_case
     from ..tyre.load import load_case

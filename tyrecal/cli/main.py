@@ -57,7 +57,7 @@ EXIT_CODES = {
 
 
 class Interrupted(TyrecalError):
-    """A signal ended the command; the words say which, and how to go on."""
+    """A signal ended the command; the words name it, and how to continue."""
 
     def __init__(self, how_to_go_on: str = ""):
         number = pending_interrupt() or signal.SIGINT
@@ -213,7 +213,7 @@ def _mistake(wrong: click.ClickException) -> str:
 
 
 def _exit_code(failure: Exception) -> int | None:
-    """Exit code of a failure that is somebody's, None for a bug of ours."""
+    """Exit code of a failure with a known cause, None for a bug of ours."""
     if isinstance(failure, TyrecalError):
         return failure.exit_code
     return EXIT_INPUT if isinstance(failure, OSError) else None

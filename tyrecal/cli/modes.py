@@ -125,7 +125,7 @@ def command(
 
 
 def wanted_loads(load_N: float | None, sweep: str | None) -> list[float]:
-    """The loads asked for, N; empty: the unloaded tyre alone. Raises click.UsageError."""
+    """The requested loads, N; empty: the unloaded tyre alone. Raises click.UsageError."""
     if load_N is not None and sweep is not None:
         raise click.UsageError("give --load-N or --sweep-load, not both")
     if sweep is not None:

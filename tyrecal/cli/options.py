@@ -277,13 +277,13 @@ class Study:
     def load(
         self, path: Path, assigned: tuple[str, ...] = (), pressure_kPa: float | None = None
     ) -> Any:
-        """`arguments.load`, at the mesh level asked for."""
+        """`arguments.load`, at the requested mesh level."""
         return arguments.load(
             path, self.mesh, assigned, pressure_kPa, self.terminal, self.allow_unusual
         )
 
     def evaluator(self, loaded: Any) -> Evaluator:
-        """The evaluator with the solver asked for. Raises InputError."""
+        """The evaluator with the requested solver. Raises InputError."""
         from ..simulate.deck.decks_design import added_words, design_of
         from ..simulate.evaluate.evaluator import Evaluator
 
@@ -322,7 +322,7 @@ class Study:
         return run
 
     def _say_earlier(self, run: Run) -> None:
-        """Say whose results are in the folder after a run that failed."""
+        """Report whose results are in the folder after a run that failed."""
         if run.has_earlier:
             self.terminal.note(
                 f"results of '{run.study}' in '{run.folder}' are those of an earlier run"
@@ -346,7 +346,7 @@ class Study:
             self.terminal.detail(words)
 
     def present(self, run: Run, result: Result, figures: Mapping[str, Figure]) -> int:
-        """Write a result with its figures by name, say what was found, and give the exit code."""
+        """Write a result with its figures by name, print its findings, and return the exit code."""
         from ..report.table import shown
         from .main import EXIT_SOLVER
 
@@ -364,7 +364,7 @@ class Study:
         return EXIT_SOLVER if lost else 0
 
     def finish(self, run: Run) -> None:
-        """Say where the results are; see `page`."""
+        """Print where the results are; see `page`."""
         self.terminal.say(f"results in {run.placed}")
         self.page(run)
 
@@ -423,7 +423,7 @@ def say_idle(terminal: Terminal, jobs: int, why: str) -> None:
 
 
 def _by_settings(option: str) -> bool:
-    """Whether nobody gave an option but the user's settings."""
+    """Whether an option was set by the user's settings alone."""
     source = click.get_current_context().get_parameter_source(option)
     return source is ParameterSource.DEFAULT_MAP
 
@@ -438,6 +438,6 @@ def _words(command: str | None) -> tuple[str, ...]:
 
 
 def not_both(jobs: int, scheduler: str) -> None:
-    """Raises click.UsageError where this machine and a scheduler's are asked for."""
+    """Raises click.UsageError where this machine and a scheduler's are both requested."""
     if scheduler and jobs > 1 and not _by_settings("jobs"):
         raise click.UsageError("--jobs is for this machine; with --scheduler its workers count")

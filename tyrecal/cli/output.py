@@ -161,7 +161,7 @@ class Run:
         click.get_current_context().call_on_close(self._say_unfinished)
 
     def open_store(self, folder: Path | None, none: bool) -> Store | None:
-        """The record of evaluations: in ``folder``, or beside the results, or ``none``."""
+        """The evaluation store: in ``folder``, or next to the results, or ``none``."""
         words = "with --no-store nothing is on record; the same command starts from the beginning"
         if not none:
             from ..simulate.evaluate.store import Store

@@ -72,7 +72,7 @@ def settings_words(entry: dict[str, Any]) -> str:
 
 
 def command_words(solver: dict[str, Any]) -> str:
-    """The program that a solver of `installed` starts, and who says so."""
+    """The program that a solver of `installed` starts, and where it was set."""
     from ..simulate.program import join_command
 
     if not solver["command"]:

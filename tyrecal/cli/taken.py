@@ -22,8 +22,8 @@ def default_case(
     case: Path | None, fitted: Path | None, study: Study
 ) -> tuple[Path, Path | None, Study]:
     """Case, fit.json to compare with and study: as given, else what lies in this folder, which is
-    said; results go to the fit's folder. Raises click.UsageError where nothing, or too much, does.
-    """
+    reported; results go to the fit's folder. Raises click.UsageError where nothing, or too much,
+    does."""
     if case is not None:
         return case, fitted, study
     folder = fitted if fitted is None or fitted.is_dir() else fitted.parent

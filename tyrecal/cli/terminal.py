@@ -21,7 +21,7 @@ RESUME = "tyrecal.resume"  # key of the context's notes: how to go on after Ctrl
 
 
 def coloured() -> bool | None:
-    """False where nobody wants colours (https://no-color.org), None: on terminals only."""
+    """False where colours are disabled (https://no-color.org), None: on terminals only."""
     unwanted = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
     return False if unwanted else None
 
@@ -45,7 +45,7 @@ def say(text: str, err: bool = False, **how: Any) -> None:
 @contextmanager
 def _reaching(err: bool) -> Iterator[None]:
     """A reader that has closed the pipe (`| head`) misses the rest, and costs no result. Where
-    standard error is full, or its terminal gone, nobody can be told."""
+    standard error is full, or its terminal gone, no message is possible."""
     try:
         yield
     except OSError as error:
@@ -57,7 +57,7 @@ def _reaching(err: bool) -> Iterator[None]:
 
 
 def resume(words: str) -> None:
-    """Have Ctrl-C say how to go on."""
+    """Have Ctrl-C print how to continue."""
     click.get_current_context().meta[RESUME] = words
 
 
@@ -171,7 +171,7 @@ def _listening(progress: Progress) -> Iterator[Progress]:
 
 
 class Progress:
-    """How far the work is: on a ``bar``, or by lines that ``say`` gets; else does nothing."""
+    """Progress of the work: on a ``bar``, or by lines that ``say`` gets; else does nothing."""
 
     def __init__(
         self, what: str, stages: Sequence[str] = (), say: Callable[[str], None] | None = None
