@@ -382,7 +382,8 @@ def _held(
 def _refuse_unusual(
     case: LoadedCase, what: str, name: str, value: float, allowed: bool = False
 ) -> None:
-    """Raises ValueError where no tyre has such a value of ``name``, told as ``what``."""
+    """Raises ValueError where no tyre has such a value of ``name``; the message calls it
+    ``what``."""
     if not allowed and (message := unusual_value(case, name, value)):
         raise ValueError(f"{what} is {value:g}: {message}")
 

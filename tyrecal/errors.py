@@ -25,7 +25,8 @@ from __future__ import annotations
 
 
 class TyrecalError(Exception):
-    """Anything that is told in one sentence; ``exit_code``: of the command that it ends."""
+    """Base of all errors that the user reads in one sentence; ``exit_code``: of the command that it
+    ends."""
 
     exit_code = 2
 

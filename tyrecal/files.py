@@ -211,7 +211,7 @@ def read_json(path: Path, follow: bool = True) -> Any:
 
 @contextlib.contextmanager
 def atomic_write(path: Path, many_writers: bool = False) -> Iterator[Path]:
-    """A path beside ``path`` to write to; it takes its place at the end, or is removed.
+    """Yield a temporary path next to ``path`` that replaces it on success, or is removed.
 
     Nobody can have laid a link there: its name is drawn, and the file is new. Leftovers of writers
     that were killed go, unless there are ``many_writers``. Raises NotWritten where the disc is full

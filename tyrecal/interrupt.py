@@ -132,7 +132,8 @@ def _remember(number: int, frame: Any) -> None:
 
 
 def _say_unless_interrupt(unraisable: Any) -> None:
-    """For ``sys.unraisablehook``: an interruption that met a callback is remembered, not told."""
+    """For ``sys.unraisablehook``: an interruption that met a callback is remembered, not
+    printed."""
     if unraisable.exc_type is not KeyboardInterrupt:
         sys.__unraisablehook__(unraisable)
 

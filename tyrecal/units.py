@@ -75,7 +75,7 @@ def factor(table: Mapping[str, float], unit: str) -> float | None:
 
 
 def display_unit(unit: str) -> tuple[str, float]:
-    """The unit that people say for one of the catalogue or the case, and the factor to it."""
+    """The unit that engineers use for one of the catalogue or the case, and the factor to it."""
     return SAID.get(unit, (unit, 1.0))
 
 

@@ -1,4 +1,4 @@
-"""One case of a batch: its studies in a row, whatever fails reported and not raised.
+"""One case of a batch: its studies in a row; every failure is reported and not raised.
 
 The report is plain data, small enough for any network: ``name``; ``provenance``, None where the
 case could not be read; ``studies``, each with
@@ -75,7 +75,7 @@ class CaseTask:
 
 
 def run_case(task: CaseTask) -> Report:
-    """All studies of a case, or its report of an earlier run that was asked the same."""
+    """All studies of a case, or its report of an earlier run with the same question."""
     facts: dict[str, Any] = {
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
         "host": platform.node() or "localhost",
@@ -216,7 +216,7 @@ def _entry(outcome: StudyOutcome, task: CaseTask) -> dict[str, Any]:
 
 
 def _question(task: CaseTask, loaded: LoadedCase, evaluator: Evaluator) -> str:
-    """Hash of all that the results depend on: the case and its files, what is asked, the tool."""
+    """Hash of all that the results depend on: the case and its files, the options, the tool."""
     files = [task.path, *loaded.files, *loaded.template_files]
     solver = [*solver_identity(evaluator.solver), sources()]
     parts = [task.studies, asdict(task.asked), task.mesh, solver, [_digest(p) for p in files]]
@@ -224,7 +224,8 @@ def _question(task: CaseTask, loaded: LoadedCase, evaluator: Evaluator) -> str:
 
 
 def _finished(folder: Path, question: str) -> dict[str, Any] | None:
-    """The entries of an earlier run that was asked the same and whose files are as it left them."""
+    """The entries of an earlier run that had the same question and whose files are as it left
+    them."""
     try:
         finished = read_json(folder / FINISHED, follow=False)
         if finished["question"] != question:

@@ -79,7 +79,7 @@ def _missing(drift: Mapping[str, Any] | None) -> list[Report]:
 
 
 def _unlike(drift: Mapping[str, Any] | None, case: str) -> tuple[list[str], list[str]]:
-    """Studies of a case that only the baseline has, and what is to be said of the two sides."""
+    """Studies of a case that only the baseline has, and lines about what only one side has."""
     if not drift:
         return [], []
     missing, new = (

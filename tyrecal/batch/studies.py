@@ -45,8 +45,8 @@ class Asked:
 
 @dataclass
 class Studied:
-    """A case under study. designs: values of the variables by name of the design, ``fitted`` once
-    a fit has it; no_fit: a fit was asked for and has no result."""
+    """A case under study. designs: values of the variables by name of the design, ``fitted`` once a
+    fit has it; no_fit: a fit was requested and has no result."""
 
     case: LoadedCase
     evaluator: Evaluator

@@ -40,7 +40,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Deviation:
-    """A cell with a colour or mark that says how far off a target is."""
+    """A cell with a colour or mark that shows how far off a target is."""
 
     percent: float
 
@@ -110,7 +110,7 @@ class Provenance(ResultPart):
 
 
 class Result(ResultPart):
-    """A result file; older ones do not say what they are of."""
+    """A result file; older ones do not record their origin."""
 
     study: ClassVar[str] = ""  # the command, as its entry in run.json
     stem: ClassVar[str] = ""  # of its files
@@ -192,7 +192,7 @@ Notify = Callable[[str, EvaluationFailed | None], None]  # words; why a place wa
 
 
 def silent(words: str, failure: EvaluationFailed | None) -> None:
-    """Say nothing of how a study goes."""
+    """Report no progress of a study."""
 
 
 def not_reached(

@@ -37,7 +37,7 @@ from .seal import refuse_open_truth, seal_answers
 
 
 def rows_of(case: LoadedCase, protocol: Protocol) -> list[ModelRow]:
-    """All that a model is asked of: the mass, and each mode at each pressure."""
+    """All rows that a model answers: the mass, and each mode at each pressure."""
     modes = labels_of(case)
     return [(None, 0.0), *((label, p) for p in protocol.pressures_kPa for label in modes)]
 
@@ -55,7 +55,7 @@ def tyre_model(
 
 
 def case_of(folder: Path) -> LoadedCase:
-    """The case that lies beside the trials. Raises InputError, CaseError."""
+    """The case next to the trials. Raises InputError, CaseError."""
     return load_case(folder / "case" / read_protocol(folder).case, allow_unusual=True)
 
 

@@ -40,7 +40,7 @@ def draw(
     outside: Mapping[str, EffectLaw],
     seed: int,
 ) -> list[Truth]:
-    """All trials, in an order that says nothing: that of their ids.
+    """All trials, in the order of their ids, which reveals nothing.
 
     Effects and families have equal chances, sizes are uniform over ``smallest`` to 1 of the range,
     on either side where it has two.

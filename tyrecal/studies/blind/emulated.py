@@ -1,4 +1,4 @@
-"""A model asked once for many tyres: polynomials in the design variables between its answers.
+"""A model evaluated once for many tyres: polynomials in the design variables between its answers.
 
 About the centre x0, with t = (x - x0) / reach, |t| <= 1:
 

@@ -118,7 +118,7 @@ class Ruler:
 
 @dataclass(frozen=True)
 class Difficulty:
-    """How hard an effect is to see, and to tell from others."""
+    """How hard an effect is to see, and to distinguish from others."""
 
     lam: float  # lambda
     nearest: float  # min_j delta_j^2 over other effects
@@ -165,7 +165,7 @@ def difficulty(
 
 
 def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> dict[str, Any]:
-    """The ruler as plain data. Raises what the model says where the plain tyre has no solution."""
+    """The ruler as plain data. Raises the model's failure where the plain tyre has no solution."""
     x0 = np.asarray(model.start, float)
     count = len(x0)
     steps = [side * CURVATURE_STEP * unit for unit in np.eye(count) for side in (1, -1)]
@@ -217,7 +217,7 @@ def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> dict[str, Any]:
 
 
 def write_ruler(folder: Path, content: Mapping[str, Any]) -> None:
-    """Beside the trials, open to all."""
+    """Write the ruler next to the trials, open to all."""
     write_json(folder / RULER_FILE, dict(content))
 
 
@@ -230,7 +230,8 @@ def read_ruler(folder: Path, labels: Sequence[Label]) -> Ruler:
 
 
 def ruler_of(content: Mapping[str, Any], labels: Sequence[Label]) -> Ruler:
-    """The ruler that `measure` told. Raises KeyError, ValueError, TypeError where it is none."""
+    """The ruler from the data of `measure`. Raises KeyError, ValueError, TypeError where they are
+    none."""
     known: dict[str, Label | None] = {str(label): label for label in labels}
     known["mass"] = None
     numbers = {key: np.array(content[key], float) for key in NUMBERS}

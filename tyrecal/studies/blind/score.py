@@ -28,7 +28,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Scored:
-    """A trial, its answer beside the truth."""
+    """A trial, its answer next to the truth."""
 
     id: str
     kind: str

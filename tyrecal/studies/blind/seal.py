@@ -1,4 +1,4 @@
-"""The seal: the truth lies in a folder of its own, its sha256 beside the trials.
+"""The seal: the truth lies in a folder of its own, its sha256 next to the trials.
 
 truth.json holds a nonce, so that nobody can find the truth by trying; ``answer`` never opens its
 folder and refuses to work where a truth lies among the trials; answers are hashed before ``score``

@@ -16,7 +16,7 @@ from ...tyre.values import with_values
 
 
 def add(path: Path, effects: Mapping[str, float], folder: Path | None = None) -> Path:
-    """Write CASE_EFFECTS.yaml beside the case at ``path`` with the effects' parameters, by id.
+    """Write CASE_EFFECTS.yaml next to the case at ``path`` with the effects' parameters, by id.
 
     Its section and templates are named relative to the case, so it goes beside it, or into
     ``folder`` where that is the same. Raises InputError; ValueError for an unknown effect or a

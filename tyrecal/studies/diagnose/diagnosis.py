@@ -90,7 +90,7 @@ class Diagnosis:
 
     def parameter(self, key: str, id: str = "") -> dict[str, Any]:
         """Mean and 90 % interval of the effect ``id`` of ``key``, the first by default, with its
-        unit, whatever else there is; what the case has of it is counted in."""
+        unit, alone or with others; what the case has of it is counted in."""
         id = id or key.split("+")[0]
         span = self.problem.spans[id]
         with_it = [h for h in self.hypotheses if h.values and holds(h.key, key)]
@@ -209,7 +209,7 @@ def _calibrated(
     expansion: Expansion | None,
     known: Expansion | None,
 ) -> InverseProblem:
-    """Observations beside the model, expanded about the plain tyre that fits them.
+    """Observations and the model, expanded about the plain tyre that fits them.
 
     Where none does, an effect or an exchange of labels may have driven it far off: then about the
     tyre that fits them if any of these may have moved them.
@@ -245,7 +245,7 @@ def _fits(problem: InverseProblem) -> bool:
 def _settled(
     problem: InverseProblem, model: ResponseModel, hypotheses: list[Hypothesis]
 ) -> tuple[InverseProblem, list[Hypothesis]]:
-    """The problem with the model asked again for hypotheses in play, and all weighed by it."""
+    """The problem with the model evaluated again for active hypotheses, and all weighed by it."""
     for _ in range(MAX_ROUNDS if problem.expansion.nodes else 0):
         again, changed = _asked_again(problem, model, hypotheses)
         if not changed:
@@ -257,8 +257,8 @@ def _settled(
 def _asked_again(
     problem: InverseProblem, model: ResponseModel, hypotheses: Sequence[Hypothesis]
 ) -> tuple[InverseProblem, bool]:
-    """The problem with the model asked where the effects in play have their re-fits, each at its
-    likeliest size, and those of likely sets two by two; whether anything was left to ask."""
+    """The problem with the model evaluated where the active effects have their re-fits, each at its
+    likeliest size, and those of likely sets two by two; whether anything was left to evaluate."""
     expansion = problem.expansion
     singles = [h for h in hypotheses if h.key in expansion.nodes]
     best = max(h.ln_evidence for h in hypotheses)
@@ -281,7 +281,8 @@ def _asked_again(
 
 
 def _known(expansion: Expansion, size: Mapping[str, float], d: Array) -> bool:
-    """Whether these effects were asked as near as `KNOWN_WITHIN`; one of 0 is none."""
+    """Whether the model was already evaluated within `KNOWN_WITHIN` of these sizes; a size of 0 is
+    no effect."""
     near = {}
     for id in size:
         low, high = expansion.nodes[id].reach

@@ -1,4 +1,4 @@
-"""The model between the few points where it was asked.
+"""The model between the few points where it was evaluated.
 
 With d = x - x0, quadratic about the plain fit x0, plus what each effect adds:
 
@@ -37,7 +37,7 @@ CURVATURE_STEP = 0.05  # of a logarithm, for H from two Jacobians
 
 @dataclass(frozen=True)
 class Refinement:
-    """Where an effect was asked again, and what the expansion is off by there."""
+    """A point where an effect was evaluated again, and the expansion's error there."""
 
     e: float
     d: Array  # (v,) x - x0
@@ -47,7 +47,7 @@ class Refinement:
 
 @dataclass(frozen=True)
 class PairInteraction:
-    """Where two effects were asked together, and what their sum is off by there."""
+    """A point where two effects were evaluated together, and the error of their sum there."""
 
     e: tuple[float, float]
     d: Array  # (v,) x - x0
@@ -63,7 +63,7 @@ class PairInteraction:
 
 @dataclass(frozen=True)
 class EffectResponse:
-    """An effect where it was asked."""
+    """An effect at the sizes where it was evaluated."""
 
     values: Array  # (k,) of its parameter
     shift: Array  # (k, n) a_k
@@ -196,8 +196,8 @@ def expand(model: ResponseModel, x0: Array, splits: bool = True) -> Expansion:
 
 
 def carried(known: Expansion, model: ResponseModel, x0: Array) -> Expansion:
-    """The expansion about another x0, where the plain tyre is asked: effects follow ``known``'s B,
-    and are off by a term of second order in x0; curvature and sources of error stay.
+    """The expansion about another x0, where the plain tyre is evaluated: effects follow ``known``'s
+    B, and are off by a term of second order in x0; curvature and sources of error stay.
 
     For many tyres of one case. Raises what the model answered where it has no solution at x0.
     """
@@ -226,8 +226,8 @@ def carried(known: Expansion, model: ResponseModel, x0: Array) -> Expansion:
 
 
 def node_values(span: Span, sloped: Sequence[float] = ()) -> Array:
-    """Where an effect is asked: parameters other than 0, rising; where its slopes are asked, too,
-    of a one-sided range at the shares ``sloped``."""
+    """Sizes at which an effect is evaluated: parameters other than 0, rising; where its slopes are
+    evaluated, too, of a one-sided range at the shares ``sloped``."""
     if span.low < 0 < span.high:
         shares = np.array(TWO_SIDED_SLOPED if sloped else TWO_SIDED)
         return np.sort([*(shares * span.low), *(shares * span.high), *span.also])
@@ -236,8 +236,8 @@ def node_values(span: Span, sloped: Sequence[float] = ()) -> Array:
 
 
 def anchored(expansion: Expansion, model: ResponseModel, wanted: Sequence[Query]) -> Expansion:
-    """The expansion with one or two effects asked again at each of these points; one that has no
-    solution there stays as it was. What an effect alone gains, those with others know."""
+    """The expansion with one or two effects evaluated again at each of these points; one that has
+    no solution there stays as it was. What an effect alone gains, those with others know."""
     nodes, joint = dict(expansion.nodes), dict(expansion.joint)
     answered = list(zip(wanted, model.answers(wanted), strict=True))
     for point, answer in sorted(answered, key=lambda each: len(each[0].effects)):

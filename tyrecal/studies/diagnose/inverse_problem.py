@@ -1,4 +1,4 @@
-"""Observations beside the model: one set of rows, covariance and prior for every hypothesis."""
+"""Observations and the model: one set of rows, covariance and prior for every hypothesis."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Added(NamedTuple):
 
 @dataclass(frozen=True)
 class InverseProblem:
-    """n observations beside the model."""
+    """n observations and the model that explains them."""
 
     observations: Observations
     expansion: Expansion

@@ -59,7 +59,7 @@ def exchanged(
 
 
 def rows_if_exchanged(observations: Observations) -> list[ModelRow]:
-    """All that a model is asked of the observations, whichever labels are exchanged."""
+    """All rows that the observations need of a model, whichever labels are exchanged."""
     read = [observations, *(with_exchanged(observations, a, b) for a, b in _near(observations))]
     return list(dict.fromkeys(row.row for each in read for row in each.rows))
 

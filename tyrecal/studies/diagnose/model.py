@@ -23,7 +23,7 @@ ModelRow = tuple[Label | None, Where]  # a mode, None: the mass
 
 @dataclass(frozen=True)
 class Span:
-    """An effect that can be asked for: the range of its parameter."""
+    """An effect that can be evaluated: the range of its parameter."""
 
     low: float
     high: float
@@ -39,7 +39,7 @@ class Span:
 
 @dataclass(frozen=True)
 class Query:
-    """Where the model is asked."""
+    """A point at which the model is evaluated."""
 
     x: Array  # (v,)
     effects: Mapping[str, float] = field(default_factory=dict)  # parameter by id, absent: 0
@@ -77,7 +77,7 @@ def state_of(where: Where) -> TyreState:
 
 
 class ResponseModel(Protocol):
-    """A model that can be asked."""
+    """A model that answers queries."""
 
     variables: Sequence[str]  # names of x
     start: Array  # (v,) centre of what x can be

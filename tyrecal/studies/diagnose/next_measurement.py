@@ -1,4 +1,5 @@
-"""The measurement worth making next: what each is expected to tell of which explanation holds.
+"""The measurement worth making next: how much each is expected to show about which explanation
+holds.
 
 Gain of a choice: information for an hour of work. With the x of the fit integrated out, data that
 are there (1) and further ones (2) are jointly normal, in
@@ -98,7 +99,7 @@ class OtherStates:
 
 
 def offered_kPa(inflation_kPa: float, measured: Sequence[float]) -> list[float]:
-    """Pressures that may be measured beside these."""
+    """Pressures that may be measured in addition to these."""
     there = [float(round(share * inflation_kPa, -1)) for share in OFFERED]
     there += [inflation_kPa + more for more in ABOVE_kPa]
     return [

@@ -40,7 +40,7 @@ class Observable:
 
     @classmethod
     def of(cls, row: ModelRow) -> Observable:
-        """A mode or the mass that a model is asked of."""
+        """The mode, or the mass, of a model's row."""
         label, state = row[0], state_of(row[1])
         quantity = "frequency_Hz" if label else "mass_kg"
         return cls(quantity, label, state.pressure_kPa or 0.0, rim=state.rim)

@@ -35,7 +35,7 @@ class SectionPart:
 
 
 class Parted(Protocol):
-    """A tyre whose parts may be asked for."""
+    """A tyre that can give its parts."""
 
     case: LoadedCase
     evaluator: Evaluator

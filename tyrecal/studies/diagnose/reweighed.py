@@ -33,8 +33,8 @@ class Perturbation:
 
     @property
     def parts_near_modes(self) -> bool:
-        """Whether a row that is left out is one of two that are coupled: what is told of their
-        labels, and what the other is mixed with, is then not what it was."""
+        """Whether a row that is left out is one of two that are coupled: what the data show of
+        their labels, and what the other is mixed with, is then not what it was."""
         return bool(self.problem.veering.size[~self.keep].any())
 
 

@@ -71,8 +71,8 @@ def robustness(
 
 
 def verdict_probability(p: Mapping[str, float], verdict: Verdict) -> float:
-    """The probability of what a verdict says: that what is named, or else likeliest, is there;
-    that nothing is; that something outside is."""
+    """Probability of a verdict: that what is named, or else likeliest, is there; that nothing is;
+    that something outside is."""
     if verdict.kind in (NAMED, UNDECIDED):
         key = verdict.key or verdict.best
         return present(p, key.split("+")) if key else 0.0
@@ -182,8 +182,8 @@ def _again(
 def _outside(
     problem: InverseProblem, h: Hypothesis, changes: Sequence[Perturbation]
 ) -> list[Hypothesis]:
-    """The same of what is outside the catalogue, but for families that say nothing of the rows that
-    count, as that a label is misread which is left out."""
+    """The same for outside the catalogue, without families that concern no row that counts, as that
+    a label is misread which is left out."""
     extra = np.array([family.extra for family in families(problem)])
     added, start = problem.added({}, len(extra)), np.zeros((len(extra), len(problem.centre)))
     near = refit_at(problem, problem, added, extra, start, REFIT_STEPS).d

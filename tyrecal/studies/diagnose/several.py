@@ -36,8 +36,8 @@ def weigh(
     pairs: bool = True,
     before: tuple[InverseProblem, Sequence[Hypothesis]] | None = None,
 ) -> list[Hypothesis]:
-    """Every hypothesis with its evidence; ``pairs``: of two and three effects, too; before: of the
-    same problem with less asked of the model, whose other hypotheses stand."""
+    """Every hypothesis with its evidence; ``pairs``: of two and three effects, too; before: an
+    earlier problem and its hypotheses; those whose model answers did not change are reused."""
     stand = _standing(problem, *before) if before else {}
     ids = list(problem.expansion.nodes)
     prior = priors(len(ids), problem.assumed.further, MAX_EFFECTS if pairs else 1)
@@ -53,7 +53,7 @@ def weigh(
 def _standing(
     problem: InverseProblem, before: InverseProblem, hypotheses: Sequence[Hypothesis]
 ) -> dict[str, Hypothesis]:
-    """By key, those of whose effects the model has been asked nothing more since."""
+    """By key, the hypotheses whose effects have not been evaluated again since."""
     now, then = problem.expansion, before.expansion
     new = {frozenset([id]) for id, nodes in now.nodes.items() if nodes is not then.nodes[id]}
     new |= {frozenset(ids) for ids, each in now.joint.items() if each is not then.joint.get(ids)}
@@ -88,7 +88,7 @@ def before(hypotheses: Sequence[Hypothesis]) -> dict[str, float]:
 
 
 def present(p: Mapping[str, float], ids: Sequence[str]) -> float:
-    """Probability that all of these effects are there, whatever else is."""
+    """Probability that all of these effects are there, alone or with others."""
     total = sum(each for key, each in p.items() if set(ids) <= set(key.split("+")))
     return min(total, 1.0)  # rounded
 
@@ -160,7 +160,7 @@ def coupled_most(known: Sequence[Hypothesis]) -> dict[int, float]:
 
 
 def next_candidates(problem: InverseProblem, base: Hypothesis) -> list[str]:
-    """Effects by what they would gain beside those of ``base``, the first `THIRDS`."""
+    """Effects by their gain in addition to those of ``base``, the first `THIRDS`."""
     gains = {id: float(own.max()) for id, (own, *_) in _gains(problem, base).items()}
     return sorted(gains, key=lambda id: -gains[id])[:THIRDS]
 

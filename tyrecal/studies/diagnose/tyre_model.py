@@ -164,7 +164,7 @@ class TyreModel:
         known: Mapping[QueryKey, Answer | Exception],
         steps: Sequence[tuple[int, str, float]],
     ) -> Answer | Exception:
-        """The answer with what other points have to say about its slopes."""
+        """The answer with its slopes completed from other points."""
         answer = known[_key(point)]
         if point.coupled and isinstance(answer, Answer):
             answer = replace(answer, coupling=self._coupling(point.x, answer.eta))
@@ -374,7 +374,7 @@ class TyreModel:
 
     def _mass_slopes(self, x: Array, labelled: Sequence[LabelledModes]) -> tuple[Array, Array]:
         """d ln mass by x (v,) and by the sources of error (k,). Raises DeckRefused where the solver
-        does not tell them."""
+        does not give them."""
         mass_kg, values, rates = labelled[0].evaluation.mass_kg, self.values(x), dict[str, float]()
         for each in labelled:  # a number that one state sets moves the mass in the others
             rates |= each.evaluation.mass_gradients

@@ -1,4 +1,4 @@
-"""Sources of error: numbers of the case that nobody calibrates, and how far they may be off."""
+"""Sources of error: uncalibrated numbers of the case, and how far they may be off."""
 
 from __future__ import annotations
 

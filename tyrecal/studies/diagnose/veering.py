@@ -1,4 +1,4 @@
-"""Two modes of one harmonic near each other, coupled by constants that nobody calibrates.
+"""Two modes of one harmonic near each other, coupled by uncalibrated constants.
 
 Uncoupled, their a, b = (2 pi f)^2 cross as a tyre changes: that is what slopes extrapolate. Coupled
 by q they are the eigenvalues of [[a, q], [q, b]] and veer (Leissa, ZAMP 25 (1974)):

@@ -22,7 +22,7 @@ PERHAPS = 0.1  # probability of a further effect, from which it is told
 
 @dataclass(frozen=True)
 class Further:
-    """An effect that is perhaps there beside those that are named."""
+    """An effect that is perhaps there in addition to those that are named."""
 
     id: str
     probability: float
@@ -113,7 +113,8 @@ def most_sure(probabilities: Mapping[str, float]) -> str | None:
 
 
 def perhaps(probabilities: Mapping[str, float], named: str) -> list[Further]:
-    """Effects beside those that are named, p >= 0.1 that they are there too, likeliest first."""
+    """Effects in addition to those that are named, p >= 0.1 that they are there too, likeliest
+    first."""
     ids = named.split("+")
     others = {id for key in probabilities for id in key.split("+")} - {*ids, NONE, OUTSIDE}
     also = [Further(id, present(probabilities, [*ids, id])) for id in others]

@@ -89,7 +89,7 @@ def _pressure_words(stated: TyreState, amounts: Array) -> str:
 
 
 def _default_wheel(problem: Problem) -> list[str]:
-    """Paths of the wheel's numbers that nobody has stated."""
+    """Paths of the wheel's numbers that the case does not state."""
     case = problem.case
     stated = case.file_data.get("rim") or {}
     paths = [f"rim.{name}" for name in WHEEL if name not in stated]

@@ -1,4 +1,4 @@
-"""The step of `gauss_newton`, with the curvature that changes of the residuals' slopes tell.
+"""The step of `gauss_newton`, with the curvature from changes of the residuals' slopes.
 
     r(x + d) ~ r + J d + d^T C d / 2
 

@@ -137,7 +137,7 @@ class Problem:
         return {**self.fixed, **free}
 
     def evaluate(self, x: Array) -> Point:
-        """The design at x with its Jacobian, from memory if it was asked for before.
+        """The design at x with its Jacobian, from memory if it was evaluated before.
 
         Raises EvaluationFailed.
         """
@@ -217,7 +217,8 @@ class Problem:
         targets: Sequence[Target],
         values: Mapping[str, float],
     ) -> Array:
-        """d f / d x (targets, variables), Hz, exact; a state's own numbers hang on no variable."""
+        """d f / d x (targets, variables), Hz, exact; a state's own numbers depend on no
+        variable."""
         modes = [(by_state[t.state], by_state[t.state].wanted[t.label].position) for t in targets]
         rows = [[_slope(each, v.name, place) for v in self.variables] for each, place in modes]
         slopes = np.array(rows, float).reshape(len(rows), len(self.variables))
@@ -226,7 +227,7 @@ class Problem:
     def _mass_slopes(
         self, by_state: Mapping[TyreState, LabelledModes], values: Mapping[str, float]
     ) -> Array:
-        """d mass / d x (variables,), kg. Raises DeckRefused where the solver does not tell it."""
+        """d mass / d x (variables,), kg. Raises DeckRefused where the solver does not give it."""
         known: dict[str, float] = {}
         for (
             each

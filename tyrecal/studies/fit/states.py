@@ -120,8 +120,8 @@ def _best_measured(problem: Problem, known: FitUncertainty) -> list[tuple[Target
 
 
 def _others(problem: Problem) -> list[TyreState]:
-    """Unloaded states beside those measured: their pressures, and one below and above, on every rim
-    that the case can have."""
+    """Unloaded states in addition to those measured: their pressures, and one below and above, on
+    every rim that the case can have."""
     measured_states = [
         state.told(problem.case) for state, labels in problem.labels.items() if labels
     ]
@@ -158,6 +158,6 @@ def _named(problem: Problem, errors: Sequence[float | None]) -> Errors:
 
 
 def plain(problem: Problem, state: TyreState) -> dict[str, Any]:
-    """A state as result files have it, nothing left to the case."""
+    """A state for result files, with nothing left to the case."""
     complete = state.told(problem.case)
     return {"pressure_kPa": complete.pressure_kPa, "load_N": complete.load_N, "rim": complete.rim}

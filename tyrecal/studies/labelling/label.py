@@ -106,7 +106,8 @@ def label(
     fixed: Mapping[str, float] | None = None,
     jobs: int = 1,
 ) -> Labelled:
-    """The readings with the likeliest labels, all frequencies of the unloaded tyre told together.
+    """The readings with the likeliest labels, all frequencies of the unloaded tyre labelled
+    together.
 
     prior: of the variables that are not ``fixed``, by default `start_prior`; about: the design at
     which the model is expanded first, by default the prior's mean. Raises InputError where the

@@ -51,7 +51,8 @@ def sample_box(posterior: Posterior, bounds: Array, count: int, seed: int) -> Dr
 
 
 def _flat(box: Array) -> Array:
-    """Information (v, v) beside that of the data: what they do not see is not wider than a box."""
+    """Information (v, v) in addition to that of the data: what they do not see is not wider than a
+    box."""
     return np.diag((np.ptp(box, axis=1) / 2) ** -2.0)
 
 

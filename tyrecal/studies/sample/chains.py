@@ -53,7 +53,7 @@ class Chains:
 
     @property
     def thinned(self) -> Array:
-        """Draws (n, v) half an autocorrelation time apart: what more there are tells nothing."""
+        """Draws (n, v) half an autocorrelation time apart: further ones add nothing."""
         apart = max(1, int(self.tau.max() / 2))
         return self.draws[::apart].reshape(-1, self.draws.shape[2])
 

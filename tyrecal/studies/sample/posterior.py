@@ -89,7 +89,7 @@ class Posterior:
 
     @property
     def evaluations(self) -> int:
-        """Designs that the emulators asked for."""
+        """Number of designs that the emulators evaluated."""
         return sum(each.evaluations + each.failed for each in self.emulators)
 
     @cached_property
