@@ -13,16 +13,14 @@ OWN_DECKS_FILE = "own_decks.json"
 
 @dataclass(frozen=True)
 class OwnDecks:
-    """Own decks of a run. jobs: each with the one that it continues, or ""; modes: requested of the
-    last one, None where a range of frequencies decides; length_m, mass_kg: the decks' units;
-    mass_sets: element sets that have a mass."""
+    """Own decks of a run."""
 
-    jobs: list[tuple[str, str]]
-    modes: int | None
+    jobs: list[tuple[str, str]]  # each with the one that it continues, or ""
+    modes: int | None  # requested of the last one, None where a range of frequencies decides
     pressure_Pa: float
-    length_m: float
-    mass_kg: float
-    mass_sets: list[str]
+    length_m: float  # unit of the decks
+    mass_kg: float  # unit of the decks
+    mass_sets: list[str]  # element sets that have a mass
 
     @property
     def last(self) -> str:
