@@ -22,16 +22,15 @@ CARCASS_CORD = CordMaterial(9.87e9, 0.3, 1500.0, bears_compression=False)
 
 @dataclass(frozen=True)
 class ConstructionParts:
-    """Parts of a case by its keys; ``notes``: words beside a material; ``variables``: paths that
-    each sets, start and bounds; ``modes_at_Hz``: where the rubber's modulus of the modes is taken,
-    None as in the static step."""
+    """Parts of a case by its keys."""
 
     materials: Mapping[str, Keys]
     solids: list[Keys]
     layers: Mapping[str, Keys]
-    variables: Mapping[str, Keys]
+    variables: Mapping[str, Keys]  # paths that each sets, start and bounds
     uncertainties: Mapping[str, Keys] = field(default_factory=dict)
-    notes: Mapping[str, str] = field(default_factory=dict)
+    notes: Mapping[str, str] = field(default_factory=dict)  # words next to a material
+    # where the rubber's modulus of the modes is taken, None as in the static step
     modes_at_Hz: float | None = None
 
 

@@ -23,16 +23,13 @@ Keys = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class Mistake:
-    """One mistake: the file, its line (from 1), the dotted key, its value, what would be right.
-
-    ``key`` is empty where the file as a whole is wrong, ``line`` 0 where it has none.
-    """
+    """One mistake in a file of the user."""
 
     file: str
-    line: int
-    key: str
+    line: int  # from 1, 0 where it has none
+    key: str  # dotted, empty where the file as a whole is wrong
     value: str
-    message: str
+    message: str  # what would be right
 
     def __str__(self) -> str:
         what = f"{self.key} is {self.value}: " if self.key else ""

@@ -29,11 +29,11 @@ CAP, BASE = "cap", "base"
 
 @dataclass(frozen=True)
 class Compound:
-    """A rubber: hardness, Shore A; density, kg/m3; relaxed: share g of the shear modulus in a
-    vibration that is gone in a static state."""
+    """A rubber."""
 
-    hardness: float
-    density: float
+    hardness: float  # Shore A
+    density: float  # kg/m3
+    # share g of the shear modulus in a vibration that is gone in a static state
     relaxed: float = 0.4
 
     @property
@@ -93,10 +93,8 @@ class Belt:
 
 @dataclass(frozen=True)
 class Construction:
-    """A type of tyre. Gauges, m: crown, sidewall, bead = (a, b): a + b S1, as `Gauges` has them;
-    liner to step, too. wires: how many are in a bead, of
-    ``wire`` m2 each; filler: its height of the arc from the rim to
-    the widest point; the turn-up ends there, or at the widest point where it is ``high``."""
+    """A type of tyre. Gauges, m: crown, sidewall, bead = (a, b): a + b S1, as in `Gauges`; liner to
+    step, too."""
 
     name: str
     compounds: dict[str, Compound]
@@ -113,10 +111,10 @@ class Construction:
     cap_gauge: float
     under_tread: float
     step: float
-    wires: int
-    wire: float
-    filler: float
-    high: bool
+    wires: int  # how many are in a bead
+    wire: float  # m2 of each
+    filler: float  # its height of the arc from the rim to the widest point; the turn-up ends there
+    high: bool  # the turn-up ends at the widest point
 
     @property
     def lines(self) -> tuple[str, ...]:

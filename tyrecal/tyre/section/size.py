@@ -77,19 +77,17 @@ SERVICE = re.compile(  # load index and speed symbol, load range, strength, tube
 
 @dataclass(frozen=True)
 class TyreSize:
-    """A size code read. width: nominal section width S1, m; rim_code: diameter, inch;
-    overall_diameter: D, m; theoretical: x; measuring: widest usual share of S1 in the rim;
-    load_index: of a single tyre, None where it is not stated."""
+    """A size code read."""
 
     text: str
     kind: str
-    width: float
-    overall_diameter: float
-    rim_code: float
-    theoretical: float
-    measuring: float
+    width: float  # nominal section width S1, m
+    overall_diameter: float  # D, m
+    rim_code: float  # diameter, inch
+    theoretical: float  # x
+    measuring: float  # widest usual share of S1 in the rim
     pressure_kPa: float
-    load_index: int | None = None
+    load_index: int | None = None  # of a single tyre, None where it is not stated
 
     @property
     def light_truck(self) -> bool:
