@@ -125,15 +125,11 @@ COLUMNS = (_columns(False), _columns(True))
 
 @dataclass(frozen=True)
 class BeltMotion:
-    """How a shape moves the belt.
+    """How a shape moves the belt."""
 
-    c: circumferential harmonic; shares (5,): of the belt's energy on orders 0 to 3 and, on c = 0,
-    along the axle; participation: mean square motion of the belt over that of all points.
-    """
-
-    c: int
-    shares: Array
-    participation: float
+    c: int  # circumferential harmonic
+    shares: Array  # (5,) of the belt's energy on orders 0 to 3 and, on c = 0, along the axle
+    participation: float  # mean square motion of the belt over that of all points
 
 
 def belt_motion(shape: HarmonicShape | RingShape) -> BeltMotion:
