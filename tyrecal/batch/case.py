@@ -59,18 +59,17 @@ Report = dict[str, Any]
 
 @dataclass(frozen=True)
 class CaseTask:
-    """Task of a worker. path, folder (of the results), record: absolute, on a file system that the
-    worker sees too; mesh: level, empty for the case's own; command: of the solver."""
+    """Task of a worker. Its paths are absolute, on a file system that the worker sees too."""
 
     name: str
     path: Path
-    folder: Path
+    folder: Path  # of the results
     studies: tuple[str, ...]
     asked: Asked
     solver: str = ""
-    mesh: str = ""
-    record: Path | None = None
-    command: tuple[str, ...] = ()
+    mesh: str = ""  # level, empty for the case's own
+    record: Path | None = None  # of evaluations
+    command: tuple[str, ...] = ()  # of the solver
     allow_unusual: bool = False
 
 

@@ -107,14 +107,13 @@ def _twists(mode: Mode) -> bool:
 
 @dataclass(frozen=True)
 class _Surface:
-    """rest, moved (k, angle, 3); share (k, angle): of the largest displacement; twists: the
-    meridians at rest are drawn; sides: the rows of the widest points."""
+    """The tyre's outer surface at rest and in a mode."""
 
-    rest: Array
-    moved: Array
-    share: Array
-    twists: bool
-    sides: tuple[int, int]
+    rest: Array  # (k, angle, 3)
+    moved: Array  # (k, angle, 3)
+    share: Array  # (k, angle) of the largest displacement
+    twists: bool  # the meridians at rest are drawn
+    sides: tuple[int, int]  # rows of the widest points
 
 
 def _drawn(mesh: SectionMesh) -> Array:

@@ -41,18 +41,17 @@ class LoadedMode:
 
 @dataclass(frozen=True)
 class Loaded:
-    """The tyre at one load: its named modes by rising frequency; ``unnamed``: members that no
-    shape could be found for; ``disputed``: members that have another name where they are followed
-    from the unloaded tyre in one stride; surface (ring, node, 3): where the shapes' points stand,
-    r, theta, z in m at their angles, deformed; cavity_Hz: of the first wave in the cavity's
-    gas, fore and aft, and up and down; none: there is no gas."""
+    """The tyre at one load."""
 
     load_N: float
     deflection_m: float
-    modes: tuple[LoadedMode, ...]
-    unnamed: tuple[Member, ...] = ()
+    modes: tuple[LoadedMode, ...]  # named ones by rising frequency
+    unnamed: tuple[Member, ...] = ()  # members for which no shape was found
+    # members that have another name where they are followed from the unloaded tyre in one stride
     disputed: tuple[Member, ...] = ()
+    # (ring, node, 3) where the shapes' points stand, r, theta, z in m at their angles, deformed
     surface: np.ndarray | None = field(default=None, compare=False, repr=False)
+    # of the first wave in the cavity's gas, fore and aft, and up and down; none: there is no gas
     cavity_Hz: tuple[float, ...] = ()
 
 

@@ -15,15 +15,12 @@ Array = np.ndarray
 @dataclass(frozen=True)
 class Patch:
     """The outer surface seen from the road, (ring, node across): rings in the direction of rolling
-    with the patch's middle amid them, nodes from -z to +z.
+    with the patch's middle amid them, nodes from -z to +z."""
 
-    along, across: m in the road's plane; pressure: Pa, 0 where it does not touch; touches: bool.
-    """
-
-    along: Array
-    across: Array
-    pressure: Array
-    touches: Array
+    along: Array  # m in the road's plane
+    across: Array  # m in the road's plane
+    pressure: Array  # Pa, 0 where it does not touch
+    touches: Array  # bool
 
     @property
     def length_m(self) -> float:

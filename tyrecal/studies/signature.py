@@ -22,24 +22,20 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Signature:
-    """An effect of one size at some pressures.
-
-    before, after (pressure, label): per cent of the plain tyre's frequency, as it comes and after
-    the best linear re-fit of the case's variables to it, NaN where a mode got lost; absorbed: the
-    share alpha = 1 - |after|^2 / |before|^2 that the re-fit takes up, doublets counted twice,
-    None where the effect moves nothing;
-    refitted: the values of the variables that do so; mass_kg: that the effect adds.
-    """
+    """An effect of one size at some pressures."""
 
     id: str
     value: float
     pressures_kPa: tuple[float, ...]
     labels: tuple[Label, ...]
+    # (pressure, label) per cent of the plain tyre's frequency, NaN where a mode got lost
     before: Array
-    after: Array
+    after: Array  # the same after the best linear re-fit of the case's variables to it
+    # share alpha = 1 - |after|^2 / |before|^2 that the re-fit absorbs, doublets counted twice, None
+    # where the effect moves nothing
     absorbed: float | None
-    refitted: dict[str, float]
-    mass_kg: float
+    refitted: dict[str, float]  # values of the variables after that re-fit
+    mass_kg: float  # that the effect adds
 
 
 class Plain:

@@ -34,14 +34,12 @@ MIN_VARIANCE_SHARE = 0.01  # of the variance, below which a cause is not listed
 
 @dataclass(frozen=True)
 class TotalError:
-    """of_values (n, n): covariance of ln q of the targets that count; of_coordinates (v, v): of the
-    fitted coordinates, not scaled by chi^2; shares: of their variances (v,) by cause, the largest
-    first; is_determined (v,): whether the data determine a variable."""
+    """Errors of a fit by all that is uncertain, and their causes."""
 
-    of_values: Array
-    of_coordinates: Array
-    shares: dict[str, Array]
-    is_determined: Array
+    of_values: Array  # (n, n) covariance of ln q of the targets that count
+    of_coordinates: Array  # (v, v) covariance of the fitted coordinates, not scaled by chi^2
+    shares: dict[str, Array]  # of their variances (v,) by cause, the largest first
+    is_determined: Array  # (v,) whether the data determine a variable
 
     def by_variable(
         self, problem: Problem, point: Point, chi2_per_dof: float | None

@@ -15,19 +15,19 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class FitUncertainty:
-    """standard_errors: in each variable's own unit, None where the data do not tell;
-    correlations (v, v); singular_values (v,) of the weighted Jacobian by the scaled variables,
-    in the objective's unit, largest first: a small one is a combination that the data do not see;
-    noise_Hz: the standard deviation of a frequency behind the errors, None where there is no
-    frequency that counts, or it cannot be known; sigma: of each target in its unit, NaN where it
-    does not count or cannot be known; is_determined (v,): whether the data determine a variable."""
+    """Standard errors of a fit by the scatter of its targets."""
 
+    # in each variable's own unit, None where the data do not determine it
     standard_errors: list[float | None]
-    correlations: Array
+    correlations: Array  # (v, v)
+    # (v,) of the weighted Jacobian by the scaled variables, in the objective's unit, largest first:
+    # a small one is a combination that the data do not see
     singular_values: Array
+    # standard deviation of a frequency behind the errors, None where there is no frequency that
+    # counts, or it cannot be known
     noise_Hz: float | None
-    sigma: Array
-    is_determined: Array
+    sigma: Array  # of each target in its unit, NaN where it does not count or cannot be known
+    is_determined: Array  # (v,) whether the data determine a variable
 
 
 def uncertainty(problem: Problem, point: Point) -> FitUncertainty:

@@ -32,14 +32,14 @@ MODES_PER_HARMONIC = 3  # at least: both families, and one across the belt that 
 
 @dataclass(frozen=True)
 class Labelled:
-    """given: all readings as they came; frequencies: those of the unloaded tyre, rising, as the
-    labelings of ``found`` have them, each a reading or the two of a doublet; start: the model where
-    the variables are expected."""
+    """Readings with the labels that the search found."""
 
-    given: Sequence[Measurement]
+    given: Sequence[Measurement]  # all readings as they came
+    # those of the unloaded tyre, rising, in the order of the labelings of ``found``, each a reading
+    # or the two of a doublet
     frequencies: list[list[Measurement]]
     found: LabelSearch
-    start: Expansion
+    start: Expansion  # the model where the variables are expected
 
     @property
     def labels(self) -> list[Label | None]:

@@ -59,29 +59,27 @@ class Modes:
 
 @dataclass(frozen=True)
 class Frequencies:
-    """Measured ones by rising value: y (m,), ln f; s (m,), its standard deviation; the state of
-    each (a number); allowed (m, n): modes that each can be; sure (m,): it is not foreign."""
+    """Measured frequencies by rising value."""
 
-    y: Array
-    s: Array
-    states: Array
-    allowed: Array
-    sure: Array
+    y: Array  # (m,) ln f
+    s: Array  # (m,) standard deviation of y
+    states: Array  # (m,) a number each
+    allowed: Array  # (m, n) modes that each can be
+    sure: Array  # (m,) it is not foreign
 
 
 @dataclass(frozen=True)
 class Labelings:
-    """The most probable first: modes (k, m), -1 of what is foreign; probabilities (k,) of them, and
-    each (m, n + 1) of every mode of a frequency, the last of foreign; ln_prior (k,): what of a
-    labeling's weight is not the evidence of its labelled frequencies, but for a constant; z (v,):
-    the variables' mean under the first; discrepancy: the model's, its mean over all."""
+    """Labelings of the frequencies, the most probable first."""
 
-    modes: Array
-    probabilities: Array
-    each: Array
+    modes: Array  # (k, m), -1 of what is foreign
+    probabilities: Array  # (k,) of the labelings
+    each: Array  # (m, n + 1) probability of every mode of a frequency, the last of foreign
+    # (k,) the part of a labeling's weight that is not the evidence of its labelled frequencies,
+    # except for a constant
     ln_prior: Array
-    z: Array
-    discrepancy: float
+    z: Array  # (v,) the variables' mean under the first
+    discrepancy: float  # the model's, its mean over all
 
     def weighed_anew(self, shares: Array) -> Labelings:
         """The first ones sharing otherwise, ``shares`` (first,), what they have together."""

@@ -22,20 +22,17 @@ LIKELY = 10.0  # below the highest ln p: optima that walkers start from
 
 @dataclass(frozen=True)
 class Draws:
-    """A posterior with its draws. optima (o, v), ln p (o,) there; covariance (v, v): the linear one
-    about the first; at_edge (v, 2): share of the draws at each edge of the box that is none of the
-    bounds; boxes, evaluations: how many it took; stopped: why the box grew no more, "" where it
-    holds the posterior."""
+    """A posterior with its draws."""
 
     posterior: Posterior
-    optima: Array
-    height: Array
-    covariance: Array
+    optima: Array  # (o, v)
+    height: Array  # (o,) ln p at the optima
+    covariance: Array  # (v, v) the linear one about the first optimum
     chains: Chains
-    at_edge: Array
-    boxes: int
-    evaluations: int
-    stopped: str
+    at_edge: Array  # (v, 2) share of the draws at each edge of the box that is none of the bounds
+    boxes: int  # how many it took
+    evaluations: int  # how many it took
+    stopped: str  # why the box grew no more, "" where it holds the posterior
 
 
 def sample_box(posterior: Posterior, bounds: Array, count: int, seed: int) -> Draws:

@@ -26,20 +26,14 @@ FIRST_DAMPING, STIFFEST = 1e-3, 1e6  # of a step, in units of the information
 
 @dataclass(frozen=True)
 class Posterior:
-    """Its logarithm, for many x at a time.
+    """Logarithm of the posterior density, for many x at a time."""
 
-    emulators: one for each way of holding the rim; states (s, 1 + k): which of them, and values of
-    its further coordinates (pressure); rows (n, 2): of every measured value the places of its state
-    and its label; y (n,), whitened (n, n): W with W^T W = Sigma^-1; box (v, 2): within it alone the
-    density is known.
-    """
-
-    emulators: tuple[Emulator, ...]
-    states: Array
-    rows: Array
-    y: Array
-    whitened: Array
-    box: Array
+    emulators: tuple[Emulator, ...]  # one for each way of holding the rim
+    states: Array  # (s, 1 + k): the emulator, and values of its further coordinates (pressure)
+    rows: Array  # (n, 2): of every measured value the places of its state and its label
+    y: Array  # (n,)
+    whitened: Array  # (n, n): W with W^T W = Sigma^-1
+    box: Array  # (v, 2): within it alone the density is known
 
     def __call__(self, x: Array) -> Array:
         """ln p (p,) at x (p, v) but for a constant; -inf outside the box."""

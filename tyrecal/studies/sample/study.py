@@ -48,9 +48,7 @@ ROUGH = 0.2  # of a row's standard deviation in Sigma: what an emulator's 99 % b
 
 @dataclass(frozen=True)
 class Sample:
-    """Draws, and what they predict at ``rows``: ln f (draws, m) of thinned ones, linear standard
-    deviations (m,) beside; rough: the emulator's error over the standard deviation of a measured
-    row, the worst one's; noise_Hz: of targets that state none, as the fit leaves it."""
+    """Draws, and what they predict at ``rows``."""
 
     variables: tuple[DesignVariable, ...]
     units: tuple[str, ...]  # of theirs
@@ -58,10 +56,11 @@ class Sample:
     sources: tuple[Source, ...]  # of error
     drawn: Draws
     rows: tuple[Observable, ...]
-    ln_f: Array
-    linear: Array
+    ln_f: Array  # (draws, m) of thinned draws
+    linear: Array  # (m,) standard deviations by the linear theory
+    # the emulator's error over the standard deviation of a measured row, the worst one's
     rough: float
-    noise_Hz: float | None
+    noise_Hz: float | None  # of targets that state none, as the fit leaves it
 
 
 def run(
