@@ -1,4 +1,4 @@
-"""A user's own decks in three dimensions: what is said of them beside their texts."""
+"""A user's own decks in three dimensions: the data about them that go with their texts."""
 
 from __future__ import annotations
 
@@ -13,16 +13,14 @@ OWN_DECKS_FILE = "own_decks.json"
 
 @dataclass(frozen=True)
 class OwnDecks:
-    """jobs: each with the one that it goes on from, or ""; modes: asked of the last one, None where
-    a range of frequencies decides; length_m, mass_kg: the decks' units; mass_sets: element sets
-    that have a mass."""
+    """Own decks of a run."""
 
-    jobs: list[tuple[str, str]]
-    modes: int | None
+    jobs: list[tuple[str, str]]  # each with the one that it continues, or ""
+    modes: int | None  # requested of the last one, None where a range of frequencies decides
     pressure_Pa: float
-    length_m: float
-    mass_kg: float
-    mass_sets: list[str]
+    length_m: float  # unit of the decks
+    mass_kg: float  # unit of the decks
+    mass_sets: list[str]  # element sets that have a mass
 
     @property
     def last(self) -> str:
@@ -31,7 +29,7 @@ class OwnDecks:
 
 
 def save(request: Mapping[str, Any], folder: Path) -> list[Path]:
-    """Write what a request says of own decks into a run folder; nothing where it is of none."""
+    """Write a request's data about own decks into a run folder; nothing where it has none."""
     if "own_decks" not in request:
         return []
     path = folder / OWN_DECKS_FILE

@@ -124,7 +124,7 @@ def _end_tree(process: subprocess.Popen[bytes]) -> None:
 
 
 def last_words(log: Path, lines: int = 3) -> str:
-    """The last lines of a log that say something, joined; empty where there are none."""
+    """The last lines of a log that are not blank, joined; empty where there are none."""
     if not log.exists():
         return ""
     with log.open("rb") as file:

@@ -17,10 +17,10 @@ import click
 import pytest
 
 from tyrecal.interrupt import (
-    interrupt_heard,
-    interrupts_put_off,
-    interrupts_remembered,
+    defer_interrupts,
+    pending_interrupt,
     raise_interrupt,
+    remember_interrupts,
 )
 from tyrecal.simulate.evaluate import folders
 from tyrecal.simulate.evaluate.pool import first_done, process_pool
@@ -48,8 +48,8 @@ def then_ctrl_c(function: Any) -> Any:
 
 def test_put_off_it_counts_when_the_block_is_done() -> None:
     done = []
-    with pytest.raises(KeyboardInterrupt), interrupts_put_off():
-        with interrupts_put_off():
+    with pytest.raises(KeyboardInterrupt), defer_interrupts():
+        with defer_interrupts():
             signal.raise_signal(signal.SIGINT)
         done.append("all")
     assert done
@@ -99,19 +99,19 @@ def test_locks_that_a_thread_shares_are_not_torn(monkeypatch: pytest.MonkeyPatch
 
 
 def test_one_that_was_swallowed_is_raised_again() -> None:
-    with interrupts_remembered():
+    with remember_interrupts():
         raise_interrupt()
         with contextlib.suppress(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
-        assert interrupt_heard()
+        assert pending_interrupt()
         with pytest.raises(KeyboardInterrupt):
             raise_interrupt()
-    assert not interrupt_heard()
+    assert not pending_interrupt()
 
 
 def test_where_it_is_ignored_it_stays_so() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with interrupts_remembered():
+    with remember_interrupts():
         signal.raise_signal(signal.SIGINT)
         raise_interrupt()
 

@@ -18,7 +18,7 @@ from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.problem import objective
 from tyrecal.studies.fit.targets import read_targets
 from tyrecal.studies.labelling.label import fitted_prior, label
-from tyrecal.studies.labelling.result import labels_told
+from tyrecal.studies.labelling.result import labels_posterior
 from tyrecal.tyre.case import start_values
 from tyrecal.tyre.load import load_case
 
@@ -101,7 +101,7 @@ def test_labels_of_the_page_on_real_data() -> None:
     readings = read_measurements(CASES / "205_60r15_vervoort.csv", labelled=False)
     labelled = label(case, evaluator, readings, fitted_prior(case, fit), fixed=fixed)
     table = rows("real_data.md", r"\d{3}")
-    for cells, frequency in zip(table, labels_told(case, labelled).frequencies, strict=True):
+    for cells, frequency in zip(table, labels_posterior(case, labelled).frequencies, strict=True):
         assert figure(cells[0]) == frequency.frequency_Hz and cells[1] == frequency.said
         assert figure(cells[2]) == pytest.approx(frequency.expected_Hz, abs=0.06)
         off = 100 * (frequency.expected_Hz or 0.0) / frequency.frequency_Hz - 100

@@ -66,7 +66,7 @@ __all__ = [
     "sweep_pressure",
     "with_values",
 ]
-MOST_SHOWN = 60  # characters of a wrong argument
+MAX_SHOWN_CHARACTERS = 60  # characters of a wrong argument
 SettingValue = TypeVar("SettingValue", bound=Setting)
 
 
@@ -329,8 +329,9 @@ def emulate(
 
 
 def list_effects() -> dict[str, Effect]:
-    """What a plain model leaves out, by id: ``title``, ``unit``, ``low`` and ``high`` of the
-    parameter, ``signature``, ``toggle``, ``aliases``. In a case it is the number ``effects.ID``.
+    """Effects that a plain model leaves out, by id: ``title``, ``unit``, ``low`` and ``high`` of
+    the parameter, ``signature``, ``toggle``, ``aliases``. In a case an effect is the number
+    ``effects.ID``.
 
     >>> filler = list_effects()["bead_filler"]
     >>> filler.title, filler.low, filler.high
@@ -384,7 +385,8 @@ def _held(
 def _refuse_unusual(
     case: LoadedCase, what: str, name: str, value: Setting, allowed: bool = False
 ) -> None:
-    """Raises ValueError where no tyre has such a value of ``name``, told as ``what``."""
+    """Raises ValueError where no tyre has such a value of ``name``; the message calls it
+    ``what``."""
     if not allowed and (message := unusual_value(case, name, value)):
         raise ValueError(f"{what} is {as_written(value)}: {message}")
 
@@ -471,5 +473,5 @@ def _listed(name: str, values: Any, one: str) -> list[Any]:
 
 def _wrong(name: str, wanted: str, value: object) -> ValueError:
     text = printable(repr(value))
-    shown = text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
+    shown = text if len(text) <= MAX_SHOWN_CHARACTERS else f"{text[:MAX_SHOWN_CHARACTERS]}..."
     return ValueError(f"{name} must be {wanted}, got {shown}")

@@ -1,4 +1,4 @@
-"""What is told to the user in one sentence: one tree, an exit code in each class.
+"""Errors that the user reads in one sentence: one tree, an exit code in each class.
 
     TyrecalError
         InputError, 2               what was given is wrong: a file, a folder, a name, a number
@@ -25,13 +25,14 @@ from __future__ import annotations
 
 
 class TyrecalError(Exception):
-    """Anything that is told in one sentence; ``exit_code``: of the command that it ends."""
+    """Base of all errors that the user reads in one sentence; ``exit_code``: of the command that it
+    ends."""
 
     exit_code = 2
 
 
 class InputError(TyrecalError, ValueError):
-    """What was given cannot be used; the sentence says where, and what would be right.
+    """Input that cannot be used; the sentence says where, and what would be right.
 
     line: the 1-based line of a table, where the sentence does not name it; else 0.
     """

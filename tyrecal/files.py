@@ -71,7 +71,7 @@ RESULTS = {  # of a study, by pattern: what a new run of it takes the place of
     ),
     "batch": ("batch.json",),
 }
-CHANGED = threading.Event()  # set once this process writes a file with `whole`
+CHANGED = threading.Event()  # set once this process writes a file with `atomic_write`
 RUN = "run.json"  # what differs from run to run, an entry a study
 PREVIOUS = "previous"  # folder for what a new run of the same study did not write again
 
@@ -92,7 +92,7 @@ def set_aside(folder: Path, study: str, written: Collection[str]) -> None:
     refuse_link(folder / PREVIOUS)
     for file in results(folder, study):
         if file.name not in written:
-            own_folder(folder / PREVIOUS)
+            private_dir(folder / PREVIOUS)
             file.replace(folder / PREVIOUS / file.name)
     for file in results(folder / PREVIOUS, study):
         if file.name in written:
@@ -133,7 +133,7 @@ def write_runs(folder: Path, new: Mapping[str, Any], many_writers: bool = False)
 
 
 class NotAFile(TyrecalError, OSError):
-    """What should be a file or folder of ours is something else: a link, a pipe, a device."""
+    """A file or folder of ours that is something else: a link, a pipe, a device."""
 
     def __init__(self, path: Path, words: str):
         super().__init__(errno.EINVAL, words, str(path))
@@ -180,7 +180,7 @@ def refuse_link(path: Path) -> None:
         raise NotAFile(path, "is a link, which is not followed: remove it")
 
 
-def own_folder(path: Path) -> Path:
+def private_dir(path: Path) -> Path:
     """``path``, made if need be, as one of our own folders. Raises NotAFile, NotWritten."""
     refuse_link(path)
     make_folder(path)
@@ -225,8 +225,8 @@ def read_json(path: Path, follow: bool = True) -> Any:
 
 
 @contextlib.contextmanager
-def whole(path: Path, many_writers: bool = False) -> Iterator[Path]:
-    """A path beside ``path`` to write to; it takes its place at the end, or is removed.
+def atomic_write(path: Path, many_writers: bool = False) -> Iterator[Path]:
+    """Yield a temporary path next to ``path`` that replaces it on success, or is removed.
 
     Nobody can have laid a link there: its name is drawn, and the file is new. Leftovers of writers
     that were killed go, unless there are ``many_writers``. Raises NotWritten where the disc is full
@@ -251,11 +251,11 @@ def whole(path: Path, many_writers: bool = False) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str, many_writers: bool = False) -> None:
-    """Write ``text`` whole or not at all, the same bytes on every system; see `whole`.
+    """Write ``text`` whole or not at all, the same bytes on every system; see `atomic_write`.
 
     Raises OSError.
     """
-    with whole(path, many_writers) as partial:
+    with atomic_write(path, many_writers) as partial:
         partial.write_text(text, encoding="utf-8", newline="")
 
 

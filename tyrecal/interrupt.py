@@ -25,12 +25,12 @@ _heard, _at, _late, _depth = 0, 0.0, 0, 0
 
 
 def exit_code(number: int) -> int:
-    """Of a command that signal ``number`` ended, as a shell has it."""
+    """Exit code of a command that signal ``number`` ended, as a shell has it."""
     return 128 + number
 
 
 def leave_when_interrupted() -> None:
-    """From here to `interrupts_remembered` an interruption ends the process with one sentence.
+    """From here to `remember_interrupts` an interruption ends the process with one sentence.
 
     For the first moments of a command, while Python imports it: KeyboardInterrupt would meet the
     importing machinery, and nothing was changed yet. Afterwards, when the command is done, it
@@ -45,11 +45,11 @@ def leave_when_interrupted() -> None:
 
 
 @contextmanager
-def interrupts_remembered() -> Iterator[None]:
+def remember_interrupts() -> Iterator[None]:
     """Within the block an interruption is remembered as well as raised.
 
     What it met may turn it into another error (a file that it had just closed is closed again) or
-    swallow it (a callback of the garbage collector): `interrupt_heard` knows, and
+    swallow it (a callback of the garbage collector): `pending_interrupt` knows, and
     `raise_interrupt` raises it again.
     """
     global _heard, _late, _depth
@@ -76,8 +76,8 @@ def interrupts_remembered() -> Iterator[None]:
             signal.raise_signal(number)
 
 
-def interrupt_heard() -> int:
-    """Number of the signal that came since the block of `interrupts_remembered` began; 0: none."""
+def pending_interrupt() -> int:
+    """Number of the signal that came since the block of `remember_interrupts` began; 0: none."""
     return _heard
 
 
@@ -88,7 +88,7 @@ def raise_interrupt() -> None:
 
 
 @contextmanager
-def interrupts_put_off() -> Iterator[None]:
+def defer_interrupts() -> Iterator[None]:
     """An interruption counts when the block, a short one, is done."""
     global _depth, _late
     if not _ours():
@@ -132,7 +132,8 @@ def _remember(number: int, frame: Any) -> None:
 
 
 def _say_unless_interrupt(unraisable: Any) -> None:
-    """For ``sys.unraisablehook``: an interruption that met a callback is remembered, not told."""
+    """For ``sys.unraisablehook``: an interruption that met a callback is remembered, not
+    printed."""
     if unraisable.exc_type is not KeyboardInterrupt:
         sys.__unraisablehook__(unraisable)
 

@@ -74,12 +74,12 @@ def factor(table: Mapping[str, float], unit: str) -> float | None:
     return next((each for name, each in table.items() if plain(name) == unit), None)
 
 
-def said(unit: str) -> tuple[str, float]:
-    """The unit that people say for one of the catalogue or the case, and the factor to it."""
+def display_unit(unit: str) -> tuple[str, float]:
+    """The unit that engineers use for one of the catalogue or the case, and the factor to it."""
     return SAID.get(unit, (unit, 1.0))
 
 
 def in_engineers_units(value: float, unit: str, digits: int = 6) -> str:
     """``in_engineers_units(-0.00934, "m", 3)`` is '-9.34 mm'."""
-    name, factor = said(unit)
+    name, factor = display_unit(unit)
     return f"{value * factor:.{digits}g} {name}".rstrip()

@@ -1,3 +1,3 @@
-"""The edition of the tool; pyproject.toml says the same."""
+"""The edition of the tool, the same as in pyproject.toml."""
 
 __version__ = "0.1.0"

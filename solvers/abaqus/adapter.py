@@ -67,7 +67,7 @@ class Abaqus:
         return release[1] if release else "unknown"
 
     def write(self, decks: Decks, folder: Path) -> list[Path]:
-        """Write the decks and, beside them, the case's options. Raises ``refusals``."""
+        """Write the decks and, next to them, the case's options. Raises ``refusals``."""
         units = decks.request.get("own_deck", {})
         paths = [read_options(decks.options, **units).save(folder)]
         paths += (own := own_decks.save(decks.request, folder))

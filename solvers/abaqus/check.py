@@ -1,4 +1,4 @@
-"""Whether keywords are as their records in the table say: what ABAQUS would refuse of a deck by its
+"""Check of keywords against their records in the table: what ABAQUS would refuse of a deck by its
 manual, and what is not checked."""
 
 from __future__ import annotations
@@ -222,7 +222,7 @@ def _elements(block: Block, names: _Names) -> Iterator[Finding]:
 
 
 def _unnamed(blocks: Sequence[Block], names: _Names) -> Iterator[Finding]:
-    """Names that nobody gives, sets whose elements nothing gives properties to."""
+    """Names that are used but not defined, and sets whose elements have no properties."""
     generated = any(block.name in GENERATORS for block in blocks)
     for kind, name, block, row in names.used:
         if kind in NUMBERED and FORM["integer"].fullmatch(name):

@@ -24,14 +24,13 @@ SIM = (
 
 @dataclass(frozen=True)
 class Modes:
-    """eigenvalues (m,): omega^2 in 1/s2; masses (m,): generalised, kg; nodes (k,);
-    coordinates (k, 3): m, undeformed; displacement (m, k, 3): both in global x, y, z."""
+    """Modes of a results file, in global x, y, z."""
 
-    eigenvalues: Array
-    masses: Array
-    nodes: Array
-    coordinates: Array
-    displacement: Array
+    eigenvalues: Array  # (m,): omega^2 in 1/s2
+    masses: Array  # (m,): generalised, kg
+    nodes: Array  # (k,)
+    coordinates: Array  # (k, 3): m, undeformed
+    displacement: Array  # (m, k, 3)
 
 
 def read_fil(path: Path) -> Modes:

@@ -1,4 +1,4 @@
-"""Tells a denied licence from every other way in which a job ends badly."""
+"""Distinguishes a denied licence from every other way in which a job ends badly."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ QUEUEING = re.compile(rf"\b(?:waiting|queue\w*)\b.*{_LICENCE}|{_LICENCE}.*queue"
 
 
 def denial(text: str) -> str:
-    """The first line of ``text`` that tells of a denied licence; empty where there is none."""
+    """The first line of ``text`` that reports a denied licence; empty where there is none."""
     for line in text.splitlines():
         if any(pattern.search(line) for pattern in PATTERNS):
             return line.strip()
@@ -34,5 +34,5 @@ def denial(text: str) -> str:
 
 
 def is_queueing(last_words: str) -> bool:
-    """Whether a job that said this last was still waiting for its licence."""
+    """Whether a job whose last line this is was still waiting for its licence."""
     return bool(QUEUEING.search(last_words) or denial(last_words))

@@ -15,14 +15,12 @@ OPTIONS_FILE = "abaqus.json"
 
 @dataclass(frozen=True)
 class Options:
-    """licence_wait_s: longest time spent waiting for a licence, 0 = none; licence_first_wait_s: the
-    first wait, each later one twice as long; length_m, mass_kg: the deck's units.
-    """
+    """Options of the solver, and the units of the decks."""
 
-    licence_wait_s: float = 600.0
-    licence_first_wait_s: float = 5.0
-    length_m: float = 1.0
-    mass_kg: float = 1.0
+    licence_wait_s: float = 600.0  # longest time spent waiting for a licence, 0 = none
+    licence_first_wait_s: float = 5.0  # the first wait, each later one twice as long
+    length_m: float = 1.0  # unit of the decks
+    mass_kg: float = 1.0  # unit of the decks
 
     def save(self, folder: Path) -> Path:
         """Write them into a run folder."""

@@ -61,7 +61,7 @@ class Bundled:
     failures = (RunFailed,)
 
     def write(self, decks: Decks, folder: Path) -> list[Path]:
-        """Write the decks and, beside them, what only this solver is asked."""
+        """Write the decks and, next to them, the requests that only this solver reads."""
         paths = []
         for name, text in decks.texts(self.dialect).items():
             paths.append(folder / name)

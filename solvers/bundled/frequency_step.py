@@ -39,7 +39,7 @@ Models = Callable[[float | None, bool, bool], Model]
 
 @dataclass
 class Inflated:
-    """A deck's tyre, and what is asked of it."""
+    """A deck's tyre, and what is requested of it."""
 
     deck: Deck
     request: Request

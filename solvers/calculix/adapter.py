@@ -60,11 +60,11 @@ class CalculiX:
 
     @property
     def version(self) -> str:
-        """As ``ccx -v`` has it; "unknown" where there is no ccx."""
+        """Version as ``ccx -v`` prints it; "unknown" where there is no ccx."""
         return _version(tuple(self.command))
 
     def write(self, decks: Decks, folder: Path) -> list[Path]:
-        """Write the decks and, beside them, how to run them. Raises Refused."""
+        """Write the decks and, next to them, how to run them. Raises Refused."""
         settings = _settings(decks.options)
         paths = own_decks.save(decks.request, folder)
         for name, text in decks.texts(self.dialect).items():

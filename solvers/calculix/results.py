@@ -27,7 +27,7 @@ class Fields:
 
 
 def read_eigenvalues(path: Path, diameter: int | None, expected: int | None) -> Array:
-    """omega^2 (asked,) in 1/s2, ascending, as .dat has them, of a nodal diameter of a sector; None:
+    """omega^2 (expected,) in 1/s2, ascending, from the .dat, of a nodal diameter of a sector; None:
     of a whole tyre, or as many as there are.
 
     Raises RunFailed: ``no_results`` unless there are as many as asked, ``unstable`` where one is
@@ -57,7 +57,7 @@ def _table(text: str) -> str:
 
 
 def read_mass(path: Path, elements: str = "EVERYTHING") -> float:
-    """Mass of a set of elements, in the deck's unit, as it is told last. Raises RunFailed
+    """Mass of a set of elements, in the deck's unit, as last printed. Raises RunFailed
     (``no_results``)."""
     matches = re.findall(MASS.format(re.escape(elements)), _text(path))
     if not matches:

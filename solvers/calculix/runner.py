@@ -12,15 +12,15 @@ from ..errors import RunFailed
 from ..process import last_words, run_command
 
 RESULT_SUFFIXES = ("dat", "frd", "sta", "cvg", "12d", "rout")
-LONGEST_LINE = 10_000  # characters of a log
-LONGEST_PATH = 100  # ccx keeps 132 characters of a file's path, the file's name included
+MAX_LINE_LENGTH = 10_000  # characters of a log
+MAX_PATH_LENGTH = 100  # ccx keeps 132 characters of a file's path, the file's name included
 NO_EQUILIBRIUM = re.compile(r"increment size smaller|too many cutbacks|max\. # of increments", re.I)
 
 
 def run_job(
     folder: Path, job: str, inputs: Sequence[str], command: Sequence[str], time_limit_s: float
 ) -> None:
-    """Run ``job``.inp of ``folder`` to its end; the results and ``job``.log stand beside it.
+    """Run ``job``.inp of ``folder`` to its end; the results and ``job``.log are next to it.
 
     ``inputs``: other files that it reads. One thread: two are slower, and results of one are
     the same to the last bit. Where ccx could not cope with the folder's path it runs elsewhere.
@@ -51,7 +51,7 @@ def clear(folder: Path, job: str) -> None:
 def _is_safe(folder: Path) -> bool:
     """ccx writes astray where a path holds a blank, and ends where it is too long."""
     path = str(folder.resolve())
-    return len(path) <= LONGEST_PATH and path.isascii() and " " not in path
+    return len(path) <= MAX_PATH_LENGTH and path.isascii() and " " not in path
 
 
 def _run(folder: Path, job: str, command: Sequence[str], time_limit_s: float) -> None:
@@ -79,7 +79,7 @@ def _said(log: Path) -> tuple[str, bool, bool]:
     error: list[str] = []
     lost = finished = False
     with log.open(encoding="utf-8", errors="replace") as file:
-        for line in iter(lambda: file.readline(LONGEST_LINE), ""):
+        for line in iter(lambda: file.readline(MAX_LINE_LENGTH), ""):
             lost = lost or bool(NO_EQUILIBRIUM.search(line))
             finished = finished or "Job finished" in line
             line = line.strip()

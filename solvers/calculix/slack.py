@@ -25,7 +25,7 @@ from .results import Fields
 Array = np.ndarray
 STRIP_COMMENT = re.compile(r"^\*\* no compression: (\{.*\})$", re.M)
 TAUT = -1e-6  # strain above which a cord counts as taut: round-off of the result file
-MOST_PLACES = 3
+MAX_PLACES = 3
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def refuse_slack(strips: list[Strip], inflated: Fields) -> None:
     if not slack:
         return
     places = [f"{layer} in {region} by {-100 * value:.2g} %" for value, layer, region, _ in slack]
-    named = ", ".join(places[:MOST_PLACES]) + (" and elsewhere" if places[MOST_PLACES:] else "")
+    named = ", ".join(places[:MAX_PLACES]) + (" and elsewhere" if places[MAX_PLACES:] else "")
     raise RunFailed(
         "unstable",
         f"CalculiX's inflated tyre compresses cords that bear no compression: {named}; its plies"

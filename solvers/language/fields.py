@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from .laws import HIGHEST_ORDER, LAW_CONSTANTS, LAWS_NOT_READ, ON_A_LINE
+from .laws import LAW_CONSTANTS, LAWS_NOT_READ, MAX_ENERGY_ORDER, ON_A_LINE
 from .rule import Field
 from .table import RULES
 from .text import Block
@@ -28,8 +28,8 @@ def law_of(block: Block) -> tuple[str, int]:
     if len(given) > 1:
         raise block.refused(f"{given[0]} and {given[1]} are two laws")
     order = block.parameters.get("N", "1")
-    if order not in map(str, range(1, HIGHEST_ORDER + 1)):
-        raise block.refused(f"N={order} is no order from 1 to {HIGHEST_ORDER}")
+    if order not in map(str, range(1, MAX_ENERGY_ORDER + 1)):
+        raise block.refused(f"N={order} is no order from 1 to {MAX_ENERGY_ORDER}")
     return given[0], int(order)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 ON_A_LINE = 8  # constants on each data line of *HYPERELASTIC
-HIGHEST_ORDER = 6
+MAX_ENERGY_ORDER = 6
 
 
 def _numbered(form: str, count: int) -> list[str]:

@@ -33,42 +33,32 @@ class Field(NamedTuple):
 
 @dataclass(frozen=True)
 class Rule:
-    """The record of one keyword: the manual's rule, and who honours what of it.
-
-    options: its parameters; needs: of each, split at |, one must be given; alone: those that
-    exclude each other; under: keywords of which it is an option; after: of which one must stand
-    before it, or in the job that it goes on from; within: procedures of the steps that it belongs
-    to; once: in the ``job``, the ``step`` or its ``parent``; rows: how few and how many data lines;
-    variants: their fields where a parameter is given that changes them ("": any or none).
-
-    honoured: by place ("deck", "deck step": a user's section; "section", "revolve", "step": the
-    bundled solver's jobs), the options that are honoured there; a value after = is the only one.
-    data: names of the data fields that are honoured, as "E:stress, nu=0", by parameter if they
-    differ; one that begins with _ is no number that may be set. is_output: asks for output or says
-    how to iterate, so that it changes no answer. is_contact: is about contact, which is left out of
-    a user's section where the bead is held. is_judged: False if its parameters and data are not
-    checked. instead: what a user may do if it is not honoured. calculix: why CalculiX has nothing
-    for it.
-    """
+    """The record of one keyword: the manual's rule, and which jobs honour what of it."""
 
     level: str
-    options: str = ""
-    fields: Fields = ""
-    rows: tuple[int, int] = (1, 10**9)
-    needs: tuple[str, ...] = ()
-    alone: tuple[str, ...] = ()
-    under: tuple[str, ...] = ()
+    options: str = ""  # its parameters
+    fields: Fields = ""  # of its data lines
+    rows: tuple[int, int] = (1, 10**9)  # how few and how many data lines
+    needs: tuple[str, ...] = ()  # of each, split at |, one must be given
+    alone: tuple[str, ...] = ()  # parameters that exclude each other
+    under: tuple[str, ...] = ()  # keywords of which it is an option
+    # of which one must stand before it, or in the job that it goes on from
     after: tuple[str, ...] = ()
-    within: tuple[str, ...] = ()
-    once: str = ""
+    within: tuple[str, ...] = ()  # procedures of the steps that it belongs to
+    once: str = ""  # in the ``job``, the ``step`` or its ``parent``
+    # fields where a parameter is given that changes them ("": any or none)
     variants: Mapping[str, Fields] = field(default_factory=dict)
+    # by place ("deck", "deck step": a user's section; "section", "revolve", "step": the bundled
+    # solver's jobs), the options that are honoured there; a value after = is the only one
     honoured: Mapping[str, str] = field(default_factory=dict)
+    # names of the data fields that are honoured, as "E:stress, nu=0", by parameter if they differ;
+    # one that begins with _ is no number that may be set
     data: str | Mapping[str, str] = ""
-    is_output: bool = False
-    is_contact: bool = False
-    is_judged: bool = True
-    instead: str = ""
-    calculix: str = ""
+    is_output: bool = False  # requests output or sets how to iterate, so that it changes no answer
+    is_contact: bool = False  # about contact, left out of a user's section if the bead is held
+    is_judged: bool = True  # False if its parameters and data are not checked
+    instead: str = ""  # what a user may do if it is not honoured
+    calculix: str = ""  # why CalculiX has nothing for it
 
     @cached_property
     def parameters(self) -> dict[str, str]:

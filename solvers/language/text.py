@@ -16,15 +16,15 @@ from ..errors import Refused
 from .element_types import NODES_AND_SECTION
 from .spelling import full_keyword, full_parameters, named
 
-MOST_BYTES = 100_000_000  # of a deck and all that it includes
+MAX_DECK_BYTES = 100_000_000  # of a deck and all that it includes
 MOST_KEYWORDS = 20_000  # of a deck and all that it includes; tyres have hundreds
-MOST_CHARACTERS = 4096  # with those that continue it; ABAQUS reads 256 of each
+MAX_CHARACTERS = 4096  # with those that continue it; ABAQUS reads 256 of each
 DEEPEST_INCLUDE = 5  # files that include others
 COMPLEX_STEP = 1e-30  # so small that its square vanishes against every real part
 
 
 class Place(NamedTuple):
-    """A line (from 1) of a file; a subclass says which error a mistake there is."""
+    """A line (from 1) of a file; a subclass chooses the error that a mistake there raises."""
 
     file: str
     line: int
@@ -175,7 +175,7 @@ class Reader:
 
     folder: Path | None  # None: nothing is included
     kind: type[Place] = Place
-    most_bytes: int = MOST_BYTES
+    most_bytes: int = MAX_DECK_BYTES
     blocks: list[Block] = field(default_factory=list)
     texts: dict[str, str] = field(default_factory=dict)  # by file
     _rows: list[Row] = field(default_factory=list)  # of the last block
@@ -227,8 +227,8 @@ class Reader:
                 if pending:
                     yield start, pending
                 start = self.kind(file, count)
-            if len(line) > MOST_CHARACTERS:
-                raise start.error(f"more than {MOST_CHARACTERS} characters in a line are not read")
+            if len(line) > MAX_CHARACTERS:
+                raise start.error(f"more than {MAX_CHARACTERS} characters in a line are not read")
             pending = ""
             if line.endswith(",") and (line.startswith("*") or self._is_short_element(line)):
                 pending = line
@@ -240,7 +240,8 @@ class Reader:
             yield start, pending
 
     def _is_short_element(self, line: str) -> bool:
-        """Whether an element's data line ends before its last node; its last comma says nothing."""
+        """Whether an element's data line ends before its last node; a comma at its end does not
+        count."""
         if not self.blocks or self.blocks[-1].name != "ELEMENT":
             return False
         nodes, _ = NODES_AND_SECTION.get(self.blocks[-1].get("TYPE"), (0, ""))
@@ -300,8 +301,8 @@ def read_deck(path: Path) -> str:
     too large; OSError."""
     if path.exists() and not path.is_file():
         raise DeckError(WHOLE_DECK, f"{path.name} is not a regular file")
-    if path.stat().st_size > MOST_BYTES:
-        raise DeckError(WHOLE_DECK, f"{path.name} is larger than {MOST_BYTES / 1e6:g} MB")
+    if path.stat().st_size > MAX_DECK_BYTES:
+        raise DeckError(WHOLE_DECK, f"{path.name} is larger than {MAX_DECK_BYTES / 1e6:g} MB")
     content = path.read_bytes()
     try:
         return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")

@@ -218,7 +218,7 @@ def test_time_is_looked_at_before_every_iteration(solid: Round) -> None:
     looks.clear()
     before = press.iterations
     state = press.parts, press.height - 1e-4, 100.0, None, 1e-8
-    press._settle(*state)
+    press._iterate(*state)
     assert len(looks) == press.iterations - before + 1 > 2
 
 
@@ -231,7 +231,7 @@ def test_friction_that_does_not_converge_is_left_soon(
     monkeypatch.setattr(press, "_step", lambda *given: (0 * press.parts, 0.0))
     before = press.iterations
     with pytest.raises(NoEquilibrium, match="did not converge"):
-        press._settle(press.parts, press.height - 1e-4, 100.0, None, 1e-8)
+        press._iterate(press.parts, press.height - 1e-4, 100.0, None, 1e-8)
     assert press.iterations == before + contact_newton.MAX_SETBACKS + 1
 
 
@@ -249,7 +249,7 @@ def test_the_line_search_asks_for_a_ten_thousandth_of_the_slope(
     fall = lambda contact, load, at: -share * 2e-9 * (at - height) / rise
     monkeypatch.setattr(press, "_energy", fall)
     with pytest.raises(NoEquilibrium, match=words):
-        press._settle(parts, height, 100.0, press._bound, 1e-8)
+        press._iterate(parts, height, 100.0, press._bound, 1e-8)
 
 
 def test_a_load_starts_along_the_slope_of_the_last_one(
@@ -258,13 +258,13 @@ def test_a_load_starts_along_the_slope_of_the_last_one(
     """The first one by a micrometre per newton."""
     press = solid.press(LENGTHS, 1e10)
     started: list[tuple[Array, float]] = []
-    settle = ContactNewton._settle
+    settle = ContactNewton._iterate
 
     def note(self: ContactNewton, parts: Array, height: float, *rest: Any) -> Any:
         started.append((parts, height))
         return settle(self, parts, height, *rest)
 
-    monkeypatch.setattr(ContactNewton, "_settle", note)
+    monkeypatch.setattr(ContactNewton, "_iterate", note)
     rest, free = press.parts, press.free_radius
     first = press.to(50.0)
     np.testing.assert_array_equal(started[0][0], rest)

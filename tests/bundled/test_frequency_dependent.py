@@ -112,7 +112,7 @@ def test_nothing_where_the_ratio_is_one() -> None:
 def test_the_inflated_state_and_the_other_rubbers_stay() -> None:
     """dK acts only where the law does."""
     m = support.model_of(support.tyre((3, 2, 2, 1)).deck)
-    (soft,) = replace(m, tables=[POWER]).growing()
+    (soft,) = replace(m, tables=[POWER]).frequency_dependent_models()
     laws = [part.law for part in soft.parts]
     assert laws and all(isinstance(law, MooneyRivlin) for law in laws)
     assert not any(law.C10.any() or law.inverse_D1.any() for law in laws)
@@ -133,7 +133,7 @@ def test_each_rubber_has_its_own_table_or_none() -> None:
     keywords, _ = grammar.check(read_keywords(head), False)
     m = model.build(keywords, None, True, own_frequency=True)
     assert [t.ratios[0] for t in m.tables] == pytest.approx([1.1, 1.2])
-    grown = [part.law.C10 for each in m.growing() for part in each.parts]
+    grown = [part.law.C10 for each in m.frequency_dependent_models() for part in each.parts]
     np.testing.assert_allclose(grown, [[1e6, 0, 0], [0, 0, 1e6]])
     assert not model.build(keywords, 15.0, True).tables
     law = model.build(keywords, 15.0, True).parts[0].law

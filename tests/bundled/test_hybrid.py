@@ -132,13 +132,13 @@ def test_a_law_of_frequency(bent: tuple[Hybrid, Array]) -> None:
     law, points = part.law, part.rows.weights.size
     assert isinstance(law, Hyperelastic)
     tabled = replace(part, law=replace(law, table=np.zeros(points, int)))
-    grown = tabled.growing(0)
-    assert grown is not None and tabled.growing(1) is not None
+    grown = tabled.frequency_dependent_part(0)
+    assert grown is not None and tabled.frequency_dependent_part(1) is not None
     stiff = replace(law, shear_ratio=np.full(points, 1.4), bulk_ratio=np.ones(points))
     whole = replace(part, law=stiff).tangents(U, True)
     for K, one, more in zip(whole, part.tangents(U, True), grown.tangents(U, True), strict=True):
         np.testing.assert_allclose(K, one + 0.4 * more, atol=1e-10 * abs(whole[0]).max())
-    other = tabled.growing(1)
+    other = tabled.frequency_dependent_part(1)
     assert other is not None and not np.any(other.tangents(U, False)[0])
 
 

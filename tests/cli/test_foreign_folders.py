@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from tyrecal.cli.output import refuse_other
-from tyrecal.files import NotAFile, read_bytes, whole, write_text
+from tyrecal.files import NotAFile, atomic_write, read_bytes, write_text
 
 from .test_cli import CASE, run
 
@@ -191,7 +191,7 @@ def test_whole_files_are_new_and_leftovers_go(tmp_path: Path, elsewhere: Path) -
     path = tmp_path / "result.json"
     leftover = tmp_path / f".result.json.{'0' * 16}.partial"
     leftover.symlink_to(elsewhere / "victim")
-    with whole(path) as partial:
+    with atomic_write(path) as partial:
         assert partial.is_file() and not partial.is_symlink() and not leftover.is_symlink()
         partial.write_text("new")
     assert path.read_text() == "new" and contents(elsewhere)["victim"] == WORDS

@@ -10,7 +10,7 @@ import click
 import pytest
 
 from tyrecal.cli.options import Study
-from tyrecal.cli.taken import taken
+from tyrecal.cli.taken import default_case
 from tyrecal.cli.terminal import Terminal
 from tyrecal.simulate.case_folder import owner
 from tyrecal.tyre.load import load_case
@@ -40,18 +40,18 @@ def fit(folder: Path, case: Path, started: str, good: bool = True) -> None:
 
 def test_the_only_case_is_taken_and_named(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (here / "jobs.yaml").write_text("queue: long\n")  # no case
-    assert taken(None, None, STUDY) == (Path("p235_75r17.yaml"), None, STUDY)
+    assert default_case(None, None, STUDY) == (Path("p235_75r17.yaml"), None, STUDY)
     assert capsys.readouterr().err == "p235_75r17.yaml, the only case here\n"
 
 
 def test_several_cases_or_none_are_refused_with_a_list(here: Path) -> None:
     shutil.copy(here / "p235_75r17.yaml", here / "b.yaml")
     with pytest.raises(click.UsageError, match=r"several here, b\.yaml, p235_75r17\.yaml"):
-        taken(None, None, STUDY)
+        default_case(None, None, STUDY)
     for path in here.glob("*.yaml"):
         path.unlink()
     with pytest.raises(click.UsageError, match="neither one here nor a finished fit"):
-        taken(None, None, STUDY)
+        default_case(None, None, STUDY)
 
 
 def test_the_last_fit_that_converged_is_taken_with_its_case(
@@ -63,14 +63,17 @@ def test_the_last_fit_that_converged_is_taken_with_its_case(
     fit(here / "new", here / "p235_75r17.yaml", "2026-01-02T10:00:00+00:00")
     fit(here / "failed", other, "2026-01-03T10:00:00+00:00", good=False)
     fit(here / "gone", here / "none.yaml", "2026-01-03T10:00:00+00:00")
-    case, fitted, study = taken(None, None, STUDY)
+    case, fitted, study = default_case(None, None, STUDY)
     assert (case, fitted) == (Path("p235_75r17.yaml"), Path("new/fit.json"))
     assert study.output == Path("new")
     notes = capsys.readouterr().err
     assert "the fit in 'gone' is left out: its case is not here\n" in notes
     assert "p235_75r17.yaml, with the fit in 'new'" in notes and "failed" not in notes
-    assert taken(None, Path("old/fit.json"), STUDY)[:2] == (Path("b.yaml"), Path("old/fit.json"))
-    assert taken(other, None, STUDY) == (other, None, STUDY)
+    assert default_case(None, Path("old/fit.json"), STUDY)[:2] == (
+        Path("b.yaml"),
+        Path("old/fit.json"),
+    )
+    assert default_case(other, None, STUDY) == (other, None, STUDY)
 
 
 def test_the_case_of_a_fit_is_known_by_its_tyre_where_it_is_not_at_its_place(here: Path) -> None:
@@ -81,32 +84,32 @@ def test_the_case_of_a_fit_is_known_by_its_tyre_where_it_is_not_at_its_place(her
     other = here / "other.yaml"
     other.write_text(renamed.read_text().replace("angle_deg: 70.0", "angle_deg: 69.0"))
     expected = (Path("renamed.yaml"), Path("results/fit.json"))
-    assert taken(None, None, STUDY)[:2] == expected
-    assert taken(None, Path("results"), STUDY)[0] == Path("renamed.yaml")
+    assert default_case(None, None, STUDY)[:2] == expected
+    assert default_case(None, Path("results"), STUDY)[0] == Path("renamed.yaml")
     deeper = here / "archive"
     deeper.mkdir()
     (here / "results").rename(deeper / "results")
-    assert taken(None, Path("archive/results"), STUDY)[0] == Path("renamed.yaml")
+    assert default_case(None, Path("archive/results"), STUDY)[0] == Path("renamed.yaml")
     shutil.copy(renamed, here / "again.yaml")
     with pytest.raises(
         click.UsageError, match=r"several have the tyre of .*, again\.yaml, renamed"
     ):
-        taken(None, Path("archive/results"), STUDY)
+        default_case(None, Path("archive/results"), STUDY)
     shutil.copy(renamed, case)  # of the name that the fit knows
-    assert taken(None, Path("archive/results"), STUDY)[0] == Path("p235_75r17.yaml")
+    assert default_case(None, Path("archive/results"), STUDY)[0] == Path("p235_75r17.yaml")
     for path in here.glob("*.yaml"):
         path.unlink()
     with pytest.raises(click.UsageError, match="none is here that 'archive/results' is a fit of"):
-        taken(None, Path("archive/results"), STUDY)
+        default_case(None, Path("archive/results"), STUDY)
 
 
 def test_a_case_of_an_own_deck_is_one(here: Path) -> None:
     (here / "p235_75r17.yaml").unlink()
     shutil.copytree(CASES / "ring_3d", here, dirs_exist_ok=True)
-    assert taken(None, None, STUDY)[0] == Path("ring.yaml")
+    assert default_case(None, None, STUDY)[0] == Path("ring.yaml")
     fit(here / "results", here / "ring.yaml", "2026-01-01T10:00:00+00:00")
     (here / "ring.yaml").rename(here / "renamed.yaml")
-    assert taken(None, None, STUDY)[0] == Path("renamed.yaml")
+    assert default_case(None, None, STUDY)[0] == Path("renamed.yaml")
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.simulate.deck.apart import TO_START, Apart
+from tyrecal.simulate.deck.apart import TO_START, TemplateProcess
 from tyrecal.simulate.deck.decks import Decks, without_header
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
@@ -252,7 +252,9 @@ def test_a_template_that_leaves_its_sandbox_reads_no_environment(
     (case_folder / "environ.j2").write_text("{{ environ }}")
     with ThreadPoolExecutor(1) as thread:  # which gets a process of its own
         rendered = thread.submit(
-            Apart("abaqus", case_folder).render, "environ.j2", {"environ": Hole(expression)}
+            TemplateProcess("abaqus", case_folder).render,
+            "environ.j2",
+            {"environ": Hole(expression)},
         )
         assert rendered.result() in ("", "{'OPENBLAS_NUM_THREADS': '1'}")
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.simulate.deck.decks import LONGEST_NAME, Decks, header, without_header
+from tyrecal.simulate.deck.decks import MAX_NAME_LENGTH, Decks, header, without_header
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.tyre.case import start_values, with_level
 from tyrecal.tyre.case.identity import tyre_sha256
@@ -61,7 +61,7 @@ def test_a_long_name_fits_a_line() -> None:
     long = case.case.model_copy(update={"name": "x" * 300})
     named = type(case)(**{**case.__dict__, "case": long})
     assert all(len(line) < 256 for line in header(named).splitlines())
-    assert header(named).count("x") >= LONGEST_NAME
+    assert header(named).count("x") >= MAX_NAME_LENGTH
 
 
 def test_studies_that_ask_the_same_share_the_record(case_folder: Path) -> None:

@@ -11,8 +11,8 @@ from numpy.polynomial import Polynomial
 
 from tyrecal.studies.diagnose.diagnosis import _asked_again
 from tyrecal.studies.diagnose.expansion import (
+    EffectResponse,
     Expansion,
-    Nodes,
     _more,
     _nodes,
     anchored,
@@ -57,7 +57,7 @@ def test_an_effect_reaches_as_far_as_there_are_solutions() -> None:
     assert tilt[:, 0, 0] == pytest.approx([0.75, 3.75])
     assert split[:, 0] == pytest.approx([0.25, 1.25])
     assert _nodes("e0", plain, span, dict.fromkeys(answers, failed)) is None
-    assert isinstance(made, Nodes)
+    assert isinstance(made, EffectResponse)
 
 
 def test_hermites_polynomials_take_values_and_slopes() -> None:

@@ -15,7 +15,13 @@ from scipy.integrate import trapezoid
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.inverse_problem import Toggle
 from tyrecal.studies.diagnose.model import Answer, Query, Span
-from tyrecal.studies.diagnose.next_measurement import CHECKED, Look, OtherStates, offered_kPa, rank
+from tyrecal.studies.diagnose.next_measurement import (
+    CHECKED,
+    CandidateRows,
+    OtherStates,
+    offered_kPa,
+    rank,
+)
 from tyrecal.studies.diagnose.observations import Observable
 from tyrecal.studies.diagnose.separability import separate
 
@@ -160,7 +166,7 @@ def test_information_is_none_of_what_is_known_and_at_most_what_is_open() -> None
     y, before = np.linspace(-9, 29, 20001), 0.0
     for off in (1e-6, 0.5, 1.0, 2.0, 4.0, 8.0, 20.0):
         shifts = {"a": np.zeros((1, 2)), "b": np.array([[0.0, off]])}
-        one = Look(np.eye(2), np.zeros((2, 1)), shifts)
+        one = CandidateRows(np.eye(2), np.zeros((2, 1)), shifts)
         gain = one.information(1, {"a": 0.6, "b": 0.4}, np.ones(1))
         normal = lambda m: np.exp(-((y - m) ** 2) / 2) / np.sqrt(2 * np.pi)
         both = 0.6 * normal(0) + 0.4 * normal(off)
@@ -169,14 +175,14 @@ def test_information_is_none_of_what_is_known_and_at_most_what_is_open() -> None
         assert before <= gain <= open_ - rest + 1e-9
         before = gain
     assert gain == pytest.approx(open_, rel=1e-9)
-    known = Look(
+    known = CandidateRows(
         np.array([[1.0, 1.0], [1.0, 1.0 + 1e-9]]),
         np.zeros((2, 1)),
         shifts | {"b": np.array([[20.0, 20.0]])},
     )
     assert abs(known.information(1, {"a": 0.6, "b": 0.4}, np.ones(1))) < 1e-9
     wide = {"a": np.zeros((7, 2)), "b": np.linspace([0, 0], [0, 9.0], 7)}
-    spread = Look(np.eye(2), np.zeros((2, 1)), wide | {"a": wide["b"]})
+    spread = CandidateRows(np.eye(2), np.zeros((2, 1)), wide | {"a": wide["b"]})
     assert abs(spread.information(1, {"a": 0.6, "b": 0.4}, np.ones(1))) < 1e-9  # alike in both
 
 

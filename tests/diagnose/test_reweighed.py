@@ -9,7 +9,7 @@ import pytest
 
 from tyrecal.studies.diagnose.evidence import families, refit
 from tyrecal.studies.diagnose.inverse_problem import Assumed, InverseProblem
-from tyrecal.studies.diagnose.reweighed import Changed, lines, reweighed
+from tyrecal.studies.diagnose.reweighed import Perturbation, lines, reweighed
 
 from ..chance import generator
 from .test_veering import Near
@@ -20,24 +20,26 @@ pytestmark = pytest.mark.numbers
 E = {"e0": np.array([0.2, 0.3, 0.4]), "e1": np.array([0.3, 0.2, 0.15])}
 
 
-def changes(p: InverseProblem) -> list[Changed]:
+def changes(p: InverseProblem) -> list[Perturbation]:
     """One of each kind, and two at once."""
     every = np.ones(len(p.places), bool)
     fewer = np.array([row.label != p.observations.rows[3].label for row in p.observations.rows])
     twice = replace(p, reduced={0: 2.0})
     sure = replace(p, assumed=replace(p.assumed, form=0.0))
     return [
-        Changed("nothing", p, every),
-        Changed("a constant", twice, every),
-        Changed("laws", p, every, 2.0),
-        Changed("form", sure, every),
-        *(Changed("starts", replace(p, spread=k * p.spread), every) for k in (0.5, 2.0)),
-        Changed("a label", p, fewer),
-        Changed("two", twice, fewer),
+        Perturbation("nothing", p, every),
+        Perturbation("a constant", twice, every),
+        Perturbation("laws", p, every, 2.0),
+        Perturbation("form", sure, every),
+        *(Perturbation("starts", replace(p, spread=k * p.spread), every) for k in (0.5, 2.0)),
+        Perturbation("a label", p, fewer),
+        Perturbation("two", twice, fewer),
     ]
 
 
-def made_anew(other: Changed, extra: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+def made_anew(
+    other: Perturbation, extra: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """ln Z and chi2 of effects `E`, or of more covariance without any, by re-fits."""
     p, law = other.problem.only(other.keep), other.problem.assumed.law
     assert law is not None

@@ -11,7 +11,7 @@ import pytest
 from tyrecal.errors import InputError
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
-from tyrecal.simulate.modes.find import Found, find_modes
+from tyrecal.simulate.modes.find import LabelledModes, find_modes
 from tyrecal.studies.diagnose.diagnosis import diagnose
 from tyrecal.studies.diagnose.inverse_problem import Assumed
 from tyrecal.studies.diagnose.model import Answer, Query
@@ -27,7 +27,7 @@ from tyrecal.studies.diagnose.section_fields import (
     sizes,
     with_fields,
 )
-from tyrecal.studies.diagnose.section_told import section_told
+from tyrecal.studies.diagnose.section_told import section_posterior
 from tyrecal.studies.diagnose.tyre_model import TyreModel
 from tyrecal.studies.diagnose.uncertainties import RIM_WIDTH, sources
 from tyrecal.studies.modes import modes_result
@@ -199,7 +199,7 @@ def test_slopes_of_fields_are_the_model_s_own() -> None:
     z = {name: 0.2 * (-1) ** i for i, name in enumerate(fields(STATED))}  # a tyre as it may be
     drawn = Evaluator(TyreDesign(with_fields(STATED, z)))
     ((_, tyre),) = find_modes(drawn, [Question({})], LABELS)
-    assert isinstance(tyre, Found)
+    assert isinstance(tyre, LabelledModes)
     ln_f = [np.log(tyre.wanted[label].frequency_Hz) for label in LABELS]
     own = np.append(ln_f, np.log(tyre.evaluation.mass_kg)) - at_0.eta
     by_slopes = sum(amount * column[name] for name, amount in z.items())
@@ -228,7 +228,7 @@ def test_what_is_told_of_the_section_holds_within_its_standard_deviation(chance:
         seen = base.measured(y).observations
         stated = Assumed(form=0.001, law=0.0)
         d = diagnose(toy, toy.rows, seen, assumed=stated)  # type: ignore[arg-type]
-        posterior = section_told(STATED, own_sources, d)
+        posterior = section_posterior(STATED, own_sources, d)
         assert {v.field for v in posterior} == {"meridian", "hold", "gauge", "stiffness", "density"}
         assert all(0 < v.sigma <= v.before for v in posterior)
         value = next(v for v in posterior if v.field == "meridian")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tyrecal.report.diagnosis import page
-from tyrecal.studies.diagnose.constants_told import constants_told
+from tyrecal.studies.diagnose.constants_told import constants_posterior
 from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
 from tyrecal.studies.diagnose.evidence import COVERAGE, explain
 from tyrecal.studies.diagnose.expansion import anchored
@@ -19,7 +19,7 @@ from tyrecal.studies.diagnose.robustness import robustness
 from tyrecal.studies.diagnose.several import (
     PARTNERS,
     before,
-    most_like,
+    next_candidates,
     present,
     probabilities,
     weigh,
@@ -104,7 +104,7 @@ def test_a_third_effect_is_looked_for_where_the_rest_of_the_gap_is_like_it() -> 
         toy.tilt[id] = 0 * toy.tilt[id]
     base = problem(toy)
     p = base.measured(toy.base + 0.8 * toy.g["e1"] + 0.5 * toy.g["e4"] + 0.6 * toy.g["e7"])
-    assert most_like(p, explain(p, ["e1", "e4"], 1.0))[0] == "e7"
+    assert next_candidates(p, explain(p, ["e1", "e4"], 1.0))[0] == "e7"
 
 
 def test_two_effects_that_hide_one_another_are_found() -> None:
@@ -156,7 +156,7 @@ def test_what_the_data_say_of_constants() -> None:
     y = toy.base + 2 * toy.constants[:, 1]
     d = diagnose(toy, toy.rows, base.measured(y).observations, assumed=base.assumed)
     assert d.verdict.kind == "no_gap"
-    shifts = {each.name: each.shift_in_sd for each in constants_told(d)}
+    shifts = {each.name: each.shift_in_sd for each in constants_posterior(d)}
     whole = base.sigma + toy.J @ toy.J.T
     wanted = toy.constants.T @ np.linalg.inv(whole) @ (y - toy.base)
     assert [shifts[name] for name in toy.sources] == pytest.approx(wanted, abs=0.01)

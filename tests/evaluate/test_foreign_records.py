@@ -17,7 +17,7 @@ import pytest
 from tyrecal.cli.main import main
 from tyrecal.simulate.evaluate.evaluator import Counts
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
-from tyrecal.simulate.evaluate.record import LONGEST_TEXT, MOST_ARRAYS, Damaged, _arrays
+from tyrecal.simulate.evaluate.record import MAX_ARRAYS, MAX_JSON_BYTES, Damaged, _arrays
 from tyrecal.simulate.evaluate.recorded import check
 from tyrecal.simulate.evaluate.store import Store
 
@@ -108,8 +108,8 @@ KINDS: dict[str, Callable[[Path], None]] = {
     "thousands of digits": lambda path: rewritten(path, b'{"content": ' + b"9" * 5000 + b"}"),
     "about a list": edited(lambda record: {**record, "about": [1]}),
     "about nothing": edited(lambda record: {**record, "about": {}}),
-    "too much text": lambda path: rewritten(path, b"[" + b"[]," * (LONGEST_TEXT // 3) + b"[]]"),
-    "too many arrays": arrays(zipped(b"", members=MOST_ARRAYS + 1)),
+    "too much text": lambda path: rewritten(path, b"[" + b"[]," * (MAX_JSON_BYTES // 3) + b"[]]"),
+    "too many arrays": arrays(zipped(b"", members=MAX_ARRAYS + 1)),
     "no arrays": arrays(b""),
     "no archive": arrays(b"PK\x03\x04 rubbish"),
     "a bomb": arrays(zipped(bytes(1_000_000), zipfile.ZIP_DEFLATED)),

@@ -8,7 +8,7 @@ import pytest
 import tyrecal
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
-from tyrecal.simulate.modes.find import Found, find_modes
+from tyrecal.simulate.modes.find import LabelledModes, find_modes
 from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.problem import Problem
 from tyrecal.studies.fit.targets import read_targets
@@ -43,7 +43,7 @@ def frequencies(case: LoadedCase, numbers: dict[str, float]) -> np.ndarray:
     labels = [t.label for t in read_targets(case)]
     question = Question({**start_values(case), **numbers})
     ((_, answer),) = find_modes(Evaluator(TyreDesign(case)), [question], lambda *_: labels, 1)
-    assert isinstance(answer, Found)
+    assert isinstance(answer, LabelledModes)
     return np.array([answer.wanted[label].frequency_Hz for label in labels])
 
 

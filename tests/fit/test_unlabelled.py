@@ -21,7 +21,7 @@ from tyrecal.studies.fit.problem import Problem
 from tyrecal.studies.fit.study import FitStudy
 from tyrecal.studies.labelling.expansion import Expansion, Prior, find_labels
 from tyrecal.studies.labelling.label import Labelled, fitted_prior, label, start_prior
-from tyrecal.studies.labelling.result import labels_told
+from tyrecal.studies.labelling.result import labels_posterior
 from tyrecal.studies.labelling.tree import (
     DISCREPANCIES,
     FOREIGN,
@@ -189,7 +189,7 @@ def test_readings_get_the_labels_of_the_tyre(labelled: Labelled) -> None:
     in_order = sorted(labelled.under(1), key=lambda each: each.value)
     assert [each.label for each in in_order] == second != [x for x in labelled.labels if x]
     assert labelled.found.settled
-    labels = labels_told(CASE, labelled)
+    labels = labels_posterior(CASE, labelled)
     assert len(labels.frequencies) == 16 and not labels.doubts()
     (foreign,) = [each for each in labels.frequencies if each.label is None]
     assert foreign.frequency_Hz == FOREIGN_Hz and foreign.said == FOREIGN_WORDS

@@ -8,7 +8,7 @@ import pytest
 
 from tyrecal.simulate.evaluate.evaluator import Question
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
-from tyrecal.simulate.modes.find import MORE_MODES, Found, find_modes
+from tyrecal.simulate.modes.find import MORE_MODES, LabelledModes, find_modes
 from tyrecal.simulate.modes.label import labelled
 
 from ..fit.fake import LABELS, FakeEvaluator
@@ -42,7 +42,7 @@ def test_a_lost_label_is_asked_for_with_more_modes(enough: int | None) -> None:
         assert isinstance(labelled, EvaluationFailed) and labelled.cause == "lost_label"
         assert str(LABELS[-1]) in str(labelled)
     else:
-        assert isinstance(labelled, Found) and list(labelled.wanted) == [LABELS[-1]]
+        assert isinstance(labelled, LabelledModes) and list(labelled.wanted) == [LABELS[-1]]
         assert len(labelled.modes) == len(LABELS) and 0 < labelled.clarity <= 1
 
 
@@ -57,7 +57,7 @@ def test_each_has_its_place_those_that_wait_the_last_ones() -> None:
     )
     assert [place for place, _ in answers] == [1, 2, 0]
     kinds = [type(answer) for _, answer in answers]
-    assert kinds == [EvaluationFailed, DeckRefused, Found]
+    assert kinds == [EvaluationFailed, DeckRefused, LabelledModes]
 
 
 def test_labels_may_hang_on_the_modes() -> None:
@@ -65,7 +65,9 @@ def test_labels_may_hang_on_the_modes() -> None:
     ((_, labelled),) = find_modes(
         evaluator, [Question(START)], lambda _, modes: [m.label for m in modes if m.label.c == 2]
     )
-    assert isinstance(labelled, Found) and set(labelled.wanted) == {x for x in LABELS if x.c == 2}
+    assert isinstance(labelled, LabelledModes) and set(labelled.wanted) == {
+        x for x in LABELS if x.c == 2
+    }
 
 
 def test_modes_rise_in_frequency() -> None:

@@ -23,7 +23,7 @@ from scipy.optimize import least_squares
 from tests.conftest import CASES
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
-from tyrecal.simulate.modes.find import Found, find_modes
+from tyrecal.simulate.modes.find import LabelledModes, find_modes
 from tyrecal.studies.fit.targets import target_labels
 from tyrecal.studies.fit.variable import DesignVariable, read_variable
 from tyrecal.tyre.case import LoadedCase, with_level
@@ -104,7 +104,7 @@ class BothColumns:
     def _column(self, values: Mapping[str, float], own: Mapping[str, float]) -> tuple[Array, Array]:
         question = Question(values, tuple(own))
         ((_, labelled),) = find_modes(self.evaluator, [question], self.labels)
-        assert isinstance(labelled, Found), labelled
+        assert isinstance(labelled, LabelledModes), labelled
         hertz = np.array([labelled.wanted[label].frequency_Hz for label in self.labels])
         places = [labelled.wanted[label].position for label in self.labels]
         rows = [

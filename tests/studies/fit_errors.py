@@ -23,7 +23,7 @@ import numpy as np
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
-from tyrecal.simulate.modes.find import Found, find_modes
+from tyrecal.simulate.modes.find import LabelledModes, find_modes
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.covariance import by_laws
 from tyrecal.studies.diagnose.form_error import MATERIAL_LAWS
@@ -61,7 +61,7 @@ def frequencies(case: LoadedCase, values: dict[str, float], pressures: Sequence[
     evaluator, hertz = Evaluator(TyreDesign(case)), []
     questions = [Question({**values, "pressure_kPa": p}) for p in pressures]
     for _, answer in sorted(find_modes(evaluator, questions, lambda *_: LABELS, 1)):
-        if not isinstance(answer, Found):
+        if not isinstance(answer, LabelledModes):
             raise answer
         hertz += [answer.wanted[label].frequency_Hz for label in LABELS]
     return hertz

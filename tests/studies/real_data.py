@@ -19,7 +19,7 @@ from tests.conftest import CASES
 from tyrecal.measured.tables import read_measurements
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
-from tyrecal.simulate.modes.find import Found, find_modes
+from tyrecal.simulate.modes.find import LabelledModes, find_modes
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.tyre.case import LoadedCase
@@ -73,7 +73,7 @@ def predicted(case: LoadedCase) -> None:
     wide = changed(case, analysis=analysis)
     question = Question(STATE.design(wide, fit.fitted.values))
     ((_, labelled),) = find_modes(Evaluator(TyreDesign(wide)), [question], LABELS)
-    assert isinstance(labelled, Found), labelled
+    assert isinstance(labelled, LabelledModes), labelled
     hertz = np.array([labelled.wanted[label].frequency_Hz for label in LABELS])
     off = np.log(hertz / [each.value for each in MEASURED])
     cells = " | ".join(f"{100 * np.expm1(x):+.1f}" for x in off)

@@ -39,7 +39,7 @@ from tyrecal.studies.diagnose.uncertainties import sources
 from tyrecal.studies.emulator import emulator
 from tyrecal.studies.fit.targets import read_targets
 from tyrecal.studies.fit.variable import DesignVariable, read_variables
-from tyrecal.studies.sample.box import drawn
+from tyrecal.studies.sample.box import sample_box
 from tyrecal.studies.sample.posterior import Posterior
 from tyrecal.studies.sample.predict import conditional
 from tyrecal.studies.sample.study import _answer, rows_of, run
@@ -124,7 +124,7 @@ def coverage(count: int, seed: int) -> None:
         off = common @ random.normal(size=len(rows))
         y = density.ln_f(truth, at)[0] + off[:n] + RELATIVE_SIGMA * random.normal(size=n)
         here = replace(density, y=y)
-        sample = drawn(here, box(0.7), 100_000, i)
+        sample = sample_box(here, box(0.7), 100_000, i)
         low, high = np.quantile(sample.chains.flat, [0.05, 0.95], axis=0)
         held += (low <= truth[0]) & (truth[0] <= high)
         linear += abs(truth[0] - sample.optima[0]) <= 1.645 * np.sqrt(np.diag(sample.covariance))

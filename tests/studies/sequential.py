@@ -8,9 +8,9 @@ laboratory may measure; tyres are then drawn by algebra: one effect, 20 to 100 %
 design variables within 5 %, and everything else (constants, section, form, law, scatter of 0.2 %)
 by the diagnosis' own covariance. A laboratory begins with the nine modes at 160 kPa, diagnoses
 (single effects), measures, and diagnoses again, until the likeliest explanation has 0.9. `next`
-takes the most information per hour (`Look.information`) of what is left, pressures as it offers
-them (`offered_kPa`); the plan has its order.
-Hours as `next_measurement.HOURS` has them; footprint and loaded modes cost hours and tell the
+takes the most information per hour (`CandidateRows.information`) of what is left, pressures as it
+offers them (`offered_kPa`); the plan has its order.
+Hours as `next_measurement.COST_HOURS` has them; footprint and loaded modes cost hours and tell the
 diagnosis nothing, which uses neither as evidence: `next` never proposes them, and the plan is told
 without them, too. Where no verdict is reached all hours of the plan are counted. With --hindsight,
 also the cheapest set that would have done, which no laboratory can know, of so many tyres.
@@ -34,21 +34,21 @@ import numpy as np
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.studies.diagnose.evidence import NONE, Hypothesis
-from tyrecal.studies.diagnose.expansion import Expansion, Nodes, expand
+from tyrecal.studies.diagnose.expansion import EffectResponse, Expansion, expand
 from tyrecal.studies.diagnose.inverse_problem import InverseProblem, Toggle
 from tyrecal.studies.diagnose.model import ModelRow
 from tyrecal.studies.diagnose.next_measurement import (
     CAVITY_GAS,
     CHECKED,
+    COST_HOURS,
+    DIRECT_READINGS,
     HELIUM,
-    HOURS,
     MASS_PERCENT,
     MAX_EXPLANATIONS,
     MIN_PROBABILITY,
-    READ,
     READING,
     SIZES,
-    Look,
+    CandidateRows,
     offered_kPa,
 )
 from tyrecal.studies.diagnose.observations import Observable, Observations
@@ -69,9 +69,9 @@ RESULT = Path(__file__).parents[1] / "benchmarks" / "sequential.jsonl"
 FIRST, OWN_kPa = "160 kPa", 240.0
 PRESSURE_kPa = {f"{p:g} kPa": p for p in offered_kPa(OWN_kPa, [])}
 PLAN = (FIRST, "weigh", "240 kPa", "320 kPa", "calliper", "footprint", "clamp", "loaded modes")
-COST = dict.fromkeys(PRESSURE_kPa, HOURS["pressure"]) | {
+COST = dict.fromkeys(PRESSURE_kPa, COST_HOURS["pressure"]) | {
     **{
-        name: HOURS[name]
+        name: COST_HOURS[name]
         for name in ("weigh", "calliper", "rim", "seat", "helium", "mount", "clamp", "cut")
     },
     "footprint": 2.0,
@@ -124,7 +124,7 @@ class Laboratory:
                 shifts[h.key] = added.shift[:, order]
         sigma = self.problem.sigma[np.ix_(order, order)]
         known = {key: likely[key] for key in keys}
-        after = Look(sigma, self.jacobian[order], shifts)
+        after = CandidateRows(sigma, self.jacobian[order], shifts)
         return after.information(len(here), known, self.problem.spread)
 
 
@@ -216,7 +216,12 @@ def laboratory() -> Laboratory:
     for place in own:
         measured("mount", Observable.of(rows[place]), place)
         measured("helium", replace(Observable.of(rows[place]), run=1), place)
-    readings = [(tool, id) for tool, (_, ids) in READ.items() for id in expanded.nodes if id in ids]
+    readings = [
+        (tool, id)
+        for tool, (_, ids) in DIRECT_READINGS.items()
+        for id in expanded.nodes
+        if id in ids
+    ]
     fields = [k for k, name in enumerate(model.sources) if name.startswith(SECTION)]
     shows = np.zeros((len(readings) + len(fields), len(own_sources)))
     far = {id: max(abs(spans[id].low), abs(spans[id].high)) for id in expanded.nodes}
@@ -246,7 +251,7 @@ def _with_readings(
     """With rows more: readings of effects' sizes, over their ranges, and of sources."""
     m, v = len(shows), len(expanded.x0)
 
-    def of(id: str, nodes: Nodes) -> Nodes:
+    def of(id: str, nodes: EffectResponse) -> EffectResponse:
         size = np.zeros((len(nodes.values), m))
         if id in ids:
             size[:, list(ids).index(id)] = nodes.values / far[id]

@@ -47,7 +47,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.results import Evaluation, RawMode
-from tyrecal.simulate.modes.find import Found, find_modes
+from tyrecal.simulate.modes.find import LabelledModes, find_modes
 from tyrecal.studies.emulator import Emulator, emulator, spread, up_to
 from tyrecal.studies.fit import problem as problem_module
 from tyrecal.studies.fit.calibrate import calibrate
@@ -106,7 +106,7 @@ def frequencies(evaluator: Evaluator, state: TyreState, values: Mapping[str, flo
     """By the model, Hz, of `LABELS`."""
     question = Question(state.design(CASE, values))
     ((_, labelled),) = find_modes(evaluator, [question], LABELS)
-    assert isinstance(labelled, Found)
+    assert isinstance(labelled, LabelledModes)
     return [labelled.wanted[label].frequency_Hz for label in LABELS]
 
 

@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 
 from tyrecal.errors import InputError
 from tyrecal.studies.diagnose.observations import Observable
-from tyrecal.studies.sample.box import drawn
+from tyrecal.studies.sample.box import sample_box
 from tyrecal.studies.sample.chains import (
     ENOUGH,
     WARM_UP,
@@ -44,7 +44,7 @@ pytestmark = pytest.mark.numbers
 def test_a_linear_tyre_has_the_normal_posterior_of_the_closed_form(chance: Chance) -> None:
     """Draws ten autocorrelation times apart, made independent standard normal ones by the closed
     form: mean, scatter and distribution. False failures: 7e-7."""
-    draws = drawn(posterior(WIDE), BOUNDS, 100_000, int(chance.random.integers(2**31)))
+    draws = sample_box(posterior(WIDE), BOUNDS, 100_000, int(chance.random.integers(2**31)))
     assert np.allclose(draws.covariance, COVARIANCE, rtol=1e-6)
     assert np.allclose(draws.optima, CENTRE[None], atol=1e-6 * WIDTH)
     chains = draws.chains
@@ -81,14 +81,14 @@ def test_what_each_rim_tells_adds_up() -> None:
 
 
 def test_draws_are_worth_as_many_as_their_autocorrelation_says() -> None:
-    chains = drawn(posterior(WIDE), BOUNDS, 40_000, 3).chains
+    chains = sample_box(posterior(WIDE), BOUNDS, 40_000, 3).chains
     flat, tau = chains.flat, chains.tau.max()
     assert len(flat) == chains.draws.shape[0] * chains.draws.shape[1]
     assert chains.effective == pytest.approx(len(flat) / tau)
     apart = max(1, int(tau / 2))
     assert len(chains.thinned) == -(-chains.draws.shape[0] // apart) * chains.draws.shape[1]
     assert chains.dropped + len(chains.draws) == 400 and 20 < chains.dropped < 100
-    assert drawn(posterior(WIDE), BOUNDS, 2000, 3).chains.enough  # more are drawn by itself
+    assert sample_box(posterior(WIDE), BOUNDS, 2000, 3).chains.enough  # more are drawn by itself
 
 
 def test_more_draws_have_more_walkers_until_their_steps_tell_tau() -> None:
@@ -162,7 +162,7 @@ def test_all_optima_of_a_box_are_found_and_walkers_start_from_the_likely_ones() 
     for each in best:  # no place around is likelier
         around = density(each + 1e-3 * generator("around").normal(size=(200, 2)))
         assert around.max() <= density(each[None])[0] + 1e-9
-    x = drawn(density, BOUNDS, 20_000, 0).chains.flat[:, 0]
+    x = sample_box(density, BOUNDS, 20_000, 0).chains.flat[:, 0]
     ratio = np.exp(height[1] - height[0])
     assert np.mean(x < 0) == pytest.approx(ratio / (1 + ratio), abs=0.1)
 

@@ -15,7 +15,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.modes.label import Label, labelled
 from tyrecal.studies.diagnose.observations import Observable, Observations
-from tyrecal.studies.sample.box import drawn
+from tyrecal.studies.sample.box import sample_box
 from tyrecal.studies.sample.predict import conditional
 from tyrecal.studies.sample.result import draws_csv, result
 from tyrecal.studies.sample.study import Sample, check, run, targets_as_readings
@@ -126,7 +126,7 @@ def test_targets_are_read_with_their_sigma_or_what_the_fit_leaves() -> None:
 def sampled(draws: int = 20_000) -> Sample:
     """As `study.run` gives it, of the linear tyre."""
     density = posterior(WIDE)
-    drawing = drawn(density, BOUNDS, draws, 5)
+    drawing = sample_box(density, BOUNDS, draws, 5)
     observations = Observations(rows((240.0,)), density.y, SIGMA, 0.0, SIGMA * np.nan, SIGMA)
     x = drawing.chains.thinned
     eta = density.ln_f(x, density.rows)

@@ -11,7 +11,14 @@ from scipy.stats import norm
 
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.studies.sample import box as box_module
-from tyrecal.studies.sample.box import AT_EDGE, drawn, grown, larger, probed, shares_at_edge
+from tyrecal.studies.sample.box import (
+    AT_EDGE,
+    edge_probability,
+    grow_box,
+    larger,
+    sample_box,
+    shares_at_edge,
+)
 from tyrecal.studies.sample.posterior import Posterior
 from tyrecal.studies.sample.study import first_box
 
@@ -32,7 +39,7 @@ def test_the_box_grows_until_it_holds_the_posterior() -> None:
 
     begun: list[bool] = []
     first = np.stack([CENTRE - 2 * WIDTH, CENTRE + 1.5 * WIDTH], 1)
-    result = grown(ask, first, BOUNDS, np.ones(3), 20_000, 1, begun.append)
+    result = grow_box(ask, first, BOUNDS, np.ones(3), 20_000, 1, begun.append)
     assert result.at_edge.sum() < AT_EDGE and not result.stopped
     assert result.boxes == len(boxes) >= 2 and result.evaluations == 14
     assert begun == [False, True] * len(boxes)
@@ -50,27 +57,27 @@ def test_a_box_that_cannot_grow_says_why() -> None:
     def failing(box: Array) -> Posterior:
         raise EvaluationFailed("no_equilibrium", "inflation stopped at 12 kPa")
 
-    result = grown(small, first, BOUNDS, np.ones(3), 3000, 1)
+    result = grow_box(small, first, BOUNDS, np.ones(3), 3000, 1)
     assert result.boxes == 1 and result.at_edge.sum() > AT_EDGE
     assert result.stopped == "a larger box has no emulator: inflation stopped at 12 kPa"
     with pytest.raises(EvaluationFailed, match="inflation"):
-        grown(failing, first, BOUNDS, np.ones(3), 3000, 1)
+        grow_box(failing, first, BOUNDS, np.ones(3), 3000, 1)
 
     def rough(box: Array) -> Posterior:
         made = posterior(box)
         errors = np.full(3, 0.02 if not np.allclose(box, first) else 0.5)
         return replace(made, emulators=(replace(made.emulators[0], stated_errors=errors),))
 
-    result = grown(rough, first, BOUNDS, np.array([0.03, 0.01, 0.03]), 3000, 1)
+    result = grow_box(rough, first, BOUNDS, np.array([0.03, 0.01, 0.03]), 3000, 1)
     assert result.stopped == "the emulator of a larger box may be 2 % off"
     assert result.boxes == 1 and result.evaluations == 14
-    assert grown(rough, first, BOUNDS, np.full(3, 0.03), 3000, 1).boxes > 1
+    assert grow_box(rough, first, BOUNDS, np.full(3, 0.03), 3000, 1).boxes > 1
 
 
 def test_a_box_does_not_grow_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(box_module, "GROWTHS", 1)
     first = np.stack([CENTRE - 0.1 * WIDTH, CENTRE + 0.1 * WIDTH], 1)
-    result = grown(posterior, first, BOUNDS, np.ones(3), 3000, 1)
+    result = grow_box(posterior, first, BOUNDS, np.ones(3), 3000, 1)
     assert result.boxes == 2 and result.stopped == "it was made larger 1 times"
 
 
@@ -91,7 +98,7 @@ def test_a_box_is_tried_by_the_shares_that_draws_from_it_will_have(chance: Chanc
     box = np.stack([CENTRE - [3, 7] * WIDTH, CENTRE + [2, 7] * WIDTH], 1)
     density = posterior(box)
     shares = np.array(
-        [probed(density, BOUNDS, int(s)) for s in chance.random.integers(10**9, size=50)]
+        [edge_probability(density, BOUNDS, int(s)) for s in chance.random.integers(10**9, size=50)]
     )
     whole = norm.cdf(2) - norm.cdf(-3)
     near = 0.05 * 2.5
@@ -104,8 +111,8 @@ def test_a_box_with_two_optima_is_tried_about_both() -> None:
     """The same shares as walkers come to, of which fewer are at the farther edge."""
     box = np.array([[-0.54, 0.55], [0.2, 0.8]])
     density = posterior(box, two_valleys, two_valleys(np.array([0.5, 0.5])))
-    shares = probed(density, BOUNDS, 1)
-    x = drawn(density, BOUNDS, 100_000, 0).chains.flat
+    shares = edge_probability(density, BOUNDS, 1)
+    x = sample_box(density, BOUNDS, 100_000, 0).chains.flat
     by_walkers = shares_at_edge(x, box, BOUNDS)
     assert by_walkers[0].min() > 1e-3
     assert shares[0] == pytest.approx(by_walkers[0], rel=0.3)

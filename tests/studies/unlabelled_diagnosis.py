@@ -38,8 +38,8 @@ from tyrecal.studies.diagnose.gap import projection
 from tyrecal.studies.diagnose.inverse_problem import InverseProblem, places
 from tyrecal.studies.diagnose.label_swap import exchanged, with_exchanged
 from tyrecal.studies.diagnose.labelings import (
-    LEAST_PROBABLE,
-    MOST_READINGS,
+    MAX_READINGS,
+    MIN_READING_PROBABILITY,
     Reading,
     averaged,
     shares,
@@ -153,7 +153,7 @@ def labelled(
     wide = np.full(v, np.inf)
     prior = Prior(whole.centre, START_SPREAD * np.eye(v), -wide, wide)
     result = find_labels(at, measured, prior).labelings
-    count = max(1, int((result.probabilities[:MOST_READINGS] >= LEAST_PROBABLE).sum()))
+    count = max(1, int((result.probabilities[:MAX_READINGS] >= MIN_READING_PROBABILITY).sum()))
     own = list(result.modes[:count])
     see = partial(observed, rows, tyre.y)
     return [Reading(see(own[k]), float(result.ln_prior[k])) for k in range(count)], own

@@ -23,7 +23,7 @@ import numpy as np
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
-from tyrecal.simulate.modes.find import Found
+from tyrecal.simulate.modes.find import LabelledModes
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.expansion import expand
 from tyrecal.studies.diagnose.inverse_problem import InverseProblem, places
@@ -63,7 +63,7 @@ def made(model: TyreModel, x: np.ndarray, random: np.random.Generator) -> tuple[
     ln_f = []
     for label, p in model.rows:
         answer = by_pressure[p]
-        assert isinstance(answer, Found) and label, answer
+        assert isinstance(answer, LabelledModes) and label, answer
         ln_f.append(np.log(answer.wanted[label].frequency_Hz))
     return np.array(ln_f), drawn
 

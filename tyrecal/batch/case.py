@@ -1,4 +1,4 @@
-"""One case of a batch: its studies in a row, whatever fails reported and not raised.
+"""One case of a batch: its studies in a row; every failure is reported and not raised.
 
 The report is plain data, small enough for any network: ``name``; ``provenance``, None where the
 case could not be read; ``studies``, each with
@@ -30,7 +30,7 @@ from ..errors import InputError
 from ..files import (
     json_text,
     os_words,
-    own_folder,
+    private_dir,
     read_bytes,
     read_json,
     set_aside,
@@ -59,23 +59,22 @@ Report = dict[str, Any]
 
 @dataclass(frozen=True)
 class CaseTask:
-    """What a worker is sent. path, folder (of the results), record: absolute, on a file system
-    that the worker sees too; mesh: level, empty for the case's own; command: of the solver."""
+    """Task of a worker. Its paths are absolute, on a file system that the worker sees too."""
 
     name: str
     path: Path
-    folder: Path
+    folder: Path  # of the results
     studies: tuple[str, ...]
     asked: Asked
     solver: str = ""
-    mesh: str = ""
-    record: Path | None = None
-    command: tuple[str, ...] = ()
+    mesh: str = ""  # level, empty for the case's own
+    record: Path | None = None  # of evaluations
+    command: tuple[str, ...] = ()  # of the solver
     allow_unusual: bool = False
 
 
 def run_case(task: CaseTask) -> Report:
-    """All studies of a case, or its report of an earlier run that was asked the same."""
+    """All studies of a case, or its report of an earlier run with the same question."""
     facts: dict[str, Any] = {
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
         "host": platform.node() or "localhost",
@@ -120,7 +119,7 @@ def _studied(
     task: CaseTask, loaded: LoadedCase, evaluator: Evaluator, facts: dict[str, Any]
 ) -> tuple[dict[str, Any], list[str]]:
     """Every study's entry in the report, and the names of the result files."""
-    own_folder(task.folder)
+    private_dir(task.folder)
     _write_runs(task, loaded, facts, (), {})
     evaluator.store = Store(task.record) if task.record else None
     state = Studied(loaded, evaluator, {"initial": start_values(loaded)}, task.asked)
@@ -136,7 +135,7 @@ def _studied(
             outcome = _failed(error)
         place = task.folder
         if outcome.cause == NOT_CONVERGED and has_good(place / "fit.json"):
-            place, aside[name] = own_folder(place / NOT_CONVERGED), NOT_CONVERGED
+            place, aside[name] = private_dir(place / NOT_CONVERGED), NOT_CONVERGED
         for file, text in outcome.files.items():
             _write_text(place / file, text)
             files.append((place / file).relative_to(task.folder).as_posix())
@@ -187,7 +186,7 @@ def _loaded(task: CaseTask) -> LoadedCase:
 
 
 def _failed(error: Exception) -> StudyOutcome:
-    """What an exception says of a study."""
+    """Outcome of a study that an exception ended."""
     if isinstance(error, EvaluationFailed):
         return StudyOutcome("error", error.cause, error.words)
     if isinstance(error, SolverUnavailable):
@@ -216,22 +215,23 @@ def _entry(outcome: StudyOutcome, task: CaseTask) -> dict[str, Any]:
 
 
 def _question(task: CaseTask, loaded: LoadedCase, evaluator: Evaluator) -> str:
-    """Hash of all that the results depend on: the case and its files, what is asked, the tool."""
+    """Hash of all that the results depend on: the case and its files, the options, the tool."""
     files = [task.path, *loaded.files, *loaded.template_files]
     solver = [*solver_identity(evaluator.solver), sources()]
-    asked = [task.studies, asdict(task.asked), task.mesh, solver, [_digest(p) for p in files]]
-    return sha256(json.dumps(asked).encode()).hexdigest()
+    parts = [task.studies, asdict(task.asked), task.mesh, solver, [_digest(p) for p in files]]
+    return sha256(json.dumps(parts).encode()).hexdigest()
 
 
 def _finished(folder: Path, question: str) -> dict[str, Any] | None:
-    """The entries of an earlier run that was asked the same and whose files are as it left them."""
+    """The entries of an earlier run that had the same question and whose files are as it left
+    them."""
     try:
-        found = read_json(folder / FINISHED, follow=False)
-        if found["question"] != question:
+        finished = read_json(folder / FINISHED, follow=False)
+        if finished["question"] != question:
             return None
-        if any(_digest(folder / file) != digest for file, digest in found["files"].items()):
+        if any(_digest(folder / file) != digest for file, digest in finished["files"].items()):
             return None
-        entries: dict[str, Any] = found["studies"]
+        entries: dict[str, Any] = finished["studies"]
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
     return entries

@@ -48,7 +48,7 @@ Figures = dict[str, dict[str, dict[str, float]]]  # by case, study, quantity
 
 
 def numbers_of(reports: Sequence[Report]) -> Figures:
-    """What a baseline keeps of reports: the quantities of all studies that are good."""
+    """Quantities that a baseline keeps of reports: those of all studies that are good."""
     kept = {
         report["name"]: {
             study: entry["quantities"]
@@ -76,12 +76,12 @@ def baseline_of(reports: Sequence[Report], before: Mapping[str, Any] | None) -> 
 def read_baseline(path: Path) -> dict[str, Any]:
     """A baseline from its file. Raises InputError, in one sentence; OSError."""
     try:
-        found = read_json(path)
+        content = read_json(path)
     except ValueError as error:
         raise InputError(f"'{path}' is not a baseline: {error}") from None
-    if not isinstance(found, dict) or found.get("format") != 1:
+    if not isinstance(content, dict) or content.get("format") != 1:
         raise InputError(f"'{path}' is not a baseline of format 1")
-    tolerances, cases = found.get("tolerances"), found.get("cases")
+    tolerances, cases = content.get("tolerances"), content.get("cases")
     if not isinstance(tolerances, dict) or not isinstance(cases, dict):
         raise InputError(f"'{path}' is not a baseline: tolerances and cases are wanted")
     for name, tolerance in tolerances.items():
@@ -99,14 +99,14 @@ def read_baseline(path: Path) -> dict[str, Any]:
                 if not _named(tolerances, study, quantity):
                     kind = f"{study}/{quantity.partition(' ')[0]}"
                     raise InputError(f"'{path}': no tolerance '{kind}' for cases.{case}")
-    return found
+    return content
 
 
 def compare(reports: Sequence[Report], baseline: Mapping[str, Any]) -> dict[str, Any]:
-    """What drifted: ``compared`` numbers; ``drifted``, the worst first, each with case, study,
-    quantity, ``baseline``, ``value`` (None where it is gone), ``allowed`` (absolute);
-    ``missing_cases``, ``new_cases``; ``missing_studies``, ``new_studies`` [case/study]; and
-    ``new``, the number of new quantities in studies that were compared.
+    """Drift of reports from a baseline: ``compared`` numbers; ``drifted``, the worst first, each
+    with case, study, quantity, ``baseline``, ``value`` (None where it is gone), ``allowed``
+    (absolute); ``missing_cases``, ``new_cases``; ``missing_studies``, ``new_studies`` [case/study];
+    and ``new``, the number of new quantities in studies that were compared.
 
     A study that is not good is a failure already: it is not compared.
     """

@@ -44,8 +44,8 @@ def junit(reports: Sequence[Report], drift: Mapping[str, Any] | None, started: s
                 value = {"name": name, "value": str(facts[name])}
                 SubElement(properties, "property", value)
         counts = dict.fromkeys(OUTCOMES.values(), 0)
-        missing, said = _unlike(drift, report["name"])
-        said += [
+        missing, lines = _unlike(drift, report["name"])
+        lines += [
             f"{study}: {entry['verdict']}: {entry['words']}"
             for study, entry in report["studies"].items()
             if "verdict" in entry
@@ -66,7 +66,7 @@ def junit(reports: Sequence[Report], drift: Mapping[str, Any] | None, started: s
         suite.set("failures", str(counts["failure"]))
         suite.set("errors", str(counts["error"]))
         suite.set("skipped", str(counts["skipped"]))
-        SubElement(suite, "system-out").text = _clean("\n".join(said)) or None
+        SubElement(suite, "system-out").text = _clean("\n".join(lines)) or None
         SubElement(suite, "system-err")
     indent(suites)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(suites, "unicode") + "\n"
@@ -79,20 +79,20 @@ def _missing(drift: Mapping[str, Any] | None) -> list[Report]:
 
 
 def _unlike(drift: Mapping[str, Any] | None, case: str) -> tuple[list[str], list[str]]:
-    """Studies of a case that only the baseline has, and what is to be said of the two sides."""
+    """Studies of a case that only the baseline has, and lines about what only one side has."""
     if not drift:
         return [], []
     missing, new = (
         [study for of, _, study in (each.rpartition("/") for each in drift[key]) if of == case]
         for key in ("missing_studies", "new_studies")
     )
-    said = [f"{study} is in the baseline, but was not studied" for study in missing]
-    said += [f"{study} is not in the baseline, so not compared" for study in new]
+    lines = [f"{study} is in the baseline, but was not studied" for study in missing]
+    lines += [f"{study} is not in the baseline, so not compared" for study in new]
     if case in drift["missing_cases"]:
-        said.append(f"{case} is in the baseline, but not in this batch")
+        lines.append(f"{case} is in the baseline, but not in this batch")
     if case in drift["new_cases"]:
-        said.append(f"{case} is not in the baseline, so not compared")
-    return missing, said
+        lines.append(f"{case} is not in the baseline, so not compared")
+    return missing, lines
 
 
 def _outcome(

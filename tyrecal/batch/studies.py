@@ -37,7 +37,7 @@ Numbers = dict[str, float]
 
 @dataclass(frozen=True)
 class Asked:
-    """Of each study, beside the case. loads_N: of the footprint, None for the case's own;
+    """Options of the studies, beyond the case. loads_N: of the footprint, None for the case's own;
     pressures: of the sweep."""
 
     loads_N: tuple[float, ...] | None
@@ -46,8 +46,8 @@ class Asked:
 
 @dataclass
 class Studied:
-    """A case under study. designs: values of the variables by name of the design, ``fitted`` once
-    a fit has it; no_fit: a fit was asked for and has no result."""
+    """A case under study. designs: values of the variables by name of the design, ``fitted`` once a
+    fit has it; no_fit: a fit was requested and has no result."""
 
     case: LoadedCase
     evaluator: Evaluator
@@ -63,7 +63,7 @@ class Studied:
 
 @dataclass
 class StudyOutcome:
-    """What came of a study (see `case`), its numbers, and its result files, name to text."""
+    """Outcome of a study (see `case`), its numbers, and its result files, name to text."""
 
     status: str = "good"
     cause: str | None = None
@@ -77,75 +77,75 @@ def fit(state: Studied) -> StudyOutcome:
     """Calibrate from the case's own start. Raises what `FitStudy` does."""
     state.no_fit = True
     fitted = FitStudy(state.case, state.evaluator).run()
-    found = fitted.found
+    result = fitted.found
     state.no_fit = False
     state.designs["fitted"] = {n: fitted.fitted.values[n] for n in state.designs["initial"]}
-    numbers = {"objective": found.objective_Hz, "mass_kg": found.mass_kg}
-    numbers |= {f"variable {name}": each.value for name, each in found.variables.items()}
-    for mode in found.modes:
+    numbers = {"objective": result.objective_Hz, "mass_kg": result.mass_kg}
+    numbers |= {f"variable {name}": each.value for name, each in result.variables.items()}
+    for mode in result.modes:
         where = " ".join(filter(None, (str(mode.label), mode.symmetry, mode.state)))
         numbers[f"fitted_Hz {where}"] = mode.fitted_Hz
-    for each in found.footprint:
+    for each in result.footprint:
         numbers[f"fitted_{each.quantity} {each.state}"] = each.fitted
-    files = found.texts() | {"fit_history.csv": history_csv(fitted.history)}
-    if found.verdict == DOES_NOT_FIT and found.chi2_per_dof:
-        words = does_not_fit_words(found.chi2_per_dof, found.reason)
+    files = result.texts() | {"fit_history.csv": history_csv(fitted.history)}
+    if result.verdict == DOES_NOT_FIT and result.chi2_per_dof:
+        words = does_not_fit_words(result.chi2_per_dof, result.reason)
         return StudyOutcome("failed", DOES_NOT_FIT, words, numbers, files)
-    if found.is_good:
+    if result.is_good:
         return StudyOutcome(quantities=numbers, files=files)
-    words = found.message if found.moved else "the fit did not move"
+    words = result.message if result.moved else "the fit did not move"
     return StudyOutcome("failed", NOT_CONVERGED, f"not converged: {words}", numbers, files)
 
 
 def modes(state: Studied) -> StudyOutcome:
     """Evaluate the case's own design. Raises what `modes.run` does."""
     values = state.designs["initial"]
-    found, _, _ = evaluated.run(state.case, state.evaluator, values)
-    numbers = {"mass_kg": found.mass_kg}
-    for mode in found.modes:
+    result, _, _ = evaluated.run(state.case, state.evaluator, values)
+    numbers = {"mass_kg": result.mass_kg}
+    for mode in result.modes:
         member = f" member {mode.member}" if mode.member else ""
         numbers[f"frequency_Hz {mode.label}{member}"] = mode.frequency_Hz
-    return StudyOutcome(quantities=numbers, files=_files(state, found))
+    return StudyOutcome(quantities=numbers, files=_files(state, result))
 
 
 def sweep_pressure(state: Studied) -> StudyOutcome:
     """Every design over the pressure. Raises what `pressure_result.run` does."""
     pressures = state.asked.pressures.on(state.case)
-    found = pressure_result.run(state.case, state.evaluator, state.designs, pressures)
+    result = pressure_result.run(state.case, state.evaluator, state.designs, pressures)
     numbers = {
         f"frequency_Hz {row.design} {row.pressure_kPa:g} kPa {mode.label}": mode.frequency_Hz
-        for row in found.rows
+        for row in result.rows
         for mode in row.modes
     }
-    files = _files(state, found, pressure_kPa=pressures)
-    return _reached(found.rows, found.failed, numbers, files)
+    files = _files(state, result, pressure_kPa=pressures)
+    return _reached(result.rows, result.failed, numbers, files)
 
 
 def footprint(state: Studied) -> StudyOutcome:
     """Every design at rising loads. Raises what `footprint.run` does."""
     state.evaluator.needs_road()
     loads = state.asked.loads_N or state.case.case.loads_N
-    found, _, _ = pressed.run(state.case, state.evaluator, state.designs, loads)
+    result, _, _ = pressed.run(state.case, state.evaluator, state.designs, loads)
     numbers = {
         f"{kind} {row.design} {row.load_N:g} N": value
-        for row in found.rows
+        for row in result.rows
         for kind, value in row.model_dump(exclude={"design", "load_N"}).items()
     }
-    return _reached(found.rows, found.failed, numbers, _files(state, found, load_N=loads))
+    return _reached(result.rows, result.failed, numbers, _files(state, result, load_N=loads))
 
 
 def sample(state: Studied) -> StudyOutcome:
     """Draw the variables under the case's targets. Raises what `sample.study.run` does."""
     readings = sampling.measured_readings(state.case)
     drawn = sampling.run(state.case, state.evaluator, readings, sampling.MANY_DRAWS)
-    found = result(drawn, 0)
-    numbers = {f"median {name}": each.median for name, each in found.variables.items()}
-    for row in found.predicted:
+    summary = result(drawn, 0)
+    numbers = {f"median {name}": each.median for name, each in summary.variables.items()}
+    for row in summary.predicted:
         numbers[f"predicted_Hz {row.pressure_kPa:g} kPa {row.label}"] = row.frequency_Hz
     states = sampling.states_sampled(state.case, readings)
-    files = _files(state, found, measured=state.measured, **states)
+    files = _files(state, summary, measured=state.measured, **states)
     files["sample_draws.csv"] = draws_csv(drawn)
-    if doubts := found.doubts():
+    if doubts := summary.doubts():
         return StudyOutcome("failed", "not_sampled", "; ".join(doubts), numbers, files)
     return StudyOutcome(quantities=numbers, files=files)
 
@@ -223,6 +223,6 @@ def _reached(
     return StudyOutcome("failed", first.cause, words, numbers, files)
 
 
-def _files(state: Studied, found: Result, **of: Any) -> dict[str, str]:
+def _files(state: Studied, result: Result, **of: Any) -> dict[str, str]:
     """The result's files; its provenance's state is the case's but for ``of``."""
-    return found.stamped(provenance(state.case, state.evaluator.solver, **of)).texts()
+    return result.stamped(provenance(state.case, state.evaluator.solver, **of)).texts()

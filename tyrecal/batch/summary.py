@@ -1,4 +1,4 @@
-"""What a batch says as a whole: the content of batch.json."""
+"""Summary of a batch: the content of batch.json."""
 
 from __future__ import annotations
 
@@ -37,6 +37,6 @@ def summary(
 
 
 def _verdict(report: Report, drifted: bool) -> str:
-    found = {entry["status"] for entry in report["studies"].values()}
-    found |= {"drifted"} if drifted else set()
-    return next((verdict for verdict in VERDICTS if verdict in found), "good")
+    statuses = {entry["status"] for entry in report["studies"].values()}
+    statuses |= {"drifted"} if drifted else set()
+    return next((verdict for verdict in VERDICTS if verdict in statuses), "good")

@@ -1,4 +1,5 @@
-"""What every worker process needs, imported once, by the process that all of them are forked from.
+"""Modules that every worker process needs, imported once, by the process that all of them are
+forked from.
 
 Only that process imports this module: `pool.warm_up`.
 """

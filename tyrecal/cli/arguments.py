@@ -1,4 +1,4 @@
-"""What the words of a command line mean: the case with what was set in it, loads, a fit."""
+"""Meaning of the words of a command line: the case with its settings, loads, a fit."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def load(
 
 
 def refuse_unusual(loaded: Any, option: str, name: str, value: Setting, allowed: bool) -> None:
-    """Raises click.UsageError where nobody states such a value of the variable, or number by its
+    """Raises click.UsageError where no tyre has such a value of the variable, or number by its
     path, ``name``, unless it is ``allowed``. option: where it is stated."""
     from ..tyre.values import unusual_value
 
@@ -84,14 +84,14 @@ def parse_loads(text: str, option: str = "--loads-N", zero: bool = False) -> lis
     """Loads in N; ``zero``: 0 may be the first. Raises click.UsageError."""
     from itertools import pairwise
 
-    from ..tyre.case.schema import LARGEST_LOAD_N, LEAST_LOAD_N
+    from ..tyre.case.schema import MAX_CASE_LOAD_N, MIN_CASE_LOAD_N
 
     loads = parse_numbers(option, text, "numbers in N, as in 3000,5000")
     for place, load in enumerate(loads):
-        if not (LEAST_LOAD_N <= load <= LARGEST_LOAD_N or (zero and load == place == 0)):
+        if not (MIN_CASE_LOAD_N <= load <= MAX_CASE_LOAD_N or (zero and load == place == 0)):
             raise click.UsageError(
-                f"{option} {load:g}: must be a load above 0, of {LEAST_LOAD_N:g} to"
-                f" {LARGEST_LOAD_N:g} N"
+                f"{option} {load:g}: must be a load above 0, of {MIN_CASE_LOAD_N:g} to"
+                f" {MAX_CASE_LOAD_N:g} N"
             )
     for before, after in pairwise(loads):
         if after <= before:
@@ -128,7 +128,7 @@ def parse_pressures(
 
 
 def fitted_values(path: Path, loaded: Any, terminal: Terminal) -> dict[str, float]:
-    """The design of a fit.json, or of the one in a results folder; says how the fit was made
+    """The design of a fit.json, or of the one in a results folder; reports how the fit was made
     otherwise. Raises click.UsageError where it is not this case's."""
     from ..errors import InputError
     from ..studies.fitted import read_fitted

@@ -72,7 +72,7 @@ FILE_PATH = Place(folder=False)
     options.no_store,
     options.allow_unusual,
 )
-@options.talking
+@options.with_terminal
 def command(
     cases: tuple[Path, ...],
     studies: str,
@@ -127,7 +127,9 @@ def command(
     names = _names(cases)
     wanted = _studies(studies)
     pressures = arguments.parse_pressures(from_kPa, to_kPa, steps, allow_unusual)
-    asked = Asked(tuple(arguments.parse_loads(loads)) if loads is not None else None, pressures)
+    study_options = Asked(
+        tuple(arguments.parse_loads(loads)) if loads is not None else None, pressures
+    )
     if write_baseline and not baseline:
         raise click.UsageError("--write-baseline needs --baseline FILE")
     options.not_both(jobs, scheduler)
@@ -144,7 +146,7 @@ def command(
             path.resolve(),
             folder / name,
             wanted,
-            asked,
+            study_options,
             solver,
             mesh,
             record.folder if record else None,
@@ -191,11 +193,11 @@ def _names(cases: Sequence[Path]) -> list[str]:
 
 
 def _studies(text: str) -> tuple[str, ...]:
-    """The studies asked for, in the order in which they are done. Raises click.UsageError."""
-    asked = [word.strip() for word in text.split(",")]
-    for word in asked:
+    """The requested studies, in the order in which they are done. Raises click.UsageError."""
+    names = [word.strip() for word in text.split(",")]
+    for word in names:
         arguments.refuse_unknown("--studies", word, STUDY_NAMES, "study")
-    return tuple(name for name in STUDY_NAMES if name in asked)
+    return tuple(name for name in STUDY_NAMES if name in names)
 
 
 def _prepare(tasks: Sequence[Any], folder: Path) -> None:
@@ -225,7 +227,7 @@ def _sweep(tasks: Sequence[Any]) -> None:
 
 
 def _tell(result: Mapping[str, Any], terminal: Terminal) -> None:
-    """What is not as it should be, what drifted, and how many."""
+    """Print failures, drift, and how many cases have each."""
     from ..report.batch import drift_table, failures_table
 
     for case in result["cases"]:

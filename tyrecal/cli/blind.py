@@ -61,7 +61,7 @@ def command() -> None:
     help="Scatter of every frequency.",
 )
 @options.every(options.mesh, options.jobs, options.store, options.allow_unusual)
-@options.talking
+@options.with_terminal
 def power(
     case: Path,
     pressures: tuple[float, ...],
@@ -100,9 +100,9 @@ def power(
         evaluator.on_progress = bar.at
         model, rows = tyre_model(loaded, evaluator, rules, jobs), rows_of(loaded, rules)
         ruler = ruler_of(measure(model, rows), labels_of(loaded))
-    found = powers(ruler, rules)
-    terminal.result({"power": [asdict(each) for each in found]})
-    terminal.say(words(found, ruler, rules, model.spans))
+    effect_powers = powers(ruler, rules)
+    terminal.result({"power": [asdict(each) for each in effect_powers]})
+    terminal.say(words(effect_powers, ruler, rules, model.spans))
     return 0
 
 
@@ -131,7 +131,7 @@ def power(
 @option("--seed", type=Whole(0), metavar="N", help="Of all that is drawn (default: a secret one).")
 @truth
 @options.every(options.jobs, options.allow_unusual)
-@options.talking
+@options.with_terminal
 def make(
     folder: Path,
     case_path: Path,
@@ -216,7 +216,7 @@ def make(
     help="Consider these effects only; repeatable.",
 )
 @options.every(options.jobs, options.store)
-@options.talking
+@options.with_terminal
 def answer(
     folder: Path,
     emulated: bool,
@@ -262,7 +262,7 @@ def answer(
 @command.command()
 @folder
 @truth
-@options.talking
+@options.with_terminal
 def score(folder: Path, truth: Path | None, terminal: Terminal) -> int:
     """Open the truth and score the answers of DIR: score.json, score.md.
 

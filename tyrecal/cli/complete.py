@@ -1,4 +1,4 @@
-"""What a shell completes: cases, and the names that stand in them. Wrong or no files: nothing."""
+"""Completion for shells: cases, and the names that stand in them. Wrong or no files: nothing."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ MAX_DEPTH = 3  # folders below the one typed in which cases are looked for
 
 
 def cases(ctx: click.Context, param: click.Parameter, incomplete: str) -> Items:
-    """Case files, those in folders below too; without any, what the shell says."""
+    """Case files, those in folders below too; without any, the shell's own completion."""
     start = Path(incomplete).parent
-    found = [str(path) for path in _yaml(start, MAX_DEPTH) if str(path).startswith(incomplete)]
-    if not found or len(found) > MAX_CASES:
+    paths = [str(path) for path in _yaml(start, MAX_DEPTH) if str(path).startswith(incomplete)]
+    if not paths or len(paths) > MAX_CASES:
         return [CompletionItem(incomplete, type="file")]
-    return [CompletionItem(path) for path in found]
+    return [CompletionItem(path) for path in paths]
 
 
 def solvers(ctx: click.Context, param: click.Parameter, incomplete: str) -> Items:
@@ -91,7 +91,7 @@ def _yaml(folder: Path, depth: int) -> Iterator[Path]:
 
 
 def _case() -> dict[str, Any]:
-    """The case on the command line as plain data, judged by nobody."""
+    """The case on the command line as plain data, unchecked."""
     from ..tyre.case.document import read_document
 
     for word in split_arg_string(os.environ.get("COMP_WORDS", "")):

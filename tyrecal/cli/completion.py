@@ -76,7 +76,7 @@ SCRIPTS = {"bash": BASH, "zsh": ZSH, "fish": FISH}
 
 @click.command()
 @click.argument("shell", type=OneOf(list(SCRIPTS)))
-@options.talking
+@options.with_terminal
 def command(shell: str, terminal: Terminal) -> int:
     """Print the script that makes SHELL complete commands, cases, solvers, effects and variables.
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..tyre.own_deck.own_decks import OwnDecks
     from ..tyre.own_deck.text import Block
 
-MOST_SAID = 10  # doubts about a deck
+MAX_DECK_DOUBTS = 10  # doubts about a deck
 
 
 @click.command()
@@ -40,7 +40,7 @@ MOST_SAID = 10  # doubts about a deck
     options.output,
     options.allow_unusual,
 )
-@options.talking
+@options.with_terminal
 def command(
     case: Path,
     assignments: tuple[str, ...],
@@ -63,7 +63,7 @@ def command(
     """
     if check:
         return _check(case, mesh, assignments, terminal)
-    from ..files import own_folder, whole
+    from ..files import atomic_write, private_dir
     from ..simulate.deck.decks import Decks
     from ..simulate.deck.decks_design import design_of
     from ..simulate.evaluate.evaluator import Evaluator
@@ -79,9 +79,9 @@ def command(
     evaluator.refuse_lacking(design)
     if loads is not None:
         evaluator.needs_road()
-        asked = arguments.parse_loads(loads)
-        arguments.refuse_unusual_loads(loaded, "--loads-N", asked, allow_unusual)
-        decks = Decks(design, loads_N=tuple(asked))
+        loads_N = arguments.parse_loads(loads)
+        arguments.refuse_unusual_loads(loaded, "--loads-N", loads_N, allow_unusual)
+        decks = Decks(design, loads_N=tuple(loads_N))
     else:
         decks = Decks(design, tuple(values) if evaluator.has_gradients else ())
     paths = []
@@ -95,9 +95,9 @@ def command(
         for path in written:
             place = run.folder / path.relative_to(fresh)  # what a deck includes may lie in folders
             for above in reversed(place.relative_to(run.folder).parents[:-1]):
-                own_folder(run.folder / above)
+                private_dir(run.folder / above)
             paths.append(str(place))
-            with whole(place) as partial:
+            with atomic_write(place) as partial:
                 shutil.copyfile(path, partial)
     run.finish()
     terminal.result(paths)
@@ -108,8 +108,8 @@ def command(
 
 
 def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Terminal) -> int:
-    """Say what a user's deck holds, which of its numbers have paths, and what is wrong with it for
-    the bundled solver and for ABAQUS, and what CalculiX has nothing for."""
+    """Print what a user's deck holds, which of its numbers have paths, what is wrong with it for
+    the bundled solver and for ABAQUS, and what CalculiX lacks."""
     from ..simulate.deck.own import asked_by_abaqus, lacking_in_calculix, trial
     from ..tyre.own_deck.found import contents, words
     from ..tyre.own_deck.own_deck import read_own_deck
@@ -121,9 +121,9 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
     if path.suffix in (".yaml", ".yml"):
         loaded, _ = arguments.load(path, mesh, assignments, None, terminal, True)
         if loaded.decks:
-            found = known_of_decks(loaded, loaded.decks, terminal)
-            terminal.result(found)
-            refused = found["abaqus"]["refuses"] and loaded.case.solver.name != "calculix"
+            content = known_of_decks(loaded, loaded.decks, terminal)
+            terminal.result(content)
+            refused = content["abaqus"]["refuses"] and loaded.case.solver.name != "calculix"
             return EXIT_INPUT if refused else 0
         if loaded.deck is None:
             raise click.UsageError(f"'{path}' names no deck of your own: 'tyrecal validate' judges")
@@ -134,8 +134,8 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
             raise click.UsageError(f"there is no file '{path}'")
         deck = read_own_deck(path)
     blocks = deck.with_numbers(numbers)
-    asked, lacking = asked_by_abaqus(blocks), lacking_in_calculix(blocks)
-    result: dict[str, Any] = {"abaqus": asked, "calculix": lacking, "refused": None}
+    report, lacking = asked_by_abaqus(blocks), lacking_in_calculix(blocks)
+    result: dict[str, Any] = {"abaqus": report, "calculix": lacking, "refused": None}
     try:
         flat = deck.flat(numbers, gauges)
         mass_kg = trial(flat)
@@ -143,47 +143,47 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
         result["refused"] = str(error)
         terminal.error(f"not honoured: {error}")
     else:
-        found, numbers = contents(deck, flat), {**deck.numbers, **numbers}
+        content, numbers = contents(deck, flat), {**deck.numbers, **numbers}
         for slip in deck_slips(deck, numbers):
             terminal.warn(str(slip))
-        result |= {"mass_kg": mass_kg, **found, "numbers": numbers}
-        for sentence in words(found, mass_kg):
+        result |= {"mass_kg": mass_kg, **content, "numbers": numbers}
+        for sentence in words(content, mass_kg):
             terminal.say(sentence)
         for name, value in numbers.items():
             terminal.say(f"  {name} = {value:g}")
     terminal.result(result)
-    _say_what_solvers_take(asked, lacking, terminal)
-    return EXIT_INPUT if result["refused"] or asked["refuses"] else 0
+    _say_what_solvers_take(report, lacking, terminal)
+    return EXIT_INPUT if result["refused"] or report["refuses"] else 0
 
 
 def _say_what_solvers_take(
-    asked: dict[str, list[str]], lacking: list[str], terminal: Terminal
+    report: dict[str, list[str]], lacking: list[str], terminal: Terminal
 ) -> None:
-    """What ABAQUS and CalculiX have against decks."""
-    for sentence in asked["refuses"]:
+    """Print the objections of ABAQUS and CalculiX to decks."""
+    for sentence in report["refuses"]:
         terminal.error(f"ABAQUS refuses by its manual: {sentence}")
-    for sentence in asked["unknown"][:MOST_SAID]:
+    for sentence in report["unknown"][:MAX_DECK_DOUBTS]:
         terminal.warn(f"not checked for ABAQUS: {sentence}")
-    if more := len(asked["unknown"][MOST_SAID:]):
+    if more := len(report["unknown"][MAX_DECK_DOUBTS:]):
         terminal.warn(f"... and {more} more")
     for sentence in lacking:
         terminal.say(f"CalculiX does not honour: {sentence}")
 
 
 def known_of_decks(loaded: LoadedCase, decks: OwnDecks, terminal: Terminal) -> dict[str, Any]:
-    """Say what is known of decks in three dimensions, what is added to them, what ABAQUS refuses of
-    them by its manual, and what CalculiX has nothing for; the same as data."""
+    """Print what is known of decks in three dimensions, what is added to them, what ABAQUS refuses
+    of them by its manual, and what CalculiX lacks; returns the same as data."""
     from ..simulate.deck.decks_design import OUTPUT, added_words
     from ..simulate.deck.own import asked_by_abaqus, lacking_in_calculix
 
     numbers = loaded.deck_numbers
     jobs_blocks = decks.with_numbers(numbers, 1e3 * loaded.case.pressure_kPa)
-    asked: dict[str, list[str]] = {"refuses": [], "unknown": []}
+    report: dict[str, list[str]] = {"refuses": [], "unknown": []}
     before: list[Block] = []
     for (_, old), blocks in zip(decks.jobs, jobs_blocks, strict=True):
         before = before if old else []
         for kind, sentences in asked_by_abaqus(blocks, before).items():
-            asked[kind] += sentences
+            report[kind] += sentences
         before = [*before, *blocks]
     lacking = lacking_in_calculix(before)
     places = [f"{row.place.file}, line {row.place.line}" for _, row, *_ in decks.pressures]
@@ -196,7 +196,7 @@ def known_of_decks(loaded: LoadedCase, decks: OwnDecks, terminal: Terminal) -> d
         terminal.say(f"  {name} = {value:g}")
     for solver, words in added.items():
         terminal.say(f"{solver}: {words or 'nothing is added'}")
-    _say_what_solvers_take(asked, lacking, terminal)
+    _say_what_solvers_take(report, lacking, terminal)
     return {
         "jobs": decks.jobs,
         "units": decks.units,
@@ -205,6 +205,6 @@ def known_of_decks(loaded: LoadedCase, decks: OwnDecks, terminal: Terminal) -> d
         "pressure": places,
         "numbers": dict(numbers),
         "added": added,
-        "abaqus": asked,
+        "abaqus": report,
         "calculix": lacking,
     }

@@ -156,7 +156,7 @@ def command(
     assumed = Assumed(form, split_percent / 100, further=further)
     with terminal.progress("diagnose", STAGES) as bar:
         evaluator.on_progress = bar.at
-        found = diagnosed(
+        diagnosed_case = diagnosed(
             loaded,
             evaluator,
             measured,
@@ -167,20 +167,20 @@ def command(
             considered,
             stage=bar.begin,
         )
-    told = run.write(found.result)
-    parts = parts_data(loaded, [part.region for part in told.section_map])
+    written = run.write(diagnosed_case.result)
+    parts = parts_data(loaded, [part.region for part in written.section_map])
     run.write_json("diagnosis_section.json", parts)
-    words = page(found, loaded.case.name, measured.name)
+    words = page(diagnosed_case, loaded.case.name, measured.name)
     run.write_text("diagnosis.md", words)
     if pictures:
         from ..report.diagnosis_pictures import draw_diagnosis
 
-        figures = draw_diagnosis(found.diagnosis, parts)
+        figures = draw_diagnosis(diagnosed_case.diagnosis, parts)
         run.write_figures({f"diagnosis_{name}": figure for name, figure in figures.items()})
     run.finish()
-    terminal.result(told.content())
+    terminal.result(written.content())
     terminal.say(words)
-    for doubt in told.labels.doubts() if told.labels else ():
+    for doubt in written.labels.doubts() if written.labels else ():
         terminal.warn(doubt)
     study.finish(run)
     return 0

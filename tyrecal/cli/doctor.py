@@ -35,7 +35,7 @@ HINTS = {
     metavar="DIR",
     help="Record to look at (default: those of the results folders here; also from TYRECAL_STORE).",
 )
-@options.talking
+@options.with_terminal
 def command(solver: str, store: Path | None, terminal: Terminal) -> int:
     """Check the installation: packages, solvers, machine, records, and a known tyre's frequencies.
 
@@ -54,7 +54,7 @@ def command(solver: str, store: Path | None, terminal: Terminal) -> int:
 
     with terminal.progress("known tyre"):
         check = self_check(solver)
-    found: dict[str, Any] = {
+    report: dict[str, Any] = {
         "format": 1,
         "tyrecal": __version__,
         "installed_in": str(Path(__file__).parents[1]),
@@ -67,11 +67,11 @@ def command(solver: str, store: Path | None, terminal: Terminal) -> int:
         "records": records(store),
         "self_check": check,
     }
-    found["ok"] = bool(check["ok"]) and all(each["ok"] for each in found["packages"])
-    terminal.result(found)
+    report["ok"] = bool(check["ok"]) and all(each["ok"] for each in report["packages"])
+    terminal.result(report)
     if not terminal.as_json:
-        terminal.say("\n".join(_words(found)))
-    for package in found["packages"]:
+        terminal.say("\n".join(_words(report)))
+    for package in report["packages"]:
         if not package["ok"]:
             there = package["version"] or "not installed"
             terminal.error(f"{package['name']} must be {package['needed']}, it is {there}")
@@ -79,35 +79,35 @@ def command(solver: str, store: Path | None, terminal: Terminal) -> int:
         terminal.error(
             f"the known tyre: {check['problem'] or 'its figures are not the recorded ones'}"
         )
-    return 0 if found["ok"] else EXIT_SOLVER
+    return 0 if report["ok"] else EXIT_SOLVER
 
 
-def _words(found: dict[str, Any]) -> list[str]:
+def _words(report: dict[str, Any]) -> list[str]:
     from ..simulate.modes.label import in_words
 
-    here, check = found["machine"], found["self_check"]
+    here, check = report["machine"], report["self_check"]
     known = [here[key] for key in ("free_memory_GB", "memory_GB") if here[key] is not None]
     of = " of ".join(f"{each:g}" for each in known) or "unknown"
-    lines = [f"tyrecal {found['tyrecal']} in {found['installed_in']}"]
+    lines = [f"tyrecal {report['tyrecal']} in {report['installed_in']}"]
     lines += [f"Python {here['python']}, {here['system']}"]
     lines += [f"{here['cores']} cores, {of} GB of memory, {here['free_disc_GB']:g} GB of disc free"]
     lines += [
         "",
-        "packages: " + ", ".join(f"{p['name']} {p['version']}" for p in found["packages"]),
+        "packages: " + ", ".join(f"{p['name']} {p['version']}" for p in report["packages"]),
     ]
-    for extra in found["extras"]:
+    for extra in report["extras"]:
         there = f"missing {', '.join(extra['missing'])}: {extra['install']} in a clone of tyrecal"
         lines.append(f"  [{extra['name']}] " + (there if extra["missing"] else "installed"))
-    lines += ["", f"settings: {settings_words(found['settings'])}", "", "solvers:"]
-    for solver in found["solvers"]:
+    lines += ["", f"settings: {settings_words(report['settings'])}", "", "solvers:"]
+    for solver in report["solvers"]:
         state = solver["problem"] or f"version {solver['version']}"
         hint = HINTS.get(solver["name"]) if solver["problem"] else None
         about = "; ".join(filter(None, (state, command_words(solver), hint)))
         lines.append(f"  {solver['name']}: {about}")
     lines += ["", "records of evaluations:"]
-    for record in found["records"]:
+    for record in report["records"]:
         lines.append(f"  {record['folder']}: {record['records']} records, {record['MB']:g} MB")
-    if not found["records"]:
+    if not report["records"]:
         lines.append("  none here yet; each goes beside its results, or to --store DIR")
     lines += ["", f"a known tyre by solver '{check['solver']}', {check['seconds']:g} s:"]
     for mode in check["modes"]:

@@ -110,7 +110,7 @@ def command(
     terminal.detail(f"each at {', '.join(f'{p:g}' for p in kPa)} kPa")
     with terminal.progress("effects") as bar:
         evaluator.on_progress = bar.at
-        found, signatures = run(
+        result, signatures = run(
             loaded, evaluator, values, kPa, able, value, study.jobs, study.notify
         )
     figures = {}
@@ -118,7 +118,7 @@ def command(
         from ..report.signature import draw_signature
 
         figures = {f"effect_{each.id}": draw_signature(each) for each in signatures}
-    return study.present(output, found, figures)
+    return study.present(output, result, figures)
 
 
 def _variables_in(assignments: tuple[str, ...], values: Mapping[str, float]) -> list[str]:

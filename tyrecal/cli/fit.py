@@ -200,7 +200,8 @@ def _write_shapes(
 
 
 class _Points:
-    """Says how the fit goes: each design with --verbose, the latest and the best on a terminal."""
+    """Reports the progress of a fit: each design with --verbose, the latest and the best on a
+    terminal."""
 
     def __init__(self, terminal: Terminal, bar: Progress, unit: str):
         self.terminal, self.bar, self.unit, self.best = terminal, bar, unit, float("inf")

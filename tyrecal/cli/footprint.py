@@ -10,7 +10,7 @@ import click
 from . import arguments, options
 from .main import EXIT_SOLVER
 from .parameters import option
-from .taken import taken
+from .taken import default_case
 from .terminal import Terminal
 
 DESIGNS = ("initial", "fitted")
@@ -57,28 +57,30 @@ def command(
     from ..studies.pressing_plan import PressedState, plan_pressing
 
     terminal = study.terminal
-    case, fitted, study = taken(case, fitted, study)
+    case, fitted, study = default_case(case, fitted, study)
     if loads is not None:
         arguments.refuse_set(assignments, "road.loads_N", "--loads-N")
     loaded, values = study.load(case, assignments, pressure_kPa)
-    asked = loaded.case.loads_N
+    loads_N = loaded.case.loads_N
     if loads is not None:
-        asked = arguments.parse_loads(loads)
-        arguments.refuse_unusual_loads(loaded, "--loads-N", asked, study.allow_unusual)
+        loads_N = arguments.parse_loads(loads)
+        arguments.refuse_unusual_loads(loaded, "--loads-N", loads_N, study.allow_unusual)
     evaluator = study.evaluator(loaded)
     evaluator.needs_road()
     fitted = _fit_compared(compare, fitted, (study.output or Path(case.stem)) / "fit.json")
     designs = _designs(compare, values, fitted, loaded, terminal)
     if len(designs) == 1:
         options.say_idle(terminal, study.jobs, "one design is pressed alone; --fitted adds another")
-    pressed_to = [PressedState(len(asked))]
+    pressed_to = [PressedState(len(loads_N))]
     plan = plan_pressing(loaded, evaluator, pressed_to, len(designs), study.jobs)
     if study.print_plan(plan, dry_run):
         return 0
-    output = study.run(loaded, "footprint", evaluator, load_N=asked)
+    output = study.run(loaded, "footprint", evaluator, load_N=loads_N)
     with terminal.progress("footprint") as bar:
         evaluator.on_progress = bar.at
-        found, pressed, meshes = run(loaded, evaluator, designs, asked, plan.at_once, study.notify)
+        result, pressed, meshes = run(
+            loaded, evaluator, designs, loads_N, plan.at_once, study.notify
+        )
     if not pressed:
         return EXIT_SOLVER
     patches = patches_data(loaded.case.name, pressed, meshes)
@@ -88,13 +90,13 @@ def command(
         from ..report.footprint import draw_footprint
         from ..report.vtu import write_pressed
 
-        figures = draw_footprint(found.rows, patches.patches)
+        figures = draw_footprint(result.rows, patches.patches)
         write_pressed(output.new, pressed, meshes)
-    return study.present(output, found, figures)
+    return study.present(output, result, figures)
 
 
 def _fit_compared(compare: str | None, fitted: Path | None, own: Path) -> Path | None:
-    """The fit to press: as given, else the one in the results folder where it is asked for."""
+    """The fit to press: as given, else the one in the results folder where it is requested."""
     if fitted or "fitted" not in (compare or "").split(","):
         return fitted
     if not own.exists():

@@ -88,7 +88,7 @@ def _length(flag: str, text: str, unit: str = "mm") -> Any:
 @options.allow_unusual
 @option("--pictures/--no-pictures", default=True, help="Draw the section.")
 @options.figure_format
-@options.talking
+@options.with_terminal
 def command(
     size: str | None,
     file: Path | None,
@@ -191,7 +191,7 @@ def _write(
     terminal: Terminal,
 ) -> None:
     """Write case, section and picture, none over an existing file and only what is right."""
-    from ..files import make_folder, whole
+    from ..files import atomic_write, make_folder
     from ..tyre.load import load_case
 
     table = target.with_name(draft.file)
@@ -202,7 +202,7 @@ def _write(
             raise InputError(f"'{path}' exists already; give --force to write over it")
     make_folder(target.parent)
     for path, content in contents.items():
-        with whole(path) as partial:
+        with atomic_write(path) as partial:
             partial.write_bytes(content)
     loaded = load_case(target, allow_unusual=True)
     outside = loaded.section.points[-1]
@@ -272,9 +272,9 @@ def _from_deck(
     allow_unusual: bool,
     terminal: Terminal,
 ) -> None:
-    """Write the case of a deck beside it, say what is in the deck, and draw it; ``suffix``: of the
-    picture, "" for none."""
-    from ..files import whole
+    """Write the case of a deck next to it, print what is in the deck, and draw it; ``suffix``: of
+    the picture, "" for none."""
+    from ..files import atomic_write
     from ..simulate.deck.own import trial
     from ..tyre.case.own_case import own_case
     from ..tyre.load import load_case
@@ -287,11 +287,11 @@ def _from_deck(
     text = own_case(deck, flat, size, pressure_kPa, numbers)
     target, picture = _beside(deck.path, output, suffix, force)
     mass_kg = trial(flat)
-    with whole(target) as partial:
+    with atomic_write(target) as partial:
         partial.write_text(text, encoding="utf-8")
-    found = contents(deck, flat)
-    terminal.result({"case": str(target), "mass_kg": mass_kg, **found})
-    for sentence in words(found, mass_kg):
+    content = contents(deck, flat)
+    terminal.result({"case": str(target), "mass_kg": mass_kg, **content})
+    for sentence in words(content, mass_kg):
         terminal.say(sentence)
     loaded = load_case(target, allow_unusual=True)
     if picture:
@@ -308,15 +308,15 @@ def _from_decks(
     force: bool,
     terminal: Terminal,
 ) -> None:
-    """Write the case of decks in three dimensions beside them, and say what is known of them."""
-    from ..files import whole
+    """Write the case of decks in three dimensions next to them, and print what is known of them."""
+    from ..files import atomic_write
     from ..tyre.case.own_case import own_decks_case
     from ..tyre.load import load_case
     from .deck import known_of_decks
 
     text = own_decks_case(decks, size, pressure_kPa, numbers)
     target, _ = _beside(decks.path, output, "", force)
-    with whole(target) as partial:
+    with atomic_write(target) as partial:
         partial.write_text(text, encoding="utf-8")
     loaded = load_case(target, allow_unusual=True)
     terminal.result({"case": str(target), **known_of_decks(loaded, decks, terminal)})

@@ -13,7 +13,7 @@ import click
 
 from ..errors import InputError, TyrecalError
 from ..files import CHANGED, os_words
-from ..interrupt import SIGNALS, exit_code, interrupt_heard, interrupts_remembered
+from ..interrupt import SIGNALS, exit_code, pending_interrupt, remember_interrupts
 from .terminal import RESUME, coloured, error, say
 
 if TYPE_CHECKING:
@@ -59,10 +59,10 @@ EXIT_CODES = {
 
 
 class Interrupted(TyrecalError):
-    """A signal ended the command; the words say which, and how to go on."""
+    """A signal ended the command; the words name it, and how to continue."""
 
     def __init__(self, how_to_go_on: str = ""):
-        number = interrupt_heard() or signal.SIGINT
+        number = pending_interrupt() or signal.SIGINT
         super().__init__(": ".join(filter(None, (SIGNALS[number], how_to_go_on))))
         self.exit_code = exit_code(number)
 
@@ -124,7 +124,7 @@ class Commands(click.Group):
             return super().invoke(ctx)
         except (KeyboardInterrupt, Exception) as error:
             if isinstance(error, click.exceptions.Exit) or not (
-                isinstance(error, KeyboardInterrupt) or interrupt_heard()
+                isinstance(error, KeyboardInterrupt) or pending_interrupt()
             ):
                 raise
         # the error is forgotten by now, and with it what was under way: its processes have ended
@@ -175,17 +175,17 @@ def cli(ctx: click.Context) -> None:
 
 
 def _defaults(command: str | None) -> dict[str, Any]:
-    """What the user's settings say in place of an option. Raises InputError, but not where the
+    """Values of the user's settings in place of options. Raises InputError, but not where the
     installation is looked at."""
     from ..simulate.settings import settings
 
     try:
-        found = settings()
+        chosen = settings()
     except InputError:
         if command in ("doctor", "solvers"):
             return {}
         raise
-    given = {k: v for k in ("jobs", "solver") if (v := getattr(found, k)) is not None}
+    given = {k: v for k in ("jobs", "solver") if (v := getattr(chosen, k)) is not None}
     parts = {part: given for part in ("make", "answer")}  # of blind
     return {name: {**given, **parts} for name in COMMANDS if name != "doctor"}
 
@@ -193,7 +193,7 @@ def _defaults(command: str | None) -> dict[str, Any]:
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; never returns."""
     try:
-        with interrupts_remembered():
+        with remember_interrupts():
             try:
                 code = cli.main(arguments, prog_name="tyrecal", standalone_mode=False)
             except (KeyboardInterrupt, click.Abort):  # just before or after the command
@@ -238,7 +238,7 @@ def _mistake(wrong: click.ClickException) -> str:
 
 
 def _exit_code(failure: Exception) -> int | None:
-    """Exit code of a failure that is somebody's, None for a bug of ours."""
+    """Exit code of a failure with a known cause, None for a bug of ours."""
     if isinstance(failure, TyrecalError):
         return failure.exit_code
     return EXIT_INPUT if isinstance(failure, OSError | MemoryError) else None

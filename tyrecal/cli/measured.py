@@ -116,7 +116,7 @@ def command() -> None:
 )
 @option("--pictures/--no-pictures", default=True, help="Draw functions and shapes beside the CSV.")
 @options.figure_format
-@options.talking
+@options.with_terminal
 def import_files(
     files: tuple[Path, ...],
     output: Path,
@@ -161,29 +161,29 @@ def import_files(
         raise click.UsageError(f"--output {output}: is one of the files to read")
     layout = _layout(axle, centre, directions, highest, band, response or "")
     sigmas = floor / 100, (assumed or 0.0) / 100
-    found = gather(files, pressure_kPa, layout, *sigmas, leave_out, keep_going)
-    write_text(output, measurements_csv(found.rows))
-    if pictures and found.runs:
+    gathered = gather(files, pressure_kPa, layout, *sigmas, leave_out, keep_going)
+    write_text(output, measurements_csv(gathered.rows))
+    if pictures and gathered.runs:
         from ..report.measured import draw_measured
 
-        draw_measured(output.with_suffix(f".{figure_format}"), found.runs)
-    for note in found.notes:
+        draw_measured(output.with_suffix(f".{figure_format}"), gathered.runs)
+    for note in gathered.notes:
         terminal.note(note)
-    for doubt in found.doubts:
+    for doubt in gathered.doubts:
         terminal.warn(doubt)
-    terminal.result(result(found))
-    if found.runs:
+    terminal.result(result(gathered))
+    if gathered.runs:
         from ..report.measured import measured_table
 
-        terminal.show(measured_table(found.runs))
-    terminal.say(f"{len(found.rows)} measurements in {output}")
+        terminal.show(measured_table(gathered.runs))
+    terminal.say(f"{len(gathered.rows)} measurements in {output}")
     return 0
 
 
 @command.command()
 @click.argument("file", type=Place(exists=True, folder=False))
 @options.every(axle, centre, directions, highest, leave_out)
-@options.talking
+@options.with_terminal
 def sensors(
     file: Path,
     axle: str | None,
@@ -210,15 +210,15 @@ def sensors(
     (test,), notes = arrange([read_universal(file)], leave_out)
     for note in notes:
         terminal.note(note)
-    told = sensors_in(test, layout).looks_like()
+    alike_labels = sensors_in(test, layout).looks_like()
     if terminal.as_json:
         told_apart = [
             {**label_entry(label), "told": not alike, "looks_like": [str(x) for x in alike]}
-            for label, alike in told.items()
+            for label, alike in alike_labels.items()
         ]
         terminal.result(told_apart)
     else:
-        terminal.say(sensors_words(told))
+        terminal.say(sensors_words(alike_labels))
     return 0
 
 
@@ -291,10 +291,10 @@ def label_file(
         fixed, prior = fit.fixed, fitted_prior(loaded, fit)
     evaluator = study.evaluator(loaded)
     run = study.run(loaded, "measured label", evaluator, "labels", measured=[file])
-    told = label(loaded, evaluator, readings, prior, fixed=fixed, jobs=study.jobs)
-    found = run.write(labels_result(loaded, told))
-    run.write_text("labelled.csv", measurements_csv(told.readings))
-    _print_labels(found, run, study)
+    labelled = label(loaded, evaluator, readings, prior, fixed=fixed, jobs=study.jobs)
+    written = run.write(labels_result(loaded, labelled))
+    run.write_text("labelled.csv", measurements_csv(labelled.readings))
+    _print_labels(written, run, study)
     return 0
 
 
@@ -364,13 +364,13 @@ def _layout(
     response: str = "",
 ) -> Layout:
     from ..measured.modal import Layout
-    from ..simulate.modes.label import HIGHEST_HARMONIC
+    from ..simulate.modes.label import MAX_SAMPLED_HARMONIC
 
     x, y, z = _numbers("--centre", centre, 3)
     limits = _numbers("--band", band, 2) if band else None
     if limits and not 0 <= limits[0] < limits[1]:
         raise click.UsageError(f"--band {band}: must rise from 0 or more")
-    most = HIGHEST_HARMONIC if highest is None else highest
+    most = MAX_SAMPLED_HARMONIC if highest is None else highest
     within = (limits[0], limits[1]) if limits else None
     return Layout(axle or "", (x, y, z), directions or "", most, within, response)
 

@@ -125,7 +125,7 @@ def command(
 
 
 def wanted_loads(load_N: float | None, sweep: str | None) -> list[float]:
-    """The loads asked for, N; empty: the unloaded tyre alone. Raises click.UsageError."""
+    """The requested loads, N; empty: the unloaded tyre alone. Raises click.UsageError."""
     if load_N is not None and sweep is not None:
         raise click.UsageError("give --load-N or --sweep-load, not both")
     if sweep is not None:
@@ -156,12 +156,12 @@ def at_load(
         outcome = load_tyres(loaded, evaluator, {"initial": values}, [load_N])["initial"]
     if not isinstance(outcome, LoadedTyre):
         raise outcome
-    found = run.write(loaded_modes_result(values, outcome))
+    result = run.write(loaded_modes_result(values, outcome))
     run.write_json("modes_shapes.json", loaded_data(outcome, loaded))
     run.finish()
-    terminal.result(found.content())
-    terminal.show(shown(*found.tables()))
-    for sentence in found.sentences():
+    terminal.result(result.content())
+    terminal.show(shown(*result.tables()))
+    for sentence in result.sentences():
         terminal.say(sentence)
     study.page(run)
     return 0
@@ -182,12 +182,12 @@ def over_loads(
 
     with study.terminal.progress("modes on the road") as bar:
         evaluator.on_progress = bar.at
-        found = run(loaded, evaluator, designs, loads_N, jobs, study.notify)
-    if not found.rows:
+        result = run(loaded, evaluator, designs, loads_N, jobs, study.notify)
+    if not result.rows:
         return EXIT_SOLVER
     figures = {}
     if pictures:
         from ..report.load import draw_load_sweep
 
-        figures["load_sweep"] = draw_load_sweep(found.rows)
-    return study.present(output, found, figures)
+        figures["load_sweep"] = draw_load_sweep(result.rows)
+    return study.present(output, result, figures)

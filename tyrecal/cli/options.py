@@ -2,7 +2,7 @@
 
 1. A command is a module of this package with ``command``, named in ``main.COMMANDS``; heavy imports
    stand inside the function, so that --help and completion stay quick.
-2. ``@options.talking`` gives every command --json, --quiet and --verbose as ``terminal``
+2. ``@options.with_terminal`` gives every command --json, --quiet and --verbose as ``terminal``
    (`Terminal`): say and show for people, result for programs, detail for --verbose, warn, error.
 3. ``@options.study``, in its place, gives what evaluates designs --jobs, --mesh, --solver,
    --output, --store, --no-store and --report too, as ``study`` (`Study`): load, evaluator,
@@ -208,19 +208,28 @@ figure_format = option(
     show_default=True,
     help="Format of the pictures.",
 )
-TALK = (as_json, quiet, verbose)
-ONE_BY_ONE = (mesh, solver, solver_command, output, store, no_store, allow_unusual, *TALK)
-STUDY = (jobs, *ONE_BY_ONE[:-3], report, *TALK)
+OUTPUT_OPTIONS = (as_json, quiet, verbose)
+SERIAL_OPTIONS = (
+    mesh,
+    solver,
+    solver_command,
+    output,
+    store,
+    no_store,
+    allow_unusual,
+    *OUTPUT_OPTIONS,
+)
+STUDY = (jobs, *SERIAL_OPTIONS[:-3], report, *OUTPUT_OPTIONS)
 
 
-def talking(function: Callable[..., int]) -> Callable[..., int]:
+def with_terminal(function: Callable[..., int]) -> Callable[..., int]:
     """--json, --quiet and --verbose, as the argument ``terminal``."""
 
     @wraps(function)
     def command(*args: Any, **values: Any) -> int:
-        return function(*args, terminal=_talk(values), **values)
+        return function(*args, terminal=_terminal_of(values), **values)
 
-    result: Callable[..., int] = every(*TALK)(command)
+    result: Callable[..., int] = every(*OUTPUT_OPTIONS)(command)
     return result
 
 
@@ -231,16 +240,16 @@ def study(function: Callable[..., int]) -> Callable[..., int]:
 
 def study_one_by_one(function: Callable[..., int]) -> Callable[..., int]:
     """The same without --jobs and --report."""
-    return _study(function, ONE_BY_ONE)
+    return _study(function, SERIAL_OPTIONS)
 
 
 def _study(function: Callable[..., int], given: tuple[Any, ...]) -> Callable[..., int]:
     @wraps(function)
     def command(*args: Any, **values: Any) -> int:
-        terminal = _talk(values)
+        terminal = _terminal_of(values)
         own = [field.name for field in fields(Study) if field.name in values]
-        asked = Study(terminal, **{name: values.pop(name) for name in own})
-        return function(*args, study=asked, **values)
+        study = Study(terminal, **{name: values.pop(name) for name in own})
+        return function(*args, study=study, **values)
 
     result: Callable[..., int] = every(*given)(command)
     return result
@@ -265,13 +274,13 @@ class Study:
     def load(
         self, path: Path, assigned: tuple[str, ...] = (), pressure_kPa: float | None = None
     ) -> Any:
-        """`arguments.load`, at the mesh level asked for."""
+        """`arguments.load`, at the requested mesh level."""
         return arguments.load(
             path, self.mesh, assigned, pressure_kPa, self.terminal, self.allow_unusual
         )
 
     def evaluator(self, loaded: Any) -> Evaluator:
-        """The evaluator with the solver asked for. Raises InputError."""
+        """The evaluator with the requested solver. Raises InputError."""
         from ..simulate.deck.decks_design import added_words, design_of
         from ..simulate.evaluate.evaluator import Evaluator
 
@@ -310,7 +319,7 @@ class Study:
         return run
 
     def _say_earlier(self, run: Run) -> None:
-        """Say whose results are in the folder after a run that failed."""
+        """Report whose results are in the folder after a run that failed."""
         if run.has_earlier:
             self.terminal.note(
                 f"results of '{run.study}' in '{run.folder}' are those of an earlier run"
@@ -333,26 +342,26 @@ class Study:
         else:
             self.terminal.detail(words)
 
-    def present(self, run: Run, found: Result, figures: Mapping[str, Figure]) -> int:
-        """Write a result with its figures by name, say what was found, and give the exit code."""
+    def present(self, run: Run, result: Result, figures: Mapping[str, Figure]) -> int:
+        """Write a result with its figures by name, print its findings, and return the exit code."""
         from ..report.table import shown
         from .main import EXIT_SOLVER
 
-        found = run.write(found, figures)
+        result = run.write(result, figures)
         run.finish()
-        self.terminal.result(found.content())
-        for table in found.tables():
+        self.terminal.result(result.content())
+        for table in result.tables():
             self.terminal.show(shown(table))
-        for sentence in found.sentences():
+        for sentence in result.sentences():
             self.terminal.say(sentence)
-        if lost := found.doubts():
-            count = len(lost) + len(getattr(found, "rows", ()))
+        if lost := result.doubts():
+            count = len(lost) + len(getattr(result, "rows", ()))
             self.terminal.error(f"{len(lost)} of {count} evaluations failed; the others are kept")
         self.finish(run)
         return EXIT_SOLVER if lost else 0
 
     def finish(self, run: Run) -> None:
-        """Say where the results are; see `page`."""
+        """Print where the results are; see `page`."""
         self.terminal.say(f"results in {run.placed}")
         self.page(run)
 
@@ -366,8 +375,8 @@ class Study:
             self.terminal.say(f"report in {path}")
 
 
-def _talk(values: dict[str, Any]) -> Terminal:
-    """Takes the options of `TALK` out of a command's values."""
+def _terminal_of(values: dict[str, Any]) -> Terminal:
+    """Takes the options of `OUTPUT_OPTIONS` out of a command's values."""
     terminal = Terminal(*(values.pop(name) for name in ("as_json", "quiet", "verbose")))
     if terminal.quiet and terminal.verbose:
         raise click.UsageError("give --quiet or --verbose, not both")
@@ -392,8 +401,8 @@ def fitted(text: str) -> Callable[[Any], Any]:
 
 
 def given(*without: str) -> list[str]:
-    """The options on the command line, ``without`` some and those of `TALK`; none that only the
-    environment or the settings give."""
+    """The options on the command line, ``without`` some and those of `OUTPUT_OPTIONS`; none that
+    only the environment or the settings give."""
     context = click.get_current_context()
     names = [
         [*([] if context.params[each.name] else each.secondary_opts), *each.opts][0]
@@ -411,7 +420,7 @@ def say_idle(terminal: Terminal, jobs: int, why: str) -> None:
 
 
 def _by_settings(option: str) -> bool:
-    """Whether nobody gave an option but the user's settings."""
+    """Whether an option was set by the user's settings alone."""
     source = click.get_current_context().get_parameter_source(option)
     return source is ParameterSource.DEFAULT_MAP
 
@@ -426,6 +435,6 @@ def _words(command: str | None) -> tuple[str, ...]:
 
 
 def not_both(jobs: int, scheduler: str) -> None:
-    """Raises click.UsageError where this machine and a scheduler's are asked for."""
+    """Raises click.UsageError where this machine and a scheduler's are both requested."""
     if scheduler and jobs > 1 and not _by_settings("jobs"):
         raise click.UsageError("--jobs is for this machine; with --scheduler its workers count")

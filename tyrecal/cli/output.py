@@ -27,7 +27,7 @@ from ..files import (
     json_text,
     make_folder,
     open_file,
-    own_folder,
+    private_dir,
     read_json,
     read_runs,
     refuse_link,
@@ -37,7 +37,7 @@ from ..files import (
     write_text,
     writing,
 )
-from ..interrupt import interrupts_put_off
+from ..interrupt import defer_interrupts
 from ..simulate.case_folder import belongs_to, named_case, owner
 from ..simulate.evaluate.solver import solver_facts
 from ..simulate.provenance import stamped
@@ -161,7 +161,7 @@ class Run:
         click.get_current_context().call_on_close(self._say_unfinished)
 
     def open_store(self, folder: Path | None, none: bool) -> Store | None:
-        """The record of evaluations: in ``folder``, or beside the results, or ``none``."""
+        """The evaluation store: in ``folder``, or next to the results, or ``none``."""
         words = "with --no-store nothing is on record; the same command starts from the beginning"
         if not none:
             from ..simulate.evaluate.store import Store
@@ -176,13 +176,13 @@ class Run:
         resume(words)
         return self.store
 
-    def write(self, found: AnyResult, figures: Mapping[str, Figure] | None = None) -> AnyResult:
+    def write(self, result: AnyResult, figures: Mapping[str, Figure] | None = None) -> AnyResult:
         """Write a study's files and figures; returns the result with its provenance."""
-        found = found.stamped(self.provenance or {})
-        for name, text in found.texts().items():
+        result = result.stamped(self.provenance or {})
+        for name, text in result.texts().items():
             self.write_text(name, text)
         self.write_figures(figures or {})
-        return found
+        return result
 
     def write_figures(self, figures: Mapping[str, Figure]) -> None:
         """Write figures by name, as files of the run's format."""
@@ -220,8 +220,8 @@ class Run:
         write run.json: command, times, host, versions, and what else is volatile."""
         if aside:
             self.placed = self.folder / aside
-            own_folder(self.placed)
-        with interrupts_put_off():
+            private_dir(self.placed)
+        with defer_interrupts():
             take_place(self.new, self.placed, self.study)
             self._finished = True
             self._write_facts(**({"results": aside} if aside else {}), **facts)
@@ -256,13 +256,13 @@ class Run:
                 self._write_facts()
 
     def _drop_unfinished(self) -> None:
-        """What processes that were ended, now or in an earlier run, left of their runs."""
+        """Remove what processes that were ended, now or in an earlier run, left of their runs."""
         from ..simulate.evaluate.folders import drop_unfinished
 
         drop_unfinished(self.runs)
 
     def _close(self) -> None:
-        with interrupts_put_off():
+        with defer_interrupts():
             if hasattr(self, "new"):
                 shutil.rmtree(self.new, ignore_errors=True)
             if self.solver and self._lock and not self._finished:

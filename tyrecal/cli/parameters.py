@@ -1,4 +1,5 @@
-"""Options and types of all commands: what is said of a value that is wrong, or given twice.
+"""Options and types of all commands, with their messages about a value that is wrong, or given
+twice.
 
 A command declares options by `option`, in place of click's, with the types of this module, whose
 errors say what would be right.
@@ -31,7 +32,7 @@ UNIT = re.compile(rf"[-_]({'|'.join(ENDINGS)})$")
 
 class Option(click.Option):
     """An option that is refused where it is given twice with two values; one that is ``multiple``
-    collects them. What the environment and settings say does not count."""
+    collects them. Values of the environment and the settings do not count."""
 
     def add_to_parser(self, parser: Any, ctx: click.Context) -> None:
         """Have the parser keep every value."""

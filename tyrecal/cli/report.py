@@ -20,7 +20,7 @@ from .terminal import Terminal
     help="The page (default: report.html in DIR, of several in the present folder).",
 )
 @option("--author", default="", metavar="NAME", help="Name under the title (default: none).")
-@options.talking
+@options.with_terminal
 def command(folders: tuple[Path, ...], output: Path | None, author: str, terminal: Terminal) -> int:
     """Tell the results in DIR (of fit, modes, sweep-pressure, footprint, diagnose: whatever is
     found) on one HTML page.
@@ -38,7 +38,7 @@ def command(folders: tuple[Path, ...], output: Path | None, author: str, termina
     path = output or (folders[0] / "report.html" if len(folders) == 1 else Path("report.html"))
     written = write_page(path, folders, author)
     terminal.result({"page": str(path), "bytes": written.size, "found": written.found})
-    for folder, found in written.found.items():
-        terminal.say(f"{folder}: {', '.join(found)}")
+    for folder, studies in written.found.items():
+        terminal.say(f"{folder}: {', '.join(studies)}")
     terminal.say(f"report in {path}")
     return 0

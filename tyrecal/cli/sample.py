@@ -99,20 +99,20 @@ def command(
     with terminal.progress("sample", SAMPLE_STAGES) as bar:
         evaluator.on_progress = bar.at
         sample = run(loaded, evaluator, readings, draws, seed, at_kPa, study.jobs, bar.begin)
-    found = output.write(result(sample, seed))
+    summary = output.write(result(sample, seed))
     if pictures:
         from ..report.sample import figures
 
-        output.write_figures(figures(found))
+        output.write_figures(figures(summary))
     output.write_text("sample_draws.csv", draws_csv(sample))
     output.finish()
-    terminal.result(found.content())
-    for table in found.tables():
+    terminal.result(summary.content())
+    for table in summary.tables():
         terminal.show(shown(table))
-    terminal.say("\n".join(found.sentences()))
+    terminal.say("\n".join(summary.sentences()))
     if left_out := len(readings or ()) - len(modal(readings or ())):
         terminal.note(f"{measured}: {left_out} values are no frequencies of the unloaded tyre")
-    doubts = found.doubts()
+    doubts = summary.doubts()
     for doubt in doubts:
         terminal.warn(doubt)
     study.finish(output)

@@ -19,7 +19,7 @@ from .terminal import Terminal
     help="Write decks with expected frequencies, for somebody who has this program to run.",
 )
 @option("--output", type=Place(file=False), help="Folder of the selftest.")
-@options.talking
+@options.with_terminal
 def command(selftest: str | None, output: Path | None, terminal: Terminal) -> int:
     """List the installed solvers: version, what they can do, why one cannot be used, which program
     each starts, and the settings file that says so.
@@ -39,11 +39,11 @@ def command(selftest: str | None, output: Path | None, terminal: Terminal) -> in
     from ..report.table import shown, solvers_table
     from ..simulate.evaluate.solver import installed
 
-    found = installed()
-    terminal.result(found)
-    terminal.show(shown(solvers_table(found)))
+    solvers = installed()
+    terminal.result(solvers)
+    terminal.show(shown(solvers_table(solvers)))
     if not terminal.as_json:
-        for solver in found:
+        for solver in solvers:
             if solver["command"]:
                 terminal.say(f"{solver['name']} {command_words(solver)}")
         terminal.say(f"settings: {settings_words(settings_file())}")
@@ -64,15 +64,15 @@ def settings_file() -> dict[str, Any]:
     return {"file": str(path) if path else None, "there": there, "problem": problem}
 
 
-def settings_words(found: dict[str, Any]) -> str:
+def settings_words(entry: dict[str, Any]) -> str:
     """The same in words."""
-    if found["file"] is None:
+    if entry["file"] is None:
         return "none (TYRECAL_SETTINGS is empty)"
-    return found["problem"] or found["file"] + ("" if found["there"] else " (not there)")
+    return entry["problem"] or entry["file"] + ("" if entry["there"] else " (not there)")
 
 
 def command_words(solver: dict[str, Any]) -> str:
-    """The program that a solver of `installed` starts, and who says so."""
+    """The program that a solver of `installed` starts, and where it was set."""
     from ..simulate.program import join_command
 
     if not solver["command"]:

@@ -22,7 +22,7 @@ from .terminal import Terminal, resume
     metavar="SIZE_MB",
     help="Remove the least recently used until SIZE_MB are left.",
 )
-@options.talking
+@options.with_terminal
 def command(folder: Path, verify: bool, prune: float | None, terminal: Terminal) -> int:
     """Look at the record of evaluations in DIR, a results folder or a --store of several.
 
@@ -45,20 +45,20 @@ def command(folder: Path, verify: bool, prune: float | None, terminal: Terminal)
         raise click.UsageError(f"'{folder}': there is no record of evaluations here{hint}")
     store = Store(own if own.is_dir() else folder, opened=float("inf"))
     removed = None if prune is None else store.prune(round(1e6 * prune))
-    found = store.summary(verify)
+    summary = store.summary(verify)
     if removed is not None:
-        found["removed"] = removed
-    terminal.result(found)
+        summary["removed"] = removed
+    terminal.result(summary)
     if terminal.as_json:
         return 0
-    size = found["bytes"] / 1e6
-    records = "1 record" if found["records"] == 1 else f"{found['records']} records"
-    lines = [f"{found['folder']}: {records}, {size:.1f} MB"]
-    lines += [f"  {solver}: {count}" for solver, count in found["solvers"].items()]
-    if found["failures"]:
-        lines.append(f"  of them failures of the design itself: {found['failures']}")
+    size = summary["bytes"] / 1e6
+    records = "1 record" if summary["records"] == 1 else f"{summary['records']} records"
+    lines = [f"{summary['folder']}: {records}, {size:.1f} MB"]
+    lines += [f"  {solver}: {count}" for solver, count in summary["solvers"].items()]
+    if summary["failures"]:
+        lines.append(f"  of them failures of the design itself: {summary['failures']}")
     if removed is not None:
         lines.append(f"  removed: {removed}")
-    lines.append(f"  damaged: {found['damaged']}" + ("" if verify else " (found so far)"))
+    lines.append(f"  damaged: {summary['damaged']}" + ("" if verify else " (found so far)"))
     terminal.say("\n".join(lines))
     return 0

@@ -10,7 +10,7 @@ import click
 from . import arguments, options
 from .main import EXIT_SOLVER
 from .parameters import option
-from .taken import taken
+from .taken import default_case
 
 
 @click.command()
@@ -50,7 +50,7 @@ def command(
     from ..tyre.state import rim_of
 
     terminal = study.terminal
-    case, fitted, study = taken(case, fitted, study)
+    case, fitted, study = default_case(case, fitted, study)
     loaded, values = study.load(case, assignments)
     pressures = _pressures(loaded, assignments, from_kPa, to_kPa, steps, study.allow_unusual)
     evaluator = study.evaluator(loaded)
@@ -61,11 +61,11 @@ def command(
     output = study.run(loaded, "sweep-pressure", evaluator, pressure_kPa=pressures)
     with terminal.progress("sweep") as bar:
         evaluator.on_progress = bar.at
-        found = run(loaded, evaluator, designs, pressures, study.jobs, study.notify, fit)
-    if not found.rows:
+        result = run(loaded, evaluator, designs, pressures, study.jobs, study.notify, fit)
+    if not result.rows:
         return EXIT_SOLVER
-    if found.standard_errors_unknown:
-        terminal.warn(f"no intervals of the fitted design: {found.standard_errors_unknown}")
+    if result.standard_errors_unknown:
+        terminal.warn(f"no intervals of the fitted design: {result.standard_errors_unknown}")
     figures = {}
     if pictures:
         from ..report.pressure import draw_pressure_sweep
@@ -77,8 +77,8 @@ def command(
             for each, state in measured
             if state.rim == rim
         ]
-        figures["pressure_sweep"] = draw_pressure_sweep(found.rows, targets)
-    return study.present(output, found, figures)
+        figures["pressure_sweep"] = draw_pressure_sweep(result.rows, targets)
+    return study.present(output, result, figures)
 
 
 def _pressures(

@@ -1,4 +1,4 @@
-"""What a command takes that is given no CASE: the last fit of this folder, or its only case."""
+"""The case of a command that is given no CASE: the last fit of this folder, or its only case."""
 
 from __future__ import annotations
 
@@ -18,10 +18,12 @@ FIT = "fit.json"
 OF_A_CASE = {"size", "pressure_kPa", "solver"}  # keys that tell a case from other YAML
 
 
-def taken(case: Path | None, fitted: Path | None, study: Study) -> tuple[Path, Path | None, Study]:
+def default_case(
+    case: Path | None, fitted: Path | None, study: Study
+) -> tuple[Path, Path | None, Study]:
     """Case, fit.json to compare with and study: as given, else what lies in this folder, which is
-    said; results go to the fit's folder. Raises click.UsageError where nothing, or too much, does.
-    """
+    reported; results go to the fit's folder. Raises click.UsageError where nothing, or too much,
+    does."""
     if case is not None:
         return case, fitted, study
     folder = fitted if fitted is None or fitted.is_dir() else fitted.parent

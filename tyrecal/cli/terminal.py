@@ -1,4 +1,4 @@
-"""What commands say: words for people, results for programs, how far long work is."""
+"""Output of commands: words for people, results for programs, the progress of long work."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ RESUME = "tyrecal.resume"  # key of the context's notes: how to go on after Ctrl
 
 
 def coloured() -> bool | None:
-    """False where nobody wants colours (https://no-color.org), None: on terminals only."""
+    """False where colours are disabled (https://no-color.org), None: on terminals only."""
     unwanted = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
     return False if unwanted else None
 
 
 def error(text: str) -> None:
-    """What went wrong, in red on a terminal."""
+    """Print what went wrong, in red on a terminal."""
     say(click.style(f"error: {_plain(text)}", fg="red"), err=True, color=coloured())
 
 
@@ -45,7 +45,7 @@ def say(text: str, err: bool = False, **how: Any) -> None:
 @contextmanager
 def _reaching(err: bool) -> Iterator[None]:
     """A reader that has closed the pipe (`| head`) misses the rest, and costs no result. Where
-    standard error is full, or its terminal gone, nobody can be told."""
+    standard error is full, or its terminal gone, no message is possible."""
     try:
         yield
     except OSError as error:
@@ -57,13 +57,13 @@ def _reaching(err: bool) -> Iterator[None]:
 
 
 def resume(words: str) -> None:
-    """Have Ctrl-C say how to go on."""
+    """Have Ctrl-C print how to continue."""
     click.get_current_context().meta[RESUME] = words
 
 
 @dataclass(frozen=True)
 class Terminal:
-    """What --json, --quiet and --verbose make of a command's words.
+    """Output of a command under --json, --quiet and --verbose.
 
     Results go to standard output; beside --json only the JSON does. Errors and warnings go to
     standard error, whatever is asked for.
@@ -105,16 +105,16 @@ class Terminal:
             say(json_text(content), nl=False)
 
     def detail(self, text: str) -> None:
-        """What only --verbose wants to know."""
+        """Print a line that only --verbose shows."""
         if self.verbose:
             say(_plain(text), err=True)
 
     def warn(self, text: str) -> None:
-        """What must not be overlooked."""
+        """Print a warning that must not be overlooked."""
         say(click.style(_plain(text), fg="yellow"), err=True, color=coloured())
 
     def error(self, text: str) -> None:
-        """What went wrong and does not end the command."""
+        """Print what went wrong without ending the command."""
         error(text)
 
     @contextmanager
@@ -171,7 +171,7 @@ def _listening(progress: Progress) -> Iterator[Progress]:
 
 
 class Progress:
-    """How far the work is: on a ``bar``, or by lines that ``say`` gets; else does nothing."""
+    """Progress of the work: on a ``bar``, or by lines that ``say`` gets; else does nothing."""
 
     def __init__(
         self, what: str, stages: Sequence[str] = (), say: Callable[[str], None] | None = None
@@ -214,7 +214,7 @@ class Progress:
             self._show(whole + done / total, f"{self._what}, load {done + 1} of {total}")
 
     def words(self, text: str) -> None:
-        """What is being done, in a few words."""
+        """Show the current work, in a few words."""
         self._show(self._done, f"{text:.60}")
 
     def _reset(self) -> None:
@@ -234,7 +234,7 @@ class Progress:
             self._say(f"{words}{count}, {self.clock(now)}")
 
     def clock(self, now: float) -> str:
-        """What has elapsed of all and, once something is done, is left of this stage."""
+        """Time elapsed in all and, once something is done, time left of this stage."""
         elapsed = f"{clock(now - self._began)} elapsed"
         if not 0 < self._done < self._total:
             return elapsed

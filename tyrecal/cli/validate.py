@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @click.command()
 @options.case_argument
 @options.allow_unusual
-@options.talking
+@options.with_terminal
 def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
     """Check CASE and report every mistake: file, line, key, value, what would be right.
 
@@ -66,8 +66,8 @@ def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
 
 
 def _refused(loaded: LoadedCase) -> Mistake | None:
-    """What the solver that it is meant for refuses of a deck of one's own, if that is the bundled
-    one, or of decks in three dimensions."""
+    """Mistake for which the solver of the case refuses a user's deck, if it is the bundled one, or
+    decks in three dimensions."""
     from ..simulate.deck.own import trial
     from ..tyre.case.mistakes import Mistake
     from ..tyre.own_deck.text import OwnDeckError

@@ -167,8 +167,8 @@ def _motions(files: Sequence[Universal]) -> tuple[list[Universal], list[str]]:
 
 
 def _of_the_tyre(files: Sequence[Universal]) -> tuple[list[Universal], list[str]]:
-    """Files without what was measured on other components than the tyre. Raises InputError where
-    two components count the same nodes, and their names do not say which one is the tyre."""
+    """Files without the measurements on components other than the tyre. Raises InputError where two
+    components count the same nodes, and their names do not show which one is the tyre."""
     nodes: defaultdict[str, set[int]] = defaultdict(set)
     for file in files:
         for each in file.functions:

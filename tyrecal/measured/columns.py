@@ -1,4 +1,4 @@
-"""What the columns of a table hold, told by their headings, with the units in them."""
+"""Contents of the columns of a table, derived from their headings and the units in them."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class TableColumn:
 
 
 def meaning_of(heading: str) -> str | None:
-    """What a column holds; None of damping, remarks and the like."""
+    """Meaning of a column by its heading; None for damping, remarks and the like."""
     return MEANING.get(_heading(heading)[0])
 
 
@@ -77,7 +77,7 @@ def is_unit(text: str) -> bool:
 def read_columns(
     headings: Sequence[str], place: str, pressure_kPa: float | None
 ) -> dict[str, TableColumn]:
-    """Columns by meaning, of those that have one; ``pressure_kPa``: where none says it.
+    """Columns by meaning, of those that have one; ``pressure_kPa``: where none gives it.
 
     Raises InputError at ``place``.
     """

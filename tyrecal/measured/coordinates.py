@@ -48,7 +48,7 @@ WORLD = CoordinateSystem(CARTESIAN, np.eye(3), np.zeros(3))
 
 def read_systems(kind: int, lines: Sequence[str]) -> dict[int, CoordinateSystem]:
     """Coordinate systems, by number, of a data set of type ``kind``, 18 or 2420, given its lines
-    after the type. Raises ValueError, a phrase that says what is wrong."""
+    after the type. Raises ValueError, a phrase that names the fault."""
     return _systems_18(lines) if kind == 18 else _systems_2420(lines)
 
 

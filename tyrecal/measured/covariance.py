@@ -31,7 +31,7 @@ HALF_WIDTHS = (0.18, 0.40)  # of a belt's half width over its radius: motorcycle
 WIDTHS = 6  # half widths averaged over
 WIDER = 1.05  # a belt reaches beyond its outermost sensor by up to this factor, at least
 HEIGHTS = 2  # highest polynomial over a sidewall's height
-LEAST_SEEN = 0.1  # share of all motions' mean square from which sensors see a label's own motions
+MIN_SEEN = 0.1  # share of all motions' mean square from which sensors see a label's own motions
 
 
 def label_covariances(
@@ -53,7 +53,7 @@ def label_covariances(
         for column in range(5 if c == 0 else 4):
             variances = [np.tile(v, len(widths)) for v in _variances(c, column)]
             seen = np.array([v @ square for v in variances])
-            shares = (1.0, SAME_PARITY, OTHER_PARITY) / np.maximum(seen, LEAST_SEEN * seen.sum())
+            shares = (1.0, SAME_PARITY, OTHER_PARITY) / np.maximum(seen, MIN_SEEN * seen.sum())
             v = shares @ variances
             S = _unit((B * v) @ B.T) + OTHER_WAVES * every
             result.append((c, column, _unit(S), float(seen[0] / seen.sum())))

@@ -26,7 +26,7 @@ MIN_EXPLAINED = 0.98  # of the functions' mean square; less, and modes are missi
 
 @dataclass(frozen=True)
 class Gathered:
-    """What several files measure together."""
+    """Measurements of several files together."""
 
     rows: list[Measurement]  # one value each with its sigma
     runs: list[ModalTest]  # of the universal files
@@ -126,7 +126,7 @@ def _without_labels(
 
 
 def _refuse_unlabelled_repeats(values: Sequence[Measurement]) -> None:
-    """Raises InputError where frequencies without labels come from several runs: nothing says
+    """Raises InputError where frequencies without labels come from several runs: nothing shows
     which of them repeat each other."""
     runs: dict[TyreState, Measurement] = {}
     for each in values:
@@ -152,7 +152,7 @@ def all_nodes(files: Sequence[Universal]) -> dict[int, Place]:
 
 
 def result(gathered: Gathered) -> dict[str, Any]:
-    """What ``tyrecal measured import --json`` prints."""
+    """The JSON that ``tyrecal measured import --json`` prints."""
     return {
         "format": 1,
         "measurements": [
@@ -177,16 +177,16 @@ def label_entry(label: Label | None) -> dict[str, Any]:
     return asdict(label) if label else dict.fromkeys(("c", "m", "kind"))
 
 
-def _entry(run: ModalTest, told: LabelledMode) -> dict[str, Any]:
+def _entry(run: ModalTest, labelled: LabelledMode) -> dict[str, Any]:
     finite = lambda x: x if isfinite(x) else None
     return {
         "file": run.name,
-        "frequency_Hz": told.mode.frequency_Hz,
-        "sigma_Hz": finite(told.mode.sigma_Hz),
-        "damping_ratio": finite(told.mode.damping),
-        "collinearity": round(told.collinearity, 4),
-        **label_entry(told.judged.label),
-        "member": told.member,
-        "confidence": round(told.judged.confidence, 4),
-        "why": told.judged.why,
+        "frequency_Hz": labelled.mode.frequency_Hz,
+        "sigma_Hz": finite(labelled.mode.sigma_Hz),
+        "damping_ratio": finite(labelled.mode.damping),
+        "collinearity": round(labelled.collinearity, 4),
+        **label_entry(labelled.judged.label),
+        "member": labelled.member,
+        "confidence": round(labelled.judged.confidence, 4),
+        "why": labelled.judged.why,
     }

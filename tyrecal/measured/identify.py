@@ -58,7 +58,7 @@ class Responses:
 
 @dataclass(frozen=True)
 class Identified:
-    """What functions are made of."""
+    """Modes that were identified from measured functions."""
 
     modes: tuple[MeasuredMode, ...]  # by rising frequency, their amplitudes the residues
     fitted: Array  # (k, n) the functions that they make, NaN outside the band
@@ -93,8 +93,8 @@ def identify(measured: Responses, low_Hz: float, high_Hz: float) -> Identified:
     inside = (f >= low_Hz) & (f <= high_Hz)
     residues, fitted = _residues(f, mobility, inside, _pole(hertz, z))
     fitted[:, ~inside] = np.nan
-    found = zip(hertz, z, residues, sigma, strict=True)
-    found_modes = [MeasuredMode(float(h), u, float(zk), float(s)) for h, zk, u, s in found]
+    rows = zip(hertz, z, residues, sigma, strict=True)
+    found_modes = [MeasuredMode(float(h), u, float(zk), float(s)) for h, zk, u, s in rows]
     return Identified(tuple(found_modes), fitted / to_mobility)
 
 
@@ -157,14 +157,14 @@ def _modes(poles: list[Array], low_Hz: float, high_Hz: float) -> Array:
     high = poles[len(poles) // LOW_ORDERS :]
     for each in high:
         w = np.abs(each)
-        found = np.column_stack([w / (2 * np.pi), -each.real / w])
-        right = (each.imag > 0) & (found[:, 0] >= low_Hz) & (found[:, 0] <= high_Hz)
-        right &= (found[:, 1] > DAMPING_RANGE[0]) & (found[:, 1] < DAMPING_RANGE[1])
-        found = found[right]
-        change = np.abs(before[None] / found[:, None] - 1)
+        candidates = np.column_stack([w / (2 * np.pi), -each.real / w])
+        right = (each.imag > 0) & (candidates[:, 0] >= low_Hz) & (candidates[:, 0] <= high_Hz)
+        right &= (candidates[:, 1] > DAMPING_RANGE[0]) & (candidates[:, 1] < DAMPING_RANGE[1])
+        candidates = candidates[right]
+        change = np.abs(before[None] / candidates[:, None] - 1)
         again = (change < (SAME_FREQUENCY, SAME_DAMPING)).all(2).any(1)
-        stable += [tuple(row) for row in found[again]]
-        before = found
+        stable += [tuple(row) for row in candidates[again]]
+        before = candidates
     stable.sort()
     rest, modes = np.array(stable).reshape(-1, 2), []
     while len(rest):  # the most crowded place first
@@ -183,14 +183,14 @@ def _modes(poles: list[Array], low_Hz: float, high_Hz: float) -> Array:
 def _jackknife(again: list[Array], frequencies: Array) -> Array:
     """Standard deviation of each frequency, Hz, from the modes found without one group each; NaN
     where fewer than three saw it."""
-    found = np.full((len(again), len(frequencies)), np.nan)
+    nearest = np.full((len(again), len(frequencies)), np.nan)
     for j, modes in enumerate(again):
         for i, hertz in enumerate(frequencies):
             change = np.abs(modes[:, 0] / hertz - 1)
             if len(change) and change.min() < 2 * MODE_WIDTH:
-                found[j, i] = modes[np.argmin(change), 0]
-    seen = np.isfinite(found).sum(0)
+                nearest[j, i] = modes[np.argmin(change), 0]
+    seen = np.isfinite(nearest).sum(0)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of modes that no group saw
-        spread = np.nanvar(found, axis=0) * (seen - 1)
+        spread = np.nanvar(nearest, axis=0) * (seen - 1)
     return np.where(seen > 2, np.sqrt(spread), np.nan)

@@ -1,4 +1,4 @@
-"""Labels [c, m] of measured shapes: the probability of each label on the sensors at hand.
+"""Labels [c, m] of measured shapes: the probability of each label on the given sensors.
 
 The signals u (k,) of a mode are normal about 0,
 
@@ -26,9 +26,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..simulate.modes.label import AXIAL_COLUMN, BELT, HIGHEST_HARMONIC, Label
+from ..simulate.modes.label import AXIAL_COLUMN, BELT, MAX_SAMPLED_HARMONIC, Label
 from .case_modes import CaseModes
-from .covariance import HALF_WIDTHS, LEAST_SEEN, label_covariances
+from .covariance import HALF_WIDTHS, MIN_SEEN, label_covariances
 from .sensors import Sensors
 
 Array = np.ndarray
@@ -67,7 +67,7 @@ class Labeller:
     """
 
     def __init__(
-        self, sensors: Sensors, highest: int = HIGHEST_HARMONIC, case: CaseModes | None = None
+        self, sensors: Sensors, highest: int = MAX_SAMPLED_HARMONIC, case: CaseModes | None = None
     ):
         self.sensors, self.case = sensors, case
         every = label_covariances(sensors, highest, case.half_width if case else None)
@@ -76,7 +76,7 @@ class Labeller:
         if case:
             pairs = zip(self.labels, self.covariance, strict=True)
             self.covariance = [case.covariance(label, sensors, S) for label, S in pairs]
-        self.is_seen = np.array([seen >= LEAST_SEEN for *_, seen in every])
+        self.is_seen = np.array([seen >= MIN_SEEN for *_, seen in every])
         self._spectra = [np.linalg.eigh(S) for S in self.covariance]
         is_alike = self._odds() < MIN_LN_ODDS
         self._groups = [np.flatnonzero(row) for row in is_alike]  # each label, and its rivals
@@ -103,7 +103,7 @@ class Labeller:
     def _probabilities(
         self, shapes: Array, below: Collection[Label] = (), frequency_Hz: float | None = None
     ) -> Array:
-        """Of each label (labels, n), of shapes (k, n)."""
+        """Probability of each label for shapes (k, n): (labels, n)."""
         evidence = np.array([_evidence(*spectrum, shapes) for spectrum in self._spectra])
         prior = self._prior(below)
         if self.case and frequency_Hz:
@@ -139,7 +139,7 @@ class Labeller:
         return odds
 
     def looks_like(self) -> dict[Label, list[Label]]:
-        """Of each label the other ones that its shapes look like on these sensors, the likeliest
+        """For each label the other labels that its shapes look like on these sensors, the likeliest
         first; none where at least `MIN_LABELLED` of the shapes drawn of it get it, in a file in
         which the mode that has to be below it was found."""
         k, random = len(self.sensors.points), np.random.default_rng(0)
@@ -203,7 +203,7 @@ def _lower(label: Label) -> Label | None:
 
 
 def _missing(sensors: Sensors) -> str:
-    """What a layout lacks to tell orders apart."""
+    """Measurements that a layout lacks to distinguish orders."""
     names = ("radial", "tangential", "axial")
     R, _, Z = sensors.points.T
     belt = R / R.max() > BELT

@@ -1,4 +1,4 @@
-"""What one line of a table measures."""
+"""Measured values in one line of a table."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Line:
         return value * self.columns[meaning].factor
 
     def measurements(self, pressure_kPa: float, run: str) -> Iterator[Measurement]:
-        """One for each quantity; ``pressure_kPa`` where the line does not say it."""
+        """One for each quantity; ``pressure_kPa`` where the line does not give it."""
         pressure, load = self.number("pressure", pressure_kPa), self.number("load", 0.0)
         if load < 0:
             raise ValueError(f"load is {load:g}, must be at least 0")
@@ -84,8 +84,8 @@ class Line:
 
     def _quantities(self) -> list[str]:
         if not self.cell("value"):
-            if found := [quantity for quantity in QUANTITIES if self.cell(quantity)]:
-                return found
+            if quantities := [quantity for quantity in QUANTITIES if self.cell(quantity)]:
+                return quantities
             raise ValueError(
                 "nothing was measured: the cell of the value is empty; write n.a. if that is meant"
             )
@@ -97,7 +97,7 @@ class Line:
         return [quantity]
 
     def _rim(self) -> RimSupport | None:
-        """As the case has it where no column says it; fixed where its cell is empty."""
+        """Rim of the line: the case's where no column gives it; fixed where its cell is empty."""
         word = self.cell("rim").strip().lower() or RIMS[0]
         if "rim" not in self.columns or word == AS_CASE:
             return None

@@ -17,7 +17,7 @@ CSV_COLUMNS = ("quantity", "c", "m", "kind", "member", "pressure_kPa", "load_N",
 RIM_COLUMN = "rim"  # where some stand on another rim than the case's
 AS_CASE = "case"
 PRESSURE_USUAL = Usual(20, 2000, "kPa", PRESSURE)
-LEAST_CARRIED, MOST_CARRIED = 0.05, 3.0  # contact area times pressure, of the load
+MIN_CARRIED, MAX_CARRIED = 0.05, 3.0  # contact area times pressure, of the load
 MeasurementKey = tuple[str, Label | None, str, float, float, RimSupport | None]
 
 
@@ -38,23 +38,23 @@ class Measurement:
 
     @property
     def key(self) -> MeasurementKey:
-        """What is measured."""
+        """Identity of the measured value: quantity, label, member and state."""
         state = (self.pressure_kPa, self.load_N, self.rim)
         return (self.quantity, self.label, self.member, *state)
 
     @property
     def state(self) -> TyreState:
-        """What the tyre was in."""
+        """State of the tyre when it was measured."""
         return TyreState(self.pressure_kPa or None, self.load_N, self.rim)
 
     @property
     def is_unlabelled(self) -> bool:
-        """It is a frequency whose mode nobody told."""
+        """Whether it is a frequency whose mode is not given."""
         return self.quantity == "frequency_Hz" and self.label is None
 
     @property
     def name(self) -> str:
-        """What is measured, in words."""
+        """Name of the measured value, in words."""
         return self.label.said if self.label else self.quantity
 
     @property
@@ -72,7 +72,7 @@ class Measurement:
             return f"the load is 0, must be greater than 0 for {self.quantity}"
         if self.quantity == "contact_area_m2":
             share = self.value * 1e3 * self.pressure_kPa / self.load_N
-            if not LEAST_CARRIED <= share <= MOST_CARRIED:
+            if not MIN_CARRIED <= share <= MAX_CARRIED:
                 return (
                     f"{self.quantity} is {self.value:g} under {self.load_N:g} N: at"
                     f" {self.pressure_kPa:g} kPa it would carry {share * self.load_N:.3g} N; check"

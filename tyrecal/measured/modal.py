@@ -11,7 +11,7 @@ from itertools import compress
 import numpy as np
 
 from ..errors import InputError
-from ..simulate.modes.label import BELT, HIGHEST_HARMONIC, TAKES_PART, Label
+from ..simulate.modes.label import BELT, MAX_SAMPLED_HARMONIC, TAKES_PART, Label
 from .case_modes import CaseModes
 from .geometry import sensors_of
 from .identify import FORMS, Responses, identify
@@ -43,7 +43,7 @@ class Layout:
     axle: str = ""  # x, y or z; "": told by the sensors' places
     centre: Place = (0.0, 0.0, 0.0)  # m
     directions: str = ""
-    highest: int = HIGHEST_HARMONIC  # the largest c that is possible
+    highest: int = MAX_SAMPLED_HARMONIC  # the largest c that is possible
     band: tuple[float, float] | None = None  # Hz; None: all
     form: str = ""  # of functions that do not say theirs
     case: CaseModes | None = None  # by which shapes and frequencies are judged, too
@@ -143,7 +143,7 @@ _ASK = "give --directions cartesian (along x, y, z) or cylindrical (radial, tang
 
 
 def _readings(signals: Sequence[Signal], geometry: Geometry, layout: Layout) -> dict[str, Labeller]:
-    """Judges of the signals by what the directions can mean: first what the user says, or else the
+    """Judges of the signals by what the directions can mean: first what the user gives, or else the
     file or the format. Where two meanings put the sensors in the same directions, one judge has
     both."""
     names = ["stated", "cartesian"] if geometry.axes else ["cartesian", "cylindrical"]
@@ -363,7 +363,7 @@ def _unit(mode: MeasuredMode) -> tuple[Array, float]:
     return shape / (np.abs(shape).max() or 1.0), collinearity
 
 
-def settled(told: list[LabelledMode]) -> list[LabelledMode]:
+def settled(labelled: list[LabelledMode]) -> list[LabelledMode]:
     """Each label once in a run, or twice where both members of a doublet were found.
 
     As in ``modes.label``, the lowest mode on an order has its label; what comes above is an
@@ -372,7 +372,7 @@ def settled(told: list[LabelledMode]) -> list[LabelledMode]:
     hertz = lambda each: each.mode.frequency_Hz
     result: list[LabelledMode] = []
     by_label: dict[Label | None, list[LabelledMode]] = {}
-    for each in sorted(told, key=hertz):
+    for each in sorted(labelled, key=hertz):
         by_label.setdefault(each.judged.label, []).append(each)
     for label, group in by_label.items():
         if label is None:

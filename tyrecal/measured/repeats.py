@@ -1,4 +1,4 @@
-"""What repeats make of single values: their mean with its standard deviation.
+"""Combination of repeated single values: their mean with its standard deviation.
 
 The value is the mean over n runs, and sigma that of the mean:
 
@@ -20,7 +20,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..simulate.modes.label import Label
-from ..tyre.usual import LARGEST_SIGMA
+from ..tyre.usual import MAX_SIGMA
 from .measurement import Measurement
 
 FLOOR = 0.001  # of the value
@@ -57,10 +57,10 @@ def combined(
                 " a column sigma, or --sigma-percent"
             )
         sigma = max(float(np.sqrt(max(variances))), floor * mean)
-        if sigma > LARGEST_SIGMA * mean:
+        if sigma > MAX_SIGMA * mean:
             raise InputError(
                 f"{runs[0].place}: sigma of {runs[0].name} comes to {sigma:.3g}, more than"
-                f" {LARGEST_SIGMA:.0%} of the value {mean:.4g}: is it a mistake, or another mode?"
+                f" {MAX_SIGMA:.0%} of the value {mean:.4g}: is it a mistake, or another mode?"
             )
         rows.append(replace(runs[0], value=mean, sigma=sigma))
     return sorted(rows, key=_order)
@@ -86,9 +86,9 @@ def one_for_both(values: Sequence[Measurement]) -> list[Measurement]:
         places.setdefault(place, {}).setdefault(each.run, []).append(each)
     result = []
     for runs in places.values():
-        told = [{each.member for each in run} for run in runs.values()]
+        per_run = [{each.member for each in run} for run in runs.values()]
         for run in runs.values():
-            if run[0].load_N or all(members == told[0] for members in told):
+            if run[0].load_N or all(members == per_run[0] for members in per_run):
                 result += run
             elif {each.member for each in run} == {"1", "2"}:
                 mean = sum(each.value for each in run) / len(run)

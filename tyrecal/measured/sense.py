@@ -39,10 +39,10 @@ SHAPE_SD_ELSE, SHAPE_SD_FREE = 0.02, 0.2  # with more waves; on a free rim with 
 RISE, RISE_SD, OWN_RISE_SD = 0.35, 0.08, 0.05  # of s and s_label
 # of [0,0] torsional, in which cords carry nearly all: computed for tyres of ten sizes
 TORSIONAL_RISE, TORSIONAL_RISE_SD = 0.24, 0.08
-LEAST_NOISE = 0.003
+MIN_NOISE = 0.003
 EXCHANGED, OFF = 16.0, 25.0  # chi-squared that a doubt takes away
 NEXT_SLIP = 6.0  # chi-squared between a slip and the next likely: below, both are named
-MOST_DOUBTS = 5
+MAX_DOUBTS = 5
 
 
 def doubts_of_file(path: Path) -> list[str]:
@@ -62,7 +62,7 @@ def doubts(rows: Sequence[Measurement]) -> list[str]:
 
 def _of_one_rim(rows: list[Measurement]) -> Iterator[str]:
     rows = list(rows)
-    for _ in range(min(MOST_DOUBTS, len(rows) - 1)):
+    for _ in range(min(MAX_DOUBTS, len(rows) - 1)):
         weight, deviation = _pattern(rows)
         base = deviation @ weight @ deviation
 
@@ -181,7 +181,7 @@ def _pattern(rows: Sequence[Measurement]) -> tuple[Array, Array]:
     same = np.array([[a == b for b in labels] for a in labels])
     torsional = np.array([label.kind == "torsional" for label in labels])
     own_rise = np.where(torsional, TORSIONAL_RISE_SD, OWN_RISE_SD)
-    noise = np.array([np.hypot(np.nan_to_num(row.sigma / row.value), LEAST_NOISE) for row in rows])
+    noise = np.array([np.hypot(np.nan_to_num(row.sigma / row.value), MIN_NOISE) for row in rows])
     covariance = (
         SCALE_SD**2
         + OFFSET_SD**2 * (m[:, None] == m)

@@ -12,7 +12,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Sensors:
-    """What is measured, and where: one row a signal, several rows for a point with several."""
+    """Sensors of a test: one row per signal, several rows for a point with several signals."""
 
     points: Array  # (k, 3) R (m), Theta (rad), Z (m) about the axle, from the middle plane
     directions: Array  # (k, 3) unit vectors in r, theta, z

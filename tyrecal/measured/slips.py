@@ -26,12 +26,15 @@ FALSE_REPORTS = 0.002  # of files without a slip
 FEW_REPEATS = (
     3  # degrees of freedom; with fewer, the file itself does not show what its repeats scatter
 )
-LARGEST_STEP = {"frequency_Hz": 0.05, "mass_kg": 0.05}  # relative, between repeats of such a file
-LARGEST_STEP_ELSE = 0.25
-LEAST_COMMON, LEAST_SHIFT = 3, 0.02  # labels of two runs, and their mean ln ratio
-MOST_SLIPS = 12  # slips that are looked for
+MAX_REPEAT_STEP = {
+    "frequency_Hz": 0.05,
+    "mass_kg": 0.05,
+}  # relative, between repeats of such a file
+MAX_REPEAT_STEP_ELSE = 0.25
+MIN_COMMON, MIN_SHIFT = 3, 0.02  # labels of two runs, and their mean ln ratio
+MAX_SLIPS = 12  # slips that are looked for
 USUAL_STEPS = [digit * 10.0**power for power in range(2, -8, -1) for digit in (5, 2.5, 2, 1.25, 1)]
-SMALLEST_SCATTER = 1e-4  # of the value: what no two set-ups of a test go below
+MIN_SCATTER = 1e-4  # of the value: what no two set-ups of a test go below
 
 
 @dataclass(frozen=True)
@@ -94,11 +97,11 @@ def common_shifts(values: Sequence[Measurement]) -> list[str]:
     sentences = []
     for (_, one), (_, other) in combinations(runs.items(), 2):
         common = [key for key in one if key in other]
-        if len(common) < LEAST_COMMON:
+        if len(common) < MIN_COMMON:
             continue
         shifts = np.log([one[key].value / other[key].value for key in common])
         mean, scatter = float(shifts.mean()), float(shifts.std(ddof=1))
-        if abs(mean) > LEAST_SHIFT and abs(mean) > 4 * scatter:
+        if abs(mean) > MIN_SHIFT and abs(mean) > 4 * scatter:
             first, second = one[common[0]], other[common[0]]
             sentences.append(
                 f"{first.place}{_run(first)}: all {len(common)} frequencies are"
@@ -116,12 +119,12 @@ def _of_quantity(values: list[Measurement]) -> list[Contradiction]:
         groups.setdefault(each.key, []).append(each)
     repeated = [runs for runs in groups.values() if len(runs) > 1]
     half_step = _step([each.value for each in values]) / 2
-    largest = LARGEST_STEP.get(values[0].quantity, LARGEST_STEP_ELSE)
+    largest = MAX_REPEAT_STEP.get(values[0].quantity, MAX_REPEAT_STEP_ELSE)
     # a group of two is one comparison
     comparisons = sum(len(runs) if len(runs) > 2 else 1 for runs in repeated)
     removed: list[Contradiction] = []
     slips = 0
-    for _ in range(min(MOST_SLIPS, comparisons)):
+    for _ in range(min(MAX_SLIPS, comparisons)):
         squares = sum(float(np.sum(_deviations(runs) ** 2)) for runs in repeated)
         freedom = sum(len(runs) - 1 for runs in repeated)
         if not freedom:
@@ -136,7 +139,7 @@ def _of_quantity(values: list[Measurement]) -> list[Contradiction]:
         )
         n = len(worst)
         rest, left = max(0.0, squares - own), freedom - 1
-        floor = max(SMALLEST_SCATTER, half_step / max(each.value for each in worst))
+        floor = max(MIN_SCATTER, half_step / max(each.value for each in worst))
         usual = np.sqrt(rest / left) if left else 0.0
         limit = np.inf
         if left:

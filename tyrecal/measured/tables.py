@@ -17,7 +17,7 @@ from pathlib import Path
 from ..errors import InputError
 from ..files import read_bytes
 from ..tyre.number_table import NumberMarks, cells_under, read_text_table
-from ..tyre.usual import LARGEST_SIGMA
+from ..tyre.usual import MAX_SIGMA
 from ..units import QUANTITIES
 from .columns import NUMBER_MEANINGS, TableColumn, is_unit, meaning_of, read_columns, unit_of
 from .formats import other_format
@@ -49,14 +49,16 @@ def read_measurements(path: Path, labelled: bool = True) -> list[Measurement]:
             " 'tyrecal measured import' makes such a file of other tables"
         )
     columns = read_columns(headings, place, None)
-    found = _measurements(path, lines, columns, separator, 0.0, _sigma_mistake, labelled=False)
-    if labelled and (lacking := next((each for each in found if each.is_unlabelled), None)):
+    measurements = _measurements(
+        path, lines, columns, separator, 0.0, _sigma_mistake, labelled=False
+    )
+    if labelled and (lacking := next((each for each in measurements if each.is_unlabelled), None)):
         raise InputError(
             f"{lacking.place}: the frequency has no label, c and m; --measured of 'tyrecal fit' and"
             " 'tyrecal diagnose', and 'tyrecal measured label' find it"
         )
-    _refuse(_twice(found))
-    return found
+    _refuse(_twice(measurements))
+    return measurements
 
 
 def read_table(path: Path, pressure_kPa: float | None = None) -> list[Measurement]:
@@ -68,10 +70,12 @@ def read_table(path: Path, pressure_kPa: float | None = None) -> list[Measuremen
     lines, separator = _lines(path)
     place, headings = lines[0]
     columns = read_columns(headings, place, pressure_kPa)
-    found = _measurements(path, lines, columns, separator, pressure_kPa or 0.0, labelled=False)
-    _refuse(_swapped(found))
-    unlabelled = [each for each in found if each.is_unlabelled]
-    named = [each for each in found if not each.is_unlabelled]
+    measurements = _measurements(
+        path, lines, columns, separator, pressure_kPa or 0.0, labelled=False
+    )
+    _refuse(_swapped(measurements))
+    unlabelled = [each for each in measurements if each.is_unlabelled]
+    named = [each for each in measurements if not each.is_unlabelled]
     return [*_runs(named, "run" in columns), *unlabelled]
 
 
@@ -84,7 +88,7 @@ def _measurements(
     more: Callable[[Measurement], str | None] = lambda each: None,
     labelled: bool = True,
 ) -> list[Measurement]:
-    """Of all lines; ``more``: what else may be wrong with one. Raises InputError."""
+    """Measurements in all lines; ``more``: a further mistake in one of them. Raises InputError."""
     if len(lines) == 1:
         raise InputError(f"{path}: there is no measurement in it")
     if len(lines) > MAX_LINES:
@@ -108,11 +112,11 @@ def _measurements(
                 continue  # not measured, as the line says
             text = {meaning: "" if is_gap(cell) else cell for meaning, cell in text.items()}
             line = Line(place, text, columns, marks, labelled)
-            found = list(line.measurements(pressure_kPa, f"{path}"))
-            for each in found:
+            values = list(line.measurements(pressure_kPa, f"{path}"))
+            for each in values:
                 if mistake := each.mistake or more(each):
                     raise ValueError(mistake)
-            measurements += found
+            measurements += values
         except ValueError as error:
             mistakes.append(f"{place}: {error}")
     _refuse(mistakes)
@@ -181,15 +185,15 @@ def _move_unit(headings: list[str], rows: list[list[str]], column: int) -> None:
 
 
 def is_gap(cell: str) -> bool:
-    """Whether a cell says that nothing was measured."""
+    """Whether a cell marks a value that was not measured."""
     return cell.lower() in GAPS
 
 
 def _sigma_mistake(each: Measurement) -> str | None:
     if isnan(each.sigma):
         return "sigma is '', must be the standard deviation, greater than 0"
-    if each.sigma > LARGEST_SIGMA * each.value:
-        return f"sigma is {each.sigma:g}, more than {LARGEST_SIGMA:.0%} of the value {each.value:g}"
+    if each.sigma > MAX_SIGMA * each.value:
+        return f"sigma is {each.sigma:g}, more than {MAX_SIGMA:.0%} of the value {each.value:g}"
     return None
 
 
@@ -206,8 +210,8 @@ def _twice(measurements: list[Measurement]) -> Iterator[str]:
         other = seen.get((*place, "")) if each.member else None
         other = other or next((seen[(*place, m)] for m in "12" if (*place, m) in seen), None)
         if other and bool(other.member) != bool(each.member):
-            told = f"{_line(other)} gives it one value for both"
-            yield f"{each.place}: gives a pair a member, {told}"
+            reason = f"{_line(other)} gives it one value for both"
+            yield f"{each.place}: gives a pair a member, {reason}"
 
 
 def _line(each: Measurement) -> str:
@@ -215,7 +219,7 @@ def _line(each: Measurement) -> str:
 
 
 def _swapped(values: list[Measurement]) -> list[str]:
-    """What is wrong with the columns as a whole."""
+    """Mistakes in the columns as a whole."""
     f = [value for value in values if value.quantity == "frequency_Hz"]
     if len(f) < 4:
         return []

@@ -175,9 +175,9 @@ def _refuse_states(case: LoadedCase, readings: Sequence[Measurement]) -> None:
 def in_states(case: LoadedCase, readings: Sequence[Measurement]) -> list[Measurement]:
     """The same with a rim only where it is not held as the case has it. Raises InputError where the
     case cannot be in a state."""
-    found = [replace(each, rim=each.state.of(case).rim) for each in readings]
-    _refuse_states(case, [each for each in found if each.rim])
-    return found
+    with_rims = [replace(each, rim=each.state.of(case).rim) for each in readings]
+    _refuse_states(case, [each for each in with_rims if each.rim])
+    return with_rims
 
 
 def _modes(case: LoadedCase, readings: Sequence[Measurement]) -> list[TargetMode]:

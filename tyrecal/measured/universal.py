@@ -30,7 +30,7 @@ Place = tuple[float, float, float]  # m
 
 MAX_BYTES = 1_000_000_000  # response functions of many points are long
 SAME_PLACE_m = 1e-5  # m
-LARGEST_HZ, LARGEST_VALUE = 1e6, 1e30  # of response functions
+MAX_RESPONSE_HZ, MAX_RESPONSE = 1e6, 1e30  # of response functions
 DELIMITER = re.compile(rb" {4}-1(?: {74})?(?=[\r\n]|\Z)")  # binary values may stand before it
 NODES, SYSTEMS, SHAPES = (15, 2411), (18, 2420), (55, 2414)
 READ_TYPES = (*NODES, *SYSTEMS, *SHAPES, 58, 82, 164)
@@ -98,7 +98,7 @@ class Function:
 
 @dataclass(frozen=True)
 class Universal:
-    """What a universal file holds.
+    """Contents of a universal file.
 
     axes: of nodes with a coordinate system of their own, unit vectors (3, 3) of the directions 1,
     2, 3 in the global system, a row each; all others measure along its x, y, z.
@@ -351,7 +351,7 @@ def _add_function(result: Universal, each: _Set) -> None:
         raise InputError(f"{each.place}: {len(values)} values, the set says {count}; it is cut off")
     if not (np.isfinite(f).all() and np.isfinite(values[f > 0]).all()):
         raise InputError(f"{each.place}: a value is not a number")
-    if f[-1] > LARGEST_HZ or np.abs(values[f > 0]).max(initial=0) > LARGEST_VALUE:
+    if f[-1] > MAX_RESPONSE_HZ or np.abs(values[f > 0]).max(initial=0) > MAX_RESPONSE:
         raise InputError(
             f"{each.place}: goes to {f[-1]:g} Hz, or a value to {np.abs(values).max():g}; no"
             " response of a tyre does"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ..studies.diagnose.constants_told import constants_told
+from ..studies.diagnose.constants_told import constants_posterior
 from ..studies.diagnose.diagnosis import Diagnosis
 from ..studies.diagnose.evidence import COVERAGE, NONE, OUTSIDE, PRIOR_OUTSIDE
 from ..studies.diagnose.gap import OWN_RIM
@@ -15,7 +15,7 @@ from ..studies.diagnose.under_load import LoadedRow
 from ..studies.diagnose.verdict import NAMED, NO_GAP, UNDECIDED, no_gap_words
 from ..studies.fit.result import OTHER_RESIDUALS
 from ..tyre.footprint_quantities import FOOTPRINT_QUANTITIES
-from ..units import in_engineers_units, said
+from ..units import display_unit, in_engineers_units
 from .table import map_resolution
 
 RUNGS = {
@@ -139,47 +139,47 @@ def _answer(study: DiagnosedCase) -> Iterator[str]:
 
 
 def _labels(study: DiagnosedCase) -> Iterator[str]:
-    """Of frequencies that came without."""
+    """Labels of the frequencies that came without one."""
     if study.labels is None:
         return
     table = study.labels.table()
     rows = [[column.name for column in table.columns], ["---"] * len(table.columns), *table.rows]
     yield "## Which labels?"
     yield "\n".join(f"| {' | '.join(str(cell or '') for cell in row)} |" for row in rows)
-    told = "; ".join(study.labels.sentences())
+    words = "; ".join(study.labels.sentences())
     yield (
-        f"{told[0].upper()}{told[1:]}. These labels are told together with the effects, whose"
+        f"{words[0].upper()}{words[1:]}. These labels are told together with the effects, whose"
         " probabilities are averages over all labelings of at least 1 % about the plain tyre; all"
         " else is told with the likeliest."
     )
 
 
 def _robust(d: Diagnosis) -> str:
-    """What the verdict hangs on."""
-    found, key = d.robustness, d.verdict.key or d.verdict.best
+    """Dependence of the verdict on the assumptions."""
+    robust, key = d.robustness, d.verdict.key or d.verdict.best
     words = {NO_GAP: "no effect", OUTSIDE: "something outside"}
     of = words.get(d.verdict.kind, f"`{key}`")
-    between = f"the probability of {of} lies between {found.low:.2f} and {found.high:.2f}"
-    if found.robust and d.exchanged:
+    between = f"the probability of {of} lies between {robust.low:.2f} and {robust.high:.2f}"
+    if robust.robust and d.exchanged:
         return (
             "The verdict rests on labels that were exchanged here: correct the file before it is"
             f" used; {between}."
         )
-    if found.robust:
+    if robust.robust:
         labels = " and under every likely labeling," if len(d.readings) > 1 else ""
         return (
             f"Robust: with every prior and every constant's standard deviation half and twice as"
             f" large, without the model's own error of form, and with each mode left out,{labels}"
             f" the verdict is the same; {between}."
         )
-    more = len(found.hangs_on) - SHOWN
+    more = len(robust.hangs_on) - SHOWN
     tail = f"; and {more} more" if more > 0 else ""
-    return f"The verdict hangs on {'; '.join(found.hangs_on[:SHOWN])}{tail}. In all, {between}."
+    return f"The verdict hangs on {'; '.join(robust.hangs_on[:SHOWN])}{tail}. In all, {between}."
 
 
 def _constants(d: Diagnosis) -> Iterator[str]:
-    """Constants that the data move, told and not named."""
-    moved = [each for each in constants_told(d) if abs(each.shift_in_sd) >= 1]
+    """Constants that the data move, reported and not named."""
+    moved = [each for each in constants_posterior(d) if abs(each.shift_in_sd) >= 1]
     if moved:
         names = ", ".join(f"{e.name.replace('_', ' ')} {e.shift_in_sd:+.1f}" for e in moved[:SHOWN])
         yield (
@@ -194,7 +194,7 @@ def _sized(d: Diagnosis, key: str, id: str) -> str:
     whose = f"the size of `{id}`" if "+" in key else "its size"
     has = in_engineers_units(base, q["unit"])
     held = f", counting the {has} that the case has already" if base else ""
-    unit, factor = said(q["unit"])
+    unit, factor = display_unit(q["unit"])
     value, low, high = (f"{factor * q[key]:.3g}" for key in ("value", "low", "high"))
     sd = d.problem.spans[id].stated
     times = abs(q["value"] - base) / sd if sd else 0.0
@@ -224,9 +224,9 @@ def _gap(d: Diagnosis) -> Iterator[str]:
 
 
 def _where(d: Diagnosis) -> Iterator[str]:
-    found = [g for g in d.gap.groups if g.corrected < 0.05]
-    if found:
-        words = ", ".join(f"{g.kind} {g.name} (rms {g.rms_percent:.2f} %)" for g in found)
+    groups = [g for g in d.gap.groups if g.corrected < 0.05]
+    if groups:
+        words = ", ".join(f"{g.kind} {g.name} (rms {g.rms_percent:.2f} %)" for g in groups)
         yield f"Beyond chance, corrected for looking at {len(d.gap.groups)} groups: {words}."
     else:
         yield f"No group of modes stands out among {len(d.gap.groups)} (corrected for that many)."
@@ -256,7 +256,7 @@ def _where(d: Diagnosis) -> Iterator[str]:
 
 
 def _fields(study: DiagnosedCase) -> Iterator[str]:
-    """What the data say of the section."""
+    """The section as the data describe it."""
     rows = [
         f"| {v.field} | {v.place} | {v.value:+.2g} {v.unit} | {v.sigma:.2g} | {v.before:.2g} |"
         for v in study.section
@@ -268,11 +268,11 @@ def _fields(study: DiagnosedCase) -> Iterator[str]:
 
 
 def _under_load(study: DiagnosedCase) -> Iterator[str]:
-    found = study.under_load
-    if not found:
+    under_load = study.under_load
+    if not under_load:
         return
-    heads = {key: f"with `{key}`" if key != NONE else "calibrated" for key in found.tyres}
-    rms = {key: found.rms_percent(key) for key in found.tyres}
+    heads = {key: f"with `{key}`" if key != NONE else "calibrated" for key in under_load.tyres}
+    rms = {key: under_load.rms_percent(key) for key in under_load.tyres}
     off = [f"{heads[key]} {each:.1f} %" for key, each in rms.items() if each is not None]
     if off:
         yield (
@@ -281,12 +281,12 @@ def _under_load(study: DiagnosedCase) -> Iterator[str]:
         )
         rows = [f"| kPa | N | measured | {' | '.join(f'{head}, %' for head in heads.values())} |"]
         rows.append("|" + "---|" * (3 + len(heads)))
-        for row in found.rows:
+        for row in under_load.rows:
             percent = [f"{100 * row.off[key]:+.1f}" if key in row.off else "" for key in heads]
             cells = [f"{row.pressure_kPa:g}", f"{row.load_N:g}", _measured(row), *percent]
             rows.append(f"| {' | '.join(cells)} |")
         yield "\n".join(rows)
-    for why in found.failed:
+    for why in under_load.failed:
         key, _, words = why.partition(", ")
         yield f"Under load not computed, {heads[key]}, {words}."
 
@@ -356,7 +356,7 @@ def _which(study: DiagnosedCase) -> Iterator[str]:
 
 
 def _ranged(q: Mapping[str, Any]) -> str:
-    unit, factor = said(q["unit"])
+    unit, factor = display_unit(q["unit"])
     value, low, high = (f"{factor * q[key]:.3g}" for key in ("value", "low", "high"))
     return f"{value} ({low} to {high}) {unit}".rstrip()
 
@@ -389,14 +389,14 @@ def _shrinkage(d: Diagnosis) -> Iterator[str]:
 
 
 def _variables(study: DiagnosedCase) -> Iterator[str]:
-    """What was calibrated, without and with what the diagnosis leads to."""
-    found, key = study.variables, study.diagnosis.leading
+    """Calibrated variables, without and with the effect to which the diagnosis leads."""
+    calibrated, key = study.variables, study.diagnosis.leading
     heads = {"without": "without an effect", "with": f"with `{key}`"}
-    shown = {head: found[side] for side, head in heads.items() if found[side]}
+    shown = {head: calibrated[side] for side, head in heads.items() if calibrated[side]}
     rows = [f"| variable | {' | '.join(shown)} |", "|---|" + "---|" * len(shown)]
     rows += [
         f"| {name} | {' | '.join(_calibrated(side[name]) for side in shown.values())} |"
-        for name in found["without"]
+        for name in calibrated["without"]
     ]
     yield "\n".join(rows)
     yield (

@@ -36,15 +36,15 @@ def draw_diagnosis(d: Diagnosis, parts: DiagnosisSection) -> dict[str, Figure]:
     """Figures by name, as far as there is what they show."""
     rows, gap = d.problem.observations.rows, d.gap
     after, effect = (_after(d), _within(d, d.leading)) if d.leading else (None, "")
-    found = {
+    figures = {
         "residuals": draw_residuals(rows, gap.residuals, gap.spread, after, effect),
         "probabilities": draw_probabilities(d),
     }
     if d.shrinkage:
-        found["held_out"] = draw_held_out(d)
+        figures["held_out"] = draw_held_out(d)
     if d.parts:
-        found["section"] = draw_section_map(parts, d.parts, d.effective_rank)
-    return found
+        figures["section"] = draw_section_map(parts, d.parts, d.effective_rank)
+    return figures
 
 
 @in_house_style
@@ -138,7 +138,7 @@ def draw_probabilities(d: Diagnosis) -> Figure:
 
 @in_house_style
 def draw_held_out(d: Diagnosis) -> Figure:
-    """The error on held-out data without and, where there is a gap, with the effect, beside the
+    """The error on held-out data without and, where there is a gap, with the effect, next to the
     noise floor and what chance does."""
     s = d.shrinkage
     assert s is not None

@@ -37,8 +37,8 @@ def drawn_numbers(figure: Figure) -> list[Panel]:
     """What the figure's own texts and each of its panels say: ``words`` and ``numbers``.
 
     numbers: for every line, area, cloud of points and coloured field the count of its values, their
-    least, greatest, mean and root mean square to `DRAWN_DIGITS` significant digits, in units of the axes.
-    Ticks are left out: they follow from the rest and from the version of Matplotlib.
+    least, greatest, mean and root mean square to `DRAWN_DIGITS` significant digits, in units of the
+    axes. Ticks are left out: they follow from the rest and from the version of Matplotlib.
     """
     return [{"words": _words(figure.texts), "numbers": []}, *map(_panel, figure.axes)]
 

@@ -1,4 +1,4 @@
-"""What all pictures share: canvas, type, colours; and how they are written: PNG, SVG or PDF."""
+"""Canvas, type and colours of all pictures, and how they are written: PNG, SVG or PDF."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from matplotlib.ticker import LogFormatter
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from ..files import whole
+from ..files import atomic_write
 from . import drawn
 
 DPI = 150
@@ -102,7 +102,7 @@ def save(figure: Figure, path: Path) -> None:
     kind = path.suffix[1:]
     if kind != "png":
         undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
-        with whole(path) as partial:
+        with atomic_write(path) as partial:
             figure.savefig(partial, format=kind, metadata=undated[kind])
         return
     canvas = figure.canvas
@@ -112,14 +112,15 @@ def save(figure: Figure, path: Path) -> None:
     small = image.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     kept = PngInfo()
     kept.add_itxt(drawn.PNG_KEY, json.dumps(drawn.drawn_numbers(figure)), zip=True)
-    with whole(path) as partial:
+    with atomic_write(path) as partial:
         small.save(partial, "PNG", compress_level=COMPRESSION, pnginfo=kept)
 
 
 @in_house_style
 def svg(figure: Figure, words: str, key: str) -> Markup:
-    """The figure as part of a page, told in ``words`` to who does not see it. The same figure gives
-    the same text; ``key``: what its ids begin with, another one for each figure of a page."""
+    """The figure as part of a page, described in ``words`` for readers who do not see it. The same
+    figure gives the same text; ``key``: what its ids begin with, another one for each figure of a
+    page."""
     use_plain_numbers(figure)
     file = io.StringIO()
     nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))

@@ -64,10 +64,10 @@ def draw_load_sweep(rows: Sequence[LoadRow]) -> Figure:
 
 def _curves(rows: Sequence[LoadRow], design: str) -> dict[tuple[Label, str], Curve]:
     """Loads (kN) and frequencies (Hz) of each member."""
-    found: dict[tuple[Label, str], Curve] = {}
+    curves: dict[tuple[Label, str], Curve] = {}
     for row in rows:
         for mode in row.modes if row.design == design else []:
-            load, hertz = found.setdefault((mode.label, mode.symmetry or ""), ([], []))
+            load, hertz = curves.setdefault((mode.label, mode.symmetry or ""), ([], []))
             load.append(row.load_N / 1e3)
             hertz.append(mode.frequency_Hz)
-    return found
+    return curves

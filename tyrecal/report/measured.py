@@ -38,25 +38,25 @@ def measured_table(runs: Sequence[ModalTest]) -> Table:
     for run in runs:
         table.add_section()
         table.add_row(Text(Path(run.name).name, "bold"))
-        for told in run.modes:
-            label, sigma = told.judged.label, told.mode.sigma_Hz
-            member = f" member {told.member}" if told.member else ""
+        for labelled in run.modes:
+            label, sigma = labelled.judged.label, labelled.mode.sigma_Hz
+            member = f" member {labelled.member}" if labelled.member else ""
             table.add_row(
                 Text(f"{label.said}{member}" if label else "-"),
-                f"{told.mode.frequency_Hz:.2f}",
+                f"{labelled.mode.frequency_Hz:.2f}",
                 f"{sigma:.3f}" if np.isfinite(sigma) else "-",
-                f"{100 * told.mode.damping:.2f}" if np.isfinite(told.mode.damping) else "-",
-                f"{told.judged.confidence:.2f}",
-                Text(told.judged.why),
+                f"{100 * labelled.mode.damping:.2f}" if np.isfinite(labelled.mode.damping) else "-",
+                f"{labelled.judged.confidence:.2f}",
+                Text(labelled.judged.why),
             )
     return table
 
 
-def sensors_words(told: Mapping[Label, Sequence[Label]]) -> str:
-    """Which labels sensors tell apart, and which look like others: a line for each c."""
+def sensors_words(alike_labels: Mapping[Label, Sequence[Label]]) -> str:
+    """Labels that sensors distinguish, and those that look like others: a line for each c."""
     lines = []
-    for c in sorted({label.c for label in told}):
-        mine = {label: alike for label, alike in told.items() if label.c == c}
+    for c in sorted({label.c for label in alike_labels}):
+        mine = {label: alike for label, alike in alike_labels.items() if label.c == c}
         right = ", ".join(label.said for label, alike in mine.items() if not alike)
         wrong = [
             f"cannot tell {label.said}, it looks like {_few(alike)}"
@@ -94,9 +94,9 @@ def _draw(path: Path, runs: Sequence[ModalTest]) -> None:
     grid = figure.add_gridspec(top + rows, PER_ROW, height_ratios=[3.4] * top + [2.35] * rows)
     if top:
         _draw_functions(figure.add_subplot(grid[0, :]), run)
-    for number, told in enumerate(modes):
+    for number, labelled in enumerate(modes):
         place = grid[top + number // PER_ROW, number % PER_ROW]
-        _draw_shape(figure.add_subplot(place), told)
+        _draw_shape(figure.add_subplot(place), labelled)
     save(figure, path)
 
 
@@ -109,14 +109,14 @@ def _draw_functions(axes: Axes, run: ModalTest) -> None:
     f, measured, made = run.frequency_Hz, size(run.functions), size(run.fitted)
     axes.semilogy(f, measured, color=GREY, lw=2.6, alpha=0.6, label="measured")
     axes.semilogy(f, made, color=COLOURS[1], lw=1.1, label="made by the modes")
-    inside = [told.mode.frequency_Hz for told in run.modes]
+    inside = [labelled.mode.frequency_Hz for labelled in run.modes]
     axes.set_ylim(0.5 * measured[measured > 0].min(), 6.0 * measured.max())
     before, level = -np.inf, 0
-    for told in run.modes:
-        hertz = told.mode.frequency_Hz
+    for labelled in run.modes:
+        hertz = labelled.mode.frequency_Hz
         axes.axvline(hertz, color=COLOURS[0], lw=0.7, ls=(0, (4, 3)))
         level = level + 1 if hertz - before < 0.08 * (f[-1] - f[0]) else 0
-        name = told.judged.label.said if told.judged.label else "?"
+        name = labelled.judged.label.said if labelled.judged.label else "?"
         axes.annotate(
             name,
             (hertz, 1.0),
@@ -146,21 +146,21 @@ def _shown(label: Label | None, size: Sequence[float]) -> int:
     return next((k for k in order if size[k] > 0), int(np.argmax(size)))
 
 
-def _draw_shape(axes: Axes, told: LabelledMode) -> None:
+def _draw_shape(axes: Axes, labelled: LabelledMode) -> None:
     """One component of the tread's motion, as a radial displacement of its sensors."""
     from .figure import COLOURS, GREY
 
-    R, angle, _ = told.sensors.points.T
+    R, angle, _ = labelled.sensors.points.T
     belt = R / R.max() > BELT
-    along = told.sensors.directions
+    along = labelled.sensors.directions
     rows = [np.flatnonzero(belt & (np.abs(along[:, k]) > MIN_COSINE)) for k in range(3)]
-    motion = [told.shape[rows[k]] * np.sign(along[rows[k], k]) for k in range(3)]
-    k = _shown(told.judged.label, [np.mean(u**2) if len(u) else 0.0 for u in motion])
+    motion = [labelled.shape[rows[k]] * np.sign(along[rows[k], k]) for k in range(3)]
+    k = _shown(labelled.judged.label, [np.mean(u**2) if len(u) else 0.0 for u in motion])
     u, at = motion[k], angle[rows[k]]
     turn = np.linspace(0, 2 * np.pi, 361)
     axes.plot(np.cos(turn), np.sin(turn), color="0.8", lw=0.8)
     scale = AMPLITUDE / (np.abs(u).max() if len(u) else 1.0)
-    label = told.judged.label
+    label = labelled.judged.label
     if label is not None and len(u):
         waves = lambda x: np.column_stack([np.cos(label.c * x), np.sin(label.c * x)])
         line = 1 + scale * waves(turn) @ np.linalg.lstsq(waves(at), u, rcond=None)[0]
@@ -177,12 +177,14 @@ def _draw_shape(axes: Axes, told: LabelledMode) -> None:
     axes.set_axis_off()
     axes.set_xlim(-1.45, 1.45)
     axes.set_ylim(-1.45, 1.45)
-    name = f"{label.said if label else 'not told'}{' ' + told.member if told.member else ''}"
-    axes.set_title(f"{name}, {told.mode.frequency_Hz:.2f} Hz", fontsize=9)
+    name = (
+        f"{label.said if label else 'not told'}{' ' + labelled.member if labelled.member else ''}"
+    )
+    axes.set_title(f"{name}, {labelled.mode.frequency_Hz:.2f} Hz", fontsize=9)
     axes.text(
         0,
         0,
-        f"{COMPONENTS[k]}\n{told.judged.confidence:.2f}",
+        f"{COMPONENTS[k]}\n{labelled.judged.confidence:.2f}",
         ha="center",
         va="center",
         fontsize=8,

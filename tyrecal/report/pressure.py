@@ -95,13 +95,13 @@ def _draw(top: Axes, bottom: Axes, curve: Any, design: str, c: int) -> None:
 
 def _curves(rows: Sequence[PressureRow], design: str) -> Curves:
     """Label to pressures (kPa), frequencies (Hz) and slopes of a design, each (row,)."""
-    found: dict[Label, list[tuple[float, float, float]]] = {}
+    curves: dict[Label, list[tuple[float, float, float]]] = {}
     for row in rows:
         for mode in row.modes if row.design == design else []:
             slope = mode.d_ln_f_d_ln_p
             point = row.pressure_kPa, mode.frequency_Hz, np.nan if slope is None else slope
-            found.setdefault(mode.label, []).append(point)
-    return {label: tuple(np.array(points).T) for label, points in found.items()}
+            curves.setdefault(mode.label, []).append(point)
+    return {label: tuple(np.array(points).T) for label, points in curves.items()}
 
 
 def name_lines(axes: Axes, ends: Sequence[tuple[float, float, Label]], gap: float) -> None:

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..studies.sample.result import PAIR_STEPS, SampledVariable, SampleResult
-from ..units import said
+from ..units import display_unit
 from .figure import COLOURS, GREY, in_house_style, new_figure
 
 Array = np.ndarray
@@ -16,29 +16,29 @@ DRAWN_COLOUR, LINEAR_COLOUR = COLOURS[0], COLOURS[1]
 AT_BOUND = 1e-6  # of a bound, up to which the box ends at it
 
 
-def figures(found: SampleResult) -> dict[str, Figure]:
+def figures(result: SampleResult) -> dict[str, Figure]:
     """By name."""
-    return {"sample_corner": draw_corner(found)}
+    return {"sample_corner": draw_corner(result)}
 
 
 @in_house_style
-def draw_corner(found: SampleResult) -> Figure:
-    """Corner picture: on the diagonal the shares of the draws with median, 90 % and, dashed, what
-    the linear standard errors say; below it each pair, darker where more draws lie."""
-    names, n = list(found.variables), len(found.variables)
+def draw_corner(result: SampleResult) -> Figure:
+    """Corner picture: on the diagonal the shares of the draws with median, 90 % and, dashed, the
+    linear standard errors; below it each pair, darker where more draws lie."""
+    names, n = list(result.variables), len(result.variables)
     figure = new_figure(1.2 + 2.4 * n, 1.0 + 2.2 * n)
     grid = figure.subplots(n, n, squeeze=False)
-    pairs = {(pair.a, pair.b): pair.counts for pair in found.pairs}
+    pairs = {(pair.a, pair.b): pair.counts for pair in result.pairs}
     for i, row in enumerate(names):
         for j, column in enumerate(names):
-            axes, v = grid[i, j], found.variables[column]
+            axes, v = grid[i, j], result.variables[column]
             if j > i:
                 axes.axis("off")
                 continue
             if i == j:
                 _alone(axes, v, row)
             else:
-                _together(axes, np.array(pairs[row, column], float), v, found.variables[row])
+                _together(axes, np.array(pairs[row, column], float), v, result.variables[row])
             if v.log:
                 axes.set_xscale("log")
             axes.set_xlim(*v.box)
@@ -48,7 +48,7 @@ def draw_corner(found: SampleResult) -> Figure:
             if i == n - 1:
                 axes.set_xlabel(_named(column, v))
             if j == 0 < i:
-                axes.set_ylabel(_named(row, found.variables[row]))
+                axes.set_ylabel(_named(row, result.variables[row]))
     lines, words = grid[0, 0].get_legend_handles_labels()
     grid[0, min(1, n - 1)].legend(lines, words, frameon=False, loc="upper left")
     return figure
@@ -56,13 +56,13 @@ def draw_corner(found: SampleResult) -> Figure:
 
 def _named(name: str, v: SampledVariable) -> str:
     """The name with the unit that engineers use."""
-    unit, _ = said(v.unit)
+    unit, _ = display_unit(v.unit)
     return f"{name}, {unit}" if unit else name
 
 
 def _tick_labels(v: SampledVariable) -> list[str]:
     """The ticks in the unit that engineers use; an end that is a bound of the variable says so."""
-    _, factor = said(v.unit)
+    _, factor = display_unit(v.unit)
     labels = [f"{factor * value:.3g}" for value in _ticks(v)]
     for place, bound in enumerate((v.lower, v.upper)):
         if abs(v.box[place] / bound - 1) < AT_BOUND if bound else v.box[place] == bound:
@@ -122,6 +122,6 @@ def _together(axes: Axes, counts: Array, across: SampledVariable, up: SampledVar
 
 
 def _middles(v: SampledVariable, count: int) -> Array:
-    """Of the steps of the box, in the variable's own unit."""
+    """Middles of the steps of the box, in the variable's own unit."""
     edges = _edges(v, count)
     return np.asarray(np.sqrt(edges[1:] * edges[:-1]) if v.log else (edges[1:] + edges[:-1]) / 2)

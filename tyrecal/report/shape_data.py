@@ -1,4 +1,4 @@
-"""What a page draws, as data: the section, mode shapes, pressure in the patch."""
+"""Data that a page draws: the section, mode shapes, pressure in the patch."""
 
 from __future__ import annotations
 
@@ -122,20 +122,20 @@ def tyre_data(case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode]) -
     A shape is u = Re[amplitude exp(i n Theta)], in r, theta, z; of a pair the member whose crest
     stands at Theta = 0. Modes that are not known on the section are left out.
     """
-    told = {
+    common = {
         "format": 1,
         "case": case.case.name,
         "pressure_kPa": evaluation.pressure_kPa,
         "variables": {name: list(v.sets) for name, v in case.case.variables.items()},
     }
     if case.drawn is None:
-        return {**told, "modes": []}
+        return {**common, "modes": []}
     mesh = resolved(case).mesh
     moved, modes = placed(evaluation, modes, mesh)
     nodes = mesh.skin()
     R, Z = np.array([mesh.nodes[int(n)] for n in nodes]).T
     return {
-        **told,
+        **common,
         "section": section_data(case, mesh, moved).model_dump(),
         "R_m": _rounded(R),
         "Z_m": _rounded(Z),
@@ -187,7 +187,7 @@ def _held(mesh: SectionMesh, around: list[int]) -> list[tuple[int, ...]]:
 
 
 def areas_of(case: LoadedCase, mesh: SectionMesh) -> dict[int, str]:
-    """What each element is drawn as: its region, or its compound where there are several."""
+    """Area as which each element is drawn: its region, or its compound where there are several."""
     solids = case.case.solids
     if len({solid.material for solid in solids}) < 2:
         order = [name for name, _ in case.section.regions]
@@ -195,8 +195,8 @@ def areas_of(case: LoadedCase, mesh: SectionMesh) -> dict[int, str]:
         return {number: region for number, (region, _) in cells}
     rows = tuple(case.case.mesh.levels[case.case.mesh.level].rows)
     claims, lines = solid_claims(case.case), case.section.names
-    found = {n: claimed(claims, lines, rows, *cell) for n, cell in mesh.cells.items()}
-    return {n: solids[i].material for n, i in found.items() if i is not None}
+    claimants = {n: claimed(claims, lines, rows, *cell) for n, cell in mesh.cells.items()}
+    return {n: solids[i].material for n, i in claimants.items() if i is not None}
 
 
 def parts_data(case: LoadedCase, named: Iterable[str]) -> DiagnosisSection:
@@ -244,14 +244,14 @@ def rubber_parts(
     regions = [name for name, _ in case.section.regions]
     crown = regions[0]
     rows = case.case.mesh.levels[case.case.mesh.level].rows
-    found: dict[str, list[tuple[int, ...]]] = {}
+    parts: dict[str, list[tuple[int, ...]]] = {}
     for number, (region, row) in mesh.cells.items():
         own = region if region in regions else region.removesuffix(GAP_ENDING)
         name = own.replace("_", " ")
         if region == crown and name not in named:
             name = "tread" if row >= sum(rows[:-1]) else f"{name} under the tread"
-        found.setdefault(name, []).append(mesh.solids[number][:4])
-    return found
+        parts.setdefault(name, []).append(mesh.solids[number][:4])
+    return parts
 
 
 def loaded_data(tyre: LoadedTyre, case: LoadedCase) -> dict[str, Any]:
@@ -309,8 +309,8 @@ def patches_data(
 def _grown(touches: Array) -> tuple[slice, slice]:
     """Rows and columns of what touches and of the next beside it, which bear nothing: between them
     contours close."""
-    found = [np.flatnonzero(touches.any(axis)) for axis in (1, 0)]
-    rings, nodes = (slice(max(0, each[0] - 1), each[-1] + 2) for each in found)
+    touched = [np.flatnonzero(touches.any(axis)) for axis in (1, 0)]
+    rings, nodes = (slice(max(0, each[0] - 1), each[-1] + 2) for each in touched)
     return rings, nodes
 
 

@@ -86,7 +86,7 @@ class _Sheet:
 def _key(
     sheet: _Sheet, modes: Sequence[Mode], words_at: tuple[float, float], more: str = ""
 ) -> None:
-    """What the colours are, at the foot, and the lines, in inches from the lower left corner."""
+    """Draw : key at, foot : the, and : lines, in inches from : lower left corner."""
     left, right, low, high = 5.9, 8.3, 0.3, 0.38
     shades = np.linspace(0, 1, 65)
     x, y = np.meshgrid(left + shades * (right - left), [low, high])
@@ -112,14 +112,13 @@ def _twists(mode: Mode) -> bool:
 
 @dataclass(frozen=True)
 class _Surface:
-    """rest, moved (k, angle, 3); share (k, angle): of the largest displacement; twists: the
-    meridians at rest are drawn; sides: the rows of the widest points."""
+    """The tyre's outer surface at rest and in a mode."""
 
-    rest: Array
-    moved: Array
-    share: Array
-    twists: bool
-    sides: tuple[int, int]
+    rest: Array  # (k, angle, 3)
+    moved: Array  # (k, angle, 3)
+    share: Array  # (k, angle) of the largest displacement
+    twists: bool  # the meridians at rest are drawn
+    sides: tuple[int, int]  # rows of the widest points
 
 
 def _drawn(mesh: SectionMesh) -> Array:

@@ -14,18 +14,18 @@ BAR = 0.38
 
 
 @in_house_style
-def draw_signature(found: Signature) -> Figure:
+def draw_signature(signature: Signature) -> Figure:
     """Change of every mode in per cent, a panel per pressure."""
-    effect = catalogue()[found.id]
-    count = len(found.pressures_kPa)
+    effect = catalogue()[signature.id]
+    count = len(signature.pressures_kPa)
     figure = new_figure(8.0, 1.2 + 1.8 * count)
     panels = np.atleast_1d(figure.subplots(count, 1, sharex=True, sharey=True))
-    places = np.arange(len(found.labels))
-    digits = 1 if np.nanmax(abs(found.before)) >= 1 else 2
+    places = np.arange(len(signature.labels))
+    digits = 1 if np.nanmax(abs(signature.before)) >= 1 else 2
     for k, axes in enumerate(panels):
         for side, rows, colour, words in (
-            (-1, found.before, COLOURS[0], "as it comes"),
-            (1, found.after, COLOURS[1], "left after the variables are fitted again"),
+            (-1, signature.before, COLOURS[0], "as it comes"),
+            (1, signature.after, COLOURS[1], "left after the variables are fitted again"),
         ):
             bars = axes.bar(places + side * BAR / 2, rows[k], BAR, color=colour, label=words)
             axes.bar_label(
@@ -33,11 +33,13 @@ def draw_signature(found: Signature) -> Figure:
             )
         axes.axhline(0, color=GREY, lw=0.8)
         axes.margins(y=0.15)
-        axes.set_title(f"{found.pressures_kPa[k]:g} kPa", loc="left", fontsize=9, color="0.3")
+        axes.set_title(f"{signature.pressures_kPa[k]:g} kPa", loc="left", fontsize=9, color="0.3")
     figure.supylabel("change of frequency, %", fontsize=9)
-    panels[-1].set_xticks(places, [label.said.replace(" ", "\n") for label in found.labels])
-    size = f"{effect.symbol} = {found.value:.4g} {effect.unit}".strip()
-    absorbed = f": calibration absorbs {100 * found.absorbed:.1f} %" if found.absorbed else ""
+    panels[-1].set_xticks(places, [label.said.replace(" ", "\n") for label in signature.labels])
+    size = f"{effect.symbol} = {signature.value:.4g} {effect.unit}".strip()
+    absorbed = (
+        f": calibration absorbs {100 * signature.absorbed:.1f} %" if signature.absorbed else ""
+    )
     headline(figure, f"{effect.title}, {size}{absorbed}")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)

@@ -10,7 +10,7 @@ from rich import table as rich
 from rich.text import Text
 
 from ..simulate.modes.label import Label
-from ..studies.fit.verdict import DOES_NOT_FIT, MOST_CHI2_PER_DOF, FitReason, does_not_fit_words
+from ..studies.fit.verdict import DOES_NOT_FIT, MAX_CHI2_PER_DOF, FitReason, does_not_fit_words
 from ..studies.labels import Labels
 from ..studies.result import Cell, Column, Deviation, Table, state_words
 from ..tyre.usual import USUAL_MEASUREMENTS
@@ -40,7 +40,7 @@ def nearness(modes: Sequence[Mapping[str, Any]]) -> str:
 
 
 def fit_verdict(result: Mapping[str, Any]) -> list[str]:
-    """What the content of fit.json amounts to, in sentences; doubts aside, see `fit_doubts`."""
+    """Verdict on a fit by the content of fit.json, in sentences; doubts aside, see `fit_doubts`."""
     states = result.get("states", ())
     count = "one state" if len(states) == 1 else f"{len(states)} states"
     where = f"in {count}" if states else f"at {result['pressure_kPa']:g} kPa"
@@ -50,7 +50,7 @@ def fit_verdict(result: Mapping[str, Any]) -> list[str]:
     if (per_dof := result.get("chi2_per_dof")) is not None:
         words.append(
             f"chi2 per degree of freedom is {per_dof:.3g}: about 1 if the stated uncertainty"
-            f" explains what is left, above {MOST_CHI2_PER_DOF:g} the model does not fit."
+            f" explains what is left, above {MAX_CHI2_PER_DOF:g} the model does not fit."
         )
     if len(result["starts"]) > 1:
         words.append(_starts(result))
@@ -92,7 +92,7 @@ def _starts(result: Mapping[str, Any]) -> str:
 
 
 def tyre_doubts(result: Mapping[str, Any]) -> list[str]:
-    """What no tyre has of ``mass_kg`` and ``modes`` of a result."""
+    """Doubts about a result whose ``mass_kg`` and ``modes`` no tyre has."""
     doubts = []
     if message := USUAL_MEASUREMENTS["mass_kg"].refusal(result["mass_kg"]):
         doubts.append(
@@ -109,7 +109,7 @@ def tyre_doubts(result: Mapping[str, Any]) -> list[str]:
 
 
 def fit_doubts(result: Mapping[str, Any]) -> list[str]:
-    """What the user of a fit (the content of fit.json) must not overlook."""
+    """Doubts that the user of a fit (the content of fit.json) must not overlook."""
     doubts = []
     if not result["moved"]:
         doubts.append("THE FIT DID NOT MOVE: every variable ended where it started")
@@ -158,7 +158,7 @@ def fit_doubts(result: Mapping[str, Any]) -> list[str]:
 
 
 def map_resolution(combinations: int) -> str:
-    """What the map on the section can show: its effective rank in words."""
+    """Resolution of the map on the section: its effective rank in words."""
     if not combinations:
         return (
             "A change of 20 % in stiffness or 10 % in mass of any parts would stay within the"
@@ -171,16 +171,16 @@ def map_resolution(combinations: int) -> str:
 
 
 def shown(table: Table, *sections: Table) -> rich.Table:
-    """What a terminal prints: a table, others as sections of it."""
-    found = _empty(table)
+    """Table for a terminal, with others as sections of it."""
+    printed = _empty(table)
     for each in (table, *sections):
         if each is not table:
-            found.add_section()
+            printed.add_section()
             if each.columns:
-                found.add_row(*(Text(column.name, "bold") for column in each.columns))
+                printed.add_row(*(Text(column.name, "bold") for column in each.columns))
         for row in each.rows:
-            found.add_row(*map(_cell, row))
-    return found
+            printed.add_row(*map(_cell, row))
+    return printed
 
 
 def _empty(table: Table) -> rich.Table:

@@ -8,7 +8,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from ..files import whole
+from ..files import atomic_write
 from ..simulate.evaluate.pressed import Footprint, Pressed
 from ..simulate.modes.label import Mode
 from ..tyre.section.mesh import SectionMesh
@@ -89,7 +89,7 @@ def _write(
         point_data={name: flat(field) for name, field in fields.items()},
     )
     # single precision and no compression: smaller than double with it, in a twentieth of the time
-    with whole(path) as partial:
+    with atomic_write(path) as partial:
         tyre.write(partial, file_format="vtu", compression=None)
 
 

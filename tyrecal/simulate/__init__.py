@@ -1,1 +1,1 @@
-"""What a design does: decks, evaluator, record, workers, labelled modes."""
+"""Behaviour of a design: decks, evaluator, record, workers, labelled modes."""

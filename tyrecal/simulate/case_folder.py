@@ -19,8 +19,8 @@ from ..tyre.load import load_case
 
 
 def owner(folder: Path, path: Path, loaded: LoadedCase | None = None) -> dict[str, str]:
-    """The part of an entry that says whose results are in ``folder``: those of the case at
-    ``path``, or of a batch, whose path is the folder itself. Raises OSError."""
+    """The part of an entry that names the owner of the results in ``folder``: the case at ``path``,
+    or a batch, whose path is the folder itself. Raises OSError."""
     try:
         relative = os.path.relpath(path.resolve(), folder.resolve())
     except ValueError:  # on another drive of Windows

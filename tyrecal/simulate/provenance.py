@@ -1,4 +1,4 @@
-"""What results are of: tool, solver, tyre, state, mesh and measurements, the same in every file."""
+"""Origin of results: tool, solver, tyre, state, mesh and measurements, the same in every file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""What belongs to the user and not to a case: the programs of solvers, and defaults of options.
+"""Settings that belong to the user and not to a case: the programs of solvers, and defaults of
+options.
 
 A case may come from anybody, so it names no program. These do, the first that is there: the option
 ``--solver-command``, the environment variable of COMMAND, ``commands`` of the settings file.
@@ -74,12 +75,14 @@ def _read(path: Path | None, changed: float) -> Any:
         output: str | None = None
         mode_names: dict[str, str] = Field(default_factory=dict)
 
-    found = typed(path, Settings) if path else Settings()
-    for solver, command in found.commands.items():
+    content = typed(path, Settings) if path else Settings()
+    for solver, command in content.commands.items():
         words(command, f"{path}: commands.{solver}", here=False)
-    if found.output is not None and not Path(found.output).expanduser().is_absolute():
-        raise InputError(f"{path}: output is {found.output}: must be a whole path or begin with ~")
-    return found
+    if content.output is not None and not Path(content.output).expanduser().is_absolute():
+        raise InputError(
+            f"{path}: output is {content.output}: must be a whole path or begin with ~"
+        )
+    return content
 
 
 def root() -> Path:

@@ -45,6 +45,6 @@ def result_types() -> dict[str, type[Result]]:
 
 
 def named(place: str) -> Any:
-    """What a place ``module:name`` names."""
+    """Import the object that a place ``module:name`` names."""
     module, _, name = place.partition(":")
     return getattr(import_module(module), name)

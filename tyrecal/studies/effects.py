@@ -240,20 +240,20 @@ def run(
 
 
 def _effect_result(
-    entry: CatalogueEntry, found: Signature, values: Mapping[str, float]
+    entry: CatalogueEntry, signature: Signature, values: Mapping[str, float]
 ) -> EffectResult:
     """``values``: of the variables before the re-fit."""
     change = lambda percent: float(percent) if np.isfinite(percent) else None
     return EffectResult(
         **entry.model_dump(exclude_unset=True),
-        value=found.value,
-        mass_kg=found.mass_kg,
-        before_percent=rms(found.before),
-        after_percent=rms(found.after),
-        absorbed=found.absorbed,
+        value=signature.value,
+        mass_kg=signature.mass_kg,
+        before_percent=rms(signature.before),
+        after_percent=rms(signature.after),
+        absorbed=signature.absorbed,
         refitted={
             name: Refitted(before=values[name], after=value)
-            for name, value in found.refitted.items()
+            for name, value in signature.refitted.items()
         },
         rows=[
             EffectRow(
@@ -266,17 +266,17 @@ def _effect_result(
                         before_percent=change(before),
                         after_percent=change(after),
                     )
-                    for label, before, after in zip(found.labels, *percents, strict=True)
+                    for label, before, after in zip(signature.labels, *percents, strict=True)
                 ],
             )
             for pressure, *percents in zip(
-                found.pressures_kPa, found.before, found.after, strict=True
+                signature.pressures_kPa, signature.before, signature.after, strict=True
             )
         ],
     )
 
 
 def about(effect: Effect) -> list[str]:
-    """What it is, and what it does to the case: the words that stand in the effect's own file."""
+    """Words of the effect's own file: what it is, and what it does to the case."""
     module = inspect.getdoc(sys.modules[effect.add.__module__]) or ""
     return [part for part in (module, inspect.getdoc(effect.add) or "") if part]

@@ -37,7 +37,7 @@ import numpy as np
 from ..errors import InputError
 from ..simulate.evaluate.evaluator import Evaluator, Question
 from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed
-from ..simulate.modes.find import Found, find_modes
+from ..simulate.modes.find import LabelledModes, find_modes
 from ..simulate.modes.label import Label
 from .fit.crossing import AXIAL, PAIR, TORSIONAL
 from .fit.variable import DesignVariable
@@ -45,7 +45,7 @@ from .fit.variable import DesignVariable
 Array = np.ndarray
 DEGREES = range(1, 9)
 SPARE_EQUATIONS = 1.3  # equations for each coefficient, at least
-LEAST_DESIGNS = 3  # designs that a bound can be told from
+MIN_DESIGNS = 3  # designs that a bound can be told from
 SIDE_DEGREE = 2  # of d, whose sign alone counts; from values, for the slopes of c are not known
 SEEN = 1e-12  # a relative error that rounding makes
 SHARE_Z, SURE_Z = 2.326, 1.645  # normal quantiles of 99 and 95 %
@@ -119,7 +119,7 @@ class Emulator:
 
     @property
     def evaluations(self) -> int:
-        """Of designs that could be evaluated."""
+        """Number of designs that could be evaluated."""
         return len(self.designs)
 
     @property
@@ -128,7 +128,8 @@ class Emulator:
         return np.stack([self.centre - self.half, self.centre + self.half], 1)
 
     def restricted(self, last: Array) -> Emulator:
-        """Of the first variables alone, the coordinates x of the others being ``last`` (s,)."""
+        """Emulator of the first variables alone, the coordinates x of the others being ``last``
+        (s,)."""
         v = len(self.half) - len(last)
         t = (last - self.centre[v:]) / self.half[v:]
         degrees, place = np.unique(self.degrees[:, :v], axis=0, return_inverse=True)
@@ -149,7 +150,8 @@ class Emulator:
         return self.ln_f_of(self.products(x))
 
     def products(self, x: Array) -> Array:
-        """What all polynomials are made of, (p, k) at designs x (p, v), at any `restricted`."""
+        """Products of which all polynomials consist, (p, k) at designs x (p, v), at any
+        `restricted`."""
         return products(self.degrees, (x - self.centre) / self.half)
 
     def ln_f_of(self, terms: Array) -> Array:
@@ -162,15 +164,15 @@ class Emulator:
         t = (x - self.centre) / self.half
         q = products(self.degrees, t) @ self.coefficients
         rise = [products(self.degrees, t, j) @ self.coefficients for j in range(len(self.half))]
-        found = np.stack(rise, 2)[:, :-1] / self.half
+        slopes = np.stack(rise, 2)[:, :-1] / self.half
         if self._pair is not None:
             # the slope of sqrt(s) is that of s over 2 sqrt(s); none where s is cut at 0
             a, b = self._pair
             root = np.sqrt(np.where(q[:, b] > SEEN**2, q[:, b], np.inf))
             root *= np.where(q[:, -1] < 0, -1.0, 1.0)
-            mean, gap = found[:, a].copy(), found[:, b] / (2 * root[:, None])
-            found[:, a], found[:, b] = mean + gap / 2, mean - gap / 2
-        return found
+            mean, gap = slopes[:, a].copy(), slopes[:, b] / (2 * root[:, None])
+            slopes[:, a], slopes[:, b] = mean + gap / 2, mean - gap / 2
+        return slopes
 
 
 def emulator(
@@ -190,8 +192,8 @@ def emulator(
     where too few designs could be evaluated; DeckRefused.
     """
     needs_slopes(evaluator)
-    if count < LEAST_DESIGNS:
-        raise InputError(f"an emulator needs {LEAST_DESIGNS} evaluations at least, got {count}")
+    if count < MIN_DESIGNS:
+        raise InputError(f"an emulator needs {MIN_DESIGNS} evaluations at least, got {count}")
     centre, half = np.mean(box, 1), np.ptp(box, axis=1) / 2
     names = tuple(v.name for v in variables)
     x, samples, failed = centre + half * spread(count, len(names)), [], 0
@@ -207,11 +209,11 @@ def emulator(
     for place, answer in sorted(answers.items()):
         if isinstance(answer, DeckRefused):
             raise answer
-        if isinstance(answer, Found):
+        if isinstance(answer, LabelledModes):
             samples.append(_evaluated(x[place], answer, variables))
         else:
             failed += 1
-    if len(samples) < LEAST_DESIGNS:
+    if len(samples) < MIN_DESIGNS:
         raise next(a for a in answers.values() if isinstance(a, EvaluationFailed))
     shared = set.intersection(*(set(each.ln_f) for each in samples))
     more = {label for label in shared if label.m <= 1} - set(wanted)
@@ -219,7 +221,7 @@ def emulator(
     return fitted(tuple(variables), labels, centre, half, samples, failed)
 
 
-def _evaluated(x: Array, answer: Found, variables: Sequence[DesignVariable]) -> Evaluated:
+def _evaluated(x: Array, answer: LabelledModes, variables: Sequence[DesignVariable]) -> Evaluated:
     modes, gradients = {mode.label: mode for mode in answer.modes}, answer.evaluation.gradients
     per_x = [v.slope(v.value(float(xi))) for v, xi in zip(variables, x, strict=True)]
     by_name = np.array([gradients[v.name] for v in variables])  # (v, modes)
@@ -299,7 +301,7 @@ def _left_out(matrix: Array, equations: Array, count: int) -> tuple[Array, Array
 
 
 def bound(errors: Array) -> float:
-    """What 99 % of designs keep, with a confidence of 95 %: the one-sided tolerance limit of
+    """Bound that 99 % of designs keep, with a confidence of 95 %: the one-sided tolerance limit of
     log-normal errors (n,) (NIST/SEMATECH e-Handbook, sec. 7.2.6.3), and no less than any seen.
 
         ln bound = mean + K sd,  K = (z_p + sqrt(z_p^2 - a b)) / a,
@@ -332,12 +334,12 @@ def paired(pair: tuple[int, int] | None, ln_f: Array, slopes: Array) -> tuple[Ar
 
 def unpaired(pair: tuple[int, int] | None, q: Array, apart: Array) -> Array:
     """ln f (p, n) of what is smooth, q (p, n); pair: the `places`; apart (p,): d."""
-    found = q.copy()
+    mixed = q.copy()
     if pair is not None:
         a, b = pair
         gap = np.where(apart < 0, -1.0, 1.0) * np.sqrt(np.maximum(q[:, b], 0.0))
-        found[:, a], found[:, b] = q[:, a] + gap / 2, q[:, a] - gap / 2
-    return found
+        mixed[:, a], mixed[:, b] = q[:, a] + gap / 2, q[:, a] - gap / 2
+    return mixed
 
 
 def up_to(count: int, degree: int) -> Array:
@@ -352,10 +354,10 @@ def up_to(count: int, degree: int) -> Array:
 def products(degrees: Array, t: Array, by: int = -1) -> Array:
     """P_k(t) (p, k) at t (p, v), or their slopes by one coordinate."""
     P = legendre(t, int(degrees.max(initial=0)))
-    found = np.ones((len(degrees), len(t)))
+    result = np.ones((len(degrees), len(t)))
     for j, own in enumerate(degrees.T):
-        found *= (_rates(P) if j == by else P)[own, j]
-    return found.T
+        result *= (_rates(P) if j == by else P)[own, j]
+    return result.T
 
 
 def legendre(t: Array, highest: int) -> Array:

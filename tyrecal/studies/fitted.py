@@ -26,14 +26,14 @@ def read_fitted(path: Path, case: LoadedCase) -> tuple[dict[str, float], list[st
     """
     try:
         fit = read_json(path)
-        found = {name: v["value"] for name, v in fit["variables"].items()} | fit["fixed"]
+        fitted_values = {name: v["value"] for name, v in fit["variables"].items()} | fit["fixed"]
         pressure = float(fit["pressure_kPa"])
         of = fit.get("provenance", {})
         tyre, theirs = of.get("tyre_sha256"), dict(of.get("overrides", {}))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise InputError(f"'{path}' is not the fit.json that 'tyrecal fit' writes") from None
     names = set(start_values(case))
-    for name in [*sorted(names - set(found)), *sorted(set(found) - names)]:
+    for name in [*sorted(names - set(fitted_values)), *sorted(set(fitted_values) - names)]:
         where = "is missing from" if name in names else "of this case is not known, but stands in"
         raise InputError(
             f"variable '{name}' {where} '{path}'; give a fit of this case, which has"
@@ -46,10 +46,10 @@ def read_fitted(path: Path, case: LoadedCase) -> tuple[dict[str, float], list[st
         )
     if tyre != tyre_sha256(case):
         raise InputError(f"'{path}' is a fit of another tyre: {_difference(theirs, case)}")
-    for name, value in found.items():
+    for name, value in fitted_values.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
             raise InputError(f"variable '{name}' is {value!r} in '{path}', must be a finite number")
-    values = {name: float(found[name]) for name in start_values(case)}
+    values = {name: float(fitted_values[name]) for name in start_values(case)}
     design = dict(values)
     if pressure_name(case) == "pressure_kPa":
         design["pressure_kPa"] = pressure  # else its variable stands among the others
@@ -61,7 +61,7 @@ def read_fitted(path: Path, case: LoadedCase) -> tuple[dict[str, float], list[st
 
 
 def _difference(theirs: Mapping[str, Any], case: LoadedCase) -> str:
-    """What sets the tyre of the fit and that of the case apart, as far as it is known."""
+    """Difference between the tyre of the fit and that of the case, as far as it is known."""
     ours = case.overrides
     differences = []
     for name in sorted({*theirs, *ours}):

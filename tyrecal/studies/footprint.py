@@ -41,14 +41,14 @@ def press(
     """Every design (name to values of the variables) at rising loads, or why not even at the
     first one; those after the first begin from its state on the road. Raises DeckRefused and what
     else ``Evaluator.press`` raises for wrong input."""
-    found: dict[str, PressOutcome] = {}
+    by_design: dict[str, PressOutcome] = {}
     base = next(iter(designs.values())) if len(designs) > 1 else None
     questions = [PressQuestion(values, loads_N, base=base) for values in designs.values()]
     outcomes = evaluator.press_all(questions, jobs)
     for design, outcome in zip(designs, outcomes, strict=True):
-        found[design] = outcome
+        by_design[design] = outcome
         notify(design, outcome)
-    return found
+    return by_design
 
 
 def progress(outcome: PressOutcome) -> tuple[int, EvaluationFailed | None]:
@@ -73,7 +73,7 @@ class FootprintRow(ResultPart):
 
 
 class FootprintFindings(ResultPart):
-    """What the rows say."""
+    """Findings from the rows of footprints."""
 
     fitted_over_initial: list[dict[str, float]] = Field(default=[])  # area, where both were pressed
     mean_over_inflation: dict[str, list[dict[str, float]]] = Field(default={})  # pressure, by load
@@ -164,7 +164,7 @@ def footprint_row(pressed: Pressed, footprint: Footprint, mesh: SectionMesh) -> 
 
 
 def findings(rows: Sequence[FootprintRow], pressure_kPa: Mapping[str, float]) -> FootprintFindings:
-    """What the rows say; ``pressure_kPa``: inflation by design."""
+    """Findings from the rows; ``pressure_kPa``: inflation by design."""
     area = {(row.design, row.load_N): row.area_m2 for row in rows}
     loads = [load for design, load in area if design == "fitted" and ("initial", load) in area]
     ratios = {load: area["fitted", load] / area["initial", load] for load in loads}

@@ -7,7 +7,10 @@ from ..simulate.modes.label import Label
 from .result import Column, CsvRow, PositiveNumber, Result, ResultPart, Table, csv_text, state_words
 
 FOREIGN_WORDS = "no mode of the tyre"
-MOST_RIVALS, LEAST_RIVAL = 4, 0.01  # labels, and labelings, beside the likeliest; probability
+MAX_RIVALS, MIN_RIVAL_PROBABILITY = (
+    4,
+    0.01,
+)  # labels, and labelings, beside the likeliest; probability
 SURE_LABEL = 0.9  # probability below which a label is in doubt
 
 
@@ -55,7 +58,7 @@ class Labeling(ResultPart):
 
 
 class Labels(ResultPart):
-    """Of all frequencies without a label."""
+    """Labels of all frequencies that came without one."""
 
     frequencies: list[LabelledFrequency]
     labelings: list[Labeling]  # the likeliest first
@@ -93,26 +96,26 @@ class Labels(ResultPart):
         ]
 
     def sentences(self) -> list[str]:
-        """What was told."""
+        """Sentences on the probability of the labels."""
         best = self.labelings[0]
-        told = [f"all these labels together are {best.probability:.1%} probable"]
+        sentences = [f"all these labels together are {best.probability:.1%} probable"]
         if len(self.labelings) > 1:
             other = self.labelings[1]
-            told.append(f"next are {', '.join(other.labels)}, {other.probability:.1%}")
-        return told
+            sentences.append(f"next are {', '.join(other.labels)}, {other.probability:.1%}")
+        return sentences
 
     def doubts(self) -> list[str]:
-        """What must not be overlooked."""
-        told = []
+        """Doubts about the labels that must not be overlooked."""
+        doubts = []
         if self.doubtful:
             where = ", ".join(f"{each.frequency_Hz:g} Hz" for each in self.doubtful)
-            told.append(f"labels less than {SURE_LABEL:.0%} probable: {where}")
+            doubts.append(f"labels less than {SURE_LABEL:.0%} probable: {where}")
         if not self.settled:
-            told.append(
+            doubts.append(
                 "several labelings each lead to a design at which another is likelier: give labels"
                 " that you know"
             )
-        return told
+        return doubts
 
 
 class LabelsResult(Result):

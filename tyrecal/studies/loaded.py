@@ -10,7 +10,7 @@ import numpy as np
 from ..simulate.evaluate.evaluator import Evaluator, PressQuestion, Question
 from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from ..simulate.evaluate.pressed import Footprint, Pressed
-from ..simulate.modes.find import Found, find_modes
+from ..simulate.modes.find import LabelledModes, find_modes
 from ..simulate.modes.label import Label, Mode
 from ..simulate.modes.loaded import Member, ModesAtLoad, Rings, follow, members, rings, state
 from ..tyre.case import LoadedCase
@@ -41,18 +41,17 @@ class LoadedMode:
 
 @dataclass(frozen=True)
 class Loaded:
-    """The tyre at one load: its named modes by rising frequency; ``unnamed``: members that no
-    shape could be found for; ``disputed``: members that have another name where they are followed
-    from the unloaded tyre in one stride; surface (ring, node, 3): where the shapes' points stand,
-    r, theta, z in m at their angles, deformed; cavity_Hz: of the first wave in the cavity's
-    gas, fore and aft, and up and down; none: there is no gas."""
+    """The tyre at one load."""
 
     load_N: float
     deflection_m: float
-    modes: tuple[LoadedMode, ...]
-    unnamed: tuple[Member, ...] = ()
+    modes: tuple[LoadedMode, ...]  # named ones by rising frequency
+    unnamed: tuple[Member, ...] = ()  # members for which no shape was found
+    # members that have another name where they are followed from the unloaded tyre in one stride
     disputed: tuple[Member, ...] = ()
+    # (ring, node, 3) where the shapes' points stand, r, theta, z in m at their angles, deformed
     surface: np.ndarray | None = field(default=None, compare=False, repr=False)
+    # of the first wave in the cavity's gas, fore and aft, and up and down; none: there is no gas
     cavity_Hz: tuple[float, ...] = ()
 
 
@@ -92,16 +91,16 @@ def load_tyres(
     loads = [load for load in loads_N if load]
     questions = [PressQuestion(designs[name], loads, _count(case)) for name in able]
     answers = evaluator.press_all(questions, jobs)
-    found: dict[str, LoadOutcome] = {}
+    outcomes: dict[str, LoadOutcome] = {}
     for name in designs:
         free = unloaded[name]
-        found[name] = (
+        outcomes[name] = (
             free
             if isinstance(free, EvaluationFailed)
             else _loaded_tyre(case, free, next(answers), 0.0 in loads_N)
         )
-        notify(name, found[name])
-    return found
+        notify(name, outcomes[name])
+    return outcomes
 
 
 def progress(outcome: LoadOutcome) -> tuple[int, EvaluationFailed | None]:
@@ -126,20 +125,20 @@ def _count(case: LoadedCase) -> int:
 
 def _unloaded(
     case: LoadedCase, evaluator: Evaluator, values: Mapping[str, float], labels: Sequence[Label]
-) -> Found | EvaluationFailed:
+) -> LabelledModes | EvaluationFailed:
     """The unloaded tyre's modes with a few harmonics more, the wanted ones surely among them."""
     highest = case.case.analysis.highest_harmonic + EXTRA_HARMONICS
     question = Question({**values, "analysis.highest_harmonic": highest})
-    ((_, found),) = find_modes(
+    ((_, outcome),) = find_modes(
         evaluator, [question], lambda place, modes: labels or _wanted(case, modes)
     )
-    if isinstance(found, DeckRefused):
-        raise found
-    return found
+    if isinstance(outcome, DeckRefused):
+        raise outcome
+    return outcome
 
 
 def _loaded_tyre(
-    case: LoadedCase, unloaded: Found, pressed: Pressed | EvaluationFailed, with_zero: bool
+    case: LoadedCase, unloaded: LabelledModes, pressed: Pressed | EvaluationFailed, with_zero: bool
 ) -> LoadOutcome:
     if isinstance(pressed, EvaluationFailed):
         return pressed

@@ -44,7 +44,7 @@ class LoadRow(ResultPart):
 
 
 class LoadFindings(ResultPart):
-    """Of one design."""
+    """Findings about one design over the loads."""
 
     design: str
     splits: list[dict[str, Any]] = Field(default=[])  # of doublets, antisymmetric less symmetric
@@ -76,15 +76,19 @@ class LoadSweep(Result):
         """A line a member of a doublet: Hz at each load."""
         own = [row for row in self.rows if row.design == design]
         hertz = [Column(f"{row.load_N:g} N") for row in own]
-        found = [{(m.label, m.symmetry): m for m in row.modes} for row in own]
-        members = {key: mode for modes in reversed(found) for key, mode in modes.items()}
+        modes_by_load = [{(m.label, m.symmetry): m for m in row.modes} for row in own]
+        members = {key: mode for modes in reversed(modes_by_load) for key, mode in modes.items()}
         lowest = {
             label: min(m.frequency_Hz for (other, _), m in members.items() if other == label)
             for label, _ in members
         }
         order = sorted(members, key=lambda k: (lowest[k[0]], str(k[0]), k[1] != SYMMETRIES[0]))
         rows = [
-            [*members[key].named(), key[1], *(_hertz_cell(hertz[0], m.get(key)) for m in found)]
+            [
+                *members[key].named(),
+                key[1],
+                *(_hertz_cell(hertz[0], m.get(key)) for m in modes_by_load),
+            ]
             for key in order
         ]
         for pair in zip(*(row.cavity for row in own), strict=False):
@@ -292,16 +296,16 @@ def _rising(tables: Mapping[float, Mapping[Any, float]]) -> list[str]:
 
 
 def _held_by_friction(loads: Sequence[Loaded]) -> list[str]:
-    """What friction does to the mode that it moves most, and up to which motion it can."""
-    told = [
+    """Effect of friction on the mode that it moves most, and the motion up to which it can hold."""
+    rises = [
         (mode.frequency_Hz - mode.sliding_Hz, each.load_N, mode)
         for each in loads
         for mode in each.modes
         if mode.sliding_Hz is not None and mode.grip_mm is not None
     ]
-    if not told:
+    if not rises:
         return []
-    shift, load, most = max(told, key=lambda each: each[0])
+    shift, load, most = max(rises, key=lambda each: each[0])
     return [
         f"the patch is taken to stick; with nothing along the road {most.member} at {load:g} N has"
         f" {most.sliding_Hz:.2f} Hz, {shift:.2f} Hz less, and friction holds it only while the"

@@ -19,19 +19,15 @@ FINE_STEPS = 8  # of an element of three nodes, between which its depth is a par
 @dataclass(frozen=True)
 class Patch:
     """The outer surface seen from the road, (ring, node across): rings in the direction of rolling
-    with the patch's middle amid them, nodes from -z to +z.
+    with the patch's middle amid them, nodes from -z to +z."""
 
-    along, across: m in the road's plane; pressure: Pa, 0 where it does not touch; touches: bool;
-    depth: m, of nodes below the road, of a solver that places the patch's edge between nodes, else
-    None; midside: whether every second node across is the middle of an element, as every second
-    ring is.
-    """
-
-    along: Array
-    across: Array
-    pressure: Array
-    touches: Array
+    along: Array  # m in the road's plane
+    across: Array  # m in the road's plane
+    pressure: Array  # Pa, 0 where it does not touch
+    touches: Array  # bool
+    # m, of nodes below the road, by a solver that places the patch's edge between nodes, else None
     depth: Array | None = None
+    # whether every second node across is the middle of an element, as every second ring is
     midside: bool = False
 
     @property

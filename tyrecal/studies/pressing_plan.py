@@ -24,34 +24,25 @@ DESIGNS_OF_FIT = {"slsqp": 15, "gauss-newton": 10}  # most that a start takes, a
 
 @dataclass(frozen=True)
 class PressedState:
-    """One state of a design, and the loads to which it is pressed there.
+    """One state of a design, and the loads to which it is pressed there."""
 
-    loads: how many; modes: those at each load are wanted; sensitivities: number of variables with
-    exact ones; neighbours: further designs, from which sensitivities are differences.
-    """
-
-    loads: int
-    modes: bool = False
-    sensitivities: int = 0
-    neighbours: int = 0
+    loads: int  # how many
+    modes: bool = False  # those at each load are wanted
+    sensitivities: int = 0  # number of variables with exact ones
+    neighbours: int = 0  # further designs, from which sensitivities are differences
 
 
 @dataclass(frozen=True)
 class PressingPlan:
-    """Size of the problem, number of runs, likely time and memory.
+    """Size of the problem, number of runs, likely time and memory."""
 
-    nodes: of the section; places_round: nodes round half the tyre, from the patch to the top, which
-    has a half turn's symmetry; designs: how many, or about how many where ``is_estimate``;
-    at_once: how many of them run side by side; is_timed: the solver is the one that the estimates
-    hold for.
-    """
-
-    nodes: int
+    nodes: int  # of the section
+    # nodes round half the tyre, from the patch to the top, which has a half turn's symmetry
     places_round: int
-    designs: int
+    designs: int  # how many, or about how many where ``is_estimate``
     states: tuple[PressedState, ...]
-    at_once: int = 1
-    is_timed: bool = True
+    at_once: int = 1  # how many of them run side by side
+    is_timed: bool = True  # the estimates hold for the solver
     is_estimate: bool = False
 
     @property

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from ..simulate.evaluate.evaluator import Evaluator, Question
 from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed
-from ..simulate.modes.find import Found, find_modes
+from ..simulate.modes.find import LabelledModes, find_modes
 from ..simulate.modes.follow import follow
 from ..simulate.modes.label import FAMILIES, Label, Mode, labelled
 from ..tyre.case import LoadedCase
@@ -86,7 +86,7 @@ def sweep(
 
 
 def _outcome(
-    design: str, pressure_kPa: float, answer: Found | EvaluationFailed, name: str
+    design: str, pressure_kPa: float, answer: LabelledModes | EvaluationFailed, name: str
 ) -> SweepOutcome:
     if isinstance(answer, EvaluationFailed):
         return Failure(design, pressure_kPa, answer)
@@ -100,7 +100,7 @@ def _outcome(
 
 
 class PressureFindings(ResultPart):
-    """Of one design."""
+    """Findings about one design over the pressures."""
 
     design: str
     from_kPa: float = 0.0
@@ -148,8 +148,8 @@ def findings(states: Sequence[State], labels: Sequence[Label]) -> PressureFindin
 
 
 def _curve(p: np.ndarray, f: np.ndarray) -> dict[str, Any]:
-    """Of one mode: its rise, whether it rises at every step, and how it bends; of two pressures
-    nobody can tell."""
+    """Curve of one mode: its rise, whether it rises at every step, and how it bends, which two
+    pressures cannot show."""
     weight = (p[2:] - p[1:-1]) / (p[2:] - p[:-2])
     bow = f[1:-1] - (weight * f[:-2] + (1 - weight) * f[2:])  # above the neighbours' chord
     straight = "neither" if len(bow) else "unknown"
@@ -179,19 +179,19 @@ def _family(name: str, rises: Mapping[Label, float]) -> dict[str, Any]:
     }
 
 
-def _words(found: Mapping[str, Any], labels: Sequence[Label]) -> list[str]:
-    said = {str(label): label.said for label in labels}
-    modes = list(zip(said.values(), found["modes"], strict=True))
-    span = f"from {found['from_kPa']:g} to {found['to_kPa']:g} kPa"
+def _words(findings: Mapping[str, Any], labels: Sequence[Label]) -> list[str]:
+    names = {str(label): label.said for label in labels}
+    modes = list(zip(names.values(), findings["modes"], strict=True))
+    span = f"from {findings['from_kPa']:g} to {findings['to_kPa']:g} kPa"
     falling = [name for name, mode in modes if not mode["rises"]]
     words = [f"{_all_but('every mode rises', falling)} {span}"]
-    for each in found["families"]:
+    for each in findings["families"]:
         if len(each["members"]) > 1:
             first, *_, last = (
-                f"{said[name]} rises {hertz:.1f} Hz"
+                f"{names[name]} rises {hertz:.1f} Hz"
                 for name, hertz in zip(each["members"], each["rise_Hz"], strict=True)
             )
-            others = [said.get(name, name) for name in each["exceptions"]]
+            others = [names.get(name, name) for name in each["exceptions"]]
             grows = _all_but(f"{each['family']}, the rise grows with c", others)
             words.append(f"{grows}: {first}, {last}")
     bent = {name: mode["curvature"] for name, mode in modes if mode["curvature"] in BENT}
@@ -204,16 +204,16 @@ def _words(found: Mapping[str, Any], labels: Sequence[Label]) -> list[str]:
             if bent.get(name) != "concave"
         ]
         words.append(_all_but("every curve is concave, steeper at low pressure", odd))
-    if not found["disagreements"]:
+    if not findings["disagreements"]:
         words.append(
             "labels stay with the shapes throughout; least MAC between neighbouring pressures"
-            f" {found['least_mac']:.3f}"
+            f" {findings['least_mac']:.3f}"
         )
-    for odd_step in found["disagreements"]:
+    for odd_step in findings["disagreements"]:
         words.append(
             f"from {odd_step['from_kPa']:g} to {odd_step['to_kPa']:g} kPa the shape of"
-            f" {said.get(odd_step['label'], odd_step['label'])} goes on under the label"
-            f" {said.get(odd_step['followed_to'], odd_step['followed_to'])}"
+            f" {names.get(odd_step['label'], odd_step['label'])} goes on under the label"
+            f" {names.get(odd_step['followed_to'], odd_step['followed_to'])}"
             f" (MAC {odd_step['mac']:.2f})"
         )
     return words

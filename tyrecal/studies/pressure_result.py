@@ -79,9 +79,9 @@ class PressureSweep(Result):
     def tables(self) -> list[Table]:
         return [self._ends(each) for each in self.findings if each.modes]
 
-    def _ends(self, found: PressureFindings) -> Table:
+    def _ends(self, findings: PressureFindings) -> Table:
         """Hz at both ends, rise, slopes at both ends, curvature."""
-        low, high = f"{found.from_kPa:g} kPa", f"{found.to_kPa:g} kPa"
+        low, high = f"{findings.from_kPa:g} kPa", f"{findings.to_kPa:g} kPa"
         slope = Column(high, ".3f")
         columns = [
             *NAME_COLUMNS,
@@ -93,10 +93,10 @@ class PressureSweep(Result):
             slope,
             Column("curvature", ""),
         ]
-        own = [row for row in self.rows if row.design == found.design]
+        own = [row for row in self.rows if row.design == findings.design]
         first, last = ({mode.label: mode for mode in row.modes} for row in (own[0], own[-1]))
         rows = []
-        for mode in found.modes:
+        for mode in findings.modes:
             label = Label(mode["c"], mode["m"], mode["kind"])
             ends = first[label], last[label]
             rows.append(
@@ -109,10 +109,10 @@ class PressureSweep(Result):
                     mode["curvature"],
                 ]
             )
-        caption = f"slope: d ln f / d ln p, at {found.from_kPa:g} and {high}"
+        caption = f"slope: d ln f / d ln p, at {findings.from_kPa:g} and {high}"
         if any(mode.standard_error_Hz is not None for mode in own[0].modes):
             caption += "; ±: 90 % interval of the tyre's own frequency"
-        return Table(columns, rows, found.design, caption)
+        return Table(columns, rows, findings.design, caption)
 
     def numbers(self) -> list[Table]:
         tables = []

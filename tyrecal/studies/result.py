@@ -1,4 +1,4 @@
-"""What all studies' results share: files, tables and words come from one class a study.
+"""Base of all studies' results: files, tables and words come from one class a study.
 
 A result is a `Result` with its numbers as fields. What a number is called in tables, its unit and
 its digits stand at its field, as a `Column`; JSON, CSV, the terminal and the page follow from it.
@@ -40,7 +40,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Deviation:
-    """A cell with a colour or mark that says how far off a target is, after the ``value``."""
+    """A cell with a colour or mark that shows how far off a target is, after the ``value``."""
 
     percent: float
     value: str = ""
@@ -83,7 +83,7 @@ class ResultPart(BaseModel):
 
 
 class ResultState(ResultPart):
-    """What a study asked for, several values where it has several."""
+    """State that a study evaluated, several values where it has several."""
 
     pressure_kPa: float | list[float]
     load_N: float | list[float]
@@ -91,7 +91,7 @@ class ResultState(ResultPart):
 
 
 class Provenance(ResultPart):
-    """What a result file is of."""
+    """Origin of a result file: tool, solver, tyre, state and inputs."""
 
     tyrecal: str
     solver: str
@@ -112,7 +112,7 @@ class Provenance(ResultPart):
 
 
 class Result(ResultPart):
-    """A result file; older ones do not say what they are of."""
+    """A result file; older ones do not record their origin."""
 
     study: ClassVar[str] = ""  # the command, as its entry in run.json
     stem: ClassVar[str] = ""  # of its files
@@ -125,7 +125,7 @@ class Result(ResultPart):
     provenance: Provenance | None = None
 
     def content(self) -> dict[str, Any]:
-        """What stands in the JSON file."""
+        """Content of the JSON file."""
         return self.model_dump(exclude_unset=True, by_alias=True)
 
     def stamped(self, provenance: Mapping[str, Any]) -> Self:
@@ -156,7 +156,7 @@ class Result(ResultPart):
         return []
 
     def sentences(self) -> list[str]:
-        """What was found: ``findings`` of all, or of each design, by their ``words``."""
+        """Sentences of the ``findings`` of all, or of each design, by their ``words``."""
         return self._words(slice(None))
 
     def summary(self) -> list[str]:
@@ -164,21 +164,23 @@ class Result(ResultPart):
         return self._words(slice(-1, None), "; ")
 
     def _words(self, chosen: slice, between: str = "") -> list[str]:
-        found = getattr(self, "findings", [])
-        if not isinstance(found, list):
-            return list(found.words)
-        told = [(each.design, each.words) for each in found[chosen]]
-        told = [(name, [between.join(words)] if between else words) for name, words in told]
-        return [f"{name}: {each}" for name, words in told for each in words]
+        findings = getattr(self, "findings", [])
+        if not isinstance(findings, list):
+            return list(findings.words)
+        by_design = [(each.design, each.words) for each in findings[chosen]]
+        by_design = [
+            (name, [between.join(words)] if between else words) for name, words in by_design
+        ]
+        return [f"{name}: {each}" for name, words in by_design for each in words]
 
     def doubts(self) -> list[str]:
-        """What must not be overlooked: the states in ``failed`` were not reached."""
+        """Doubts that must not be overlooked: the states in ``failed`` were not reached."""
         failed: list[Failed] = getattr(self, "failed", [])
         return [f"not reached: {each.place}: {each.words or each.cause}" for each in failed]
 
 
 class Failed(ResultPart):
-    """What a study could not reach."""
+    """A state that a study could not reach."""
 
     design: str
     load_N: float | None = None
@@ -199,7 +201,7 @@ Notify = Callable[[str, EvaluationFailed | None], None]  # words; why a place wa
 
 
 def silent(words: str, failure: EvaluationFailed | None) -> None:
-    """Say nothing of how a study goes."""
+    """Report no progress of a study."""
 
 
 def not_reached(
@@ -266,7 +268,7 @@ class CavityMode(ResultPart):
 
     @classmethod
     def pair(cls, hertz: Sequence[float]) -> list[CavityMode]:
-        """Of the two frequencies (fore-aft, vertical), or none."""
+        """Modes of the two frequencies (fore-aft, vertical), or none."""
         names: tuple[Literal["fore-aft", "vertical"], ...] = ("fore-aft", "vertical")
         return [cls(direction=d, frequency_Hz=f) for d, f in zip(names, hertz, strict=False)]
 

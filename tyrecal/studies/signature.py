@@ -1,4 +1,4 @@
-"""What an effect does to the modes, and what calibration would hide of it."""
+"""Shift of the modes by an effect, and the part of it that calibration would hide."""
 
 from __future__ import annotations
 
@@ -22,24 +22,20 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Signature:
-    """An effect of one size at some pressures.
-
-    before, after (pressure, label): per cent of the plain tyre's frequency, as it comes and after
-    the best linear re-fit of the case's variables to it, NaN where a mode got lost; absorbed: the
-    share alpha = 1 - |after|^2 / |before|^2 that the re-fit takes up, doublets counted twice,
-    None where the effect moves nothing;
-    refitted: the values of the variables that do so; mass_kg: that the effect adds.
-    """
+    """An effect of one size at some pressures."""
 
     id: str
     value: float
     pressures_kPa: tuple[float, ...]
     labels: tuple[Label, ...]
+    # (pressure, label) per cent of the plain tyre's frequency, NaN where a mode got lost
     before: Array
-    after: Array
+    after: Array  # the same after the best linear re-fit of the case's variables to it
+    # share alpha = 1 - |after|^2 / |before|^2 that the re-fit absorbs, doublets counted twice, None
+    # where the effect moves nothing
     absorbed: float | None
-    refitted: dict[str, float]
-    mass_kg: float
+    refitted: dict[str, float]  # values of the variables after that re-fit
+    mass_kg: float  # that the effect adds
 
 
 class Plain:
@@ -61,9 +57,9 @@ class Plain:
         self.names = tuple(name for name in values if name != pressure)
         self.values = dict(values)
         self.states = [{**values, pressure: p} for p in pressures_kPa]
-        found = [evaluator.evaluate(Question(state, self.names)) for state in self.states]
-        self.mass_kg = found[0].mass_kg
-        modes = [_modes(evaluation) for evaluation in found]
+        evaluations = [evaluator.evaluate(Question(state, self.names)) for state in self.states]
+        self.mass_kg = evaluations[0].mass_kg
+        modes = [_modes(evaluation) for evaluation in evaluations]
         wanted = target_labels(case) or [m for m in modes[0] if m.m < 2]
         self.labels = tuple(label for label in wanted if all(label in each for each in modes))
         self.hertz = np.array([[m[label].frequency_Hz for label in self.labels] for m in modes])
@@ -77,21 +73,21 @@ class Plain:
         )
         slopes = [
             [[e.gradients[name][m[label].position] for name in self.names] for label in self.labels]
-            for e, m in zip(found, modes, strict=True)
+            for e, m in zip(evaluations, modes, strict=True)
         ]
         self.jacobian = np.array(slopes) * self.steps / self.hertz[:, :, None]
 
     def signature(self, id: str, value: float) -> Signature:
-        """What the effect does to this tyre. Raises what ``Evaluator.evaluate`` does."""
-        found = next(self.signatures({id: value}))
-        if isinstance(found, EvaluationFailed):
-            raise found
-        return found
+        """Signature of the effect on this tyre. Raises what ``Evaluator.evaluate`` does."""
+        signature = next(self.signatures({id: value}))
+        if isinstance(signature, EvaluationFailed):
+            raise signature
+        return signature
 
     def signatures(
         self, sizes: Mapping[str, float], jobs: int = 1
     ) -> Iterator[Signature | EvaluationFailed]:
-        """Of each effect, in their order, its signature at that size; ``jobs`` designs at a time.
+        """Signature of each effect at its size, in their order; ``jobs`` designs at a time.
 
         Raises what ``Evaluator.evaluate_all`` does.
         """
@@ -102,24 +98,24 @@ class Plain:
         ]
         answers = self.evaluator.evaluate_all(questions, jobs)
         for id, value in sizes.items():
-            found: list[Evaluation] = []
+            evaluations: list[Evaluation] = []
             failed: list[EvaluationFailed] = []
             for answer in islice(answers, len(self.states)):
                 if isinstance(answer, EvaluationFailed):
                     failed.append(answer)
                 else:
-                    found.append(answer)
+                    evaluations.append(answer)
             try:
-                yield failed[0] if failed else self._signature(id, value, found)
+                yield failed[0] if failed else self._signature(id, value, evaluations)
             except EvaluationFailed as failure:
                 yield failure
 
-    def _signature(self, id: str, value: float, found: list[Evaluation]) -> Signature:
+    def _signature(self, id: str, value: float, evaluations: list[Evaluation]) -> Signature:
         lost = np.nan
         hertz = np.array(
             [
                 [m[label].frequency_Hz if label in m else lost for label in self.labels]
-                for m in map(_modes, found)
+                for m in map(_modes, evaluations)
             ]
         )
         change = np.log(hertz / self.hertz)
@@ -140,7 +136,7 @@ class Plain:
             100 * np.expm1(rest),
             1 - after / before if before else None,
             {name: self._moved(name, float(step[k]), k) for k, name in enumerate(self.names)},
-            found[0].mass_kg - self.mass_kg,
+            evaluations[0].mass_kg - self.mass_kg,
         )
 
     def _moved(self, name: str, step: float, place: int) -> float:

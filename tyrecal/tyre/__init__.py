@@ -1,1 +1,1 @@
-"""What a tyre is: case file, section, mesh, materials, effects, resolved."""
+"""Tyre of a case: case file, section, mesh, materials, effects, resolved."""

@@ -11,19 +11,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class FootprintQuantity:
-    """A quantity of the tyre at a load.
+    """A quantity of the tyre at a load."""
 
-    sigma: key of its standard deviation in a case, in the same unit; words: its name in tables;
-    unit: the one that tables show; per_SI: how many of that unit are one in SI; row: its key in a
-    row of footprint.json; slope: its key in the solver's sensitivities.
-    """
-
-    sigma: str
-    words: str
-    unit: str
-    per_SI: float
-    row: str
-    slope: str
+    sigma: str  # key of its standard deviation in a case, in the same unit
+    words: str  # its name in tables
+    unit: str  # the one that tables show
+    per_SI: float  # how many of that unit are one in SI
+    row: str  # its key in a row of footprint.json
+    slope: str  # its key in the solver's sensitivities
 
 
 FOOTPRINT_QUANTITIES = {

@@ -133,15 +133,15 @@ def _typed(document: Document, data: dict[str, Any]) -> Case | None:
     try:
         return Case.model_validate(data)
     except ValidationError as error:
-        found = list(explain(error))
-        _add(document, found)
-        without(data, [keys for keys, _ in found])
+        mistakes = list(explain(error))
+        _add(document, mistakes)
+        without(data, [keys for keys, _ in mistakes])
         return None
 
 
-def _add(document: Document, found: Iterable[tuple[Keys, str]]) -> None:
-    """Record what is found at keys of which nothing has been said yet."""
-    told = {mistake.key for mistake in document.mistakes}
-    for keys, message in found:
-        if dotted(keys) not in told:
+def _add(document: Document, mistakes: Iterable[tuple[Keys, str]]) -> None:
+    """Record mistakes at keys that have none yet."""
+    reported = {mistake.key for mistake in document.mistakes}
+    for keys, message in mistakes:
+        if dotted(keys) not in reported:
             document.add(keys, message)

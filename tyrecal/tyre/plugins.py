@@ -38,12 +38,12 @@ def load_plugin(entry: EntryPoint, kind: str, use: Callable[[Any], Any] = lambda
 
 def _own() -> dict[str, str]:
     """Id to module of each effect of the folder, by rising place."""
-    found = [
+    modules = [
         (int(place), id, path.stem)
         for path in (Path(__file__).parent / "effects").glob("*.py")
         for id, place in _ENTRY.findall(path.read_text(encoding="utf-8"))
     ]
-    return {id: module for _, id, module in sorted(found)}
+    return {id: module for _, id, module in sorted(modules)}
 
 
 OWN = _own()

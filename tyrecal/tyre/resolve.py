@@ -63,7 +63,7 @@ class Tyre:
         """Capabilities that a solver must have for this tyre, and what for, in words."""
         c = self.case
         rubbers = [m for m in c.materials.values() if isinstance(m, Rubber)]
-        asked = {
+        needed = {
             "spindle": c.rim.moves,
             "frequency_modulus": any(m.frequency_exponent for m in rubbers),
             "cavity": bool(c.cavity.share),
@@ -71,7 +71,7 @@ class Tyre:
             "rotation": bool(c.spin_rad_per_s),
             "own_deck": bool(c.deck),
         }
-        return {need: CAPABILITIES[need] for need, there in asked.items() if there}
+        return {need: CAPABILITIES[need] for need, there in needed.items() if there}
 
 
 def resolved(case: LoadedCase) -> Tyre:

@@ -71,31 +71,33 @@ class TyreState:
         return TyreState(pressure, self.load_N, rim).of(after)
 
     def numbers(self, case: LoadedCase) -> dict[str, float]:
-        """What it sets of the case, by path: nothing where it is as the case.
+        """Numbers that the state sets in the case, by path: none where it is as the case.
 
         Raises ValueError where the case cannot be in it.
         """
-        state, found = self.of(case), dict[str, float]()
+        state, numbers = self.of(case), dict[str, float]()
         if state.rim and case.decks:
             raise ValueError("must be absent: how the rim is held stands in the decks")
         if state.pressure_kPa is not None:
-            found["pressure_kPa"] = state.pressure_kPa
+            numbers["pressure_kPa"] = state.pressure_kPa
         if state.rim == "springs":
             raise ValueError(
                 "has no springs in this case: give a compliance in rim.spindle, as"
                 " rim: {spindle: {lateral_m_per_N: 1e-7}}"
             )
         if state.rim:
-            found |= {RIM_FREE: state.rim == "free", WHEEL_FREE: 0.0} | dict.fromkeys(SPRINGS, 0.0)
+            numbers |= {RIM_FREE: state.rim == "free", WHEEL_FREE: 0.0} | dict.fromkeys(
+                SPRINGS, 0.0
+            )
             point = case.case.rim.reference_point_m
             if state.rim == "free":
-                found[STANDING] = 0.0
+                numbers[STANDING] = 0.0
             if state.rim == "free" and point.r:
                 raise ValueError(
                     "cannot move: rim.reference_point_m must be on the axle, with r = 0, got"
                     f" {point.r:g}"
                 )
-        return found
+        return numbers
 
     def design(self, case: LoadedCase, values: Mapping[str, float]) -> dict[str, float]:
         """Values of variables, or other numbers of the case by path, and the state's own, which win

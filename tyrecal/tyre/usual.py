@@ -1,4 +1,4 @@
-"""Numbers of a case that no tyre has, told before they are computed with: most are slips of unit.
+"""Implausible numbers of a case, reported before they are computed with: most are slips of unit.
 
 Usual values of what a user states reach from passenger cars' tyres to trucks'; a number outside its
 range stands most often in another unit. The ranges are wide: they hold what is built and tested,
@@ -52,26 +52,27 @@ class Usual:
         return self.low <= value <= self.high and (value == 0 or abs(value) >= self.least)
 
     def refusal(self, value: float) -> str | None:
-        """What is usual instead of ``value``, and what was probably meant; None where it is."""
+        """Sentence with the range that is usual instead of ``value``, and what was probably meant;
+        None where the value is usual."""
         if self.holds(value):
             return None
         low = f"0, or {self.least:g}" if self.least and self.low == 0 else f"{self.low:g}"
         unit = f" {self.unit}" if self.unit else ""
         least = f", of a size of at least {self.least:g} or 0" if self.low < 0 < self.least else ""
-        found = self._meant(value, unit)
-        asked = f"; did you mean {' or '.join(found)}?" if found else ""
-        return f"usual is {low} to {self.high:g}{unit}{least}{self.reason}{asked}"
+        meant = self._meant(value, unit)
+        question = f"; did you mean {' or '.join(meant)}?" if meant else ""
+        return f"usual is {low} to {self.high:g}{unit}{least}{self.reason}{question}"
 
     def _meant(self, value: float, unit: str) -> list[str]:
         """At most two readings of ``value`` that would be usual, in words; of those that are almost
         the same, the first."""
-        found: dict[float, str] = {}
+        readings: dict[float, str] = {}
         for name, slip in self.slips.items():
             right = slip(value) if callable(slip) else slip * value
-            alike = any(abs(right - other) <= READING_RTOL * abs(other) for other in found)
+            alike = any(abs(right - other) <= READING_RTOL * abs(other) for other in readings)
             if value and self.holds(right) and not alike:
-                found[right] = f"{value:g} {name}, {right:.4g}{unit}"
-        return list(found.values())[:2]
+                readings[right] = f"{value:g} {name}, {right:.4g}{unit}"
+        return list(readings.values())[:2]
 
 
 def inverse(of: float) -> Callable[[float], float]:
@@ -112,8 +113,8 @@ USUAL_MEASUREMENTS = {
     "vertical_stiffness_N_per_m": Usual(1e4, 1e7, "N/m", STIFFNESS),
     "mass_kg": Usual(0.5, 500, "kg", QUANTITIES["mass_kg"]),
 }
-LARGEST_SIGMA = 0.2  # of the value: such a number tells nothing
-SMALLEST_SIGMA = 1e-5  # of the value: nothing is measured so well
+MAX_SIGMA = 0.2  # of the value: such a number tells nothing
+MIN_SIGMA = 1e-5  # of the value: nothing is measured so well
 # of the numbers of a case, by path; * is any name or place in a list
 USUAL: dict[str, Usual] = {
     "pressure_kPa": Usual(50, 1200, "kPa", PRESSURE),
@@ -314,17 +315,17 @@ def refusal(
 def _ranges(
     data: Mapping[str, Any], section: Section | None, keys: Keys
 ) -> Iterator[tuple[Usual, str]]:
-    """What is usual at ``keys``, and words that go before."""
+    """Usual ranges at ``keys``, each with words that go before."""
     here, last = keys[0], str(keys[-1])
     if here == "variables":
         for path in entries(at(data, keys[:-1]), "sets") if last == "start" else ():
-            if isinstance(path, str) and (found := _keys(data, path)):
-                yield from ((usual, f"{path}: ") for usual, _ in _ranges(data, section, found))
+            if isinstance(path, str) and (path_keys := _keys(data, path)):
+                yield from ((usual, f"{path}: ") for usual, _ in _ranges(data, section, path_keys))
     elif here == "uncertainties" and last == "absolute":
         for path in entries(at(data, keys[:-1]), "sets"):
-            if isinstance(path, str) and (found := _keys(data, path)):
-                for usual, _ in _ranges(data, section, found):
-                    value = number({"": _value(data, found)}, "")
+            if isinstance(path, str) and (path_keys := _keys(data, path)):
+                for usual, _ in _ranges(data, section, path_keys):
+                    value = number({"": _value(data, path_keys)}, "")
                     most = abs(value) if value and usual.holds(value) else usual.high
                     yield Usual(0, most, usual.unit, usual.slips), f"{path}: "
     elif here == "effects" and len(keys) == 2 and last in IDS:
@@ -339,7 +340,7 @@ def _ranges(
             value = number(at(data, keys[:-1]), quantity)
             if value and value > 0:
                 whole = USUAL_MEASUREMENTS[quantity]
-                yield replace(whole, low=SMALLEST_SIGMA * value, high=LARGEST_SIGMA * value), ""
+                yield replace(whole, low=MIN_SIGMA * value, high=MAX_SIGMA * value), ""
     else:
         words = tuple(map(str, keys))
         load = last == "load_N" or words[:2] == ("road", "loads_N")
@@ -421,7 +422,7 @@ def _value(data: Mapping[str, Any], keys: Keys) -> Any:
 
 
 def _keys(data: Mapping[str, Any], path: str) -> Keys:
-    """Where a path leads; nowhere where it is wrong, which is told elsewhere."""
+    """Keys to which a path leads; none where it is wrong, which is reported elsewhere."""
     effects = {**dict.fromkeys(IDS, 0.0), **table(data, "effects")}
     try:
         return find({**data, "effects": effects}, path)

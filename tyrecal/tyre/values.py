@@ -24,7 +24,7 @@ from .state import with_states_kept
 from .usual import belts_on_one_side, refusal
 from .usual_deck import unusual_numbers
 
-MOST_MEANT = 3  # paths that are offered for a name that is none
+MAX_MEANT = 3  # paths that are offered for a name that is none
 # numbers that stand alone: no other part of the case, and no mesh, depends on their values
 ALONE = {
     "pressure_kPa",
@@ -55,7 +55,7 @@ def with_values(loaded: LoadedCase, values: Mapping[str, Setting]) -> LoadedCase
 
 
 def set_values(loaded: LoadedCase, values: Mapping[str, Setting]) -> LoadedCase:
-    """`with_values` of who resolves the case next: that its effects can be is not asked here."""
+    """Like `with_values`, without checking that the effects can be applied."""
     targets: dict[Keys, Setting] = {}
     tree: dict[Any, Any] = {}
     for name, value in values.items():
@@ -112,15 +112,15 @@ def unusual_value(loaded: LoadedCase, name: str, value: Setting) -> str | None:
     if value is None or isinstance(value, str):
         return None
     data = loaded.case.plain()
-    found = [refusal(data, loaded.drawn, keys, value) for keys in _keys(loaded, name)]
+    messages = [refusal(data, loaded.drawn, keys, value) for keys in _keys(loaded, name)]
     if any(path.startswith("rebar_layers.") and path.endswith("angle_deg") for path in paths):
-        found += [message for _, message in belts_on_one_side(data, loaded.drawn)]
+        messages += [message for _, message in belts_on_one_side(data, loaded.drawn)]
     if loaded.deck:
         names = [path.removeprefix("deck.numbers.") for path in paths]
         numbers = {**loaded.deck_numbers, **dict.fromkeys(names, value)}
-        messages = dict(unusual_numbers(loaded.deck, numbers))
-        found += [messages[path] for path in names if path in messages]
-    return next((message for message in found if message), None)
+        of_deck = dict(unusual_numbers(loaded.deck, numbers))
+        messages += [of_deck[path] for path in names if path in of_deck]
+    return next((message for message in messages if message), None)
 
 
 def paths_of(loaded: LoadedCase, name: str) -> list[str]:
@@ -155,7 +155,7 @@ def _meant(loaded: LoadedCase, name: str) -> list[str]:
     dump = loaded.case.model_dump()
     numbers = dict.fromkeys([*_numbers(dump, ()), *(f"effects.{id}" for id in IDS)])
     if ends := [path for path in numbers if path.endswith(f".{name}")]:
-        return ends[:MOST_MEANT]
+        return ends[:MAX_MEANT]
     words = {path.rpartition(".")[2]: path for path in reversed(numbers)}
     words |= {name: name for name in (*loaded.case.variables, "pressure_kPa")}
     return [words[word] for word in get_close_matches(name, words, 1) if "." not in name]

@@ -99,8 +99,8 @@ def read_pressed_start(folder: Path, text: str) -> PressedStart | None:
 
 
 def write_start(folder: Path, shape: Array) -> str:
-    """Put ``shape`` (n, 4), node number and displacement in m, beside the deck; the deck's last
-    line. Raises OSError."""
+    """Write ``shape`` (n, 4), node number and displacement in m, next to the deck; returns the
+    deck's last line. Raises OSError."""
     content = io.BytesIO()
     np.save(content, np.ascontiguousarray(shape, dtype="<f8"), allow_pickle=False)
     (folder / FILE).write_bytes(content.getvalue())

@@ -1,4 +1,5 @@
-"""Unknowns of a harmonic beside the tyre's own: motions q of the rim, flow w of the cavity's air.
+"""Unknowns of a harmonic in addition to the tyre's own: motions q of the rim, flow w of the
+cavity's air.
 
     [K   Kx  .   C^T] [u]   [b]        q: see `wheel`; u of the rim's nodes is T q
     [Kx* Kq  .   Cq*] [q] = [b]        w, s: see `cavity`; s = Q^-1 (C u + H w) stands in so that
@@ -50,7 +51,7 @@ class Border:
         return flow
 
     def columns(self, shift: float) -> tuple[Array, Array]:
-        """E (size, q + w + s) and D beside the band of K - shift M."""
+        """E (size, q + w + s) and D next to the band of K - shift M."""
         q, w, s = self.widths
         k = q + w
         E = np.zeros((len(self.stiffness[0]), k + s), self.stiffness[0].dtype)

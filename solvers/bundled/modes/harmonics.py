@@ -116,7 +116,9 @@ class Vibration:
         self._model, self._U = model, U
         # the whole, then what each law of frequency adds per unit of its ratio less 1
         parts = [mechanics.tangents(model, U, loads, harmonics=True)]
-        parts += [mechanics.tangents(m, U, [], harmonics=True) for m in model.growing()]
+        parts += [
+            mechanics.tangents(m, U, [], harmonics=True) for m in model.frequency_dependent_models()
+        ]
         self._parts = parts
         self._bands = [[numbering.assemble(p) for p in three] for three in parts]
         self.weights = np.array([1.0] + [0.0] * (len(parts) - 1))

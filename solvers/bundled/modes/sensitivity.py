@@ -63,7 +63,7 @@ def eigenvalue_rates(
     for part in (*model.parts, *(load for load in loads if not isinstance(load, Spin))):
         total += part.form(state, fields)
         for i, table in enumerate(model.tables):
-            if (grown := part.growing(i)) is not None:
+            if (grown := part.frequency_dependent_part(i)) is not None:
                 form = grown.form(state, fields)
                 hertz = np.sqrt(eigenvalues) / (2 * np.pi)
                 ratio = np.array([table.ratio(f) for f in hertz])

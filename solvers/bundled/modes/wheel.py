@@ -60,8 +60,8 @@ class Wheel:
         return real, imag
 
     def own(self, n: int, X: Array, forces: Array) -> tuple[Array, Array]:
-        """Stiffness and mass (motions,) per radian beside the tyre's; ``forces`` (nodes, 3):
-        gradient of the potential in the inflated state, N per radian."""
+        """Stiffness and mass (motions,) per radian in addition to the tyre's; ``forces`` (nodes,
+        3): gradient of the potential in the inflated state, N per radian."""
         circle = np.pi if n else 2 * np.pi  # an amplitude's energy over it, as in `harmonics`
         r, d_z = X[self.rim, 0], X[self.rim, 1] - X[self.reference, 1]
         f_r, f_z = forces[self.rim, 0], forces[self.rim, 2]

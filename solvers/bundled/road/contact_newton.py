@@ -185,7 +185,7 @@ class ContactNewton:
         z = np.where(X[:, 0] > rim, np.abs(X[:, 1]), np.inf)
         return rim + float(np.ptp(X[z <= z.min() + 1e-9, 0]))
 
-    def rest(self) -> None:
+    def drop_factor(self) -> None:
         """Let go of the memory that is only of use while the load stays."""
         self._factor = None
 
@@ -220,7 +220,7 @@ class ContactNewton:
         for _ in range(MAX_NEWTON):
             if state:
                 break
-            parts, height, contact = self._softly(parts, height, load, bound, reached)
+            parts, height, contact = self._solve_tresca(parts, height, load, bound, reached)
             bound = contact.bound(self.road.share(contact.points, height)[0])
             if reached > COULOMB_RTOL:
                 reached = COULOMB_RTOL  # what newly touches had no friction yet
@@ -245,12 +245,12 @@ class ContactNewton:
             parts, height = self.parts + guess.moved, self.free_radius - guess.deflection
             if abs(guess.share - 1) > SAME_SHARE:
                 near = guess.share * load
-                parts, height, contact = self._settle(parts, height, near, None, COULOMB_RTOL)
+                parts, height, contact = self._iterate(parts, height, near, None, COULOMB_RTOL)
                 tangent = Tangent.of(contact, self.symmetry)
                 moved, rise, *_ = self.solve(tangent, 0 * parts, 1.0, LINEAR_RTOL)
                 parts = parts - (load - near) / 2 * moved
                 height -= (load - near) / 2 * rise
-            return self._settle(parts, height, load, None, CONTACT_FORCE_RTOL)
+            return self._iterate(parts, height, load, None, CONTACT_FORCE_RTOL)
         except (NoEquilibrium, Indefinite, Inverted):
             log.info("%g N: the start was too far away, loaded from nothing", load)
             self._factor, self._used, self._formed_at = None, 0, 0.0
@@ -261,11 +261,11 @@ class ContactNewton:
     ) -> tuple[Array, float, Contact] | None:
         """The equilibrium, None where Newton's method does not converge from there."""
         try:
-            return self._settle(parts, height, load, None, CONTACT_FORCE_RTOL)
+            return self._iterate(parts, height, load, None, CONTACT_FORCE_RTOL)
         except NoEquilibrium:
             return None
 
-    def _softly(
+    def _solve_tresca(
         self, parts: Array, height: float, load: float, bound: Bound, tolerance: float
     ) -> tuple[Array, float, Contact]:
         """By Tresca's friction; a hard stick is approached by softer ones."""
@@ -276,12 +276,12 @@ class ContactNewton:
         try:
             for slip in slips:
                 self.road = replace(road, elastic_slip=slip)
-                parts, height, contact = self._settle(parts, height, load, bound, tolerance)
+                parts, height, contact = self._iterate(parts, height, load, bound, tolerance)
         finally:
             self.road = road
         return parts, height, contact
 
-    def _settle(
+    def _iterate(
         self, parts: Array, height: float, load: float, bound: Bound | None, tolerance: float
     ) -> tuple[Array, float, Contact]:
         """Newton's method, with an energy line search where the friction is bounded; with

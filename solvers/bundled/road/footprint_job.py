@@ -1,4 +1,4 @@
-"""The job that presses the inflated tyre on the road: what its deck asks, its steps, its results.
+"""The job that presses the inflated tyre on the road: the deck's requests, its steps, its results.
 
 JOB.json: pressure_Pa, mass_kg, free_radius_m, failure, cause, ``footprints`` [load_N, road_N, rim_N
 (x down, y, z), deflection_m, stiffness_N_per_m, contact_area_m2]; where a request has sensitivities
@@ -195,7 +195,7 @@ def _modes(
     holds = holds if road.friction else holds[:1]
     vibration = Vibration(wanted.model, inflated, tyre.loads, equations, 0.0)
     start = lowest_of_all(vibration, 2 * (wanted.count + 2 * SPARE), work.check)
-    work.rest()
+    work.drop_factor()
     modes = loaded_modes(
         tyre, work.symmetry, U, holds, start, wanted.count, work.check, wanted.wheel_kg
     )

@@ -62,7 +62,7 @@ class Slopes:
 
     def at(self, work: ContactNewton, state: PressedState, rings: Array) -> dict[str, Any]:
         """``slopes`` of a footprint's numbers at the last state followed to, whose patch is on
-        nodes at the angles ``rings``, by name; nothing where none was asked for. Raises
+        nodes at the angles ``rings``, by name; empty where none was requested. Raises
         NoEquilibrium."""
         if not self.paths:
             return {}

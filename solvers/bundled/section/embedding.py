@@ -21,7 +21,10 @@ from .shapes import TYPES, ElementType
 Array = np.ndarray
 EXTERIOR = 0.05  # of the hosts' size that a node may lie outside them (ABAQUS' default)
 ROUNDOFF = 1e-6  # weights below it are zero (likewise)
-MOST_STEPS, XI_SETTLED = 20, 1e-9  # of Newton's method for xi, whose error is the square of a step
+MAX_MAPPING_STEPS, XI_SETTLED = (
+    20,
+    1e-9,
+)  # of Newton's method for xi, whose error is the square of a step
 
 
 @dataclass(frozen=True)
@@ -224,7 +227,7 @@ def _guest(
 def _inverse(kind: ElementType, corners: Array, place: Array) -> Array | None:
     """xi of a point of the isoparametric map, by Newton's method; None where it does not settle."""
     xi = kind.clipped(np.full(2, 0.25 if len(kind.faces) == 3 else 0.0))
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_MAPPING_STEPS):
         step = _step(kind, corners, place, xi)
         if not np.isfinite(step).all() or abs(xi).max() > 10:
             return None

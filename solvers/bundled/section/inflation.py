@@ -81,7 +81,8 @@ def _reached(solve: _Solver, start: Array, check: Callable[[], None]) -> Array:
 
 
 def stopped(reached: float, pressure: float, why: str) -> NoEquilibrium:
-    """No stable equilibrium beyond ``reached`` times the load that was asked for."""
+    """Error of an inflation that has no stable equilibrium beyond ``reached`` times the requested
+    load."""
     full, reached_kPa = pressure / 1e3, reached * pressure / 1e3
     return NoEquilibrium(f"inflation stopped at {reached_kPa:.4g} of {full:.4g} kPa: {why}")
 
@@ -150,7 +151,7 @@ def _by_stiffness(solve: _Solver, start: Array, check: Callable[[], None]) -> Ar
 
 
 def _by_pressure(solve: _Solver, start: Array, check: Callable[[], None]) -> Array:
-    """In adaptive load steps, which tell how far the tyre can be inflated."""
+    """Inflate in adaptive load steps, which show how far the tyre can be inflated."""
     U, reached, step = start, 0.0, 0.25
     while reached < 1.0:
         check()

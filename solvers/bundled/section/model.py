@@ -30,10 +30,13 @@ class Model:
         parts = [replace(p, law=change(p.law)) if isinstance(p, Elastic) else p for p in self.parts]
         return replace(self, parts=parts)
 
-    def growing(self) -> list[Model]:
+    def frequency_dependent_models(self) -> list[Model]:
         """Per table a model with the tangent that grows with its modulus: the rubber's own, without
         its initial stress."""
-        grown = [[part.growing(i) for part in self.parts] for i in range(len(self.tables))]
+        grown = [
+            [part.frequency_dependent_part(i) for part in self.parts]
+            for i in range(len(self.tables))
+        ]
         return [replace(self, parts=[p for p in parts if p is not None]) for parts in grown]
 
 

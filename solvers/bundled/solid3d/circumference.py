@@ -18,13 +18,13 @@ from itertools import pairwise, takewhile
 import numpy as np
 
 Array = np.ndarray
-LONGEST_NEAR = np.radians(10.0)  # of elements near the patch
+MAX_NEAR_LENGTH = np.radians(10.0)  # of elements near the patch
 FARTHEST_ELEMENT = np.radians(45.0)  # from its middle, but for the last one
 WAVE_BY_ELEMENTS = (
     2 * np.pi / 7.5
 )  # of the highest harmonic, over the elements' length that hold it
 MORE_WAVES = 5  # than a mode's own, for a pressed tyre mixes them
-LEAST_WAVES = 4 + MORE_WAVES
+MIN_WAVES = 4 + MORE_WAVES
 SPARE_WAVE_POINTS = 8  # Gauss points of the waves beyond those that their products need
 
 
@@ -127,7 +127,7 @@ def half_circle(lengths: Array, highest: int = 0) -> HalfCircle:
 
 def waves_beyond(lengths: Array) -> HalfCircle:
     """In place of elements from 0 to pi: the short ones near the patch, one more, then waves."""
-    short = list(takewhile(lambda length: length <= LONGEST_NEAR, lengths))
+    short = list(takewhile(lambda length: length <= MAX_NEAR_LENGTH, lengths))
     near = [
         length
         for length, end in zip(short, np.cumsum(short), strict=True)
@@ -136,7 +136,7 @@ def waves_beyond(lengths: Array) -> HalfCircle:
     if not near:
         return half_circle(lengths)
     holds = WAVE_BY_ELEMENTS / float(max(lengths))
-    return half_circle(np.array([*near, near[-1]]), max(LEAST_WAVES, MORE_WAVES + int(holds)))
+    return half_circle(np.array([*near, near[-1]]), max(MIN_WAVES, MORE_WAVES + int(holds)))
 
 
 def _waves(join: float, highest: int) -> Array:

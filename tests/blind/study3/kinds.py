@@ -7,7 +7,7 @@ from math import sqrt
 
 from tyrecal.errors import InputError
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE
-from tyrecal.studies.diagnose.several import MOST_EFFECTS, priors
+from tyrecal.studies.diagnose.several import MAX_EFFECTS, priors
 
 EFFECTS_OF = {"none": 0, "one": 1, "two": 2, "three": 3, "outside": 0}
 EFFECTS_OF |= {"one_strong": 1, "two_strong": 2, "three_strong": 3, "outside_strong": 0}
@@ -23,7 +23,7 @@ def further(counts: Mapping[str, int]) -> float:
     have = [numbers[kind] for kind, count in counts.items() for _ in range(count) if numbers[kind]]
     if not have:
         return 0.0
-    if min(have) == MOST_EFFECTS:
+    if min(have) == MAX_EFFECTS:
         raise InputError("add a tyre of one or two effects: that all have three no prior can tell")
     mean = sum(have) / len(have)
     a, b, c = 3 - mean, 2 - mean, 1 - mean
@@ -33,7 +33,7 @@ def further(counts: Mapping[str, int]) -> float:
 def weighed_again(p: Mapping[str, float], before: float, after: float) -> dict[str, float]:
     """Probabilities by key as they were answered with one prior of a further effect, by another:
     Bayes' rule about `several.priors`, of which the number of effects in the catalogue cancels."""
-    old, new = (priors(MOST_EFFECTS, further) for further in (before, after))
+    old, new = (priors(MAX_EFFECTS, further) for further in (before, after))
     times = {k: new.get(k, 0.0) / old[k] for k in old}
     sets = {key: 1.0 if key in (NONE, OUTSIDE) else times[key.count("+") + 1] for key in p}
     whole = sum(p[key] * sets[key] for key in p)

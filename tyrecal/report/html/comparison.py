@@ -20,7 +20,7 @@ UNITS = {"Hz": "Hz", "sigma": "sigmas"}
 
 @dataclass(frozen=True)
 class Row:
-    """What it is, more of it in small letters, and a cell a folder."""
+    """A row: its name, more of it in small letters, and a cell per folder."""
 
     name: str
     more: str
@@ -94,8 +94,8 @@ def _end(fit: FitResult) -> str:
 
 
 def _pressures(fit: FitResult) -> str:
-    told = dict.fromkeys(each.pressure_kPa for each in fit.states) or [fit.pressure_kPa]
-    return f"{', '.join(f'{p:g}' for p in told)} kPa"
+    pressures = dict.fromkeys(each.pressure_kPa for each in fit.states) or [fit.pressure_kPa]
+    return f"{', '.join(f'{p:g}' for p in pressures)} kPa"
 
 
 def _worst(fit: FitResult) -> str:

@@ -17,7 +17,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from ...errors import InputError
-from ...files import open_file, whole
+from ...files import atomic_write, open_file
 from ...studies import named, result_types
 from ...studies.fit.result import FitResult
 from ...studies.footprint import FootprintResult
@@ -71,13 +71,13 @@ def write_page(path: Path, folders: Sequence[Path], author: str = "") -> Page:
         raise InputError(
             f"the page would have {size / 1e6:.1f} MB, more than 5: give fewer folders"
         )
-    with whole(path) as partial:
+    with atomic_write(path) as partial:
         partial.write_bytes(content)
-    found = {
+    studies = {
         str(each.folder): [result_types()[name].command or name for name in each.studies]
         for each in results
     }
-    return Page(path, size, found)
+    return Page(path, size, studies)
 
 
 def _refuse(path: Path) -> None:
@@ -112,45 +112,47 @@ def page(results: Sequence[Results], author: str = "") -> str:
     )
 
 
-def chapter(found: Results, prefix: str) -> dict[str, Any]:
-    """What the templates ask of one folder's results."""
-    draw = partial(_picture, found, prefix)
-    shapes = [_shapes(found, what, shapes, table) for what, shapes, table in _shown_modes(found)]
+def chapter(results: Results, prefix: str) -> dict[str, Any]:
+    """Values of the templates for one folder's results."""
+    draw = partial(_picture, results, prefix)
+    shapes = [
+        _shapes(results, what, shapes, table) for what, shapes, table in _shown_modes(results)
+    ]
     return {
         "prefix": prefix,
-        "folder": found.folder.resolve().name,
-        "case": found.case,
-        "of": list(found.provenances.items()),
-        "mixed": len({each.tyre_sha256 for each in found.provenances.values()}) > 1,
+        "folder": results.folder.resolve().name,
+        "case": results.case,
+        "of": list(results.provenances.items()),
+        "mixed": len({each.tyre_sha256 for each in results.provenances.values()}) > 1,
         "stale": [
             study
-            for study, run in found.runs.items()
-            if study in found.provenances and not run.finished
+            for study, run in results.runs.items()
+            if study in results.provenances and not run.finished
         ],
         "absent": [
             kind.command or name
             for name, kind in result_types().items()
-            if name not in found.studies and not kind.is_seldom
+            if name not in results.studies and not kind.is_seldom
         ],
-        "studies": [_study(found, each, draw) for each in found.studies.values()],
+        "studies": [_study(results, each, draw) for each in results.studies.values()],
         "shapes": shapes,
-        "section": _section(found, draw),
-        "diagnosis": found.diagnosis and _diagnosis(found, draw),
-        "fit": found.fit,
-        "history": found.history,
-        "sets": found.fit_shapes.variables if found.fit_shapes else {},
-        "patches": found.patches,
+        "section": _section(results, draw),
+        "diagnosis": results.diagnosis and _diagnosis(results, draw),
+        "fit": results.fit,
+        "history": results.history,
+        "sets": results.fit_shapes.variables if results.fit_shapes else {},
+        "patches": results.patches,
     }
 
 
-def _study(found: Results, result: Result, draw: Draw) -> dict[str, Any]:
-    """What every study has: words, pictures, tables."""
+def _study(results: Results, result: Result, draw: Draw) -> dict[str, Any]:
+    """Words, pictures and tables that every study has."""
     doubts = fit_doubts(result.content()) if isinstance(result, FitResult) else result.doubts()
-    pictures = list(_pictures(found, result, draw))
-    with _lists_of(found.folder / f"{result.stem}.json"):
+    pictures = list(_pictures(results, result, draw))
+    with _lists_of(results.folder / f"{result.stem}.json"):
         return {
             "id": result.study,
-            "run": found.runs.get(result.study, RunFacts()),
+            "run": results.runs.get(result.study, RunFacts()),
             "heading": result.heading,
             "summary": summary(result),
             "doubts": doubts,
@@ -161,9 +163,9 @@ def _study(found: Results, result: Result, draw: Draw) -> dict[str, Any]:
         }
 
 
-def _pictures(found: Results, result: Result, draw: Draw) -> Iterator[Markup]:
+def _pictures(results: Results, result: Result, draw: Draw) -> Iterator[Markup]:
     """The figures of a study, each with words for who does not see it."""
-    fit, file = found.fit, f"{result.stem}.json"
+    fit, file = results.fit, f"{result.stem}.json"
     if isinstance(result, FitResult):
         if result.modes and not result.states:
             words = "Frequencies over their targets before and after the fit"
@@ -171,9 +173,9 @@ def _pictures(found: Results, result: Result, draw: Draw) -> Iterator[Markup]:
         if result.states:
             words = "Deviations from the targets after the fit, states side by side"
             yield draw("states", words, file, partial(draw_states, result))
-        if found.history:
+        if results.history:
             words = "The objective and the variables, design point by design point"
-            plot = partial(draw_convergence, found.history, result.objective_unit)
+            plot = partial(draw_convergence, results.history, result.objective_unit)
             yield draw("convergence", words, "fit_history.csv", plot)
     elif isinstance(result, PressureSweep):
         targets = fit.over_pressure() if fit else []
@@ -184,7 +186,7 @@ def _pictures(found: Results, result: Result, draw: Draw) -> Iterator[Markup]:
         yield draw("load", "Frequencies over the load", file, plot)
     elif isinstance(result, FootprintResult):
         known = {(row.design, row.load_N) for row in result.rows}
-        patches = found.patches.patches if found.patches else []
+        patches = results.patches.patches if results.patches else []
         patches = [each for each in patches if (each.design, each.load_N) in known]
         words = "Contact area, deflection, stiffness and mean contact pressure over the load"
         yield draw("curves", words, file, partial(draw_curves, result.rows))
@@ -201,15 +203,15 @@ def _pictures(found: Results, result: Result, draw: Draw) -> Iterator[Markup]:
 
 
 def _picture(
-    found: Results, prefix: str, name: str, words: str, file: str, draw: Callable[[], Figure]
+    results: Results, prefix: str, name: str, words: str, file: str, draw: Callable[[], Figure]
 ) -> Markup:
-    """A figure of what stands in ``file``, told in words. Raises InputError."""
-    with _lists_of(found.folder / file):
+    """A figure of the contents of ``file``, described in words. Raises InputError."""
+    with _lists_of(results.folder / file):
         return svg(draw(), words, f"{prefix}{name}")
 
 
 def _shapes(
-    found: Results, what: str, shapes: Shapes | None, table: Sequence[Named]
+    results: Results, what: str, shapes: Shapes | None, table: Sequence[Named]
 ) -> dict[str, Any]:
     """The viewer's data, or why there are none."""
     why = ""
@@ -220,11 +222,11 @@ def _shapes(
     elif not shapes.modes:
         why = "This solver gives shapes on the crown alone, so there is no section to revolve."
     data = None
-    with _lists_of(found.folder / f"{what}_shapes.json"):
+    with _lists_of(results.folder / f"{what}_shapes.json"):
         if shapes and shapes.modes:
             data = packed(shapes)
     heading = {"fit": "Shapes of the fitted tyre", "modes": "Mode shapes"}[what]
-    if what == "modes" and _is_initial(found):
+    if what == "modes" and _is_initial(results):
         heading = "Mode shapes of the initial tyre"
     if shapes and shapes.load_N:
         heading += f" under {shapes.load_N:g} N, on the tread"
@@ -235,40 +237,40 @@ def _shapes(
     return {"id": what, "heading": heading, "data": data, "why": why}
 
 
-def _is_initial(found: Results) -> bool:
+def _is_initial(results: Results) -> bool:
     """Whether the modes are those of the design that the fit started from."""
-    fit, modes = found.fit, found.get(ModesResult)
+    fit, modes = results.fit, results.get(ModesResult)
     if not fit or not modes:
         return False
     start = {name: each.initial for name, each in fit.variables.items()} | fit.fixed
     return modes.variables == start
 
 
-def _shown_modes(found: Results) -> Iterator[tuple[str, Shapes | None, Sequence[Named]]]:
-    """Of each study whose modes are shown: its name, shapes, and the table's modes."""
-    if fit := found.fit:
-        yield "fit", found.fit_shapes, fit.of_first_state
-    if modes := found.get(ModesResult):
-        yield "modes", found.modes_shapes, modes.modes
+def _shown_modes(results: Results) -> Iterator[tuple[str, Shapes | None, Sequence[Named]]]:
+    """For each study whose modes are shown: its name, shapes, and the table's modes."""
+    if fit := results.fit:
+        yield "fit", results.fit_shapes, fit.of_first_state
+    if modes := results.get(ModesResult):
+        yield "modes", results.modes_shapes, modes.modes
 
 
-def _section(found: Results, draw: Draw) -> Markup | None:
+def _section(results: Results, draw: Draw) -> Markup | None:
     """The section of the fitted tyre, or of that whose modes are known."""
-    for what, shapes, table in _shown_modes(found):
+    for what, shapes, table in _shown_modes(results):
         if shapes and shapes.section and shapes.are_of(table):
             plot = partial(draw_section, shapes.section, shapes.case, shapes.pressure_kPa)
             return draw("section", "The section", f"{what}_shapes.json", plot)
     return None
 
 
-def _diagnosis(found: Results, draw: Draw) -> dict[str, Any]:
-    d = found.diagnosis
+def _diagnosis(results: Results, draw: Draw) -> dict[str, Any]:
+    d = results.diagnosis
     assert d
-    place, drawn = found.diagnosis_section, None
+    place, drawn = results.diagnosis_section, None
     if place and d.section_map:
-        told = "Parts of the section by the evidence for a change of them alone"
+        words = "Parts of the section by the evidence for a change of them alone"
         drawing = partial(draw_section_map, place, d.section_map)
-        drawn = draw("map", told, "diagnosis_section.json", drawing)
+        drawn = draw("map", words, "diagnosis_section.json", drawing)
     known = [(row, each) for each in d.gap.residuals if not each.run and (row := each.of)]
     percent = np.array([[each.percent, each.sigma_percent] for _, each in known]).T / 100
     return {
@@ -279,7 +281,7 @@ def _diagnosis(found: Results, draw: Draw) -> dict[str, Any]:
             for key, p in list(d.probabilities.items())[:MAX_SHOWN]
             if p >= MIN_SHOWN_PROBABILITY or key in ("none", "outside")
         ],
-        "words": html(found.diagnosis_words),
+        "words": html(results.diagnosis_words),
         "map": drawn,
         "residuals": draw(
             "residuals",

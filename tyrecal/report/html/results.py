@@ -48,7 +48,7 @@ class RunFacts(ResultPart):
 
 @dataclass(frozen=True)
 class Results:
-    """What a folder holds; None or empty: it does not."""
+    """Results in a folder; None or empty: it has none."""
 
     folder: Path
     studies: dict[str, Result]  # by name, in the order of a page
@@ -74,7 +74,7 @@ class Results:
 
     @property
     def provenances(self) -> dict[str, Provenance]:
-        """What the results of each study are of, where they say so."""
+        """Origin of the results of each study, where they record it."""
         return {name: of for name, each in self.studies.items() if (of := each.provenance)}
 
     @property
@@ -91,13 +91,13 @@ class Results:
 
 
 def read_results(folder: Path) -> Results:
-    """What the commands left in a folder. Raises InputError; OSError."""
+    """Read the results that commands left in a folder. Raises InputError; OSError."""
     if not folder.is_dir():
         what = "is a file" if folder.exists() else "does not exist"
         raise InputError(f"'{folder}' {what}; give a folder of results")
     types = result_types()
     studies = {name: _read(folder / f"{kind.stem}.json", kind) for name, kind in types.items()}
-    found = Results(
+    results = Results(
         folder,
         {name: each for name, each in studies.items() if each and _is_filled(each)},
         _read(folder / "fit_shapes.json", Shapes),
@@ -108,8 +108,8 @@ def read_results(folder: Path) -> Results:
         _text(folder / "diagnosis.md") or "",
         _runs(folder),
     )
-    if not found.studies:
-        run = max(found.runs.values(), key=lambda each: each.started, default=RunFacts())
+    if not results.studies:
+        run = max(results.runs.values(), key=lambda each: each.started, default=RunFacts())
         last = "" if run.finished else f": its last run, 'tyrecal {run.command}', did not finish"
         if (folder / "batch.json").exists():
             last = "; it is a batch's: give the folders of its cases, which stand in it"
@@ -117,12 +117,12 @@ def read_results(folder: Path) -> Results:
             f"'{folder}' holds no results of fit, modes, sweep-pressure, footprint,"
             f" effects, sample or diagnose{last}"
         )
-    return found
+    return results
 
 
-def _is_filled(found: Result) -> bool:
+def _is_filled(result: Result) -> bool:
     """Whether it has rows; where no effect had an answer effects.json has none."""
-    return not isinstance(found, Effects) or bool(found.rows)
+    return not isinstance(result, Effects) or bool(result.rows)
 
 
 def _read(path: Path, kind: type[File]) -> File | None:

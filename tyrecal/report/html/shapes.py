@@ -15,9 +15,9 @@ PAGE_ANGLES = 60  # round the circumference, in the page
 
 
 def packed(shapes: Shapes) -> dict[str, Any]:
-    """What `viewer.js` reads: points and modes; a surface round the section's outside that is
-    swept by the script, or, of the loaded tyre, as it is. Raises ValueError where lists that
-    belong together differ in length."""
+    """Data that `viewer.js` reads: points and modes; a surface round the section's outside that the
+    script sweeps, or the loaded tyre's as it is. Raises ValueError where lists that belong together
+    differ in length."""
     return _loaded(shapes) if shapes.load_N else _swept(shapes)
 
 

@@ -1,4 +1,4 @@
-"""What a folder's results say, in sentences."""
+"""Summary of a folder's results, in sentences."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from ...studies.effects import EffectResult, Effects
 from ...studies.fit.result import FitResult
 from ...studies.modes import ModesResult
 from ...studies.result import Result
-from ...units import said
+from ...units import display_unit
 from ..table import ended_words, nearness
 
 VERDICT_WORDS = {"named": "Named", "undecided": "Undecided", "outside": "Outside the catalogue"}
 
 
-def summary(found: Result) -> list[str]:
+def summary(result: Result) -> list[str]:
     """A study in short, in sentences."""
     for kind, words in SHORT.items():
-        if isinstance(found, kind):
-            return words(found)
-    return [*map(sentence, found.summary())]
+        if isinstance(result, kind):
+            return words(result)
+    return [*map(sentence, result.summary())]
 
 
 def fit_words(fit: FitResult) -> list[str]:
@@ -66,43 +66,43 @@ def modes_words(modes: ModesResult) -> list[str]:
     return [*words, *map(sentence, modes.findings.words)]
 
 
-def diagnosis_words(found: DiagnosisResult) -> list[str]:
+def diagnosis_words(result: DiagnosisResult) -> list[str]:
     """Verdict, size, how far the error shrinks, what next."""
-    gap = found.verdict != "no_gap"
-    words = [sentence(verdict_words(found) + (f": {found.words}" if gap else ""))]
-    if found.effect:
-        words[0] += f" Probability {present(found.probabilities, found.effect.split('+')):.2f}."
-    if found.robust:
-        least, most = found.robust.range
+    gap = result.verdict != "no_gap"
+    words = [sentence(verdict_words(result) + (f": {result.words}" if gap else ""))]
+    if result.effect:
+        words[0] += f" Probability {present(result.probabilities, result.effect.split('+')):.2f}."
+    if result.robust:
+        least, most = result.robust.range
         words.append(
             "It rests on labels that were exchanged: correct the file first."
-            if found.exchanged_labels
+            if result.exchanged_labels
             else f"Robust: {least:.2f} to {most:.2f} with other priors and standard deviations."
-            if found.robust.robust
-            else sentence(f"It hangs on {found.robust.hangs_on[0]}")
+            if result.robust.robust
+            else sentence(f"It hangs on {result.robust.hangs_on[0]}")
         )
-    if found.effect and found.parameter:
-        p = found.parameter
-        unit, factor = said(p.unit)
+    if result.effect and result.parameter:
+        p = result.parameter
+        unit, factor = display_unit(p.unit)
         value, low, high = (f"{factor * x:.3g}" for x in (p.value, p.low, p.high))
         words.append(f"Its size is {value} {unit}".rstrip() + f", 90 % between {low} and {high}.")
-    if found.shrinkage and gap:
-        s = found.shrinkage
+    if result.shrinkage and gap:
+        s = result.shrinkage
         words.append(
             f"On held-out data the error goes from {s.before_percent:.2f} to"
             f" {s.after_percent:.2f} % with {s.effect}: it shrinks by {100 * s.fraction:.0f} %,"
             f" chance alone reaches {100 * s.placebo_95:.0f} % (95 % quantile)."
         )
-    if found.next_measurements:
-        words.append(f"Next: {found.next_measurements[0].what}.")
+    if result.next_measurements:
+        words.append(f"Next: {result.next_measurements[0].what}.")
     return words
 
 
-def verdict_words(found: DiagnosisResult) -> str:
+def verdict_words(result: DiagnosisResult) -> str:
     """The verdict of a diagnosis in a few words."""
-    if found.verdict == "no_gap":
-        return no_gap_words(found.probabilities[NONE]).capitalize()
-    return VERDICT_WORDS[found.verdict]
+    if result.verdict == "no_gap":
+        return no_gap_words(result.probabilities[NONE]).capitalize()
+    return VERDICT_WORDS[result.verdict]
 
 
 def effect_words(effect: EffectResult) -> str:
@@ -124,6 +124,6 @@ def sentence(words: str) -> str:
 SHORT: dict[type[Result], Callable[[Any], list[str]]] = {
     FitResult: fit_words,
     ModesResult: modes_words,
-    Effects: lambda found: [effect_words(each) for each in found.rows],
+    Effects: lambda result: [effect_words(each) for each in result.rows],
     DiagnosisResult: diagnosis_words,
 }

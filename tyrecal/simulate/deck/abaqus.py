@@ -223,7 +223,8 @@ def _tables(
 
 
 def aside(tyre: Tyre) -> dict[str, Any]:
-    """What no deck of keywords says: which surfaces hold the gas, whose frequency counts."""
+    """Requests that no deck of keywords holds: which surfaces hold the gas, whose frequency
+    counts."""
     request: dict[str, Any] = {}
     if tyre.case.deck:
         units = tyre.case.deck.units

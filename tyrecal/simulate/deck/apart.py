@@ -29,7 +29,7 @@ TO_START = ("SYSTEMROOT", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "PYTHONHOME")
 _own = threading.local()
 
 
-class Apart:
+class TemplateProcess:
     """Templates of a dialect, the user's own in ``folder`` before the tool's."""
 
     auto_reload = True
@@ -39,13 +39,13 @@ class Apart:
 
     def render(self, template: str, names: dict[str, Any]) -> str:
         """The text of a template. Raises TemplateFailed."""
-        asked = pickle.dumps((self.dialect, self.folder, template, names))
+        request = pickle.dumps((self.dialect, self.folder, template, names))
         process = _process()
         timer = threading.Timer(WALL_S, process.kill)
         timer.start()
         try:
             assert process.stdin and process.stdout
-            process.stdin.write(len(asked).to_bytes(8, "big") + asked)
+            process.stdin.write(len(request).to_bytes(8, "big") + request)
             process.stdin.flush()
             kind = process.stdout.read(1)
             text = _read(process.stdout, MAX_TEXT_BYTES)
@@ -103,24 +103,24 @@ def _read(stream: IO[bytes], most: int) -> bytes:
 
 
 def _exactly(stream: IO[bytes], count: int) -> bytes:
-    found = stream.read(count)
-    if len(found) < count:
+    data = stream.read(count)
+    if len(data) < count:
         raise EOFError
-    return found
+    return data
 
 
 def serve() -> None:
-    """What the process apart does: texts of templates, until nobody asks any more."""
+    """Serve as the separate process: render templates until no further request comes."""
     os.environ.clear()
     os.environ["OPENBLAS_NUM_THREADS"] = "1"  # each thread reserves some of MEMORY
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever is printed is no answer
     while True:
         try:
-            asked = _read(sys.stdin.buffer, sys.maxsize)
+            request = _read(sys.stdin.buffer, sys.maxsize)
         except EOFError:
             return
-        dialect, folder, template, names = pickle.loads(asked)
+        dialect, folder, template, names = pickle.loads(request)
         _limit()
         try:
             kind, text = GOOD, render(environment(dialect, folder), template, names).encode()

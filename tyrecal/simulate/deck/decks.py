@@ -17,7 +17,7 @@ from ...tyre.case.identity import tyre_sha256
 from ...tyre.case.schema import SolverChoice
 from ...tyre.templates import TemplateFailed
 
-LONGEST_NAME = 200  # of a case, as a line of a deck has at most 256 characters
+MAX_NAME_LENGTH = 200  # of a case, as a line of a deck has at most 256 characters
 FIRST = b"** Written by tyrecal: "
 HEADER_LINES = 3
 UNITS_IN_WORDS = {"m": "SI units: m, kg, s, Pa", "mm": "units: mm, t, s, MPa"}
@@ -30,7 +30,7 @@ DeckSlopes = dict[str, list[tuple[str, int, int, float]]]
 
 
 class Design(Protocol):
-    """What is evaluated: a tyre with all its numbers, which can write itself as decks.
+    """A design to evaluate: a tyre with all its numbers, which can write itself as decks.
 
     `TyreDesign` is one, of a case; whatever has these is another.
     """
@@ -48,7 +48,8 @@ class Design(Protocol):
 
     @property
     def request(self) -> dict[str, Any]:
-        """``highest_harmonic`` and ``modes_per_harmonic`` that it wants, what decks cannot say."""
+        """``highest_harmonic`` and ``modes_per_harmonic`` that it wants, and requests that decks
+        cannot express."""
 
     @property
     def needs(self) -> dict[str, str]:
@@ -104,7 +105,7 @@ class PressedTyre:
 
 
 class Decks:
-    """Texts of a design's decks, written when asked for: what a solver's adapter is given."""
+    """Texts of a design's decks, written on request: the input of a solver's adapter."""
 
     def __init__(
         self,
@@ -131,7 +132,7 @@ class Decks:
 
     @property
     def values(self) -> Mapping[str, float]:
-        """Of the design's variables, by name."""
+        """Values of the design's variables, by name."""
         return self.design.values
 
     @property
@@ -224,22 +225,22 @@ def header(case: LoadedCase) -> str:
     c = case.case
     units = case.decks.units if case.decks else "m"
     return (
-        f"{FIRST.decode()}{c.name[:LONGEST_NAME]}\n"
+        f"{FIRST.decode()}{c.name[:MAX_NAME_LENGTH]}\n"
         f"** tyre_sha256 {tyre_sha256(case)}, mesh {c.mesh.level}\n"
         f"** {UNITS_IN_WORDS[units]}; angles in degrees, of rebar layers from the meridian\n"
     )
 
 
 def refuse_outside(file: str, text: str) -> None:
-    """Raises TemplateFailed where a deck of somebody's own templates would have the solver read or
+    """Raises TemplateFailed where a deck of a user's own templates would have the solver read or
     write elsewhere than in its run folder, compile a program or load a library."""
-    for found in LEADS_OUTSIDE.finditer(text):
-        line = text.count("\n", 0, found.start()) + 1
+    for match in LEADS_OUTSIDE.finditer(text):
+        line = text.count("\n", 0, match.start()) + 1
         raise TemplateFailed(
-            f"{file}, line {line}: '{found[0].strip():.60}' leads out of the run's folder"
+            f"{file}, line {line}: '{match[0].strip():.60}' leads out of the run's folder"
         )
 
 
 def without_header(text: bytes) -> bytes:
-    """A file of a run, a deck without what it is called: what the solver is asked."""
+    """A file of a run, a deck without its name: the part that determines the solver's answer."""
     return text.split(b"\n", HEADER_LINES)[-1] if text.startswith(FIRST) else text

@@ -40,7 +40,7 @@ class DecksDesign:
 
     @property
     def header(self) -> str:
-        """What the decks are of."""
+        """Comment lines that identify the tyre of the decks."""
         return header(self.case)
 
     @property
@@ -113,13 +113,13 @@ def design_of(case: LoadedCase, values: Mapping[str, float] | None = None) -> De
 
 
 def output_lines(decks: OwnDecks, dialect: str) -> Added:
-    """What the decks must say besides, so that the modes' shapes and the mass can be read.
+    """Lines that are added to the decks, so that the modes' shapes and the mass can be read.
 
     Raises OwnDeckError where the step of the modes asks for other shapes.
     """
     of_nodes, others = OUTPUT.get(dialect, (("U",), None))
-    asked = [block for block in decks.modes_step if block.name == "NODE FILE"]
-    for block in asked:
+    node_files = [block for block in decks.modes_step if block.name == "NODE FILE"]
+    for block in node_files:
         fields = {named(field) for row in block.rows for field in row.fields}
         whole = set(block.parameters) <= {"NSET", "GLOBAL"} and block.get("GLOBAL") != "NO"
         if block.get("NSET") != decks.crown or not whole or not {*of_nodes} <= fields:
@@ -130,7 +130,7 @@ def output_lines(decks: OwnDecks, dialect: str) -> Added:
             )
     if others is None:
         return {}
-    shapes = [] if asked else [f"*NODE FILE, NSET={decks.crown}", ", ".join(of_nodes)]
+    shapes = [] if node_files else [f"*NODE FILE, NSET={decks.crown}", ", ".join(of_nodes)]
     added = others(decks)
     end = decks.modes_step[-1].place
     added[end] = shapes + added.get(end, [])
@@ -138,7 +138,8 @@ def output_lines(decks: OwnDecks, dialect: str) -> Added:
 
 
 def added_words(decks: OwnDecks, dialect: str) -> str:
-    """What is added, and where, in words; "" where nothing is. Raises OwnDeckError."""
+    """The added lines and their places, in words; "" where nothing is added. Raises
+    OwnDeckError."""
     return "; ".join(
         f"{file}, line {line}: added before it, to label modes: {' / '.join(more)}"
         for (file, line), more in output_lines(decks, dialect).items()
@@ -146,17 +147,17 @@ def added_words(decks: OwnDecks, dialect: str) -> str:
 
 
 def _abaqus(decks: OwnDecks) -> Added:
-    """Eigenvalues beside the shapes, and the file that holds them as text: once in an analysis,
-    "and the format cannot be changed upon restart" (manual, *FILE FORMAT)."""
+    """Eigenvalues in addition to the shapes, and the file that holds them as text: once in an
+    analysis, "and the format cannot be changed upon restart" (manual, *FILE FORMAT)."""
     blocks = [block for deck in decks.restarted for block in deck.blocks]
     formats = [block for block in blocks if block.name == "FILE FORMAT"]
     if formats and "ASCII" not in formats[0].parameters:
         raise formats[0].refused("must say ASCII: shapes are read from the results file as text")
     first = next(block for block in blocks if block.name == "STEP").place
-    told = any(block.name == "MODAL FILE" for block in decks.modes_step)
+    has_modal_file = any(block.name == "MODAL FILE" for block in decks.modes_step)
     return {
         first: [] if formats else ["*FILE FORMAT, ASCII"],
-        decks.modes_step[-1].place: [] if told else ["*MODAL FILE"],
+        decks.modes_step[-1].place: [] if has_modal_file else ["*MODAL FILE"],
     }
 
 

@@ -21,7 +21,7 @@ PLACE = re.compile(r"^inflate\.inp, line (\d+): ")
 
 
 def own_section(tyre: Tyre) -> dict[str, Any]:
-    """What stands in the deck: all as the mesh's text."""
+    """Names for the templates of a user's deck, all of whose text is the mesh's."""
     flat = tyre.flat
     point = tyre.case.rim.reference_point_m
     return {
@@ -121,26 +121,26 @@ def trial(flat: Flat) -> float:
     Raises OwnDeckError where it refuses something.
     """
     bundled = import_module("tyrecal_solvers.bundled.adapter")
-    found = bundled.examine(flat.text, flat.long_term)
-    if isinstance(found, float):
-        return found
-    line, words = found
+    outcome = bundled.examine(flat.text, flat.long_term)
+    if isinstance(outcome, float):
+        return outcome
+    line, words = outcome
     raise OwnDeckError(_origin(flat, line - 1) or flat.origins[0], words)
 
 
 def asked_by_abaqus(blocks: Sequence[Block], before: Sequence[Block] = ()) -> dict[str, list[str]]:
-    """What ABAQUS ``refuses`` of a user's deck, which goes on from the model of others, by its
-    manual, and what is ``unknown`` to our grammar of it: sentences with file and line."""
+    """Sentences, with file and line, on what ABAQUS ``refuses`` by its manual of a user's deck,
+    which goes on from the model of others, and on what is ``unknown`` to our grammar of it."""
     check = import_module("tyrecal_solvers.abaqus.check")
-    found: dict[str, list[str]] = {"refuses": [], "unknown": []}
+    sentences: dict[str, list[str]] = {"refuses": [], "unknown": []}
     for each in check.findings(blocks, before):
         sentence = str(each.block.refused(each.words, each.row))
-        found["refuses" if each.sure else "unknown"].append(sentence)
-    return found
+        sentences["refuses" if each.sure else "unknown"].append(sentence)
+    return sentences
 
 
 def lacking_in_calculix(blocks: Sequence[Block]) -> list[str]:
-    """What CalculiX has nothing for: sentences with file and line."""
+    """Sentences, with file and line, on what CalculiX lacks."""
     check = import_module("tyrecal_solvers.calculix.check")
     return [str(block.refused(why)) for block, why in check.lacking(blocks)]
 
@@ -152,8 +152,8 @@ def _origin(flat: Flat, line: int) -> Place | None:
 
 def explained(tyre: Tyre, words: str, header_lines: int) -> str:
     """A solver's refusal with the line of the user's deck in place of that of the flat one."""
-    found = PLACE.match(words)
-    if not found or not tyre.case.deck:
+    match = PLACE.match(words)
+    if not match or not tyre.case.deck:
         return words
-    place = _origin(tyre.flat, int(found[1]) - header_lines - BEFORE - 1)
-    return f"{place.file}, line {place.line}: {words[found.end() :]}" if place else words
+    place = _origin(tyre.flat, int(match[1]) - header_lines - BEFORE - 1)
+    return f"{place.file}, line {place.line}: {words[match.end() :]}" if place else words

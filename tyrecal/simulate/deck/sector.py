@@ -26,36 +26,31 @@ INNER_FACE = "P6"  # a brick's face over side 4 of the section's element
 
 @dataclass(frozen=True)
 class Strip:
-    """An element of a ply. element: in the section; along: its meridian (r, z); radius: of the
-    cord line's middle in m; thickness: its volume over the cord surface's area, in m, which is less
-    than the ply's where the line has a kink."""
+    """An element of a ply."""
 
-    element: int
-    along: tuple[float, float]
-    radius: float
+    element: int  # in the section
+    along: tuple[float, float]  # its meridian (r, z)
+    radius: float  # of the cord line's middle, m
+    # its volume over the cord surface's area, m: less than the ply's where the line has a kink
     thickness: float
 
 
 @dataclass(frozen=True, eq=False)
 class Sector:
-    """Bricks of one sector.
+    """Bricks of one sector."""
 
-    nodes: (number, x, y, z) in m; bricks: section element to nodes (8 or 20); rows: its row in
-    the mesh without plies, a ply's being that inside it; strips: per line, from -z to +z, `Strip`;
-    section, behind: nodes on the two faces; between: (node halfway between the faces, node in
-    front of it), the held ones left out; rim: held nodes but those behind; inner: section elements.
-    """
-
-    nodes: list[tuple[int, float, float, float]]
-    bricks: dict[int, tuple[int, ...]]
+    nodes: list[tuple[int, float, float, float]]  # number, x, y, z in m
+    bricks: dict[int, tuple[int, ...]]  # section element to nodes (8 or 20)
+    # section element to its row in the mesh without plies, a ply's being that inside it
     rows: dict[int, int]
     regions: dict[int, str]
-    strips: dict[str, list[Strip]]
-    section: list[int]
-    behind: list[int]
+    strips: dict[str, list[Strip]]  # per line, from -z to +z
+    section: list[int]  # nodes on the front face
+    behind: list[int]  # nodes on the other face
+    # (node halfway between the faces, node in front of it), the held ones left out
     between: list[tuple[int, int]]
-    rim: list[int]
-    inner: list[int]
+    rim: list[int]  # held nodes except those behind
+    inner: list[int]  # section elements
 
 
 @lru_cache(maxsize=4)

@@ -18,7 +18,7 @@ from ...tyre.resolve import Tyre, resolved
 from ...tyre.templates import TemplateFailed, environment, render
 from ...tyre.values import set_values
 from .abaqus import aside, context
-from .apart import Apart
+from .apart import TemplateProcess
 from .calculix import calculix_context
 from .decks import HEADER_LINES, header, refuse_outside
 from .own import explained, own_jobs
@@ -72,7 +72,7 @@ class TyreDesign:
 
     @property
     def header(self) -> str:
-        """What the decks are of."""
+        """Comment lines that identify the tyre of the decks."""
         return header(self.case)
 
     @property
@@ -82,7 +82,7 @@ class TyreDesign:
 
     @property
     def request(self) -> dict[str, Any]:
-        """The case's ``analysis``, and what no deck of keywords says."""
+        """The case's ``analysis``, and requests that no deck of keywords holds."""
         analysis = self.case.case.analysis
         return {
             "highest_harmonic": analysis.highest_harmonic,
@@ -92,7 +92,8 @@ class TyreDesign:
 
     @property
     def needs(self) -> dict[str, str]:
-        """What its effects ask of a solver, and the tyre's own parts."""
+        """Capabilities that its effects, and the tyre's own parts, need of a solver, each with the
+        reason."""
         lacks = {}
         for id, value in self.case.case.effects.items():
             if value and (need := catalogue()[id].needs):
@@ -160,7 +161,9 @@ class TyreDesign:
         """File name to text, without the header. Raises TemplateFailed."""
         own = self.case.case.templates
         shipped = "abaqus" if dialect == OWN_TEXT else dialect
-        env = Apart(dialect, self.case.folder / own) if own else environment(shipped, None)
+        env = (
+            TemplateProcess(dialect, self.case.folder / own) if own else environment(shipped, None)
+        )
         texts = DIALECTS[dialect](self.tyre, env, request)
         if own or dialect == OWN_TEXT:
             for file, text in texts.items():

@@ -1,4 +1,4 @@
-"""What is installed, what is missing, and what the machine has."""
+"""Installed and missing packages, and what the machine has."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ GB = 1e9
 
 
 def packages() -> list[dict[str, Any]]:
-    """What tyrecal needs: ``name``, ``needed``, ``version`` (None: missing), ``ok``."""
+    """Packages that tyrecal needs: ``name``, ``needed``, ``version`` (None: missing), ``ok``."""
     return [_found(each) for each in _required("")]
 
 
 def extras() -> list[dict[str, Any]]:
-    """What can be added: ``name``, ``missing`` packages, ``install``, the command for
-    them in a clone of tyrecal: no package index has it."""
+    """Extras that can be added: ``name``, ``missing`` packages, ``install``, the command for them
+    in a clone of tyrecal: no package index has it."""
     named = {extra for text in _all() for extra in re.findall(r"extra == ['\"](.+?)['\"]", text)}
     entries = []
     for extra in sorted(named):
@@ -56,10 +56,10 @@ def records(shared: Path | None) -> list[dict[str, Any]]:
     from ..evaluate.store import Store
 
     folders = [shared] if shared else sorted(Path().glob("*/record"))
-    found = [Store(folder, opened=float("inf")).summary() for folder in folders]
+    summaries = [Store(folder, opened=float("inf")).summary() for folder in folders]
     return [
         {"folder": each["folder"], "records": each["records"], "MB": round(each["bytes"] / 1e6, 1)}
-        for each in found
+        for each in summaries
     ]
 
 

@@ -35,7 +35,7 @@ def self_check(solver: str = "bundled") -> dict[str, Any]:
 
     started = time.monotonic()
     tolerance = TOLERANCE_PERCENT.get(solver, OTHERS_PERCENT)
-    found: dict[str, Any] = {
+    result: dict[str, Any] = {
         "solver": solver,
         "ok": False,
         "tolerance_percent": tolerance,
@@ -46,8 +46,8 @@ def self_check(solver: str = "bundled") -> dict[str, Any]:
     try:
         answer = Evaluator(TyreDesign(load_case(CASE)), solver).evaluate(Question({}))
         hertz = {str(m.label): m.frequency_Hz for m in labelled(answer)}
-        found["mass_kg"] = answer.mass_kg
-        found["modes"] = [
+        result["mass_kg"] = answer.mass_kg
+        result["modes"] = [
             {
                 "label": label,
                 "frequency_Hz": hertz.get(label),
@@ -56,14 +56,14 @@ def self_check(solver: str = "bundled") -> dict[str, Any]:
             }
             for label, recorded in RECORDED_HZ.items()
         ]
-        off = [mode["deviation_percent"] for mode in found["modes"]]
+        off = [mode["deviation_percent"] for mode in result["modes"]]
         off.append(_percent(answer.mass_kg, RECORDED_KG))
-        found["ok"] = all(each is not None and abs(each) <= tolerance for each in off)
+        result["ok"] = all(each is not None and abs(each) <= tolerance for each in off)
     except (DeckRefused, EvaluationFailed, SolverUnavailable, OSError) as error:
-        found["problem"] = str(error)
-    found["seconds"] = round(time.monotonic() - started, 2)
-    return found
+        result["problem"] = str(error)
+    result["seconds"] = round(time.monotonic() - started, 2)
+    return result
 
 
-def _percent(found: float | None, recorded: float) -> float | None:
-    return None if found is None else 100 * (found / recorded - 1)
+def _percent(value: float | None, recorded: float) -> float | None:
+    return None if value is None else 100 * (value / recorded - 1)

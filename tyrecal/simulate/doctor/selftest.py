@@ -1,4 +1,4 @@
-"""What somebody with an ABAQUS runs for us: pairs of decks of the known tyre, the frequencies that
+"""Test that a user with ABAQUS runs for us: pairs of decks of the known tyre, the frequencies that
 they should have, and a page that says what to send back."""
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from math import degrees
 from pathlib import Path
 from typing import Any
 
-from ...files import make_folder, whole
+from ...files import atomic_write, make_folder
 from ...tyre.case import LoadedCase
 from ...tyre.load import load_case
 from ..deck.decks import Decks
@@ -75,16 +75,16 @@ def write_selftest(folder: Path) -> list[Path]:
         for file, text in files.items():
             paths.append(_written(folder / name / file, text))
     answer = _answer(plain)
-    found = {each: _answer(_with_carcass(plain, how)) for each, how in READINGS.items()}
-    told = str(labelled(answer)[-1].label)
-    asked = 2 * plain.case.analysis.modes_per_harmonic * (plain.case.analysis.highest_harmonic + 1)
+    answers = {each: _answer(_with_carcass(plain, how)) for each, how in READINGS.items()}
+    last_label = str(labelled(answer)[-1].label)
+    count = 2 * plain.case.analysis.modes_per_harmonic * (plain.case.analysis.highest_harmonic + 1)
     page = PAGE.format(
-        modes=asked,
+        modes=count,
         plain=_table({"Hz": answer}),
-        angular=_table(found),
+        angular=_table(answers),
         deg=FANNED_DEG,
-        told=told,
-        ratio=_hertz(found["manual"])[told] / _hertz(answer)[told],
+        told=last_label,
+        ratio=_hertz(answers["manual"])[last_label] / _hertz(answer)[last_label],
         mass_kg=answer.mass_kg,
     )
     return [_written(folder / "README.txt", page), *paths]
@@ -99,16 +99,16 @@ def _hertz(answer: Evaluation) -> dict[str, float]:
     return {str(mode.label): mode.frequency_Hz for mode in labelled(answer)}
 
 
-def _table(found: dict[str, Evaluation]) -> str:
+def _table(answers: dict[str, Evaluation]) -> str:
     """Frequencies and masses, a column each."""
-    first = next(iter(found.values()))
+    first = next(iter(answers.values()))
     twice = {str(mode.label): "  twice" * (mode.multiplicity == 2) for mode in labelled(first)}
-    rows = [("", "", *found)]
+    rows = [("", "", *answers)]
     rows += [
-        (in_words(label), words, *(f"{_hertz(each)[label]:.3f}" for each in found.values()))
+        (in_words(label), words, *(f"{_hertz(each)[label]:.3f}" for each in answers.values()))
         for label, words in twice.items()
     ]
-    rows.append(("total mass, kg", "", *(f"{each.mass_kg:.4f}" for each in found.values())))
+    rows.append(("total mass, kg", "", *(f"{each.mass_kg:.4f}" for each in answers.values())))
     lines = (
         f"       {label:16}" + "".join(f"{text:>13}" for text in texts) + words
         for label, words, *texts in rows
@@ -125,6 +125,6 @@ def _with_carcass(case: LoadedCase, update: dict[str, Any]) -> LoadedCase:
 
 def _written(path: Path, text: str) -> Path:
     make_folder(path.parent)
-    with whole(path) as partial:
+    with atomic_write(path) as partial:
         partial.write_text(text, encoding="utf-8", newline="")
     return path

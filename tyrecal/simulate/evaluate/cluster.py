@@ -98,28 +98,25 @@ def connected(address: str) -> Iterator[Cluster]:
 
 
 class QueueSettings(BaseModel):
-    """Jobs of a queueing system. ``local`` starts them on this machine, to try the settings.
-
-    workers: processes in all, each does one case at a time; cores: of one job, a worker each;
-    memory: of one job, e.g. "8GB"; directives: further lines of the job's head, without their
-    ``#SBATCH`` or ``#PBS``; prologue: shell lines before the workers start (modules, environments);
-    interface: network device, e.g. ib0; python: on the nodes; log_directory: of the jobs' output.
-    """
+    """Jobs of a queueing system. ``local`` starts them on this machine, to try the settings."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
     queueing_system: Literal["slurm", "pbs", "local"]
+    # processes in all, each does one case at a time
     workers: Annotated[int, Field(ge=1, le=100_000)]
-    cores: Annotated[int, Field(ge=1, le=1024)] = 1
-    memory: Annotated[str, Field(pattern=r"^[0-9.]+ *[kMGT]i?B$")] = "2GB"
+    cores: Annotated[int, Field(ge=1, le=1024)] = 1  # of one job, a worker each
+    memory: Annotated[str, Field(pattern=r"^[0-9.]+ *[kMGT]i?B$")] = "2GB"  # of one job, e.g. "8GB"
     walltime: Annotated[str, Field(pattern=r"^([0-9]+-)?[0-9]+:[0-9]{2}:[0-9]{2}$")] = "01:00:00"
     queue: str | None = None
     account: str | None = None
+    # further lines of the job's head, without their ``#SBATCH`` or ``#PBS``
     directives: list[str] = Field(default_factory=list)
+    # shell lines before the workers start (modules, environments)
     prologue: list[str] = Field(default_factory=list)
-    interface: str | None = None
-    python: str = sys.executable
-    log_directory: str | None = None
+    interface: str | None = None  # network device, e.g. ib0
+    python: str = sys.executable  # on the nodes
+    log_directory: str | None = None  # of the jobs' output
 
 
 def read_settings(path: Path) -> QueueSettings:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from ...files import NotWritten, printable
-from ...interrupt import interrupts_put_off, raise_interrupt
+from ...interrupt import defer_interrupts, raise_interrupt
 from ..deck.decks import Decks, Design, DesignKey, PressedTyre
 from . import folders
 from .executor import executor, in_order
@@ -65,7 +65,7 @@ class Counts:
 
 
 def _unwatched(done: int, total: int) -> None:
-    """Nobody wants to know."""
+    """Ignore progress."""
 
 
 @dataclass
@@ -117,17 +117,17 @@ class Evaluator:
         start = self._start_of(design)
         decks = Decks(design, question.gradients, question.modes_per_harmonic, start=start)
         try:
-            found = self._ask(decks, lambda answer, kept: evaluation(answer))
+            result = self._ask(decks, lambda answer, kept: evaluation(answer))
         except EvaluationFailed as failure:
             raise _advised(failure, design) from None
         if design.is_nominal and (nominal := design.nominal):
-            self.shapes.setdefault(_key(nominal), _shape(found))
-        return found
+            self.shapes.setdefault(_key(nominal), _shape(result))
+        return result
 
     def _start_of(self, design: Design) -> Array | None:
-        """Where a design's inflation starts: at the inflated shape of its nominal one, which is
-        asked for first, so that the answer hangs on no other question. None: at rest, as for that
-        one itself, and for all where it does not inflate."""
+        """Inflated shape from which a design's inflation starts: that of its nominal design, which
+        is evaluated first, so that the answer depends on no other question. None: at rest, as for
+        the nominal design itself, and for all where it does not inflate."""
         nominal = None if design.is_nominal else design.nominal
         return self._inflated(nominal) if nominal else None
 
@@ -232,7 +232,7 @@ class Evaluator:
         raise_interrupt()
         folder: Path | None = None
         try:
-            with interrupts_put_off():  # it must not come between the folder and its name
+            with defer_interrupts():  # it must not come between the folder and its name
                 folder = folders.fresh(self.folder)
             return self._ask_in(folder, decks, typed)
         except KeyboardInterrupt:
@@ -311,46 +311,46 @@ class Evaluator:
         """`press` for each question, in their order; ``jobs`` at a time."""
         return _not_refused(self._each("press", list(questions), jobs))
 
-    def _each(self, ask: str, asked: Sequence[Any], jobs: int) -> Iterator[Any]:
-        self.on_progress(0, len(asked))
-        if len(asked) <= 1 or (jobs <= 1 and not self.scheduler):
-            for done, arguments in enumerate(asked, start=1):
+    def _each(self, ask: str, questions: Sequence[Any], jobs: int) -> Iterator[Any]:
+        self.on_progress(0, len(questions))
+        if len(questions) <= 1 or (jobs <= 1 and not self.scheduler):
+            for done, arguments in enumerate(questions, start=1):
                 answer = _answer(self, ask, arguments)
-                self.on_progress(done, len(asked))
+                self.on_progress(done, len(questions))
                 yield answer
             return
         if ask == "evaluate" and (nominal := self.design.nominal):
             self._inflated(nominal)  # before the workers each ask for it
-        first = self._press_bases(asked) if ask == "press" else {}
+        first = self._press_bases(questions) if ask == "press" else {}
         done = len(first)
         if first:
-            self.on_progress(done, len(asked))
-        others = [arguments for place, arguments in enumerate(asked) if place not in first]
+            self.on_progress(done, len(questions))
+        others = [arguments for place, arguments in enumerate(questions) if place not in first]
         with executor(jobs, self.scheduler) as workers:
             work = partial(_answer_and_count, self.worker(), ask)
             answers = in_order(workers.each(work, others))
-            for place in range(len(asked)):
+            for place in range(len(questions)):
                 if place in first:
                     yield first[place]
                     continue
                 answer, done = next(answers), done + 1
-                self.on_progress(done, len(asked))
+                self.on_progress(done, len(questions))
                 if isinstance(answer, EvaluationFailed):  # its process died
                     yield answer
                     continue
-                found, counts = answer
+                result, counts = answer
                 self.counts.add(counts)
-                if isinstance(found, Pressed) and asked[place].base:
-                    self._remember(self._with(asked[place].values), found)
-                yield found
+                if isinstance(result, Pressed) and questions[place].base:
+                    self._remember(self._with(questions[place].values), result)
+                yield result
             next(answers, None)  # to their end: workers of a loop that is cut off are ended
 
-    def _press_bases(self, asked: Sequence[PressQuestion]) -> dict[int, Any]:
+    def _press_bases(self, questions: Sequence[PressQuestion]) -> dict[int, Any]:
         """Press the designs from which others begin, in this process, before the workers each do.
         Returns the answers of those that are asked for themselves, by their places."""
-        own = [place for place, each in enumerate(asked) if each.values == each.base]
-        answers = {place: _answer(self, "press", asked[place]) for place in own}
-        for each in asked:
+        own = [place for place, each in enumerate(questions) if each.values == each.base]
+        answers = {place: _answer(self, "press", questions[place]) for place in own}
+        for each in questions:
             if each.base:
                 self._pressed(each.base, tuple(each.loads_N), each.gradients)
         return answers
@@ -434,7 +434,7 @@ class Evaluator:
 
 
 def _key(design: Design) -> DesignKey:
-    """What tells nominal designs apart."""
+    """Key that distinguishes nominal designs."""
     return design.header, design.pressure_kPa, tuple(sorted(design.values.items()))
 
 
@@ -447,15 +447,15 @@ def _advised(failure: EvaluationFailed, design: Design) -> EvaluationFailed:
     return EvaluationFailed(failure.cause, words, failure.folder)
 
 
-def _shape(found: Evaluation) -> Array:
+def _shape(result: Evaluation) -> Array:
     """Node numbers and displacements (n, 4) of an inflated tyre; empty where they are not known."""
-    if len(found.nodes) != len(found.displacement):
+    if len(result.nodes) != len(result.displacement):
         return np.empty((0, 4))
-    return np.column_stack([found.nodes, found.displacement])
+    return np.column_stack([result.nodes, result.displacement])
 
 
 def _answer(evaluator: Evaluator, ask: str, arguments: tuple[Any, ...]) -> Any:
-    """What the evaluator's method ``ask`` returns, or the failure or refusal that it raises."""
+    """Result of the evaluator's method ``ask``, or the failure or refusal that it raises."""
     try:
         return getattr(evaluator, ask)(*arguments)
     except (EvaluationFailed, DeckRefused) as failure:

@@ -99,8 +99,8 @@ if hasattr(os, "register_at_fork"):  # not on Windows
 
 
 def end_workers() -> None:
-    """End the processes of loops that were cut off: an error that is told later holds such a loop,
-    and with it its workers, until it is collected."""
+    """End the processes of loops that were cut off: an error that is reported later holds such a
+    loop, and with it its workers, until it is collected."""
     for pool in [*_at_work, *_idle.values()]:
         pool.end()
     _idle.clear()

@@ -25,7 +25,7 @@ class EvaluationFailed(TyrecalError):
 
     @property
     def denied(self) -> bool:
-        """Whether there was no licence, which says nothing about the design."""
+        """Whether there was no licence, which shows nothing about the design."""
         return self.cause == "licence"
 
     def __reduce__(self) -> tuple[type[EvaluationFailed], tuple[str, str, Path | None]]:
@@ -39,4 +39,4 @@ class SolverUnavailable(TyrecalError):
 
 
 class DeckRefused(InputError):
-    """The solver refuses the deck: the case, or the user's template, asks for what it lacks."""
+    """The solver refuses the deck: the case, or the user's template, needs what it lacks."""

@@ -7,8 +7,8 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from ...files import own_folder, refuse_link
-from ...interrupt import interrupts_put_off
+from ...files import private_dir, refuse_link
+from ...interrupt import defer_interrupts
 
 OUTCOME = "outcome.txt"  # in every kept folder; one without it was cut off in the middle
 
@@ -17,7 +17,7 @@ def fresh(parent: Path | None) -> Path:
     """An empty folder under ``parent``, or among the system's temporary ones. Raises OSError."""
     if parent is None:
         return Path(tempfile.mkdtemp(prefix="tyrecal-"))
-    return Path(tempfile.mkdtemp(prefix="run-", dir=own_folder(parent)))
+    return Path(tempfile.mkdtemp(prefix="run-", dir=private_dir(parent)))
 
 
 def keep(folder: Path, outcome: str) -> Path:
@@ -29,7 +29,7 @@ def keep(folder: Path, outcome: str) -> Path:
 
 def drop(folder: Path) -> None:
     """Remove the folder."""
-    with interrupts_put_off():  # it would close a file twice, and say that instead
+    with defer_interrupts():  # it would close a file twice, and say that instead
         shutil.rmtree(folder, ignore_errors=True)
 
 

@@ -19,7 +19,7 @@ from multiprocessing import get_all_start_methods, get_context, parent_process, 
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from ...interrupt import exit_code, interrupt_heard, interrupts_put_off, interrupts_remembered
+from ...interrupt import defer_interrupts, exit_code, pending_interrupt, remember_interrupts
 
 WARM = "tyrecal.batch.warm"
 ANSWERED_S = 0.1  # within which an interruption is
@@ -36,7 +36,7 @@ class Pool(ProcessPoolExecutor):
     ) -> Future[Any]:
         """As in the standard library; no worker is left half started, and so unknown, by an
         interruption."""
-        with interrupts_put_off(), _deaf_children():
+        with defer_interrupts(), _deaf_children():
             return super().submit(_work, function, *task)
 
     def map(  # type: ignore[override]
@@ -49,7 +49,7 @@ class Pool(ProcessPoolExecutor):
 
     def end(self) -> None:
         """End the workers now, whatever they do; a second Ctrl-C has to wait until they have."""
-        with interrupts_put_off():
+        with defer_interrupts():
             workers = list((self._processes or {}).values())
             answers: Any = self._result_queue
             for worker in workers:
@@ -79,7 +79,7 @@ def first_done(futures: Collection[Future[Any]]) -> set[Future[Any]]:
     """Those that are done, once one is. An interruption does not meet the locks that are shared
     with the thread that reads the answers: torn there, it would end that thread."""
     while True:
-        with interrupts_put_off():
+        with defer_interrupts():
             done = wait(futures, ANSWERED_S, FIRST_COMPLETED).done
         if done:
             return done
@@ -108,8 +108,8 @@ def warm_up() -> None:
 
 
 def process_pool(jobs: int) -> Pool:
-    """``jobs`` worker processes, which end when the process that asked for them is killed."""
-    with interrupts_put_off():  # half made, it would leave semaphores behind
+    """``jobs`` worker processes, which end when their parent process is killed."""
+    with defer_interrupts():  # half made, it would leave semaphores behind
         warm_up()
         with _deaf_children():
             return Pool(jobs, get_context(_method()), initializer=_begin)
@@ -152,12 +152,12 @@ def _tell_to_end(worker: BaseProcess) -> None:
 
 def _work(function: Callable[..., Any], *task: Any) -> Any:
     """A task in a worker, which, told to end, ends when the task has cleared what it had begun."""
-    with interrupts_remembered():
+    with remember_interrupts():
         try:
             return function(*task)
         finally:
-            if interrupt_heard():
-                os._exit(exit_code(interrupt_heard()))
+            if pending_interrupt():
+                os._exit(exit_code(pending_interrupt()))
 
 
 def _begin() -> None:

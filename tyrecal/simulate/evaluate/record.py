@@ -17,8 +17,8 @@ import numpy as np
 from ...errors import InputError
 
 ARRAY = "__array__"
-LONGEST_TEXT = 2_000_000  # bytes of JSON: a hundred times what an answer's longest one has
-MOST_ARRAYS = 5000
+MAX_JSON_BYTES = 2_000_000  # bytes of JSON: a hundred times what an answer's longest one has
+MAX_ARRAYS = 5000
 DIGEST = 65  # bytes of the first line: 64 hexadecimal digits and its end
 
 
@@ -29,15 +29,15 @@ class Damaged(InputError):
 def pack(key: str, about: dict[str, Any], content: Any) -> bytes:
     """``content``, the answer to the question ``key``: dicts with text keys, lists, text, finite
     numbers, None and arrays, all kept to the last bit (tuples become lists, arrays of no dimension
-    numbers). ``about``: plain JSON, for whoever lists records.
+    numbers). ``about``: plain JSON, for lists of records.
 
     Raises TypeError for anything else, ValueError for a number that is not finite or more text or
     arrays than `unpack` reads.
     """
     arrays: list[np.ndarray] = []  # one that stands in several places is kept once
-    told = {"key": key, "about": about, "content": _plain(content, arrays)}
-    line = json.dumps(told, allow_nan=False) + "\n"
-    if len(line) > LONGEST_TEXT or len(arrays) > MOST_ARRAYS:
+    record = {"key": key, "about": about, "content": _plain(content, arrays)}
+    line = json.dumps(record, allow_nan=False) + "\n"
+    if len(line) > MAX_JSON_BYTES or len(arrays) > MAX_ARRAYS:
         raise ValueError(f"an answer of {len(line)} bytes and {len(arrays)} arrays is too large")
     stored = io.BytesIO()
     if arrays:
@@ -53,15 +53,15 @@ def unpack(data: bytes, key: str) -> tuple[dict[str, Any], Any]:
         raise Damaged("its checksum does not match")
     try:
         line, _, stored = body.partition(b"\n")
-        if len(line) > LONGEST_TEXT:
-            raise Damaged(f"its text is longer than {LONGEST_TEXT / 1e6:g} MB")
-        told = json.loads(line, parse_constant=_not_finite)
-        about, content = told["about"], _filled(told["content"], _arrays(stored))
+        if len(line) > MAX_JSON_BYTES:
+            raise Damaged(f"its text is longer than {MAX_JSON_BYTES / 1e6:g} MB")
+        record = json.loads(line, parse_constant=_not_finite)
+        about, content = record["about"], _filled(record["content"], _arrays(stored))
     except Damaged:
         raise
     except Exception as error:  # whatever is in it, it is none that we wrote
         raise Damaged(f"it is not what tyrecal writes ({type(error).__name__})") from None
-    if told.get("key") != key:
+    if record.get("key") != key:
         raise Damaged("it does not answer the question that it is named by")
     if not isinstance(about, dict):
         raise Damaged("it does not say which solver answered")
@@ -74,13 +74,13 @@ def _not_finite(word: str) -> None:
 
 def _arrays(stored: bytes) -> dict[str, np.ndarray]:
     """The arrays by name, as many bytes as stand there: nothing is unpacked. Raises Damaged."""
-    found: dict[str, np.ndarray] = {}
+    arrays: dict[str, np.ndarray] = {}
     if not stored:
-        return found
+        return arrays
     with ZipFile(io.BytesIO(stored)) as archive:
         members = archive.infolist()
-        if len(members) > MOST_ARRAYS:
-            raise Damaged(f"it has more than {MOST_ARRAYS} arrays")
+        if len(members) > MAX_ARRAYS:
+            raise Damaged(f"it has more than {MAX_ARRAYS} arrays")
         packed = any(each.compress_type != ZIP_STORED for each in members)
         if packed or sum(each.file_size for each in members) > len(stored):
             raise Damaged("its arrays are larger than the file")
@@ -93,8 +93,8 @@ def _arrays(stored: bytes) -> dict[str, np.ndarray]:
                     raise Damaged("an array has another size than it says")
             with archive.open(each) as file:
                 array = np.lib.format.read_array(file, allow_pickle=False)
-            found[each.filename.removesuffix(".npy")] = array
-    return found
+            arrays[each.filename.removesuffix(".npy")] = array
+    return arrays
 
 
 def _plain(value: Any, arrays: list[np.ndarray]) -> Any:

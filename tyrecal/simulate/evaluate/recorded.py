@@ -1,4 +1,4 @@
-"""What an answer may be: of a solver's run or of a record. Checked before it is believed.
+"""Form that an answer must have, of a solver's run or of a record; checked before it is believed.
 
 `check` judges an answer or a recorded failure by itself, `contradiction` an answer by what was
 asked. `Evaluator` makes a typed failure of a run's wrong answer, and sets a wrong record aside.
@@ -20,8 +20,8 @@ from ..deck.decks import Decks
 from .record import Damaged
 
 REAL = "fiu"  # NumPy's letters for kinds of number
-FEWEST_BYTES = 4  # of a number with decimals: half precision has three digits
-LEAST_HZ, MOST_HZ = 1e-3, 1e5  # of a tyre's vibrations, and far beyond
+MIN_NUMBER_BYTES = 4  # of a number with decimals: half precision has three digits
+MIN_ANSWER_HZ, MAX_ANSWER_HZ = 1e-3, 1e5  # of a tyre's vibrations, and far beyond
 NODE_TOLERANCE = 1e-4  # of the largest coordinate: solvers write six digits
 NODE_BLOCK = re.compile(
     r"^\*NODE *(?:,[^\n]*)?\n((?:[^*\n][^\n]*\n)+)", re.MULTILINE | re.IGNORECASE
@@ -41,7 +41,7 @@ def _shaped(
         array = np.asarray(value)
         if array.dtype.kind not in kinds or array.ndim != len(shape):
             raise ValueError("is not such a number or array")
-        if array.dtype.kind in "fc" and array.dtype.itemsize < FEWEST_BYTES:
+        if array.dtype.kind in "fc" and array.dtype.itemsize < MIN_NUMBER_BYTES:
             raise ValueError("has half precision only")
         if not all(n in (None, m) for n, m in zip(shape, array.shape, strict=True)):
             raise ValueError(f"has the shape {array.shape}")
@@ -58,9 +58,9 @@ def _shaped(
 
 Finite = Annotated[Any, _shaped(REAL)]
 PositiveFinite = Annotated[Any, _shaped(REAL, least=0.0)]
-Hertz = Annotated[Any, _shaped(REAL, least=LEAST_HZ, most=MOST_HZ)]
-HertzPair = Annotated[Any, _shaped(REAL, 2, least=LEAST_HZ, most=MOST_HZ)]
-HertzArray = Annotated[Any, _shaped(REAL, None, least=LEAST_HZ, most=MOST_HZ)]
+Hertz = Annotated[Any, _shaped(REAL, least=MIN_ANSWER_HZ, most=MAX_ANSWER_HZ)]
+HertzPair = Annotated[Any, _shaped(REAL, 2, least=MIN_ANSWER_HZ, most=MAX_ANSWER_HZ)]
+HertzArray = Annotated[Any, _shaped(REAL, None, least=MIN_ANSWER_HZ, most=MAX_ANSWER_HZ)]
 Points = Annotated[Any, _shaped(REAL, None, 3)]
 Triple = Annotated[Any, _shaped(REAL, None)]
 FiniteArray = Annotated[Any, _shaped("iu", None)]
@@ -192,17 +192,17 @@ class _Pressed(_Tyre):
                 and set(map(int, each.node)) <= set(map(int, self.nodes))
             ):
                 raise ValueError("a patch is not on this tyre")
-            told = (each.mode_frequency_Hz, each.mode_node, each.mode_shape)
-            if any(part is not None for part in told):
-                if any(part is None for part in told):
+            parts = (each.mode_frequency_Hz, each.mode_node, each.mode_shape)
+            if any(part is not None for part in parts):
+                if any(part is None for part in parts):
                     raise ValueError("of modes under load a part is missing")
-                if _shape(told[2])[:3] != (*_shape(told[0]), rings, *_shape(told[1])):
+                if _shape(parts[2])[:3] != (*_shape(parts[0]), rings, *_shape(parts[1])):
                     raise ValueError("modes under load do not go together")
             free = (each.mode_traction_N, each.sliding_frequency_Hz, each.sliding_shape)
             if any(part is not None for part in free) and not (
-                all(part is not None for part in (*told, *free))
-                and _shape(free[0]) == _shape(told[0])
-                and _shape(free[2])[:3] == (*_shape(free[1]), *_shape(told[2])[1:3])
+                all(part is not None for part in (*parts, *free))
+                and _shape(free[0]) == _shape(parts[0])
+                and _shape(free[2])[:3] == (*_shape(free[1]), *_shape(parts[2])[1:3])
             ):
                 raise ValueError("modes of a sliding patch do not go together")
         return self

@@ -1,4 +1,4 @@
-"""What an evaluation returns, whichever solver ran: frequencies with shapes, and their slopes."""
+"""Results of an evaluation, whichever solver ran: frequencies with shapes, and their slopes."""
 
 from __future__ import annotations
 
@@ -12,16 +12,13 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class HarmonicShape:
-    """u(R, Theta, Z) = Re[amplitude(R, Z) exp(i n Theta)], in cylindrical components.
+    """u(R, Theta, Z) = Re[amplitude(R, Z) exp(i n Theta)], in cylindrical components. For n >= 1
+    the shape stands for a pair."""
 
-    n: circumferential harmonic; nodes (k,): deck numbers; points (k, 2): R, Z in m, uninflated;
-    amplitude (k, 3) complex: r, theta, z. For n >= 1 the shape stands for a pair.
-    """
-
-    n: int
-    nodes: Array
-    points: Array
-    amplitude: Array
+    n: int  # circumferential harmonic
+    nodes: Array  # (k,) deck numbers
+    points: Array  # (k, 2) R, Z in m, uninflated
+    amplitude: Array  # (k, 3) complex: r, theta, z
 
 
 @dataclass(frozen=True)
@@ -52,19 +49,16 @@ class RawMode:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Modes of one deck at one pressure.
-
-    mass_kg: of the tyre without rim; gradients: variable name to d f / d variable (mode,), in
-    Hz per unit of the variable; mass_gradients: likewise d mass, kg per unit; displacement (k, 3):
-    the inflation's, at ``nodes`` (k,).
-    """
+    """Modes of one deck at one pressure."""
 
     pressure_kPa: float
-    mass_kg: float
+    mass_kg: float  # of the tyre without rim
     modes: tuple[RawMode, ...]
+    # variable name to d f / d variable (mode,), Hz per unit of the variable
     gradients: dict[str, Array] = field(default_factory=dict)
-    nodes: Array = field(default_factory=lambda: np.empty(0, int))
-    displacement: Array = field(default_factory=lambda: np.empty((0, 3)))
+    nodes: Array = field(default_factory=lambda: np.empty(0, int))  # (k,) deck numbers
+    displacement: Array = field(default_factory=lambda: np.empty((0, 3)))  # (k, 3) by the inflation
+    # variable name to d mass, kg per unit
     mass_gradients: dict[str, float] = field(default_factory=dict)
 
 

@@ -18,7 +18,7 @@ GROUP = "tyrecal.solvers"
 
 
 class Solver(Protocol):
-    """What a solver brings: one class, registered under the entry point group above.
+    """Interface of a solver: one class, registered under the entry point group above.
 
     version: of the program that runs, "unknown" where it is not found; part of every record's key.
     dialect: the template folder of its decks; capabilities: of ``modes``, ``gradients``,
@@ -66,7 +66,7 @@ class Solver(Protocol):
 
 def find_solver(name: str, command: Sequence[str] = ()) -> Solver:
     """The installed solver of that name, with the program that the user has set, or ``command``;
-    whether it is there, `refuse_missing_program` says. Raises InputError."""
+    `refuse_missing_program` checks that it is there. Raises InputError."""
     entries = {entry.name: entry for entry in entry_points(group=GROUP)}
     if name not in entries:
         raise InputError(f"solver '{name}' is not installed{suggestion(name, sorted(entries))}")

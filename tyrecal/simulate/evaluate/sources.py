@@ -1,4 +1,4 @@
-"""What computes: a hash of the tool's own sources, so that no two editions of it are mixed."""
+"""Hash of the tool's own sources, so that results of two editions are never mixed."""
 
 from __future__ import annotations
 

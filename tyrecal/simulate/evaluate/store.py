@@ -1,4 +1,4 @@
-"""The record of evaluations: a folder of files named by what was asked of which solver.
+"""The evaluation store: a folder of files named by the question and the solver.
 
 A key is the hash of every file that was written for a run (names and contents, but for the comment
 that a deck begins with), of the solver's name and version, of the program that it starts, and of
@@ -21,7 +21,15 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from ...files import NotAFile, make_folder, open_file, own_folder, read_bytes, refuse_link, whole
+from ...files import (
+    NotAFile,
+    atomic_write,
+    make_folder,
+    open_file,
+    private_dir,
+    read_bytes,
+    refuse_link,
+)
 from ..deck.decks import without_header
 from ..program import program_identity
 from .record import DIGEST, Damaged, pack, unpack
@@ -36,7 +44,7 @@ log = logging.getLogger("tyrecal")
 
 
 def key_of(folder: Path, solver: Solver) -> str:
-    """What ``solver`` is asked by the files in ``folder``, as 64 hexadecimal digits."""
+    """Key of the question that the files in ``folder`` put to ``solver``, 64 hexadecimal digits."""
     digest = sha256()
     parts = [FORMAT, *solver_identity(solver)]
     pieces = [part.encode() for part in parts]
@@ -97,7 +105,7 @@ class Store:
         return self.folder / key[:2] / f"{key}.record"
 
     def read(self, key: str) -> Any:
-        """What was recorded, or None."""
+        """Read the content that was recorded, or None."""
         path = self.path(key)
         try:
             refuse_link(path.parent)
@@ -119,8 +127,8 @@ class Store:
             if len(data) > MAX_RECORD_BYTES:
                 raise ValueError(f"an answer of {len(data) / 1e6:.0f} MB is too large")
             make_folder(self.folder)
-            own_folder(path.parent)
-            with whole(path, many_writers=True) as partial:
+            private_dir(path.parent)
+            with atomic_write(path, many_writers=True) as partial:
                 partial.write_bytes(data)
         except (OSError, TypeError, ValueError) as error:
             if not self._warned:
@@ -186,7 +194,7 @@ class Store:
                     yield path, path.lstat()
 
     def set_aside(self, path: Path, why: str) -> None:
-        """Have a record be absent, and say why."""
+        """Set a record aside, so that it counts as absent, and report why."""
         log.warning("record '%s' is damaged and not used: %s", path, why)
         with contextlib.suppress(OSError):
             path.replace(path.with_suffix(".damaged"))
@@ -206,7 +214,7 @@ def _about(path: Path) -> dict[str, Any]:
 
 
 def _read(path: Path) -> tuple[dict[str, Any], Any]:
-    """What stands in a record, whole, of the question it is named by, and what such an answer is.
+    """Read a record whole: the question that it is named by, and an answer that passes the checks.
 
     Raises Damaged; OSError where there is none, or it may not be read.
     """

@@ -1,4 +1,4 @@
-"""Labelled modes of designs: more are asked for where a wanted label is not among them."""
+"""Labelled modes of designs; more modes are computed where a wanted label is not among them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Wanted = Callable[[int, Sequence[Mode]], Sequence[Label]]  # of a question's pla
 
 
 @dataclass(frozen=True)
-class Found:
+class LabelledModes:
     """An evaluated design with its modes by label."""
 
     evaluation: Evaluation
@@ -29,7 +29,7 @@ class Found:
         return margin(self.wanted)
 
 
-ModesAnswer = Found | EvaluationFailed | DeckRefused
+ModesAnswer = LabelledModes | EvaluationFailed | DeckRefused
 
 
 def find_modes(
@@ -45,8 +45,8 @@ def find_modes(
     lost = dict.fromkeys(range(len(questions)), EvaluationFailed("lost_label", ""))
     for count in (None, *MORE_MODES):
         places, lost = list(lost), {}
-        asked = [replace(questions[place], modes_per_harmonic=count) for place in places]
-        answers = evaluator.answer_all(asked, min(jobs, len(asked)))
+        repeats = [replace(questions[place], modes_per_harmonic=count) for place in places]
+        answers = evaluator.answer_all(repeats, min(jobs, len(repeats)))
         for place, answer in zip(places, answers, strict=True):
             if not isinstance(answer, Evaluation):
                 yield place, answer
@@ -54,7 +54,7 @@ def find_modes(
             modes = paired_labels(answer.modes)
             try:
                 labels = wanted(place, modes) if callable(wanted) else wanted
-                yield place, Found(answer, modes, match(modes, labels))
+                yield place, LabelledModes(answer, modes, match(modes, labels))
             except EvaluationFailed as error:
                 lost[place] = error
         if not lost:

@@ -40,7 +40,7 @@ Array = np.ndarray
 BELT = 0.94  # of the largest radius: a belt is nearly flat, a sidewall leaves this height at once
 DEGREE = 3
 CONDITION = 30.0  # of the polynomials on the points at hand; fewer rings carry a lower degree
-HIGHEST_HARMONIC = 12  # that is looked for in sampled shapes
+MAX_SAMPLED_HARMONIC = 12  # that is looked for in sampled shapes
 ALIASED = 1e-4  # of what a harmonic holds: solvers print angles and shapes with six digits
 SUBSTANTIAL = 0.2  # share of the belt's motion below which a mode cannot claim an order
 TAKES_PART = 0.1  # the belt's mean square motion over that of all points, likewise
@@ -72,12 +72,12 @@ class Label:
 
     @property
     def said(self) -> str:
-        """As people say it; files and options have the label itself: ``axial`` is lateral."""
+        """Name for people; files and options have the label itself: ``axial`` is lateral."""
         return in_words(str(self))
 
     @property
     def motion(self) -> str:
-        """What the tyre does: that of [2,1] is 'first out-of-plane bending'."""
+        """Motion of the tyre, in words: that of [2,1] is 'first out-of-plane bending'."""
         if (self.c, self.m, self.kind) in KNOWN:
             return KNOWN[self.c, self.m, self.kind]
         if self.m > 1:
@@ -130,15 +130,11 @@ COLUMNS = (_columns(False), _columns(True))
 
 @dataclass(frozen=True)
 class BeltMotion:
-    """How a shape moves the belt.
+    """How a shape moves the belt."""
 
-    c: circumferential harmonic; shares (5,): of the belt's energy on orders 0 to 3 and, on c = 0,
-    along the axle; participation: mean square motion of the belt over that of all points.
-    """
-
-    c: int
-    shares: Array
-    participation: float
+    c: int  # circumferential harmonic
+    shares: Array  # (5,) of the belt's energy on orders 0 to 3 and, on c = 0, along the axle
+    participation: float  # mean square motion of the belt over that of all points
 
 
 def belt_motion(shape: HarmonicShape | RingShape) -> BeltMotion:
@@ -293,8 +289,8 @@ def _section_fit(points: bytes) -> tuple[Array, Array]:
 def _ring_energy(shape: RingShape) -> tuple[int, Array]:
     """The harmonic that holds most of the motion, and |a|^2 (3, DEGREE + 1) on it."""
     points = np.ascontiguousarray(shape.points, float).tobytes()
-    held = np.zeros(HIGHEST_HARMONIC + 1)
-    energy = np.zeros((HIGHEST_HARMONIC + 1, 3, DEGREE + 1))
+    held = np.zeros(MAX_SAMPLED_HARMONIC + 1)
+    energy = np.zeros((MAX_SAMPLED_HARMONIC + 1, 3, DEGREE + 1))
     on_belt = False
     for k, u in enumerate(shape.displacement.T):
         for zone, (rows, fits) in enumerate(_ring_fits(points, np.isfinite(u).tobytes())):
@@ -332,7 +328,7 @@ def _ring_fits(points: bytes, measured: bytes) -> list[tuple[Array, list[tuple[A
         fits = []
         if len(rows) >= 4:
             P = _polynomials(x[rows])
-            for c in range(HIGHEST_HARMONIC + 1):
+            for c in range(MAX_SAMPLED_HARMONIC + 1):
                 angle = c * Theta[rows, None]
                 basis, size, right = np.linalg.svd(
                     np.hstack([P * np.cos(angle), P * np.sin(angle)]), full_matrices=False

@@ -57,7 +57,7 @@ class Rings:
         return np.asarray((x @ y.T) ** 2 / np.outer((x * x).sum(1), (y * y).sum(1)))
 
     def part(self, shapes: Array, symmetric: bool) -> Array:
-        """What of shapes (p, k, j, 3) is symmetric about the patch, or antisymmetric."""
+        """The part of shapes (p, k, j, 3) that is symmetric about the patch, or antisymmetric."""
         back = (-np.arange(len(self.angles))) % len(self.angles)
         image = MIRROR * shapes[:, back]
         return (shapes + image if symmetric else shapes - image) / 2
@@ -149,9 +149,9 @@ def follow(before: ModesAtLoad, after: ModesAtLoad, where: Rings) -> Followed:
             for s, rows in ((before, here), (after, there))
         )
         to = _homotopy(before.frequencies[here], a, after.frequencies[there], b)
-        found = to >= 0
-        position[here[found]] = there[to[found]]
-        spanned[here[found]] = ((a.T @ b) ** 2).sum(0)[to[found]]
+        matched = to >= 0
+        position[here[matched]] = there[to[matched]]
+        spanned[here[matched]] = ((a.T @ b) ** 2).sum(0)[to[matched]]
     return Followed(position, spanned)
 
 

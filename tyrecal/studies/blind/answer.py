@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...files import own_folder
+from ...files import private_dir
 from ...measured.load import load_case
 from ...measured.tables import read_measurements
 from ...simulate.evaluate.evaluator import Evaluator
@@ -37,7 +37,7 @@ from .seal import refuse_open_truth, seal_answers
 
 
 def rows_of(case: LoadedCase, protocol: Protocol) -> list[ModelRow]:
-    """All that a model is asked of: the mass, and each mode at each pressure."""
+    """All rows that a model answers: the mass, and each mode at each pressure."""
     modes = labels_of(case)
     return [(None, 0.0), *((label, p) for p in protocol.pressures_kPa for label in modes)]
 
@@ -55,7 +55,7 @@ def tyre_model(
 
 
 def case_of(folder: Path) -> LoadedCase:
-    """The case that lies beside the trials. Raises InputError, CaseError."""
+    """The case next to the trials. Raises InputError, CaseError."""
     return load_case(folder / "case" / read_protocol(folder).case, allow_unusual=True)
 
 
@@ -76,7 +76,7 @@ def answer(
     protocol = read_protocol(folder)
     trials = sorted((folder / "trials").glob("*.csv"))
     answers = folder / "answers"
-    own_folder(answers)
+    private_dir(answers)
     waiting = [t for t in trials if not (answers / f"{t.stem}.json").exists()]
     known = expand(model, model.start)
     work = partial(one_answer, model, list(rows), protocol, known, further)
@@ -101,41 +101,45 @@ def one_answer(
     known: about the start, for all trials."""
     observations = observe(read_measurements(trial), split=protocol.split)
     assumed = Assumed(split=protocol.split, further=further)
-    found = diagnose(model, rows, observations, assumed=assumed, known=known, ranked=False)
-    told = diagnosis_result(found).content()
-    told.pop("next_measurements"), told.pop("section_map")  # empty: neither was asked for
-    key = told["effect"] or told["likeliest"]
+    diagnosis = diagnose(model, rows, observations, assumed=assumed, known=known, ranked=False)
+    content = diagnosis_result(diagnosis).content()
+    content.pop("next_measurements"), content.pop("section_map")  # empty: neither was asked for
+    key = content["effect"] or content["likeliest"]
     return {
         "further": further,
-        "diagnosis": told,
+        "diagnosis": content,
         "held_out": {
             "pressure_kPa": protocol.held_out_kPa,
             "effect": key,
-            "plain_Hz": predicted(found, rows, protocol.held_out_kPa, NONE),
-            "with_effect_Hz": predicted(found, rows, protocol.held_out_kPa, key) if key else None,
-            "expected_Hz": intervals(found, rows, protocol.held_out_kPa),
+            "plain_Hz": predicted(diagnosis, rows, protocol.held_out_kPa, NONE),
+            "with_effect_Hz": predicted(diagnosis, rows, protocol.held_out_kPa, key)
+            if key
+            else None,
+            "expected_Hz": intervals(diagnosis, rows, protocol.held_out_kPa),
         },
     }
 
 
 def predicted(
-    found: Diagnosis, rows: Sequence[ModelRow], pressure_kPa: float, key: str
+    diagnosis: Diagnosis, rows: Sequence[ModelRow], pressure_kPa: float, key: str
 ) -> dict[str, float]:
     """Hz by label at a pressure that was not fitted, by a hypothesis at its best parameters."""
     places = places_at(rows, pressure_kPa)
-    eta = likeliest(found.problem, found.hypothesis(key), rows, places)
-    return _by_label(found, rows, places, [round(float(np.exp(f)), 4) for f in eta])
+    eta = likeliest(diagnosis.problem, diagnosis.hypothesis(key), rows, places)
+    return _by_label(diagnosis, rows, places, [round(float(np.exp(f)), 4) for f in eta])
 
 
 def intervals(
-    found: Diagnosis, rows: Sequence[ModelRow], pressure_kPa: float
+    diagnosis: Diagnosis, rows: Sequence[ModelRow], pressure_kPa: float
 ) -> dict[str, list[float]]:
     """Hz by label as all explanations of the catalogue together expect them beside what was
     measured, with the ends of their 90 % intervals."""
     places = places_at(rows, pressure_kPa)
-    told = expected(found.problem, found.hypotheses, rows, places)
-    three = np.exp([told.mean, *told.interval()]).T
-    return _by_label(found, rows, places, [[round(f, 4) for f in each] for each in three.tolist()])
+    prediction = expected(diagnosis.problem, diagnosis.hypotheses, rows, places)
+    three = np.exp([prediction.mean, *prediction.interval()]).T
+    return _by_label(
+        diagnosis, rows, places, [[round(f, 4) for f in each] for each in three.tolist()]
+    )
 
 
 def places_at(rows: Sequence[ModelRow], pressure_kPa: float) -> np.ndarray:
@@ -144,11 +148,11 @@ def places_at(rows: Sequence[ModelRow], pressure_kPa: float) -> np.ndarray:
 
 
 def _by_label(
-    found: Diagnosis, rows: Sequence[ModelRow], places: np.ndarray, each: Sequence[Any]
+    diagnosis: Diagnosis, rows: Sequence[ModelRow], places: np.ndarray, each: Sequence[Any]
 ) -> dict[str, Any]:
     """By the laboratory's own labels."""
-    said = {str(rows[i][0]): value for i, value in zip(places, each, strict=True)}
-    if found.exchanged:
-        a, b = map(str, found.exchanged)
-        said[a], said[b] = said[b], said[a]
-    return said
+    by_label = {str(rows[i][0]): value for i, value in zip(places, each, strict=True)}
+    if diagnosis.exchanged:
+        a, b = map(str, diagnosis.exchanged)
+        by_label[a], by_label[b] = by_label[b], by_label[a]
+    return by_label

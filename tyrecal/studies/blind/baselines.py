@@ -1,4 +1,4 @@
-"""What simpler ways say of the same measurements, with the ruler's sensitivities.
+"""Answers of simpler methods from the same measurements, with the ruler's sensitivities.
 
 All fit ln x first, in the ruler's quadratic model with weights by repeatability alone. Nearest
 signature: the effect whose residual, after its own fit, points most along the measured one; "none"

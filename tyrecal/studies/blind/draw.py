@@ -1,4 +1,4 @@
-"""What is true of each trial, drawn at random."""
+"""Truth of each trial, drawn at random."""
 
 from __future__ import annotations
 
@@ -41,20 +41,20 @@ def draw(
     outside: Mapping[str, EffectLaw],
     seed: int,
 ) -> list[Truth]:
-    """All trials, in an order that says nothing: that of their ids.
+    """All trials, in the order of their ids, which reveals nothing.
 
     Effects and families have equal chances, sizes are uniform over ``smallest`` to 1 of the range,
     on either side where it has two.
     """
     random = np.random.default_rng(seed)
     kinds = [kind for kind, count in protocol.counts.items() for _ in range(count)]
-    found = []
+    truths = []
     for kind in kinds:
         known = {"effect": laws, "outside": outside, "none": {}}[kind]
         law = str(random.choice(sorted(known))) if known else ""
         size = known[law].drawn(random, protocol.smallest) if law else 0.0
         width = log1p(protocol.spread)
-        found.append(
+        truths.append(
             Truth(
                 random.bytes(6).hex(),
                 kind,
@@ -69,7 +69,7 @@ def draw(
                 bool(random.random() < protocol.swapped),
             )
         )
-    return sorted(found, key=lambda truth: truth.id)
+    return sorted(truths, key=lambda truth: truth.id)
 
 
 def tyre(

@@ -1,4 +1,4 @@
-"""A model asked once for many tyres: polynomials in the design variables between its answers.
+"""A model evaluated once for many tyres: polynomials in the design variables between its answers.
 
 About the centre x0, with t = (x - x0) / reach, |t| <= 1:
 
@@ -48,7 +48,7 @@ class Polynomial:
 
 @dataclass(frozen=True)
 class EmulatedEffect:
-    """What an effect adds, by Lagrange between its nodes."""
+    """Shift that an effect adds, by Lagrange interpolation between its nodes."""
 
     nodes: Array  # (k,) of the parameter, 0 left out
     added: tuple[Polynomial, ...]  # at each
@@ -91,8 +91,8 @@ class Emulated:
     def answers(self, points: Sequence[Query]) -> list[Answer | Exception]:
         """From the polynomials; from the model where an effect has none."""
         far = [i for i, point in enumerate(points) if not set(point.effects) <= set(self._effects)]
-        asked = self.model.answers([points[i] for i in far]) if far else []
-        known = dict(zip(far, asked, strict=True))
+        far_answers = self.model.answers([points[i] for i in far]) if far else []
+        known = dict(zip(far, far_answers, strict=True))
         return [known[i] if i in known else self._answer(p) for i, p in enumerate(points)]
 
     def _answer(self, point: Query) -> Answer:
@@ -125,11 +125,11 @@ def emulate(model: ResponseModel, reach: float = REACH) -> Emulated:
     signs = 2 * qmc.Halton(count, seed=SEED).random(PLAIN_DESIGNS) - 1
     signs[0] = 0.0
     designs = [start + reach * t for t in signs]
-    asked = [
+    queries = [
         Query(x, constants=i < SOURCE_DESIGNS, coupled=i < SOURCE_DESIGNS)
         for i, x in enumerate(designs)
     ]
-    plain = model.answers(asked)
+    plain = model.answers(queries)
     good = [i for i, answer in enumerate(plain) if isinstance(answer, Answer)]
     powers = up_to(count, PLAIN_DEGREE)
     if len(good) * (1 + count) < len(powers):
@@ -143,9 +143,9 @@ def emulate(model: ResponseModel, reach: float = REACH) -> Emulated:
     )
     effects = {}
     for id, span in model.spans.items():
-        found = _effect(model, id, span, signs, designs, plain, reach)
-        if found is not None:
-            effects[id] = found
+        emulated = _effect(model, id, span, signs, designs, plain, reach)
+        if emulated is not None:
+            effects[id] = emulated
     couplings = [(signs[i], plain[i].coupling) for i in sources]  # type: ignore[union-attr]
     return Emulated(model, reach, fitted, constants, effects, couplings)
 
@@ -189,8 +189,8 @@ def _effect(
     if not nodes:
         return None
     ends = [e for e in nodes if span.second and e in (span.low, span.high)]
-    asked = model.answers([Query(designs[0], {id: e}, beside=True) for e in ends])
-    beside = {e: a.beside for e, a in zip(ends, asked, strict=True) if isinstance(a, Answer)}
+    at_ends = model.answers([Query(designs[0], {id: e}, beside=True) for e in ends])
+    beside = {e: a.beside for e, a in zip(ends, at_ends, strict=True) if isinstance(a, Answer)}
     known = {e: shift for e, shift in beside.items() if shift is not None}
     return EmulatedEffect(np.array(nodes), tuple(added), tuple(split), known)
 
@@ -209,17 +209,19 @@ def _fit(powers: Array, t: Array, answers: Sequence[Answer], reach: float) -> Po
     rows = [monomials(powers, each)[None] for each in t] + [slopes(powers, each) for each in t]
     values = [a.eta[None] for a in answers] + [reach * a.jacobian.T for a in answers]
     A, b = np.concatenate(rows), np.concatenate(values)
-    found = np.linalg.lstsq(A, b, None)[0]
+    coefficients = np.linalg.lstsq(A, b, None)[0]
     for _ in range(REWEIGHTED):
-        off = abs(b - A @ found)
+        off = abs(b - A @ coefficients)
         scale = HUBER * np.median(off, axis=0) + MIN_SCALE
         weights = np.sqrt(np.minimum(1.0, scale / np.maximum(off, scale)))
         columns = zip(weights.T, b.T, strict=True)
-        found = np.array([np.linalg.lstsq(A * w[:, None], c * w, None)[0] for w, c in columns]).T
-    return Polynomial(powers, found)
+        coefficients = np.array(
+            [np.linalg.lstsq(A * w[:, None], c * w, None)[0] for w, c in columns]
+        ).T
+    return Polynomial(powers, coefficients)
 
 
 def _values(powers: Array, t: Array, values: Sequence[Array]) -> Polynomial:
     rows = np.array([monomials(powers, each) for each in t])
-    found, *_ = np.linalg.lstsq(rows, np.array(values), None)
-    return Polynomial(powers, found)
+    coefficients, *_ = np.linalg.lstsq(rows, np.array(values), None)
+    return Polynomial(powers, coefficients)

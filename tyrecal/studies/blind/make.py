@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...files import make_folder, refuse_link, whole
+from ...files import atomic_write, make_folder, refuse_link
 from ...measured.measurement import CSV_COLUMNS
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.evaluate.pool import process_pool
@@ -78,8 +78,8 @@ def make(
         refuse_link(path)
     write_ruler(folder, ruler())
     seed = kept_seed(sealed, seed)
-    found, _ = sources(case)
-    truths = draw(protocol, case, found, maker.laws, maker.outside, seed)
+    own_sources, _ = sources(case)
+    truths = draw(protocol, case, own_sources, maker.laws, maker.outside, seed)
     work = partial(_resumed, sealed, protocol, case, maker)
     trials: list[Trial] = []
     with process_pool(jobs) if jobs > 1 else nullcontext() as pool:
@@ -101,7 +101,7 @@ def labels_of(case: LoadedCase) -> list[Label]:
 
 
 def values(trial: Trial, protocol: Protocol) -> dict[float, dict[Label, tuple[float, ...]]]:
-    """What the laboratory reads, Hz by pressure and label: noise, the tyre's own splits, labels.
+    """Readings of the laboratory, Hz by pressure and label: noise, the tyre's own splits, labels.
 
     One member for [0,0], two for doublets in an order by chance; NaN where a value is missing.
     """
@@ -130,8 +130,8 @@ def _resumed(
     sealed: Path, protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth
 ) -> Trial:
     """The trial as it was made before it was stopped, or made now."""
-    asked = json.dumps([asdict(truth), asdict(protocol), maker.about], sort_keys=True)
-    path = sealed / "made" / f"{sha256(asked.encode()).hexdigest()[:16]}.json"
+    question = json.dumps([asdict(truth), asdict(protocol), maker.about], sort_keys=True)
+    path = sealed / "made" / f"{sha256(question.encode()).hexdigest()[:16]}.json"
     if path.exists():
         return read_trial(read_json(path), labels_of(case))
     make_folder(path.parent)
@@ -142,7 +142,7 @@ def _resumed(
 
 def _make(protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth) -> Trial:
     """The trial, its tyre drawn again where it has no solution."""
-    found, _ = sources(case)
+    own_sources, _ = sources(case)
     labels = labels_of(case)
     random = np.random.default_rng(truth.scatter + 1)
     law = {"effect": maker.laws, "outside": maker.outside, "none": {}}[truth.kind].get(truth.law)
@@ -150,7 +150,7 @@ def _make(protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth) -> T
         try:
             both = [
                 {
-                    p: maker.compute(tyre(truth, case, found, p, each), labels)
+                    p: maker.compute(tyre(truth, case, own_sources, p, each), labels)
                     for p in protocol.pressures_kPa
                 }
                 for each in ([law, None] if law else [None])
@@ -169,8 +169,8 @@ def _again(
     truth: Truth, case: LoadedCase, protocol: Protocol, random: np.random.Generator
 ) -> Truth:
     """The same trial with other design variables and constants."""
-    rules, found = replace(protocol, counts={"none": 1}), sources(case)[0]
-    (other,) = draw(rules, case, found, {}, {}, int(random.integers(2**63)))
+    rules, own_sources = replace(protocol, counts={"none": 1}), sources(case)[0]
+    (other,) = draw(rules, case, own_sources, {}, {}, int(random.integers(2**63)))
     return replace(truth, variables=other.variables, constants=other.constants)
 
 
@@ -213,7 +213,7 @@ def write_trials(folder: Path, protocol: Protocol, trials: list[Trial]) -> None:
         mass *= exp(protocol.mass * random.normal())
         lines.append(f"mass_kg,,,,,,,{mass:.3f},{protocol.mass * mass:.3f}")
         path = folder / "trials" / f"{trial.truth.id}.csv"
-        with whole(path) as partial:
+        with atomic_write(path) as partial:
             partial.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="")
     for path in (folder / "trials").iterdir():
         os.utime(path, (0, 0))

@@ -10,7 +10,7 @@ from typing import Protocol
 from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator, Question
 from ...simulate.evaluate.store import Store
-from ...simulate.modes.find import Found, find_modes
+from ...simulate.modes.find import LabelledModes, find_modes
 from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase
 from .laws import EffectLaw, Frequencies, catalogue_laws
@@ -34,11 +34,11 @@ class Maker(Protocol):
 
     @property
     def laws(self) -> Mapping[str, EffectLaw]:
-        """Of effects, by id."""
+        """Laws of effects, by id."""
 
     @property
     def outside(self) -> Mapping[str, EffectLaw]:
-        """Of families that the catalogue does not hold, by name."""
+        """Laws of families that the catalogue does not hold, by name."""
 
     def compute(self, case: LoadedCase, labels: list[Label]) -> Computed:
         """The tyre as it stands in ``case``. Raises EvaluationFailed; ValueError."""
@@ -57,14 +57,16 @@ class SolverMaker:
     def compute(self, case: LoadedCase, labels: list[Label]) -> Computed:
         """Raises EvaluationFailed, also where a label is lost."""
         evaluator = Evaluator(TyreDesign(case), self.solver, store=self.store)
-        ((_, found),) = find_modes(evaluator, [Question({})], labels)
-        if not isinstance(found, Found):
-            raise found
+        ((_, labelled),) = find_modes(evaluator, [Question({})], labels)
+        if not isinstance(labelled, LabelledModes):
+            raise labelled
         ln_f = {}
         for label in labels:
-            low, high = found.wanted[label].raw.members or (found.wanted[label].frequency_Hz,) * 2
+            low, high = (
+                labelled.wanted[label].raw.members or (labelled.wanted[label].frequency_Hz,) * 2
+            )
             ln_f[label] = log(low), log(high)
-        return Computed(ln_f, log(found.evaluation.mass_kg))
+        return Computed(ln_f, log(labelled.evaluation.mass_kg))
 
 
 def bundled_maker(case: LoadedCase, store: Store | None = None) -> SolverMaker:

@@ -1,4 +1,4 @@
-"""What the catalogue does not hold: families of errors for trials whose answer is "outside"."""
+"""Families of errors that the catalogue does not hold, for trials whose answer is "outside"."""
 
 from __future__ import annotations
 

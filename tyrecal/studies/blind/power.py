@@ -1,4 +1,4 @@
-"""What could be found on a tyre, before anything is measured.
+"""Effects that a test could detect on a tyre, before anything is measured.
 
 lambda of each effect over its range, by the ruler at the start design: from 25 on the studies on
 record named 95 of 100, from 10 on it is seen, below 4 it is not.
@@ -23,8 +23,9 @@ NAMED_AS_A_RULE = 25.0  # lambda
 
 @dataclass(frozen=True)
 class Power:
-    """Of one effect: lambda at the far end of its range where that is larger; sizes from which it
-    is seen and, as a rule, named, None beyond the range; effects that it is hardly told from."""
+    """Power of a test for one effect: lambda at the far end of its range where that is larger;
+    sizes from which it is seen and, as a rule, named, None beyond the range; effects that it is
+    hardly told from."""
 
     id: str
     full: float
@@ -34,13 +35,13 @@ class Power:
 
 
 def powers(ruler: Ruler, protocol: Protocol) -> list[Power]:
-    """Of every effect, the largest lambda first."""
+    """Power for every effect, the largest lambda first."""
     given = [i for i, (label, p) in enumerate(ruler.rows) if not label or p in protocol.given_kPa]
     places = np.array(given)
     labels = [ruler.rows[i][0] for i in given]
     counts = np.array([2 if label and label.c else 1 for label in labels])
     start = np.zeros(len(ruler.x0))
-    found = []
+    result = []
     for id, signature in ruler.signatures.items():
         sizes, shift, split = signature.grid(start, places)
         hard = [
@@ -50,19 +51,19 @@ def powers(ruler: Ruler, protocol: Protocol) -> list[Power]:
         lengths = np.array([each.lam for each in hard])
         far = hard[int(np.argmax(lengths))]
         seen, named = (smallest(sizes, lengths, least) for least in (VISIBLE, NAMED_AS_A_RULE))
-        found.append(Power(id, far.lam, seen, named, far.group[1:]))
-    return sorted(found, key=lambda power: -power.full)
+        result.append(Power(id, far.lam, seen, named, far.group[1:]))
+    return sorted(result, key=lambda power: -power.full)
 
 
 def words(
-    found: Sequence[Power], ruler: Ruler, protocol: Protocol, spans: Mapping[str, Span]
+    effect_powers: Sequence[Power], ruler: Ruler, protocol: Protocol, spans: Mapping[str, Span]
 ) -> str:
     """For people."""
-    return "\n".join(_lines(found, ruler, protocol, spans))
+    return "\n".join(_lines(effect_powers, ruler, protocol, spans))
 
 
 def _lines(
-    found: Sequence[Power], ruler: Ruler, protocol: Protocol, spans: Mapping[str, Span]
+    effect_powers: Sequence[Power], ruler: Ruler, protocol: Protocol, spans: Mapping[str, Span]
 ) -> Iterator[str]:
     labels = list(dict.fromkeys(label.said for label, _ in ruler.rows if label))
     at = ", ".join(f"{p:g}" for p in protocol.given_kPa)
@@ -73,7 +74,7 @@ def _lines(
     yield ""
     yield "| effect | named as a rule from | seen from | lambda at most | hardly told from |"
     yield "|---|---|---|---|---|"
-    for power in found:
+    for power in effect_powers:
         if power.seen is not None:
             span = spans[power.id]
             sizes = (
@@ -83,5 +84,7 @@ def _lines(
             alike = ", ".join(power.alike)
             yield f"| `{power.id}` | {' | '.join(sizes)} | {power.full:.0f} | {alike} |"
     yield ""
-    hidden = ", ".join(f"`{power.id}`" for power in found if power.seen is None) or "nothing"
+    hidden = (
+        ", ".join(f"`{power.id}`" for power in effect_powers if power.seen is None) or "nothing"
+    )
     yield f"What could hide within its whole range: {hidden}."

@@ -118,7 +118,7 @@ class Ruler:
 
 @dataclass(frozen=True)
 class Difficulty:
-    """How hard an effect is to see, and to tell from others."""
+    """How hard an effect is to see, and to distinguish from others."""
 
     lam: float  # lambda
     nearest: float  # min_j delta_j^2 over other effects
@@ -144,8 +144,8 @@ def difficulty(
     shift: Array,
     split: Array,
 ) -> Difficulty:
-    """Of a true effect that shifts the measured rows ``places`` by ``shift`` (n,), and pairs apart
-    by ``split`` (n,); d: the trial's design minus x0."""
+    """Difficulty of a true effect that shifts the measured rows ``places`` by ``shift`` (n,), and
+    pairs apart by ``split`` (n,); d: the trial's design minus x0."""
     P = ruler.projection(d, places, ruler.sigma(places, counts, protocol))
     tau2 = 2 * protocol.noise**2 + protocol.split**2
     pairs = counts == 2
@@ -165,7 +165,7 @@ def difficulty(
 
 
 def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> dict[str, Any]:
-    """The ruler as plain data. Raises what the model says where the plain tyre has no solution."""
+    """The ruler as plain data. Raises the model's failure where the plain tyre has no solution."""
     x0 = np.asarray(model.start, float)
     count = len(x0)
     steps = [side * CURVATURE_STEP * unit for unit in np.eye(count) for side in (1, -1)]
@@ -189,8 +189,8 @@ def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> dict[str, Any]:
     hessian = (hessian + hessian.transpose(0, 2, 1)) / 2
     signatures = {}
     for id, each in sizes.items():
-        asked = list(islice(left, len(each)))
-        known = [(e, a) for e, a in zip(each, asked, strict=True) if isinstance(a, Answer)]
+        replies = list(islice(left, len(each)))
+        known = [(e, a) for e, a in zip(each, replies, strict=True) if isinstance(a, Answer)]
         zero = (0.0, Answer(first.eta, first.jacobian, 0 * first.split))
         known = sorted([*known, zero], key=lambda pair: pair[0])
         if len(known) > 1:
@@ -217,7 +217,7 @@ def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> dict[str, Any]:
 
 
 def write_ruler(folder: Path, content: Mapping[str, Any]) -> None:
-    """Beside the trials, open to all."""
+    """Write the ruler next to the trials, open to all."""
     write_json(folder / RULER_FILE, dict(content))
 
 
@@ -230,7 +230,8 @@ def read_ruler(folder: Path, labels: Sequence[Label]) -> Ruler:
 
 
 def ruler_of(content: Mapping[str, Any], labels: Sequence[Label]) -> Ruler:
-    """The ruler that `measure` told. Raises KeyError, ValueError, TypeError where it is none."""
+    """The ruler from the data of `measure`. Raises KeyError, ValueError, TypeError where they are
+    none."""
     known: dict[str, Label | None] = {str(label): label for label in labels}
     known["mass"] = None
     numbers = {key: np.array(content[key], float) for key in NUMBERS}

@@ -28,7 +28,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Scored:
-    """A trial, its answer beside the truth."""
+    """A trial, its answer next to the truth."""
 
     id: str
     kind: str
@@ -111,11 +111,11 @@ def scored(
         shift, split = true_shift(truth, ruler, places, labels)
         hard = difficulty(ruler, protocol, truth["law"], d, places, counts, shift, split)
     group = hard.group if truth["kind"] == "effect" else (key,)
-    told = answer["diagnosis"]
-    p = told["probabilities"]
-    named, held = told["effect"], None
+    diagnosis = answer["diagnosis"]
+    p = diagnosis["probabilities"]
+    named, held = diagnosis["effect"], None
     if truth["kind"] == "effect" and named == key and hard.equivalent is not None:
-        held = told["parameter"]["low"] <= hard.equivalent <= told["parameter"]["high"]
+        held = diagnosis["parameter"]["low"] <= hard.equivalent <= diagnosis["parameter"]["high"]
     out = answer["held_out"]
     sigma = ruler.sigma(places, counts, protocol, constants=False)
     return Scored(
@@ -128,13 +128,13 @@ def scored(
         group,
         hard.lam,
         hard.band,
-        told["verdict"],
+        diagnosis["verdict"],
         named,
         tuple(sorted(p, key=lambda k: -p[k])),
         p,
         p.get(key, 0.0),
         sum(p.get(k, 0.0) for k in group),
-        key in told["candidate_set"],
+        key in diagnosis["candidate_set"],
         held,
         held_out_error(truth["held_out"], out["plain_Hz"]),
         held_out_error(truth["held_out"], out["with_effect_Hz"] or out["plain_Hz"]),
@@ -144,22 +144,22 @@ def scored(
 
 def means(readings: Sequence[Measurement], ruler: Ruler) -> tuple[Array, Array, Array]:
     """ln of each row's mean of members (n,), its place in the ruler (n,), number of values (n,)."""
-    found: dict[tuple[Label | None, float], list[float]] = {}
+    logarithms: dict[tuple[Label | None, float], list[float]] = {}
     for each in readings:
         pressure = each.pressure_kPa if each.label else 0.0
-        found.setdefault((each.label, pressure), []).append(log(each.value))
+        logarithms.setdefault((each.label, pressure), []).append(log(each.value))
     place = {row: i for i, row in enumerate(ruler.rows)}
     return (
-        np.array([np.mean(values) for values in found.values()]),
-        np.array([place[row] for row in found]),
-        np.array([len(values) for values in found.values()]),
+        np.array([np.mean(values) for values in logarithms.values()]),
+        np.array([place[row] for row in logarithms]),
+        np.array([len(values) for values in logarithms.values()]),
     )
 
 
 def true_shift(
     truth: Mapping[str, Any], ruler: Ruler, places: Array, labels: Sequence[Label]
 ) -> tuple[Array, Array]:
-    """What the effect moved (n,), and how far it split pairs (n,), from runs without noise."""
+    """Shift of the effect (n,), and how far it splits pairs (n,), from runs without noise."""
     names = {str(label) for label in labels}
     tables: list[dict[tuple[str, float], list[float]]] = []
     for key in ("with_effect", "without"):
@@ -176,7 +176,7 @@ def true_shift(
 def held_out_error(
     measured: Mapping[str, Sequence[float]], predicted: Mapping[str, float]
 ) -> float:
-    """Of ln measured (mean of members) - ln predicted."""
+    """RMS of ln measured (mean of members) - ln predicted."""
     errors = [
         np.mean(np.log(values)) - log(predicted[name])
         for name, values in measured.items()

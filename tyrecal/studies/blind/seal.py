@@ -1,4 +1,4 @@
-"""The seal: the truth lies in a folder of its own, its sha256 beside the trials.
+"""The seal: the truth lies in a folder of its own, its sha256 next to the trials.
 
 truth.json holds a nonce, so that nobody can find the truth by trying; ``answer`` never opens its
 folder and refuses to work where a truth lies among the trials; answers are hashed before ``score``
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import InputError
-from ...files import read_bytes, whole
+from ...files import atomic_write, read_bytes
 from .protocol import read_json, write_json
 
 SEAL, TRUTH, ANSWERS = "seal.json", "truth.json", "answers.json"
@@ -23,7 +23,7 @@ SEAL, TRUTH, ANSWERS = "seal.json", "truth.json", "answers.json"
 def seal(folder: Path, sealed: Path, content: dict[str, Any]) -> str:
     """Write the truth to ``sealed`` and its sha256 to ``folder``; returns the sha256."""
     text = json.dumps({"nonce": secrets.token_hex(32), **content}, indent=1, allow_nan=False)
-    with whole(sealed / TRUTH) as partial:
+    with atomic_write(sealed / TRUTH) as partial:
         partial.write_text(text + "\n", encoding="utf-8")
     mark = _sha256(sealed / TRUTH)
     write_json(folder / SEAL, {"sha256": mark})
@@ -41,9 +41,9 @@ def open_truth(folder: Path, sealed: Path) -> dict[str, Any]:
 
 def refuse_open_truth(folder: Path) -> None:
     """Raises InputError where the truth can be read from the folder that is answered."""
-    found = sorted(folder.rglob(TRUTH))
-    if found:
-        raise InputError(f"{found[0]} lies open among the trials; move it elsewhere")
+    paths = sorted(folder.rglob(TRUTH))
+    if paths:
+        raise InputError(f"{paths[0]} lies open among the trials; move it elsewhere")
     read_json(folder / SEAL)
 
 

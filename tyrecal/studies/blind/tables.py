@@ -73,9 +73,9 @@ def summary(trials: Sequence[Scored]) -> dict[str, Any]:
     }
 
 
-def rate(found: Sequence[bool]) -> dict[str, Any]:
+def rate(hits: Sequence[bool]) -> dict[str, Any]:
     """A share with its exact 95 % bounds."""
-    right, count = sum(found), len(found)
+    right, count = sum(hits), len(hits)
     low, high = clopper_pearson(right, count)
     return {
         "right": right,

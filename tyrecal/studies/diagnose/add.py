@@ -10,13 +10,13 @@ from ruamel.yaml.nodes import ScalarNode
 from ruamel.yaml.representer import RoundTripRepresenter
 
 from ...errors import InputError
-from ...files import whole
+from ...files import atomic_write
 from ...tyre.load import load_case
 from ...tyre.values import with_values
 
 
 def add(path: Path, effects: Mapping[str, float], folder: Path | None = None) -> Path:
-    """Write CASE_EFFECTS.yaml beside the case at ``path`` with the effects' parameters, by id.
+    """Write CASE_EFFECTS.yaml next to the case at ``path`` with the effects' parameters, by id.
 
     Its section and templates are named relative to the case, so it goes beside it, or into
     ``folder`` where that is the same. Raises InputError; ValueError for an unknown effect or a
@@ -39,7 +39,7 @@ def add(path: Path, effects: Mapping[str, float], folder: Path | None = None) ->
     else:
         place = list(data).index("variables") if "variables" in data else len(data)
         data.insert(place, "effects", dict(effects))
-    with whole(target) as partial, partial.open("w", encoding="utf-8") as file:
+    with atomic_write(target) as partial, partial.open("w", encoding="utf-8") as file:
         yaml.dump(data, file)
     load_case(target, allow_unusual=True)
     return target

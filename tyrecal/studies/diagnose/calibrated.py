@@ -27,11 +27,11 @@ def calibrated_variables(diagnosis: Diagnosis, model: TyreModel) -> dict[str, An
 
 
 def _calibrated(diagnosis: Diagnosis, model: TyreModel, key: str) -> dict[str, dict[str, Any]]:
-    found = diagnosis.hypothesis(key)
-    p, d = found.posterior, found.fitted.d
+    hypothesis = diagnosis.hypothesis(key)
+    p, d = hypothesis.posterior, hypothesis.fitted.d
     apart = d - p @ d
-    covariance = np.tensordot(p, found.fitted.covariance, 1) + (p[:, None] * apart).T @ apart
-    x = diagnosis.problem.expansion.x0 + d[found.best]
+    covariance = np.tensordot(p, hypothesis.fitted.covariance, 1) + (p[:, None] * apart).T @ apart
+    x = diagnosis.problem.expansion.x0 + d[hypothesis.best]
     values = model.values(x)
     above, below = (model.values(x + step) for step in (SLOPE_STEP, -SLOPE_STEP))
     scatter = np.sqrt(np.diag(covariance)).tolist()

@@ -1,4 +1,5 @@
-"""What the data say of the constants that nobody calibrates: told, and never named as a cause.
+"""Constants that nobody calibrates, as the data describe them: reported, and never named as a
+cause.
 
 With z ~ N(0, 1) of each and g its slopes: E z = G^T P r, r the residual of the likeliest fit. An
 effect that the case states as uncertain (``uncertainties``) is such a constant as far as that
@@ -26,20 +27,20 @@ class ConstantShift:
     shift_in_sd: float  # of the standard deviation that is stated or assumed
 
 
-def constants_told(diagnosis: Diagnosis) -> list[ConstantShift]:
+def constants_posterior(diagnosis: Diagnosis) -> list[ConstantShift]:
     """Every source of error but the section's fields, with what is named or leads in the model;
     the largest shift first."""
-    found = diagnosis.hypothesis(diagnosis.leading or NONE)
-    best = found.best
-    problem = replace(diagnosis.problem, zeta=float(found.fitted.zeta[best]))
-    d = found.fitted.d[best]
-    effects = {id: e[[best]] for id, e in found.values.items()}
+    hypothesis = diagnosis.hypothesis(diagnosis.leading or NONE)
+    best = hypothesis.best
+    problem = replace(diagnosis.problem, zeta=float(hypothesis.fitted.zeta[best]))
+    d = hypothesis.fitted.d[best]
+    effects = {id: e[[best]] for id, e in hypothesis.values.items()}
     r = problem.observations.y - problem.predicted(effects, d[None])[0]
     P, _, _ = projection(problem, d)
     G = problem.mixed @ problem.constants if problem.zeta else problem.constants
-    told = [
+    shifts = [
         ConstantShift(name, float(z))
         for name, z in zip(diagnosis.sources, G.T @ P @ r, strict=True)
         if not name.startswith(SECTION)
     ]
-    return sorted(told, key=lambda each: -abs(each.shift_in_sd))
+    return sorted(shifts, key=lambda each: -abs(each.shift_in_sd))

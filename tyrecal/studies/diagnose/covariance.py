@@ -50,7 +50,8 @@ def between_runs(rows: tuple[Observable, ...]) -> Array:
 
 @lru_cache(16)
 def by_laws(rows: tuple[Observable, ...]) -> Array:
-    """What material laws do (n, n), by the variance of each part; see `laws_alike`."""
+    """Covariance (n, n) of the errors of material laws, by the variance of each part; see
+    `laws_alike`."""
     laws = laws_alike([row.label for row in rows], _pressures_kPa(rows))
     result = between_runs(rows) * laws
     result.flags.writeable = False

@@ -49,7 +49,7 @@ KNOWN_WITHIN = (
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What was found."""
+    """Result of a diagnosis, with the problem as it was solved."""
 
     problem: InverseProblem  # as it was solved
     bare: InverseProblem  # before effects were asked again, near modes coupled as without effects
@@ -90,7 +90,7 @@ class Diagnosis:
 
     def parameter(self, key: str, id: str = "") -> dict[str, Any]:
         """Mean and 90 % interval of the effect ``id`` of ``key``, the first by default, with its
-        unit, whatever else there is; what the case has of it is counted in."""
+        unit, alone or with others; what the case has of it is counted in."""
         id = id or key.split("+")[0]
         span = self.problem.spans[id]
         with_it = [h for h in self.hypotheses if h.values and holds(h.key, key)]
@@ -152,20 +152,20 @@ def diagnose(
     kept = np.flatnonzero(share > REFUTED).tolist()
     settled = [_settled(bares[k], model, first[k]) for k in kept]
     every = [h for _, own in settled for h in own]
-    found = [with_sets(problem, own, every) for problem, own in settled]
+    per_reading = [with_sets(problem, own, every) for problem, own in settled]
     readings = [readings[k] for k in kept]
-    among = shares(readings, found)
+    among = shares(readings, per_reading)
     share[:], share[kept] = 0.0, among
     best = int(np.argmax(among))
-    bare, problem, hypotheses = bares[kept[best]], settled[best][0], found[best]
-    p = averaged(among, found)
+    bare, problem, hypotheses = bares[kept[best]], settled[best][0], per_reading[best]
+    p = averaged(among, per_reading)
     plain = next(h for h in hypotheses if h.key == NONE).fitted
     d, bare = plain.d[0], replace(bare, zeta=float(plain.zeta[0]))
     verdict = decide(hypotheses, p, len(bare.places), len(d))
     alone = decide(hypotheses, probabilities(hypotheses), len(bare.places), len(d))
     robust = robustness(problem, hypotheses, alone, tuple(model.sources))
     if len(readings) > 1:
-        robust = over_labels(robust, readings, found, among, verdict, len(d))
+        robust = over_labels(robust, readings, per_reading, among, verdict, len(d))
     gap = find_gap(bare, d, tuple(model.variables))
     P, _, _ = projection(replace(problem, zeta=bare.zeta), d)
     means = {h.key: h.mean() for h in hypotheses if h.values}
@@ -209,7 +209,7 @@ def _calibrated(
     expansion: Expansion | None,
     known: Expansion | None,
 ) -> InverseProblem:
-    """Observations beside the model, expanded about the plain tyre that fits them.
+    """Observations and the model, expanded about the plain tyre that fits them.
 
     Where none does, an effect or an exchange of labels may have driven it far off: then about the
     tyre that fits them if any of these may have moved them.
@@ -245,7 +245,7 @@ def _fits(problem: InverseProblem) -> bool:
 def _settled(
     problem: InverseProblem, model: ResponseModel, hypotheses: list[Hypothesis]
 ) -> tuple[InverseProblem, list[Hypothesis]]:
-    """The problem with the model asked again for hypotheses in play, and all weighed by it."""
+    """The problem with the model evaluated again for active hypotheses, and all weighed by it."""
     for _ in range(MAX_ROUNDS if problem.expansion.nodes else 0):
         again, changed = _asked_again(problem, model, hypotheses)
         if not changed:
@@ -257,8 +257,8 @@ def _settled(
 def _asked_again(
     problem: InverseProblem, model: ResponseModel, hypotheses: Sequence[Hypothesis]
 ) -> tuple[InverseProblem, bool]:
-    """The problem with the model asked where the effects in play have their re-fits, each at its
-    likeliest size, and those of likely sets two by two; whether anything was left to ask."""
+    """The problem with the model evaluated where the active effects have their re-fits, each at its
+    likeliest size, and those of likely sets two by two; whether anything was left to evaluate."""
     expansion = problem.expansion
     singles = [h for h in hypotheses if h.key in expansion.nodes]
     best = max(h.ln_evidence for h in hypotheses)
@@ -281,7 +281,8 @@ def _asked_again(
 
 
 def _known(expansion: Expansion, size: Mapping[str, float], d: Array) -> bool:
-    """Whether these effects were asked as near as `KNOWN_WITHIN`; one of 0 is none."""
+    """Whether the model was already evaluated within `KNOWN_WITHIN` of these sizes; a size of 0 is
+    no effect."""
     near = {}
     for id in size:
         low, high = expansion.nodes[id].reach
@@ -294,10 +295,11 @@ def _known(expansion: Expansion, size: Mapping[str, float], d: Array) -> bool:
         return small or bool(same and all(abs(e - at) < near[id] for (id, e), at in there))
     ((id, e),) = size.items()
     nodes = expansion.nodes[id]
-    asked = [(float(each), np.zeros_like(d)) for each in nodes.values]  # 0 among them
-    asked += [(nodes.anchor.e, nodes.anchor.d)] if nodes.anchor else []
+    evaluated = [(float(each), np.zeros_like(d)) for each in nodes.values]  # 0 among them
+    evaluated += [(nodes.anchor.e, nodes.anchor.d)] if nodes.anchor else []
     return any(
-        abs(e - at) < near[id] and (at == 0 or abs(d - x).max() < KNOWN_WITHIN) for at, x in asked
+        abs(e - at) < near[id] and (at == 0 or abs(d - x).max() < KNOWN_WITHIN)
+        for at, x in evaluated
     )
 
 

@@ -18,7 +18,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from .covariance import between_runs, of_one_mode
-from .expansion import Nodes
+from .expansion import EffectResponse
 from .gap import family
 from .inverse_problem import Added, InverseProblem
 from .observations import Observable
@@ -91,26 +91,26 @@ class Hypothesis:
     def at_bound(self) -> list[str]:
         """Effects whose most probable parameter is the last one of the grid: more would fit
         better."""
-        found = []
+        bounded = []
         for id, values in self.values.items():
             e = values[self.best]
             low, high = self.ends.get(id, (values.min(), values.max()))
             if low < high and ((e == high and e > 0) or (e == low and e < 0)):
-                found.append(id)
-        return found
+                bounded.append(id)
+        return bounded
 
     def shares(self, p: Array) -> dict[str, float]:
-        """What of ``p`` (q,) over the grid is whose, by key: a size within `COVERAGE` standard
-        deviations of what the case states is that constant's, and no effect."""
+        """Share of ``p`` (q,) over the grid by key: a size within `COVERAGE` standard deviations of
+        what the case states is that constant's, and no effect."""
         ids = self.key.split("+")
         off = [abs(self.values[id]) > COVERAGE * sd for id, sd in self.stated.items()]
-        found: dict[str, float] = {}
+        by_key: dict[str, float] = {}
         for beyond in product((True, False), repeat=len(off)):
             here = [x == y for x, y in zip(off, beyond, strict=True)]
             within = {id for id, far in zip(self.stated, beyond, strict=True) if not far}
             key = "+".join(id for id in ids if id not in within) or NONE
-            found[key] = float(p[np.all(here, axis=0)].sum()) if here else float(p.sum())
-        return found
+            by_key[key] = float(p[np.all(here, axis=0)].sum()) if here else float(p.sum())
+        return by_key
 
     def typical(self, count: int) -> dict[str, Array]:
         """Equally probable parameters (count,)."""
@@ -155,10 +155,10 @@ def refit(
             return plain
         near = plain.d
     points = list(among) if among else list(range(len(problem.integrand)))
-    found = [
+    results = [
         refit_at(problem, problem.integrand[k], added, extra, near, COUPLED_STEPS) for k in points
     ]
-    ln, d, chi2, covariance = (np.array([each[part] for each in found]) for part in range(4))
+    ln, d, chi2, covariance = (np.array([each[part] for each in results]) for part in range(4))
     zeta, total = rule()[0], over_zeta(ln, among)
     ln_prior = -(zeta[points, None] ** 2) / 2
     best, every = np.argmax(ln + ln_prior, axis=0), np.arange(count)
@@ -220,21 +220,21 @@ def refit_at(
     best: tuple[Array, ...] | None = None
     share = np.ones(len(d))
     while True:
-        eta, J, told = model(d)
+        eta, J, ln_label = model(d)
         r = y - eta
         weighted = inverse @ np.concatenate([J, r[:, :, None]], 2)
         both = weighted.transpose(0, 2, 1) @ J
         chi2, off = (weighted[:, :, -1] * r).sum(1), (d - centre) / problem.spread
         slope = both[:, -1] - off / problem.spread
         misfit = chi2 + (off**2).sum(1)
-        here: tuple[Array, ...] = (misfit, d, chi2, told, both[:, :-1] + information, slope)
+        here: tuple[Array, ...] = (misfit, d, chi2, ln_label, both[:, :-1] + information, slope)
         if best is not None:  # where the misfit rose, from the best point half as far
             rose = here[0] > best[0]
             share = np.where(rose, share / 2, 1.0)
             for new, old in zip(here, best, strict=True):
                 new[rose] = old[rose]
         best = here
-        _, d, chi2, told, normal, slope = best
+        _, d, chi2, ln_label, normal, slope = best
         step = share[:, None] * np.linalg.solve(normal, slope[:, :, None])[:, :, 0]
         if not steps or (step * slope).sum(1).max() < REFITTED:
             break
@@ -243,12 +243,12 @@ def refit_at(
     _, ln_normal = np.linalg.slogdet(normal * np.outer(problem.spread, problem.spread))
     n = len(y)
     ln_evidence = -(chi2 + ln_det + n * np.log(2 * np.pi) + (off**2).sum(1) + ln_normal) / 2
-    ln_evidence += problem.splits.ln_likelihood(added.split) + told
+    ln_evidence += problem.splits.ln_likelihood(added.split) + ln_label
     return Fitted(ln_evidence, d, chi2, np.linalg.inv(normal), np.zeros((len(d), 0)))
 
 
 class Family(NamedTuple):
-    """What lies outside the catalogue: more covariance (n, n) of ln f, in words."""
+    """Family of errors outside the catalogue: more covariance (n, n) of ln f, in words."""
 
     words: str
     extra: Array
@@ -256,7 +256,7 @@ class Family(NamedTuple):
 
 
 def outside(problem: InverseProblem) -> Hypothesis:
-    """What the catalogue does not hold; ``words`` names the likeliest."""
+    """Hypothesis that the cause is outside the catalogue; ``words`` names the likeliest family."""
     known = families(problem)
     fitted = refit(problem, {}, len(known), np.array([each.extra for each in known]))
     ln = fitted.ln_evidence + ln_shares(known)
@@ -277,25 +277,25 @@ def families(problem: InverseProblem) -> list[Family]:
     same = (
         of_one_mode(rows) * between * between_runs(rows) * [row.label is not None for row in rows]
     )
-    found = [
+    result = [
         Family(f"modes are off by {size:.1%} in a way of their own", size**2 * same, False)
         for size in UNKNOWN
     ]
     for over, together in _smooth(rows, problem.observations.y):
         words = f"smoothly over {over}"
-        found += [
+        result += [
             Family(f"modes are off by {size:.1%}, {words}", size**2 * between * together, False)
             for size in UNKNOWN
         ]
-    found += [
+    result += [
         Family(f"all scatter is {k:g} times as large", (k**2 - 1) * problem.sigma, False)
         for k in INFLATION
     ]
     for label in sorted({row.label for row in rows if row.label}, key=str):
         hit = np.array([row.label == label for row in rows])
         misread = MISREAD**2 * same * np.outer(hit, hit)
-        found.append(Family(f"{label.said} is misread", misread, True))
-    return found
+        result.append(Family(f"{label.said} is misread", misread, True))
+    return result
 
 
 def ln_shares(known: Sequence[Family]) -> Array:
@@ -395,7 +395,7 @@ def _gauss_legendre(count: int) -> tuple[Array, Array]:
     return np.polynomial.legendre.leggauss(count)
 
 
-def grid(nodes: Nodes) -> tuple[Array, Array]:
+def grid(nodes: EffectResponse) -> tuple[Array, Array]:
     """Parameters over the reach and ln of weight times density, which sum to 1."""
     low, high = nodes.reach
     points, weights = _rule(low, high, RULE_POINTS[1])

@@ -1,4 +1,4 @@
-"""The model between the few points where it was asked.
+"""The model between the few points where it was evaluated.
 
 With d = x - x0, quadratic about the plain fit x0, plus what each effect adds:
 
@@ -36,8 +36,8 @@ CURVATURE_STEP = 0.05  # of a logarithm, for H from two Jacobians
 
 
 @dataclass(frozen=True)
-class Anchor:
-    """Where an effect was asked again, and what the expansion is off by there."""
+class Refinement:
+    """A point where an effect was evaluated again, and the expansion's error there."""
 
     e: float
     d: Array  # (v,) x - x0
@@ -46,8 +46,8 @@ class Anchor:
 
 
 @dataclass(frozen=True)
-class Joint:
-    """Where two effects were asked together, and what their sum is off by there."""
+class PairInteraction:
+    """A point where two effects were evaluated together, and the error of their sum there."""
 
     e: tuple[float, float]
     d: Array  # (v,) x - x0
@@ -55,15 +55,15 @@ class Joint:
     tilt: Array  # (n, v)
 
     def at(self, first: Array, second: Array) -> tuple[Array, Array]:
-        """What it adds to a (q, n) and B (q, n, v) at parameters (q,)."""
+        """Additions to a (q, n) and B (q, n, v) at parameters (q,)."""
         grown = np.clip(first / self.e[0], 0, 1) * np.clip(second / self.e[1], 0, 1)
         shift = grown[:, None] * (self.shift - self.tilt @ self.d)
         return shift, grown[:, None, None] * self.tilt
 
 
 @dataclass(frozen=True)
-class Nodes:
-    """An effect where it was asked."""
+class EffectResponse:
+    """An effect at the sizes where it was evaluated."""
 
     values: Array  # (k,) of its parameter
     shift: Array  # (k, n) a_k
@@ -73,7 +73,7 @@ class Nodes:
     split: Array  # (k, n)
     reach: tuple[float, float]  # of the parameter, between nodes that have a solution
     beside: Mapping[float, Array] = field(default_factory=dict)  # (n,) at far ends, see `Answer`
-    anchor: Anchor | None = None
+    anchor: Refinement | None = None
 
     def at(self, e: Array) -> tuple[Array, Array, Array]:
         """a (q, n), B (q, n, v) and split (q, n) at parameters (q,)."""
@@ -116,10 +116,10 @@ class Expansion:
     hessian: Array  # (n, v, v)
     split: Array  # (n,)
     constants: Array  # (n, k)
-    nodes: Mapping[str, Nodes]  # of effects by id
+    nodes: Mapping[str, EffectResponse]  # of effects by id
     failed: Mapping[str, str] = field(default_factory=dict)  # why effects, by id, have no nodes
     coupling: Coupling | None = None  # of modes by the sources of error
-    joint: Mapping[tuple[str, ...], Joint] = field(default_factory=dict)  # of two effects
+    joint: Mapping[tuple[str, ...], PairInteraction] = field(default_factory=dict)  # of two effects
     material_laws: float = 0.0  # see `ResponseModel`
 
     def plain(self, x: Array) -> tuple[Array, Array]:
@@ -129,7 +129,7 @@ class Expansion:
         return self.eta + self.jacobian @ d + bent @ d / 2, self.jacobian + bent
 
     def range_shifts(self, places: Array) -> Array:
-        """What every effect may do to the rows ``places`` (n,) over its range, as so many more
+        """Shifts of the rows ``places`` (n,) by every effect over its range, as so many more
         constants (n, k)."""
         every = [each.range_shifts()[:, places] for each in self.nodes.values()]
         return np.vstack([np.zeros((0, len(places))), *every]).T
@@ -149,8 +149,8 @@ def expand(model: ResponseModel, x0: Array, splits: bool = True) -> Expansion:
     values = {id: node_values(model.spans[id], shares.get(id, ())) for id in ids}
     points = [Query(x0, constants=True, slopes=at_0, coupled=True)]
     points += [Query(x0 + side * step) for step in steps for side in (1, -1)]
-    asked = [(id, float(e)) for id in ids for e in values[id]]
-    points += [_with_effect(model, x0, id, e) for id, e in asked]
+    pairs = [(id, float(e)) for id in ids for e in values[id]]
+    points += [_with_effect(model, x0, id, e) for id, e in pairs]
     answers = model.answers(points)
     first = answers[0]
     if isinstance(first, Exception):
@@ -173,29 +173,31 @@ def expand(model: ResponseModel, x0: Array, splits: bool = True) -> Expansion:
         material_laws=model.material_laws,
     )
     nodes, failed = {}, {}
-    replies = dict(zip(asked, answers[1 + 2 * count :], strict=True))
-    found = {id: {float(e): replies[id, float(e)] for e in values[id]} | {0.0: first} for id in ids}
+    replies = dict(zip(pairs, answers[1 + 2 * count :], strict=True))
+    by_effect = {
+        id: {float(e): replies[id, float(e)] for e in values[id]} | {0.0: first} for id in ids
+    }
     more = [
         (id, e)
         for id in ids
-        for e in _more(_nodes(id, plain, model.spans[id], found[id]))
-        or _nearer(model.spans[id], found[id])
+        for e in _more(_nodes(id, plain, model.spans[id], by_effect[id]))
+        or _nearer(model.spans[id], by_effect[id])
     ]
     again = model.answers([_with_effect(model, x0, id, e) for id, e in more]) if more else []
     for (id, e), answer in zip(more, again, strict=True):
-        found[id][e] = answer
+        by_effect[id][e] = answer
     for id in ids:
-        made = _nodes(id, plain, model.spans[id], found[id])
+        made = _nodes(id, plain, model.spans[id], by_effect[id])
         if made is None:
-            failed[id] = str(next(a for a in found[id].values() if isinstance(a, Exception)))
+            failed[id] = str(next(a for a in by_effect[id].values() if isinstance(a, Exception)))
         else:
             nodes[id] = made
     return replace(plain, nodes=nodes, failed=failed, coupling=first.coupling)
 
 
 def carried(known: Expansion, model: ResponseModel, x0: Array) -> Expansion:
-    """The expansion about another x0, where the plain tyre is asked: effects follow ``known``'s B,
-    and are off by a term of second order in x0; curvature and sources of error stay.
+    """The expansion about another x0, where the plain tyre is evaluated: effects follow ``known``'s
+    B, and are off by a term of second order in x0; curvature and sources of error stay.
 
     For many tyres of one case. Raises what the model answered where it has no solution at x0.
     """
@@ -224,8 +226,8 @@ def carried(known: Expansion, model: ResponseModel, x0: Array) -> Expansion:
 
 
 def node_values(span: Span, sloped: Sequence[float] = ()) -> Array:
-    """Where an effect is asked: parameters other than 0, rising; where its slopes are asked, too,
-    of a one-sided range at the shares ``sloped``."""
+    """Sizes at which an effect is evaluated: parameters other than 0, rising; where its slopes are
+    evaluated, too, of a one-sided range at the shares ``sloped``."""
     if span.low < 0 < span.high:
         shares = np.array(TWO_SIDED_SLOPED if sloped else TWO_SIDED)
         return np.sort([*(shares * span.low), *(shares * span.high), *span.also])
@@ -234,11 +236,11 @@ def node_values(span: Span, sloped: Sequence[float] = ()) -> Array:
 
 
 def anchored(expansion: Expansion, model: ResponseModel, wanted: Sequence[Query]) -> Expansion:
-    """The expansion with one or two effects asked again at each of these points; one that has no
-    solution there stays as it was. What an effect alone gains, those with others know."""
+    """The expansion with one or two effects evaluated again at each of these points; one that has
+    no solution there stays as it was. What an effect alone gains, those with others know."""
     nodes, joint = dict(expansion.nodes), dict(expansion.joint)
-    asked = list(zip(wanted, model.answers(wanted), strict=True))
-    for point, answer in sorted(asked, key=lambda each: len(each[0].effects)):
+    answered = list(zip(wanted, model.answers(wanted), strict=True))
+    for point, answer in sorted(answered, key=lambda each: len(each[0].effects)):
         if not isinstance(answer, Answer):
             continue
         (id, e), *others = point.effects.items()
@@ -251,9 +253,9 @@ def anchored(expansion: Expansion, model: ResponseModel, wanted: Sequence[Query]
             shift, tilt = shift - a[0] - B[0] @ d, tilt - B[0]
         if others:
             ((other, size),) = others
-            joint[id, other] = Joint((e, size), d, shift, tilt)
+            joint[id, other] = PairInteraction((e, size), d, shift, tilt)
         else:
-            nodes[id] = replace(nodes[id], anchor=Anchor(e, d, shift, tilt))
+            nodes[id] = replace(nodes[id], anchor=Refinement(e, d, shift, tilt))
     return replace(expansion, nodes=nodes, joint=joint)
 
 
@@ -267,14 +269,14 @@ def _with_effect(model: ResponseModel, x: Array, id: str, e: float) -> Query:
 
 def _nodes(
     id: str, plain: Expansion, span: Span, replies: Mapping[float, Answer | Exception]
-) -> Nodes | None:
+) -> EffectResponse | None:
     """Nodes from 0 outwards as far as there are solutions; None where there is none at all."""
-    asked = {0.0: Answer(plain.eta, plain.jacobian, plain.split), **replies}
+    known = {0.0: Answer(plain.eta, plain.jacobian, plain.split), **replies}
     good = [0.0]
     reach = [max(0.0, span.low), min(0.0, span.high)]  # 0, or the near end of the range
     for side in (1, -1):
         for e in sorted((e for e in replies if e * side > 0), key=abs):
-            if not isinstance(asked[e], Answer):
+            if not isinstance(known[e], Answer):
                 break
             good.append(e)
             if span.low <= e <= span.high:
@@ -283,8 +285,8 @@ def _nodes(
         return None
     low, high = sorted(reach)
     values = np.array(sorted(good))
-    answers = [answer for e in values if isinstance(answer := asked[float(e)], Answer)]
-    return Nodes(
+    answers = [answer for e in values if isinstance(answer := known[float(e)], Answer)]
+    return EffectResponse(
         values,
         np.array([each.eta - plain.eta for each in answers]),
         np.array([each.slopes.get(id, np.zeros_like(plain.eta)) for each in answers]),
@@ -300,7 +302,7 @@ def _nodes(
     )
 
 
-def _more(made: Nodes | None) -> list[float]:
+def _more(made: EffectResponse | None) -> list[float]:
     """Further parameters towards the far ends of the range, where the nodes do not follow the
     effect closely: where what the farthest says last, its slope or its value, matters."""
     if made is None or len(made.values) + sum(made.sloped) < 3:
@@ -355,9 +357,9 @@ def derivatives(nodes: Array) -> Array:
     """d l_j / d e (k, k) of Lagrange's polynomials l_j at the nodes (k,)."""
     apart = nodes[:, None] - nodes + np.eye(len(nodes))
     weights = np.prod(apart, axis=1)
-    found = weights[:, None] / weights / apart
-    np.fill_diagonal(found, 0.0)
-    return found - np.diag(found.sum(axis=1))
+    matrix = weights[:, None] / weights / apart
+    np.fill_diagonal(matrix, 0.0)
+    return matrix - np.diag(matrix.sum(axis=1))
 
 
 def lagrange(nodes: Array, e: Array) -> Array:

@@ -51,7 +51,7 @@ class Contrast:
 
 @dataclass(frozen=True)
 class Gap:
-    """What the plain fit leaves."""
+    """Gap that the plain fit leaves."""
 
     chi2: float
     freedom: int
@@ -65,7 +65,7 @@ class Gap:
 
     @property
     def rms_percent(self) -> float:
-        """Of all residuals."""
+        """RMS of all residuals, per cent."""
         return float(100 * np.sqrt(np.mean(self.residuals**2)))
 
 

@@ -1,4 +1,4 @@
-"""Observations beside the model: one set of rows, covariance and prior for every hypothesis."""
+"""Observations and the model: one set of rows, covariance and prior for every hypothesis."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Toggle:
-    """What was switched in a toggled run."""
+    """Change of one effect in a toggled run."""
 
     id: str  # of the effect
     value: float  # that it was set to, or times which it was
@@ -46,7 +46,7 @@ class Assumed:
 
 
 class Added(NamedTuple):
-    """What effects add at parameters (q,), and how far each of the k may be off it."""
+    """Contribution of effects at parameters (q,), and how far each of the k may be off it."""
 
     shift: Array  # (q, n)
     tilt: Array  # (q, n, v) by x
@@ -57,7 +57,7 @@ class Added(NamedTuple):
 
 @dataclass(frozen=True)
 class InverseProblem:
-    """n observations beside the model."""
+    """n observations and the model that explains them."""
 
     observations: Observations
     expansion: Expansion
@@ -93,7 +93,7 @@ class InverseProblem:
 
     @cached_property
     def splits(self) -> Splits:
-        """Of the pairs."""
+        """Splits of the pairs."""
         return Splits.of(self.observations, self.assumed.split)
 
     @cached_property
@@ -140,13 +140,13 @@ class InverseProblem:
         probability (q,) of their labels."""
         if not self.zeta:
             return eta, jacobian, np.zeros(len(eta))
-        eta, own, part, told = self.veering.mixed(eta, self.zeta)
+        eta, own, part, ln_label = self.veering.mixed(eta, self.zeta)
         beside = jacobian[:, self.veering.partner]
-        return eta, own[:, :, None] * jacobian + part[:, :, None] * beside, told
+        return eta, own[:, :, None] * jacobian + part[:, :, None] * beside, ln_label
 
     def added(self, effects: Mapping[str, Array], count: int) -> Added:
-        """What effects, each (count,), add. Squares of splits add up, each counted from the plain
-        tyre's."""
+        """Contribution of effects, each (count,). Squares of splits add up, each counted from the
+        plain tyre's."""
         n, v = len(self.places), len(self.expansion.x0)
         shift, tilt = np.zeros((count, n)), np.zeros((count, n, v))
         own = self.expansion.split[self.places] ** 2
@@ -179,7 +179,7 @@ class InverseProblem:
         return self.with_mixed_laws(Added(shift, tilt, split, off, beside))
 
     def with_mixed_laws(self, added: Added) -> Added:
-        """What effects may be off by as coupled modes have it."""
+        """Transform the response errors of effects to the coupled modes."""
         if not self.zeta:
             return added
         off, beside = (each @ self.mixed.T for each in (added.off, added.beside))

@@ -46,12 +46,12 @@ def exchanged(
     seen = lambda p: np.array([refit(p, {}, 1, extra).ln_evidence[0] for extra in scatters])
     plain = seen(problem)
     readings = list(_near(problem.observations))
-    found = [pair for pair in readings if np.any(seen(read(*pair)) > plain + MIN_GAIN)]
-    if not found:
+    pairs = [pair for pair in readings if np.any(seen(read(*pair)) > plain + MIN_GAIN)]
+    if not pairs:
         return None
     # with sets of effects: two strong ones, beside which no single one fits, look like an exchange
     best, most = None, _all(hypotheses) + float(np.log(1 - SWAP_PROBABILITY))
-    for pair in found:
+    for pair in pairs:
         ln = _all(weigh(read(*pair))) + float(np.log(SWAP_PROBABILITY / len(readings)))
         if ln > most:
             best, most = pair, ln
@@ -59,24 +59,24 @@ def exchanged(
 
 
 def rows_if_exchanged(observations: Observations) -> list[ModelRow]:
-    """All that a model is asked of the observations, whichever labels are exchanged."""
+    """All rows that the observations need of a model, whichever labels are exchanged."""
     read = [observations, *(with_exchanged(observations, a, b) for a, b in _near(observations))]
     return list(dict.fromkeys(row.row for each in read for row in each.rows))
 
 
 def exchange_shifts(observations: Observations) -> Array:
-    """What each exchange of labels near each other would have done to the observations, (n, k);
-    where one of the two was not measured, what it does to the other elsewhere."""
+    """Shift of the observations by each exchange of labels near each other, (n, k); where one of
+    the two was not measured, the shift of the other elsewhere."""
     labels = np.array([str(row.label) for row in observations.rows])
-    found = []
+    shifts = []
     for a, b in _near(observations):
         there = with_exchanged(observations, a, b)
         shift = there.y - observations.y
         alone = np.array([str(row.label) for row in there.rows]) != labels
         for label in (str(a), str(b)):
             shift[alone & (labels == label)] = shift[~alone & (labels == label)].mean()
-        found.append(shift)
-    return np.array(found).reshape(-1, len(labels)).T
+        shifts.append(shift)
+    return np.array(shifts).reshape(-1, len(labels)).T
 
 
 def with_exchanged(observations: Observations, a: Label, b: Label) -> Observations:

@@ -6,8 +6,8 @@ y_a: the frequencies with the labels of a, less those that are foreign under it;
 one covariance for all. So a labeling that an effect makes likelier counts under that effect. P(a):
 what of the tree's weight of a is not its own evidence of y_a (`labelling.tree`): modes that were
 missed, foreign frequencies, the views, about the plain tyre. Labelings are looked for about that
-too, its modes off smoothly; those that have `LEAST_PROBABLE` are weighed, the first
-`MOST_READINGS`.
+too, its modes off smoothly; those that have `MIN_READING_PROBABILITY` are weighed, the first
+`MAX_READINGS`.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from ..labelling.label import Labelled
 from ..labels import FOREIGN_WORDS
 from .evidence import Hypothesis
 from .observations import Observations
-from .robustness import Robustness, in_words, said
+from .robustness import Robustness, in_words, verdict_probability
 from .several import probabilities
 from .verdict import Verdict, decide
 
 Array = np.ndarray
-LEAST_PROBABLE, MOST_READINGS = 0.01, 5
+MIN_READING_PROBABILITY, MAX_READINGS = 0.01, 5
 REFUTED = 1e-6  # probability of a reading for which the model is not asked again
 
 
 @dataclass(frozen=True)
 class Reading:
-    """What was measured under one labeling: ln P(a), and the labels of frequencies, in words, that
+    """Measurements under one labeling: ln P(a), and the labels, in words, of the frequencies that
     came without."""
 
     observations: Observations
@@ -42,42 +42,44 @@ class Reading:
     labels: Sequence[tuple[str, Label | None]] = ()
 
 
-def likely(told: Labelled, observed: Callable[[list[Measurement]], Observations]) -> list[Reading]:
+def likely(
+    labelled: Labelled, observed: Callable[[list[Measurement]], Observations]
+) -> list[Reading]:
     """The readings to be weighed, the tree's likeliest first."""
-    found = told.found.labelings
-    count = max(1, int((found.probabilities[:MOST_READINGS] >= LEAST_PROBABLE).sum()))
-    hertz = [None if own.label else f"{own.value:.4g} Hz" for own, *_ in told.frequencies]
+    labelings = labelled.found.labelings
+    count = max(1, int((labelings.probabilities[:MAX_READINGS] >= MIN_READING_PROBABILITY).sum()))
+    hertz = [None if own.label else f"{own.value:.4g} Hz" for own, *_ in labelled.frequencies]
     return [
         Reading(
-            observed(told.under(k)),
-            float(found.ln_prior[k]),
-            [(f, x) for f, x in zip(hertz, told.found.labels(k), strict=True) if f],
+            observed(labelled.under(k)),
+            float(labelings.ln_prior[k]),
+            [(f, x) for f, x in zip(hertz, labelled.found.labels(k), strict=True) if f],
         )
         for k in range(count)
     ]
 
 
-def weighed_anew(told: Labelled, p: Sequence[float]) -> Labelled:
+def weighed_anew(labelled: Labelled, p: Sequence[float]) -> Labelled:
     """The labelings with the probabilities ``p`` of the first ones' readings."""
-    anew = told.found.labelings.weighed_anew(np.array(p))
-    return replace(told, found=replace(told.found, labelings=anew))
+    anew = labelled.found.labelings.weighed_anew(np.array(p))
+    return replace(labelled, found=replace(labelled.found, labelings=anew))
 
 
-def shares(readings: Sequence[Reading], found: Sequence[Sequence[Hypothesis]]) -> Array:
+def shares(readings: Sequence[Reading], per_reading: Sequence[Sequence[Hypothesis]]) -> Array:
     """P(a | y) (a,) by the hypotheses under each reading."""
     ln = np.array(
         [
             own.ln_prior + np.logaddexp.reduce([h.ln_evidence + np.log(h.prior) for h in here])
-            for own, here in zip(readings, found, strict=True)
+            for own, here in zip(readings, per_reading, strict=True)
         ]
     )
     return np.asarray(np.exp(ln - np.logaddexp.reduce(ln)))
 
 
-def averaged(p: Array, found: Sequence[Sequence[Hypothesis]]) -> dict[str, float]:
+def averaged(p: Array, per_reading: Sequence[Sequence[Hypothesis]]) -> dict[str, float]:
     """P(h | y) by key, of readings that have ``p``."""
     total: dict[str, float] = {}
-    for share, here in zip(p.tolist(), found, strict=True):
+    for share, here in zip(p.tolist(), per_reading, strict=True):
         for key, own in probabilities(here).items():
             total[key] = total.get(key, 0.0) + share * own
     return total
@@ -86,20 +88,21 @@ def averaged(p: Array, found: Sequence[Sequence[Hypothesis]]) -> dict[str, float
 def over_labels(
     alone: Robustness,
     readings: Sequence[Reading],
-    found: Sequence[Sequence[Hypothesis]],
+    per_reading: Sequence[Sequence[Hypothesis]],
     p: Array,
     verdict: Verdict,
     variables: int,
 ) -> Robustness:
-    """What a verdict over all readings hangs on: on labels, too, where another verdict holds under
-    a reading that has `LEAST_PROBABLE`. alone: of the verdict under the likeliest reading."""
+    """Robustness of a verdict over all readings: it depends on labels, too, where another verdict
+    holds under a reading that has `MIN_READING_PROBABILITY`. alone: of the verdict under the
+    likeliest reading."""
     best = int(np.argmax(p))
     same, changes = True, list[str]()
-    between = [said(averaged(p, found), verdict)]
-    for k in np.flatnonzero(p >= LEAST_PROBABLE).tolist():
-        here = probabilities(found[k])
-        between.append(said(here, verdict))
-        other = decide(found[k], here, len(readings[k].observations.rows), variables)
+    between = [verdict_probability(averaged(p, per_reading), verdict)]
+    for k in np.flatnonzero(p >= MIN_READING_PROBABILITY).tolist():
+        here = probabilities(per_reading[k])
+        between.append(verdict_probability(here, verdict))
+        other = decide(per_reading[k], here, len(readings[k].observations.rows), variables)
         if (other.kind, other.key) != (verdict.kind, verdict.key):
             same = same and k != best
             changes.append(f"{_told(readings, p, k, best)}, {in_words(other)})")

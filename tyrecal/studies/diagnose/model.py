@@ -1,4 +1,4 @@
-"""What the diagnosis asks a model, and the model that answers.
+"""Interface between the diagnosis and the model that answers it.
 
 eta(x, e, c) = ln f over rows (mode, pressure) and ln mass; x: logarithms of the design variables
 (linear ones: in units of the width of their bounds); e: parameters of effects; c: constants that
@@ -23,7 +23,7 @@ ModelRow = tuple[Label | None, Where]  # a mode, None: the mass
 
 @dataclass(frozen=True)
 class Span:
-    """An effect that can be asked for: the range of its parameter."""
+    """An effect that can be evaluated: the range of its parameter."""
 
     low: float
     high: float
@@ -39,7 +39,7 @@ class Span:
 
 @dataclass(frozen=True)
 class Query:
-    """Where the model is asked."""
+    """A point at which the model is evaluated."""
 
     x: Array  # (v,)
     effects: Mapping[str, float] = field(default_factory=dict)  # parameter by id, absent: 0
@@ -51,7 +51,7 @@ class Query:
 
 @dataclass(frozen=True)
 class Coupling:
-    """What the sources of error couple modes by, see `veering`."""
+    """Coupling of modes by the sources of error, see `veering`."""
 
     partner: Array  # (n,) row of the other mode at the same pressure, -1: there is none
     size: Array  # (n,) standard deviation of q over lambda
@@ -60,7 +60,7 @@ class Coupling:
 
 @dataclass(frozen=True)
 class Answer:
-    """What the model says there."""
+    """Answer of the model to one query."""
 
     eta: Array  # (n,) ln f or ln mass
     jacobian: Array  # (n, v) d eta / d x
@@ -77,7 +77,7 @@ def state_of(where: Where) -> TyreState:
 
 
 class ResponseModel(Protocol):
-    """A model that can be asked."""
+    """A model that answers queries."""
 
     variables: Sequence[str]  # names of x
     start: Array  # (v,) centre of what x can be

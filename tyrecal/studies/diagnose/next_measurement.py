@@ -1,4 +1,5 @@
-"""The measurement worth making next: what each is expected to tell of which explanation holds.
+"""The measurement worth making next: how much each is expected to show about which explanation
+holds.
 
 Gain of a choice: information for an hour of work. With the x of the fit integrated out, data that
 are there (1) and further ones (2) are jointly normal, in
@@ -22,7 +23,7 @@ import numpy as np
 
 from ...simulate.modes.label import Label
 from .evidence import NONE, OUTSIDE
-from .expansion import Nodes
+from .expansion import EffectResponse
 from .inverse_problem import InverseProblem, Toggle
 from .model import Answer, ModelRow, Query, ResponseModel
 from .observations import Observable, Observations
@@ -32,7 +33,7 @@ Array = np.ndarray
 Sizes = Mapping[str, Array]  # equally probable parameters (q,) of an explanation's effects, by id
 MIN_PROBABILITY, MAX_EXPLANATIONS = 0.005, 10  # others do not count
 SIZES = 7  # of each explanation
-HOURS = dict(
+COST_HOURS = dict(
     weigh=0.1,
     rim=0.2,
     seat=0.2,
@@ -47,7 +48,7 @@ HOURS = dict(
     cut=8.0,
 )
 """Of a laboratory, as an orientation."""
-READ = {
+DIRECT_READINGS = {
     "rim": ("measure the rim between its flanges", {"rim_width"}),
     "seat": ("look how level the moulded line runs with the flange", {"bead_seat"}),
     "calliper": ("check gauges and widths with a calliper", {"tread_wear", "sidewall_gauge"}),
@@ -75,7 +76,7 @@ CAVITY_GAS, HELIUM = "cavity_air", 0.14  # a seventh of the mass
 READING = 0.1  # of an effect's range, by which such a reading may be off
 CHECKED = 0.25  # of a constant's standard deviation, likewise
 OFFERED = (0.4, 2 / 3, 5 / 6, 1.0)  # of the tyre's inflation pressure
-LEAST_APART = 0.25  # of it, from every pressure measured so far, for a new one to be offered
+MIN_OFFERED_STEP = 0.25  # of it, from every pressure measured so far, for a new one to be offered
 ABOVE_kPa = (40.0, 80.0)  # it, offered too: as much as any tyre bears
 MASS_PERCENT = 0.5
 
@@ -98,24 +99,26 @@ class OtherStates:
 
 
 def offered_kPa(inflation_kPa: float, measured: Sequence[float]) -> list[float]:
-    """Pressures that may be measured beside these."""
+    """Pressures that may be measured in addition to these."""
     there = [float(round(share * inflation_kPa, -1)) for share in OFFERED]
     there += [inflation_kPa + more for more in ABOVE_kPa]
     return [
-        p for p in there if all(abs(p - each) >= LEAST_APART * inflation_kPa for each in measured)
+        p
+        for p in there
+        if all(abs(p - each) >= MIN_OFFERED_STEP * inflation_kPa for each in measured)
     ]
 
 
 @dataclass(frozen=True)
-class Look:
-    """What a set of rows shows, those that are there first."""
+class CandidateRows:
+    """Rows of a measurement, those that are there first, and what they show."""
 
     sigma: Array  # (n, n)
     jacobian: Array  # (n, v)
     shifts: Mapping[str, Array]  # (q, n) of each explanation at its sizes
 
     def information(self, known: int, likely: Mapping[str, float], spread: Array) -> float:
-        """Of what comes after the ``known`` rows, in nats; spread (v,): of x."""
+        """Information in the rows after the ``known`` ones, in nats; spread (v,): of x."""
         S = self.sigma + (self.jacobian * spread**2) @ self.jacobian.T
         foretold = np.linalg.solve(S[:known, :known], S[:known, known:])
         root = np.linalg.cholesky(S[known:, known:] - S[known:, :known] @ foretold)
@@ -153,25 +156,25 @@ def rank(
         return []
     problem = replace(problem, zeta=0.0)
     of = {key: sizes.get(key, {}) for key in likely}
-    now = look(problem, d, of)
-    offered: list[tuple[str, float, Look]] = []
+    now = rows_shown(problem, d, of)
+    offered: list[tuple[str, float, CandidateRows]] = []
     of_section = [k for k, name in enumerate(sources) if name.startswith(SECTION)]
     for k, source in enumerate(sources):
         if k not in of_section:
             words = f"measure by itself: {source.replace('_', ' ')}"
-            offered.append((words, HOURS["check"], with_readings(problem, now, of, [], [k])))
+            offered.append((words, COST_HOURS["check"], with_readings(problem, now, of, [], [k])))
     ids = list(dict.fromkeys(id for each in of.values() for id in each))
-    for tool, (words, shown) in READ.items():
+    for tool, (words, shown) in DIRECT_READINGS.items():
         here, known = [id for id in ids if id in shown], of_section if tool == "cut" else []
         if here or known:
-            offered.append((words, HOURS[tool], with_readings(problem, now, of, here, known)))
+            offered.append((words, COST_HOURS[tool], with_readings(problem, now, of, here, known)))
     words = "dismount the tyre, mount it again and measure all once more"
-    offered.append((words, HOURS["mount"], again(problem, now, d, of)))
+    offered.append((words, COST_HOURS["mount"], again(problem, now, d, of)))
     if clamped := [id for id in ids if id in HELD_BY]:
         words = "clamp the rim rigidly in place of the spindle and measure again"
         changes = [_absent(problem, id) for id in clamped]
-        offered.append((words, HOURS["clamp"], again(problem, now, d, of, changes)))
-    every = HELD_BY.union(*(shown for _, shown in READ.values()))
+        offered.append((words, COST_HOURS["clamp"], again(problem, now, d, of, changes)))
+    every = HELD_BY.union(*(shown for _, shown in DIRECT_READINGS.values()))
     for id in (id for id in ids if id not in every):
         change, tool = _absent(problem, id), "toggle"
         toggle = problem.spans[id].toggle if id in problem.spans else ""
@@ -179,7 +182,7 @@ def rank(
         if id == CAVITY_GAS:
             words, tool = "inflate with helium and measure again", "helium"
             change = replace(change, value=HELIUM, times=True)
-        offered.append((words, HOURS[tool], again(problem, now, d, of, [change])))
+        offered.append((words, COST_HOURS[tool], again(problem, now, d, of, [change])))
     if further:
         offered += _more_rows(problem, now, d, of, further)
     there = len(now.sigma)
@@ -194,14 +197,14 @@ def _absent(problem: InverseProblem, id: str) -> Toggle:
     return Toggle(id, 0.0, base=problem.spans[id].base if id in problem.spans else 0.0)
 
 
-def look(problem: InverseProblem, d: Array, sizes: Mapping[str, Sizes]) -> Look:
+def rows_shown(problem: InverseProblem, d: Array, sizes: Mapping[str, Sizes]) -> CandidateRows:
     """At the rows that are there."""
     shifts = {key: _shifts(problem, each, d) for key, each in sizes.items()}
-    return Look(problem.sigma, problem.plain(d)[1], shifts)
+    return CandidateRows(problem.sigma, problem.plain(d)[1], shifts)
 
 
 def _shifts(problem: InverseProblem, sizes: Sizes, d: Array) -> Array:
-    """What an explanation adds (q, n) at x0 + d."""
+    """Shift (q, n) that an explanation adds at x0 + d."""
     added = problem.added(sizes, _count(sizes))
     return np.asarray(added.shift + added.tilt @ d)
 
@@ -212,11 +215,11 @@ def _count(sizes: Sizes) -> int:
 
 def with_readings(
     problem: InverseProblem,
-    now: Look,
+    now: CandidateRows,
     sizes: Mapping[str, Sizes],
     ids: Sequence[str],
     sources: Sequence[int],
-) -> Look:
+) -> CandidateRows:
     """With readings of effects' sizes, over their ranges, and of sources of error themselves."""
     n, m = len(now.sigma), len(ids) + len(sources)
     spans = [problem.spans[id] for id in ids]
@@ -233,16 +236,18 @@ def with_readings(
         for i, (id, end) in enumerate(zip(ids, far, strict=True)):
             more[:, i] = each.get(id, 0.0) / end
         shifts[key] = np.hstack([now.shifts[key], more])
-    return Look(sigma, np.vstack([now.jacobian, np.zeros((m, len(problem.centre)))]), shifts)
+    return CandidateRows(
+        sigma, np.vstack([now.jacobian, np.zeros((m, len(problem.centre)))]), shifts
+    )
 
 
 def again(
     problem: InverseProblem,
-    now: Look,
+    now: CandidateRows,
     d: Array,
     sizes: Mapping[str, Sizes],
     changes: Sequence[Toggle] = (),
-) -> Look:
+) -> CandidateRows:
     """With one run more, in which something was switched."""
     o, run = problem.observations, 1 + max(row.run for row in problem.observations.rows)
     first = np.array([row.run == 0 for row in o.rows])
@@ -257,12 +262,12 @@ def again(
         later = _shifts(problem, switched, d)[:, first]
         shifts[key] = np.hstack([now.shifts[key], later])
     sigma = problem.covariance(both, problem.constants[more])
-    return Look(sigma, now.jacobian[more], shifts)
+    return CandidateRows(sigma, now.jacobian[more], shifts)
 
 
-def _along(nodes: Nodes, e: float, slope: Array) -> Array:
-    """What an effect of parameter e adds to further rows (m,), whose slopes by it are known at 0:
-    they bend as those that it was asked for do, on the whole; 0 where there is no slope."""
+def _along(nodes: EffectResponse, e: float, slope: Array) -> Array:
+    """Shift of further rows (m,) by an effect of parameter e, whose slopes by it are known at 0:
+    they bend as the rows for which it was evaluated do, on the whole; 0 where there is no slope."""
     line, bent = nodes.slope[nodes.values == 0][0] * e, nodes.shift_at(np.array([e]))[0]
     known = np.isfinite(line)
     share = bent[known] @ line[known] / (line[known] @ line[known]) if line[known].any() else 1.0
@@ -276,8 +281,12 @@ def _grown(shifts: Array, mean: Array) -> Array:
 
 
 def _more_rows(
-    problem: InverseProblem, now: Look, d: Array, sizes: Mapping[str, Sizes], further: OtherStates
-) -> list[tuple[str, float, Look]]:
+    problem: InverseProblem,
+    now: CandidateRows,
+    d: Array,
+    sizes: Mapping[str, Sizes],
+    further: OtherStates,
+) -> list[tuple[str, float, CandidateRows]]:
     """Other pressures, higher harmonics and the mass, as far as the model has an answer at the
     explanations' mean sizes."""
     o = problem.observations
@@ -286,14 +295,14 @@ def _more_rows(
     offered: list[tuple[str, float, list[ModelRow]]] = []
     for p in offered_kPa(further.inflation_kPa, pressures):
         more: list[ModelRow] = [(label, p) for label in labels]
-        offered.append((f"measure the same modes at {p:g} kPa", HOURS["pressure"], more))
+        offered.append((f"measure the same modes at {p:g} kPa", COST_HOURS["pressure"], more))
     top = max(label.c for label in labels)
     higher = [Label(top + 1, 0), Label(top + 1, 1)]
     measured_in = dict.fromkeys(row.row[1] for row in o.rows if row.label)
     more = [(label, where) for label in higher for where in measured_in]
-    offered.append((f"measure {higher[0]} and {higher[1]}, too", HOURS["harmonics"], more))
+    offered.append((f"measure {higher[0]} and {higher[1]}, too", COST_HOURS["harmonics"], more))
     if all(row.label for row in o.rows):
-        offered.append(("weigh the tyre", HOURS["weigh"], [(None, 0.0)]))
+        offered.append(("weigh the tyre", COST_HOURS["weigh"], [(None, 0.0)]))
     rows = list(dict.fromkeys(row for _, _, more in offered for row in more))
     model = further.model(rows)
     x = problem.expansion.x0 + d
@@ -337,5 +346,5 @@ def _more_rows(
         shifts = {key: np.hstack([now.shifts[key], added[key][:, at]]) for key in sizes}
         jacobian = np.vstack([now.jacobian, plain.jacobian[at]])
         sigma = problem.covariance(both, constants)
-        result.append((words, hours, Look(sigma, jacobian, shifts)))
+        result.append((words, hours, CandidateRows(sigma, jacobian, shifts)))
     return result

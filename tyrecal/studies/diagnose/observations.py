@@ -25,7 +25,7 @@ ObservationKey = tuple[str, Label | None, float, RimSupport | None]
 
 @dataclass(frozen=True)
 class Observable:
-    """What one number is."""
+    """Identity of one number: quantity, mode, state and run."""
 
     quantity: str
     label: Label | None  # of the mode; None: the mass
@@ -40,19 +40,19 @@ class Observable:
 
     @classmethod
     def of(cls, row: ModelRow) -> Observable:
-        """A mode or the mass that a model is asked of."""
+        """The mode, or the mass, of a model's row."""
         label, state = row[0], state_of(row[1])
         quantity = "frequency_Hz" if label else "mass_kg"
         return cls(quantity, label, state.pressure_kPa or 0.0, rim=state.rim)
 
     @property
     def state(self) -> TyreState:
-        """What the tyre was in."""
+        """State of the tyre when it is measured."""
         return TyreState(self.pressure_kPa, 0.0, self.rim)
 
     @property
     def row(self) -> ModelRow:
-        """What a model is asked of."""
+        """Row of the model to which it belongs."""
         return self.label, self.state if self.rim else self.pressure_kPa
 
 
@@ -111,23 +111,23 @@ def observe(
 
 def _used(run: Sequence[Measurement], left_out: list[str]) -> dict[tuple[str, ...], Measurement]:
     """Readings by (quantity, label, pressure, rim, member); of two members, 1 is the lower."""
-    found: dict[tuple, Measurement] = {}
+    by_key: dict[tuple, Measurement] = {}
     for each in run:
         if each.load_N or each.quantity not in ("frequency_Hz", "mass_kg"):
             what = f"{each.label} under load" if each.load_N and each.label else each.quantity
             left_out.append(f"{Path(each.place).name}, {what}: not used by the diagnosis")
             continue
         pressure = each.pressure_kPa if each.label else 0.0
-        found[each.quantity, each.label, pressure, each.rim, each.member] = each
-    for key in [key for key in found if key[4] == "1"]:
+        by_key[each.quantity, each.label, pressure, each.rim, each.member] = each
+    for key in [key for key in by_key if key[4] == "1"]:
         twin = (*key[:4], "2")
-        if twin in found and found[twin].value < found[key].value:
-            found[key], found[twin] = found[twin], found[key]
-    return found
+        if twin in by_key and by_key[twin].value < by_key[key].value:
+            by_key[key], by_key[twin] = by_key[twin], by_key[key]
+    return by_key
 
 
 def _unrepeated(runs: Sequence[dict]) -> Iterator[str]:
-    """What `_scatter` cannot use of repeats, a value of which has to stand in every file."""
+    """Repeats that `_scatter` cannot use, because a value has to be in every file."""
     keys = dict.fromkeys(key for run in runs for key in run)
     some = [key for key in keys if not all(key in run for run in runs)]
     first, later = [k for k in some if k in runs[0]], [k for k in some if k not in runs[0]]

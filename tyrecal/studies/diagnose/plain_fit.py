@@ -38,7 +38,9 @@ def plain_fit(
     information = np.diag(model.spread**-2.0)
     more = np.zeros((len(rows), 0)) if moved is None else moved[run0]
 
-    def descended(x: Array, asked: Callable[[Array], Answer | Exception], answer: Answer) -> Array:
+    def descended(
+        x: Array, evaluate: Callable[[Array], Answer | Exception], answer: Answer
+    ) -> Array:
         """From x, where ``answer`` is the model's."""
 
         def misfit(x: Array, answer: Answer) -> float:
@@ -55,11 +57,11 @@ def plain_fit(
                 return x  # which was asked: one step on there may be no solution
             for halvings in range(6):
                 trial = x + step / 2**halvings
-                found = asked(trial)
-                if isinstance(found, Answer):
-                    there = misfit(trial, found)
+                reply = evaluate(trial)
+                if isinstance(reply, Answer):
+                    there = misfit(trial, reply)
                     if there < value:
-                        x, answer, value = trial, found, there
+                        x, answer, value = trial, reply, there
                         break
             else:
                 return x
@@ -76,12 +78,12 @@ def plain_fit(
     x = np.array(model.start, float)
     if known is not None:
         inverse = weights(known.constants)
-        said = lambda x: Answer(*known.plain(x), known.split)
-        near = descended(x, said, said(x))
+        expanded = lambda x: Answer(*known.plain(x), known.split)
+        near = descended(x, expanded, expanded(x))
         answer = told(near)
         if isinstance(answer, Answer):
             return descended(near, told, answer)
-        return descended(x, told, said(x))
+        return descended(x, told, expanded(x))
     for again in range(MAX_COVARIANCES):
         answer = told(x, constants=True)
         if isinstance(answer, Exception):

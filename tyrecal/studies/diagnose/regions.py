@@ -10,7 +10,7 @@ import numpy as np
 
 from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator
-from ...simulate.modes.find import Found
+from ...simulate.modes.find import LabelledModes
 from ...tyre.case import LoadedCase, number_at
 from ...tyre.case.schema import Rubber, Solid
 from ...tyre.own_deck.numbers import moduli
@@ -35,7 +35,7 @@ class SectionPart:
 
 
 class Parted(Protocol):
-    """A tyre whose parts may be asked for."""
+    """A tyre that can give its parts."""
 
     case: LoadedCase
     evaluator: Evaluator
@@ -69,10 +69,10 @@ def regions(model: Parted, x: Array) -> list[SectionPart]:
     own = model.values(x)
     taken = {path: own[name] for name, v in case.case.variables.items() for path in v.sets}
     design = {**numbers, **taken}
-    asked = [model.in_state(state, design, list(numbers)) for state in model.states]
-    at: dict[TyreState, Found] = {}
-    for state, each in zip(model.states, problem.modes_of(asked), strict=True):
-        if not isinstance(each, Found):
+    designs = [model.in_state(state, design, list(numbers)) for state in model.states]
+    at: dict[TyreState, LabelledModes] = {}
+    for state, each in zip(model.states, problem.modes_of(designs), strict=True):
+        if not isinstance(each, LabelledModes):
             raise each
         at[state] = each
     weighed = at[model.states[0]].evaluation

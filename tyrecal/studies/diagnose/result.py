@@ -16,7 +16,7 @@ from pydantic import Field
 from ...simulate.modes.label import Label
 from ..labels import Labels
 from ..result import CsvRow, Result, ResultPart, rows_csv
-from .constants_told import ConstantShift, constants_told
+from .constants_told import ConstantShift, constants_posterior
 from .evidence import NONE, OUTSIDE
 from .gap import projection
 from .observations import Observable
@@ -32,7 +32,7 @@ ROW_PATTERN = re.compile(
     r"\[(\d{1,3}),(\d{1,3})\](?: (axial|torsional))? at ([\d.]{1,9}) kPa"
     r"(?:, rim (fixed|springs|free))?"
 )
-LEAST_PROBABILITY = 1e-6  # of an effect that is listed
+MIN_LISTED_PROBABILITY = 1e-6  # of an effect that is listed
 
 
 class EffectSize(ResultPart):
@@ -44,7 +44,7 @@ class EffectSize(ResultPart):
     unit: str
 
 
-class Explained(ResultPart):
+class EffectEstimate(ResultPart):
     """The size of the effect that a diagnosis names or likes best."""
 
     effect: str
@@ -65,11 +65,11 @@ class Residual(ResultPart):
 
     @property
     def of(self) -> Observable | None:
-        """What was measured, where it is a frequency."""
-        found = ROW_PATTERN.fullmatch(self.row)
-        if not found:
+        """Observable that was measured, where it is a frequency."""
+        match = ROW_PATTERN.fullmatch(self.row)
+        if not match:
             return None
-        c, m, kind, pressure, rim = found.groups()
+        c, m, kind, pressure, rim = match.groups()
         label = Label(int(c), int(m), kind)
         return Observable("frequency", label, float(pressure), self.run, rim)  # type: ignore[arg-type]
 
@@ -92,7 +92,7 @@ class ContrastPart(ResultPart):
 
 
 class GapPart(ResultPart):
-    """What calibration leaves; rms in per cent by group."""
+    """Gap that calibration leaves; rms in per cent by group."""
 
     p_value: float
     chi2: float
@@ -140,7 +140,7 @@ class NextMeasurement(ResultPart):
 
 
 class RobustPart(ResultPart):
-    """What the verdict hangs on."""
+    """Dependence of the verdict on the assumptions."""
 
     robust: bool
     hangs_on: list[str]
@@ -155,7 +155,7 @@ class DiagnosisResult(Result):
     verdict: VerdictKind
     words: str
     effect: str | None
-    parameter: Explained | None
+    parameter: EffectEstimate | None
     parameters: dict[str, EffectSize] = Field(default={})  # of every effect of several
     also: list[Further] = Field(default=[])  # perhaps there too
     constants: list[ConstantShift] = Field(default=[])
@@ -226,9 +226,9 @@ def diagnosis_result(
     section: Sequence[FieldValue] = (),
     labels: Labels | None = None,
 ) -> DiagnosisResult:
-    """What was found. ``calibrated``: see `calibrated_variables`."""
+    """Result of a diagnosis for its files. ``calibrated``: see `calibrated_variables`."""
     d, shown = diagnosis, diagnosis.verdict.key or diagnosis.best
-    found = DiagnosisResult(
+    result = DiagnosisResult(
         format=1,
         verdict=d.verdict.kind,
         words=d.verdict.words,
@@ -240,7 +240,7 @@ def diagnosis_result(
             if shown and holds(shown, id)
         },
         also=list(d.verdict.also),
-        constants=constants_told(d),
+        constants=constants_posterior(d),
         robust=RobustPart(
             robust=d.robustness.robust,
             hangs_on=list(d.robustness.hangs_on),
@@ -272,7 +272,7 @@ def diagnosis_result(
         left_out=list(d.problem.observations.left_out),
         not_evaluated=dict(d.problem.expansion.failed),
     )
-    return found.model_copy(update={"calibrated": calibrated}) if calibrated else found
+    return result.model_copy(update={"calibrated": calibrated}) if calibrated else result
 
 
 def _gap(diagnosis: Diagnosis, under_load: UnderLoad | None) -> GapPart:
@@ -308,10 +308,10 @@ def _gap(diagnosis: Diagnosis, under_load: UnderLoad | None) -> GapPart:
     )
 
 
-def _under_load(found: UnderLoad | None) -> UnderLoadPart | None:
-    if found is None:
+def _under_load(comparison: UnderLoad | None) -> UnderLoadPart | None:
+    if comparison is None:
         return None
-    effect = found.tyres[1] if len(found.tyres) > 1 else None
+    effect = comparison.tyres[1] if len(comparison.tyres) > 1 else None
     return UnderLoadPart(
         effect=effect,
         rows=[
@@ -325,15 +325,15 @@ def _under_load(found: UnderLoad | None) -> UnderLoadPart | None:
                 calibrated_percent=100 * row.off[NONE] if NONE in row.off else None,
                 effect_percent=100 * row.off[effect] if effect and effect in row.off else None,
             )
-            for row in found.rows
+            for row in comparison.rows
         ],
-        calibrated_rms_percent=found.rms_percent(NONE),
-        effect_rms_percent=found.rms_percent(effect) if effect else None,
-        failed=list(found.failed),
+        calibrated_rms_percent=comparison.rms_percent(NONE),
+        effect_rms_percent=comparison.rms_percent(effect) if effect else None,
+        failed=list(comparison.failed),
     )
 
 
-def _explained(diagnosis: Diagnosis, key: str | None) -> Explained | None:
+def _explained(diagnosis: Diagnosis, key: str | None) -> EffectEstimate | None:
     """``detectability``: lambda of all that ``key`` names, at its likeliest size."""
     if key is None:
         return None
@@ -342,10 +342,10 @@ def _explained(diagnosis: Diagnosis, key: str | None) -> Explained | None:
     shift = diagnosis.bare.added(effects, 1)[0][0] - diagnosis.bare.added({}, 1)[0][0]
     P, _, _ = projection(diagnosis.bare, hypothesis.fitted.d[hypothesis.best])
     size = {**diagnosis.parameter(key), "lambda": float(shift @ P @ shift)}
-    return Explained(effect=key.split("+")[0], **size)
+    return EffectEstimate(effect=key.split("+")[0], **size)
 
 
 def _listed(probabilities: Mapping[str, float]) -> dict[str, float]:
     """Likeliest first; none and outside always."""
     order = sorted(probabilities.items(), key=lambda item: -item[1])
-    return {key: p for key, p in order if p > LEAST_PROBABILITY or key in (NONE, OUTSIDE)}
+    return {key: p for key, p in order if p > MIN_LISTED_PROBABILITY or key in (NONE, OUTSIDE)}

@@ -23,7 +23,7 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True)
-class Changed:
+class Perturbation:
     """The same data seen otherwise. words: what is other."""
 
     words: str
@@ -33,13 +33,13 @@ class Changed:
 
     @property
     def parts_near_modes(self) -> bool:
-        """Whether a row that is left out is one of two that are coupled: what is told of their
-        labels, and what the other is mixed with, is then not what it was."""
+        """Whether a row that is left out is one of two that are coupled: what the data show of
+        their labels, and what the other is mixed with, is then not what it was."""
         return bool(self.problem.veering.size[~self.keep].any())
 
 
 @dataclass(frozen=True)
-class Line:
+class LinearFit:
     """An explanation at parameters (q,) about its re-fits, near modes coupled in one way."""
 
     place: int | None  # in the rule of what couples them; None: none are
@@ -55,7 +55,7 @@ class Line:
         at = problem if self.place is None else problem.integrand[self.place]
         return np.asarray(at.sigma + laws**2 * self.by_law + self.beside)
 
-    def ln_evidence(self, other: Changed, extra: Array | None) -> tuple[Array, Array]:
+    def ln_evidence(self, other: Perturbation, extra: Array | None) -> tuple[Array, Array]:
         """ln Z and chi2 of the data (q,). extra (q, n, n): more covariance."""
         problem, keep = other.problem, other.keep
         S = self.covariance(problem, other.laws)
@@ -75,31 +75,31 @@ def lines(
     near: Array,
     among: Mapping[int, float] | None = None,
     extra: Array | None = None,
-) -> list[Line]:
+) -> list[LinearFit]:
     """One for each point of the rule in what couples near modes, or one if none are, about re-fits
     that start from x - x0 = near (q, v); the rest as in `refit`."""
-    added, found = problem.added(effects, len(near)), []
+    added, result = problem.added(effects, len(near)), []
     places: list[int | None] = [*(among or range(len(problem.integrand)))]
     for k in places or [None]:
         at = problem if k is None else problem.integrand[k]
         d = refit_at(problem, at, added, extra, near, COUPLED_STEPS).d
-        found.append(line_about(problem, added, d, k))
-    return found
+        result.append(line_about(problem, added, d, k))
+    return result
 
 
-def line_about(problem: InverseProblem, added: Added, d: Array, place: int | None) -> Line:
+def line_about(problem: InverseProblem, added: Added, d: Array, place: int | None) -> LinearFit:
     """About x - x0 = d (q, v), with what effects add."""
     at = problem if place is None else problem.integrand[place]
-    eta, J, told = model_of(problem, at, added)(d)
+    eta, J, ln_label = model_of(problem, at, added)(d)
     back = d - (problem.centre - problem.expansion.x0)
     residual = problem.observations.y - eta + (J @ back[:, :, None])[:, :, 0]
     laws = problem.laws(at.with_mixed_laws(added))
-    return Line(place, residual, J, *laws, told, added.split)
+    return LinearFit(place, residual, J, *laws, ln_label, added.split)
 
 
 def reweighed(
-    known: list[Line],
-    other: Changed,
+    known: list[LinearFit],
+    other: Perturbation,
     among: Mapping[int, float] | None = None,
     extra: Array | None = None,
 ) -> tuple[Array, Array]:

@@ -1,4 +1,5 @@
-"""What a verdict hangs on: the same data, judged with other numbers than were assumed.
+"""Dependence of a verdict on the assumptions: the same data, judged with other numbers than were
+assumed.
 
 Every prior, every constant's standard deviation, what laws are off and how far variables may be
 from their start half and twice as large, the model's own form and the section beyond doubt, each
@@ -27,26 +28,26 @@ from .evidence import (
     refit_at,
 )
 from .inverse_problem import InverseProblem
-from .reweighed import Changed, lines, reweighed
+from .reweighed import Perturbation, lines, reweighed
 from .section_fields import SECTION
 from .several import coupled_most, present, probabilities
 from .verdict import NAMED, NO_GAP, UNDECIDED, Verdict, decide, holds
 
 Array = np.ndarray
 FACTORS = {0.5: "half", 2.0: "twice"}
-LEAST_WEIGHED = 1e-5  # of the likeliest explanation's probability, from which one is weighed again
-MOST_WEIGHED = 20  # explanations
+MIN_WEIGHED = 1e-5  # of the likeliest explanation's probability, from which one is weighed again
+MAX_WEIGHED = 20  # explanations
 KEPT_BELOW = 8.0  # of ln posterior of a grid's points below the best, that are
 JUDGED = {UNDECIDED: "undecided", NO_GAP: "no gap", "outside": "outside the catalogue"}
 
 
 @dataclass(frozen=True)
 class Robustness:
-    """Of a verdict."""
+    """Robustness of a verdict against other assumptions."""
 
     robust: bool  # it is the same with all of these numbers
     hangs_on: tuple[str, ...]  # what changes it, and to what
-    low: float  # range of the probability of what it says, see `said`
+    low: float  # range of the probability of what it says, see `verdict_probability`
     high: float
 
 
@@ -56,22 +57,22 @@ def robustness(
     verdict: Verdict,
     sources: Sequence[str],
 ) -> Robustness:
-    """Of the verdict on these hypotheses. sources: names of the sources of error."""
+    """Robustness of the verdict on these hypotheses. sources: names of the sources of error."""
     kept = _weighty(hypotheses)
-    p = [said(probabilities(hypotheses), verdict)]
+    p = [verdict_probability(probabilities(hypotheses), verdict)]
     changes: list[str] = []
     for words, judged, rows in _variants(problem, kept, verdict, sources):
-        found = probabilities(judged)
-        p.append(said(found, verdict))
-        other = decide(judged, found, rows, len(problem.centre))
+        share = probabilities(judged)
+        p.append(verdict_probability(share, verdict))
+        other = decide(judged, share, rows, len(problem.centre))
         if (other.kind, other.key) != (verdict.kind, verdict.key):
             changes.append(f"{words} ({in_words(other)})")
     return Robustness(not changes, tuple(changes), min(p), max(p))
 
 
-def said(p: Mapping[str, float], verdict: Verdict) -> float:
-    """The probability of what a verdict says: that what is named, or else likeliest, is there;
-    that nothing is; that something outside is."""
+def verdict_probability(p: Mapping[str, float], verdict: Verdict) -> float:
+    """Probability of a verdict: that what is named, or else likeliest, is there; that nothing is;
+    that something outside is."""
     if verdict.kind in (NAMED, UNDECIDED):
         key = verdict.key or verdict.best
         return present(p, key.split("+")) if key else 0.0
@@ -81,16 +82,17 @@ def said(p: Mapping[str, float], verdict: Verdict) -> float:
 def _variants(
     problem: InverseProblem, kept: Sequence[Hypothesis], verdict: Verdict, sources: Sequence[str]
 ) -> Iterator[tuple[str, list[Hypothesis], int]]:
-    """What is other, the hypotheses then, and how many rows speak."""
+    """Variants of the assumptions: the change in words, the hypotheses then, and the number of rows
+    that count."""
     count = len(problem.places)
     for words, of in _priors(verdict):
         for factor, times in FACTORS.items():
-            found = [replace(h, prior=h.prior * factor ** of(h)) for h in kept]
-            yield f"the prior of {words} {times} as large", found, count
+            changed = [replace(h, prior=h.prior * factor ** of(h)) for h in kept]
+            yield f"the prior of {words} {times} as large", changed, count
     changes = list(_changes(problem, sources))
     again = [_again(problem, h, changes) for h in kept]
-    for other, *found in zip(changes, *again, strict=True):
-        yield other.words, found, int(other.keep.sum())
+    for other, *changed in zip(changes, *again, strict=True):
+        yield other.words, changed, int(other.keep.sum())
 
 
 def _priors(verdict: Verdict) -> Iterator[tuple[str, Callable[[Hypothesis], int]]]:
@@ -103,8 +105,8 @@ def _priors(verdict: Verdict) -> Iterator[tuple[str, Callable[[Hypothesis], int]
         yield words, lambda h: int(bool(h.values) and holds(h.key, key))
 
 
-def _changes(problem: InverseProblem, sources: Sequence[str]) -> Iterator[Changed]:
-    """What may be other."""
+def _changes(problem: InverseProblem, sources: Sequence[str]) -> Iterator[Perturbation]:
+    """Changes of the numbers that were assumed."""
     rows = problem.observations.rows
     every = np.ones(len(rows), bool)
     of_section = [k for k, name in enumerate(sources) if name.startswith(SECTION)]
@@ -115,20 +117,22 @@ def _changes(problem: InverseProblem, sources: Sequence[str]) -> Iterator[Change
         constants["all constants"] = [k for (k,) in constants.values()]
     if of_section:
         constants["the section"] = of_section
-        yield Changed("the section beyond doubt", _scaled(problem, of_section, 0.0), every)
+        yield Perturbation("the section beyond doubt", _scaled(problem, of_section, 0.0), every)
     for factor, times in FACTORS.items():
         for name, places in constants.items():
             words = f"the standard deviation of {name} {times} as large"
-            yield Changed(words, _scaled(problem, places, factor), every)
-        yield Changed(f"the allowance for effects' laws {times} as large", problem, every, factor)
+            yield Perturbation(words, _scaled(problem, places, factor), every)
+        yield Perturbation(
+            f"the allowance for effects' laws {times} as large", problem, every, factor
+        )
         looser = replace(problem, spread=factor * problem.spread)
-        yield Changed(f"what variables may be off their start {times} as large", looser, every)
+        yield Perturbation(f"what variables may be off their start {times} as large", looser, every)
     sure = replace(problem, assumed=replace(problem.assumed, form=0.0))
-    yield Changed("the model's own form beyond doubt", sure, every)
+    yield Perturbation("the model's own form beyond doubt", sure, every)
     for label in sorted({row.label for row in rows if row.label}, key=str):
         keep = np.array([row.label != label for row in rows])
         if keep.any():
-            yield Changed(f"without {label.said}", problem, keep)
+            yield Perturbation(f"without {label.said}", problem, keep)
 
 
 def _scaled(problem: InverseProblem, places: Sequence[int], factor: float) -> InverseProblem:
@@ -139,9 +143,9 @@ def _scaled(problem: InverseProblem, places: Sequence[int], factor: float) -> In
 def _weighty(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Those that carry weight, none and outside always; of sets of effects the points that do."""
     ln = {h.key: h.ln_evidence + np.log(h.prior) for h in hypotheses}
-    least = max(ln.values()) + np.log(LEAST_WEIGHED)
+    least = max(ln.values()) + np.log(MIN_WEIGHED)
     likely = [h for h in hypotheses if h.values and ln[h.key] > least]
-    likely = sorted(likely, key=lambda h: -ln[h.key])[:MOST_WEIGHED]
+    likely = sorted(likely, key=lambda h: -ln[h.key])[:MAX_WEIGHED]
     kept = [h for h in hypotheses if not h.values]
     for h in likely:
         p = h.posterior
@@ -154,11 +158,13 @@ def _weighty(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
     return kept
 
 
-def _again(problem: InverseProblem, h: Hypothesis, changes: Sequence[Changed]) -> list[Hypothesis]:
+def _again(
+    problem: InverseProblem, h: Hypothesis, changes: Sequence[Perturbation]
+) -> list[Hypothesis]:
     """A hypothesis weighed anew with each change."""
     if h.key == OUTSIDE:
         return _outside(problem, h, changes)
-    d, among, found = h.fitted.d, coupled_most([h]), []
+    d, among, result = h.fitted.d, coupled_most([h]), []
     fits = lines(problem, h.values, d, among)
     for other in changes:
         if other.parts_near_modes:
@@ -169,19 +175,19 @@ def _again(problem: InverseProblem, h: Hypothesis, changes: Sequence[Changed]) -
             ln, chi2 = reweighed(fits, other, among)
         total = float(np.logaddexp.reduce(ln + h.ln_weights))
         fitted = h.fitted._replace(ln_evidence=ln, chi2=chi2)
-        found.append(replace(h, ln_evidence=total, fitted=fitted))
-    return found
+        result.append(replace(h, ln_evidence=total, fitted=fitted))
+    return result
 
 
 def _outside(
-    problem: InverseProblem, h: Hypothesis, changes: Sequence[Changed]
+    problem: InverseProblem, h: Hypothesis, changes: Sequence[Perturbation]
 ) -> list[Hypothesis]:
-    """The same of what is outside the catalogue, but for families that say nothing of the rows that
-    count, as that a label is misread which is left out."""
+    """The same for outside the catalogue, without families that concern no row that counts, as that
+    a label is misread which is left out."""
     extra = np.array([family.extra for family in families(problem)])
     added, start = problem.added({}, len(extra)), np.zeros((len(extra), len(problem.centre)))
     near = refit_at(problem, problem, added, extra, start, REFIT_STEPS).d
-    fits, found = lines(problem, {}, near, extra=extra), []
+    fits, result = lines(problem, {}, near, extra=extra), []
     for other in changes:
         if other.parts_near_modes:
             total = outside(other.problem.only(other.keep)).ln_evidence
@@ -192,8 +198,8 @@ def _outside(
             there = np.array([each[np.ix_(other.keep, other.keep)].any() for each in more])
             shares = ln_shares([family for family, on in zip(now, there, strict=True) if on])
             total = float(np.logaddexp.reduce(ln[there] + shares))
-        found.append(replace(h, ln_evidence=total))
-    return found
+        result.append(replace(h, ln_evidence=total))
+    return result
 
 
 def in_words(verdict: Verdict) -> str:

@@ -1,4 +1,5 @@
-"""The design of a case whose section may be a little off: fields are numbers beside its own."""
+"""The design of a case whose section may be a little off: fields are numbers in addition to its
+own."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ class SectionField:
 
 
 def known_from(case: LoadedCase) -> SectionOrigin:
-    """What the section is known from; "exact" for a user's decks, which have no stations."""
+    """Origin of the section's data; "exact" for a user's decks, which have no stations."""
     return "exact" if case.deck or case.decks else case.case.section.known_from or UNSAID
 
 
@@ -133,7 +133,7 @@ def rubber_parts(case: LoadedCase) -> dict[str, str]:
 
 
 def words(case: LoadedCase) -> str:
-    """What is assumed, for people."""
+    """Assumptions about the section, for people."""
     known = known_from(case)
     meridian, filler, gauge, stiffness, density = sizes(case)
     tip = f" bead filler's tip {1e3 * filler:.2g} mm," if len(higher_filler(case)) else ""
@@ -163,9 +163,9 @@ def higher_filler(case: LoadedCase) -> Array:
     s, tip = arc_length(case), filler_tip(case)
     if tip is None:
         return np.empty((0, len(s)))
-    found = turned_up(case)
-    assert found
-    end = min(stations(case.section, name)[0] for name in found[1])
+    turn_up = turned_up(case)
+    assert turn_up
+    end = min(stations(case.section, name)[0] for name in turn_up[1])
     above = end if end < tip else belt_edge(case)
     return np.interp(s, s[[above, tip, rim_edge(case.section)]], [0.0, 1.0, 0.0])[None]
 

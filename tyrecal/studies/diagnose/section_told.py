@@ -1,4 +1,4 @@
-"""What the data say of the section's fields, where nothing else is wrong.
+"""The section's fields as the data describe them, where nothing else is wrong.
 
 With z ~ N(0, 1) of each component and g its slopes: E z = G^T P r, cov z = I - G^T P G, r what the
 plain calibration leaves and P what it cannot absorb.
@@ -23,7 +23,7 @@ Array = np.ndarray
 FIELD_UNITS = dict.fromkeys(("meridian", *ALONG_CARCASS), ("mm", 1e3))  # the others in per cent
 
 
-def section_told(
+def section_posterior(
     case: LoadedCase, sources: Sequence[Source], diagnosis: Diagnosis
 ) -> list[FieldValue]:
     """Meridian and gauges amid each region, the filler's tip, the rim's hold, compounds by part."""

@@ -1,4 +1,4 @@
-"""What the data can see and tell apart.
+"""Effects that the data can see and distinguish.
 
     lambda_i    = |P^1/2 g_i|^2                                    detectability
     delta_ij^2  = min over e_j of |P^1/2 (g_i - g_j(e_j))|^2       distance of two effects
@@ -22,7 +22,7 @@ GRID_POINTS = 81
 
 @dataclass(frozen=True)
 class Separability:
-    """Of the effects ``ids`` (m,)."""
+    """Separability of the effects ``ids`` (m,)."""
 
     ids: tuple[str, ...]
     sizes: Mapping[str, float]  # the parameter that each is judged at

@@ -22,7 +22,7 @@ from .inverse_problem import InverseProblem
 
 Array = np.ndarray
 PRIOR_NONE: Final = 0.25
-MOST_EFFECTS = 3
+MAX_EFFECTS = 3
 COUPLED_POINTS = 3  # of the rule in what couples modes, that stand for all from two effects on
 PARTNERS = 4  # singles that are tried with every other
 BASES, BASES_WITHIN = 3, 3.0  # pairs that a third is added to; ln probability behind the best
@@ -36,24 +36,24 @@ def weigh(
     pairs: bool = True,
     before: tuple[InverseProblem, Sequence[Hypothesis]] | None = None,
 ) -> list[Hypothesis]:
-    """Every hypothesis with its evidence; ``pairs``: of two and three effects, too; before: of the
-    same problem with less asked of the model, whose other hypotheses stand."""
+    """Every hypothesis with its evidence; ``pairs``: of two and three effects, too; before: an
+    earlier problem and its hypotheses; those whose model answers did not change are reused."""
     stand = _standing(problem, *before) if before else {}
     ids = list(problem.expansion.nodes)
-    prior = priors(len(ids), problem.assumed.further, MOST_EFFECTS if pairs else 1)
+    prior = priors(len(ids), problem.assumed.further, MAX_EFFECTS if pairs else 1)
     plain = refit(problem, {}, 1)
     none = Hypothesis(NONE, PRIOR_NONE, float(plain.ln_evidence[0]), {}, np.zeros(1), plain)
-    found = [none, outside(problem)]
-    found += [stand.get(id) or explain(problem, [id], prior[1]) for id in ids]
+    hypotheses = [none, outside(problem)]
+    hypotheses += [stand.get(id) or explain(problem, [id], prior[1]) for id in ids]
     for count in range(2, len(prior) + 1):
-        found += _with_one_more(problem, found, count, prior[count], stand)
-    return found
+        hypotheses += _with_one_more(problem, hypotheses, count, prior[count], stand)
+    return hypotheses
 
 
 def _standing(
     problem: InverseProblem, before: InverseProblem, hypotheses: Sequence[Hypothesis]
 ) -> dict[str, Hypothesis]:
-    """By key, those of whose effects the model has been asked nothing more since."""
+    """By key, the hypotheses whose effects have not been evaluated again since."""
     now, then = problem.expansion, before.expansion
     new = {frozenset([id]) for id, nodes in now.nodes.items() if nodes is not then.nodes[id]}
     new |= {frozenset(ids) for ids, each in now.joint.items() if each is not then.joint.get(ids)}
@@ -61,11 +61,11 @@ def _standing(
     return {
         h.key: h
         for h in hypotheses
-        if h.values and not any(asked <= {*h.values, *switched} for asked in new)
+        if h.values and not any(added_ids <= {*h.values, *switched} for added_ids in new)
     }
 
 
-def priors(effects: int, further: float, most: int = MOST_EFFECTS) -> dict[int, float]:
+def priors(effects: int, further: float, most: int = MAX_EFFECTS) -> dict[int, float]:
     """Prior of each set of 1, 2, ... of so many effects: they sum to 0.65 over all sets."""
     counts = range(1, min(most if further else 1, effects) + 1)
     total = sum(further ** (k - 1) for k in counts)
@@ -88,7 +88,7 @@ def before(hypotheses: Sequence[Hypothesis]) -> dict[str, float]:
 
 
 def present(p: Mapping[str, float], ids: Sequence[str]) -> float:
-    """Probability that all of these effects are there, whatever else is."""
+    """Probability that all of these effects are there, alone or with others."""
     total = sum(each for key, each in p.items() if set(ids) <= set(key.split("+")))
     return min(total, 1.0)  # rounded
 
@@ -96,38 +96,38 @@ def present(p: Mapping[str, float], ids: Sequence[str]) -> float:
 def _by_key(
     hypotheses: Sequence[Hypothesis], p: Array, over: Callable[[Hypothesis], Array]
 ) -> dict[str, float]:
-    found = {h.key: 0.0 for h in hypotheses}
+    totals = {h.key: 0.0 for h in hypotheses}
     for h, whole in zip(hypotheses, p.tolist(), strict=True):
         if not h.stated:
-            found[h.key] += whole
+            totals[h.key] += whole
             continue
         for key, share in h.shares(over(h)).items():
-            found[key if key in found else h.key] += whole * share
-    return found
+            totals[key if key in totals else h.key] += whole * share
+    return totals
 
 
 def _with_one_more(
     problem: InverseProblem,
-    found: Sequence[Hypothesis],
+    hypotheses: Sequence[Hypothesis],
     count: int,
     prior: float,
     stand: Mapping[str, Hypothesis],
 ) -> list[Hypothesis]:
     """Sets of ``count`` effects: the likeliest of one less, each with others; ``stand``: by key,
     those that are known."""
-    order = [h.key for h in found if h.key in problem.expansion.nodes]
-    singles = {h.key: h for h in found if h.key in order}
-    fewer = [h for h in found if len(h.values) == count - 1]
+    order = [h.key for h in hypotheses if h.key in problem.expansion.nodes]
+    singles = {h.key: h for h in hypotheses if h.key in order}
+    fewer = [h for h in hypotheses if len(h.values) == count - 1]
     fewer = sorted(fewer, key=lambda h: -h.ln_evidence)
     if count == 2:
         wanted = {frozenset((h.key, id)) for h in fewer[:PARTNERS] for id in order if id != h.key}
-        wanted |= {*together_most_like(problem, found[0], wanted)}
+        wanted |= {*hidden_pairs(problem, hypotheses[0], wanted)}
     else:
-        ln = {h.key: h.ln_evidence + np.log(h.prior) for h in found if h.key != OUTSIDE}
+        ln = {h.key: h.ln_evidence + np.log(h.prior) for h in hypotheses if h.key != OUTSIDE}
         likely = [h for h in fewer[:BASES] if ln[h.key] > max(ln.values()) - BASES_WITHIN]
-        wanted = {frozenset((*h.values, id)) for h in likely for id in most_like(problem, h)}
+        wanted = {frozenset((*h.values, id)) for h in likely for id in next_candidates(problem, h)}
     sets = [[id for id in order if id in each] for each in wanted]
-    most, result = max(h.ln_evidence + np.log(h.prior) for h in found), []
+    most, result = max(h.ln_evidence + np.log(h.prior) for h in hypotheses), []
     for ids in sorted(sets, key=lambda ids: [order.index(id) for id in ids]):
         among = coupled_most([singles[id] for id in ids])
         h = stand.get("+".join(ids)) or explain(problem, ids, prior, among, few=True)
@@ -138,13 +138,13 @@ def _with_one_more(
 
 
 def with_sets(
-    problem: InverseProblem, found: Sequence[Hypothesis], others: Sequence[Hypothesis]
+    problem: InverseProblem, hypotheses: Sequence[Hypothesis], others: Sequence[Hypothesis]
 ) -> list[Hypothesis]:
     """The hypotheses, and sets of effects of ``others`` that are not among them."""
-    by_key = {h.key: h for h in found}
+    by_key = {h.key: h for h in hypotheses}
     more = {h.key: h for h in others if h.key not in by_key}
     return [
-        *found,
+        *hypotheses,
         *(
             explain(problem, list(h.values), h.prior, coupled_most([by_key[id] for id in h.values]))
             for h in more.values()
@@ -159,13 +159,13 @@ def coupled_most(known: Sequence[Hypothesis]) -> dict[int, float]:
     return {int(k): float(share[k]) for k in np.argsort(-share)[:COUPLED_POINTS]}
 
 
-def most_like(problem: InverseProblem, base: Hypothesis) -> list[str]:
-    """Effects by what they would gain beside those of ``base``, the first `THIRDS`."""
+def next_candidates(problem: InverseProblem, base: Hypothesis) -> list[str]:
+    """Effects by their gain in addition to those of ``base``, the first `THIRDS`."""
     gains = {id: float(own.max()) for id, (own, *_) in _gains(problem, base).items()}
     return sorted(gains, key=lambda id: -gains[id])[:THIRDS]
 
 
-def together_most_like(
+def hidden_pairs(
     problem: InverseProblem, none: Hypothesis, tried: Container[frozenset[str]]
 ) -> list[frozenset[str]]:
     """Pairs that are not among ``tried`` by what both gain together, the first `HIDDEN_PAIRS`: two
@@ -179,8 +179,8 @@ def together_most_like(
 
 
 def _gains(problem: InverseProblem, base: Hypothesis) -> dict[str, tuple[Array, Array, Array]]:
-    """Of each effect that is not in ``base``, over its range (q,): what it would gain in ln
-    likelihood, its shift c (q, n), and c P (q, n).
+    """For each effect that is not in ``base``, over its range (q,): its gain in ln likelihood, its
+    shift c (q, n), and c P (q, n).
 
     With r the residual of the base's likeliest fit and P what neither calibration nor the sizes
     that it has already absorb, c gains c^T P r - c^T P c / 2, and one more, c', -c^T P c' besides.
@@ -205,11 +205,11 @@ def _gains(problem: InverseProblem, base: Hypothesis) -> dict[str, tuple[Array, 
     inner = J.T @ inverse @ J + np.diag(np.concatenate(information))
     P = inverse - inverse @ J @ np.linalg.solve(inner, J.T @ inverse)
     r = problem.observations.y - problem.predicted(at, d[None])[0]
-    found = {}
+    gains = {}
     for id, nodes in problem.expansion.nodes.items():
         if id not in sizes:
             points, _ = grid(nodes)
             c = problem.added({id: points}, len(points)).shift - problem.added({}, 1).shift
             Pc = c @ P
-            found[id] = Pc @ r - (Pc * c).sum(1) / 2, c, Pc
-    return found
+            gains[id] = Pc @ r - (Pc * c).sum(1) / 2, c, Pc
+    return gains

@@ -81,9 +81,9 @@ def shrink(problem: InverseProblem, key: str | None = None, seed: int = 0) -> Sh
     fitted = problem.only(keep)
     plain = refit(fitted, {}, 1)
     none = Hypothesis(NONE, 1.0, float(plain.ln_evidence[0]), {}, np.zeros(1), plain)
-    asked = [key.split("+")] if key else [[id] for id in problem.expansion.nodes]
-    found = [explain(fitted, ids, 1.0) for ids in asked]
-    chosen = max(found, key=lambda h: h.ln_evidence)
+    candidates = [key.split("+")] if key else [[id] for id in problem.expansion.nodes]
+    hypotheses = [explain(fitted, ids, 1.0) for ids in candidates]
+    chosen = max(hypotheses, key=lambda h: h.ln_evidence)
     out = problem.only(hold)
     likeliest = lambda h: _errors(out, h, [int(np.argmax(h.posterior))])[0]
     before, after = _errors(out, none, [0])[0], likeliest(chosen)

@@ -19,12 +19,12 @@ from .observations import Observations
 
 Array = np.ndarray
 FAR_OUT = 6.0  # standard deviations of u, beyond what the splits ask for
-LEAST_WIDTH = 1e-9  # of u
+MIN_SPLIT_WIDTH = 1e-9  # of u
 
 
 @dataclass(frozen=True)
 class Splits:
-    """Of m pairs in up to k states, empty places aside."""
+    """Splits of m pairs in up to k states, empty places aside."""
 
     places: Array  # (m, k) among the observations
     there: Array  # (m, k) whether there is one
@@ -36,17 +36,17 @@ class Splits:
     @classmethod
     def of(cls, observations: Observations, width: float) -> Splits:
         """All pairs of which both members were measured."""
-        found: dict[str, list[int]] = {}
+        by_label: dict[str, list[int]] = {}
         for i in np.flatnonzero(np.isfinite(observations.split)).tolist():
-            found.setdefault(str(observations.rows[i].label), []).append(i)
-        most = max(map(len, found.values()), default=0)
-        places = np.array([each + [0] * (most - len(each)) for each in found.values()], int)
-        places = places.reshape(len(found), most)
-        there = np.array([[j < len(each) for j in range(most)] for each in found.values()], bool)
-        there = there.reshape(len(found), most)
+            by_label.setdefault(str(observations.rows[i].label), []).append(i)
+        most = max(map(len, by_label.values()), default=0)
+        places = np.array([each + [0] * (most - len(each)) for each in by_label.values()], int)
+        places = places.reshape(len(by_label), most)
+        there = np.array([[j < len(each) for j in range(most)] for each in by_label.values()], bool)
+        there = there.reshape(len(by_label), most)
         s = np.where(there, observations.split[places], 0.0)
         tau = np.where(there, observations.split_scatter[places], 1.0)
-        return cls(places, there, s, tau, max(width, LEAST_WIDTH))
+        return cls(places, there, s, tau, max(width, MIN_SPLIT_WIDTH))
 
     @property
     def count(self) -> int:
@@ -62,8 +62,8 @@ class Splits:
             a = np.where(self.there, np.array([*new.values()])[:, self.places], 0.0)
             u, h = self._grid(float(a.max()))
             ln, _ = self._integrand(a, u)
-            found = (np.logaddexp.reduce(ln, axis=-1) + np.log(h)).sum(-1)
-            self.known.update(zip(new, found.tolist(), strict=True))
+            values = (np.logaddexp.reduce(ln, axis=-1) + np.log(h)).sum(-1)
+            self.known.update(zip(new, values.tolist(), strict=True))
         return np.array([self.known[key] for key in keys])
 
     def chi2(self) -> float:

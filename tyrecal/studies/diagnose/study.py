@@ -20,7 +20,7 @@ from ...tyre.number_units import EFFECT_PATH
 from ..far_off import far_off
 from ..fit.targets import rims_of
 from ..labelling.label import label
-from ..labelling.result import labels_told
+from ..labelling.result import labels_posterior
 from ..labels import Labels
 from .calibrated import calibrated_variables
 from .diagnosis import Diagnosis, diagnose
@@ -33,7 +33,7 @@ from .next_measurement import OtherStates
 from .observations import Observations, observe
 from .regions import regions
 from .result import DiagnosisResult, diagnosis_result
-from .section_told import section_told
+from .section_told import section_posterior
 from .tyre_model import TyreModel
 from .uncertainties import Source, calibrated, sources
 from .under_load import UnderLoad, Values, compare
@@ -62,9 +62,9 @@ class DiagnosedCase:
 
     @property
     def section(self) -> list[FieldValue]:
-        """See `section_told`."""
+        """See `section_posterior`."""
         stated = any(source.field for source in self.sources)
-        return section_told(self.model.case, self.sources, self.diagnosis) if stated else []
+        return section_posterior(self.model.case, self.sources, self.diagnosis) if stated else []
 
     @property
     def result(self) -> DiagnosisResult:
@@ -113,8 +113,8 @@ def study(
 
     def observed(run: Sequence[Measurement]) -> Observations:
         again, toggles = ([runs[path] for path in group] for group in (repeats, switched))
-        found = observe(run, again, toggles, assumed.split)
-        return replace(found, left_out=(*found.left_out, *elsewhere))
+        observations = observe(run, again, toggles, assumed.split)
+        return replace(observations, left_out=(*observations.left_out, *elsewhere))
 
     if not any(each.quantity == "frequency_Hz" and not each.load_N for each in given):
         raise InputError(f"{measured}: there is no frequency of the unloaded tyre in it")
@@ -125,28 +125,28 @@ def study(
             "a variable of the case sets pressure_kPa, which a diagnosis takes from the"
             " measurements: consider the effect pressure_offset instead"
         )
-    told, readings = None, [Reading(observed(runs[measured]))]
+    labelled, readings = None, [Reading(observed(runs[measured]))]
     if any(each.is_unlabelled for each in given):
-        told = label(case, evaluator, given, jobs=jobs)
-        readings = likely(told, lambda run: observed(in_states(case, run)))
-    asked = [rows_if_exchanged(each.observations) for each in readings]
-    rows = list(dict.fromkeys(row for each in asked for row in each))
+        labelled = label(case, evaluator, given, jobs=jobs)
+        readings = likely(labelled, lambda run: observed(in_states(case, run)))
+    per_reading = [rows_if_exchanged(each.observations) for each in readings]
+    rows = list(dict.fromkeys(row for each in per_reading for row in each))
     spans, inexpressible = spans_of(case, evaluator, [id for id in ids if id not in fitted])
     changes = tuple(_counted_from(change, spans) for _, change in toggled)
     for change in changes:
         spans[change.id] = _reaching(spans[change.id], change)
-    found, assumed_sources = sources(case)
-    model = TyreModel(case, evaluator, rows, found, spans, jobs)
+    own_sources, assumed_sources = sources(case)
+    model = TyreModel(case, evaluator, rows, own_sources, spans, jobs)
     check_units(model, readings[0].observations, [str(measured), *map(str, switched)], changes)
     diagnosis = diagnose(
         model,
         rows,
-        readings if told else readings[0].observations,
+        readings if labelled else readings[0].observations,
         changes,
         assumed,
         parts=(lambda x: regions(model, x)) if section_map else None,
         further=OtherStates(
-            lambda more: TyreModel(case, evaluator, more, found, spans, jobs),
+            lambda more: TyreModel(case, evaluator, more, own_sources, spans, jobs),
             case.case.pressure_kPa,
         ),
         stage=stage,
@@ -154,13 +154,13 @@ def study(
     own = [runs[path] for path in (measured, *repeats)]
     return DiagnosedCase(
         diagnosis,
-        tuple(found),
+        tuple(own_sources),
         assumed_sources,
         inexpressible,
         fitted,
         model,
         _under_load(case, evaluator, own, diagnosis, model),
-        labels_told(case, weighed_anew(told, diagnosis.readings)) if told else None,
+        labels_posterior(case, weighed_anew(labelled, diagnosis.readings)) if labelled else None,
     )
 
 
@@ -187,16 +187,16 @@ def _under_load(
     diagnosis: Diagnosis,
     model: TyreModel,
 ) -> UnderLoad | None:
-    """What was measured on a road, against the calibrated tyre and the one with the effect that is
-    named or, where there is a gap, likeliest."""
+    """Measurements on a road against the calibrated tyre and the one with the effect that is named
+    or, where there is a gap, likeliest."""
     readings = [each for run in runs for each in run if each.load_N and not each.rim]
     if not readings:
         return None
     tyres: dict[str, Values] = {}
     for key in filter(None, (NONE, diagnosis.leading)):
-        found = diagnosis.hypothesis(key)
-        x = diagnosis.problem.expansion.x0 + found.fitted.d[found.best]
-        effects = {id: float(e[found.best]) for id, e in found.values.items()}
+        hypothesis = diagnosis.hypothesis(key)
+        x = diagnosis.problem.expansion.x0 + hypothesis.fitted.d[hypothesis.best]
+        effects = {id: float(e[hypothesis.best]) for id, e in hypothesis.values.items()}
         tyres[key] = model.design(Query(x, effects))
     return compare(case, evaluator, readings, tyres)
 
@@ -242,7 +242,7 @@ def spans_of(
 
 
 def _lacking(case: LoadedCase, effect: Effect) -> str:
-    """What a case of a user's deck lacks for an effect, "" = nothing."""
+    """Reason why a case of a user's deck cannot have an effect, "" = none."""
     if not case.deck:
         return ""
     try:
@@ -255,9 +255,9 @@ def _lacking(case: LoadedCase, effect: Effect) -> str:
 def parse_change(text: str) -> Toggle:
     """``EFFECT=VALUE`` or ``EFFECT*FACTOR``. Raises InputError."""
     mark = "=" if "=" in text else "*"
-    id, found, value = text.partition(mark)
+    id, separator, value = text.partition(mark)
     id, known = id.strip(), catalogue()
-    if not found:
+    if not separator:
         raise InputError(
             f"'{text}' must say what was switched: EFFECT=VALUE or EFFECT*FACTOR, as in"
             " spindle_lateral=0"
@@ -296,10 +296,10 @@ def _reaching(span: Span, change: Toggle) -> Span:
 
 def _check_copies(paths: Sequence[Path], runs: Mapping[Path, Sequence[Measurement]]) -> None:
     """Raises InputError where two runs are the same to the last digit."""
-    told = [[(*r.key, r.value) for r in runs[path]] for path in paths]
+    contents = [[(*r.key, r.value) for r in runs[path]] for path in paths]
     for k, path in enumerate(paths):
-        if told[k] in told[:k]:
-            first = paths[told.index(told[k])]
+        if contents[k] in contents[:k]:
+            first = paths[contents.index(contents[k])]
             raise InputError(
                 f"{path}: holds the same values as {first}; a copy is no measurement of its own"
             )

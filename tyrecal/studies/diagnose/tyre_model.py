@@ -13,7 +13,7 @@ import numpy as np
 from ...simulate.deck.decks import Decks
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
-from ...simulate.modes.find import Found, ModesAnswer
+from ...simulate.modes.find import LabelledModes, ModesAnswer
 from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase, start_values
 from ...tyre.case.schema import TargetMode, Targets
@@ -53,7 +53,7 @@ class TyreModel:
         case: LoadedCase,
         evaluator: Evaluator,
         rows: Sequence[ModelRow],
-        found: list[Source],
+        own_sources: list[Source],
         spans: Mapping[str, Span],
         jobs: int = 1,
     ):
@@ -67,7 +67,7 @@ class TyreModel:
                 f"solver '{evaluator.solver.name}' gives no exact slopes, which a diagnosis needs:"
                 " 'tyrecal solvers' shows which one does (gradients)"
             )
-        self.rows, self.found, self.jobs = list(rows), found, jobs
+        self.rows, self.found, self.jobs = list(rows), own_sources, jobs
         self.spans: Mapping[str, Span] = spans
         self._present = case.case.effects
         found_in = {state_of(where) for label, where in rows if label}
@@ -77,16 +77,18 @@ class TyreModel:
         labels = sorted({label for label, _ in rows if label}, key=str)
         case = asked_for(case, labels)
         self.case = case
-        self._moved = {each.name: each.field for each in found if each.field and each.field.moves}
+        self._moved = {
+            each.name: each.field for each in own_sources if each.field and each.field.moves
+        }
         self.evaluator = evaluator = evaluator.of(SectionDesign(case, self._moved))
         self._fit = fit.Problem(case, evaluator, jobs=jobs)
         self._variables = case.case.variables
         self.variables: Sequence[str] = list(self._variables)
-        self.sources: Sequence[str] = [source.name for source in found]
+        self.sources: Sequence[str] = [source.name for source in own_sources]
         self.material_laws = 0.0 if known_from(case) == "exact" else MATERIAL_LAWS
         self.start = np.array([self._scaled(n, v) for n, v in start_values(case).items()])
         self.spread = np.array([v.spread for v in read_variables(case)])
-        self._plain = values_of(case, found)
+        self._plain = values_of(case, own_sources)
         self._plain.setdefault("pressure_kPa", case.case.pressure_kPa)
         self._slopeless = {id for id, span in spans.items() if not self._has_slopes(id, span)}
 
@@ -139,20 +141,20 @@ class TyreModel:
             if path.startswith(EFFECT_PATH)
         ]
         beside = [Query(p.x, {id: e}) for p in stepped for _, id, e in steps]
-        asked = {_key(p): p for p in (*points, *(Query(p.x) for p in bare), *beside)}
-        known = dict(zip(asked, self._evaluated(list(asked.values())), strict=True))
+        queries = {_key(p): p for p in (*points, *(Query(p.x) for p in bare), *beside)}
+        known = dict(zip(queries, self._evaluated(list(queries.values())), strict=True))
         return [self._completed(point, known, steps) for point in points]
 
     def values_at(self, x: Array) -> Array:
         """eta (n,) alone, without slopes. Raises DeckRefused, EvaluationFailed."""
-        found = []
-        asked = [self.in_state(state, self.values(x))[0] for state in self.states]
-        for each in self._modes([(design, ()) for design in asked]):
-            if not isinstance(each, Found):
+        answers = []
+        designs = [self.in_state(state, self.values(x))[0] for state in self.states]
+        for each in self._modes([(design, ()) for design in designs]):
+            if not isinstance(each, LabelledModes):
                 raise each
-            found.append(each)
-        at = dict(zip(self.states, found, strict=True))
-        mass_kg = found[0].evaluation.mass_kg
+            answers.append(each)
+        at = dict(zip(self.states, answers, strict=True))
+        mass_kg = answers[0].evaluation.mass_kg
         return np.array(
             [_ln(label, at[state_of(w)]) if label else log(mass_kg) for label, w in self.rows]
         )
@@ -163,7 +165,7 @@ class TyreModel:
         known: Mapping[QueryKey, Answer | Exception],
         steps: Sequence[tuple[int, str, float]],
     ) -> Answer | Exception:
-        """The answer with what other points have to say about its slopes."""
+        """The answer with its slopes completed from other points."""
         answer = known[_key(point)]
         if point.coupled and isinstance(answer, Answer):
             answer = replace(answer, coupling=self._coupling(point.x, answer.eta))
@@ -255,11 +257,11 @@ class TyreModel:
             names = () if self._is_bare(point) else (*self.variables, *known, *slopes)
             at_0 = {EFFECT_PATH + id: self._present.get(id, 0.0) for id in point.slopes}
             wanted.append(self.in_state(state, {**known, **at_0, **self.design(point)}, names))
-        found = self._modes(wanted)
+        modes = self._modes(wanted)
         per, results = len(self.states), []
         for i, point in enumerate(points):
             here = slice(i * per, (i + 1) * per)
-            results.append(self._answer(point, [design for design, _ in wanted[here]], found[here]))
+            results.append(self._answer(point, [design for design, _ in wanted[here]], modes[here]))
         return results
 
     def in_state(
@@ -279,11 +281,11 @@ class TyreModel:
         self._fit.jobs = self.jobs if len(wanted) >= WORTH_A_POOL else 1
         # the longest first, so that the last ones end together
         order = sorted(range(len(wanted)), key=lambda i: -self._effort(wanted[i][0]))
-        found = self._fit.modes_of([wanted[i] for i in order])
-        for each in found:
+        answers = self._fit.modes_of([wanted[i] for i in order])
+        for each in answers:
             if isinstance(each, EvaluationFailed) and each.denied:
                 raise SolverUnavailable(str(each))
-        return [found[place] for place in np.argsort(order)]
+        return [answers[place] for place in np.argsort(order)]
 
     def _effort(self, design: Mapping[str, float]) -> int:
         """How long an evaluation takes, by its effects: 2 without slopes, 1 where it needs more
@@ -296,21 +298,21 @@ class TyreModel:
     def _answer(
         self, point: Query, designs: list[dict[str, float]], answers: Sequence[ModesAnswer]
     ) -> Answer | Exception:
-        found: list[Found] = []
+        labelled: list[LabelledModes] = []
         for each in answers:
             if isinstance(each, DeckRefused) and not point.effects:
                 raise each
-            if not isinstance(each, Found):
+            if not isinstance(each, LabelledModes):
                 return each
-            found.append(each)
-        at = dict(zip(self.states, zip(designs, found, strict=True), strict=True))
+            labelled.append(each)
+        at = dict(zip(self.states, zip(designs, labelled, strict=True), strict=True))
         eta, jacobian = np.zeros(len(self.rows)), np.zeros((len(self.rows), len(self.variables)))
         slopes, split = np.zeros((len(self.rows), len(self.found))), np.zeros(len(self.rows))
         by_effect = {id: np.full(len(self.rows), np.nan) for id in point.slopes}  # not the mass
         for i, (label, where) in enumerate(self.rows):
             if label is None:
-                eta[i] = log(found[0].evaluation.mass_kg)
-                jacobian[i], slopes[i] = self._mass_slopes(point.x, found)
+                eta[i] = log(labelled[0].evaluation.mass_kg)
+                jacobian[i], slopes[i] = self._mass_slopes(point.x, labelled)
                 continue
             design, answer = at[state_of(where)]
             gradients, modes = answer.evaluation.gradients, answer.wanted
@@ -334,7 +336,7 @@ class TyreModel:
         return Answer(eta, jacobian, split, slopes if point.constants else None, by_effect)
 
     def _coupling(self, x: Array, eta: Array) -> Coupling | None:
-        """What turned cords couple modes by that are near each other at x; other constants move
+        """Coupling by turned cords of modes that are near each other at x; other constants move
         modes, and couple hardly any. None where there are no such modes."""
         places = {row: i for i, row in enumerate(self.rows)}
         mates = np.array([places.get((partner(label), w), -1) for label, w in self.rows])
@@ -353,14 +355,14 @@ class TyreModel:
             for source in turned
             for side in (1, -1)
         ]
-        asked = [self.in_state(state, each) for each in sides for state in self.states]
-        found = iter(self._modes(asked))
+        designs = [self.in_state(state, each) for each in sides for state in self.states]
+        answers = iter(self._modes(designs))
         square, rise = np.zeros(len(self.rows)), np.zeros(len(self.rows))
         for _ in turned:
             ln_f = [eta.copy(), eta.copy()]
             for side, state in product((0, 1), self.states):
-                answer = next(found)
-                if not isinstance(answer, Found):
+                answer = next(answers)
+                if not isinstance(answer, LabelledModes):
                     raise answer
                 for i, (label, where) in enumerate(self.rows):
                     if label and mates[i] >= 0 and state_of(where) == state:
@@ -371,11 +373,11 @@ class TyreModel:
         size = np.where(mates >= 0, np.sqrt(square), 0.0)
         return Coupling(mates, size, np.where(size > 0, rise / np.maximum(square, 1e-300), 0.0))
 
-    def _mass_slopes(self, x: Array, found: Sequence[Found]) -> tuple[Array, Array]:
+    def _mass_slopes(self, x: Array, labelled: Sequence[LabelledModes]) -> tuple[Array, Array]:
         """d ln mass by x (v,) and by the sources of error (k,). Raises DeckRefused where the solver
-        does not tell them."""
-        mass_kg, values, rates = found[0].evaluation.mass_kg, self.values(x), dict[str, float]()
-        for each in found:  # a number that one state sets moves the mass in the others
+        does not give them."""
+        mass_kg, values, rates = labelled[0].evaluation.mass_kg, self.values(x), dict[str, float]()
+        for each in labelled:  # a number that one state sets moves the mass in the others
             rates |= each.evaluation.mass_gradients
             if each.evaluation.gradients.keys() != each.evaluation.mass_gradients.keys():
                 raise DeckRefused(
@@ -394,20 +396,20 @@ class TyreModel:
         return design[name] if v.scale == "log" else v.upper - v.lower
 
 
-def _ln(label: Label, found: Found) -> float:
+def _ln(label: Label, labelled: LabelledModes) -> float:
     """ln f of a mode, of a pair the mean."""
-    mode = found.wanted[label]
+    mode = labelled.wanted[label]
     members = mode.raw.members
     return log(members[0] * members[1]) / 2 if members else log(mode.frequency_Hz)
 
 
 def _steps(source: Source) -> Mapping[str, float]:
-    """Of numbers by path, or of the field of the section that it is."""
+    """Steps of numbers by path, or of the field of the section that the source is."""
     return {source.name: 1.0} if source.field else source.steps
 
 
 def _key(point: Query) -> QueryKey:
-    """What tells two points apart."""
+    """Key that distinguishes two points."""
     effects = tuple(point.effects.items())
     return point.x.tobytes(), effects, point.constants, point.slopes
 

@@ -1,4 +1,4 @@
-"""Sources of error: numbers of the case that nobody calibrates, and how far they may be off."""
+"""Sources of error: uncalibrated numbers of the case, and how far they may be off."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ def sources(case: LoadedCase) -> tuple[list[Source], bool]:
     not exact, how far apart the rim holds the beads, unless the case states `effects.rim_width`,
     and the section's fields.
     """
-    found, assumed = _constants(case)
+    constants, assumed = _constants(case)
     of_section = [Source(name, {}, "", field) for name, field in fields(case).items()]
     if of_section:
         of_section[0] = replace(of_section[0], words=words(case))
-        if not any(RIM_WIDTH in source.steps for source in found):
+        if not any(RIM_WIDTH in source.steps for source in constants):
             seat = BEAD_SEAT_DISTANCE[known_from(case)]
-            found.append(_source("bead_seat_distance", {RIM_WIDTH: seat}, 0.0, seat))
-    return [*found, *of_section], assumed
+            constants.append(_source("bead_seat_distance", {RIM_WIDTH: seat}, 0.0, seat))
+    return [*constants, *of_section], assumed
 
 
 def _constants(case: LoadedCase) -> tuple[list[Source], bool]:
@@ -119,7 +119,9 @@ def calibrated(case: LoadedCase) -> set[str]:
     return {path for variable in case.case.variables.values() for path in variable.sets}
 
 
-def values_of(case: LoadedCase, found: list[Source]) -> dict[str, float]:
+def values_of(case: LoadedCase, own_sources: list[Source]) -> dict[str, float]:
     """The case's own numbers at every path of the sources, effects aside."""
-    paths = [path for source in found for path in source.steps if not path.startswith(EFFECT_PATH)]
+    paths = [
+        path for source in own_sources for path in source.steps if not path.startswith(EFFECT_PATH)
+    ]
     return {path: float(number_at(case, path)) for path in paths}

@@ -1,4 +1,4 @@
-"""What was measured on the road against tyres that were fitted without a load: held out by kind."""
+"""Measurements on the road against tyres that were fitted without a load: held out by kind."""
 
 from __future__ import annotations
 
@@ -39,15 +39,15 @@ class LoadedRow:
 
 @dataclass(frozen=True)
 class UnderLoad:
-    """What was measured on the road beside what tyres have there."""
+    """Measurements on the road, with the values that tyres have there."""
 
     rows: tuple[LoadedRow, ...]  # by pressure and load
     tyres: tuple[str, ...]  # names of those compared, the calibrated one first
     failed: tuple[str, ...]  # what a tyre lacks and why
 
     def rms_percent(self, tyre: str, load_N: float | None = None) -> float | None:
-        """Of ``off``, over the rows (of all loads, or of one) that every tyre has which has any;
-        None: there is none."""
+        """RMS of ``off``, per cent, over the rows (of all loads, or of one) that every tyre with
+        any rows has; None: there is none."""
         able = {each for row in self.rows for each in row.off}
         rows = [row for row in self.rows if able == set(row.off) and load_N in (None, row.load_N)]
         if tyre not in able or not rows:
@@ -69,19 +69,19 @@ def compare(
     failed: dict[str, None] = {}
     for pressure, here in _grouped(readings):
         places = sorted(here, key=lambda place: (place[2], place[0], str(place[1] or "")))
-        found: dict[str, dict[LoadedKey, float]] = {}
+        tables: dict[str, dict[LoadedKey, float]] = {}
         for name, values in tyres.items():
-            found[name] = {}
+            tables[name] = {}
             for part in (_footprints, _modes):
                 try:  # what comes before a failure is kept
                     inflated = {**values, "pressure_kPa": pressure}
-                    found[name].update(part(case, evaluator, inflated, places))
+                    tables[name].update(part(case, evaluator, inflated, places))
                 except (EvaluationFailed, DeckRefused, TemplateFailed) as failure:
                     failed[f"{name}, {pressure:g} kPa: {failure}"] = None
         for place in places:
             quantity, member, load = place
             value, sigma = here[place]
-            known = {name: table[place] for name, table in found.items() if place in table}
+            known = {name: table[place] for name, table in tables.items() if place in table}
             off = {name: log(value / computed) for name, computed in known.items()}
             rows.append(LoadedRow(quantity, member, pressure, load, value, sigma, off))
     return UnderLoad(tuple(rows), tuple(tyres), tuple(failed))

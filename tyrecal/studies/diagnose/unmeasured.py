@@ -1,4 +1,4 @@
-"""What an explanation says of modes that were not measured, and how sure that is.
+"""Predictions of an explanation for modes that were not measured, and how sure they are.
 
 Of rows that are jointly normal, covariance T as in `reweighed`, those measured are known:
 
@@ -21,7 +21,7 @@ from .evidence import OUTSIDE, Hypothesis
 from .inverse_problem import InverseProblem
 from .model import ModelRow
 from .observations import Observable, Observations
-from .reweighed import Line, line_about
+from .reweighed import LinearFit, line_about
 from .veering import ZETA_POINTS, rule
 
 Array = np.ndarray
@@ -49,7 +49,8 @@ def expected(
     rows: Sequence[ModelRow],
     places: Array,
 ) -> Expected:
-    """Of rows of the model at its ``places`` (m,), by all that the catalogue explains them by."""
+    """Prediction of rows of the model at its ``places`` (m,), by all explanations in the
+    catalogue."""
     known = [h for h in hypotheses if h.key != OUTSIDE]
     ln = np.array([h.ln_evidence + np.log(h.prior) for h in known])
     p = np.exp(ln - ln.max())
@@ -118,7 +119,7 @@ def _coupled(coupled: Array) -> list[tuple[int | None, Array]]:
     return [(k, share[:, k]) for k in range(len(zeta)) if share[:, k].max() > WORTH_COUPLING]
 
 
-def _conditional(line: Line, problem: InverseProblem, count: int) -> tuple[Array, Array]:
+def _conditional(line: LinearFit, problem: InverseProblem, count: int) -> tuple[Array, Array]:
     """Mean and variance (q, m) of all rows but the first ``count``, which are known."""
     J = line.slopes * problem.spread
     T = line.covariance(problem) + J @ J.transpose(0, 2, 1)
@@ -131,7 +132,7 @@ def _conditional(line: Line, problem: InverseProblem, count: int) -> tuple[Array
 
 
 def _pooled(p: Array, mean: Array, variance: Array) -> Expected:
-    """Of means and variances (q, m) that are as probable as p (q,)."""
+    """Pool means and variances (q, m) that have the probabilities p (q,)."""
     p = p / p.sum()
     middle = p @ mean
     spread = p @ (np.maximum(variance, 0.0) + (mean - middle) ** 2)

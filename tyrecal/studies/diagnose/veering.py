@@ -1,4 +1,4 @@
-"""Two modes of one harmonic near each other, coupled by constants that nobody calibrates.
+"""Two modes of one harmonic near each other, coupled by uncalibrated constants.
 
 Uncoupled, their a, b = (2 pi f)^2 cross as a tyre changes: that is what slopes extrapolate. Coupled
 by q they are the eigenvalues of [[a, q], [q, b]] and veer (Leissa, ZAMP 25 (1974)):
@@ -24,7 +24,7 @@ from .model import Coupling
 from .observations import Observations
 
 Array = np.ndarray
-LARGEST_ZETA = 4.0
+MAX_ZETA = 4.0
 ZETA_POINTS, ZETA_GRID = 8, 64  # Gauss and Legendre's up to there, and a finer grid between
 NEGLIGIBLE_SHIFT = 5e-4  # shift of ln f at 3 standard deviations of q
 MISLABELLED = 0.01  # of laboratories that give a mode to the label of which it has nothing
@@ -60,8 +60,8 @@ def rule() -> tuple[Array, Array, Array]:
     grid (m, k), by an even cubic spline; ln of weight times density (m,)."""
     from scipy.interpolate import CubicSpline
 
-    zeta = LARGEST_ZETA * (np.polynomial.legendre.leggauss(ZETA_POINTS)[0] + 1) / 2
-    fine = LARGEST_ZETA * (np.arange(ZETA_GRID) + 0.5) / ZETA_GRID
+    zeta = MAX_ZETA * (np.polynomial.legendre.leggauss(ZETA_POINTS)[0] + 1) / 2
+    fine = MAX_ZETA * (np.arange(ZETA_GRID) + 0.5) / ZETA_GRID
     even = np.vstack([np.eye(ZETA_POINTS)[::-1], np.eye(ZETA_POINTS)])
     between = CubicSpline(np.append(-zeta[::-1], zeta), even)(fine)
     return zeta, between, -(fine**2) / 2 - np.log(np.exp(-(fine**2) / 2).sum())
@@ -94,15 +94,15 @@ class Veering:
         delta = (a - b) / 2
         D = np.sqrt(delta**2 + q**2)
         side = np.where(mate >= 0, self.side[on], np.where(delta < 0, -1.0, 1.0))
-        found = (a + b) / 2 + self.rise[on] * zeta**2 + side * D
+        eigenvalues = (a + b) / 2 + self.rise[on] * zeta**2 + side * D
         share = (1 + side * delta / np.maximum(D, 1e-300)) / 2  # of its own
         each = np.log(MISLABELLED + (1 - MISLABELLED) * share)
-        told = each.sum(1) / max(len(on), 1)  # labels go together
+        ln_label = each.sum(1) / max(len(on), 1)  # labels go together
         ln_f, own, part = eta.copy(), np.ones_like(eta), np.zeros_like(eta)
-        ln_f[:, on] = scale + np.log(np.maximum(found, 1e-6)) / 2
-        own[:, on] = share * a / found
-        part[:, on] = np.where(mate >= 0, (1 - share) * b / found, 0.0)
-        return ln_f, own, part, told
+        ln_f[:, on] = scale + np.log(np.maximum(eigenvalues, 1e-6)) / 2
+        own[:, on] = share * a / eigenvalues
+        part[:, on] = np.where(mate >= 0, (1 - share) * b / eigenvalues, 0.0)
+        return ln_f, own, part, ln_label
 
     def weights(self, y: Array, zeta: float) -> Array:
         """d ln f of coupled modes by ln f of uncoupled ones (n, n), where they are as measured."""
@@ -111,15 +111,16 @@ class Veering:
         r = np.sqrt(1 - np.minimum(zeta * self.size / np.maximum(abs(apart), 1e-300), 1.0) ** 2)
         both = (self.size > 0) & (self.partner >= 0)
         own[both], part[both] = (1 + r[both]) / 2, (1 - r[both]) / 2
-        found = np.diag(own)
-        found[np.flatnonzero(both), self.partner[both]] = part[both]
-        return found
+        matrix = np.diag(own)
+        matrix[np.flatnonzero(both), self.partner[both]] = part[both]
+        return matrix
 
 
 def veering(
     observations: Observations, places: Array, eta: Array, coupling: Coupling | None
 ) -> Veering:
-    """Of observations at ``places`` (n,) among the model's rows, whose ln f at x0 is eta (m,)."""
+    """Veering of the observations at ``places`` (n,) among the model's rows, whose ln f at x0 is
+    eta (m,)."""
     n = len(places)
     size, rise, partner, side = np.zeros(n), np.zeros(n), np.full(n, -1), np.ones(n)
     scale, other = eta[places], eta[places]

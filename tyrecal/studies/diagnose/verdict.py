@@ -1,4 +1,4 @@
-"""What may be said: named, undecided, no gap seen, or outside the catalogue."""
+"""Verdicts: named, undecided, no gap seen, or outside the catalogue."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PERHAPS = 0.1  # probability of a further effect, from which it is told
 
 @dataclass(frozen=True)
 class Further:
-    """An effect that is perhaps there beside those that are named."""
+    """An effect that is perhaps there in addition to those that are named."""
 
     id: str
     probability: float
@@ -30,7 +30,7 @@ class Further:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What may be said."""
+    """Verdict of a diagnosis."""
 
     kind: VerdictKind
     key: str | None  # of what is named, "id1", "id1+id2", ...: whatever else there is
@@ -104,16 +104,17 @@ def most_sure(probabilities: Mapping[str, float]) -> str | None:
     """The most effects, as a key that was weighed, that are there with p >= 0.7 together, the
     likeliest of as many; None where no effect is."""
     keys = [key for key in probabilities if key not in (NONE, OUTSIDE)]
-    found = [
+    sure = [
         (key.count("+"), p, key)
         for key in keys
         if (p := present(probabilities, key.split("+"))) >= SURE
     ]
-    return max(found)[2] if found else None
+    return max(sure)[2] if sure else None
 
 
 def perhaps(probabilities: Mapping[str, float], named: str) -> list[Further]:
-    """Effects beside those that are named, p >= 0.1 that they are there too, likeliest first."""
+    """Effects in addition to those that are named, p >= 0.1 that they are there too, likeliest
+    first."""
     ids = named.split("+")
     others = {id for key in probabilities for id in key.split("+")} - {*ids, NONE, OUTSIDE}
     also = [Further(id, present(probabilities, [*ids, id])) for id in others]
@@ -127,7 +128,7 @@ def _with_at_bound(ids: Sequence[str]) -> str:
 
 
 def _falls_short(best: str | None, check: float) -> str:
-    """What the catalogue's likeliest explanation lacks."""
+    """Reason why the catalogue's likeliest explanation falls short."""
     if best is None:
         return "the catalogue has nothing that could explain it"
     if check <= CHECK:

@@ -73,6 +73,6 @@ def section_map(
             (float(100 * size * change[j]), float(100 * size * sigma[j]))
             for j, size in ((i, STIFFNESS_PRIOR), (count + i, MASS_PRIOR))
         )
-        found = tuple(dict.fromkeys(same))
-        result.append(PartChange(part.name, *stiffness, *mass, float(ln[better]), found))
+        same_as = tuple(dict.fromkeys(same))
+        result.append(PartChange(part.name, *stiffness, *mass, float(ln[better]), same_as))
     return sorted(result, key=lambda place: -place.evidence), rank

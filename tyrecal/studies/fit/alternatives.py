@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from ...simulate.modes.find import Found
+from ...simulate.modes.find import LabelledModes
 from ...simulate.modes.label import Label
 from ...tyre.state import PRESSURE_PATH, RIMS, TyreState, pressure_name
 from .problem import Point, Problem
@@ -43,7 +43,7 @@ def other_states(problem: Problem, point: Point, keep: Array) -> list[Shift]:
     rates: dict[tuple[TyreState, str], Array] = {}  # d ln f / d ln number, of all rows
     answers = problem.modes_of(questions, labels)
     for state, answer, (values, names) in zip(states, answers, questions, strict=True):
-        if not isinstance(answer, Found):
+        if not isinstance(answer, LabelledModes):
             continue
         for name in names:
             slopes = values[name] * answer.evaluation.gradients[name]
@@ -89,7 +89,7 @@ def _pressure_words(stated: TyreState, amounts: Array) -> str:
 
 
 def _default_wheel(problem: Problem) -> list[str]:
-    """Paths of the wheel's numbers that nobody has stated."""
+    """Paths of the wheel's numbers that the case does not state."""
     case = problem.case
     stated = case.file_data.get("rim") or {}
     paths = [f"rim.{name}" for name in WHEEL if name not in stated]
@@ -131,7 +131,7 @@ def _rims(
             answers = problem.modes_of(questions, [problem.labels[state] for state in here])
             shift = np.zeros(len(problem.measured))
             for state, answer in zip(here, answers, strict=True):
-                if not isinstance(answer, Found):
+                if not isinstance(answer, LabelledModes):
                     break
                 before, after = point.states[state], answer.wanted
                 ratios = {x: after[x].frequency_Hz / before[x].frequency_Hz for x in before}

@@ -30,7 +30,7 @@ METHODS: dict[str, Descend] = {"slsqp": slsqp.descend, "gauss-newton": gauss_new
 TOLERANCE = 1e-3  # projected gradient, Hz per unit of a logarithm: 1e-5 Hz for a change of 1 %
 SLOPE_NOISE_HZ = 50.0  # differences of a step that suits the digits: this times the step
 SLOPE_ERROR = 1e-4  # of d ln q / d x of patches and stiffnesses, by the curvature within a step
-MOST_REPLACED = 20  # replaced starts per start asked for
+MAX_REPLACED = 20  # replaced starts per start asked for
 
 FitNotify = Callable[[int, Mapping[str, float], Point | EvaluationFailed], None]
 
@@ -146,7 +146,7 @@ def _run(problem: Problem, start: Array, method: str) -> StartReport:
 
 
 def _tolerance(problem: Problem) -> float:
-    """What the projected gradient can be told from 0 by, given how exact the slopes are."""
+    """Largest projected gradient that counts as 0, given how exact the slopes are."""
     modal = SLOPE_NOISE_HZ * (problem.difference_step or 0.0)
     sigma = min((t.sigma_Hz or 1.0 for t in problem.targets), default=1.0)
     pressed = SLOPE_ERROR * float(np.linalg.norm([t.scale * t.value for t in problem.road]))
@@ -175,7 +175,7 @@ def _more_starts(
             else:
                 reports.append(answer)
                 finished(len(reports) + 1, count + 1)
-        if replaced > MOST_REPLACED * count:
+        if replaced > MAX_REPLACED * count:
             raise EvaluationFailed(
                 "no_equilibrium",
                 f"{replaced} drawn starts could not be evaluated: the bounds hold too few tyres",

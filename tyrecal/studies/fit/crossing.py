@@ -62,7 +62,7 @@ def gap(point: Point, state: TyreState) -> float:
 
 
 def pair_clarity(point: Point, state: TyreState | None = None) -> float:
-    """How clearly the two modes are told apart, in a state or where they are least; 1 where they
+    """How clearly the two modes are distinguished, in a state or where they are least; 1 where they
     are not both wanted."""
     states = point.states if state is None else (state,)
     pairs = [[point.states[s][label] for label in PAIR if label in point.states[s]] for s in states]

@@ -1,4 +1,4 @@
-"""The step of `gauss_newton`, with the curvature that changes of the residuals' slopes tell.
+"""The step of `gauss_newton`, with the curvature from changes of the residuals' slopes.
 
     r(x + d) ~ r + J d + d^T C d / 2
 
@@ -15,9 +15,9 @@ import numpy as np
 from scipy.optimize import nnls
 
 Array = np.ndarray
-MOST_NEWTON_STEPS = 20  # on the model, which no evaluation is asked for
-LEAST_MOVE = 1e-7  # of a coordinate
-MOST_HALVINGS = 12
+MAX_NEWTON_STEPS = 20  # on the model, which no evaluation is asked for
+MIN_MOVE = 1e-7  # of a coordinate
+MAX_HALVINGS = 12
 ROUND_OFF = 1e-12  # of numbers of the order of 1
 
 
@@ -43,7 +43,7 @@ def curved_step(J: Array, r: Array, C: Array, damping: float, G: Array, h: Array
     weight = damping * np.trace(J.T @ J) / v
     value = lambda d: np.sum(foreseen(J, r, C, d) ** 2) + weight * d @ d
     d = np.zeros(v)
-    for _ in range(MOST_NEWTON_STEPS):
+    for _ in range(MAX_NEWTON_STEPS):
         at, slopes = foreseen(J, r, C, d), J + C @ d
         H, g = slopes.T @ slopes + weight * np.eye(v), slopes.T @ at + weight * d
         size = max(float(np.linalg.norm(at)), 1e-300)
@@ -51,10 +51,10 @@ def curved_step(J: Array, r: Array, C: Array, damping: float, G: Array, h: Array
             whole = quadratic_step(H + np.tensordot(at, C, 1), g, size, G, h - G @ d)
         except np.linalg.LinAlgError:
             whole = quadratic_step(H, g, size, G, h - G @ d)
-        parts = (whole / 2**k for k in range(MOST_HALVINGS))
+        parts = (whole / 2**k for k in range(MAX_HALVINGS))
         move = next((part for part in parts if value(d + part) < value(d)), np.zeros(v))
         d = d + move
-        if abs(move).max() < LEAST_MOVE:
+        if abs(move).max() < MIN_MOVE:
             break
     return d
 

@@ -33,13 +33,13 @@ def differences(
     failures: dict[int, EvaluationFailed] = {}
     sides = [_sides(v, values[v.name], step) for v in variables]
     for side in (0, 1):
-        asked = [i for i, steps in enumerate(sides) if i not in columns and side < len(steps)]
-        if not asked:
+        pending = [i for i, steps in enumerate(sides) if i not in columns and side < len(steps)]
+        if not pending:
             break
         designs = [
             {**values, v.name: v.value(v.scaled(values[v.name]) + sides[i][side])}
             for i, v in enumerate(variables)
-            if i in asked
+            if i in pending
         ]
         answers = iter(ask(designs if centre is not None else [values, *designs]))
         if centre is None:
@@ -47,7 +47,7 @@ def differences(
             if isinstance(first, EvaluationFailed):
                 raise first
             centre = first
-        for i, answer in zip(asked, answers, strict=True):
+        for i, answer in zip(pending, answers, strict=True):
             if isinstance(answer, EvaluationFailed):
                 if answer.denied:
                     raise answer

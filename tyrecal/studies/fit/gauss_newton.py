@@ -19,8 +19,8 @@ from .search import (
     CONVERGED,
     DAMPING,
     EXACT,
-    LEAST_GAIN,
-    MOST_DESIGNS,
+    MAX_DESIGNS,
+    MIN_OBJECTIVE_GAIN,
     NO_LOWER,
     USED_UP,
     CrossingWatch,
@@ -30,8 +30,8 @@ from .search import (
 )
 
 Array = np.ndarray
-LEAST_DAMPING = 1e-6  # mu over the mean diagonal of J^T J, at last
-KEPT_WELL, KEPT_BADLY = 0.7, 0.25  # shares of a promised decrease: above mu falls, below it rises
+MIN_DAMPING = 1e-6  # mu over the mean diagonal of J^T J, at last
+GOOD_GAIN, POOR_GAIN = 0.7, 0.25  # shares of a promised decrease: above mu falls, below it rises
 HALVINGS = 5  # of a step towards a design without a solution
 
 
@@ -41,11 +41,14 @@ def descend(
     """Lower the objective from ``point``; ``known``: see `CrossingWatch`."""
     damping, watch = DAMPING, CrossingWatch(problem, known)
     curvature = np.zeros((*point.jacobian.shape, len(point.x)))
-    for _ in range(MOST_DESIGNS):
+    for _ in range(MAX_DESIGNS):
         if is_converged(problem, point, tolerance):
             return Descent(point, CONVERGED)
         step = _step(problem, point, curvature, damping, watch.edge)
-        if promised(point, curvature, step) <= LEAST_GAIN * max(point.objective, EXACT) ** 2:
+        if (
+            promised(point, curvature, step)
+            <= MIN_OBJECTIVE_GAIN * max(point.objective, EXACT) ** 2
+        ):
             return Descent(point, NO_LOWER, watch.edge)
         there = _first_solvable(problem, point, step)
         if there is None:
@@ -59,10 +62,10 @@ def descend(
             watch.edge = crossing(problem, (point, there), reached) or watch.edge
         change, gain = there.x - point.x, point.objective**2 - there.objective**2
         wanted = promised(point, curvature, change)
-        if not gain >= KEPT_BADLY * wanted:
+        if not gain >= POOR_GAIN * wanted:
             damping *= 4
-        elif gain > KEPT_WELL * wanted:
-            damping = max(0.1 * damping, LEAST_DAMPING)
+        elif gain > GOOD_GAIN * wanted:
+            damping = max(0.1 * damping, MIN_DAMPING)
         curvature = with_secant(curvature, change, there.jacobian - point.jacobian)
         point = reached
     return Descent(point, USED_UP, watch.edge)

@@ -23,7 +23,7 @@ import numpy as np
 
 from ...simulate.evaluate.evaluator import Evaluator, Question
 from ...simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
-from ...simulate.modes.find import Found, ModesAnswer, find_modes
+from ...simulate.modes.find import LabelledModes, ModesAnswer, find_modes
 from ...simulate.modes.label import Label, Mode
 from ...tyre.case import LoadedCase
 from ...tyre.state import AS_THE_CASE, TyreState, without
@@ -137,7 +137,7 @@ class Problem:
         return {**self.fixed, **free}
 
     def evaluate(self, x: Array) -> Point:
-        """The design at x with its Jacobian, from memory if it was asked for before.
+        """The design at x with its Jacobian, from memory if it was evaluated before.
 
         Raises EvaluationFailed.
         """
@@ -162,14 +162,14 @@ class Problem:
     def _evaluate(self, values: dict[str, float]) -> Point:
         names = tuple(v.name for v in self.variables)
         exact = self.difference_step is None
-        (found,) = self._in_states([values], names if exact else ())
-        if isinstance(found, EvaluationFailed):
-            raise found
-        measured = self._measured(found)
+        (by_state,) = self._in_states([values], names if exact else ())
+        if isinstance(by_state, EvaluationFailed):
+            raise by_state
+        measured = self._measured(by_state)
         if exact:
-            slopes = self.slopes(found, self.targets, values)
+            slopes = self.slopes(by_state, self.targets, values)
             if self.mass:
-                slopes = np.vstack([slopes, self._mass_slopes(found, values)])
+                slopes = np.vstack([slopes, self._mass_slopes(by_state, values)])
         else:
             step, ask = self.difference_step or STEP, self._neighbours
             slopes = differences(self.variables, values, step, ask, measured)[1]
@@ -184,9 +184,9 @@ class Problem:
             x,
             self.scale * (np.concatenate([measured[:modal], others]) - wanted),
             self.scale[:, None] * slopes,
-            {state: answer.wanted for state, answer in found.items()},
-            min(answer.clarity for answer in found.values()),
-            _mass_kg(found),
+            {state: answer.wanted for state, answer in by_state.items()},
+            min(answer.clarity for answer in by_state.values()),
+            _mass_kg(by_state),
             others,
         )
 
@@ -206,27 +206,32 @@ class Problem:
             quantities, slopes = np.append(quantities, more[0]), np.vstack([slopes, more[1]])
         return quantities, slopes
 
-    def _measured(self, found: Mapping[TyreState, Found]) -> Array:
+    def _measured(self, by_state: Mapping[TyreState, LabelledModes]) -> Array:
         """Frequencies (targets,) of a design, Hz, and behind them its mass where it is a target."""
-        hertz = [found[t.state].wanted[t.label].frequency_Hz for t in self.targets]
-        return np.array(hertz + [_mass_kg(found) for _ in self.mass])
+        hertz = [by_state[t.state].wanted[t.label].frequency_Hz for t in self.targets]
+        return np.array(hertz + [_mass_kg(by_state) for _ in self.mass])
 
     def slopes(
         self,
-        found: Mapping[TyreState, Found],
+        by_state: Mapping[TyreState, LabelledModes],
         targets: Sequence[Target],
         values: Mapping[str, float],
     ) -> Array:
-        """d f / d x (targets, variables), Hz, exact; a state's own numbers hang on no variable."""
-        modes = [(found[t.state], found[t.state].wanted[t.label].position) for t in targets]
+        """d f / d x (targets, variables), Hz, exact; a state's own numbers depend on no
+        variable."""
+        modes = [(by_state[t.state], by_state[t.state].wanted[t.label].position) for t in targets]
         rows = [[_slope(each, v.name, place) for v in self.variables] for each, place in modes]
         slopes = np.array(rows, float).reshape(len(rows), len(self.variables))
         return slopes * [v.slope(values[v.name]) for v in self.variables]
 
-    def _mass_slopes(self, found: Mapping[TyreState, Found], values: Mapping[str, float]) -> Array:
-        """d mass / d x (variables,), kg. Raises DeckRefused where the solver does not tell it."""
+    def _mass_slopes(
+        self, by_state: Mapping[TyreState, LabelledModes], values: Mapping[str, float]
+    ) -> Array:
+        """d mass / d x (variables,), kg. Raises DeckRefused where the solver does not give it."""
         known: dict[str, float] = {}
-        for each in found.values():  # a variable that one state sets moves the mass in the others
+        for (
+            each
+        ) in by_state.values():  # a variable that one state sets moves the mass in the others
             known |= each.evaluation.mass_gradients
         if not known:
             name = self.evaluator.solver.name
@@ -238,28 +243,28 @@ class Problem:
         self, designs: Sequence[Mapping[str, float]]
     ) -> Iterator[Array | EvaluationFailed]:
         """`_measured` of each design, or its failure."""
-        for found in self._in_states(designs):
-            yield found if isinstance(found, EvaluationFailed) else self._measured(found)
+        for answer in self._in_states(designs):
+            yield answer if isinstance(answer, EvaluationFailed) else self._measured(answer)
 
     def _in_states(
         self, designs: Sequence[Mapping[str, float]], names: tuple[str, ...] = ()
-    ) -> list[dict[TyreState, Found] | EvaluationFailed]:
-        """Of each design its target modes in every state, or its first failure, all asked for at
-        once. Raises DeckRefused."""
+    ) -> list[dict[TyreState, LabelledModes] | EvaluationFailed]:
+        """For each design its target modes in every state, or its first failure; all are requested
+        at once. Raises DeckRefused."""
         wanted = [
             self.question(design, state, names) for design in designs for state in self.labels
         ]
         answers = iter(self.modes_of(wanted, [*self.labels.values()] * len(designs)))
-        found: list[dict[TyreState, Found] | EvaluationFailed] = []
+        results: list[dict[TyreState, LabelledModes] | EvaluationFailed] = []
         for _ in designs:
             here = {state: next(answers) for state in self.labels}
             for answer in here.values():
                 if isinstance(answer, DeckRefused):
                     raise answer
             failed = (each for each in here.values() if isinstance(each, EvaluationFailed))
-            modes = {state: each for state, each in here.items() if isinstance(each, Found)}
-            found.append(next(failed, modes))
-        return found
+            modes = {state: each for state, each in here.items() if isinstance(each, LabelledModes)}
+            results.append(next(failed, modes))
+        return results
 
     def question(
         self, values: Mapping[str, float], state: TyreState, names: tuple[str, ...]
@@ -274,8 +279,8 @@ class Problem:
         wanted: Sequence[tuple[Mapping[str, float], tuple[str, ...]]],
         labels: Sequence[Sequence[Label]] = (),
     ) -> list[ModesAnswer]:
-        """Of each design, with the names of its own slopes, the modes with its ``labels``, by
-        default those of all targets; failures and refusals among them."""
+        """Modes of each design, with the names of its own slopes, by its ``labels``, by default
+        those of all targets; failures and refusals among them."""
         every = [t.label for t in self.targets]
         tell = lambda place, modes: labels[place] if labels else every
         questions = [Question(*each) for each in wanted]
@@ -283,12 +288,12 @@ class Problem:
         return [answers[place] for place in range(len(wanted))]
 
 
-def _mass_kg(found: Mapping[TyreState, Found]) -> float:
+def _mass_kg(by_state: Mapping[TyreState, LabelledModes]) -> float:
     """The tyre's, kg, the same in every state."""
-    return next(iter(found.values())).evaluation.mass_kg
+    return next(iter(by_state.values())).evaluation.mass_kg
 
 
-def _slope(found: Found, name: str, place: int) -> float:
+def _slope(labelled: LabelledModes, name: str, place: int) -> float:
     """d f / d variable of the mode at a place, Hz per unit of it; 0 where it sets nothing there."""
-    gradient = found.evaluation.gradients.get(name)
+    gradient = labelled.evaluation.gradients.get(name)
     return 0.0 if gradient is None else float(gradient[place])

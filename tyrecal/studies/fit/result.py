@@ -1,4 +1,4 @@
-"""What a fit found: fit.json, fit.csv, and its tables."""
+"""Result of a fit: fit.json, fit.csv, and its tables."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ OTHER_RESIDUALS = (
     " scatter alone, the diagnosis also by the model's own error and the uncalibrated constants,"
     " so that it leaves what these explain."
 )
-MOST_PROPOSED = 4  # states in a table
+MAX_PROPOSED = 4  # states in a table
 HERTZ, RESULT_DIGITS = Column("Hz"), Column("", ".4g")
 
 
@@ -290,7 +290,7 @@ class FitResult(Result):
         ]
 
     def numbers(self) -> list[Table]:
-        """Of a fit over several states every target with its initial and measured value."""
+        """All targets of a fit over every target with its initial and measured value."""
         return [replace(self._every_target(), title="Every target")] if self.states else []
 
     def _every_target(self) -> Table:
@@ -336,7 +336,7 @@ class FitResult(Result):
         return "; ".join(filter(None, (units, str(self.provenance or ""))))
 
     def _states(self) -> list[Table]:
-        """What each state adds and, below, which would tell most next."""
+        """Tables of what each state adds and, below, of the states that would add most next."""
         if not self.states:
             return []
         own = {name: each.standard_error for name, each in self.variables.items()}
@@ -354,7 +354,7 @@ class FitResult(Result):
             rows = [
                 [each.said, f"{100 * (each.ratio or 0.0):.0f} %"]
                 + [self._percent(n, each.standard_errors_with[n]) for n in own]
-                for each in self.next_states[:MOST_PROPOSED]
+                for each in self.next_states[:MAX_PROPOSED]
             ]
             tables.append(
                 Table(heads, rows, title="Which state would tell most next, of the same modes")
@@ -506,24 +506,24 @@ def _variables(
 
 def _modes(problem: Problem, initial: Point, point: Point, several: bool) -> list[FittedMode]:
     """Those of the unloaded tyre, then those on the road."""
-    found = []
+    result = []
     for target in problem.targets:
         before, after = (p.states[target.state][target.label] for p in (initial, point))
         hertz = (before.frequency_Hz, after.frequency_Hz, target.frequency_Hz)
         of = _mode(target.label, after.multiplicity, hertz)
         own = plain(problem, target.state) | {"sigma_Hz": target.sigma_Hz}
-        found.append(FittedMode.model_validate(of | (own if several else {})))
+        result.append(FittedMode.model_validate(of | (own if several else {})))
     for i, road in enumerate(problem.road):
         if road.member:
             hertz = (float(initial.others[i]), float(point.others[i]), road.value)
             own = plain(problem, road.state) | {"symmetry": road.member.symmetry}
             of = _mode(road.member.label, 1, hertz) | own | {"sigma_Hz": road.sigma}
-            found.append(FittedMode.model_validate(of))
-    return found
+            result.append(FittedMode.model_validate(of))
+    return result
 
 
 def _mode(label: Label, multiplicity: int, hertz: tuple[float, float, float]) -> dict[str, Any]:
-    """Of a mode; hertz: initial, fitted, target."""
+    """Entry of a mode; hertz: initial, fitted, target."""
     initial, fitted, target = hertz
     return {
         **asdict(label),
@@ -538,7 +538,7 @@ def _mode(label: Label, multiplicity: int, hertz: tuple[float, float, float]) ->
 
 def _others(problem: Problem, initial: Point, point: Point, several: bool) -> list[FittedFootprint]:
     """All but modes."""
-    found = []
+    result = []
     for i, target in enumerate(problem.others):
         if target.member:
             continue
@@ -556,12 +556,12 @@ def _others(problem: Problem, initial: Point, point: Point, several: bool) -> li
             del of["load_N"]
         elif several:
             of |= plain(problem, target.state)
-        found.append(FittedFootprint.model_validate(of))
-    return found
+        result.append(FittedFootprint.model_validate(of))
+    return result
 
 
 def _states(problem: Problem, point: Point, known: FitUncertainty) -> dict[str, Any]:
-    """What each adds, and which would tell most next."""
+    """Entries of what each state adds, and of the states that would add most next."""
     measured = [
         {
             **plain(problem, each.state),

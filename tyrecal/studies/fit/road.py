@@ -39,7 +39,7 @@ def press(
     designs: Designs,
     jobs: int,
 ) -> Iterator[Array | EvaluationFailed]:
-    """Of each design the targets' quantities (targets,), or why a load was not reached."""
+    """The targets' quantities (targets,) of each design, or why a load was not reached."""
     answers: list[list[Quantities | EvaluationFailed]] = [[] for _ in designs]
     for state, modal in dict.fromkeys((t.state.unloaded, bool(t.member)) for t in targets):
         here = {
@@ -47,19 +47,19 @@ def press(
             for place, t in enumerate(targets)
             if (t.state.unloaded, bool(t.member)) == (state, modal)
         }
-        asked = [state.design(case, values) for values in designs]
+        in_state = [state.design(case, values) for values in designs]
         ask = _modes if modal else _footprints
-        for known, outcome in zip(answers, ask(case, evaluator, here, asked, jobs), strict=True):
+        for known, outcome in zip(answers, ask(case, evaluator, here, in_state, jobs), strict=True):
             known.append(outcome)
     for outcomes in answers:
-        found: Quantities = {}
+        quantities: Quantities = {}
         for outcome in outcomes:
             if isinstance(outcome, EvaluationFailed):
                 yield outcome
                 break
-            found |= outcome
+            quantities |= outcome
         else:
-            yield np.array([found[place] for place in range(len(targets))])
+            yield np.array([quantities[place] for place in range(len(targets))])
 
 
 def press_with_slopes(

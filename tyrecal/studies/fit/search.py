@@ -17,14 +17,14 @@ from .crossing import MIXED, TELLING, Crossing, crossing, gap, order, pair_clari
 from .problem import Point, Problem
 
 Array = np.ndarray
-MOST_DESIGNS = 100
+MAX_DESIGNS = 100
 EXACT = 1e-3  # Hz, an objective below every measurement's resolution
-LEAST_GAIN = 1e-9  # of the squared objective: a smaller gain is none
+MIN_OBJECTIVE_GAIN = 1e-9  # of the squared objective: a smaller gain is none
 NO_GAIN = 1e-6  # of the squared objective: half of this of the objective, below every resolution
 DAMPING = 0.01  # share of the mean diagonal of J^T J that is added to it at the start of a search
-ROOM = 0.1  # of the gap of the [0, 0] modes, between a bounded step and where labels change places
-CREEPING = 3e-4  # of the objective, less than ROOM costs: a gain that is not worth another step
-ALONG = 0.1  # of the gradient: as much along the crossing counts as none
+CROSSING_ROOM = 0.1  # of the [0, 0] modes' gap, from a bounded step to where labels change
+STALL_RTOL = 3e-4  # of the objective, less than CROSSING_ROOM costs: not worth another step
+ALONG_RTOL = 0.1  # of the gradient: as much along the crossing counts as none
 CONVERGED = "converged"
 NO_LOWER = "no lower objective along the search direction"
 USED_UP = "designs used up"
@@ -109,13 +109,13 @@ class CrossingWatch:
         reached = min(point, there, key=lambda p: p.objective)
         side = order(self.problem, reached)
         back = self.known is not None and side == order(self.problem, self.known)
-        if self.known and back and reached.objective >= (1 - CREEPING) * self.known.objective:
+        if self.known and back and reached.objective >= (1 - STALL_RTOL) * self.known.objective:
             return CAME_BACK
         if side != order(self.problem, point):
             self.edge = None
         elif side != order(self.problem, there) and _are_mixed(point, there):
             self.edge = crossing(self.problem, (point, there), reached) or self.edge
-        creeping = point.objective - reached.objective <= CREEPING * point.objective
+        creeping = point.objective - reached.objective <= STALL_RTOL * point.objective
         return AT_CROSSING if creeping and self.bounds(reached) else ""
 
     def bounds(self, point: Point) -> bool:
@@ -125,7 +125,7 @@ class CrossingWatch:
             return False
         normal = self.edge.slopes / max(float(np.linalg.norm(self.edge.slopes)), 1e-300)
         along = np.linalg.norm(point.gradient - (point.gradient @ normal) * normal)
-        return bool(along <= ALONG * np.linalg.norm(point.gradient))
+        return bool(along <= ALONG_RTOL * np.linalg.norm(point.gradient))
 
 
 def room_to_move(problem: Problem, point: Point, edge: Crossing | None) -> tuple[Array, Array]:
@@ -138,7 +138,7 @@ def room_to_move(problem: Problem, point: Point, edge: Crossing | None) -> tuple
         apart = gap(point, edge.state)
         side = np.sign(apart)
         G = np.vstack([G, side * edge.slopes])
-        h = np.append(h, ROOM * abs(apart) - side * edge.at(point.x))
+        h = np.append(h, CROSSING_ROOM * abs(apart) - side * edge.at(point.x))
     return G, h
 
 

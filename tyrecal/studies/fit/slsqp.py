@@ -22,8 +22,8 @@ from .search import (
     CONVERGED,
     DAMPING,
     EXACT,
-    LEAST_GAIN,
-    MOST_DESIGNS,
+    MAX_DESIGNS,
+    MIN_OBJECTIVE_GAIN,
     NO_LOWER,
     USED_UP,
     CrossingWatch,
@@ -34,7 +34,7 @@ from .search import (
 )
 
 Array = np.ndarray
-LEAST_CHANGE = 1e-15  # of F^2 / (2 F0^2), by which SLSQP stops: the gradient ends a search before
+MIN_CHANGE = 1e-15  # of F^2 / (2 F0^2), by which SLSQP stops: the gradient ends a search before
 
 
 class _Run:
@@ -67,7 +67,7 @@ class _Run:
                 jac=self.gradient,
                 method="SLSQP",
                 constraints=[inside],
-                options={"ftol": LEAST_CHANGE, "maxiter": MOST_DESIGNS},
+                options={"ftol": MIN_CHANGE, "maxiter": MAX_DESIGNS},
             )
         except StopIteration as stop:
             return str(stop.value or "")
@@ -113,7 +113,7 @@ def descend(
     problem: Problem, point: Point, tolerance: float, known: Point | None = None
 ) -> Descent:
     """Lower the objective from ``point``; ``known``: see `CrossingWatch`."""
-    watch, left = CrossingWatch(problem, known), MOST_DESIGNS
+    watch, left = CrossingWatch(problem, known), MAX_DESIGNS
     while not is_converged(problem, point, tolerance):
         run = _Run(problem, point, tolerance, watch, left)
         end = run.descend()
@@ -123,7 +123,7 @@ def descend(
             break
         if not end and watch.bounds(point):
             end = AT_CROSSING
-        if not end and gain <= LEAST_GAIN * point.objective**2 and watch.edge is run.edge:
+        if not end and gain <= MIN_OBJECTIVE_GAIN * point.objective**2 and watch.edge is run.edge:
             end = CONVERGED if has_nothing_to_gain(problem, point) else NO_LOWER
         if end:
             return Descent(point, end, watch.edge)

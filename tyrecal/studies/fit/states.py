@@ -1,4 +1,4 @@
-"""What each state of a fit tells of the variables, and which state would tell most next.
+"""Contribution of each state of a fit to the variables, and the state that would add most next.
 
 Standard errors are those of the linearised fit (see `uncertainty`): without a state its rows of the
 Jacobian are left out; with another one rows are added, of the same modes as the best measured
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...simulate.modes.find import Found
+from ...simulate.modes.find import LabelledModes
 from ...simulate.modes.label import Label
 from ...tyre.state import RIMS, TyreState
 from ...tyre.usual import USUAL
@@ -49,12 +49,12 @@ class NextState:
 
 
 def state_reports(problem: Problem, point: Point, known: FitUncertainty) -> list[StateReport]:
-    """Of every measured state, in the order of the targets."""
+    """Report on every measured state, in the order of the targets."""
     own = [None if t in problem.mass else t.state for t in problem.measured]
     counts = problem.scale > 0
     with np.errstate(divide="ignore", invalid="ignore"):
         off = point.residuals / problem.scale / known.sigma
-    found = []
+    reports = []
     for state in dict.fromkeys(each for each in own if each):
         here = np.array([each == state for each in own])
         rest = counts & ~here
@@ -63,8 +63,8 @@ def state_reports(problem: Problem, point: Point, known: FitUncertainty) -> list
         )
         mean = float(np.mean(off[counts & here] ** 2)) if (counts & here).any() else np.nan
         rms = float(np.sqrt(mean)) if np.isfinite(mean) else None
-        found.append(StateReport(state, int((counts & here).sum()), rms, errors))
-    return found
+        reports.append(StateReport(state, int((counts & here).sum()), rms, errors))
+    return reports
 
 
 def next_states(problem: Problem, point: Point, known: FitUncertainty) -> list[NextState]:
@@ -76,13 +76,13 @@ def next_states(problem: Problem, point: Point, known: FitUncertainty) -> list[N
     like = _best_measured(problem, known)
     states = _others(problem) if like else []
     names = tuple(v.name for v in problem.variables)
-    asked = [problem.question(point.values, state, names) for state in states]
-    answers = problem.modes_of(asked, [[t.label for t, _ in like]] * len(states))
+    questions = [problem.question(point.values, state, names) for state in states]
+    answers = problem.modes_of(questions, [[t.label for t, _ in like]] * len(states))
     counts = problem.scale > 0
     J, root, sigma = point.jacobian[counts], problem.scale[counts], known.sigma[counts]
-    found = []
+    proposals = []
     for state, answer in zip(states, answers, strict=True):
-        if not isinstance(answer, Found):
+        if not isinstance(answer, LabelledModes):
             continue
         hertz = np.array([answer.wanted[t.label].frequency_Hz for t, _ in like])
         scattered = hertz * [relative for _, relative in like]
@@ -99,8 +99,8 @@ def next_states(problem: Problem, point: Point, known: FitUncertainty) -> list[N
         )
         both = [(before[v.name], after[v.name]) for v in problem.variables]
         gained = [np.log(with_it / without) for without, with_it in both if without and with_it]
-        found.append(NextState(state, after, float(np.exp(np.mean(gained)))))
-    return sorted(found, key=lambda each: each.ratio)
+        proposals.append(NextState(state, after, float(np.exp(np.mean(gained)))))
+    return sorted(proposals, key=lambda each: each.ratio)
 
 
 def _best_measured(problem: Problem, known: FitUncertainty) -> list[tuple[Target, float]]:
@@ -120,9 +120,11 @@ def _best_measured(problem: Problem, known: FitUncertainty) -> list[tuple[Target
 
 
 def _others(problem: Problem) -> list[TyreState]:
-    """Unloaded states beside those measured: their pressures, and one below and above, on every rim
-    that the case can have."""
-    told = [state.told(problem.case) for state, labels in problem.labels.items() if labels]
+    """Unloaded states in addition to those measured: their pressures, and one below and above, on
+    every rim that the case can have."""
+    measured_states = [
+        state.told(problem.case) for state, labels in problem.labels.items() if labels
+    ]
     measured = [t.state.told(problem.case) for t in problem.measured if t not in problem.mass]
     pressures = sorted(p for p in {state.pressure_kPa for state in measured} if p)
     ends = (pressures[0] / STEP_OUT, pressures[-1] * STEP_OUT)
@@ -131,7 +133,7 @@ def _others(problem: Problem) -> list[TyreState]:
         TyreState(p, 0.0, rim)
         for rim in RIMS
         for p in pressures
-        if USUAL["pressure_kPa"].holds(p) and TyreState(p, 0.0, rim) not in told
+        if USUAL["pressure_kPa"].holds(p) and TyreState(p, 0.0, rim) not in measured_states
     ]
     return [state.of(problem.case) for state in wanted if is_possible(problem, state)]
 
@@ -156,6 +158,6 @@ def _named(problem: Problem, errors: Sequence[float | None]) -> Errors:
 
 
 def plain(problem: Problem, state: TyreState) -> dict[str, Any]:
-    """A state as result files have it, nothing left to the case."""
-    told = state.told(problem.case)
-    return {"pressure_kPa": told.pressure_kPa, "load_N": told.load_N, "rim": told.rim}
+    """A state for result files, with nothing left to the case."""
+    complete = state.told(problem.case)
+    return {"pressure_kPa": complete.pressure_kPa, "load_N": complete.load_N, "rim": complete.rim}

@@ -17,13 +17,13 @@ from ...simulate.provenance import provenance
 from ...tyre.case import LoadedCase, start_values
 from ...tyre.values import with_values
 from ..labelling.label import label
-from ..labelling.result import labels_told
+from ..labelling.result import labels_posterior
 from ..pressing_plan import DESIGNS_OF_FIT, PressedState, PressingPlan, plan_pressing
 from .calibrate import Fit, FitNotify, calibrate, check
 from .problem import Problem
 from .targets import states_of
 
-MOST_FITS = 5  # to frequencies without labels
+MAX_FITS = 5  # to frequencies without labels
 
 
 class FitStudy:
@@ -145,7 +145,7 @@ class FitStudy:
     def _fit_with_labels(self, calibrated: Callable[[], Fit], jobs: int) -> Fit:
         case, evaluator, readings, fixed = self._plain, self.evaluator, self.readings, self.fixed
         likeliest = label(case, evaluator, readings, fixed=fixed, jobs=jobs)
-        for _ in range(MOST_FITS):
+        for _ in range(MAX_FITS):
             used = likeliest
             self._set_targets(used.readings)
             fit = calibrated()
@@ -154,6 +154,6 @@ class FitStudy:
             if same:
                 break
         last = replace(likeliest.found, settled=likeliest.found.settled and same)
-        labels = labels_told(case, replace(likeliest, found=last))
+        labels = labels_posterior(case, replace(likeliest, found=last))
         fit.found = fit.found.model_copy(update={"labels": labels})
         return fit

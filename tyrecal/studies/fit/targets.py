@@ -1,4 +1,4 @@
-"""What a fit aims at: measured values, each with its state, standard deviation and weight."""
+"""Targets of a fit: measured values, each with its state, standard deviation and weight."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class ValueTarget:
 
 def read_targets(case: LoadedCase) -> list[Target]:
     """Target modes of the unloaded tyre, those as the case is before those in other states."""
-    found = [
+    targets = [
         Target(
             Label(t.c, t.m, t.kind),
             t.frequency_Hz,
@@ -69,18 +69,19 @@ def read_targets(case: LoadedCase) -> list[Target]:
         for t in case.case.targets.modes
         if not t.load_N
     ]
-    return sorted(found, key=lambda t: t.state != AS_THE_CASE)
+    return sorted(targets, key=lambda t: t.state != AS_THE_CASE)
 
 
 def target_labels(case: LoadedCase) -> list[Label]:
-    """Of the unloaded tyre's target modes, each once, whatever states they were measured in."""
+    """Labels of the unloaded tyre's target modes, each once, whatever states they were measured
+    in."""
     return list(dict.fromkeys(target.label for target in read_targets(case)))
 
 
 def read_road_targets(case: LoadedCase) -> list[ValueTarget]:
     """Targets on the road: those of the patch and stiffnesses, then modes."""
     targets = case.case.targets
-    found = [
+    rows = [
         ValueTarget(
             name,
             getattr(t, name),
@@ -92,7 +93,7 @@ def read_road_targets(case: LoadedCase) -> list[ValueTarget]:
         for name, quantity in FOOTPRINT_QUANTITIES.items()
         if getattr(t, name) is not None
     ]
-    return found + [
+    return rows + [
         ValueTarget(
             "frequency_Hz",
             t.frequency_Hz,
@@ -126,8 +127,8 @@ def states_of(case: LoadedCase) -> dict[str, Any]:
 
 def rims_of(case: LoadedCase, states: Iterable[TyreState]) -> list[str]:
     """How their rims are held, as `provenance` takes it."""
-    told = (state.told(case).rim or "" for state in states)
-    return list(dict.fromkeys(RIM_WORDS.get(rim, rim) for rim in told))
+    rims = (state.told(case).rim or "" for state in states)
+    return list(dict.fromkeys(RIM_WORDS.get(rim, rim) for rim in rims))
 
 
 def objective_unit(case: LoadedCase) -> str:

@@ -26,26 +26,23 @@ from .uncertainty import FitUncertainty, fit_response, standard_errors
 
 Array = np.ndarray
 BY_MEASUREMENT, BY_MODEL, BY_SECTION = "measurement", "material laws and mesh", "section"
-LEAST_SHARE = 0.01  # of the variance, below which a cause is not listed
+MIN_VARIANCE_SHARE = 0.01  # of the variance, below which a cause is not listed
 
 
 @dataclass(frozen=True)
 class TotalError:
-    """of_values (n, n): covariance of ln q of the targets that count; of_coordinates (v, v): of the
-    fitted coordinates, not scaled by chi^2; shares: of their variances (v,) by cause, the largest
-    first; is_determined (v,): whether the data determine a variable; responses: how the fitted
-    coordinates answer each target that counts."""
+    """Errors of a fit by all that is uncertain, and their causes."""
 
-    of_values: Array
-    of_coordinates: Array
-    shares: dict[str, Array]
-    is_determined: Array
-    responses: list[FitResponse]
+    of_values: Array  # (n, n) covariance of ln q of the targets that count
+    of_coordinates: Array  # (v, v) covariance of the fitted coordinates, not scaled by chi^2
+    shares: dict[str, Array]  # of their variances (v,) by cause, the largest first
+    is_determined: Array  # (v,) whether the data determine a variable
+    responses: list[FitResponse]  # how the fitted coordinates answer each target that counts
 
     def by_variable(
         self, problem: Problem, point: Point, chi2_per_dof: float | None
     ) -> dict[str, dict[str, Any]]:
-        """What fit.json says of the total by variable; standard errors in each one's unit."""
+        """Entries of fit.json about the total by variable; standard errors in each one's unit."""
         spread = self.of_coordinates * max(1.0, chi2_per_dof or 0.0)
         errors = standard_errors(problem, point, spread, self.is_determined)
         return {
@@ -54,7 +51,7 @@ class TotalError:
                 "variance_by_cause": {
                     cause: float(share[i])
                     for cause, share in self.shares.items()
-                    if share[i] >= LEAST_SHARE
+                    if share[i] >= MIN_VARIANCE_SHARE
                 },
             }
             for i, v in enumerate(problem.variables)

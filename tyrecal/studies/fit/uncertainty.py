@@ -15,19 +15,19 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class FitUncertainty:
-    """standard_errors: in each variable's own unit, None where the data do not tell;
-    correlations (v, v); singular_values (v,) of the weighted Jacobian by the scaled variables,
-    in the objective's unit, largest first: a small one is a combination that the data do not see;
-    noise_Hz: the standard deviation of a frequency behind the errors, None where there is no
-    frequency that counts, or it cannot be known; sigma: of each target in its unit, NaN where it
-    does not count or cannot be known; is_determined (v,): whether the data determine a variable."""
+    """Standard errors of a fit by the scatter of its targets."""
 
+    # in each variable's own unit, None where the data do not determine it
     standard_errors: list[float | None]
-    correlations: Array
+    correlations: Array  # (v, v)
+    # (v,) of the weighted Jacobian by the scaled variables, in the objective's unit, largest first:
+    # a small one is a combination that the data do not see
     singular_values: Array
+    # standard deviation of a frequency behind the errors, None where there is no frequency that
+    # counts, or it cannot be known
     noise_Hz: float | None
-    sigma: Array
-    is_determined: Array
+    sigma: Array  # of each target in its unit, NaN where it does not count or cannot be known
+    is_determined: Array  # (v,) whether the data determine a variable
 
 
 def uncertainty(problem: Problem, point: Point) -> FitUncertainty:
@@ -50,8 +50,8 @@ def uncertainty(problem: Problem, point: Point) -> FitUncertainty:
         correlations = covariance / np.outer(spread, spread)
         correlations[~seen] = correlations[:, ~seen] = np.nan
     values = np.zeros(J.shape[1])  # fewer data than variables leave some combinations unseen
-    found = np.linalg.svd(J, compute_uv=False)
-    values[: len(found)] = found
+    singular_values = np.linalg.svd(J, compute_uv=False)
+    values[: len(singular_values)] = singular_values
     modal = sigma[: int(counts[: len(problem.targets)].sum())]
     noise = float(np.sqrt(np.mean(modal**2))) if len(modal) else float("nan")
     every = np.full(len(problem.scale), np.nan)
@@ -78,14 +78,14 @@ def fit_response(J: Array, root: Array) -> tuple[Array, Array]:
 def standard_errors(
     problem: Problem, point: Point, covariance: Array, seen: Array
 ) -> list[float | None]:
-    """Of each variable in its own unit; None where the data do not tell."""
+    """Standard error of each variable in its own unit; None where the data do not determine it."""
     slopes = [v.slope(point.values[v.name]) for v in problem.variables]
     spread = np.sqrt(np.where(seen, np.diag(covariance), np.inf))
     return [float(s * k) if np.isfinite(s) else None for s, k in zip(spread, slopes, strict=True)]
 
 
 def _noise(problem: Problem, point: Point, counts: Array, leverage: Array) -> Array:
-    """Standard deviation of each target that counts, in its unit; NaN where nothing tells.
+    """Standard deviation of each target that counts, in its unit; NaN where nothing determines it.
 
     leverage: diagonal of J (J^T J)^-1 J^T, whose sum is the number of variables that the data see:
     what the targets with a sigma do not determine of them, the others lose as freedom.

@@ -41,11 +41,11 @@ FIT_VERDICT_WORDS: Final[dict[FitVerdict, str]] = {
     NOT_JUDGED: "converged, not judged",
     NOT_CONVERGED: "not converged",
 }
-MOST_CHI2_PER_DOF = 5.0  # of a model that fits
+MAX_CHI2_PER_DOF = 5.0  # of a model that fits
 MARKED = 16.0  # chi2 that a reason takes away, over the chi2 per degree of freedom that it leaves
 MARKED_UNSTATED = 49.0  # the same where the scatter is known from the residuals alone
-FEWEST_LEFT = 3  # degrees of freedom that tell such a scatter
-LEAST_CHECKED = 1e-6  # of a value's own weight: below, nothing else checks the value
+MIN_DEGREES_LEFT = 3  # degrees of freedom that tell such a scatter
+MIN_CHECKED = 1e-6  # of a value's own weight: below, nothing else checks the value
 NEXT_REASON = 6.0  # chi2 between a reason and the next, 20 times less likely: below, both are named
 SAME_VALUE = 0.015  # relative, between a corrected value and the model, besides 3 sd
 
@@ -130,7 +130,7 @@ def fit_verdict(is_good: bool, chi2_per_dof: float | None) -> FitVerdict:
         return NOT_CONVERGED
     if chi2_per_dof is None:
         return NOT_JUDGED
-    return DOES_NOT_FIT if chi2_per_dof > MOST_CHI2_PER_DOF else FITS
+    return DOES_NOT_FIT if chi2_per_dof > MAX_CHI2_PER_DOF else FITS
 
 
 def does_not_fit_words(chi2_per_dof: float, reason: FitReason | None) -> str:
@@ -157,7 +157,7 @@ def likeliest_reason(left: Remainder, shifts: Sequence[Shift] = ()) -> FitReason
     for each in (*_values(left), *_exchanges(left), *_shifts(left, shifts)):
         freedom = left.freedom - each.parameters
         taken = left.chi2 - each.chi2
-        if freedom < (1 if left.is_stated else FEWEST_LEFT) or taken <= 0:
+        if freedom < (1 if left.is_stated else MIN_DEGREES_LEFT) or taken <= 0:
             continue
         per_dof = max(each.chi2, 1e-12 * left.chi2) / freedom
         scale, marked = (
@@ -178,7 +178,7 @@ def _values(left: Remainder) -> Iterator[_Suspicion]:
     """Each value left out."""
     weighted, own = left.weight @ left.deviation, np.diag(left.weight)
     for i, row in enumerate(left.rows):
-        if own[i] < LEAST_CHECKED / left.covariance[i, i]:
+        if own[i] < MIN_CHECKED / left.covariance[i, i]:
             continue
         model = row.value * float(np.exp(-weighted[i] / own[i]))
         reason = FitReason(kind="value", words=_slip(row, model, float(own[i] ** -0.5)))

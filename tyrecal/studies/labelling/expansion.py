@@ -18,14 +18,14 @@ from .tree import Frequencies, Labelings, Modes, labelings
 Array = np.ndarray
 
 ROUNDS = 10
-LONGEST_STEP = 0.5  # of a variable's coordinate, between expansions
+MAX_EXPANSION_STEP = 0.5  # of a variable's coordinate, between expansions
 SAME_DESIGN = 0.01  # of its prior standard deviations
 
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known of the variables' coordinates: mean (v,), a root (v, v) of the covariance, and
-    bounds (v,)."""
+    """Prior of the variables' coordinates: mean (v,), a root (v, v) of the covariance, and bounds
+    (v,)."""
 
     mean: Array
     root: Array
@@ -45,7 +45,7 @@ class Expansion:
 
 
 @dataclass(frozen=True)
-class Found:
+class LabelSearch:
     """Labelings about the model's ``expansion`` at x (v,), how many it took, and whether another
     would find the same; else it is the surest of those that take turns."""
 
@@ -56,7 +56,7 @@ class Found:
     settled: bool
 
     def labels(self, place: int = 0) -> list[Label | None]:
-        """Of each measured frequency under the labeling at a place; None: foreign."""
+        """Label of each measured frequency under the labeling at a place; None: foreign."""
         own = self.labelings.modes[place]
         return [self.expansion.labels[j] if j >= 0 else None for j in own]
 
@@ -71,10 +71,10 @@ def find_labels(
     measured: Measured,
     prior: Prior,
     first: Array | None = None,
-) -> Found:
+) -> LabelSearch:
     """first: where the model is expanded first, by default at the prior's mean. Raises what
     ``expand`` does."""
-    x, seen = prior.mean if first is None else first, list[Found]()
+    x, seen = prior.mean if first is None else first, list[LabelSearch]()
     for round_ in range(1, ROUNDS + 1):
         at = expand(x)
         slopes = at.slopes
@@ -83,12 +83,12 @@ def find_labels(
         )
         answer = labelings(measured(at), modes)
         aim = np.clip(prior.mean + prior.root @ answer.z, prior.lower, prior.upper)
-        step = np.clip(aim - x, -LONGEST_STEP, LONGEST_STEP)
+        step = np.clip(aim - x, -MAX_EXPANSION_STEP, MAX_EXPANSION_STEP)
         near = abs(np.linalg.lstsq(prior.root, step, None)[0]).max(initial=0.0) < SAME_DESIGN
-        found = Found(answer, at, x, round_, near)
-        if near and (not seen or found.labels() == seen[-1].labels()):
-            return found
-        seen.append(found)
+        result = LabelSearch(answer, at, x, round_, near)
+        if near and (not seen or result.labels() == seen[-1].labels()):
+            return result
+        seen.append(result)
         x = x + step
     last = seen[ROUNDS // 2 :]
     return replace(max(last, key=lambda each: each.labelings.probabilities[0]), settled=False)

@@ -20,30 +20,30 @@ from ...tyre.state import TyreState
 from ..fit.problem import Problem
 from ..fit.result import FitResult
 from ..fit.variable import DesignVariable, read_variable
-from .expansion import Expansion, Found, Prior, admissible, find_labels
+from .expansion import Expansion, LabelSearch, Prior, admissible, find_labels
 from .tree import Frequencies
 
 Array = np.ndarray
 
 BAND_ABOVE = 1.25  # of the highest measured frequency, up to which modes are looked for
-MOST_HARMONICS = 20
+MAX_EXPANDED_HARMONICS = 20
 MODES_PER_HARMONIC = 3  # at least: both families, and one across the belt that comes between
 
 
 @dataclass(frozen=True)
 class Labelled:
-    """given: all readings as they came; frequencies: those of the unloaded tyre, rising, as the
-    labelings of ``found`` have them, each a reading or the two of a doublet; start: the model where
-    the variables are expected."""
+    """Readings with the labels that the search found."""
 
-    given: Sequence[Measurement]
+    given: Sequence[Measurement]  # all readings as they came
+    # those of the unloaded tyre, rising, in the order of the labelings of ``found``, each a reading
+    # or the two of a doublet
     frequencies: list[list[Measurement]]
-    found: Found
-    start: Expansion
+    found: LabelSearch
+    start: Expansion  # the model where the variables are expected
 
     @property
     def labels(self) -> list[Label | None]:
-        """Of ``frequencies``."""
+        """Labels of ``frequencies``."""
         return self.found.labels()
 
     @property
@@ -53,13 +53,13 @@ class Labelled:
 
     def under(self, place: int) -> list[Measurement]:
         """The readings with the labels of the labeling at a place, less those that are foreign."""
-        told = {
+        by_reading = {
             id(reading): own
             for each, own in zip(self.frequencies, self.found.labels(place), strict=True)
             for reading in each
         }
-        kept = [r for r in self.given if id(r) not in told or told[id(r)]]
-        return [replace(r, label=told.get(id(r), r.label)) for r in kept]
+        kept = [r for r in self.given if id(r) not in by_reading or by_reading[id(r)]]
+        return [replace(r, label=by_reading.get(id(r), r.label)) for r in kept]
 
 
 def start_prior(variables: Sequence[DesignVariable]) -> Prior:
@@ -69,8 +69,8 @@ def start_prior(variables: Sequence[DesignVariable]) -> Prior:
 
 
 def fitted_prior(case: LoadedCase, fit: FitResult) -> Prior:
-    """What a fit of the case left open of the variables that it did not hold: values, standard
-    errors and correlations; of those that it did not determine as far as `start_prior` says."""
+    """Prior that a fit of the case leaves for the variables that it did not hold: values, standard
+    errors and correlations; for those that it did not determine as far as `start_prior` says."""
     values = {name: each.value for name, each in fit.variables.items()}
     variables = [read_variable(case, name) for name in values]
     wide = np.diag(start_prior(variables).root)
@@ -106,7 +106,8 @@ def label(
     fixed: Mapping[str, float] | None = None,
     jobs: int = 1,
 ) -> Labelled:
-    """The readings with the likeliest labels, all frequencies of the unloaded tyre told together.
+    """The readings with the likeliest labels, all frequencies of the unloaded tyre labelled
+    together.
 
     prior: of the variables that are not ``fixed``, by default `start_prior`; about: the design at
     which the model is expanded first, by default the prior's mean. Raises InputError where the
@@ -132,17 +133,17 @@ def label(
 
     def measured(at: Expansion) -> Frequencies:
         allowed = admissible(known, place, at)
-        told = np.array([own is not None for own in known])
+        is_labelled = np.array([own is not None for own in known])
         return Frequencies(
-            np.log(values), np.array(relative), place, allowed, allowed.any(1) & told
+            np.log(values), np.array(relative), place, allowed, allowed.any(1) & is_labelled
         )
 
     start = model.expand(prior.mean)
     first = prior.mean
     if about:
         first = np.array([v.scaled(about[v.name]) for v in problem.variables])
-    found = find_labels(model.expand, measured, prior, first)
-    return Labelled(readings, frequencies, found, start)
+    result = find_labels(model.expand, measured, prior, first)
+    return Labelled(readings, frequencies, result, start)
 
 
 def _of_unloaded(case: LoadedCase, readings: Sequence[Measurement]) -> list[list[Measurement]]:
@@ -169,18 +170,18 @@ class Model:
     def expand(self, x: Array) -> Expansion:
         """The model at coordinates x (v,). Raises EvaluationFailed, DeckRefused."""
         while True:
-            found = self._evaluated(x)
+            by_state = self._evaluated(x)
             tops = [
                 min((m.frequency_Hz for m in modes if m.label.c == self.harmonics), default=0.0)
-                for modes, _ in found
+                for modes, _ in by_state
             ]
-            if min(tops) > self.top_Hz or self.harmonics == MOST_HARMONICS:
+            if min(tops) > self.top_Hz or self.harmonics == MAX_EXPANDED_HARMONICS:
                 break
             more = ceil(self.harmonics * self.top_Hz / max(min(tops), 0.5 * self.top_Hz))
-            self.harmonics = min(max(more, self.harmonics + 1), MOST_HARMONICS)
+            self.harmonics = min(max(more, self.harmonics + 1), MAX_EXPANDED_HARMONICS)
         every = [
             (i, mode, row)
-            for i, (modes, rows) in enumerate(found)
+            for i, (modes, rows) in enumerate(by_state)
             for mode, row in zip(modes, rows, strict=True)
             if mode.label.family
         ]
@@ -190,7 +191,7 @@ class Model:
         return Expansion(labels, np.array([i for i, *_ in every]), np.log(hertz), slopes)
 
     def _evaluated(self, x: Array) -> list[tuple[list[Mode], Array]]:
-        """Of each state the modes and d f / d x (modes, variables)."""
+        """Modes of each state, and d f / d x (modes, variables)."""
         problem = self.problem
         case = problem.case
         analysis = case.case.analysis.model_copy(update={"highest_harmonic": self.harmonics})
@@ -202,7 +203,7 @@ class Model:
         questions = [
             Question(*problem.question(values, state, names), count) for state in self.states
         ]
-        found = []
+        result = []
         for answer in evaluator.answer_all(questions, self.jobs):
             if isinstance(answer, EvaluationFailed | DeckRefused):
                 raise answer
@@ -212,5 +213,5 @@ class Model:
                 if v.name in answer.gradients:
                     own = np.asarray(answer.gradients[v.name])[[m.position for m in modes]]
                     rows[:, j] = own * v.slope(values[v.name])
-            found.append((modes, rows))
-        return found
+            result.append((modes, rows))
+        return result

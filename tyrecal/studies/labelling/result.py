@@ -1,4 +1,4 @@
-"""What a labelling found, as `studies.labels` has it in files."""
+"""Result of a labelling in the form of `studies.labels`, for its files."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from ...tyre.case import LoadedCase
 from ...tyre.state import TyreState
 from ..labels import (
     FOREIGN_WORDS,
-    LEAST_RIVAL,
-    MOST_RIVALS,
+    MAX_RIVALS,
+    MIN_RIVAL_PROBABILITY,
     Labeling,
     LabelledFrequency,
     LabelProbability,
@@ -27,59 +27,70 @@ if TYPE_CHECKING:
     from ...measured.modal import ModalTest
 
 
-def labels_told(case: LoadedCase, told: Labelled) -> Labels:
-    """Of the readings that came without a label."""
-    found, at = told.found.labelings, told.found.expansion
-    own = [i for i, each in enumerate(told.frequencies) if each[0].label is None]
+def labels_posterior(case: LoadedCase, labelled: Labelled) -> Labels:
+    """Labels of the readings that came without one."""
+    all_labelings, at = labelled.found.labelings, labelled.found.expansion
+    own = [i for i, each in enumerate(labelled.frequencies) if each[0].label is None]
     places = {
-        key: n for n, key in enumerate(zip(told.start.labels, told.start.states, strict=True))
+        key: n
+        for n, key in enumerate(zip(labelled.start.labels, labelled.start.states, strict=True))
     }
     frequencies = []
     for i in own:
-        reading = told.frequencies[i][0]
+        reading = labelled.frequencies[i][0]
         state = reading.state.of(case).told(case)
-        j = int(found.modes[0, i])
+        j = int(all_labelings.modes[0, i])
         expected = places.get((at.labels[j], at.states[j])) if j >= 0 else None
         others = [
-            n for n in np.argsort(-found.each[i], kind="stable") if n != j % found.each.shape[1]
+            n
+            for n in np.argsort(-all_labelings.each[i], kind="stable")
+            if n != j % all_labelings.each.shape[1]
         ]
-        likely = [n for n in others[:MOST_RIVALS] if found.each[i, n] >= LEAST_RIVAL]
+        likely = [
+            n for n in others[:MAX_RIVALS] if all_labelings.each[i, n] >= MIN_RIVAL_PROBABILITY
+        ]
         name = lambda n: at.labels[n] if 0 <= n < len(at.labels) else None
         frequencies.append(
             LabelledFrequency(
                 **_entry(name(j)),
-                probability=float(found.each[i, j]),
+                probability=float(all_labelings.each[i, j]),
                 frequency_Hz=reading.value,
                 sigma_Hz=reading.sigma,
                 pressure_kPa=state.pressure_kPa or 0.0,
                 rim=state.rim or "",
-                expected_Hz=None if expected is None else float(np.exp(told.start.ln_f[expected])),
+                expected_Hz=None
+                if expected is None
+                else float(np.exp(labelled.start.ln_f[expected])),
                 rivals=[
-                    LabelProbability(**_entry(name(n)), probability=float(found.each[i, n]))
+                    LabelProbability(**_entry(name(n)), probability=float(all_labelings.each[i, n]))
                     for n in likely
                 ],
             )
         )
-    kept = [k for k, p in enumerate(found.probabilities) if p >= LEAST_RIVAL or not k]
+    kept = [
+        k for k, p in enumerate(all_labelings.probabilities) if p >= MIN_RIVAL_PROBABILITY or not k
+    ]
     labelings = [
         Labeling(
-            labels=[each.said if (each := told.found.labels(k)[i]) else FOREIGN_WORDS for i in own],
-            probability=float(found.probabilities[k]),
+            labels=[
+                each.said if (each := labelled.found.labels(k)[i]) else FOREIGN_WORDS for i in own
+            ],
+            probability=float(all_labelings.probabilities[k]),
         )
-        for k in kept[: 1 + MOST_RIVALS]
+        for k in kept[: 1 + MAX_RIVALS]
     ]
     return Labels(
         frequencies=frequencies,
         labelings=labelings,
-        model_off_percent=100 * found.discrepancy,
-        expansions=told.found.rounds,
-        settled=told.found.settled,
+        model_off_percent=100 * all_labelings.discrepancy,
+        expansions=labelled.found.rounds,
+        settled=labelled.found.settled,
     )
 
 
-def labels_result(case: LoadedCase, told: Labelled) -> LabelsResult:
+def labels_result(case: LoadedCase, labelled: Labelled) -> LabelsResult:
     """As a result of its own."""
-    return LabelsResult.model_validate({"format": 1, "labels": labels_told(case, told)})
+    return LabelsResult.model_validate({"format": 1, "labels": labels_posterior(case, labelled)})
 
 
 def shape_labels_result(run: ModalTest, case_modes: CaseModes, state: TyreState) -> LabelsResult:
@@ -87,7 +98,9 @@ def shape_labels_result(run: ModalTest, case_modes: CaseModes, state: TyreState)
     frequencies = []
     for each in run.modes:
         label, likely = each.judged.label, each.judged.probabilities
-        rivals = [(own, p) for own, p in likely.items() if own != label and p >= LEAST_RIVAL]
+        rivals = [
+            (own, p) for own, p in likely.items() if own != label and p >= MIN_RIVAL_PROBABILITY
+        ]
         sigma = each.mode.sigma_Hz
         frequencies.append(
             LabelledFrequency(
@@ -99,8 +112,7 @@ def shape_labels_result(run: ModalTest, case_modes: CaseModes, state: TyreState)
                 rim=state.rim or "",
                 expected_Hz=case_modes.expected_Hz(label),
                 rivals=[
-                    LabelProbability(**_entry(own), probability=p)
-                    for own, p in rivals[:MOST_RIVALS]
+                    LabelProbability(**_entry(own), probability=p) for own, p in rivals[:MAX_RIVALS]
                 ],
             )
         )

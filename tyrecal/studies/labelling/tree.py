@@ -59,29 +59,27 @@ class Modes:
 
 @dataclass(frozen=True)
 class Frequencies:
-    """Measured ones by rising value: y (m,), ln f; s (m,), its standard deviation; the state of
-    each (a number); allowed (m, n): modes that each can be; sure (m,): it is not foreign."""
+    """Measured frequencies by rising value."""
 
-    y: Array
-    s: Array
-    states: Array
-    allowed: Array
-    sure: Array
+    y: Array  # (m,) ln f
+    s: Array  # (m,) standard deviation of y
+    states: Array  # (m,) a number each
+    allowed: Array  # (m, n) modes that each can be
+    sure: Array  # (m,) it is not foreign
 
 
 @dataclass(frozen=True)
 class Labelings:
-    """The most probable first: modes (k, m), -1 of what is foreign; probabilities (k,) of them, and
-    each (m, n + 1) of every mode of a frequency, the last of foreign; ln_prior (k,): what of a
-    labeling's weight is not the evidence of its labelled frequencies, but for a constant; z (v,):
-    the variables' mean under the first; discrepancy: the model's, its mean over all."""
+    """Labelings of the frequencies, the most probable first."""
 
-    modes: Array
-    probabilities: Array
-    each: Array
+    modes: Array  # (k, m), -1 of what is foreign
+    probabilities: Array  # (k,) of the labelings
+    each: Array  # (m, n + 1) probability of every mode of a frequency, the last of foreign
+    # (k,) the part of a labeling's weight that is not the evidence of its labelled frequencies,
+    # except for a constant
     ln_prior: Array
-    z: Array
-    discrepancy: float
+    z: Array  # (v,) the variables' mean under the first
+    discrepancy: float  # the model's, its mean over all
 
     def weighed_anew(self, shares: Array) -> Labelings:
         """The first ones sharing otherwise, ``shares`` (first,), what they have together."""
@@ -99,7 +97,7 @@ class Labelings:
 
 
 def labelings(measured: Frequencies, modes: Modes) -> Labelings:
-    """Of all labelings that are not cut."""
+    """All labelings that are not cut."""
     total: dict[tuple[int, ...], float] = {}
     evidence: dict[tuple[int, ...], float] = {}
     means: dict[tuple[int, ...], tuple[float, Array]] = {}
@@ -116,13 +114,13 @@ def labelings(measured: Frequencies, modes: Modes) -> Labelings:
     order = sorted(total, key=lambda key: (-total[key], key))
     ln = np.array([total[key] for key in order])
     probabilities = np.exp(ln - np.logaddexp.reduce(ln))
-    found = np.array(order).reshape(len(order), -1)
+    chosen_modes = np.array(order).reshape(len(order), -1)
     likely = np.exp(np.array(strata) - np.logaddexp.reduce(strata))
     v = modes.H.shape[1]
     return Labelings(
-        found,
+        chosen_modes,
         probabilities,
-        _of_each(found, probabilities, (len(measured.y), len(modes.mu) + 1)),
+        _of_each(chosen_modes, probabilities, (len(measured.y), len(modes.mu) + 1)),
         ln - [evidence[key] for key in order],
         means[order[0]][1][:v],
         float(likely @ DISCREPANCIES),
@@ -156,7 +154,7 @@ def _tree(measured: Frequencies, modes: Modes, tau: float) -> tuple[Array, Array
     (count, n), k = measured.allowed.shape, H.shape[1]
     family = np.array([FAMILIES.index(label.family or FAMILIES[0]) for label in modes.labels])
     sees = np.array(list(VIEWS))[:, family]  # (views, n)
-    found = np.where(sees, 1 - MISSED, UNSEEN)
+    detection = np.where(sees, 1 - MISSED, UNSEEN)
     width = float(np.ptp(measured.y)) + 2 * FOREIGN_MARGIN
 
     ln = np.log(list(VIEWS.values()))[None]  # (branches, views)
@@ -171,7 +169,7 @@ def _tree(measured: Frequencies, modes: Modes, tau: float) -> tuple[Array, Array
         foreign = -np.inf if measured.sure[i] else np.log(FOREIGN / width)
         grown = np.concatenate(
             [
-                ln[:, None] + score[:, :, None] + np.log(found.T),
+                ln[:, None] + score[:, :, None] + np.log(detection.T),
                 np.broadcast_to(ln[:, None] + foreign, (len(ln), 1, ln.shape[1])),
             ],
             axis=1,

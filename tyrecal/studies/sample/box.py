@@ -21,24 +21,21 @@ LIKELY = 10.0  # below the highest ln p: optima that walkers start from
 
 
 @dataclass(frozen=True)
-class Drawn:
-    """A posterior with its draws. optima (o, v), ln p (o,) there; covariance (v, v): the linear one
-    about the first; at_edge (v, 2): share of the draws at each edge of the box that is none of the
-    bounds; boxes, evaluations: how many it took; stopped: why the box grew no more, "" where it
-    holds the posterior."""
+class Draws:
+    """A posterior with its draws."""
 
     posterior: Posterior
-    optima: Array
-    height: Array
-    covariance: Array
+    optima: Array  # (o, v)
+    height: Array  # (o,) ln p at the optima
+    covariance: Array  # (v, v) the linear one about the first optimum
     chains: Chains
-    at_edge: Array
-    boxes: int
-    evaluations: int
-    stopped: str
+    at_edge: Array  # (v, 2) share of the draws at each edge of the box that is none of the bounds
+    boxes: int  # how many it took
+    evaluations: int  # how many it took
+    stopped: str  # why the box grew no more, "" where it holds the posterior
 
 
-def drawn(posterior: Posterior, bounds: Array, count: int, seed: int) -> Drawn:
+def sample_box(posterior: Posterior, bounds: Array, count: int, seed: int) -> Draws:
     """About ``count`` draws from all likely optima on; bounds (v, 2) of x."""
     best, height = posterior.optima
     information, flat = posterior.information(best[:1])[0], _flat(posterior.box)
@@ -46,17 +43,18 @@ def drawn(posterior: Posterior, bounds: Array, count: int, seed: int) -> Drawn:
     likely = best[height > height[0] - LIKELY]
     chains = walk(posterior, likely, np.linalg.inv(information + flat), count, seed)
     edges = shares_at_edge(chains.flat, posterior.box, bounds)
-    asked = posterior.evaluations
-    return Drawn(posterior, best, height, covariance, chains, edges, 1, asked, "")
+    evaluations = posterior.evaluations
+    return Draws(posterior, best, height, covariance, chains, edges, 1, evaluations, "")
 
 
 def _flat(box: Array) -> Array:
-    """Information (v, v) beside that of the data: what they do not see is not wider than a box."""
+    """Information (v, v) in addition to that of the data: what they do not see is not wider than a
+    box."""
     return np.diag((np.ptp(box, axis=1) / 2) ** -2.0)
 
 
-def probed(posterior: Posterior, bounds: Array, seed: int) -> Array:
-    """What `shares_at_edge` of the posterior's draws will be, by importance sampling: draws of
+def edge_probability(posterior: Posterior, bounds: Array, seed: int) -> Array:
+    """Forecast of `shares_at_edge` of the posterior's draws by importance sampling: draws of
     Student's t about the likely optima, each weighted by the posterior's density over theirs."""
     best, height = posterior.optima
     best = best[height > height[0] - LIKELY]
@@ -73,7 +71,7 @@ def probed(posterior: Posterior, bounds: Array, seed: int) -> Array:
     return shares_at_edge(x, posterior.box, bounds, np.exp(ln_p - ln_p.max()) / theirs)
 
 
-def grown(
+def grow_box(
     ask: Callable[[Array], Posterior],
     box: Array,
     bounds: Array,
@@ -81,7 +79,7 @@ def grown(
     count: int,
     seed: int,
     stage: Callable[[bool], None] = lambda sampling: None,
-) -> Drawn:
+) -> Draws:
     """Draws from a box (v, 2) with less than `AT_EDGE` of them at its edges, or from the last one
     that could be had.
 
@@ -107,16 +105,16 @@ def grown(
             break
         stage(True)
         boxes, last = boxes + 1, posterior
-        at_edge = probed(posterior, bounds, seed)
+        at_edge = edge_probability(posterior, bounds, seed)
         if at_edge.sum() < AT_EDGE:
-            found = drawn(posterior, bounds, count, seed)
-            if found.at_edge.sum() < AT_EDGE:
-                return replace(found, boxes=boxes, evaluations=evaluations)
-            at_edge = found.at_edge
+            result = sample_box(posterior, bounds, count, seed)
+            if result.at_edge.sum() < AT_EDGE:
+                return replace(result, boxes=boxes, evaluations=evaluations)
+            at_edge = result.at_edge
         box = larger(box, bounds, at_edge)
     assert last
-    found = drawn(last, bounds, count, seed)
-    return replace(found, boxes=boxes, evaluations=evaluations, stopped=stopped)
+    result = sample_box(last, bounds, count, seed)
+    return replace(result, boxes=boxes, evaluations=evaluations, stopped=stopped)
 
 
 def shares_at_edge(x: Array, box: Array, bounds: Array, weights: Array | None = None) -> Array:

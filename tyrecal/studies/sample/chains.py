@@ -27,7 +27,7 @@ STEPS = 400  # that as many walkers as that leave of the draws
 ENOUGH = 20  # tau, of steps
 WARM_UP = 5  # tau, of steps that are dropped
 WINDOW = 5  # tau: beyond, what is seen of rho is noise
-MOST_TIMES = 20  # times the steps that were first wanted: chains that need more stop and say so
+MAX_TIMES = 20  # times the steps that were first wanted: chains that need more stop and say so
 SPARE_STEPS = 1.5  # of draws that would be enough: a short chain's tau is too small
 TRIES = 100  # of walkers to begin within the box
 MISSING = (
@@ -53,7 +53,7 @@ class Chains:
 
     @property
     def thinned(self) -> Array:
-        """Draws (n, v) half an autocorrelation time apart: what more there are tells nothing."""
+        """Draws (n, v) half an autocorrelation time apart: further ones add nothing."""
         apart = max(1, int(self.tau.max() / 2))
         return self.draws[::apart].reshape(-1, self.draws.shape[2])
 
@@ -69,7 +69,7 @@ class Chains:
 
 
 def walkers(count: int, size: int) -> int:
-    """Of ``count`` draws of so many variables."""
+    """Number of walkers for ``count`` draws of so many variables."""
     fewest, most = WALKERS
     return max(min(count // STEPS, most), fewest, 4 * size)
 
@@ -91,7 +91,7 @@ def needs_emcee() -> None:
 def walk(
     density: Callable[[Array], Array], start: Array, covariance: Array, count: int, seed: int
 ) -> Chains:
-    """About ``count`` draws in all, and up to `MOST_TIMES` as many until they are `Chains.enough`;
+    """About ``count`` draws in all, and up to `MAX_TIMES` as many until they are `Chains.enough`;
     walkers begin about the rows of ``start`` (s, v) with a ``covariance`` (v, v). Raises InputError
     where emcee is not installed."""
     needs_emcee()
@@ -136,7 +136,7 @@ def walk(
     sampler.compute_log_prob = lambda x: (density(x), None)
     state = np.random.RandomState(seed % 2**32).get_state()
     steps = max(2, ceil(count / number))
-    most = MOST_TIMES * steps
+    most = MAX_TIMES * steps
     sampler.run_mcmc(emcee.State(begin, random_state=state), steps)
     while not (chains := _chains_of(sampler)).enough and steps < most:
         wanted = ceil(SPARE_STEPS * (WARM_UP + ENOUGH) * chains.tau.max())

@@ -26,28 +26,22 @@ FIRST_DAMPING, STIFFEST = 1e-3, 1e6  # of a step, in units of the information
 
 @dataclass(frozen=True)
 class Posterior:
-    """Its logarithm, for many x at a time.
+    """Logarithm of the posterior density, for many x at a time."""
 
-    emulators: one for each way of holding the rim; states (s, 1 + k): which of them, and values of
-    its further coordinates (pressure); rows (n, 2): of every measured value the places of its state
-    and its label; y (n,), whitened (n, n): W with W^T W = Sigma^-1; box (v, 2): within it alone the
-    density is known.
-    """
-
-    emulators: tuple[Emulator, ...]
-    states: Array
-    rows: Array
-    y: Array
-    whitened: Array
-    box: Array
+    emulators: tuple[Emulator, ...]  # one for each way of holding the rim
+    states: Array  # (s, 1 + k): the emulator, and values of its further coordinates (pressure)
+    rows: Array  # (n, 2): of every measured value the places of its state and its label
+    y: Array  # (n,)
+    whitened: Array  # (n, n): W with W^T W = Sigma^-1
+    box: Array  # (v, 2): within it alone the density is known
 
     def __call__(self, x: Array) -> Array:
         """ln p (p,) at x (p, v) but for a constant; -inf outside the box."""
         inside = ((self.box[:, 0] <= x) & (x <= self.box[:, 1])).all(1)
-        found = np.full(len(x), -np.inf)
+        ln_p = np.full(len(x), -np.inf)
         if inside.any():
-            found[inside] = -0.5 * (self.residuals(x[inside]) ** 2).sum(1)
-        return found
+            ln_p[inside] = -0.5 * (self.residuals(x[inside]) ** 2).sum(1)
+        return ln_p
 
     def residuals(self, x: Array) -> Array:
         """W r (p, n) at x (p, v)."""
@@ -56,7 +50,7 @@ class Posterior:
 
     def ln_f(self, x: Array, rows: Array) -> Array:
         """ln f (p, n) of rows of states and labels at x (p, v)."""
-        found = np.empty((len(x), len(rows)))
+        result = np.empty((len(x), len(rows)))
         for first in range(0, len(x), AT_ONCE):
             here, terms = slice(first, first + AT_ONCE), {}
             for state in sorted(set(rows[:, 0].tolist())):
@@ -64,37 +58,37 @@ class Posterior:
                 which = self.states[state, 0]
                 if which not in terms:  # the same for all states of one emulator
                     terms[which] = emulator.products(x[here])
-                found[here, own] = emulator.ln_f_of(terms[which])[:, rows[own, 1]]
-        return found
+                result[here, own] = emulator.ln_f_of(terms[which])[:, rows[own, 1]]
+        return result
 
     def slopes(self, x: Array, rows: Array) -> Array:
         """d ln f / d x (p, n, v) of rows at x (p, v)."""
-        found = np.empty((len(x), len(rows), x.shape[1]))
+        result = np.empty((len(x), len(rows), x.shape[1]))
         for state, emulator in enumerate(self._at_states):
             own = rows[:, 0] == state
             if own.any():
-                found[:, own] = emulator.slopes(x)[:, rows[own, 1]]
-        return found
+                result[:, own] = emulator.slopes(x)[:, rows[own, 1]]
+        return result
 
     @cached_property
     def _at_states(self) -> list[Emulator]:
-        """Of the variables alone, state by state."""
+        """Emulators of the variables alone, state by state."""
         return [self.emulators[int(which)].restricted(at) for which, *at in self.states]
 
     @property
     def stated_errors(self) -> Array:
-        """Of the measured values (n,), by their emulators."""
-        found = [self._at_states[state].stated_errors[label] for state, label in self.rows]
-        return np.array(found)
+        """Stated errors of the measured values (n,), by their emulators."""
+        errors = [self._at_states[state].stated_errors[label] for state, label in self.rows]
+        return np.array(errors)
 
     @property
     def evaluations(self) -> int:
-        """Designs that the emulators asked for."""
+        """Number of designs that the emulators evaluated."""
         return sum(each.evaluations + each.failed for each in self.emulators)
 
     @cached_property
     def optima(self) -> tuple[Array, Array]:
-        """What `optima` finds."""
+        """Optima of the posterior, see the function `optima`."""
         return optima(self)
 
     def information(self, x: Array) -> Array:

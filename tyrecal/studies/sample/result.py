@@ -1,4 +1,4 @@
-"""What a sample says: sample.json, sample.csv, its tables and sentences."""
+"""Result of a sample: sample.json, sample.csv, its tables and sentences."""
 
 from __future__ import annotations
 
@@ -190,24 +190,24 @@ class SampleResult(Result):
 
     def sentences(self) -> list[str]:
         e, c = self.emulator, self.chains
-        told = [
+        sentences = [
             f"{c.draws} draws, worth {c.effective:.0f} independent ones (autocorrelation"
             f" {max(c.autocorrelation.values()):.1f} steps, {100 * c.acceptance:.0f} % accepted)",
             f"emulator of {e.evaluations} evaluations: off by less than"
             f" {100 * e.stated_error:.2g} % in 99 of 100 designs",
         ]
         if self.noise_Hz is not None:
-            told.append(
+            sentences.append(
                 f"the targets state no sigma: {self.noise_Hz:.2f} Hz, as a fit leaves them, stands"
                 " for it"
             )
         near = [each for each in self.optima if each.below < NEARLY]
         if len(near) > 1:
-            told.append(
+            sentences.append(
                 f"{len(near)} designs are each likelier than those around them, by ln p"
                 f" {near[-1].below:.1f} apart: see optima in sample.json"
             )
-        return told
+        return sentences
 
     def summary(self) -> list[str]:
         ranges = (
@@ -218,28 +218,28 @@ class SampleResult(Result):
 
     def doubts(self) -> list[str]:
         c = self.chains
-        found = []
+        doubts = []
         if c.at_edge >= AT_EDGE:
-            found.append(
+            doubts.append(
                 f"{100 * c.at_edge:.2g} % of the draws lie at the edge of the box, which could not"
                 f" grow: {c.stopped}"
             )
         if not c.enough:
             tau = max(c.autocorrelation.values())
-            found.append(
+            doubts.append(
                 f"{c.steps} steps are fewer than {ENOUGH} autocorrelation times of {tau:.1f}: give"
                 f" --draws {ceil(enough_draws(tau) / 1e4) * 10_000} or more"
             )
         if self.emulator.share_of_sigma > ROUGH:
-            found.append(
+            doubts.append(
                 f"the emulator may be off by {self.emulator.share_of_sigma:.2g} of a standard"
                 " deviation of what was measured"
             )
-        return found
+        return doubts
 
 
 def result(sample: Sample, seed: int) -> SampleResult:
-    """What stands in sample.json."""
+    """Content of sample.json."""
     drawn, names = sample.drawn, [v.name for v in sample.variables]
     chains, made, box = drawn.chains, drawn.posterior.emulators, drawn.posterior.box
     flat, thin = chains.flat, chains.thinned
@@ -351,11 +351,11 @@ def _predicted(sample: Sample) -> list[PredictedRow]:
     }
     hertz = np.exp(sample.ln_f)
     low, median, high = np.quantile(hertz, [LOW, 0.5, HIGH], axis=0)
-    found = []
+    rows = []
     for i, row in enumerate(sample.rows):
         value, sigma = measured.get((row.label, row.state), (None, None))
         assert row.label
-        found.append(
+        rows.append(
             PredictedRow(
                 c=row.label.c,
                 m=row.label.m,
@@ -371,4 +371,4 @@ def _predicted(sample: Sample) -> list[PredictedRow]:
                 sigma_Hz=sigma,
             )
         )
-    return found
+    return rows

@@ -30,7 +30,7 @@ from ..emulator import Emulator, emulator, needs_slopes
 from ..fit.calibrate import calibrate
 from ..fit.targets import read_targets, rims_of
 from ..fit.variable import DesignVariable, read_variables
-from .box import Drawn, grown
+from .box import Draws, grow_box
 from .chains import needs_emcee
 from .posterior import Posterior
 from .predict import conditional
@@ -48,20 +48,19 @@ ROUGH = 0.2  # of a row's standard deviation in Sigma: what an emulator's 99 % b
 
 @dataclass(frozen=True)
 class Sample:
-    """Draws, and what they predict at ``rows``: ln f (draws, m) of thinned ones, linear standard
-    deviations (m,) beside; rough: the emulator's error over the standard deviation of a measured
-    row, the worst one's; noise_Hz: of targets that state none, as the fit leaves it."""
+    """Draws, and what they predict at ``rows``."""
 
     variables: tuple[DesignVariable, ...]
     units: tuple[str, ...]  # of theirs
     observations: Observations
     sources: tuple[Source, ...]  # of error
-    drawn: Drawn
+    drawn: Draws
     rows: tuple[Observable, ...]
-    ln_f: Array
-    linear: Array
+    ln_f: Array  # (draws, m) of thinned draws
+    linear: Array  # (m,) standard deviations by the linear theory
+    # the emulator's error over the standard deviation of a measured row, the worst one's
     rough: float
-    noise_Hz: float | None
+    noise_Hz: float | None  # of targets that state none, as the fit leaves it
 
 
 def run(
@@ -87,8 +86,8 @@ def run(
         readings = targets_as_readings(case, noise)
     observations = observe(modal(readings), split=Assumed().split)
     known = list(dict.fromkeys(row.row for row in observations.rows))
-    found, _ = sources(case)
-    model = TyreModel(case, evaluator, known, found, {}, jobs)
+    own_sources, _ = sources(case)
+    model = TyreModel(case, evaluator, known, own_sources, {}, jobs)
     check_units(model, observations, ["what was measured"])
     where = places(observations, known)
     x = plain_fit(model, observations, where)
@@ -117,9 +116,9 @@ def run(
         whole = np.vstack([box, *([[v.scaled(v.lower), v.scaled(v.upper)]] for v in others)])
         own = [row.label for row, here in zip(observations.rows, on_rim[rim], strict=True) if here]
         for each in EACH:
-            asked = (*variables, *others)
+            numbers = (*variables, *others)
             made = before[rim] = emulator(
-                tyres[rim], asked, whole, labels, each * len(asked), jobs, before[rim]
+                tyres[rim], numbers, whole, labels, each * len(numbers), jobs, before[rim]
             )
             errors = made.stated_errors[[made.labels.index(label) for label in own if label]]
             if (errors <= ROUGH * spread[on_rim[rim]]).all():
@@ -132,7 +131,7 @@ def run(
         return Posterior(made, coordinates, at, observations.y, white, box)
 
     J = white @ answer.jacobian[where]
-    drawn = grown(
+    drawn = grow_box(
         ask,
         first_box(x, J.T @ J, variables, bounds),
         bounds,
@@ -150,7 +149,7 @@ def run(
         for label in own
     )
     asked_of = [row.row for row in rows]
-    there = _answer(TyreModel(case, evaluator, asked_of, found, {}, jobs), best)
+    there = _answer(TyreModel(case, evaluator, asked_of, own_sources, {}, jobs), best)
     assert there.constants is not None
     given = conditional(
         observations.rows, sigma, constants, rows, there.constants, model.material_laws
@@ -163,7 +162,7 @@ def run(
         variables,
         tuple(map(model.unit, model.variables)),
         observations,
-        tuple(found),
+        tuple(own_sources),
         drawn,
         rows,
         given.drawn(posterior.ln_f(thin, at), off, seed),
@@ -283,6 +282,6 @@ def _answer(model: TyreModel, x: Array) -> Answer:
 
 
 def _pressures(case: LoadedCase, measured: Iterable[float], at_kPa: Sequence[float]) -> list[float]:
-    """Of the measurements, the case, and those asked for, rising."""
+    """Pressures of the measurements, of the case, and those requested, rising."""
     own = case.case.pressure_kPa
     return sorted({*measured, own, *(at_kPa or [factor * own for factor in OTHER_PRESSURES])})

@@ -13,7 +13,7 @@ from ruamel.yaml import YAML
 from ..section.curve import length_along
 from ..section.section import Section
 from ..templates import environment, render
-from .made_of import MadeOf
+from .made_of import ConstructionParts
 from .parts import SectionOrigin
 
 ELEMENTS_BY_LEVEL = {"coarse": 14, "default": 28, "refined": 56}  # along the half section, by level
@@ -23,7 +23,7 @@ OUTER_ROWS = {"coarse": 1, "default": 3, "refined": 4}  # between the outermost 
 
 def new_case(
     section: Section,
-    made: MadeOf,
+    made: ConstructionParts,
     file: str,
     name: str,
     size: str,

@@ -1,5 +1,5 @@
-"""What must agree between the parts of a case, and between case and section: lines, regions, rows,
-and a mesh that fits.
+"""Rules between the parts of a case, and between case and section: lines, regions, rows, and a mesh
+that fits.
 
 All checks read plain data in which wrong values are WRONG, so that one mistake never hides
 another one, nor causes one.
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ..section.section import Section
 
 Problems = Iterator[tuple[Keys, str]]
-MOST_ELEMENTS = 20_000
+MAX_ELEMENTS = 20_000
 # what a variable cannot set: a fit that moved its own bounds or targets would mean nothing
 FIXED = ("format", "variables", "targets", "uncertainties", "solver")
 
@@ -90,9 +90,9 @@ def _names(data: Mapping[str, Any]) -> Problems:
             hint = suggestion(wanted, materials)
             yield (*keys, "material"), f"is not one of the materials{hint}"
         else:
-            found = table(materials, wanted).get("kind", kind)
-            if found not in (kind, WRONG):
-                yield (*keys, "material"), f"must be a {kind}, '{wanted}' is a {found}"
+            actual = table(materials, wanted).get("kind", kind)
+            if actual not in (kind, WRONG):
+                yield (*keys, "material"), f"must be a {kind}, '{wanted}' is a {actual}"
 
 
 def _targets(data: Mapping[str, Any]) -> Problems:
@@ -323,8 +323,8 @@ def levels(data: Mapping[str, Any], section: Section) -> Problems:
                 each = "one for each gap between two lines"
                 yield (*here, key), f"must have {gaps} entries, {each}, got {len(counts)}"
         count = _sum(elements.values()) * _sum(entries(level, "rows"))
-        if count > MOST_ELEMENTS:
-            yield here, f"must have at most {MOST_ELEMENTS} elements, elements x rows is {count}"
+        if count > MAX_ELEMENTS:
+            yield here, f"must have at most {MAX_ELEMENTS} elements, elements x rows is {count}"
 
 
 def folds(data: Mapping[str, Any], section: Section) -> str | None:

@@ -20,7 +20,7 @@ from .parts import WRONG
 
 MAX_TABLE_BYTES = 1_000_000  # of a table beside a case
 MAX_CASE_BYTES = 100_000  # bytes of YAML; shipped cases have 5000, and it is read at 30 kB/s
-MOST_EVENTS = 20_000
+MAX_EVENTS = 20_000
 DEEPEST = 20
 
 
@@ -51,7 +51,7 @@ class Document:
 
 
 def read_document(path: Path) -> Document:
-    """Read a YAML file that holds a mapping; whatever is wrong stands in its mistakes."""
+    """Read a YAML file that holds a mapping; every fault is among its mistakes."""
     document = Document(str(path))
     text = _text(path, document)
     if text is None:
@@ -82,8 +82,8 @@ def _yaml() -> YAML:
 
 @lru_cache(maxsize=32)
 def _compose(text: str) -> Node | None:
-    """The nodes of a text, which nobody may change. Composing takes two thirds of the time to load
-    a case, and one command loads the same text several times. Raises YAMLError."""
+    """The nodes of a text, which must not be changed. Composing takes two thirds of the time to
+    load a case, and one command loads the same text several times. Raises YAMLError."""
     return _yaml().compose(text)
 
 
@@ -116,7 +116,7 @@ def _text(path: Path, document: Document) -> str | None:
 
 
 class _Harmful(YAMLError):
-    """What YAML allows and a case does not need; line 0: where the first % begins one."""
+    """YAML that is valid but that no case needs; line 0: where the first % begins one."""
 
     def __init__(self, line: int, message: str):
         super().__init__(message)
@@ -134,8 +134,8 @@ class _Harmless(Parser):
         event = super().get_event()
         line = event.start_mark.line + 1
         self.events += 1
-        if self.events > MOST_EVENTS:
-            raise _Harmful(line, f"there are more than {MOST_EVENTS} keys and values")
+        if self.events > MAX_EVENTS:
+            raise _Harmful(line, f"there are more than {MAX_EVENTS} keys and values")
         if getattr(event, "version", None) or getattr(event, "tags", None):
             raise _Harmful(0, "a directive, as %YAML, must go: a case is plain YAML 1.2")
         self.depth += isinstance(event, CollectionStartEvent)

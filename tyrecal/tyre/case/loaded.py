@@ -52,7 +52,7 @@ class LoadedCase:
 
     @property
     def deck_numbers(self) -> Mapping[str, float]:
-        """Of the deck, by mark or path; none where the case names none."""
+        """Numbers of the deck, by mark or path; none where the case names none."""
         return self.case.deck.numbers if self.case.deck else {}
 
     @property

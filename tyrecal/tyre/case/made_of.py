@@ -1,4 +1,4 @@
-"""What the section of a new case is made of: rubbers, cords, where they are, and how well known."""
+"""Materials of the section of a new case: rubbers, cords, where they are, and how well known."""
 
 from __future__ import annotations
 
@@ -21,21 +21,20 @@ CARCASS_CORD = CordMaterial(9.87e9, 0.3, 1500.0, bears_compression=False)
 
 
 @dataclass(frozen=True)
-class MadeOf:
-    """Parts of a case by its keys; ``notes``: words beside a material; ``variables``: paths that
-    each sets, start and bounds; ``modes_at_Hz``: where the rubber's modulus of the modes is taken,
-    None as in the static step."""
+class ConstructionParts:
+    """Parts of a case by its keys."""
 
     materials: Mapping[str, Keys]
     solids: list[Keys]
     layers: Mapping[str, Keys]
-    variables: Mapping[str, Keys]
+    variables: Mapping[str, Keys]  # paths that each sets, start and bounds
     uncertainties: Mapping[str, Keys] = field(default_factory=dict)
-    notes: Mapping[str, str] = field(default_factory=dict)
+    notes: Mapping[str, str] = field(default_factory=dict)  # words next to a material
+    # where the rubber's modulus of the modes is taken, None as in the static step
     modes_at_Hz: float | None = None
 
 
-def one_rubber(section: Section, carcass_plies: int = 1) -> MadeOf:
+def one_rubber(section: Section, carcass_plies: int = 1) -> ConstructionParts:
     """A section of which only the lines are known, of the materials of Bekakos et al. (2016).
 
     Lines from the crown to the bead become the carcass (each of ``carcass_plies`` layers), lines
@@ -65,10 +64,10 @@ def one_rubber(section: Section, carcass_plies: int = 1) -> MadeOf:
         **({"belt_cord": _cord(BELT_CORD)} if belts else {}),
         "carcass_cord": _cord(CARCASS_CORD),
     }
-    return MadeOf(materials, [{"material": "rubber"}], layers, variables)
+    return ConstructionParts(materials, [{"material": "rubber"}], layers, variables)
 
 
-def constructed(made: Construction, section: Section) -> MadeOf:
+def constructed(made: Construction, section: Section) -> ConstructionParts:
     """A section with the lines and regions that `from_size` gives one of this type of tyre."""
     regions = [name for name, _ in section.regions]
     belted = regions[: regions.index("upper_sidewall")]
@@ -104,7 +103,7 @@ def constructed(made: Construction, section: Section) -> MadeOf:
         layers["cap_ply"] = _layer(CAP, made.cap)
     layers["bead_wire"] = _bead_wire(made, section)
     compounds = made.compounds
-    return MadeOf(
+    return ConstructionParts(
         materials={
             **{name: _rubber(compound) for name, compound in compounds.items()},
             **{name: _cord(cord) for name, cord in made.cords.items()},
@@ -217,5 +216,5 @@ def _numbered(word: str, lines: list[str]) -> dict[str, str]:
 
 
 def _three(value: float) -> float:
-    """Of three digits."""
+    """Round to three significant digits."""
     return float(f"{value:.3g}")

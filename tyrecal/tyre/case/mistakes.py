@@ -12,8 +12,8 @@ from pathlib import Path
 from ...errors import InputError
 from ...files import printable
 
-MOST_FILES = 1000  # whose names are compared with a mistyped one
-LEAST_ALIKE = {
+MAX_FILES = 1000  # whose names are compared with a mistyped one
+MIN_SIMILARITY = {
     "*": 0.6,
     "*/*": 0.8,
 }  # how much of two names must be, beside a file and a folder down
@@ -23,16 +23,13 @@ Keys = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class Mistake:
-    """One mistake: the file, its line (from 1), the dotted key, its value, what would be right.
-
-    ``key`` is empty where the file as a whole is wrong, ``line`` 0 where it has none.
-    """
+    """One mistake in a file of the user."""
 
     file: str
-    line: int
-    key: str
+    line: int  # from 1, 0 where it has none
+    key: str  # dotted, empty where the file as a whole is wrong
     value: str
-    message: str
+    message: str  # what would be right
 
     def __str__(self) -> str:
         what = f"{self.key} is {self.value}: " if self.key else ""
@@ -73,11 +70,11 @@ def nearby(path: Path, suffix: str) -> str:
     is not there; beside it, or one folder down. Empty where none has such a name."""
     name = path.name.removesuffix(suffix) + suffix
     folder = path.parent if path.parent.is_dir() else path.parent.parent
-    for pattern, alike in LEAST_ALIKE.items():
+    for pattern, alike in MIN_SIMILARITY.items():
         with suppress(OSError, ValueError):
             files = (p for p in folder.glob(f"{pattern}{suffix}") if p.is_file())
             # Names alone are compared: any two paths in one long folder look alike.
-            names = {p.name: p for p in islice(files, MOST_FILES) if p.parent.name[:1] != "."}
+            names = {p.name: p for p in islice(files, MAX_FILES) if p.parent.name[:1] != "."}
             for close in get_close_matches(name, names, 1, alike):
                 return f"; did you mean '{names[close]}'?"
     return ""

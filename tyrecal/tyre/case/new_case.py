@@ -19,19 +19,19 @@ from ..section.from_size import BELOW, build, construction, usual
 from ..section.section import Section, SectionError
 from ..section.size import TyreSize
 from .case_text import new_case
-from .made_of import MadeOf, constructed, one_rubber
+from .made_of import ConstructionParts, constructed, one_rubber
 from .parts import Outline, SectionSource
 from .stations import read_section_of
 
 FLANGE = 17.3e-3  # m, height of the rim's flange, contour J
 PRESSURE_KPA = 250.0  # where nothing says more
 LOAD_SHARES = (0.25, 0.5, 0.75, 1.0, 1.25)  # of what the tyre is rated for
-MOST_LOAD_N = 6e4  # usual on the road
+MAX_USUAL_LOAD_N = 6e4  # usual on the road
 
 
 @dataclass(frozen=True)
 class Draft:
-    """A case's text and the file that its section is in: name beside the case, and content."""
+    """A case's text and the file that its section is in: name next to the case, and content."""
 
     text: str
     file: str
@@ -72,7 +72,7 @@ def from_size(
         f"section from the size code, as {made.name} tyres are built:\n"
         f"# crown {mm['crown']}, sidewall {mm['sidewall']}, bead {mm['bead']} mm thick, belt"
         f" {mm['belt']} mm wide. An estimate to start from.",
-        loads_N=[_rounded(min(share * size.load_N, MOST_LOAD_N)) for share in LOAD_SHARES],
+        loads_N=[_rounded(min(share * size.load_N, MAX_USUAL_LOAD_N)) for share in LOAD_SHARES],
     )
     return Draft(text, f"{stem}.csv", table.csv().encode())
 
@@ -123,8 +123,8 @@ def _place_named(file: Path) -> Iterator[None]:
         raise InputError(f"{file}{line}: {error}") from None
 
 
-def _made_of(section: Section, size: TyreSize | None) -> MadeOf:
-    """Of compounds where the lines and regions are those that a size gives, else of one rubber."""
+def _made_of(section: Section, size: TyreSize | None) -> ConstructionParts:
+    """Compounds where the lines and regions are those that a size gives, else one rubber."""
     regions = {name for name, _ in section.regions}
     for made in [construction(size)] if size else [PASSENGER, TRUCK]:
         if section.names == made.lines and regions.issuperset(BELOW):
@@ -137,7 +137,7 @@ def _is_outline(file: Path) -> bool:
 
 
 def _outline_keys(file: Path, size: TyreSize | None, belt: float | None) -> dict[str, float]:
-    """What the curves do not show, as far as it is known, else as is usual."""
+    """Keys of an outline that its curves do not show: as far as known, else usual values."""
     from ..section.outline import read_outline
 
     curves = read_outline(file)

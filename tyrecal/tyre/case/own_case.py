@@ -1,4 +1,4 @@
-"""The case of a user's deck, ready to be written beside it."""
+"""The case of a user's deck, ready to be written next to it."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def own_decks_case(
     pressure_kPa: float | None,
     numbers: Mapping[str, float] = NO_NUMBERS,
 ) -> str:
-    """The same of decks in three dimensions. Raises InputError where they do not tell the crown or
+    """The same for decks in three dimensions. Raises InputError where they do not give the crown or
     the pressure."""
     if decks.crown.rpartition(".")[2] not in decks.node_sets:
         known = ", ".join(decks.node_sets)
@@ -113,7 +113,7 @@ def _variables(
 ) -> dict[str, list[str]]:
     """Paths by the name of the variable that sets them: layers of one cord and area are one.
     cords: the material of each layer."""
-    found: dict[str, list[str]] = {}
+    by_name: dict[str, list[str]] = {}
     groups: dict[tuple[str, float], list[str]] = {}
     for path, value in numbers.items():
         head, _, field = path.rpartition(" / ")
@@ -121,13 +121,13 @@ def _variables(
             of = cords.get(head.rpartition("rebar ")[2], "")
             groups.setdefault((of, value), []).append(path)
     for (material, _), paths in groups.items():
-        found[_name(f"A_{material}", found)] = paths
+        by_name[_name(f"A_{material}", by_name)] = paths
     for material in dict.fromkeys(materials):
         for field in ("C10", "mu", "mu1"):
             path = f"material {material} / HYPERELASTIC / {field}"
             if numbers.get(path, 0.0) > 0:
-                found[_name(f"{field}_{material}", found)] = [path]
-    return found
+                by_name[_name(f"{field}_{material}", by_name)] = [path]
+    return by_name
 
 
 def _name(words: str, taken: dict[str, list[str]]) -> str:

@@ -19,7 +19,7 @@ from pydantic_core import PydanticCustomError
 
 LEAST, LARGEST = 1e-30, 1e15  # beyond, products of numbers leave what a computer holds
 Moduli = Literal["long_term", "instantaneous"]
-MOST_RELAXED = 0.999  # of a modulus: what is left must be a tyre's
+MAX_RELAXED = 0.999  # of a modulus: what is left must be a tyre's
 Element = Literal["CGAX8R", "CGAX8", "CGAX4R"]
 WHOLE_BEAD: Literal["whole_bead"] = "whole_bead"
 RimSupport = Literal["fixed", "springs", "free"]
@@ -64,7 +64,7 @@ def number(values: Mapping[str, Any], key: str) -> float | None:
 
 
 def one_of(values: Mapping[str, Any], first: str, second: str) -> Iterator[Disagreement]:
-    """What is wrong where not exactly one of two keys is given."""
+    """Disagreement where not exactly one of two keys is given."""
     if values.get(first) is None and values.get(second) is None:
         yield first, f"must be given, or {second}"
     elif values.get(first) is not None and values.get(second) is not None:
@@ -80,7 +80,7 @@ class Part(BaseModel):
 
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
-        """What is wrong between the keys of ``values``; those that are WRONG are not judged."""
+        """Disagreements between the keys of ``values``; those that are WRONG are not judged."""
         yield from ()
 
     @model_validator(mode="after")
@@ -125,8 +125,8 @@ class Rubber(Part):
             terms = values.get("prony")
             terms = terms if isinstance(terms, list) else []
             total = sum(number(dict(term), share) or 0 for term in terms if term is not WRONG)
-            if total > MOST_RELAXED:
-                least = f"must have a sum of all {share} of at most {MOST_RELAXED:g}"
+            if total > MAX_RELAXED:
+                least = f"must have a sum of all {share} of at most {MAX_RELAXED:g}"
                 yield "prony", f"{least}, got {total:.9g}"
 
 
@@ -168,15 +168,12 @@ SectionOrigin = Literal["exact", "measured", "drawing", "size_code"]
 
 
 class SectionSource(Part):
-    """``stations``: the station table, or ``outline``: two curves; CSV, relative to the case file.
+    """Source of the section: a station table, or an outline of two curves."""
 
-    ``gauges`` scale it. ``known_from``: how well it is known, so how large its errors are; None:
-    not said, and taken as a drawing.
-    """
-
-    stations: Text | None = None
+    stations: Text | None = None  # the table, CSV, relative to the case file
     outline: Outline | None = None
-    gauges: list[Gauge] | None = None
+    gauges: list[Gauge] | None = None  # they scale the section
+    # how well it is known, so how large its errors are; None: taken as a drawing
     known_from: SectionOrigin | None = None
 
     @property
@@ -201,22 +198,21 @@ class DeckGauges(Part):
 
 
 class DeckSource(Part):
-    """An ABAQUS deck of the section, relative to the case file, in m or mm (with t, s, MPa); or
-    ``decks`` of the whole tyre in three dimensions, in the order in which they are run.
+    """A user's ABAQUS deck of the section, or decks of the whole tyre in three dimensions."""
 
-    ``numbers``: of the marks in its text, by name, and others of its numbers, by path, in its own
-    units; those not given are as the text has them. ``crown``: its set of nodes of the outer
-    surface over the belt, which ABAQUS gives shapes of; in three dimensions all round. ``parts``:
-    the element sets of its sections that are the tread, the sidewall, the bead filler, the belts,
-    for effects; ``gauges``: of the first two.
-    """
-
-    file: Text | None = None
+    file: Text | None = None  # deck of the section, relative to the case file
+    # in three dimensions, in the order in which they are run
     decks: Annotated[list[Text], Field(min_length=1, max_length=20)] | None = None
-    units: Literal["m", "mm"]
+    units: Literal["m", "mm"]  # of length; m with kg, s, Pa, mm with t, s, MPa
+    # set of nodes of the outer surface over the belt, which ABAQUS gives shapes of; in three
+    # dimensions all round
     crown: Text = "CROWN"
+    # the element sets of its sections that are the tread, the sidewall, the bead filler, the belts,
+    # for effects
     parts: dict[DeckPart, list[Text]] = Field(default_factory=dict)
-    gauges: DeckGauges = DeckGauges()
+    gauges: DeckGauges = DeckGauges()  # of the tread and the sidewall
+    # of the marks in its text, by name, and others of its numbers, by path, in its own units; those
+    # not given are as the text has them
     numbers: dict[Text, Number] = Field(default_factory=dict)
 
     def sets(self, part: str) -> list[str]:

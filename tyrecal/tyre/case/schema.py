@@ -45,14 +45,14 @@ from .parts import (
     part_values,
 )
 
-LEAST_LOAD_N, LARGEST_LOAD_N = 1.0, 1e6  # outside, no tyre finds its balance on a road
-Load = Annotated[Positive, Field(ge=LEAST_LOAD_N, le=LARGEST_LOAD_N)]
+MIN_CASE_LOAD_N, MAX_CASE_LOAD_N = 1.0, 1e6  # outside, no tyre finds its balance on a road
+Load = Annotated[Positive, Field(ge=MIN_CASE_LOAD_N, le=MAX_CASE_LOAD_N)]
 Weight = Annotated[NotNegative, Field(le=1e6)]
 Pressure = Annotated[Number, Field(ge=0, lt=2000)]  # kPa
 
 
 class Analysis(Part):
-    """What is computed: the inflation, then modes up to ``highest_harmonic``."""
+    """Steps of the computation: the inflation, then modes up to ``highest_harmonic``."""
 
     static_moduli: Moduli = "long_term"
     static_increments: Annotated[int, Field(ge=1, le=1000)] = 10
@@ -63,18 +63,14 @@ class Analysis(Part):
 
 
 class Road(Part):
-    """The flat, rigid road that a tyre is pressed on, and the mesh round the tyre for it.
-
-    ``stiffness_Pa_per_m``: contact pressure over overclosure; ``elastic_slip_m``: slip before
-    friction is full; ``element_angles_deg``: lengths from the patch's middle to the top;
-    ``wheel``: in vibrations on the road its centre is held, or free along the load, with the rim's
-    mass.
-    """
+    """The flat, rigid road that a tyre is pressed on, and the mesh round the tyre for it."""
 
     friction: NotNegative = 0.5
-    stiffness_Pa_per_m: Positive = 1e9
-    elastic_slip_m: Annotated[float, Field(ge=1e-6)] = 1e-4
+    stiffness_Pa_per_m: Positive = 1e9  # contact pressure over overclosure
+    elastic_slip_m: Annotated[float, Field(ge=1e-6)] = 1e-4  # slip before friction is full
+    # in vibrations its centre is held, or free along the load, with the rim's mass
     wheel: Literal["held", "free_along_load"] = "held"
+    # lengths from the patch's middle to the top
     element_angles_deg: Annotated[list[Positive], Field(min_length=1, max_length=200)] = Field(
         default_factory=lambda: [4.0] * 3 + [5.0, 8.0, 17.0, 45.0, 93.0]
     )
@@ -254,7 +250,7 @@ class Targets(Part):
 
 
 class Uncertainty(Part):
-    """A source of error: numbers nobody calibrates, all off together by a standard deviation.
+    """A source of error: uncalibrated numbers, all off together by a standard deviation.
 
     ``percent`` of each number or ``absolute``, in its unit; ``signs``: -1 for those that fall
     where the others rise.
@@ -290,11 +286,7 @@ DECK_LEVEL = "deck"
 
 
 class Case(Part):
-    """One tyre, its mesh and analysis, what may vary and what was measured.
-
-    ``spin_rad_per_s``: the tyre turns about its axle, not touching a road. ``effects``: parameters
-    of effects that are in it, by id, in the effect's unit.
-    """
+    """One tyre, its mesh and analysis, what may vary and what was measured."""
 
     format: Annotated[int, Field(ge=1, le=1)]  # Literal[1] would take true
     name: Text
@@ -312,12 +304,14 @@ class Case(Part):
     rebar_layers: dict[Name, RebarLayer] = Field(default_factory=dict)
     rim: Rim
     cavity: Cavity = Cavity()
+    # about the tyre's axle, not touching a road
     spin_rad_per_s: Annotated[NotNegative, Field(le=1e4)] = 0.0
     point_mass: PointMass = PointMass()
     road_spring: RoadSpring = RoadSpring()
     splice: Splice = Splice()
     analysis: Analysis
     road: Road = Road()
+    # parameters of effects that are in the tyre, by id, in the effect's unit
     effects: Annotated[dict[str, Number], AfterValidator(_every_effect)] = Field(
         default_factory=lambda: dict.fromkeys(IDS, 0.0)
     )
@@ -344,7 +338,8 @@ class Case(Part):
 
     @classmethod
     def _beside_decks(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
-        """What stands in decks in three dimensions, and not in the case."""
+        """Disagreements with decks in three dimensions: keys that belong in the decks, not in the
+        case."""
         for key in IN_DECKS:
             if cls._is_given(key, values.get(key)):
                 yield key, "must be absent with deck.decks, where it stands"
@@ -352,8 +347,8 @@ class Case(Part):
         spindle = part_values(rim.get("spindle"))
         if rim.get("free") is True or any(number(spindle, key) for key in spindle):
             yield "rim", "must be held: with deck.decks, what moves stands there"
-        usual, said = Analysis().__dict__, part_values(values.get("analysis"))
-        if any(said.get(key, usual[key]) != usual[key] for key in usual.keys() - {HIGHEST}):
+        usual, given = Analysis().__dict__, part_values(values.get("analysis"))
+        if any(given.get(key, usual[key]) != usual[key] for key in usual.keys() - {HIGHEST}):
             yield "analysis", f"must say {HIGHEST} alone: with deck.decks, all else stands there"
 
     @classmethod

@@ -1,4 +1,4 @@
-"""What the schema says of plain data, in the user's words."""
+"""Mistakes in plain data by the schema, in the user's words."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def with_defaults(data: Any, kind: Any = Case) -> Any:
 
 
 def disagreements(data: Mapping[str, Any]) -> Iterator[tuple[Keys, str]]:
-    """What is wrong between the keys of one part, in data whose wrong values are WRONG."""
+    """Disagreements between the keys of one part, in data whose wrong values are WRONG."""
     parts: list[tuple[Keys, Any, type[Any]]] = []
     for name, part in table(data, "materials").items():
         if isinstance(part, dict) and part.get("kind") == "rubber":

@@ -16,7 +16,7 @@ from .shape import table
 if TYPE_CHECKING:
     from ..section.section import Section
 
-SMALLEST_MM, LARGEST_MM = 50, 5000  # outer radius of a tyre
+MIN_RADIUS_MM, MAX_RADIUS_MM = 50, 5000  # outer radius of a tyre
 
 
 def inside(folder: Path, name: str) -> Path:
@@ -156,10 +156,10 @@ def _check_section(section: Section) -> None:
         if count < 1:
             raise SectionError(f"region '{name}' has no two stations: it needs one more")
     reach = 1e3 * section.points[-1, 0, 0]  # mm; a tyre of inches, cm or m would pass else
-    if not SMALLEST_MM < reach < LARGEST_MM:
+    if not MIN_RADIUS_MM < reach < MAX_RADIUS_MM:
         raise SectionError(
             f"the tyre's outer radius is {reach:.3g} mm: r and z must be in mm, and a tyre's radius"
-            f" between {SMALLEST_MM} and {LARGEST_MM} mm"
+            f" between {MIN_RADIUS_MM} and {MAX_RADIUS_MM} mm"
         )
     if not section.rigid.any():
         raise SectionError("no station is held by the rim, rigid must be 1 somewhere")

@@ -1,4 +1,5 @@
-"""What a plain model leaves out: one file an effect, each with one parameter; 0 = absent."""
+"""Effects that a plain model leaves out: one file an effect, each with one parameter; 0 =
+absent."""
 
 from __future__ import annotations
 

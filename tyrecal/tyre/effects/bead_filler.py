@@ -37,8 +37,8 @@ def higher(case: LoadedCase, value: float) -> LoadedCase:
 def _place(case: LoadedCase) -> tuple[list[str], tuple[str, str]]:
     """Regions, from the upper one down, and lines (inner, outer) that the filler lies in."""
     regions = [*lower_sidewall(case), *held_regions(case.section)]
-    if found := turned_up(case):
-        line, up = found
+    if turn_up := turned_up(case):
+        line, up = turn_up
         return [region for region in regions if region in up], (carcass_line(case), line)
     return regions, (case.section.names[0], case.section.names[-1])
 

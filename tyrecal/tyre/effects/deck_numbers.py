@@ -73,13 +73,13 @@ def with_prony(case: LoadedCase, shear: float, tau_s: float) -> LoadedCase:
 def stresses(case: LoadedCase) -> list[str]:
     """Paths of the moduli of all materials. Raises ValueError where one has none, but marks."""
     numbers, flat, _ = _read(case, "")
-    found = []
+    result = []
     for name in dict.fromkeys((*flat.materials, *(ply.material for ply in flat.plies))):
         own = [path for path, sign in moduli(numbers, name).items() if sign > 0]
         if not own:
             raise ValueError(f"needs plain numbers of material {name}, not marks")
-        found += own
-    return found
+        result += own
+    return result
 
 
 def with_angles(case: LoadedCase, part: str, change: Change) -> LoadedCase:

@@ -16,43 +16,34 @@ PASSENGER_kPa = 240.0  # of the tyres that the catalogue's ranges are of
 
 @dataclass(frozen=True)
 class Effect:
-    """One entry of the catalogue.
+    """One entry of the catalogue."""
 
-    id, title: its name in files and in words; place: where it comes among the tool's own, as they
-    are listed and applied to a case (those of installed packages follow, by their ids); symbol,
-    unit: of the parameter ("" = a number); low, high: the parameter's range on passenger tyres,
-    taken as equally likely throughout; changes: the keywords of the deck that it touches;
-    signature: which modes move, which way and how far, as this model says; toggle: the experiment
-    that would prove it; aliases: ids of effects that frequencies alone hardly tell from it; add:
-    the case with the effect of that parameter (not 0) in it, written in the case's own numbers, or
-    ValueError ("must be ...");
-    needs: what a solver must list among its capabilities to express it, "" = nothing;
-    add_to_deck: `add` for a case of a user's deck, None = it changes lines or regions of a section;
-    part: of ``deck.parts``, which such a case must name for it, "" = none;
-    law: by how much of its shift of a mode a real one's may be off, as a standard deviation;
-    pressure_power: of the tyre's own pressure, with which its range goes: see `range_on`;
-    beside: `add` with one standard deviation more of what else its nature leaves open, as a
-    filler's height, or None: a diagnosis integrates over it.
-    """
-
-    id: str
-    title: str
-    symbol: str
-    unit: str
-    low: float
-    high: float
-    changes: tuple[str, ...]
-    signature: str
-    toggle: str
-    aliases: tuple[str, ...]
+    id: str  # its name in files
+    title: str  # its name in words
+    symbol: str  # of the parameter
+    unit: str  # of the parameter ("" = a number)
+    low: float  # of the parameter's range on passenger tyres, taken as equally likely throughout
+    high: float  # of that range
+    changes: tuple[str, ...]  # keywords of the deck that it touches
+    signature: str  # which modes move, which way and how far, as this model says
+    toggle: str  # the experiment that would prove it
+    aliases: tuple[str, ...]  # ids of effects that frequencies alone hardly distinguish from it
+    # the case with the effect of that parameter (not 0) in it, written in the case's own numbers,
+    # or ValueError ("must be ...")
     add: Callable[[LoadedCase, float], LoadedCase]
-    needs: str = ""
+    needs: str = ""  # what a solver must list among its capabilities to express it, "" = nothing
+    # where it comes among the tool's own, as they are listed and applied to a case (those of
+    # installed packages follow, by their ids)
     place: int = 0
+    # `add` for a case of a user's deck, None = it changes lines or regions of a section
     add_to_deck: Callable[[LoadedCase, float], LoadedCase] | None = None
-    part: str = ""
+    part: str = ""  # of ``deck.parts``, which a case of a user's deck must name for it, "" = none
+    # by how much of its shift of a mode a real one's may be off, as a standard deviation
     law: float = 0.04
+    # `add` with one standard deviation more of what else its nature leaves open, as a filler's
+    # height, or None: a diagnosis integrates over it
     beside: Callable[[LoadedCase, float], LoadedCase] | None = None
-    pressure_power: int = 0
+    pressure_power: int = 0  # of the tyre's own pressure, with which its range goes: see `range_on`
 
     def __repr__(self) -> str:
         return (

@@ -56,15 +56,15 @@ def belts(case: LoadedCase) -> list[str]:
     tyre, as cap plies do, nor turn-ups on what is a belt's line at the crown. Raises ValueError."""
     layers = case.case.rebar_layers
     top = case.section.regions[0][0]
-    found = [
+    names = [
         name
         for line in belt_lines(case)
         for name, layer in layers.items()
         if layer.line == line and top in (layer.regions or [top]) and layer.angle_deg % 180 != 90
     ]
-    if not found:
+    if not names:
         raise ValueError("must be 0: this case has no belt, all layers at the crown go round it")
-    return found
+    return names
 
 
 def tread(case: LoadedCase) -> tuple[str, str]:
@@ -125,10 +125,10 @@ def lower_sidewall(case: LoadedCase) -> list[str]:
     line = case.section.points[case.section.names.index(carcass_line(case))]
     widest = int(np.argmax(line[:, 1]))
     middle = {name: (first + last) / 2 for name, first, last in _regions(case.section)}
-    found = [name for name in sidewall(case) if middle[name] > widest]
-    if not found:
+    names = [name for name in sidewall(case) if middle[name] > widest]
+    if not names:
         raise ValueError("must be 0: no region of this case is a lower half of the sidewall")
-    return found
+    return names
 
 
 def rim_edge(section: Section) -> int:

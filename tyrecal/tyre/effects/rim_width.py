@@ -58,10 +58,10 @@ def _mounted(section: Section, line: int, start: int, end: int, distance: float)
 
     from scipy.optimize import root  # late: its import takes longer than an answer from the record
 
-    found = root(miss, np.zeros(3), tol=1e-13)
-    if not abs(found.fun).max() < 1e-9:
+    solution = root(miss, np.zeros(3), tol=1e-13)
+    if not abs(solution.fun).max() < 1e-9:
         raise ValueError("must be smaller: the sidewall does not reach the rim")
-    phi, moved = turned(found.x)
+    phi, moved = turned(solution.x)
     points = section.points.copy()
     offset = points[:, start : end + 1] - carcass
     points[:, start : end + 1] = carcass + moved + _rotated(offset, phi)

@@ -1,4 +1,4 @@
-"""What holds the wheel gives way: the rim moves with its own mass."""
+"""Compliance of the spindle that holds the wheel: the rim moves with its own mass."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from .text import Block
 
 @dataclass
 class Assembly:
-    """What stands in the deck, parts under their instances' names."""
+    """Contents of the deck, parts under their instances' names."""
 
     root: Scope = field(default_factory=Scope)
     taken: dict[str, set[int]] = field(default_factory=dict)  # numbers outside parts, by keyword

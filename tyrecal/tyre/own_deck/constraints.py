@@ -1,4 +1,4 @@
-"""What the rim holds, and plies that are tied to or embedded in rubber."""
+"""Nodes that the rim holds, and plies that are tied to or embedded in rubber."""
 
 from __future__ import annotations
 
@@ -38,12 +38,15 @@ class RigidBody:
 
 
 class Constraints:
-    """Of a deck. rim: nodes that it holds; reference: its node; same: node to the node that it is
-    one with; guests: embedded nodes where the rubber has none; bodies: rigid ones; motions: of
-    reference nodes of those that only touch, by degree of freedom. Raises OwnDeckError."""
+    """Constraints of a deck.
 
-    def __init__(self, made: Assembly, found: Sorted):
-        self.made, self.found, self.root = made, found, made.root
+    rim: nodes that it holds; reference: its node; same: node to the node that it is one with;
+    guests: embedded nodes where the rubber has none; bodies: rigid ones; motions: of reference
+    nodes of those that only touch, by degree of freedom. Raises OwnDeckError.
+    """
+
+    def __init__(self, made: Assembly, deck: Sorted):
+        self.made, self.found, self.root = made, deck, made.root
         self.rim: dict[int, None] = {}
         self.reference: tuple[int, Point] | None = None
         self.same: dict[int, int] = {}
@@ -195,7 +198,8 @@ class Constraints:
         return far
 
     def _held(self) -> None:
-        """What *BOUNDARY holds: the rim's reference node, the bead, or the plane of a half."""
+        """Collect what *BOUNDARY holds: the rim's reference node, the bead, or the plane of a
+        half."""
         blocks = [*self.made.held, *(b for b in self.found.inflation if b.name == "BOUNDARY")]
         fixed: dict[int, set[int]] = {}
         for block in blocks:

@@ -50,7 +50,7 @@ class Flat:
 
     @property
     def set_names(self) -> list[str]:
-        """Of the element sets, rubber first."""
+        """Names of the element sets, rubber first."""
         count = len(self.model.solids), len(self.model.plies)
         words = zip(("SOLID", "PLY"), count, strict=True)
         return [f"{word}_{k + 1}" for word, n in words for k in range(n)]
@@ -66,13 +66,13 @@ class Flat:
         return "\n".join(self.lines)
 
 
-def flatten(found: Sorted, model: Model, length: float, mass: float) -> Flat:
+def flatten(deck: Sorted, model: Model, length: float, mass: float) -> Flat:
     """The flat deck of a model whose units of length and mass are so many m and kg. Raises
     OwnDeckError."""
     mesh = flat_mesh(model, length)
     write = _Writer(length, mass)
-    blocks = _materials(found.model)
-    options = _options(found.model)
+    blocks = _materials(deck.model)
+    options = _options(deck.model)
     used: dict[str, str] = {}
     rubbers, plies = [], list[Ply]()
     for k, section in enumerate(model.solids, start=1):
@@ -101,7 +101,7 @@ def flatten(found: Sorted, model: Model, length: float, mass: float) -> Flat:
         rebars = [_layer_of(block, row) for block, row in section.rebars]
         for option in [*options[section.block], *rebars]:
             plies += _layers(write, section, k, option, blocks, used, mesh, length)
-    for block in found.model:
+    for block in deck.model:
         if block.name == "SECTION CONTROLS":
             head = f"*SECTION CONTROLS, NAME={block.need('NAME')}, HOURGLASS=STIFFNESS"
             if "HOURGLASS" not in block.parameters or block.rows:
@@ -115,7 +115,7 @@ def flatten(found: Sorted, model: Model, length: float, mass: float) -> Flat:
                 for key, value in option.parameters.items()
             )
             write.block(option, f"*{option.name}{values}")
-    static = next(block for block in found.inflation if block.name == "STATIC")
+    static = next(block for block in deck.inflation if block.name == "STATIC")
     block, row, i = model.pressure[0]
     stress = mass / length
     return Flat(
@@ -127,7 +127,7 @@ def flatten(found: Sorted, model: Model, length: float, mass: float) -> Flat:
         tuple(plies),
         row.number(i) * stress,
         "LONG TERM" in static.parameters,
-        found,
+        deck,
         model,
     )
 
@@ -165,36 +165,36 @@ class _Writer:
 
 
 def _options(blocks: Sequence[Block]) -> dict[Block, list[Block]]:
-    """What stands under each section option: *REBAR LAYER, or *HOURGLASS STIFFNESS."""
-    found: dict[Block, list[Block]] = {}
+    """Options under each section keyword: *REBAR LAYER, or *HOURGLASS STIFFNESS."""
+    options: dict[Block, list[Block]] = {}
     section: Block | None = None
     for block in blocks:
         if block.name in ("SOLID SECTION", "SURFACE SECTION", "MEMBRANE SECTION"):
             section = block
-            found[section] = []
+            options[section] = []
         elif section and block.name in SECTION_OPTIONS:
-            found[section].append(block)
-    return found
+            options[section].append(block)
+    return options
 
 
 def _materials(blocks: Sequence[Block]) -> dict[str, list[Block]]:
     """*MATERIAL with its options, by name."""
-    found: dict[str, list[Block]] = {}
+    by_name: dict[str, list[Block]] = {}
     current: list[Block] = []
     for block in blocks:
         if block.name == "MATERIAL":
             name = block.need("NAME")
-            if name in found:
+            if name in by_name:
                 raise block.refused(f"the material {name} is defined twice")
             if block.rows:
                 raise block.refused("takes no data")
-            current = found[name] = [block]
+            current = by_name[name] = [block]
         elif block.name in MATERIAL_OPTIONS:
             if any(each.name == block.name for each in current):
                 raise block.refused(f"stands twice under {current[0].get('NAME')}")
             fields_of(block)
             current.append(block)
-    return found
+    return by_name
 
 
 def _used(
@@ -226,7 +226,7 @@ def _layers(
     if not option.rows:
         raise option.refused("needs a data line: name, area, spacing, position, material, angle")
     angular = option.get("GEOMETRY") == "ANGULAR"
-    rows, found = [], []
+    rows, layers = [], []
     for row in option.rows:
         material = row.name(4)
         flat_name = _used(option, material, blocks, used)
@@ -241,7 +241,7 @@ def _layers(
                 raise option.refused(f"the {what} must be positive", row)
         name = re.sub(r"\W", "_", row.name(0)) or "LAYER"
         rows.append(Row(row.place, ",".join((name, *row.fields[1:4], flat_name, *row.fields[5:]))))
-        found.append(
+        layers.append(
             Ply(
                 row.name(0),
                 section.name,
@@ -255,7 +255,7 @@ def _layers(
         )
     head = "*REBAR LAYER" + (", GEOMETRY=ANGULAR" if angular else "")
     write.block(Block(option.name, option.place, option.parameters, tuple(rows)), head, angular)
-    return found
+    return layers
 
 
 def _layer_of(block: Block, row: Row) -> Block:

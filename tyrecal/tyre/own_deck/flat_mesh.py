@@ -48,15 +48,15 @@ class FlatMesh:
 
 def _tolerances(block: Block, length: float) -> str:
     """Those of an *EMBEDDED ELEMENT that are given, m."""
-    found = ""
+    tolerances = ""
     for name, scale in (
         ("ROUNDOFF TOLERANCE", 1.0),
         ("EXTERIOR TOLERANCE", 1.0),
         ("ABSOLUTE EXTERIOR TOLERANCE", length),
     ):
         if text := block.get(name):
-            found += f", {name}={written(Row(block.place, text).number(0) * scale)}"
-    return found
+            tolerances += f", {name}={written(Row(block.place, text).number(0) * scale)}"
+    return tolerances
 
 
 def flat_mesh(model: Model, length: float) -> FlatMesh:

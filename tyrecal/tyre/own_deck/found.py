@@ -1,4 +1,4 @@
-"""What a deck was found to hold, in words and as data."""
+"""Contents of a user's deck, in words and as data."""
 
 from __future__ import annotations
 
@@ -58,14 +58,14 @@ def contents(deck: OwnDeck, flat: Flat) -> dict[str, Any]:
 
 def laws(flat: Flat, material: str) -> list[str]:
     """The options of a material."""
-    found: list[str] = []
+    names: list[str] = []
     inside = False
     for block in flat.found.model:
         if block.name == "MATERIAL":
             inside = block.get("NAME") == material
         elif inside and block.name in ("ELASTIC", "HYPERELASTIC", "VISCOELASTIC"):
-            found.append(", ".join((block.name.lower(), *map(str.lower, block.parameters))))
-    return found
+            names.append(", ".join((block.name.lower(), *map(str.lower, block.parameters))))
+    return names
 
 
 def step_name(name: str) -> str:
@@ -73,17 +73,17 @@ def step_name(name: str) -> str:
     return name or "without a name"
 
 
-def words(found: dict[str, Any], mass_kg: float) -> Iterator[str]:
+def words(content: dict[str, Any], mass_kg: float) -> Iterator[str]:
     """The same in sentences."""
-    how = {"m": "m, kg, s, Pa", "mm": "mm, t, s, MPa"}[found["units"]]
-    kinds = ", ".join(f"{count} {kind}" for kind, count in found["elements"].items())
-    half = ", the half made whole" if found["reflected"] else ""
+    how = {"m": "m, kg, s, Pa", "mm": "mm, t, s, MPa"}[content["units"]]
+    kinds = ", ".join(f"{count} {kind}" for kind, count in content["elements"].items())
+    half = ", the half made whole" if content["reflected"] else ""
     yield f"units {how}; {mass_kg:.2f} kg without the rim"
-    yield f"{found['nodes']} nodes, {kinds}{half}"
-    for section in found["sections"]:
-        laws = "; ".join(found["compounds"][section["material"]])
+    yield f"{content['nodes']} nodes, {kinds}{half}"
+    for section in content["sections"]:
+        laws = "; ".join(content["compounds"][section["material"]])
         yield f"section {section['set']}: {section['material']} ({laws})"
-    for ply in found["plies"]:
+    for ply in content["plies"]:
         spacing = (
             f"{ply['spacing_deg']:g} degrees"
             if "spacing_deg" in ply
@@ -93,24 +93,24 @@ def words(found: dict[str, Any], mass_kg: float) -> Iterator[str]:
             f"ply {ply['name']} on {ply['set']}: {ply['material']}, {1e6 * ply['area_m2']:.4g} mm²"
             f" every {spacing}, {ply['angle_deg']:g} degrees from the meridian"
         )
-    rim, crown = found["rim"], found["crown"]
+    rim, crown = content["rim"], content["crown"]
     yield f"rim: holds {rim['nodes']} nodes, up to r = {1e3 * rim['radius_m']:.1f} mm"
     yield (
-        f"cavity: surface {found['cavity']['surface']}, {found['cavity']['faces']} faces,"
-        f" {found['pressure_kPa']:g} kPa by the step {found['inflation_step']},"
-        f" {found['static_moduli'].replace('_', ' ')} moduli"
+        f"cavity: surface {content['cavity']['surface']}, {content['cavity']['faces']} faces,"
+        f" {content['pressure_kPa']:g} kPa by the step {content['inflation_step']},"
+        f" {content['static_moduli'].replace('_', ' ')} moduli"
     )
     yield (
         f"crown: {crown['nodes']} nodes of the outer surface, {2e3 * crown['half_width_m']:.1f} mm"
         f" wide, radius {1e3 * crown['radius_m']:.1f} mm"
     )
-    if found["marks"]:
-        yield f"marks: {', '.join(found['marks'])}"
-    if found["left_out"]:
-        yield f"left out: {'; '.join(found['left_out'])}"
-    if found["passed_over"]:
-        yield f"passed over, as they change no answer: *{', *'.join(found['passed_over'])}"
-    if found["later_steps"]:
+    if content["marks"]:
+        yield f"marks: {', '.join(content['marks'])}"
+    if content["left_out"]:
+        yield f"left out: {'; '.join(content['left_out'])}"
+    if content["passed_over"]:
+        yield f"passed over, as they change no answer: *{', *'.join(content['passed_over'])}"
+    if content["later_steps"]:
         yield (
-            f"left out, as they come after the inflation: steps {', '.join(found['later_steps'])}"
+            f"left out, as they come after the inflation: steps {', '.join(content['later_steps'])}"
         )

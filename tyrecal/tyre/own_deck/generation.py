@@ -1,4 +1,4 @@
-"""What mesh keywords make in a scope: nodes, elements and sets, written out or generated."""
+"""Nodes, elements and sets that mesh keywords make in a scope, written out or generated."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .text import Block, Row, is_label, named
 
 
 def read(scope: Scope, block: Block) -> None:
-    """What a mesh keyword adds. Raises OwnDeckError."""
+    """Add the nodes, elements or sets of a mesh keyword to a scope. Raises OwnDeckError."""
     MESH_READERS[block.name](scope, block)
 
 
@@ -186,7 +186,7 @@ def _elset(scope: Scope, block: Block) -> None:
 
 def _listed(scope: Scope, block: Block, members: Callable, known: dict) -> list[int]:
     """Members of a set's data lines: numbers and names of other sets, or first, last, step."""
-    found: list[int] = []
+    result: list[int] = []
     what = "node" if block.name == "NSET" else "element"
     in_order = sorted(known) if "GENERATE" in block.parameters else []
     for row in block.rows:
@@ -208,8 +208,8 @@ def _listed(scope: Scope, block: Block, members: Callable, known: dict) -> list[
         missing = [n for n in some if n not in known]
         if missing:
             raise block.refused(f"{what} {missing[0]} of the set is not defined", row)
-        found += some
-    return found
+        result += some
+    return result
 
 
 def _element(scope: Scope, block: Block) -> None:

@@ -29,7 +29,7 @@ class Sorted:
 
 def sort(blocks: Sequence[Block]) -> Sorted:
     """Blocks checked and sorted. Raises OwnDeckError for what is not honoured."""
-    found = Sorted()
+    deck = Sorted()
     steps: list[list[Block]] = []
     step: list[Block] | None = None
     part = assembly = instance = False
@@ -50,17 +50,17 @@ def sort(blocks: Sequence[Block]) -> Sorted:
                 step, after_a_step = None, True
             continue
         if name in OUTPUT_KEYWORDS:
-            found.passed.append(block)
+            deck.passed.append(block)
             continue
         if name in RULES and [*RULES[name].options_at] == ["deck step"]:
             raise block.refused("stands outside a step")
         if after_a_step:
             raise block.refused("stands after a step: the model's keywords stand before *STEP")
         if name in CONTACT_KEYWORDS:
-            found.contact.append(block)
+            deck.contact.append(block)
             continue
         check_honoured(block, "deck")
-        found.model.append(block)
+        deck.model.append(block)
         if name in MATERIAL_OPTIONS:
             if over is None or over.name != "MATERIAL":
                 raise block.refused("must follow a *MATERIAL")
@@ -94,13 +94,13 @@ def sort(blocks: Sequence[Block]) -> Sorted:
         raise blocks[-1].refused("is the last, but a *PART, *ASSEMBLY or *INSTANCE has no end")
     inflating = _last_that_raises_the_pressure(steps)
     for k, each in enumerate(steps[: len(steps) if inflating is None else inflating + 1]):
-        _step(each, found, is_inflation=k == inflating)
+        _step(each, deck, is_inflation=k == inflating)
     if inflating is None:
         raise blocks[-1].refused(
             "no *STATIC step of the deck inflates: one needs *DSLOAD or *DLOAD with a pressure"
         )
-    found.later = [each[0] for each in steps[inflating + 1 :]]
-    return found
+    deck.later = [each[0] for each in steps[inflating + 1 :]]
+    return deck
 
 
 def _last_that_raises_the_pressure(steps: Sequence[Sequence[Block]]) -> int | None:
@@ -133,14 +133,14 @@ def _pressures(loads: Sequence[Block]) -> dict[tuple[str, str], float] | None:
     return {(row.name(0), row.name(1)): row.number(2) for row in rows}
 
 
-def _step(step: list[Block], found: Sorted, is_inflation: bool) -> None:
+def _step(step: list[Block], deck: Sorted, is_inflation: bool) -> None:
     """A step up to the one that inflates: of those before it, what they hold stays held."""
     kept = []
     for block in step:
         if block.name in OUTPUT_KEYWORDS:
-            found.passed.append(block)
+            deck.passed.append(block)
         elif block.name in CONTACT_KEYWORDS:
-            found.contact.append(block)
+            deck.contact.append(block)
         else:
             if (
                 is_inflation or block.name != "STATIC"
@@ -151,25 +151,25 @@ def _step(step: list[Block], found: Sorted, is_inflation: bool) -> None:
     if new := [block for block in held if block.get("OP") == "NEW"]:
         if len(new) < len(held):
             raise new[0].refused("OP=NEW must stand at every *BOUNDARY of the step, or at none")
-        found.model = [block for block in found.model if block.name != "BOUNDARY"]  # released
+        deck.model = [block for block in deck.model if block.name != "BOUNDARY"]  # released
     procedures = [block for block in kept if block.name == "STATIC"]
     if len(procedures) != 1:
         raise step[0].refused("needs one *STATIC")
-    found.is_nonlinear |= "NLGEOM" in step[0].parameters
+    deck.is_nonlinear |= "NLGEOM" in step[0].parameters
     if not is_inflation:
         moved = [block for block in held if any(row.number(3, 0.0) for row in block.rows)]
-        _check_amplitudes(found, moved, procedures[0])
-        found.model.extend(held)
+        _check_amplitudes(deck, moved, procedures[0])
+        deck.model.extend(held)
         return
-    if not found.is_nonlinear:
+    if not deck.is_nonlinear:
         raise step[0].refused("inflates: it needs NLGEOM=YES")
-    _check_amplitudes(found, kept, procedures[0])
-    found.inflation = kept
+    _check_amplitudes(deck, kept, procedures[0])
+    deck.inflation = kept
 
 
-def _check_amplitudes(found: Sorted, blocks: Sequence[Block], static: Block) -> None:
+def _check_amplitudes(deck: Sorted, blocks: Sequence[Block], static: Block) -> None:
     """What follows an amplitude has its full size at the step's end."""
-    tables = {block.need("NAME"): block for block in found.model if block.name == "AMPLITUDE"}
+    tables = {block.need("NAME"): block for block in deck.model if block.name == "AMPLITUDE"}
     for block in blocks:
         name = block.get("AMPLITUDE")
         if not name:

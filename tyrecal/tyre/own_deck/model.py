@@ -48,17 +48,17 @@ class Model:
     left_out: tuple[str, ...] = ()  # contact that the held bead makes superfluous, in words
 
 
-def build(found: Sorted) -> Model:
+def build(deck: Sorted) -> Model:
     """The section. Raises OwnDeckError."""
-    made = collect(found.model)
-    return _Builder(made, found).model()
+    made = collect(deck.model)
+    return _Builder(made, deck).model()
 
 
 class _Builder:
     """From what was collected to the model."""
 
-    def __init__(self, made: Assembly, found: Sorted):
-        self.made, self.found, self.root = made, found, made.root
+    def __init__(self, made: Assembly, deck: Sorted):
+        self.made, self.found, self.root = made, deck, made.root
 
     def model(self) -> Model:
         """Raises OwnDeckError."""
@@ -244,7 +244,7 @@ class _Builder:
         """The free faces of solids that a pressure acts on, those under plies among them."""
         free = {frozenset((f[2][0], f[2][-1])): f for f in boundary}
         surface = self.found.inflation[0]
-        found: dict[int, Face] = {}
+        faces: dict[int, Face] = {}
         for n, face, raw in pressed:
             nodes = tuple(self.tied.same.get(each, each) for each in raw)
             own = free.get(frozenset((nodes[0], nodes[-1])))
@@ -258,10 +258,10 @@ class _Builder:
                     f"element {n}: the pressure on its face {face} comes from the rubber's side",
                     element.row,
                 )
-            if id(own) in found:
+            if id(own) in faces:
                 raise surface.refused(f"the pressure acts twice on face {face} of element {n}")
-            found[id(own)] = own
-        return tuple(found.values())
+            faces[id(own)] = own
+        return tuple(faces.values())
 
     def _reflect(
         self, solids: Sequence[Assigned], plies: Sequence[Assigned], pressed: list[Face]

@@ -23,7 +23,7 @@ Numbers = Mapping[str, float]
 
 def paths(blocks: Sequence[Block]) -> dict[str, tuple[int, int, int]]:
     """Path to block, row and field of the plain numbers of materials, layers and parameters."""
-    found: dict[str, tuple[int, int, int]] = {}
+    places: dict[str, tuple[int, int, int]] = {}
     material, section = "", ""
     layers = [row.name(0) for b in blocks if b.name == "REBAR LAYER" for row in b.rows]
     rebars = [b.get("NAME") for b in blocks if b.name == "REBAR" for _ in b.rows]
@@ -38,7 +38,7 @@ def paths(blocks: Sequence[Block]) -> dict[str, tuple[int, int, int]]:
             for i, row in enumerate(block.rows):
                 name, value = assigned(row)
                 if plain_number(value):
-                    found[f"parameter / {name}"] = place, i, -1
+                    places[f"parameter / {name}"] = place, i, -1
             continue
         for (name, *_), i, j in placed_fields(block) if block.name in IN_PATHS else ():
             row = block.rows[i]
@@ -58,9 +58,9 @@ def paths(blocks: Sequence[Block]) -> dict[str, tuple[int, int, int]]:
                     else ""
                 )
                 path = f"{material} / {block.name} / {line}{name}"
-            if path not in found:
-                found[path] = place, i, j
-    return found
+            if path not in places:
+                places[path] = place, i, j
+    return places
 
 
 def moduli(numbers: Iterable[str], material: str) -> dict[str, int]:
@@ -94,16 +94,16 @@ def plain_number(text: str) -> bool:
 
 def marks(blocks: Sequence[Block]) -> dict[str, Block]:
     """The marks of a deck, each with a block that has it."""
-    found: dict[str, Block] = {}
+    by_mark: dict[str, Block] = {}
     for block in blocks:
         for row in block.rows:
             for field in row.fields:
                 for name in DECK_MARK.findall(field):
-                    found.setdefault(name, block)
+                    by_mark.setdefault(name, block)
         for value in block.parameters.values():
             if "{{" in value:
                 raise block.refused(f"a mark stands in data lines, not in {value}")
-    return found
+    return by_mark
 
 
 def marked_numbers(marks: Mapping[str, Block], given: Numbers, variable: Any) -> dict[str, float]:
@@ -154,8 +154,8 @@ def _parameter(block: Block, parameters: Mapping[str, Any], name: str) -> str:
     raise block.refused(f"the parameter <{name}> is not defined above")
 
 
-LARGEST_RESULT = 1e300  # result of an expression
-LARGEST_BASE = 1e30  # of a power
+MAX_RESULT = 1e300  # result of an expression
+MAX_BASE = 1e30  # of a power
 OPERATORS: dict[type, Callable[..., Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -208,11 +208,11 @@ def _evaluate(node: ast.AST, known: Mapping[str, Any]) -> Any:
         whole = isinstance(left, int) and isinstance(right, int)
         if isinstance(node.op, ast.Div) and whole and left % right:
             raise ValueError(f"{left}/{right} of whole numbers: write {left}./{right}")
-        if isinstance(node.op, ast.Pow) and (abs(right) > 100 or abs(left) > LARGEST_BASE):
+        if isinstance(node.op, ast.Pow) and (abs(right) > 100 or abs(left) > MAX_BASE):
             raise ValueError("a power above 100, or of a large number")
         value = OPERATORS[type(node.op)](left, right)
-        if abs(value) > LARGEST_RESULT:
-            raise ValueError(f"a number above {LARGEST_RESULT:g}")
+        if abs(value) > MAX_RESULT:
+            raise ValueError(f"a number above {MAX_RESULT:g}")
         return value
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
         function = EXPRESSION_FUNCTIONS.get(node.func.id)
@@ -248,7 +248,7 @@ def as_known(path: Any, known: Iterable[str]) -> Any:
 
 
 def canonical(path: str, known: Iterable[str]) -> str | None:
-    """The path of ``known`` that is meant, whatever the case and blanks."""
+    """The path of ``known`` that is meant, ignoring case and blanks."""
     wanted = _key(path)
     return next((each for each in known if _key(each) == wanted), None)
 

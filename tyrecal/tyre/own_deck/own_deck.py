@@ -51,24 +51,24 @@ class OwnDeck:
 
     @cached_property
     def _marked(self) -> set[int]:
-        """Places of the blocks whose numbers hang on marks or parameters."""
+        """Places of the blocks whose numbers depend on marks or parameters."""
         return {k for k, block in enumerate(self.blocks) if numbers_of.is_marked(block)}
 
     @cached_property
     def numbers(self) -> dict[str, float]:
         """Its plain numbers by path, as the text has them."""
-        found = {}
+        values = {}
         for path, (place, i, j) in self.places.items():
             row = self.blocks[place].rows[i]
             text = numbers_of.assigned(row)[1] if j < 0 else row.text(j)
-            found[path] = number_from(text)
-        return found
+            values[path] = number_from(text)
+        return values
 
     @cached_property
     def sha256(self) -> str:
-        """Hash of all that it says but its plain numbers, however it is indented or commented."""
+        """Hash of all its content except plain numbers, independent of indentation and comments."""
         numbers = set(self.places.values())
-        said = []
+        parts = []
         for k, block in enumerate(self.blocks):
             fields = [
                 "" if (k, i, j) in numbers or (k, i, -1) in numbers else text
@@ -76,8 +76,8 @@ class OwnDeck:
                 for j, text in enumerate(row.fields)
             ]
             if block.name not in OUTPUT_KEYWORDS:
-                said.append((block.name, sorted(block.parameters.items()), fields))
-        return sha256(json.dumps([self.units, said]).encode()).hexdigest()
+                parts.append((block.name, sorted(block.parameters.items()), fields))
+        return sha256(json.dumps([self.units, parts]).encode()).hexdigest()
 
     def with_numbers(self, numbers: Mapping[str, float]) -> list[Block]:
         """The blocks with all marks, parameters and numbers set. Raises OwnDeckError."""
@@ -99,7 +99,7 @@ class OwnDeck:
         return result
 
     def _same(self, place: int, block: Block) -> Block:
-        """A block, or the one that was there last where it says the same."""
+        """A block, or the one that was there last where it has the same content."""
         last = self._filled.get(place, block)
         rows = [[row.fields for row in each.rows] for each in (block, last)]
         if last.parameters != block.parameters or rows[0] != rows[1]:
@@ -107,28 +107,28 @@ class OwnDeck:
         self._filled[place] = last
         return last
 
-    def model(self, found: Sorted) -> Model:
+    def model(self, deck: Sorted) -> Model:
         """The section of sorted blocks, remembered while the mesh's own stay the same."""
-        mesh = (b for b in (*found.model, *found.inflation) if b.name in TOPOLOGY)
-        key = (*mesh, *found.contact)
+        mesh = (b for b in (*deck.model, *deck.inflation) if b.name in TOPOLOGY)
+        key = (*mesh, *deck.contact)
         if key not in self._models:
             while len(self._models) > 3:
                 self._models.pop(next(iter(self._models)))
-            self._models[key] = build(found)
+            self._models[key] = build(deck)
         return self._models[key]
 
     def flat(self, numbers: Mapping[str, float], gauges: Gauges = ()) -> Flat:
         """The flat deck with numbers set and ``gauges`` of its parts, in SI units.
 
         Raises OwnDeckError."""
-        found = sort(self.with_numbers(numbers))
-        model = thickened(self.model(found), gauges) if gauges else self.model(found)
-        return flatten(found, model, UNIT_LENGTH[self.units], UNIT_MASS[self.units])
+        deck = sort(self.with_numbers(numbers))
+        model = thickened(self.model(deck), gauges) if gauges else self.model(deck)
+        return flatten(deck, model, UNIT_LENGTH[self.units], UNIT_MASS[self.units])
 
 
 def read_own_deck(path: Path, units: Units | None = None) -> OwnDeck:
-    """The deck, its units told by its densities where they are not given. Raises OwnDeckError,
-    OSError."""
+    """The deck, with units derived from its densities where they are not given. Raises
+    OwnDeckError, OSError."""
     blocks, texts = read_blocks(path)
     if not blocks:
         raise OwnDeckError(Place(path.name, 1), "there is no keyword in it")
@@ -136,7 +136,8 @@ def read_own_deck(path: Path, units: Units | None = None) -> OwnDeck:
 
 
 def recognised(blocks: Sequence[Block]) -> Units:
-    """The units that the densities are in. Raises OwnDeckError where these do not tell."""
+    """The units that the densities are in. Raises OwnDeckError where these do not determine
+    them."""
     rows = [(b, row) for b in blocks if b.name == "DENSITY" for row in b.rows[:1]]
     values = []
     for block, row in rows:

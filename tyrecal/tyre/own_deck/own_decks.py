@@ -40,12 +40,12 @@ class OwnDecks:
 
     @property
     def units(self) -> Units:
-        """Of all of them."""
+        """Units of all the decks."""
         return self.decks[0].units
 
     @cached_property
     def blocks(self) -> list[Block]:
-        """Of all, one deck after the other."""
+        """Blocks of all the decks, one deck after the other."""
         return [block for deck in self.decks for block in deck.blocks]
 
     @cached_property
@@ -56,45 +56,45 @@ class OwnDecks:
     @cached_property
     def marks(self) -> dict[str, Block]:
         """But the pressure's."""
-        found = {name: block for deck in self.decks for name, block in deck.marks.items()}
-        return {name: block for name, block in found.items() if name != PRESSURE_MARK}
+        by_name = {name: block for deck in self.decks for name, block in deck.marks.items()}
+        return {name: block for name, block in by_name.items() if name != PRESSURE_MARK}
 
     @cached_property
     def numbers(self) -> dict[str, float]:
         """Plain numbers by path; one that two decks state has a path where they agree."""
-        found: dict[str, set[float]] = {}
+        by_path: dict[str, set[float]] = {}
         for deck in self.decks:
             for path, value in deck.numbers.items():
-                found.setdefault(path, set()).add(value)
-        return {path: min(values) for path, values in found.items() if len(values) == 1}
+                by_path.setdefault(path, set()).add(value)
+        return {path: min(values) for path, values in by_path.items() if len(values) == 1}
 
     @cached_property
     def sha256(self) -> str:
-        """Hash of all that they say but plain numbers, and of the set that is the crown."""
-        said = [*(deck.sha256 for deck in self.decks), self.crown]
-        return sha256("\n".join(said).encode()).hexdigest()
+        """Hash of all their content except plain numbers, and of the set that is the crown."""
+        parts = [*(deck.sha256 for deck in self.decks), self.crown]
+        return sha256("\n".join(parts).encode()).hexdigest()
 
     @cached_property
     def jobs(self) -> list[tuple[str, str]]:
         """Each job and the one before it that it goes on from, "" where it is whole by itself.
 
         Raises OwnDeckError where the first goes on from a job that is not among them."""
-        found: list[tuple[str, str]] = []
+        jobs: list[tuple[str, str]] = []
         for deck in self.decks:
             reads = next((b for b in deck.blocks if b.name in CONTINUES or _restarts(b)), None)
-            if reads and not found:
+            if reads and not jobs:
                 raise reads.refused("goes on from a job that no deck before this one is of")
-            found.append((deck.path.stem, found[-1][0] if reads else ""))
-        return found
+            jobs.append((deck.path.stem, jobs[-1][0] if reads else ""))
+        return jobs
 
     @cached_property
     def restarted(self) -> list[OwnDeck]:
         """The last deck and those before it whose analysis it goes on with by *RESTART, in their
         order: for ABAQUS one analysis, which has one format of its results file."""
-        found = [self.decks[-1]]
-        while any(map(_restarts, found[0].blocks)):
-            found.insert(0, self.decks[self.decks.index(found[0]) - 1])
-        return found
+        chain = [self.decks[-1]]
+        while any(map(_restarts, chain[0].blocks)):
+            chain.insert(0, self.decks[self.decks.index(chain[0]) - 1])
+        return chain
 
     @cached_property
     def modes_step(self) -> list[Block]:
@@ -105,28 +105,28 @@ class OwnDecks:
                 steps.append([])
             if steps and (not steps[-1] or steps[-1][-1].name != "END STEP"):
                 steps[-1].append(block)
-        found = [step for step in steps if any(block.name == "FREQUENCY" for block in step)]
-        if len(found) != 1:
+        modal = [step for step in steps if any(block.name == "FREQUENCY" for block in step)]
+        if len(modal) != 1:
             raise OwnDeckError(
                 Place(self.path.name, 1),
                 f"the last deck finds the modes: it needs one step with *FREQUENCY, it has"
-                f" {len(found)}",
+                f" {len(modal)}",
             )
-        if found[0][-1].name != "END STEP":
-            raise found[0][0].refused("has no *END STEP")
-        return found[0]
+        if modal[0][-1].name != "END STEP":
+            raise modal[0][0].refused("has no *END STEP")
+        return modal[0]
 
     @cached_property
     def modes(self) -> int | None:
-        """How many are asked for; None where a range of frequencies decides."""
+        """Number of modes that are requested; None where a range of frequencies decides."""
         row = next(b for b in self.modes_step if b.name == "FREQUENCY").only_row()
         return None if row.text(1) or row.text(2) or not row.text(0) else row.integer(0)
 
     @cached_property
     def solid_sets(self) -> list[str]:
         """Element sets that have a section, and so a mass."""
-        found = [b.get("ELSET") for b in self.blocks if b.name.endswith(" SECTION")]
-        return list(dict.fromkeys(name for name in found if name))
+        names = [b.get("ELSET") for b in self.blocks if b.name.endswith(" SECTION")]
+        return list(dict.fromkeys(name for name in names if name))
 
     @cached_property
     def pressures(self) -> list[tuple[OwnDeck, Row, int, float]]:
@@ -137,15 +137,15 @@ class OwnDecks:
         if any(PRESSURE_MARK in deck.marks for deck in self.decks):
             return []
         ends = _ends_of_amplitudes(self.blocks)
-        found = [(deck, *place) for deck in self.decks for place in _pressures(deck.blocks, ends)]
-        largest = max((abs(value) for *_, value in found), default=0.0)
+        loads = [(deck, *place) for deck in self.decks for place in _pressures(deck.blocks, ends)]
+        largest = max((abs(value) for *_, value in loads), default=0.0)
         if not largest:
             raise OwnDeckError(
                 Place(self.decks[0].path.name, 1),
                 "no pressure is found in *DSLOAD, *DLOAD, or *BOUNDARY of the degree of freedom"
                 f" {PRESSURE_DOF}: {MARK_IT}",
             )
-        return [(deck, row, i, value / largest) for deck, row, i, value in found if value]
+        return [(deck, row, i, value / largest) for deck, row, i, value in loads if value]
 
     @property
     def pressure_Pa(self) -> float:

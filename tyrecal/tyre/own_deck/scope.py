@@ -45,7 +45,7 @@ def nodes_of(kind: str) -> int | None:
 
 @dataclass
 class Scope:
-    """What the mesh keywords of one *PART, or of the model, make."""
+    """Nodes, elements and sets that the mesh keywords of one *PART, or of the model, make."""
 
     name: str = ""
     nodes: dict[int, Point] = field(default_factory=dict)

@@ -48,27 +48,27 @@ class OwnDeckMesh(SectionMesh):
 
     @property
     def angles(self) -> dict[str, float]:
-        """Of the layers by name, degrees from the meridian."""
+        """Angles of the layers by name, degrees from the meridian."""
         return {name: ply.angle_deg for name, ply in self._named().items()}
 
     @property
     def layers(self) -> dict[str, list[tuple[int, ...]]]:
         """Nodes of the elements to draw each layer with: layers of one set take turns."""
-        found = {}
+        result = {}
         for name, ply in self._named().items():
             sharing = [other.set_name for other in self.plies].count(ply.set_name)
             turn = [other for other in self.plies if other.set_name == ply.set_name].index(ply)
-            found[name] = list(self.cords[ply.set_name].values())[turn::sharing]
-        return found
+            result[name] = list(self.cords[ply.set_name].values())[turn::sharing]
+        return result
 
     @property
     def compounds(self) -> dict[str, list[tuple[int, ...]]]:
         """Corner nodes of the elements of each."""
-        found: dict[str, list[tuple[int, ...]]] = {}
+        by_material: dict[str, list[tuple[int, ...]]] = {}
         for number, (material, _) in self.cells.items():
             nodes = self.solids[number]
-            found.setdefault(material, []).append(nodes[: CORNERS_OF[len(nodes)]])
-        return found
+            by_material.setdefault(material, []).append(nodes[: CORNERS_OF[len(nodes)]])
+        return by_material
 
     def _named(self) -> dict[str, Ply]:
         names = [ply.name for ply in self.plies]

@@ -19,7 +19,7 @@ def surface_faces(made: Assembly, name: str, block: Block, row: Row | None = Non
     surface, prefix = made.surfaces[name]
     if surface.get("TYPE") in ("NODE", "SEGMENTS"):
         raise surface.refused("a surface of nodes or segments has no faces: use TYPE=ELEMENT")
-    found: list[Face] = []
+    faces: list[Face] = []
     for line in surface.rows:
         face = line.name(1)
         if any(line.fields[2:]):
@@ -32,16 +32,16 @@ def surface_faces(made: Assembly, name: str, block: Block, row: Row | None = Non
                 if face not in ("SPOS", "SNEG"):
                     raise surface.refused(f"element {n} has the faces SPOS and SNEG", line)
                 nodes = element.nodes if face == "SNEG" else element.nodes[::-1]
-                found.append((n, face, nodes))
+                faces.append((n, face, nodes))
                 continue
             own = dict(faces_of(element))
             if face and face not in own:
                 raise surface.refused(f"element {n} has no face {face}", line)
             some = [face] if face else [f for f in own if (n, f, own[f]) in free]
-            found += [(n, f, own[f]) for f in some]
-    if not found:
+            faces += [(n, f, own[f]) for f in some]
+    if not faces:
         raise surface.refused(f"the surface {name} has no faces")
-    return found
+    return faces
 
 
 def boundary_of(root: Scope) -> tuple[Face, ...]:

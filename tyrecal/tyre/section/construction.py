@@ -1,4 +1,4 @@
-"""What tyres of a type are made of: compounds and cords with usual values, and where they are.
+"""Materials of tyres of a type: compounds and cords with usual values, and where they are.
 
 Compounds are known by their hardness. Gent (Rubber Chem. Technol. 31 (1958) 896) relates it to
 Young's modulus, MPa, of Shore A hardness S:
@@ -29,11 +29,11 @@ CAP, BASE = "cap", "base"
 
 @dataclass(frozen=True)
 class Compound:
-    """A rubber: hardness, Shore A; density, kg/m3; relaxed: share g of the shear modulus in a
-    vibration that is gone in a static state."""
+    """A rubber."""
 
-    hardness: float
-    density: float
+    hardness: float  # Shore A
+    density: float  # kg/m3
+    # share g of the shear modulus in a vibration that is gone in a static state
     relaxed: float = 0.4
 
     @property
@@ -49,7 +49,7 @@ class Compound:
 
     @property
     def spread_percent(self) -> float:
-        """Of C10, a standard deviation."""
+        """Standard deviation of C10, per cent."""
         up, down = (gent_C10(self.hardness + d) for d in (HARDNESS_SPREAD, -HARDNESS_SPREAD))
         return 100 * (up - down) / (2 * self.C10_Pa)
 
@@ -93,10 +93,8 @@ class Belt:
 
 @dataclass(frozen=True)
 class Construction:
-    """A type of tyre. Gauges, m: crown, sidewall, bead = (a, b): a + b S1, as `Gauges` has them;
-    liner to step, too. wires: how many are in a bead, of
-    ``wire`` m2 each; filler: its height of the arc from the rim to
-    the widest point; the turn-up ends there, or at the widest point where it is ``high``."""
+    """A type of tyre. Gauges, m: crown, sidewall, bead = (a, b): a + b S1, as in `Gauges`; liner to
+    step, too."""
 
     name: str
     compounds: dict[str, Compound]
@@ -113,14 +111,14 @@ class Construction:
     cap_gauge: float
     under_tread: float
     step: float
-    wires: int
-    wire: float
-    filler: float
-    high: bool
+    wires: int  # how many are in a bead
+    wire: float  # m2 of each
+    filler: float  # its height of the arc from the rim to the widest point; the turn-up ends there
+    high: bool  # the turn-up ends at the widest point
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """Of the section, from the inner surface to the outer."""
+        """Lines of the section, from the inner surface to the outer."""
         belts = [TURN_UP, *(f"belt{i}" for i in range(2, len(self.belts) + 1))]
         return ("inner", "ply", *belts, *([CAP] if self.cap else []), BASE, "outer")
 

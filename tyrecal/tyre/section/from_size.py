@@ -33,28 +33,23 @@ NANOMETRE = 1e-9
 
 @dataclass(frozen=True)
 class Gauges:
-    """Thicknesses and widths, m. crown: inner surface to the tread's, the grooves' volume spread
-    over it; sidewall: at the widest point, bead: at the rim's flange, both over all; belt: width
-    of the widest belt along the carcass; ``step``: of which others are narrower; rim: width
-    between the flanges; liner: inner surface to carcass; ply: carcass to first belt, or to its
-    turn-up above the filler; belts: from each belt to the next; cap: last belt to cap ply;
-    under_tread: last layer to the tread."""
+    """Thicknesses and widths, m."""
 
-    crown: float
-    sidewall: float
-    bead: float
-    belt: float
-    rim: float
-    liner: float
-    ply: float
-    belts: float
-    step: float
-    cap: float
-    under_tread: float
+    crown: float  # inner surface to the tread's, the grooves' volume spread over it
+    sidewall: float  # at the widest point, over all
+    bead: float  # at the rim's flange, over all
+    belt: float  # width of the widest belt along the carcass
+    rim: float  # width between the flanges
+    liner: float  # inner surface to carcass
+    ply: float  # carcass to first belt, or to its turn-up above the filler
+    belts: float  # from each belt to the next
+    step: float  # in widths, of which other belts are narrower
+    cap: float  # last belt to cap ply
+    under_tread: float  # last layer to the tread
 
 
 def construction(size: TyreSize) -> Construction:
-    """What a tyre of this size is made of."""
+    """Construction of a tyre of this size."""
     return TRUCK if size.truck else LIGHT_TRUCK if size.light_truck else PASSENGER
 
 
@@ -131,15 +126,15 @@ def build(size: TyreSize, gauges: Gauges) -> GaugeTable:
 def _layers(g: Gauges, made: Construction) -> dict[str, tuple[float, float]]:
     """Distance from the carcass and half a width of every line under the tread, m."""
     belts = made.lines[2 : 2 + len(made.belts)]
-    found = {
+    layers = {
         name: (g.ply + i * g.belts, (belt.share * g.belt - belt.steps * g.step) / 2)
         for i, (name, belt) in enumerate(zip(belts, made.belts, strict=True))
     }
-    last = found[belts[-1]][0]
+    last = layers[belts[-1]][0]
     if made.cap:
         last += g.cap
-        found[CAP] = last, g.belt / 2
-    return {**found, BASE: (last + g.under_tread, g.belt / 2)}
+        layers[CAP] = last, g.belt / 2
+    return {**layers, BASE: (last + g.under_tread, g.belt / 2)}
 
 
 def _stations(ends: list[float]) -> tuple[Array, list[str]]:

@@ -15,16 +15,15 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class GaugeTable:
-    """Half a section. names: of the lines, from the inner surface to the outer; line: the one
-    that has points (station, 2), m; gauges (line, station): distances from it, inwards negative,
-    NaN where a line is absent, m; labels: each station's region; rigid: held by the rim."""
+    """Half a section, by the gauges from one of its lines."""
 
-    names: tuple[str, ...]
-    line: str
-    points: Array
+    names: tuple[str, ...]  # of the lines, from the inner surface to the outer
+    line: str  # the one that has points
+    points: Array  # (station, 2), m
+    # (line, station): distances from it, inwards negative, NaN where a line is absent, m
     gauges: Array
-    labels: list[str]
-    rigid: Array
+    labels: list[str]  # each station's region
+    rigid: Array  # held by the rim
 
     def csv(self) -> str:
         """The station table, in mm to the hundredth of a micrometre."""

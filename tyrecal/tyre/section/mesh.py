@@ -14,23 +14,19 @@ Array = np.ndarray
 
 @dataclass(eq=False)
 class SectionMesh:
-    """Nodes, solids and cord lines of both halves; everything keyed by its deck number.
-
-    nodes: number to (r, z) in m; solids: number to corner (and midside) nodes, counter-clockwise
-    in (r, z); ``cells``: number of a solid to (region, row); ``cords``: line name to
-    {number: nodes}, running from -z to +z; rim: nodes that the rim holds; inner, outer: solids
-    whose faces S4, S2 are the inner, the outer surface; shape: (elements along, rows).
-    """
+    """Nodes, solids and cord lines of both halves; everything keyed by its deck number."""
 
     quadratic: bool
-    nodes: dict[int, tuple[float, float]]
+    nodes: dict[int, tuple[float, float]]  # number to (r, z) in m
+    # number to corner (and midside) nodes, counter-clockwise in (r, z)
     solids: dict[int, tuple[int, ...]]
-    cells: dict[int, tuple[str, int]]
+    cells: dict[int, tuple[str, int]]  # number of a solid to (region, row)
+    # line name to {number: nodes}, running from -z to +z
     cords: dict[str, dict[int, tuple[int, ...]]]
-    rim: list[int]
-    inner: list[int]
-    outer: list[int]
-    shape: tuple[int, int]
+    rim: list[int]  # nodes that the rim holds
+    inner: list[int]  # solids whose faces S4 are the inner surface
+    outer: list[int]  # solids whose faces S2 are the outer surface
+    shape: tuple[int, int]  # (elements along, rows)
     crown_outer: list[int] = field(default_factory=list)
 
     def region_of(self, cord: int) -> str:

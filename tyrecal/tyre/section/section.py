@@ -31,18 +31,14 @@ class SectionError(InputError):
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """Half a section, uninflated, from the crown's centre (z = 0) to the bead.
+    """Half a section, uninflated, from the crown's centre (z = 0) to the bead."""
 
-    names: the lines from the inner surface to the outer, e.g. inner, ply, belt1, belt2, outer;
-    points (line, station, 2): r and z in m, NaN where a line is absent;
-    regions: name and number of stations' intervals, in order; rigid (station,): held by the rim;
-    outline: the outer and the inner curve (point, 2), m, where it was drawn between such.
-    """
-
+    # the lines from the inner surface to the outer, e.g. inner, ply, belt1, belt2, outer
     names: tuple[str, ...]
-    points: Array
-    regions: tuple[tuple[str, int], ...]
-    rigid: Array
+    points: Array  # (line, station, 2): r and z in m, NaN where a line is absent
+    regions: tuple[tuple[str, int], ...]  # name and number of stations' intervals, in order
+    rigid: Array  # (station,): held by the rim
+    # the outer and the inner curve (point, 2), m, where it was drawn between such
     outline: tuple[Array, ...] = ()
 
     @cached_property
@@ -165,8 +161,8 @@ def fill_lines(section: Section) -> Array:
         start, end = points[k - 1, near], points[above, near]  # already made whole
         span = end - start
         fraction = (points[k, near] - start) @ span / (span @ span)
-        found: Array = points[k - 1, j] + fraction * (points[above, j] - points[k - 1, j])
-        return found
+        result: Array = points[k - 1, j] + fraction * (points[above, j] - points[k - 1, j])
+        return result
 
     for k in range(1, len(section.names) - 1):
         have = np.flatnonzero(present[k])

@@ -77,19 +77,17 @@ SERVICE = re.compile(  # load index and speed symbol, load range, strength, tube
 
 @dataclass(frozen=True)
 class TyreSize:
-    """A size code read. width: nominal section width S1, m; rim_code: diameter, inch;
-    overall_diameter: D, m; theoretical: x; measuring: widest usual share of S1 in the rim;
-    load_index: of a single tyre, None where it is not stated."""
+    """A size code read."""
 
     text: str
     kind: str
-    width: float
-    overall_diameter: float
-    rim_code: float
-    theoretical: float
-    measuring: float
+    width: float  # nominal section width S1, m
+    overall_diameter: float  # D, m
+    rim_code: float  # diameter, inch
+    theoretical: float  # x
+    measuring: float  # widest usual share of S1 in the rim
     pressure_kPa: float
-    load_index: int | None = None
+    load_index: int | None = None  # of a single tyre, None where it is not stated
 
     @property
     def light_truck(self) -> bool:
@@ -129,8 +127,8 @@ class TyreSize:
 
     @property
     def bead_seat_radius(self) -> float:
-        """Of the 5 degree drop centre rim, m: specified diameters of ISO 4000-2; of the 15 degree
-        rim the code's own, at the flange."""
+        """Bead seat radius of the 5 degree drop centre rim, m: specified diameters of ISO 4000-2;
+        of the 15 degree rim the code's own, at the flange."""
         if self.truck:
             return self.rim_code * INCH / 2
         return (self.rim_code * INCH + (4.8e-3 if self.rim_code > 16 else -0.8e-3)) / 2
@@ -150,12 +148,12 @@ def parse_size(text: str) -> TyreSize:
     code = re.sub(r"^(LT.+R ?\d{2}) ?(?=[B-F]\b)", r"\1/", code)  # LT245/75R16E: load range E
     if MOTORCYCLE.match(code):
         raise InputError(_motorcycle(text))
-    found = METRIC.match(code) or FLOTATION.match(code) or INCHES.match(code)
-    if not found or (found.re is INCHES and not _is_truck(found.groupdict())):
+    match = METRIC.match(code) or FLOTATION.match(code) or INCHES.match(code)
+    if not match or (match.re is INCHES and not _is_truck(match.groupdict())):
         raise InputError(f"'{text}' is not a tyre size that is known{_hint(code)}")
-    parts = found.groupdict()
-    name = found.group(0).replace(" ", "")
-    service = re.sub(r"LOAD RANGE ?|/(?=[B-L]\b)|LR ", "LR", code[found.end() :])
+    parts = match.groupdict()
+    name = match.group(0).replace(" ", "")
+    service = re.sub(r"LOAD RANGE ?|/(?=[B-L]\b)|LR ", "LR", code[match.end() :])
     service = re.sub(r"EXTRA LOAD|REINFORCED|REINF\b", "XL", service)
     if RUN_FLAT.search(service):
         raise InputError(_run_flat(name))
@@ -165,13 +163,13 @@ def parse_size(text: str) -> TyreSize:
                 f"'{text}': '{word}' after the size is no service description, as 91V is"
             )
     _check_build(name, parts["build"])
-    truck = _is_truck(parts) and found.re is not FLOTATION
+    truck = _is_truck(parts) and match.re is not FLOTATION
     if not truck and not (parts["rim"].isdigit() and int(parts["rim"]) in RIM_CODES):
         raise InputError(
             f"'{name}': no rim of code {parts['rim']}, known are {RIM_CODES[0]} to {RIM_CODES[-1]}"
             f" inches, 5 degree drop centre, and {', '.join(map(str, TRUCK_RIM_CODES))}, 15 degree"
         )
-    read = {METRIC: _metric, FLOTATION: _flotation, INCHES: _inches}[found.re]
+    read = {METRIC: _metric, FLOTATION: _flotation, INCHES: _inches}[match.re]
     return _with_service(read(name, parts), service)
 
 
@@ -247,7 +245,7 @@ def _with_service(size: TyreSize, service: str) -> TyreSize:
 
 
 def _check_build(name: str, build: str) -> None:
-    """Radial, whatever speed symbol stands before the R."""
+    """Check that the build is radial, with any speed symbol before the R."""
     if build in ("D", "-", "B"):
         raise InputError(f"'{name}' is a bias-ply tyre: only radial ones (R) can be built")
     if build.endswith("RF"):

@@ -50,7 +50,7 @@ class CubicSpline:
         h = (self.x[i + 1] - self.x[i]).reshape(shape)
         t = (at - self.x[i]).reshape(shape) / h
         y0, y1, d0, d1 = self.y[i], self.y[i + 1], h * self.slope[i], h * self.slope[i + 1]
-        found: Array = (
+        result: Array = (
             y0 + t * d0 + t**2 * (3 * (y1 - y0) - 2 * d0 - d1) + t**3 * (2 * (y0 - y1) + d0 + d1)
         )
-        return found
+        return result

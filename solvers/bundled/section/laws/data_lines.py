@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ....language.fields import constants_of, law_of
-from ....language.laws import HIGHEST_ORDER, LAW_CONSTANTS, OF_ORDER_N, ON_A_LINE
+from ....language.laws import LAW_CONSTANTS, MAX_ENERGY_ORDER, OF_ORDER_N, ON_A_LINE
 from ....language.text import Block, DeckError
 from .arruda_boyce import ArrudaBoyce
 from .hyperelastic import Hyperelastic
@@ -44,7 +44,7 @@ def read_law(k: Block) -> Hyperelastic:
         raise DeckError(k.place, f"N={order} of {name} is not honoured, which has no N")
     law = kind_of(name, order)
     if law is None:
-        right = " or ".join(str(n) for n in range(1, HIGHEST_ORDER) if kind_of(name, n))
+        right = " or ".join(str(n) for n in range(1, MAX_ENERGY_ORDER) if kind_of(name, n))
         raise DeckError(k.place, f"N={order} of {name} is not honoured, only N={right}")
     names = constants_of(k)
     given = dict(zip(names, _numbers(k, names), strict=True))

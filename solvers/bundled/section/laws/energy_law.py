@@ -50,7 +50,7 @@ class EnergyLaw(ABC):
         """The law with no bulk modulus above ``ratio`` times the shear modulus."""
         return self
 
-    def growing(self, table: int) -> Self | None:
+    def frequency_dependent_part(self, table: int) -> Self | None:
         """The part of the tangent that scales with the modulus of table number ``table``; None: no
         part."""
         return None

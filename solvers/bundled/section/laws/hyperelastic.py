@@ -151,7 +151,7 @@ class Hyperelastic(EnergyLaw):
     def eased(self, ratio: float) -> Self:
         return self.scaled(1.0, np.minimum(1.0, ratio / self.bulk_over_shear))
 
-    def growing(self, table: int) -> Self:
+    def frequency_dependent_part(self, table: int) -> Self:
         own = self.scaled(self.table == table, 0.0)
         return replace(own, shear_ratio=None, bulk_ratio=None, stressed=False)
 

@@ -17,11 +17,11 @@ from .energy_law import EnergyLaw
 from .hyperelastic import Hyperelastic
 
 Array = np.ndarray
-MOST_THICKNESS_STEPS, STRESS_SETTLED = (
+MAX_THICKNESS_STEPS, STRESS_SETTLED = (
     40,
     1e-13,
 )  # of Newton's method for d, relative to the modulus
-LEAST_AREA = 0.2  # over the reference area
+MIN_AREA_RATIO = 0.2  # over the reference area
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class PlaneStress(EnergyLaw):
         normal = np.cross(p, q)
         d = normal / (normal * normal).sum(-1, keepdims=True)
         size = np.max(np.abs(static.bulk_over_shear * static.shear_modulus))
-        for _ in range(MOST_THICKNESS_STEPS):
+        for _ in range(MAX_THICKNESS_STEPS):
             F = np.stack([p, q, d], -1).reshape(-1, 9)
             across = static.force(F).reshape(-1, 3, 3)[:, :, 2]
             stiffness = static.tangent(F).reshape(-1, 3, 3, 3, 3)[:, :, 2, :, 2]
@@ -65,7 +65,7 @@ class PlaneStress(EnergyLaw):
 
     def bears(self, z: Array) -> bool:
         normal = np.cross(z[:, :3].real, z[:, 3:].real)
-        return bool((normal * normal).sum(-1).min() > LEAST_AREA**2)
+        return bool((normal * normal).sum(-1).min() > MIN_AREA_RATIO**2)
 
     def stiffened(self, factor: float) -> Self:
         return replace(self, bulk=self.bulk.stiffened(factor))

@@ -77,8 +77,8 @@ class Elastic(TyrePart):
     def form(self, U: Array, fields: ModeShapes) -> Array:
         return contract(self._tangent(U), fields.products(self.connectivity, self.rows))
 
-    def growing(self, table: int) -> TyrePart | None:
-        law = self.law.growing(table)
+    def frequency_dependent_part(self, table: int) -> TyrePart | None:
+        law = self.law.frequency_dependent_part(table)
         return None if law is None else replace(self, law=law)
 
     def at_stations(self, nodes: int) -> AtStations:

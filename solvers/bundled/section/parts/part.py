@@ -44,14 +44,14 @@ class TyrePart(ABC):
 
     @abstractmethod
     def tangents(self, U: Array, harmonics: bool) -> Tangents:
-        """K0, K1, K2 (e, 3a, 3a) of K(n) = K0 + i n K1 + n^2 K2; None where one is zero or, but
-        for K0, not asked for."""
+        """K0, K1, K2 (e, 3a, 3a) of K(n) = K0 + i n K1 + n^2 K2; None where one is zero or, except
+        for K0, not requested."""
 
     @abstractmethod
     def at_stations(self, nodes: int) -> AtStations:
         """The part in three dimensions, in a section of so many nodes."""
 
-    def growing(self, table: int) -> TyrePart | None:
+    def frequency_dependent_part(self, table: int) -> TyrePart | None:
         """The part of its stiffness that scales with the modulus of table number ``table``; None:
         no part."""
         return None

@@ -17,7 +17,7 @@ class Spin(TyrePart):
     """The force on the mass of one other part."""
 
     connectivity: Array
-    whirled: Array  # (e, a, a): the other part's mass
+    coupled_mass: Array  # (e, a, a): the other part's mass
     R: Array  # (e, a): radius of its nodes
     spin2: complex | float  # square of the spin about the axle, rad2/s2
 
@@ -29,14 +29,14 @@ class Spin(TyrePart):
 
     def energy(self, U: Array) -> Any:
         x = self._place(U)
-        return -self.spin2 * np.einsum("eai,eab,ebi->", x, self.whirled, x) / 2
+        return -self.spin2 * np.einsum("eai,eab,ebi->", x, self.coupled_mass, x) / 2
 
     def force(self, U: Array) -> Array:
-        force = -self.spin2 * self.whirled @ self._place(U)
+        force = -self.spin2 * self.coupled_mass @ self._place(U)
         return np.asarray(force.reshape(len(force), -1))
 
     def tangents(self, U: Array, harmonics: bool) -> Tangents:
-        return of_each_component(-self.spin2 * self.whirled, IN_PLANE), None, None
+        return of_each_component(-self.spin2 * self.coupled_mass, IN_PLANE), None, None
 
     def at_stations(self, nodes: int) -> AtStations:
         raise NotImplementedError("a turning tyre is honoured off the road and all round alike")
