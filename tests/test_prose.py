@@ -18,7 +18,8 @@ from tyrecal.tyre.case.schema import Case
 ROOT = Path(__file__).parents[1]
 GUIDES = sorted((ROOT / "cases").glob("*.md"))
 DOCUMENTS = ["README.md", *(f"cases/{path.name}" for path in GUIDES), "solvers/README.md"]
-NOT_YET_REWRITTEN = [  # whoever rewrites one takes it out
+PAGES = [*ROOT.glob("*.md"), *ROOT.glob("[!.]*/**/*.md"), *ROOT.glob(".github/*.md")]
+NOT_YET_REWRITTEN: list[str] = [  # whoever rewrites one takes it out
     "cases/blind.md",
     "cases/diagnosis.md",
     "cases/paper.md",
@@ -56,17 +57,11 @@ AVOID = re.compile(  # the left column is what a reader stumbles over, the comme
 )
 
 
-def prose(name: str) -> Iterator[str]:
-    """Paragraphs, items of lists and cells of tables of a document, links as their text.
-
-    Inline code is one word.
-    """
-    for _, text in blocks(name):
-        yield text
-
-
 def blocks(name: str) -> Iterator[tuple[str, str]]:
-    """The same, each with the kind of block that it is in: paragraph, heading, th or td."""
+    """Kind (paragraph, h1 ..., th, td) and text of each block of a document, without code blocks.
+
+    A link is its text, inline code one word.
+    """
     tokens = MarkdownIt().enable("table").parse((ROOT / name).read_text(encoding="utf-8"))
     for before, token in pairwise(tokens):
         if token.type == "inline":
@@ -106,7 +101,15 @@ def test_sentences_are_short(name: str) -> None:
 
 @pytest.mark.parametrize("name", REWRITTEN)
 def test_words_are_plain(name: str) -> None:
-    assert not [(match[0], text) for text in prose(name) for match in AVOID.finditer(text)]
+    assert not [(match[0], text) for _, text in blocks(name) for match in AVOID.finditer(text)]
+
+
+@pytest.mark.parametrize("name", REWRITTEN)
+def test_guides_say_whom_they_are_for_and_end_with_limits(name: str) -> None:
+    if name not in {"README.md", "CHANGELOG.md", *REFERENCE}:
+        paragraphs = [text for kind, text in blocks(name) if kind == "paragraph"]
+        assert paragraphs[0].startswith("For ")
+        assert "limits" in anchors(ROOT / name)
 
 
 def test_documents_together_are_short() -> None:
@@ -139,8 +142,7 @@ def anchors(path: Path) -> set[str]:
 
 
 def test_links_lead_to_headings() -> None:
-    documents = [*ROOT.glob("*.md"), *ROOT.glob("[!.]*/**/*.md"), *ROOT.glob(".github/*.md")]
-    for path in documents:
+    for path in PAGES:
         for file, heading in re.findall(
             r"\]\(([^)#:]*)#([^)]+)\)", path.read_text(encoding="utf-8")
         ):
@@ -150,3 +152,10 @@ def test_links_lead_to_headings() -> None:
 def test_the_changelog_is_short() -> None:
     versions = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").split("\n## ")[1:]
     assert max(map(word_count, versions)) <= CHANGELOG_WORDS
+
+
+def test_every_picture_is_on_a_page() -> None:
+    texts = "".join(path.read_text(encoding="utf-8") for path in PAGES)
+    assert {path.name for path in ROOT.glob("cases/pictures/*")} == {
+        *re.findall(r"pictures/([\w.]+)\)", texts)
+    }
