@@ -58,7 +58,7 @@ AVOID = re.compile(  # the left column is what a reader stumbles over, the comme
 
 
 def blocks(name: str) -> Iterator[tuple[str, str]]:
-    """Kind (paragraph, h1 ..., th, td) and text of each block of a document, without code blocks.
+    """Kind (paragraph, heading, th, td) and text of each block of a document, without code blocks.
 
     A link is its text, inline code one word.
     """
