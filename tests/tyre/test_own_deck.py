@@ -160,6 +160,26 @@ def test_marks_and_paths_have_exact_slopes(tmp_path: Path) -> None:
         assert slopes[name] == pytest.approx((up - down) / (2 * h), rel=1e-5, abs=1e-6 / value)
 
 
+def test_a_parameter_that_is_only_the_pressure_is_no_number_of_a_case(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The case's pressure counts in its place. One that sets more is a number."""
+    text = own_decks.parameters().replace("p = 2*10**5", "bar = 1e5\nidle = 3.\np = 2*bar")
+    case = write(tmp_path, text)
+    deck = load_case(case).deck
+    assert deck
+    assert deck.idle.keys() == {"parameter / bar", "parameter / idle"}
+    assert {"parameter / shear", "parameter / share", "parameter / area"} <= {*deck.section_numbers}
+    numbers = json.dumps({"parameter / bar": 9e4})
+    other = case.with_name("other.yaml")
+    other.write_text(f"format: 1\ndeck: {{file: tyre.inp, numbers: {numbers}}}\n")
+    for command in (["modes", str(case), "--set", "Parameter/BAR=9e4"], ["validate", str(other)]):
+        with pytest.raises(SystemExit) as ended:
+            main(command)
+        assert ended.value.code == 2
+        assert re.search(r"/ ?bar.*use pressure_kPa", capsys.readouterr().err, re.IGNORECASE)
+
+
 def test_a_parameter_is_set_behind_its_sign(tmp_path: Path) -> None:
     path = tmp_path / "tyre.inp"
     path.write_text("*PARAMETER\np2 =2 # two\n" + own_decks.plain())

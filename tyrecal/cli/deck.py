@@ -143,7 +143,7 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
         result["refused"] = str(error)
         terminal.error(f"not honoured: {error}")
     else:
-        content, numbers = contents(deck, flat), {**deck.numbers, **numbers}
+        content, numbers = contents(deck, flat), {**deck.section_numbers, **numbers}
         for slip in deck_slips(deck, numbers):
             terminal.warn(str(slip))
         result |= {"mass_kg": mass_kg, **content, "numbers": numbers}

@@ -17,7 +17,7 @@ from .case.parts import Setting, as_written
 from .case.schema import Case
 from .case.shape import explain, type_at
 from .case.stations import read_section_of
-from .own_deck.numbers import as_known
+from .own_deck.numbers import as_known, canonical
 from .plugins import IDS
 from .resolve import resolved
 from .state import with_states_kept
@@ -141,6 +141,9 @@ def _keys(loaded: LoadedCase, name: str) -> list[Keys]:
     try:
         return [find(loaded.case, path) for path in paths]
     except KeyError as error:
+        idle = loaded.deck.idle if loaded.deck else {}
+        if (path := canonical(name, idle)) is not None:
+            raise ValueError(f"{name} {idle[path]}") from None
         if meant := " or ".join(f"'{path}'" for path in _meant(loaded, name)):
             raise ValueError(f"there is no '{name}'; did you mean {meant}?") from None
         if "." in name:

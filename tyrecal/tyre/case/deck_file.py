@@ -45,14 +45,16 @@ def read_deck_of(
         deck = _read(paths, source, first.units) if key == "decks" else first
         numbers = table(source, "numbers")
         given = {k: v for k, v in numbers.items() if isinstance(v, int | float)}
+        idle = deck.idle if isinstance(deck, OwnDeck) else {}
+        known = deck.section_numbers if isinstance(deck, OwnDeck) else deck.numbers
         for name in given:
-            if name not in deck.marks and name not in deck.numbers:
-                hint = suggestion(name, [*deck.marks, *deck.numbers], "")
-                message = f"is no mark and no number of the deck{hint}"
+            if name not in deck.marks and name not in known:
+                hint = suggestion(name, [*deck.marks, *known], "")
+                message = idle.get(name, f"is no mark and no number of the deck{hint}")
                 document.add(("deck", "numbers", name), message)
         for variable in table(data, "variables").values():  # a mark's value may be its start
             given |= marked_numbers(deck.marks, given, variable)
-        source["numbers"] = {**deck.numbers, **given}
+        source["numbers"] = {**known, **given}
         for entry in (*table(data, "variables").values(), *table(data, "uncertainties").values()):
             if isinstance(sets := entry.get("sets") if isinstance(entry, dict) else None, list):
                 entry["sets"] = [as_known(path, source["numbers"]) for path in sets]

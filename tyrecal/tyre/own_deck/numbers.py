@@ -13,7 +13,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from .text import MATERIAL_OPTIONS, Block, Row, named, number_from, placed_fields
+from .text import MATERIAL_OPTIONS, OUTPUT_KEYWORDS, Block, Row, named, number_from, placed_fields
 
 DECK_MARK = re.compile(r"\{\{\s*([A-Za-z][A-Za-z0-9_\-]*)\s*\}\}")
 PARAMETER = re.compile(r"<\s*(\w+)\s*>")
@@ -61,6 +61,24 @@ def paths(blocks: Sequence[Block]) -> dict[str, tuple[int, int, int]]:
             if path not in places:
                 places[path] = place, i, j
     return places
+
+
+def acting_parameters(blocks: Sequence[Block]) -> set[str]:
+    """Names, in upper case, of the parameters of a section deck on which more than the pressure and
+    steps' increments depends: of these the case decides."""
+    acting, in_step = set[str](), False
+    for block in blocks:
+        in_step = block.name != "END STEP" and (in_step or block.name == "STEP")
+        if (in_step and block.name != "BOUNDARY") or block.name in OUTPUT_KEYWORDS:
+            continue
+        texts = [*(row.line for row in block.rows), *block.parameters.values()]
+        acting |= {name.upper() for text in texts for name in PARAMETER.findall(text)}
+    rows = [row for block in blocks if block.name == "PARAMETER" for row in block.rows]
+    for row in reversed(rows):
+        name, expression = assigned(row)
+        if name.upper() in acting:
+            acting |= {word.upper() for word in re.findall(r"[A-Za-z]\w*", expression)}
+    return acting
 
 
 def moduli(numbers: Iterable[str], material: str) -> dict[str, int]:

@@ -65,6 +65,23 @@ class OwnDeck:
         return values
 
     @cached_property
+    def idle(self) -> dict[str, str]:
+        """Paths of parameters that are no numbers of a case whose deck this is, and why."""
+        acting = numbers_of.acting_parameters(self.blocks)
+        why = "sets only the pressure, or nothing: use pressure_kPa"
+        names = {path: path.removeprefix("parameter / ").upper() for path in self.numbers}
+        return {
+            path: why
+            for path, name in names.items()
+            if path.startswith("parameter / ") and name not in acting
+        }
+
+    @cached_property
+    def section_numbers(self) -> dict[str, float]:
+        """Its plain numbers that change the section."""
+        return {path: x for path, x in self.numbers.items() if path not in self.idle}
+
+    @cached_property
     def sha256(self) -> str:
         """Hash of all its content except plain numbers, independent of indentation and comments."""
         numbers = set(self.places.values())
