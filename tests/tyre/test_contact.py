@@ -232,6 +232,9 @@ def test_a_held_bead_makes_contact_superfluous(tmp_path: Path) -> None:
     path.write_text(plain(Tyre().mesh() + rims() + PAIRS, step=MOUNT + own_decks.STEP))
     flat = read_own_deck(path).flat({})
     assert flat.text == whole.text and flat.model.reference == whole.model.reference
+    for pairs in ("", "*CONTACT PAIR, INTERACTION=GRIP\nTREAD, ROAD\n"):
+        path.write_text(plain(Tyre().mesh() + ROAD.format(0.4) + pairs))
+        assert read_own_deck(path).flat({}).text == whole.text
     assert [words.rpartition(", as ")[2] for words in flat.model.left_out] == [
         "13 of its nodes are held, up to 0 off the rim"
     ] * 2

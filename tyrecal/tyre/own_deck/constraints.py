@@ -75,13 +75,13 @@ class Constraints:
     def _choose_rim(self) -> None:
         """The one rigid body that holds rubber; others only touch it."""
         rubber = {n for e in self.root.elements.values() if e.is_solid for n in e.nodes}
-        for body in self.bodies:
-            is_rim = bool(body.nodes & rubber or self.seats & set(body.surfaces))
-            if not is_rim and self.found.contact:
-                self.motions[body.reference] = {}
-                continue
-            if self.reference:
-                raise body.block.refused("one rigid body is honoured, the rim")
+        rims = [b for b in self.bodies if b.nodes & rubber or self.seats & set(b.surfaces)]
+        if not rims and not self.found.contact:
+            rims = self.bodies
+        if len(rims) > 1:
+            raise rims[1].block.refused("one rigid body is honoured, the rim")
+        self.motions = {body.reference: {} for body in self.bodies if body not in rims}
+        for body in rims:
             self.reference = body.reference, self.root.nodes[body.reference]
 
     def _rigid(self, block: Block, prefix: str) -> None:
