@@ -236,8 +236,21 @@ def test_a_held_bead_makes_contact_superfluous(tmp_path: Path) -> None:
         path.write_text(plain(Tyre().mesh() + ROAD.format(0.4) + pairs))
         assert read_own_deck(path).flat({}).text == whole.text
     assert [words.rpartition(", as ")[2] for words in flat.model.left_out] == [
-        "13 of its nodes are held, up to 0 off the rim"
+        "5 of its nodes are held, up to 0 off the rim"
     ] * 2
+
+
+def test_one_held_bead_holds_not_the_other(tmp_path: Path) -> None:
+    """Though one surface of both touches the rim."""
+    both = PAIRS.replace("BEAD_L, RIM_L", "BEADS, RIM_L").replace("BEAD_R, RIM_R", "BEADS, RIM_R")
+    beads = "*SURFACE, NAME=BEADS, TYPE=NODE\nBEAD_L\nBEAD_R\n"
+    held = beads + "*BOUNDARY\nBEAD_L, ENCASTRE\n"
+    path = tmp_path / "tyre.inp"
+    path.write_text(in_contact(both, held))
+    with pytest.raises(OwnDeckError, match="contact of BEADS and RIM_R is not honoured"):
+        read_own_deck(path).flat({})
+    path.write_text(in_contact(both, held + "BEAD_R, ENCASTRE\n"))
+    assert len(read_own_deck(path).flat({}).model.left_out) == 2
 
 
 @pytest.mark.parametrize(

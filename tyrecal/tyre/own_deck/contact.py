@@ -52,7 +52,8 @@ class Contact:
         words, free = list[str](), list[tuple[Pair, Array, Array]]()
         for pair in self._pairs():
             touching, distance = self._touching(pair)
-            held = [n for n in pair.nodes if n in self.tied.rim]
+            at_rim = touching.tolist() or pair.nodes
+            held = [n for n in at_rim if n in self.tied.rim]
             if pair.pieces[..., 0].min() > self.middle:  # a road or a mould
                 if len(touching):
                     raise pair.block.refused(
