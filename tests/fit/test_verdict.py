@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import json
+import re
+import shutil
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tyrecal.api import evaluate_modes, load_case, with_values
 from tyrecal.measured.measurement import Measurement
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.fit.verdict import (
@@ -17,6 +22,9 @@ from tyrecal.studies.fit.verdict import (
     likeliest_reason,
     likely_value,
 )
+
+from ..cli.test_cli import run
+from ..conftest import CASES
 
 pytestmark = pytest.mark.numbers
 
@@ -178,3 +186,32 @@ def test_a_reason_that_is_nearly_as_likely_is_named_too() -> None:
     clear[6] *= 1.06
     alone = likeliest_reason(remainder(clear, model_Hz(), both, PRESSURES))
     assert alone and not alone.also and "Nearly" not in alone.sentence
+
+
+@pytest.mark.slow
+def test_a_default_wheel_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Measured on a freely hanging wheel of 10.5 kg, of which the case says nothing: 15 kg."""
+    path = tmp_path / "tyre.yaml"
+    shutil.copy(CASES / "p235_75r17.csv", tmp_path)
+    text = (CASES / "p235_75r17.yaml").read_text()
+    path.write_text(text.replace("known_from: size_code", "known_from: exact"))
+    wheel = {"mass_kg": 10.5, "polar_inertia_kg_m2": 0.3, "diametral_inertia_kg_m2": 0.2}
+    given = {"rim.free": True} | {f"rim.{name}": value for name, value in wheel.items()}
+    table = tmp_path / "m.csv"
+    lines = ["pressure_kPa,c,m,kind,rim,frequency_Hz,sigma_Hz"]
+    for mode in evaluate_modes(with_values(load_case(path, mesh="coarse"), given)):
+        c, m, kind = mode.label.c, mode.label.m, mode.label.kind or ""
+        if m <= 1:
+            hertz = mode.frequency_Hz
+            lines.append(f"240,{c},{m},{kind},free,{hertz:.3f},{0.003 * hertz:.3f}")
+    table.write_text("\n".join(lines) + "\n")
+    out = tmp_path / "fit"
+    words = ["fit", str(path), "--measured", str(table), "--mesh", "coarse", "--no-pictures"]
+    words += ["--fix", "A_belt", "--fix", "A_carcass", "--no-store", "--output", str(out)]
+    assert run(*words) == 0
+    fit = json.loads((out / "fit.json").read_text())
+    assert fit["verdict"] == "does_not_fit" and fit["reason"]["kind"] == "wheel"
+    likely = re.findall(r"rim\.(\w+) \S+ \(likely (\S+)\)", fit["reason"]["words"])
+    assert {name: float(value) for name, value in likely} == pytest.approx(wheel, rel=0.05)
+    assert fit["reason"]["chi2_per_dof"] < 5 < fit["chi2_per_dof"]
+    assert "what does yours weigh?" in capsys.readouterr().err
