@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -75,6 +76,15 @@ def test_what_each_rim_tells_adds_up() -> None:
     assert both(x) == pytest.approx(one(x) + two(x), abs=1e-6)
     assert np.allclose(both.information(x), one.information(x) + two.information(x), rtol=1e-6)
     assert both.evaluations == 2 * one.evaluations and len(both.stated_errors) == 6
+    free = both.emulators[1]
+    C = np.array([[4.0, 1.0, 0.0], [1.0, 9.0, 2.0], [0.0, 2.0, 1.0]])
+    rough = replace(both, emulators=(one.emulators[0], replace(free, error_covariance=C)))
+    rough = replace(rough, states=np.array([[0.0], [1.0], [1.0]]))
+    rough = replace(rough, rows=np.vstack([rough.rows, [2, 1]]))
+    covariance = rough.emulator_covariance
+    assert not covariance[:3, 3:].any()  # an emulator each
+    assert np.allclose(covariance[3:6, 3:6], C)
+    assert np.allclose(covariance[6, 3:], [0.5, 4.5, 1.0, 9.0])  # half of it at another pressure
     states = [TyreState(240.0), TyreState(240.0, 0.0, "free")]
     measured = [Observable("frequency_Hz", LABELS[2], 240.0, rim=rim) for rim in ("free", None)]
     assert rows_of(measured, states, [LABELS, LABELS[1:]]).tolist() == [[1, 1], [0, 2]]

@@ -171,11 +171,14 @@ def test_doubts_of_a_result() -> None:
     at_edge = np.array([[2e-3, 0.0], [0.0, 1e-3]])
     short = replace(sample.drawn.chains, draws=sample.drawn.chains.draws[:9])
     poor = replace(sample.drawn, at_edge=at_edge, stopped="why", chains=short)
-    words = " ".join(result(replace(sample, drawn=poor, rough=0.3), 0).doubts())
+    words = " ".join(result(replace(sample, drawn=poor, widened=0.13), 0).doubts())
     assert "0.3 % of the draws lie at the edge of the box, which could not grow: why" in words
     assert "steps are fewer than 20 autocorrelation times" in words and "--draws" in words
-    assert "may be off by 0.3 of a standard deviation" in words
+    assert "makes a standard deviation of what was measured 13 % larger" in words
     assert len(result(replace(sample, noise_Hz=1.2), 0).sentences()) == 3
+    usual = result(replace(sample, widened=0.02), 0)
+    assert usual.sentences()[-1].endswith("it makes the largest standard deviation 2 % larger")
+    assert not any("standard deviation" in words for words in usual.doubts())
 
 
 def test_the_corner_picture_says_names_units_and_lines(

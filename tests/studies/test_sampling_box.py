@@ -66,10 +66,11 @@ def test_a_box_that_cannot_grow_says_why() -> None:
     def rough(box: Array) -> Posterior:
         made = posterior(box)
         errors = np.full(3, 0.02 if not np.allclose(box, first) else 0.5)
-        return replace(made, emulators=(replace(made.emulators[0], stated_errors=errors),))
+        own = replace(made.emulators[0], error_covariance=np.diag(errors**2))
+        return replace(made, emulators=(own,))
 
     result = grow_box(rough, first, BOUNDS, np.array([0.03, 0.01, 0.03]), 3000, 1)
-    assert result.stopped == "the emulator of a larger box may be 2 % off"
+    assert result.stopped == "the emulator of a larger box is 2 % (rms) off"
     assert result.boxes == 1 and result.evaluations == 14
     assert grow_box(rough, first, BOUNDS, np.full(3, 0.03), 3000, 1).boxes > 1
 

@@ -68,7 +68,7 @@ class Emulator:
 
     degrees (k, v) of the products; coefficients (k, n + 1), the last of d; designs: what it is made
     of; errors, relative: the median of all; of each label (n,) what 99 % of designs keep; what they
-    keep in all labels.
+    keep in all labels; covariance (n, n) of the labels' errors in a design.
     """
 
     variables: tuple[DesignVariable, ...]
@@ -82,6 +82,7 @@ class Emulator:
     median_error: float
     stated_errors: Array
     stated_error: float
+    error_covariance: Array
 
     def __repr__(self) -> str:
         names = ", ".join(v.name for v in self.variables)
@@ -266,7 +267,8 @@ def fitted(
             break
         rows = [products(degrees, t), *(products(degrees, t, j) for j in range(t.shape[1]))]
         coefficients, left_out = _left_out(np.concatenate(rows), equations, len(samples))
-        error = abs(unpaired(pair, value - left_out, apart) - own)
+        signed = unpaired(pair, value - left_out, apart) - own
+        error = abs(signed)
         stated = bound(error.max(1))
         if best is None or stated < best.stated_error:
             few = (degrees.sum(1) <= SIDE_DEGREE).sum()
@@ -284,6 +286,7 @@ def fitted(
                 float(np.median(error)),
                 np.minimum([bound(each) for each in error.T], stated),
                 stated,
+                signed.T @ signed / len(samples),
             )
     assert best
     return best

@@ -84,8 +84,8 @@ def grow_box(
     that could be had.
 
     ask: the posterior on an emulator of a box, each one larger than the last; tolerance (n,): its
-    largest errors, row by row; stage: hears whether sampling begins, or asking. Raises what ``ask``
-    does of the first box.
+    largest rms errors, row by row; stage: hears whether sampling begins, or asking. Raises what
+    ``ask`` does of the first box.
     """
     last: Posterior | None = None
     evaluations, boxes, stopped = 0, 0, f"it was made larger {GROWTHS} times"
@@ -99,9 +99,9 @@ def grow_box(
             stopped = f"a larger box has no emulator: {failure}"
             break
         evaluations = posterior.evaluations  # those of smaller boxes among them
-        error = posterior.stated_errors
+        error = np.sqrt(np.diag(posterior.emulator_covariance))
         if last and (error > tolerance).any():
-            stopped = f"the emulator of a larger box may be {100 * error.max():.2g} % off"
+            stopped = f"the emulator of a larger box is {100 * error.max():.2g} % (rms) off"
             break
         stage(True)
         boxes, last = boxes + 1, posterior

@@ -3,8 +3,8 @@
     ln p(x | y) = -1/2 r^T Sigma^-1 r + constant,   r = y - eta(x),   x within the variables' bounds
 
 eta: ln f of the measured modes; Sigma: scatter, the model's form and what nobody calibrates, as a
-diagnosis has it (diagnose/covariance.py). Before the measurement every x within the bounds is as
-good as another: of a variable on a logarithmic scale, every ratio.
+diagnosis has it (diagnose/covariance.py), and the emulator's error. Before the measurement every x
+within the bounds is as good as another: of a variable on a logarithmic scale, every ratio.
 """
 
 from __future__ import annotations
@@ -80,6 +80,19 @@ class Posterior:
         """Stated errors of the measured values (n,), by their emulators."""
         errors = [self._at_states[state].stated_errors[label] for state, label in self.rows]
         return np.array(errors)
+
+    @property
+    def emulator_covariance(self) -> Array:
+        """Covariance (n, n) of the emulators' errors in the measured values. How alike those of one
+        design are at two pressures is not known: half of it is taken as common."""
+        state, label = self.rows.T
+        rim = self.states[state, 0].astype(int)
+        covariance = np.zeros((len(rim), len(rim)))
+        for which, emulator in enumerate(self.emulators):
+            own = np.flatnonzero(rim == which)
+            at = np.ix_(label[own], label[own])
+            covariance[np.ix_(own, own)] = emulator.error_covariance[at]
+        return np.asarray(covariance * (0.5 + 0.5 * (state[:, None] == state)))
 
     @property
     def evaluations(self) -> int:

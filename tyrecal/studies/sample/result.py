@@ -21,10 +21,11 @@ from ..result import (
 )
 from .box import AT_EDGE
 from .chains import ENOUGH, enough_draws
-from .study import ROUGH, Sample
+from .study import MOST_ERROR, Sample
 
 Array = np.ndarray
 LOW, HIGH = 0.05, 0.95  # quantiles: 90 % lie between
+LEAST_WIDENED = 0.01  # share that is worth a sentence
 NEARLY = 5.0  # of ln p below the highest: another optimum that is worth a word
 DENSITY_STEPS, PAIR_STEPS = 40, 30  # of histograms
 DIGITS = Column("", ".4g")
@@ -98,6 +99,7 @@ class EmulatorFacts(ResultPart):
     median_error: float
     stated_error: float
     share_of_sigma: float  # that error of a measured row, the worst one's
+    widened: float = 0.0  # share by which it makes that row's standard deviation larger
     boxes: int
     evaluations_of_all: int
 
@@ -196,6 +198,11 @@ class SampleResult(Result):
             f"emulator of {e.evaluations} evaluations: off by less than"
             f" {100 * e.stated_error:.2g} % in 99 of 100 designs",
         ]
+        if e.widened >= LEAST_WIDENED:
+            told.append(
+                "the emulator's error counts as an error of the measurement: it makes the largest"
+                f" standard deviation {100 * e.widened:.2g} % larger"
+            )
         if self.noise_Hz is not None:
             sentences.append(
                 f"the targets state no sigma: {self.noise_Hz:.2f} Hz, as a fit leaves them, stands"
@@ -230,10 +237,10 @@ class SampleResult(Result):
                 f"{c.steps} steps are fewer than {ENOUGH} autocorrelation times of {tau:.1f}: give"
                 f" --draws {ceil(enough_draws(tau) / 1e4) * 10_000} or more"
             )
-        if self.emulator.share_of_sigma > ROUGH:
+        if self.emulator.widened > (1 + MOST_ERROR**2) ** 0.5 - 1:
             doubts.append(
-                f"the emulator may be off by {self.emulator.share_of_sigma:.2g} of a standard"
-                " deviation of what was measured"
+                "the emulator is rough: its error makes a standard deviation of what was measured"
+                f" {100 * self.emulator.widened:.2g} % larger"
             )
         return doubts
 
@@ -259,6 +266,7 @@ def result(sample: Sample, seed: int) -> SampleResult:
             median_error=max(each.median_error for each in made),
             stated_error=max(each.stated_error for each in made),
             share_of_sigma=sample.rough,
+            widened=sample.widened,
             boxes=drawn.boxes,
             evaluations_of_all=drawn.evaluations,
         ),

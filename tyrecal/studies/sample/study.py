@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +43,10 @@ OTHER_PRESSURES = (0.8, 1.2)  # times the case's, where no others are asked for
 EACH = (10, 20)  # designs of a box for each of its coordinates; where they are too few
 WIDE = 4.5  # standard deviations, of half a box at first
 WIDEST_BOX = 0.7  # at first, of ln x: so far it was tried how good an emulator is
-ROUGH = 0.2  # of a row's standard deviation in Sigma: what an emulator's 99 % bound may be
+ROUGH = 0.2  # of a row's standard deviation in Sigma: above, twice as many designs are evaluated
+# An emulator's rms error, of that standard deviation, up to which it is an error among others:
+# cords that go slack make frequencies jump, which no polynomial follows. It is 12 % larger then.
+MOST_ERROR = 0.5
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,8 @@ class Sample:
     # the emulator's error over the standard deviation of a measured row, the worst one's
     rough: float
     noise_Hz: float | None  # of targets that state none, as the fit leaves it
+    # share by which the emulator's error makes the worst measured row's deviation larger
+    widened: float = 0.0
 
 
 def run(
@@ -95,7 +100,7 @@ def run(
     assert answer.constants is not None
     constants = answer.constants[where]
     sigma = covariance(observations, constants, model.material_laws)
-    spread, white = np.sqrt(np.diag(sigma)), np.linalg.inv(np.linalg.cholesky(sigma))
+    spread, white = np.sqrt(np.diag(sigma)), whitening(sigma)
 
     pressures = _pressures(case, {row.pressure_kPa for row in observations.rows}, at_kPa)
     rims = list(dict.fromkeys([None, *(row.rim for row in observations.rows)]))
@@ -128,14 +133,15 @@ def run(
     def ask(box: Array) -> Posterior:
         made = tuple(made_on(rim, box) for rim in range(len(rims)))
         at = rows_of(observations.rows, states, [made[rims.index(s.rim)].labels for s in states])
-        return Posterior(made, coordinates, at, observations.y, white, box)
+        alone = Posterior(made, coordinates, at, observations.y, white, box)
+        return replace(alone, whitened=whitening(sigma + alone.emulator_covariance))
 
     J = white @ answer.jacobian[where]
     drawn = grow_box(
         ask,
         first_box(x, J.T @ J, variables, bounds),
         bounds,
-        ROUGH * spread,
+        MOST_ERROR * spread,
         draws,
         seed,
         lambda sampling: stage(SAMPLE_STAGES[1 + sampling]),
@@ -150,9 +156,10 @@ def run(
     )
     asked_of = [row.row for row in rows]
     there = _answer(TyreModel(case, evaluator, asked_of, own_sources, {}, jobs), best)
+    total = sigma + posterior.emulator_covariance
     assert there.constants is not None
     given = conditional(
-        observations.rows, sigma, constants, rows, there.constants, model.material_laws
+        observations.rows, total, constants, rows, there.constants, model.material_laws
     )
     at = rows_of(rows, states, known_in)
     thin = drawn.chains.thinned
@@ -169,7 +176,13 @@ def run(
         given.sigma(J, other, drawn.covariance),
         float((posterior.stated_errors / spread).max()),
         noise,
+        float((np.sqrt(np.diag(total)) / spread).max()) - 1,
     )
+
+
+def whitening(sigma: Array) -> Array:
+    """W (n, n) with W^T W = Sigma^-1."""
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(sigma)))
 
 
 def check(case: LoadedCase, evaluator: Evaluator, readings: Sequence[Measurement] | None) -> None:
