@@ -46,6 +46,12 @@ SLIPS = {  # name: text of the good case, text in its place, key, what was meant
         "materials.belt_cord.youngs_modulus_Pa",
         "of steel, by its density; did you mean 1.722e+08 kPa, 1.722e+11 Pa",
     ),
+    "belt cords thicker than their spacing": (
+        "belt_1: {line: belt1, material: belt_cord, area_m2: 2.118683e-7",
+        "belt_1: {line: belt1, material: belt_cord, area_m2: 2.118683e-6",
+        "rebar_layers.belt_1.area_m2",
+        "usual is 5e-09 to 1.52184e-06 m2, for belt cords every 1.16 mm",
+    ),
     "belts on one side": (
         "angle_deg: 110.0",
         "angle_deg: 70.0",

@@ -80,6 +80,7 @@ def test_a_slip_is_refused_with_what_was_meant(
             "of steel, by its density; did you mean 1.9e+08 kPa, 1.9e+11 Pa",
         ),
         ([("10000000000.0", "2e8")], "material CORD / ELASTIC / E", "of a belt's cords"),
+        ([("BELT_1, 2.1e-7", "BELT_1, 2.1e-6")], "rebar BELT_1 / area", "cords every 1.16 mm"),
         ([(", 110.0", ", 70.0")], "rebar BELT_2 / angle", "did you mean 110 degrees"),
         ([(", 70.0", ", 20.0")], "rebar BELT_1 / angle", "20 degrees from the circumference"),
         ([("CORD, 0.0", "CORD, 90.0")], "rebar CARCASS / angle", "usual is -30 to 30"),

@@ -199,6 +199,9 @@ BELT_ANGLE = Usual(25, 155, "degrees from the meridian", FROM_CIRCUMFERENCE)
 SHEAR_MODULUS_Pa = 3e5, 4e7  # of rubber
 RUBBER_DENSITY = Usual(700, 2500, "kg/m3", DENSITY, reason=" of rubber")
 STEEL_DENSITY = 5000.0  # kg/m3 from which a cord is steel, filled with rubber or not
+THICKEST_CORD = (
+    1.2  # diameter of a belt's cord over their spacing, for what a measured area may hold
+)
 LEAST_ANGLE = 5.0  # degrees from the circumference, of a belt that has a side
 # slips of effects' parameters, whose ranges the catalogue has, by their unit
 OF_EFFECTS: dict[str, Slips] = {
@@ -263,6 +266,16 @@ def cord_modulus(density: float | None, is_belt: bool) -> Usual:
     if density is not None and STEEL_DENSITY <= density <= most:
         return replace(usual, low=5e10, high=2.5e11, reason=" of steel, by its density")
     return replace(usual, low=1e9, reason=" of a belt's cords") if is_belt else usual
+
+
+def area_beside(usual: Usual, spacing: float | None) -> Usual:
+    """Narrow the range of an area of a belt's cords, m2: they are not thicker than their spacing,
+    m, which gum and wrapping leave half of."""
+    if spacing is None or not USUAL["rebar_layers.*.spacing_m"].holds(spacing):
+        return usual
+    high = pi / 4 * (THICKEST_CORD * spacing) ** 2
+    reason = f", for belt cords every {1e3 * spacing:.4g} mm"
+    return replace(usual, high=min(usual.high, high), reason=reason)
 
 
 def one_side(angles: Iterable[float]) -> str | None:
@@ -349,7 +362,18 @@ def _ranges(
                 p in ("*", w) for p, w in zip(pattern, words, strict=True)
             ):
                 usual = _up_to_the_rim(usual, data, section) if load and section else usual
+                usual = _of_belt(usual, data, section, keys)
                 yield _of_material(usual, data, section, keys), ""
+
+
+def _of_belt(usual: Usual, data: Mapping[str, Any], section: Section | None, keys: Keys) -> Usual:
+    """The range of the area of a belt's cords beside their spacing; of any other number,
+    ``usual``."""
+    if keys[0] != "rebar_layers" or keys[-1] != "area_m2" or section is None:
+        return usual
+    layer = table(table(data, "rebar_layers"), str(keys[1]))
+    spacing = number(layer, "spacing_m")
+    return area_beside(usual, spacing) if _angle(layer, section) is BELT_ANGLE else usual
 
 
 def _of_material(

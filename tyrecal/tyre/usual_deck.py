@@ -22,6 +22,7 @@ from .usual import (
     STRESS,
     USUAL,
     Usual,
+    area_beside,
     constant_beside,
     cord_modulus,
     holds_angle,
@@ -82,6 +83,10 @@ def usual_numbers(deck: OwnDeck, numbers: Mapping[str, float], flat: Flat) -> di
             usual = _beside_others(usual or ANY_CONSTANT, deck, numbers, first, last)
         if last == "spacing" and layer in angular:
             usual = ANGULAR_SPACING
+        if last == "area" and _is_belt(layer.split()[0], angles) and layer not in angular:
+            spacing = numbers.get(path.removesuffix("area") + "spacing")
+            length = UNIT_LENGTH[deck.units]
+            usual = area_beside(USUAL["rebar_layers.*.area_m2"], spacing and spacing * length)
         if last == "angle":
             usual = angles.get((layer.split()[0], numbers[path]))
         if usual and (first.startswith("material ") or owner.startswith("rebar ")):
@@ -124,6 +129,12 @@ def _unusual(deck: OwnDeck, numbers: Mapping[str, float], flat: Flat) -> Iterato
     belts = [angle for (_, angle), usual in _angles(flat).items() if usual is BELT_ANGLE]
     if message := one_side(belts):
         yield last_belt, message + ALL_THE_SAME
+
+
+def _is_belt(name: str, angles: Mapping[tuple[str, float], Usual]) -> bool:
+    """Whether all layers of a name are belts."""
+    kinds = [usual for (other, _), usual in angles.items() if other == name]
+    return bool(kinds) and all(usual is BELT_ANGLE for usual in kinds)
 
 
 def _key(ply: Ply) -> tuple[str, float]:

@@ -30,7 +30,7 @@ def calculix_context(tyre: Tyre) -> dict[str, Any]:
     if c.analysis.vibration_frequency_Hz is not None:
         raise TemplateFailed(
             "analysis.vibration_frequency_Hz must be null: CalculiX cannot evaluate hyperelastic"
-            " rubber at a frequency"
+            " rubber at a frequency (--set analysis.vibration_frequency_Hz=null)"
         )
     element = c.solver.options.get("element", ELEMENT_TYPES[0])
     thickness = c.solver.options.get("ply_thickness_m", PLY_THICKNESS_M)
