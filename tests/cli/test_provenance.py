@@ -88,8 +88,9 @@ def test_every_result_file_carries_it(project: Path) -> None:
 
 @pytest.mark.slow
 def test_the_report_tells_the_modified_tyre_from_the_fit(project: Path) -> None:
-    assert run("report", str(project / "out"), "--quiet") == 0
+    assert run("report", str(project / "out"), "--quiet", "--author", "A. Engineer") == 0
     page = (project / "out/report.html").read_text()
+    assert ", A. Engineer</p>" in page and f"--set {TURNED}=68" in page
     assert f"{TURNED} = 68" in page and "not all of one tyre" in page
 
 

@@ -84,8 +84,8 @@ def test_convergence_shows_every_point_and_the_best_so_far() -> None:
 def test_frequencies_over_load_have_their_values() -> None:
     rows = LoadSweep.model_validate(ring_under_load.load_sweep()).rows
     figure = draw_load_sweep(rows)
-    told = {x for axes in figure.axes for line in axes.lines for x in line.get_ydata()}
-    assert {mode.frequency_Hz for row in rows for mode in row.modes} <= told
+    hertz = {x for axes in figure.axes for line in axes.lines for x in line.get_ydata()}
+    assert {mode.frequency_Hz for row in rows for mode in row.modes} <= hertz
     loads = {x for axes in figure.axes for line in axes.lines for x in line.get_xdata()}
     assert loads == {0.0, 1.0} and figure.axes[-1].get_xlabel() == "load, kN"
 

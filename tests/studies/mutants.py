@@ -5,9 +5,10 @@
     python tests/studies/mutants.py table           the record, by area
 
 Works in copies of a commit beside the system's temporary files; the checkout stays as it is. `run`
-draws lines, so many an area, and one change of each. A mutant meets the tests that execute its
-line, by what `cover` found there or on an earlier commit, the quickest first, up to a budget of
-processor time, and tests of its area that are newer. It runs in a fork of a process that has
+draws lines, so many an area, and one change of each, of Python and of the page's templates. A
+mutant meets the tests that execute its line, by what `cover` found there or on an earlier commit,
+the quickest first, up to a budget of processor time, and tests of its area that are newer; one of a
+template all tests of the page. It runs in a fork of a process that has
 imported and collected everything, with the changed function's code exchanged; what is executed on
 import, and tests that start processes, need a mutated copy.
 
@@ -48,7 +49,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 # worker processes of tests import this file anew, and then the tree that is tested
 sys.path[0] = os.environ.get("MUTANTS_TREE", str(ROOT))
-from tests.studies.mutation import Mutant, exchange, functions, mutants_of  # noqa: E402
+from tests.studies.mutation import Mutant, exchange, functions, mutants_of, template_mutants_of  # noqa: E402
 
 RECORD = ROOT / "tests" / "benchmarks" / "mutants.jsonl"
 PLACE = Path(tempfile.gettempdir()) / "mutants"
@@ -60,8 +61,16 @@ QUOTA = {  # lines of every 200
     "tyrecal/simulate/modes": 13,
     "tyrecal/simulate/evaluate": 13,
     "tyrecal/measured": 15,
+    "tyrecal/report": 20,
+    "tyrecal/cli": 20,
+    "tyrecal/tyre/section": 8,
+    "templates/report": 8,
 }
-NEW = {"solvers/calculix": "tests/solvers/"}  # where an area's tests are; else tests/AREA/
+NEW = {  # where an area's tests are; else tests/AREA/
+    "solvers/calculix": "tests/solvers/",
+    "tyrecal/tyre/section": "tests/tyre/",
+    "templates/report": "tests/report/html/",
+}
 PROCESSES = {  # tests whose work happens in processes that `cover` does not see into
     "solvers/calculix/": ["tests/solvers/test_calculix_runs.py"],
     "tyrecal/simulate/evaluate/pool": ["tests/evaluate/test_pool.py"],
@@ -90,9 +99,10 @@ def drawn(tree: Path, seed: int, count: int, areas: Sequence[str] = ()) -> list[
     quota = {area: share for area, share in QUOTA.items() if not areas or area in areas}
     for area, share in quota.items():
         lines: dict[tuple[str, int], list[Mutant]] = defaultdict(list)
-        for path in sorted((tree / area).rglob("*.py")):
+        for path in sorted((tree / area).rglob("*")):
             file = path.relative_to(tree).as_posix()
-            for mutant in mutants_of(file, path.read_bytes()):
+            of = {".py": mutants_of, ".j2": template_mutants_of}.get(path.suffix)
+            for mutant in of(file, path.read_bytes()) if of else ():
                 lines[mutant.file, mutant.line].append(mutant)
         wanted = round(share * count / sum(quota.values()))
         for place in chance.sample(sorted(lines), wanted):
@@ -144,9 +154,9 @@ class Cover:
             return sum(cost > step for step in STEPS_S), Path(file).name != own, file, cost
 
         tests: list[str] = []
-        spent = 0.0
+        spent, is_template = 0.0, not mutant.file.endswith(".py")
         for test in sorted(known, key=order):
-            new = test not in self.seconds and test.startswith(home)
+            new = (test not in self.seconds or is_template) and test.startswith(home)
             if (test in who or new) and test not in self.failing:
                 if (spent := spent + self.seconds.get(test, UNKNOWN_S)) > budget_s and tests:
                     break
@@ -157,6 +167,8 @@ class Cover:
         """Tests that execute a mutant: for a line in a function those that execute it; for one that
         is executed on import those that execute the function it heads, or a line with a name that
         it sets."""
+        if not mutant.file.endswith(".py"):
+            return set()
         lines = self.lines[mutant.file]
         function, names = place_of(mutant, (self.tree / mutant.file).read_bytes())
         if function:
@@ -304,7 +316,8 @@ class Runner:
         source = path.read_bytes()
         module = mutant.file.removesuffix(".py").replace("/", ".")
         module = module.replace("solvers.", "tyrecal_solvers.", 1).removesuffix(".__init__")
-        function, _ = place_of(mutant, source)
+        is_python = mutant.file.endswith(".py")
+        function = place_of(mutant, source)[0] if is_python else None
         inside = function and function.body[0].lineno <= mutant.line
         on_import = mutant.line in self.imported.get(mutant.file, set())
         watch = Watch(names, files)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import gc
+import re
 import warnings
 from collections import defaultdict
 from collections.abc import Callable, Iterator
@@ -55,7 +56,9 @@ class Mutant:
         return source[: self.start] + self.new.encode() + source[self.end :]
 
     def compiles(self, source: bytes) -> bool:
-        """Whether it is Python still."""
+        """Whether it is Python still; templates are not judged."""
+        if not self.file.endswith(".py"):
+            return True
         with warnings.catch_warnings(action="ignore"):
             try:
                 compile(self.of(source), self.file, "exec")
@@ -92,6 +95,18 @@ def mutants_of(file: str, source: bytes) -> Iterator[Mutant]:
         for target, kind, new in _changes(node, text):
             start, end = span(target)
             yield Mutant(file, target.lineno, kind, text(target), new, start, end)
+
+
+def template_mutants_of(file: str, source: bytes) -> Iterator[Mutant]:
+    """Changes of a Jinja template: a value that is shown is dropped, a condition turned round."""
+    for match in re.finditer(rb"\{\{(?![{]).*?\}\}|\{% (?:el)?if (.*?) %\}", source, re.DOTALL):
+        line = source.count(b"\n", 0, match.start()) + 1
+        if condition := match[1]:
+            start, end = match.span(1)
+            turned = f"not ({condition.decode()})"
+            yield Mutant(file, line, "condition", condition.decode(), turned, start, end)
+        else:
+            yield Mutant(file, line, "value dropped", match[0].decode(), "", *match.span())
 
 
 def _changes(node: Any, text: Callable[[ast.AST], str]) -> Iterator[tuple[Any, str, str]]:

@@ -7,7 +7,7 @@ from types import ModuleType
 
 import pytest
 
-from .mutation import exchange, functions, mutants_of
+from .mutation import exchange, functions, mutants_of, template_mutants_of
 
 SOURCE = b'''"""A docstring 1."""
 from math import pi
@@ -34,6 +34,13 @@ def test_changes_are_python_and_none_is_in_words() -> None:
     assert ("comparison", "r < 0", "r <= 0") in changes
     assert ("part dropped", "pi * r**2 - cut", "(pi * r**2)") in changes
     assert ("operator", "r**2", "((r) * (2))") in changes
+
+
+def test_values_and_conditions_of_templates_change() -> None:
+    source = b"{% if a.b %}\n<p>{{ x|fixed(2) }}</p>\n{% endif %}{# {{ no }} #}"
+    first, second, *_ = template_mutants_of("a.j2", source)
+    assert first.of(source).startswith(b"{% if not (a.b) %}") and first.compiles(source)
+    assert (second.line, second.kind) == (2, "value dropped") and b"<p></p>" in second.of(source)
 
 
 @pytest.mark.parametrize(
