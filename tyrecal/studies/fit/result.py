@@ -285,7 +285,8 @@ class FitResult(Result):
             "'std. err.' is the total by which a variable may be off: measurement, section,"
             " material laws and uncalibrated constants. 'scatter' is the share of the measurement"
             " alone: how far a repeated test would move it.",
-            f"The largest part of the total is: {cause}, {share:.0%} of the variance on average.",
+            f"The largest part of the total is: {cause}, {100 * share:.0f} % of the variance on"
+            " average.",
             OTHER_RESIDUALS,
         ]
 
