@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from tyrecal.cli.doctor import _words as doctor_words
+from tyrecal.report import diagnosis
 from tyrecal.report.convergence import draw_convergence, draw_deviations, draw_states
 from tyrecal.report.load import draw_load_sweep
 from tyrecal.report.measured import measured_table
 from tyrecal.report.sample import draw_corner
+from tyrecal.report.signature import draw_signature
 from tyrecal.report.table import MINUS, nearness, shown
+from tyrecal.simulate.modes.label import Label
+from tyrecal.studies.diagnose.where import PartChange
 from tyrecal.studies.fit.result import FitResult
 from tyrecal.studies.loaded_result import LoadSweep
 from tyrecal.studies.modes import ModesResult
 from tyrecal.studies.result import Deviation
 from tyrecal.studies.sample.result import SampleResult
+from tyrecal.studies.signature import Signature
 
 from .html import ring, ring_inference, ring_under_load
 from .test_measured import run_of
@@ -67,7 +75,7 @@ def test_deviations_of_states_stand_in_their_panels() -> None:
 def test_convergence_shows_every_point_and_the_best_so_far() -> None:
     objectives = [33.1, 8.6, None, 9.0, 3.1]
     history = [
-        {"point": k, "start": 1, "objective_Hz": each, "values": {"C10": 1e6 / k}}
+        {"point": k, "start": 1, "objective_Hz": each, "values": {"C10": 1e6 / k, "D1": k - 1}}
         for k, each in enumerate(objectives, 1)
     ]
     figure = draw_convergence(history, "Hz")
@@ -78,6 +86,8 @@ def test_convergence_shows_every_point_and_the_best_so_far() -> None:
     assert points == [33.1, 8.6, 9.0, 3.1]
     (ratio,) = (line for line in below.lines if line.get_label() == "C10")
     assert list(ratio.get_ydata()) == pytest.approx([1 / k for k in range(1, 6)])
+    (none,) = (line for line in below.lines if line.get_label() == "D1: no ratio")
+    assert np.isnan(none.get_ydata()).all()  # it starts from 0
     assert "Hz" in above.get_ylabel() and "33.10 Hz to 3.10 Hz" in figure.get_suptitle()
 
 
@@ -128,3 +138,57 @@ def test_measured_modes_have_hertz_sigma_damping_and_label() -> None:
     text = "\n".join(lines(measured_table([run_of("run.uff")]), 120))
     for words in ("[2,1] member 1", "66.10", "0.100", "2.00", "1.00"):
         assert words in text
+
+
+def test_bars_of_a_signature_have_their_signs_and_a_legend() -> None:
+    before, after = np.array([[5.0, -2.5]]), np.array([[1.5, np.nan]])
+    labels = Label(2, 0), Label(0, 0, "axial")
+    given = Signature("bead_filler", 3.0, (240.0,), labels, before, after, 0.886, {}, 0.0)
+    figure = draw_signature(given)
+    (panel,) = figure.axes
+    assert [bar.get_height() for bar in panel.patches[:2]] == [5.0, -2.5]
+    texts = [text.get_text() for text in panel.texts if text.get_text()]
+    assert texts == ["+5.0", f"{MINUS}2.5", "+1.5", "lost"]
+    assert len(figure.legends[0].get_texts()) == 2 and "88.6 %" in figure.get_suptitle()
+    assert [each.get_text() for each in panel.get_xticklabels()] == ["[2,0]", "[0,0]\nlateral"]
+
+
+@pytest.mark.parametrize(
+    ("mass", "words"), [(21.0, "mass +21 % ± 8 %"), (2.0, "stiffness +9 % ± 20 %")]
+)
+def test_the_part_that_serves_best_is_stated_by_what_is_surer(mass: float, words: str) -> None:
+    part = PartChange("tread", 9.0, 20.0, mass, 8.0, 4.9, ("belt",))
+    d: Any = SimpleNamespace(
+        gap=SimpleNamespace(groups=[], contrasts=[]), parts=[part], effective_rank=2
+    )
+    text = " ".join(diagnosis._where(d))
+    assert f"tread (looks the same as belt), {words}, ln evidence +4.9" in text
+
+
+def test_a_doctors_words_have_records_and_the_known_tyre() -> None:
+    mode = {"label": "[0,0] axial", "recorded_Hz": 37.0277}
+    check = {"solver": "bundled", "seconds": 1.2, "ok": False, "tolerance_percent": 0.01}
+    check["modes"] = [
+        {**mode, "frequency_Hz": 37.5, "deviation_percent": 1.275},
+        {**mode, "frequency_Hz": None, "deviation_percent": None},
+    ]
+    machine = {"python": "3.11", "system": "Linux", "cores": 2, "free_disc_GB": 9.5}
+    text = "\n".join(
+        doctor_words(
+            {
+                "tyrecal": "0.1",
+                "installed_in": "here",
+                "machine": {**machine, "free_memory_GB": 3.5, "memory_GB": 8.0},
+                "packages": [],
+                "extras": [],
+                "settings": {"file": None},
+                "solvers": [],
+                "records": [{"folder": "x/record", "records": 7, "MB": 2.1}],
+                "self_check": check,
+            }
+        )
+    )
+    assert "2 cores, 3.5 of 8 GB of memory, 9.5 GB" in text
+    assert "x/record: 7 records, 2.1 MB" in text
+    assert "[0,0] lateral    recorded 37.03, now 37.50 Hz (+1.275 %)" in text
+    assert "now not found" in text and "NOT as recorded, within 0.01 %" in text

@@ -165,6 +165,24 @@ def test_the_section_has_the_dimensions_of_its_code(code: str) -> None:
     assert 2 * outer[section.rigid][0, 1] == pytest.approx(gauges.rim, rel=0.01)
 
 
+@pytest.mark.parametrize(
+    ("code", "of_width"),
+    [
+        ("205/60R15", ((7, 0.027), (3, 0.01), (8, 0.02))),
+        ("LT245/75R16", ((9.5, 0.03), (4.5, 0.015), (11, 0.02))),
+        ("315/80R22.5", ((8, 0.06), (8, 0.02), (18, 0.04))),
+    ],
+)
+def test_gauges_are_those_that_the_guide_states(
+    code: str, of_width: tuple[tuple[float, float], ...]
+) -> None:
+    """Crown, sidewall and bead, mm, and shares of the nominal width."""
+    size = parse_size(code)
+    gauges = usual(size)
+    stated = [1e-3 * mm + share * size.width for mm, share in of_width]
+    assert [gauges.crown, gauges.sidewall, gauges.bead] == pytest.approx(stated)
+
+
 @pytest.mark.parametrize("code", TWELVE)
 def test_gauges_and_belts(code: str) -> None:
     size = parse_size(code)

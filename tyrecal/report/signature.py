@@ -28,9 +28,10 @@ def draw_signature(signature: Signature) -> Figure:
             (1, signature.after, COLOURS[1], "left after the variables are fitted again"),
         ):
             bars = axes.bar(places + side * BAR / 2, rows[k], BAR, color=colour, label=words)
-            axes.bar_label(
-                bars, [_text(x, digits) for x in rows[k]], fontsize=7, color="0.3", padding=1
-            )
+            look = {"fontsize": 7, "color": "0.3"}
+            axes.bar_label(bars, [_text(x, digits) for x in rows[k]], padding=1, **look)
+            for place in places[~np.isfinite(rows[k])]:  # such bars get no label
+                axes.text(place + side * BAR / 2, 0, "lost", ha="center", va="bottom", **look)
         axes.axhline(0, color=GREY, lw=0.8)
         axes.margins(y=0.15)
         axes.set_title(f"{signature.pressures_kPa[k]:g} kPa", loc="left", fontsize=9, color="0.3")
@@ -47,6 +48,4 @@ def draw_signature(signature: Signature) -> Figure:
 
 
 def _text(value: float, digits: int) -> str:
-    if not np.isfinite(value):
-        return "lost"
     return f"{round(value, digits) + 0.0:+.{digits}f}".replace("-", MINUS)

@@ -129,6 +129,7 @@ def test_table_2_is_there(folder: Path) -> None:
         "Fitted: every mode rises; every curve",
         "Named: rim_width explains the gap. Probability 0.71",
         "weigh the tyre",
+        "<b>measure</b> again",
         "upper sidewall",
         "contact area, cm²",
         "A_belt sets rebar_layers.belt_1.area_m2",
@@ -137,6 +138,15 @@ def test_table_2_is_there(folder: Path) -> None:
 )
 def test_what_was_found_is_told(folder: Path, words: str) -> None:
     assert words in kept_words_of(folder)
+
+
+def test_every_mode_is_in_its_viewer(folder: Path) -> None:
+    results, text = read_results(folder), kept_text_of(folder)
+    for study, shapes in (("fit", results.fit_shapes), ("modes", results.modes_shapes)):
+        match = re.search(rf'id="f1-{study}-data">(.*?)</script>', text, re.DOTALL)
+        assert shapes and match
+        shown = [mode["hertz"] for mode in json.loads(match[1])["modes"]]
+        assert shown == [f"{mode.frequency_Hz:.2f} Hz" for mode in shapes.modes]
 
 
 def test_the_page_stands_alone(folder: Path) -> None:
