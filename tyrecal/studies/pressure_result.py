@@ -170,6 +170,8 @@ def _with_errors(
 
     own = [row for row in result.rows if row.design == FITTED]
     wanted = [(mode.label, row.pressure_kPa) for row in own for mode in row.modes]
+    if not wanted:
+        return result
     try:
         errors = predicted_errors(case, evaluator, result.designs[FITTED], fit, wanted, jobs)
     except (ValueError, EvaluationFailed) as failure:

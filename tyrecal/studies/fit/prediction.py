@@ -31,6 +31,7 @@ from ..result import ResultPart
 from .responses import FitResponse, linear_answer
 
 Array = np.ndarray
+MOST_PRESSURES = 4  # at which a fitted design is evaluated with all sensitivities
 
 
 class FitResponses(ResultPart):
@@ -55,17 +56,27 @@ def predicted_errors(
     jobs: int = 1,
 ) -> Array:
     """Standard deviations (m,) of ln f of modes (label, kPa) on the case's rim, as the design
-    ``values`` of the fit has them. Evaluates it with slopes by all sources of error once in each
-    state. Raises DeckRefused, EvaluationFailed."""
+    ``values`` of the fit has them. It is evaluated with its sensitivities to all sources of error
+    in the measured states and at ``MOST_PRESSURES`` pressures, between which these are interpolated
+    in ln p. Raises DeckRefused, EvaluationFailed."""
     names = list(case.case.variables)
     measured = tuple(_observable(case, each) for each in fit.responses)
     others = tuple(Observable("frequency_Hz", label, p) for label, p in wanted)
+    pressures = sorted({p for _, p in wanted})
+    chosen = np.linspace(0, len(pressures) - 1, min(len(pressures), MOST_PRESSURES)).round()
+    nodes = [pressures[int(i)] for i in chosen]
+    labels = list(dict.fromkeys(label for label, _ in wanted))
+    evaluated = tuple(Observable("frequency_Hz", label, p) for label in labels for p in nodes)
     R = np.array([[each.response.get(name, 0.0) for each in fit.responses] for name in names])
     known, _ = sources(case)
-    J, G, laws = linear_answer(case, evaluator, values, (*measured, *others), known, jobs)
+    J, G, laws = linear_answer(case, evaluator, values, (*measured, *evaluated), known, jobs)
+    both, n = np.hstack([J, G]), len(measured)
+    curves = both[n:].reshape(len(labels), len(nodes), -1)
+    there = [_interpolated(curves[labels.index(x)], np.log(nodes), np.log(p)) for x, p in wanted]
+    J, G = np.split(np.vstack([both[:n], *there]), [J.shape[1]], axis=1)
     model = model_form((*measured, *others), laws) + G @ G.T
     scatter = np.array([each.scatter for each in fit.responses])
-    variance = prediction_variance(J[len(measured) :], R, scatter, model)
+    variance = prediction_variance(J[n:], R, scatter, model)
     return np.asarray(np.sqrt(variance * max(1.0, fit.chi2_per_dof or 0.0)))
 
 
@@ -75,6 +86,11 @@ def prediction_variance(J: Array, R: Array, scatter: Array, model: Array) -> Arr
     A = np.hstack([J @ R, -np.eye(len(J))])
     whole = model + np.diag(np.concatenate([scatter**2, np.zeros(len(J))]))
     return np.asarray(np.einsum("ij,jk,ik->i", A, whole, A))
+
+
+def _interpolated(curve: Array, nodes: Array, at: float) -> Array:
+    """Rows (k,) of a curve (nodes, k) between its nodes."""
+    return np.array([np.interp(at, nodes, column) for column in curve.T])
 
 
 def _observable(case: LoadedCase, each: FitResponse) -> Observable:
