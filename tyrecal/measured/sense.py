@@ -6,8 +6,9 @@ with the waves c along a smooth curve for each m. As a normal distribution of ln
     ln f = a + ln F(label) + o_m + g ln(c / 2) + t_label + (s + s_label) ln(p / mean p) + noise
 
 F are the rounded frequencies of two passenger tyres; a is free, the others have the standard
-deviations below; [0,0] torsional has an s of its own. A doubt is a change of the data, two pressures or two labels exchanged or one
-value left out, that makes them far more probable. These are questions to the user: nothing is
+deviations below; [0,0] torsional has an s of its own. A doubt is a change of the data, two
+pressures or two labels exchanged or one value left out, that makes them far more probable. Where
+the next change is nearly as probable, it is named too. These are questions to the user: nothing is
 changed here. `measured import` and `fit` report them; the pattern must never enter a fit.
 """
 
