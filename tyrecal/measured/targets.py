@@ -129,7 +129,7 @@ def _in_set_state(
     set_by_user = case.overrides.keys()
     at_pressure = at_pressure or PRESSURE_PATH in set_by_user
     on_rim = not set_by_user.isdisjoint((RIM_FREE, WHEEL_FREE))
-    own, whole = AS_THE_CASE.told(case), [state.told(case) for state in states]
+    own, whole = AS_THE_CASE.with_defaults(case), [state.with_defaults(case) for state in states]
     count = [
         (not at_pressure or state.pressure_kPa == own.pressure_kPa)
         and (not on_rim or (state.rim == "free") == (own.rim == "free"))

@@ -114,14 +114,16 @@ def run(
     """Every design at every pressure. Raises as ``sweep`` does, and the first failure where no
     pressure could be evaluated."""
 
-    def told(outcome: SweepOutcome) -> None:
+    def notify_outcome(outcome: SweepOutcome) -> None:
         place = f"{outcome.design}, {outcome.pressure_kPa:g} kPa"
         if isinstance(outcome, Failure):
             notify(place, outcome.failed)
         else:
             notify(f"{place}: {len(outcome.modes)} modes", None)
 
-    return sweep_result(case, designs, sweep(case, evaluator, designs, pressures_kPa, jobs, told))
+    return sweep_result(
+        case, designs, sweep(case, evaluator, designs, pressures_kPa, jobs, notify_outcome)
+    )
 
 
 def sweep_result(

@@ -102,7 +102,7 @@ def _worst(fit: FitResult) -> str:
     if not fit.modes:
         return NOTHING
     worst = max(fit.modes, key=lambda mode: abs(mode.deviation_percent))
-    return f"{worst.label.said} {_graded(fit, _aim(worst))}{NB}%"
+    return f"{worst.label.display} {_graded(fit, _aim(worst))}{NB}%"
 
 
 def _aim(mode: FittedMode) -> tuple[str, str]:

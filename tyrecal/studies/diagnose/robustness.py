@@ -132,7 +132,7 @@ def _changes(problem: InverseProblem, sources: Sequence[str]) -> Iterator[Pertur
     for label in sorted({row.label for row in rows if row.label}, key=str):
         keep = np.array([row.label != label for row in rows])
         if keep.any():
-            yield Perturbation(f"without {label.said}", problem, keep)
+            yield Perturbation(f"without {label.display}", problem, keep)
 
 
 def _scaled(problem: InverseProblem, places: Sequence[int], factor: float) -> InverseProblem:

@@ -269,7 +269,7 @@ class TyreModel:
         """A design in a state, which wins over an effect that holds the rim otherwise, and those
         of the slopes ``names`` that it has there."""
         held = replace(state, pressure_kPa=None).numbers(self.case)
-        pressure = state.told(self.case).pressure_kPa or 0.0
+        pressure = state.with_defaults(self.case).pressure_kPa or 0.0
         left = without(self.case, dict.fromkeys(names, 0.0), held)
         there = {**without(self.case, design, held), "pressure_kPa": pressure, **held}
         return there, tuple(name for name in left if name not in held)

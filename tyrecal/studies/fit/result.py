@@ -96,7 +96,7 @@ class FittedState(ResultPart):
     ratio: float | None = None  # of the standard errors with it to those without, their mean
 
     @property
-    def said(self) -> str:
+    def display(self) -> str:
         """In words."""
         return state_words(self.pressure_kPa, self.load_N, self.rim)
 
@@ -314,7 +314,7 @@ class FitResult(Result):
         heads = [Column("left out", ""), Column("values", "d"), Column("rms, sigmas")]
         heads += [Column(in_lines(f"{name}, std. err. %")) for name in own]
         rows: list[list[Any]] = [
-            [each.said, f"{each.values}", heads[2].cell(each.rms_sigmas)]
+            [each.display, f"{each.values}", heads[2].cell(each.rms_sigmas)]
             + [self._percent(n, each.standard_errors_without[n]) for n in own]
             for each in self.states
         ]
@@ -323,7 +323,7 @@ class FitResult(Result):
         if self.next_states:
             heads = [Column("added", ""), Column("errors become"), *heads[3:]]
             rows = [
-                [each.said, f"{100 * (each.ratio or 0.0):.0f} %"]
+                [each.display, f"{100 * (each.ratio or 0.0):.0f} %"]
                 + [self._percent(n, each.standard_errors_with[n]) for n in own]
                 for each in self.next_states[:MAX_PROPOSED]
             ]
