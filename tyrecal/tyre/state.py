@@ -43,7 +43,7 @@ class TyreState:
 
     @property
     def unloaded(self) -> TyreState:
-        """The same without a load."""
+        """The state without a load."""
         return replace(self, load_N=0.0)
 
     def of(self, case: LoadedCase) -> TyreState:
