@@ -15,7 +15,7 @@ DRAWN_COLOUR, LINEAR_COLOUR = COLOURS[0], COLOURS[1]
 
 
 def figures(result: SampleResult) -> dict[str, Figure]:
-    """By name."""
+    """Figures of a sample, by name."""
     return {"sample_corner": draw_corner(result)}
 
 

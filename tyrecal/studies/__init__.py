@@ -26,7 +26,7 @@ RESULT_TYPES = {  # in the order of a page
 
 
 def result_types() -> dict[str, type[Result]]:
-    """By the name of the study, those from outside last."""
+    """Types of results by the name of the study, those from outside last."""
     outside = {entry.name: entry.value for entry in entry_points(group=STUDY_GROUP)}
     return {name: named(place) for name, place in {**RESULT_TYPES, **outside}.items()}
 

@@ -29,7 +29,7 @@ class LabelProbability(ResultPart):
 
     @property
     def display(self) -> str:
-        """In words."""
+        """Label in words."""
         return self.label.display if self.label else FOREIGN_WORDS
 
 
@@ -46,7 +46,7 @@ class LabelledFrequency(LabelProbability):
 
     @property
     def state(self) -> str:
-        """In words."""
+        """State in words."""
         return state_words(self.pressure_kPa, 0.0, self.rim)
 
 

@@ -123,7 +123,7 @@ def _variable(fit: FitResult, name: str) -> str:
 
 
 def _deviations(fit: FitResult) -> dict[tuple[str, str], float]:
-    """In %, by what was aimed at."""
+    """Deviations in per cent, by target."""
     return {_aim(mode): mode.deviation_percent for mode in fit.modes} | {
         (each.state, ROAD_QUANTITIES[each.quantity].name.split(",")[0]): each.deviation_percent
         for each in fit.others

@@ -41,7 +41,7 @@ def plain_fit(
     def descended(
         x: Array, evaluate: Callable[[Array], Answer | Exception], answer: Answer
     ) -> Array:
-        """From x, where ``answer`` is the model's."""
+        """Descend from x, where ``answer`` is the model's."""
 
         def misfit(x: Array, answer: Answer) -> float:
             r, off = observed.y - answer.eta[rows], (x - model.start) / model.spread

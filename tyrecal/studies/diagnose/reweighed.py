@@ -24,7 +24,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Perturbation:
-    """The same data seen otherwise. words: what is other."""
+    """Other assumptions about the same data. words: what is other."""
 
     words: str
     problem: InverseProblem  # of the same rows

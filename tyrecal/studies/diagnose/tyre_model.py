@@ -213,7 +213,7 @@ class TyreModel:
             constants[:, k] = np.array(slopes).T @ field.values
 
     def _of(self, case: LoadedCase) -> TyreModel:
-        """The same of another tyre without sources of error or effects."""
+        """Model of another tyre without sources of error or effects."""
         return TyreModel(case, self.evaluator, self.rows, [], {}, self.jobs)
 
     def _has_slopes(self, id: str, span: Span) -> bool:

@@ -97,7 +97,7 @@ class FittedState(ResultPart):
 
     @property
     def display(self) -> str:
-        """In words."""
+        """State in words."""
         return state_words(self.pressure_kPa, self.load_N, self.rim)
 
 
@@ -117,7 +117,7 @@ class FittedMode(Named):
 
     @property
     def state(self) -> str:
-        """In words; "" in a fit to one."""
+        """State in words; "" in a fit to one."""
         if self.pressure_kPa is None:
             return ""
         return state_words(self.pressure_kPa, self.load_N, self.rim or "")
@@ -149,7 +149,7 @@ class FittedFootprint(ResultPart):
 
     @property
     def state(self) -> str:
-        """In words, of the mass none; in a fit to one state the load."""
+        """State in words, of the mass none; in a fit to one state the load."""
         if self.quantity == "mass_kg":
             return ""
         if self.pressure_kPa is None:
@@ -471,7 +471,7 @@ def _variables(
 
 
 def _modes(problem: Problem, initial: Point, point: Point, several: bool) -> list[FittedMode]:
-    """Those of the unloaded tyre, then those on the road."""
+    """Modes of the unloaded tyre, then those on the road."""
     result = []
     for target in problem.targets:
         before, after = (p.states[target.state][target.label] for p in (initial, point))

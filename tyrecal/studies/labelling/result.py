@@ -90,7 +90,7 @@ def labels_posterior(case: LoadedCase, labelled: Labelled) -> Labels:
 
 
 def labels_result(case: LoadedCase, labelled: Labelled) -> LabelsResult:
-    """As a result of its own."""
+    """Labels as a result of their own."""
     return LabelsResult.model_validate({"format": 1, "labels": labels_posterior(case, labelled)})
 
 
