@@ -1,4 +1,4 @@
-"""How far a batch is, and how long it will take yet."""
+"""Progress of a batch, and the time that it will still take."""
 
 from __future__ import annotations
 
