@@ -114,7 +114,7 @@ def _is_alive(process: subprocess.Popen[bytes]) -> bool:
 
 
 def _end_tree(process: subprocess.Popen[bytes]) -> None:
-    """As Windows has it, which knows what started what as long as it lives."""
+    """End a process tree on Windows, which knows what started what as long as it lives."""
     taskkill = shutil.which("taskkill")
     if taskkill:
         command = [taskkill, "/T", "/F", "/PID", str(process.pid)]

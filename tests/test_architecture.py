@@ -16,6 +16,7 @@ ROOMS = re.findall(r"^(\w+) {2,}", MAP.split("```")[1], re.MULTILINE)  # from th
 LEAVES = ("errors", "files", "interrupt", "units", "version")
 FACES = ("__init__", "__main__")  # what is offered, and the command
 PACKAGES = {"tyrecal": "tyrecal", "solvers": "tyrecal_solvers"}
+OTHER_LIMITS = r"(MOST|LEAST(?!_SQUARES)|LARGEST|SMALLEST|LONGEST|SHORTEST|FEWEST|HIGHEST|LOWEST)_"
 
 
 def module_of(path: Path) -> str:
@@ -137,3 +138,4 @@ def test_a_constants_name_means_one_thing() -> None:
                     files.setdefault(each.id, set()).add(module)
     twice = {name: sorted(values) for name, values in files.items() if len(values) > 1}
     assert len(twice) <= 10, twice
+    assert not list(filter(re.compile(OTHER_LIMITS).match, files)), "name limits MAX_ or MIN_"

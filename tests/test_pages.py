@@ -102,7 +102,7 @@ def test_labels_of_the_page_on_real_data() -> None:
     labelled = label(case, evaluator, readings, fitted_prior(case, fit), fixed=fixed)
     table = rows("real_data.md", r"\d{3}")
     for cells, frequency in zip(table, labels_posterior(case, labelled).frequencies, strict=True):
-        assert figure(cells[0]) == frequency.frequency_Hz and cells[1] == frequency.said
+        assert figure(cells[0]) == frequency.frequency_Hz and cells[1] == frequency.display
         assert figure(cells[2]) == pytest.approx(frequency.expected_Hz, abs=0.06)
         off = 100 * (frequency.expected_Hz or 0.0) / frequency.frequency_Hz - 100
         assert figure(cells[3]) == pytest.approx(off, abs=0.06)

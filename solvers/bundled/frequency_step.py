@@ -100,7 +100,7 @@ class FrequencyStep:
         self.newton = self._static_factor()
 
     def modes(self) -> list[HarmonicModes]:
-        """By harmonic."""
+        """Modes by harmonic."""
         solver: HasModes = self.vibration
         if self.model.tables:
             solver = SelfConsistent(self.vibration, self.model.tables)
@@ -227,7 +227,7 @@ def nonuniform_modes(
 def _sector_modes(
     tyre: Inflated, step: DeckStep, vibration: Vibration, harmonics: list[int], count: int
 ) -> list[HarmonicModes]:
-    """With a sector of other stuff, at the static moduli."""
+    """Modes with a sector of other stuff, at the static moduli."""
     place = step.procedure.place
     if step.procedure.number("PROPERTY EVALUATION") is not None or vibration.shift:
         raise DeckError(place, "a sector of other stuff is honoured at the static moduli")

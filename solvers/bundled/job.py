@@ -199,7 +199,8 @@ class Job:
     def _inflated_tangents(
         self, model: Model, equations: Numbering, acting: list[Pressure], place: int
     ) -> dict[str, InflatedTangent]:
-        """By variable, of the tyre that the last static step, at its ``place``, presses."""
+        """Tangents by variable, of the tyre that the last static step, at its ``place``,
+        presses."""
         sensitivities = self.tyre.request.sensitivities
         if not sensitivities:
             return {}

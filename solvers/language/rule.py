@@ -68,7 +68,7 @@ class Rule:
 
     @cached_property
     def options_at(self) -> dict[str, dict[str, tuple[str, ...] | None]]:
-        """By place: the options that are honoured, and the values of each, None for any."""
+        """Options that are honoured by place, and the values of each, None for any."""
         return {
             place: {
                 name.removeprefix(QUIET): tuple(values.split("|")) if equals else self._words(name)

@@ -103,7 +103,7 @@ def test_no_state_is_proposed_that_cannot_be_computed() -> None:
     problem = Problem(case_with(measured([TyreState(160.0), AS_THE_CASE])), tyre)  # type: ignore[arg-type]
     point = problem.evaluate(problem.start())
     proposals = next_states(problem, point, uncertainty(problem, point))
-    states = [each.state.told(CASE) for each in proposals]
+    states = [each.state.with_defaults(CASE) for each in proposals]
     assert {(s.pressure_kPa, s.rim) for s in states} == {(130.0, "fixed"), (300.0, "fixed")}
     tyre.has_gradients = False
     bare = Problem(problem.case, tyre)  # type: ignore[arg-type]

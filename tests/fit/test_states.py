@@ -166,7 +166,7 @@ def test_tables_and_files_show_states_side_by_side() -> None:
     assert f"{mode.fitted_Hz:.2f} {mode.deviation_percent:+.2f}" in text.get()
     assert before.rows[0][0] == "nothing" and len(before.rows) == 7
     assert len(after.rows) == len(fit.found.next_states) == 4
-    assert after.rows[0][0] == fit.found.next_states[0].said
+    assert after.rows[0][0] == fit.found.next_states[0].display
     (table,) = fit.found.numbers()
     assert len(table.rows) == 55 and table.rows[1][0] == "240 kPa, rim fixed"
     rows = list(csv.DictReader(io.StringIO(fit.found.csv())))

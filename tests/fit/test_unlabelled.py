@@ -192,11 +192,11 @@ def test_readings_get_the_labels_of_the_tyre(labelled: Labelled) -> None:
     labels = labels_posterior(CASE, labelled)
     assert len(labels.frequencies) == 16 and not labels.doubts()
     (foreign,) = [each for each in labels.frequencies if each.label is None]
-    assert foreign.frequency_Hz == FOREIGN_Hz and foreign.said == FOREIGN_WORDS
+    assert foreign.frequency_Hz == FOREIGN_Hz and foreign.display == FOREIGN_WORDS
     for each in labels.frequencies:
         rest = 1 - each.probability - sum(rival.probability for rival in each.rivals)
         assert -1e-9 < rest < 0.05
-    assert labels.labelings[0].labels == [each.said for each in labels.frequencies]
+    assert labels.labelings[0].labels == [each.display for each in labels.frequencies]
 
 
 @pytest.mark.numbers

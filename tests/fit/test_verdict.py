@@ -103,7 +103,9 @@ def test_a_slip_is_named_with_its_line_and_what_would_be_left(i: int, value: flo
     values[i] = value
     reason = likeliest_reason(two_pressures(values))
     assert reason and reason.kind == "value"
-    assert reason.words.startswith(f"t.csv, line {i + 2}: {LABELS[i % 10].said} is {value:g} Hz at")
+    assert reason.words.startswith(
+        f"t.csv, line {i + 2}: {LABELS[i % 10].display} is {value:g} Hz at"
+    )
     rest, both = np.arange(20) != i, np.vstack([J, J])
     d = np.log(values / model_Hz())[rest]
     best = d - both[rest] @ np.linalg.lstsq(both[rest], d, None)[0]

@@ -143,7 +143,13 @@ def test_all_names_that_tyrecal_prints() -> None:
     labels = [Label(0, 0, "axial"), Label(0, 0, "torsional")]
     labels += [Label(c, m) for c in range(1, 10) for m in (0, 1)]
     for label in labels:
-        for name in (str(label), label.said, label.motion, f"{label}x2", f"{label} {label.motion}"):
+        for name in (
+            str(label),
+            label.display,
+            label.motion,
+            f"{label}x2",
+            f"{label} {label.motion}",
+        ):
             c, m, kind = label_parts(name, {}) or ("", "", "")
             assert (int(c), int(m)) == (label.c, label.m), name
             assert kind.replace("lateral", "axial") == (label.kind or ""), name

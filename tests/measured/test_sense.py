@@ -87,7 +87,7 @@ def test_exchanged_pressures_are_reported_with_their_lines() -> None:
 def test_exchanged_labels_are_reported(one: Label, other: Label, at: float) -> None:
     (doubt,) = doubts(relabelled(measured(200, 250), one, other, at))
     assert "are the two labels exchanged?" in doubt
-    assert one.said in doubt and other.said in doubt
+    assert one.display in doubt and other.display in doubt
 
 
 def test_a_row_far_from_a_smooth_curve_is_reported() -> None:

@@ -42,7 +42,7 @@ HIGHEST = 90  # harmonic: K(n) is positive up to about 100
 WITH_MODES = 12  # harmonics beyond it follow quasi-statically
 STRIPS = 3  # of the patch along the road
 PRESSURE_RATIO = 1.13  # of the mean contact pressure over the inflation's
-LOWEST_HZ = 30.0  # below all modes
+MIN_MODE_HZ = 30.0  # below all modes
 POISSON, SHEAR_PA = 0.475, 2e6  # of the half space: the tread's rubber
 # harmonic, place among its modes, and whether it is the member symmetric about the patch
 LABELS = {"[1,1]": (1, 0, True), "torsion": (0, 1, False), "[2,1]": (2, 0, True)}
@@ -152,7 +152,7 @@ class Patch:
             return int((free < value).sum()) - negative
 
         roots = []
-        spans = [(LOWEST_HZ, count(LOWEST_HZ), up_to_Hz, count(up_to_Hz))]
+        spans = [(MIN_MODE_HZ, count(MIN_MODE_HZ), up_to_Hz, count(up_to_Hz))]
         while spans:
             a, before, b, after = spans.pop()
             if before == after:

@@ -51,7 +51,7 @@ def test_a_state_is_the_cases_own_or_sets_what_it_has_otherwise() -> None:
         for state in (TyreState(), TyreState(240.0, 4000.0, rim_of(case))):
             assert state.numbers(case) == {}
             assert state.of(case) == TyreState(None, state.load_N, None)
-            assert state.told(case) == TyreState(240.0, state.load_N, rim_of(case))
+            assert state.with_defaults(case) == TyreState(240.0, state.load_N, rim_of(case))
     assert TyreState(160.0).numbers(CASE) == {"pressure_kPa": 160.0}
     assert TyreState(160.0, 4000.0).unloaded == TyreState(160.0)
     for case in (CASE, SPRUNG, FREE, with_values(CASE, {"effects.wheel_free": 0.05})):

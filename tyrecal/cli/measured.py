@@ -322,7 +322,7 @@ def _label_shapes(
     case_modes = evaluate_case_modes(loaded, evaluator, values, layout.highest)
     pressure_kPa = loaded.case.pressure_kPa
     gathered = gather([file], pressure_kPa, replace(layout, case=case_modes), assumed=assumed)
-    state = gathered.rows[0].state.of(loaded).told(loaded)
+    state = gathered.rows[0].state.of(loaded).with_defaults(loaded)
     for note in gathered.notes:
         study.terminal.note(note)
     labels = run.write(shape_labels_result(gathered.runs[0], case_modes, state))

@@ -239,7 +239,7 @@ def study(function: Callable[..., int]) -> Callable[..., int]:
 
 
 def study_one_by_one(function: Callable[..., int]) -> Callable[..., int]:
-    """The same without --jobs and --report."""
+    """The options of `study` without --jobs and --report."""
     return _study(function, SERIAL_OPTIONS)
 
 

@@ -87,7 +87,7 @@ class _Number(_Answering):
     what = "a number"
 
     def answer(self, value: Any, param: click.Parameter | None) -> str:
-        """Its unit and range, with an example."""
+        """Unit and range of the answer, with an example."""
         default = param.default if param and type(param.default) in (int, float) else 2
         unit, example = "", f"{default:g}"
         for name in [param.opts[0], param.metavar or ""] if param else []:

@@ -1,4 +1,4 @@
-"""How far a batch is, and how long it will take yet."""
+"""Progress of a batch, and the time that it will still take."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class BatchProgress:
     def __init__(self, total: int, quiet: bool, verbose: bool):
         self.total, self.quiet, self.verbose = total, quiet, verbose
         self.done = self.run = self.bad = 0
-        self.began = self.said = time.monotonic()
+        self.began = self.reported = time.monotonic()
         self.bar: Any = None
 
     def __enter__(self) -> BatchProgress:
@@ -45,8 +45,8 @@ class BatchProgress:
         now = time.monotonic()
         if self.bar:
             self.bar.update(0, completed=self.done, description=self._state(now))
-        elif not self.quiet and (self.verbose or bad or now > self.said + BETWEEN_S):
-            self.said = now
+        elif not self.quiet and (self.verbose or bad or now > self.reported + BETWEEN_S):
+            self.reported = now
             what = ", ".join(f"{study}: {entries[study]['status']}" for study in bad) or "good"
             click.echo(
                 f"{self.done}/{self.total} {report['name']}: {what}; {self._state(now)}", err=True

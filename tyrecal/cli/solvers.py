@@ -65,7 +65,7 @@ def settings_file() -> dict[str, Any]:
 
 
 def settings_words(entry: dict[str, Any]) -> str:
-    """The same in words."""
+    """The settings file, and its problem if it has one, in words."""
     if entry["file"] is None:
         return "none (TYRECAL_SETTINGS is empty)"
     return entry["problem"] or entry["file"] + ("" if entry["there"] else " (not there)")

@@ -70,7 +70,7 @@ def command(
     if pictures:
         from ..report.pressure import draw_pressure_sweep
 
-        measured = [(each, each.state.told(loaded)) for each in read_targets(loaded)]
+        measured = [(each, each.state.with_defaults(loaded)) for each in read_targets(loaded)]
         rim = rim_of(loaded)
         targets = [
             (each.label, state.pressure_kPa or 0.0, each.frequency_Hz)

@@ -184,7 +184,7 @@ class Progress:
         self._of_stage = self._said = self._began
 
     def show_on(self, bar: Any) -> None:
-        """From here on, on a rich bar."""
+        """Show progress on a rich bar from here on."""
         self._bar, self._task = bar, bar.add_task(self._what, total=None)
 
     def begin(self, stage: str) -> None:

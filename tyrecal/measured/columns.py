@@ -157,5 +157,5 @@ def _is_length(name: str) -> bool:
 
 
 def _words(name: str) -> str:
-    """Its words, joined by low lines."""
+    """Words of a heading, joined by low lines."""
     return re.sub(r"[\s\-_.]+", "_", name).strip("_")

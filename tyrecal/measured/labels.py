@@ -96,7 +96,7 @@ class Labeller:
         if p[first] < MIN_LABEL_PROBABILITY:
             return Judged(None, probabilities, self._why(p, order))
         if not self.is_seen[first]:
-            why = f"the sensors hardly see {self.labels[first].said}: {_missing(self.sensors)}"
+            why = f"the sensors hardly see {self.labels[first].display}: {_missing(self.sensors)}"
             return Judged(None, probabilities, why)
         return Judged(self.labels[first], probabilities)
 
@@ -167,7 +167,7 @@ class Labeller:
         second = others[0] if open_waves else order[1]
         a, b = self.labels[first], self.labels[second]
         if second not in self._groups[first] and first not in self._groups[second]:
-            return f"the shape is between {a.said} and {b.said}: noise, or two modes mixed"
+            return f"the shape is between {a.display} and {b.display}: noise, or two modes mixed"
         if a.c != b.c:
             angles = np.round(np.degrees(self.sensors.points[:, 1])) % 360
             count = len(np.unique(angles))
@@ -175,7 +175,7 @@ class Labeller:
                 f"aliasing: sensors at {count} angle{'s' * (count > 1)}, spaced as they are, let"
                 f" {min(a.c, b.c)} and {max(a.c, b.c)} waves look alike"
             )
-        return f"sensors let {a.said} and {b.said} look alike: {_missing(self.sensors)}"
+        return f"sensors let {a.display} and {b.display} look alike: {_missing(self.sensors)}"
 
 
 def _evidence(values: Array, vectors: Array, shapes: Array) -> Array:

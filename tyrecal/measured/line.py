@@ -38,7 +38,7 @@ class Line:
         return self.cells.get(meaning, "")
 
     def number(self, meaning: str, default: float | None = None) -> float:
-        """In our unit; ``default`` for an empty cell."""
+        """Number in our unit; ``default`` for an empty cell."""
         cell = self.cell(meaning)
         if not cell and default is not None:
             return default

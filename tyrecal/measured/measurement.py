@@ -55,7 +55,7 @@ class Measurement:
     @property
     def name(self) -> str:
         """Name of the measured value, in words."""
-        return self.label.said if self.label else self.quantity
+        return self.label.display if self.label else self.quantity
 
     @property
     def mistake(self) -> str | None:

@@ -384,7 +384,9 @@ def settled(labelled: list[LabelledMode]) -> list[LabelledMode]:
         for number, each in enumerate(pair, start=1):
             result.append(replace(each, member=str(number) if len(pair) == 2 else ""))
         for each in group[len(pair) :]:
-            why = f"{label.said} stands at {lowest:.2f} Hz already; an overtone, or another's pair"
+            why = (
+                f"{label.display} stands at {lowest:.2f} Hz already; an overtone, or another's pair"
+            )
             result.append(replace(each, judged=replace(each.judged, label=None, why=why)))
     return sorted(result, key=hertz)
 

@@ -69,7 +69,7 @@ def readings_of(case: LoadedCase, path: Path, labelled: bool = True) -> list[Mea
 
 
 def _placed(case: LoadedCase, readings: Sequence[Measurement]) -> list[Measurement]:
-    """Those that have a state, at pressures of which those that differ by little are one."""
+    """Measurements that have a state, with pressures that differ by little made one."""
     rest = [each for each in readings if each.quantity != "mass_kg"]
     known = [case.case.pressure_kPa]
     for each in rest:
@@ -129,7 +129,7 @@ def _in_set_state(
     set_by_user = case.overrides.keys()
     at_pressure = at_pressure or PRESSURE_PATH in set_by_user
     on_rim = not set_by_user.isdisjoint((RIM_FREE, WHEEL_FREE))
-    own, whole = AS_THE_CASE.told(case), [state.told(case) for state in states]
+    own, whole = AS_THE_CASE.with_defaults(case), [state.with_defaults(case) for state in states]
     count = [
         (not at_pressure or state.pressure_kPa == own.pressure_kPa)
         and (not on_rim or (state.rim == "free") == (own.rim == "free"))
@@ -173,8 +173,8 @@ def _refuse_states(case: LoadedCase, readings: Sequence[Measurement]) -> None:
 
 
 def in_states(case: LoadedCase, readings: Sequence[Measurement]) -> list[Measurement]:
-    """The same with a rim only where it is not held as the case has it. Raises InputError where the
-    case cannot be in a state."""
+    """Measurements with a rim only where it is held otherwise than in the case. Raises InputError
+    where the case cannot be in a state."""
     with_rims = [replace(each, rim=each.state.of(case).rim) for each in readings]
     _refuse_states(case, [each for each in with_rims if each.rim])
     return with_rims

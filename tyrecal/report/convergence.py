@@ -107,7 +107,7 @@ def draw_deviations(modes: Sequence[FittedMode]) -> Figure:
     axes.hlines(rows, before, after, color=GREY, lw=1.2)
     axes.plot(before, rows, "s", color=COLOURS[1], mfc="white", ms=5, label="initial")
     axes.plot(after, rows, "o", color=COLOURS[0], ms=5, label="fitted")
-    axes.set_yticks(rows, [mode.label.said for mode in modes])
+    axes.set_yticks(rows, [mode.label.display for mode in modes])
     axes.invert_yaxis()
     axes.set_xlabel("deviation from target, %")
     axes.legend(frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
@@ -119,7 +119,7 @@ def draw_states(fit: FitResult) -> Figure:
     """Deviations after a fit over several states, a column a state; bars: one standard deviation of
     the measured value."""
     states = list(dict.fromkeys(each.state for each in fit.modes))
-    name = lambda mode: f"{mode.label.said} {mode.symmetry or ''}".rstrip()
+    name = lambda mode: f"{mode.label.display} {mode.symmetry or ''}".rstrip()
     names = list(dict.fromkeys(map(name, fit.modes)))
     figure = new_figure(1.6 + 1.7 * len(states), 1.3 + 0.26 * len(names))
     grid = figure.subplots(1, len(states), sharex=True, sharey=True, squeeze=False)[0]

@@ -98,8 +98,8 @@ def _answer(study: DiagnosedCase) -> Iterator[str]:
     if d.exchanged:
         a, b = d.exchanged
         yield (
-            f"The file has the labels {a.said} and {b.said} the wrong way round, as far as the"
-            " model can tell (look at the shapes again); what follows has them exchanged."
+            f"The file has the labels {a.display} and {b.display} the wrong way round, as far as"
+            " the model can tell (look at the shapes again); what follows has them exchanged."
         )
     if v.kind == NAMED and v.key:
         ids = v.key.split("+")

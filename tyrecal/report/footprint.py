@@ -31,7 +31,7 @@ CURVES = {  # key of a row: words, unit over SI
 
 
 def draw_footprint(rows: Sequence[FootprintRow], patches: Sequence[PatchData]) -> dict[str, Figure]:
-    """By name: footprint and, all in one scale, footprint_DESIGN."""
+    """Figures by name: footprint and, all in one scale, footprint_DESIGN."""
     highest = max(row.peak_pressure_Pa for row in rows) / 1e3
     figures = {"footprint": draw_curves(rows)}
     for design in dict.fromkeys(patch.design for patch in patches):

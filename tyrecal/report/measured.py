@@ -42,7 +42,7 @@ def measured_table(runs: Sequence[ModalTest]) -> Table:
             label, sigma = labelled.judged.label, labelled.mode.sigma_Hz
             member = f" member {labelled.member}" if labelled.member else ""
             table.add_row(
-                Text(f"{label.said}{member}" if label else "-"),
+                Text(f"{label.display}{member}" if label else "-"),
                 f"{labelled.mode.frequency_Hz:.2f}",
                 f"{sigma:.3f}" if np.isfinite(sigma) else "-",
                 f"{100 * labelled.mode.damping:.2f}" if np.isfinite(labelled.mode.damping) else "-",
@@ -57,9 +57,9 @@ def sensors_words(alike_labels: Mapping[Label, Sequence[Label]]) -> str:
     lines = []
     for c in sorted({label.c for label in alike_labels}):
         mine = {label: alike for label, alike in alike_labels.items() if label.c == c}
-        right = ", ".join(label.said for label, alike in mine.items() if not alike)
+        right = ", ".join(label.display for label, alike in mine.items() if not alike)
         wrong = [
-            f"cannot tell {label.said}, it looks like {_few(alike)}"
+            f"cannot tell {label.display}, it looks like {_few(alike)}"
             for label, alike in mine.items()
             if alike
         ]
@@ -69,7 +69,7 @@ def sensors_words(alike_labels: Mapping[Label, Sequence[Label]]) -> str:
 
 def _few(labels: Sequence[Label], most: int = 4) -> str:
     more = len(labels) - most
-    return ", ".join(label.said for label in labels[:most]) + (
+    return ", ".join(label.display for label in labels[:most]) + (
         f" and {more} more" if more > 0 else ""
     )
 
@@ -116,7 +116,7 @@ def _draw_functions(axes: Axes, run: ModalTest) -> None:
         hertz = labelled.mode.frequency_Hz
         axes.axvline(hertz, color=COLOURS[0], lw=0.7, ls=(0, (4, 3)))
         level = level + 1 if hertz - before < 0.08 * (f[-1] - f[0]) else 0
-        name = labelled.judged.label.said if labelled.judged.label else "?"
+        name = labelled.judged.label.display if labelled.judged.label else "?"
         axes.annotate(
             name,
             (hertz, 1.0),
@@ -177,9 +177,8 @@ def _draw_shape(axes: Axes, labelled: LabelledMode) -> None:
     axes.set_axis_off()
     axes.set_xlim(-1.45, 1.45)
     axes.set_ylim(-1.45, 1.45)
-    name = (
-        f"{label.said if label else 'not told'}{' ' + labelled.member if labelled.member else ''}"
-    )
+    member = f" {labelled.member}" if labelled.member else ""
+    name = f"{label.display if label else 'not told'}{member}"
     axes.set_title(f"{name}, {labelled.mode.frequency_Hz:.2f} Hz", fontsize=9)
     axes.text(
         0,

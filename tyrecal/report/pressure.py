@@ -114,7 +114,7 @@ def name_lines(axes: Axes, ends: Sequence[tuple[float, float, Label]], gap: floa
     place = apart([(y - low) / (high - low) for y, _, _ in ends], gap)
     for (y, x, label), height in zip(ends, place, strict=True):
         axes.annotate(
-            label.said,
+            label.display,
             (x, y),
             xytext=(1.03, height),
             textcoords="axes fraction",

@@ -17,7 +17,7 @@ AT_BOUND = 1e-6  # of a bound, up to which the box ends at it
 
 
 def figures(result: SampleResult) -> dict[str, Figure]:
-    """By name."""
+    """Figures of a sample, by name."""
     return {"sample_corner": draw_corner(result)}
 
 

@@ -195,7 +195,7 @@ def _colour(place: PartChange | None) -> tuple[float, ...]:
 
 
 def _signed(value: float, digits: int) -> str:
-    """With a sign, a true minus, and no -0."""
+    """A number with a sign, a true minus, and no -0."""
     text = f"{round(value, digits) + 0.0:+.{digits}f}"
     return text.replace("-", MINUS)
 

@@ -36,7 +36,7 @@ def draw_signature(signature: Signature) -> Figure:
         axes.margins(y=0.15)
         axes.set_title(f"{signature.pressures_kPa[k]:g} kPa", loc="left", fontsize=9, color="0.3")
     figure.supylabel("change of frequency, %", fontsize=9)
-    panels[-1].set_xticks(places, [label.said.replace(" ", "\n") for label in signature.labels])
+    panels[-1].set_xticks(places, [label.display.replace(" ", "\n") for label in signature.labels])
     size = f"{effect.symbol} = {signature.value:.4g} {effect.unit}".strip()
     absorbed = (
         f": calibration absorbs {100 * signature.absorbed:.1f} %" if signature.absorbed else ""

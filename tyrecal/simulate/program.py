@@ -35,7 +35,8 @@ def join_command(words: Sequence[str], windows: bool = WINDOWS) -> str:
 
 
 def _split_for_windows(text: str) -> list[str]:
-    r"""As Microsoft documents it for C programs ("Parsing C command-line arguments").
+    r"""Split a command line as Microsoft documents it for C programs ("Parsing C command-line
+    arguments").
 
     Words end at blanks outside quotation marks, and backslashes are letters, except before a
     quotation mark: 2k of them are k, 2k + 1 are k and a quotation mark that is a letter. Inside a

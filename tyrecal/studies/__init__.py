@@ -31,8 +31,8 @@ RESULT_TYPES = {  # in the order of a page
 
 
 def result_types() -> dict[str, type[Result]]:
-    """By the name of the study, those from outside last; one that cannot be loaded is named and
-    left out."""
+    """Types of results by the name of the study, those from outside last; one that cannot be loaded
+    is named and left out."""
     from ..tyre.plugins import load_plugin
 
     types = {name: named(place) for name, place in RESULT_TYPES.items()}

@@ -62,7 +62,7 @@ class Refitted(ResultPart):
     after: float
 
     @property
-    def said(self) -> str:
+    def display(self) -> str:
         """How far it moves."""
         if not self.before:
             return f"{self.after - self.before:+.3g}"
@@ -173,7 +173,7 @@ class Effects(Result):
                 mass.cell(each.mass_kg),
                 *map(percent.cell, (each.before_percent, each.after_percent)),
                 absorbed.cell(each.absorbed),
-                *(moved.said for moved in each.refitted.values()),
+                *(moved.display for moved in each.refitted.values()),
             ]
             for each in self.rows
         ]
@@ -191,7 +191,7 @@ class Effects(Result):
         middle = first[len(first) // 2].pressure_kPa
         labels = dict.fromkeys(m.label for e in self.rows for row in e.rows for m in row.modes)
         change, share = Column("left", "+.1f"), Column("absorbed, %", ".0f", 100.0)
-        heads = [each for x in labels for each in (Column(x.said), change)]
+        heads = [each for x in labels for each in (Column(x.display), change)]
         rows = []
         for each in self.rows:
             size = f"{each.symbol} = {each.value:.4g} {each.unit}".rstrip()

@@ -111,13 +111,13 @@ def run(
     """Every design at rising loads: the result, and what was reached, with the sections' meshes.
     Raises as ``press`` does; the result has no rows where no design bore the first load."""
 
-    def told(design: str, outcome: PressOutcome) -> None:
+    def notify_outcome(design: str, outcome: PressOutcome) -> None:
         reached, failure = progress(outcome)
         if failure:
             notify(f"{design}, {loads_N[reached]:g} N", failure)
         notify(f"{design}: {reached} loads", None)
 
-    outcomes = press(evaluator, designs, loads_N, jobs, told)
+    outcomes = press(evaluator, designs, loads_N, jobs, notify_outcome)
     pressed = {name: each for name, each in outcomes.items() if isinstance(each, Pressed)}
     meshes = {name: TyreDesign(case, designs[name]).tyre.mesh for name in pressed}
     return footprint_result(designs, loads_N, outcomes, meshes), pressed, meshes

@@ -28,9 +28,9 @@ class LabelProbability(ResultPart):
         return None if self.c is None or self.m is None else Label(self.c, self.m, self.kind)
 
     @property
-    def said(self) -> str:
-        """In words."""
-        return self.label.said if self.label else FOREIGN_WORDS
+    def display(self) -> str:
+        """Label in words."""
+        return self.label.display if self.label else FOREIGN_WORDS
 
 
 class LabelledFrequency(LabelProbability):
@@ -46,7 +46,7 @@ class LabelledFrequency(LabelProbability):
 
     @property
     def state(self) -> str:
-        """In words."""
+        """State in words."""
         return state_words(self.pressure_kPa, 0.0, self.rim)
 
 
@@ -79,10 +79,10 @@ class Labels(ResultPart):
             [
                 each.state,
                 f"{each.frequency_Hz:.1f}",
-                each.said,
+                each.display,
                 None if each.expected_Hz is None else f"{each.expected_Hz:.1f}",
                 f"{100 * each.probability:.1f}",
-                ", ".join(f"{r.said} {100 * r.probability:.1f} %" for r in each.rivals),
+                ", ".join(f"{r.display} {100 * r.probability:.1f} %" for r in each.rivals),
             ]
             for each in self.frequencies
         ]

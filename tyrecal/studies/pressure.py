@@ -180,7 +180,7 @@ def _family(name: str, rises: Mapping[Label, float]) -> dict[str, Any]:
 
 
 def _words(findings: Mapping[str, Any], labels: Sequence[Label]) -> list[str]:
-    names = {str(label): label.said for label in labels}
+    names = {str(label): label.display for label in labels}
     modes = list(zip(names.values(), findings["modes"], strict=True))
     span = f"from {findings['from_kPa']:g} to {findings['to_kPa']:g} kPa"
     falling = [name for name, mode in modes if not mode["rises"]]

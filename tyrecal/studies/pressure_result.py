@@ -148,14 +148,14 @@ def run(
     """Every design at every pressure; with ``fit`` the standard errors of the design "fitted".
     Raises as ``sweep`` does, and the first failure where no pressure could be evaluated."""
 
-    def told(outcome: SweepOutcome) -> None:
+    def notify_outcome(outcome: SweepOutcome) -> None:
         place = f"{outcome.design}, {outcome.pressure_kPa:g} kPa"
         if isinstance(outcome, Failure):
             notify(place, outcome.failed)
         else:
             notify(f"{place}: {len(outcome.modes)} modes", None)
 
-    outcomes = sweep(case, evaluator, designs, pressures_kPa, jobs, told)
+    outcomes = sweep(case, evaluator, designs, pressures_kPa, jobs, notify_outcome)
     result = sweep_result(case, designs, outcomes)
     if fit and fit.responses and FITTED in designs:
         return _with_errors(result, case, evaluator, fit, jobs)

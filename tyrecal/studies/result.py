@@ -69,7 +69,7 @@ class ResultPart(BaseModel):
 
     @classmethod
     def columns(cls) -> dict[str, Column]:
-        """By field, those that tables show."""
+        """Columns that tables show, by field."""
         return {
             key: each
             for key, field in cls.model_fields.items()
@@ -152,7 +152,7 @@ class Result(ResultPart):
         return []
 
     def numbers(self) -> list[Table]:
-        """More of them, for the page alone."""
+        """Further tables, for the page alone."""
         return []
 
     def sentences(self) -> list[str]:
@@ -160,7 +160,7 @@ class Result(ResultPart):
         return self._words(slice(None))
 
     def summary(self) -> list[str]:
-        """The same in short, for the head of the page: of the last design, the fitted one."""
+        """Sentences in short, for the head of the page: of the last design, the fitted one."""
         return self._words(slice(-1, None), "; ")
 
     def _words(self, chosen: slice, between: str = "") -> list[str]:
@@ -207,7 +207,7 @@ def silent(words: str, failure: EvaluationFailed | None) -> None:
 def not_reached(
     loads_N: Sequence[float], progress: Mapping[str, tuple[int, EvaluationFailed | None]]
 ) -> list[Failed]:
-    """By design, how many loads were reached, and why no more."""
+    """Loads that were not reached, one per design, with the reason."""
     return [
         Failed(design=name, load_N=loads_N[count], cause=failure.cause, words=failure.words)
         for name, (count, failure) in progress.items()

@@ -58,7 +58,7 @@ def read_text_table(path: Path) -> TextTable:
 
 
 def _checked(table: TextTable) -> TextTable:
-    """The same. Raises InputError where it is empty or a cell is too long."""
+    """The table, checked. Raises InputError where it is empty or a cell is too long."""
     if not table.lines:
         raise InputError("the file is empty", 1)
     for line, cells in table.lines:

@@ -43,7 +43,7 @@ class TyreState:
 
     @property
     def unloaded(self) -> TyreState:
-        """The same without a load."""
+        """The state without a load."""
         return replace(self, load_N=0.0)
 
     def of(self, case: LoadedCase) -> TyreState:
@@ -55,7 +55,7 @@ class TyreState:
             None if self.rim == rim_of(case) else self.rim,
         )
 
-    def told(self, case: LoadedCase) -> TyreState:
+    def with_defaults(self, case: LoadedCase) -> TyreState:
         """The state with the case's own pressure and rim in the places of None."""
         pressure = case.case.pressure_kPa if self.pressure_kPa is None else self.pressure_kPa
         return TyreState(pressure, self.load_N, self.rim or rim_of(case))

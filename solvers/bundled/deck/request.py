@@ -114,7 +114,7 @@ def _sensitivities(key: str, value: Any) -> None:
 
 
 def _plainly_right(row: Any) -> bool:
-    """As every program writes the rows, of which nodes that move have thousands."""
+    """Whether the rows are as every program writes them; nodes that move have thousands."""
     if not (isinstance(row, list) and [type(each) for each in row] == [str, int, int, float]):
         return False
     job, line, place, slope = row

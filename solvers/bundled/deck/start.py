@@ -23,7 +23,7 @@ COMMENT = re.compile(r"^\*\* Newton's method starts from (\S+), SHA-256 ([0-9a-f
 
 
 class PressedShape(Protocol):
-    """Another tyre of the same mesh on the road, whose state is a good start."""
+    """State of another tyre of the same mesh on the road, which is a good start."""
 
     texts: Mapping[str, str]
     """Its decks, file name to text."""

@@ -118,8 +118,8 @@ def assemble(
     mass: Array,
     air: Coupling | None,
 ) -> Border:
-    """From the rim's ``fields`` T (nodes, 3, q), K T and M T (nodes, 3, q), and the wheel's own
-    stiffness and mass (q,)."""
+    """Assemble the border from the rim's ``fields`` T (nodes, 3, q), K T and M T (nodes, 3, q), and
+    the wheel's own stiffness and mass (q,)."""
     on_band = numbering.gather(stiffness)
     real = np.isrealobj(on_band)  # on half of the section products of kept fields are real
 

@@ -41,7 +41,7 @@ class Combination(Protocol):
         """d lambda / dp (m,) from the forms (m,) and what else has p's tangent."""
 
     def where(self, keep: Array | slice) -> Combination:
-        """That of some of the modes."""
+        """Combinations of some of the modes."""
 
 
 @dataclass
@@ -80,11 +80,11 @@ class HarmonicModes:
         return np.full(modes, self.n), self.shapes, np.arange(modes), self.eigenvalues
 
     def below(self, frequency_Hz: float) -> HarmonicModes:
-        """Those up to a frequency."""
+        """The modes up to a frequency."""
         return self.where(self.eigenvalues <= (2 * np.pi * frequency_Hz) ** 2)
 
     def where(self, keep: Array | slice) -> HarmonicModes:
-        """Those of a mask or slice."""
+        """The modes of a mask or slice."""
         rim, air = (a[keep] if len(a) else a for a in (self.rim, self.air))
         members = None if self.members is None else self.members[keep]
         combination = self.combination.where(keep) if self.combination else None
@@ -137,7 +137,7 @@ class Vibration:
             self._shifted_mass = numbering.assemble(three)
 
     def at(self, ratios: Array) -> Vibration:
-        """The same with the modulus ratios of the model's laws of frequency (l,)."""
+        """The vibration with the modulus ratios of the model's laws of frequency (l,)."""
         other = copy.copy(self)
         other.weights = np.concatenate([[1.0], np.asarray(ratios) - 1])
         other._borders = {}

@@ -38,7 +38,7 @@ class Wheel:
     inertia: dict[str, Scalar]  # per motion, kg or kg m2; absent = 0
 
     def motions(self, n: int) -> list[str]:
-        """Those of harmonic n that are free."""
+        """The free motions of harmonic n."""
         return [name for name in MOTIONS.get(n, ()) if name in self.free]
 
     def fields(self, n: int, X: Array) -> tuple[Array, Array]:

@@ -108,7 +108,7 @@ class FullCircle:
         self._more = mass(sector.model) - vibration.mass
 
     def turning(self, turn: float) -> FullCircle:
-        """The same of other fields."""
+        """A copy for the fields that half a turn multiplies by ``turn``."""
         other = copy.copy(self)
         other.turn = turn
         return other

@@ -64,7 +64,7 @@ class FlatRoad:
         return begin, end
 
     def gap(self, points: Points) -> Array:
-        """To the road at the last load (i, j, p), 0 where it touched, m."""
+        """Gap to the road at the last load (i, j, p), 0 where it touched, m."""
         return np.maximum(self.height - points.positions(self.U)[..., 0], 0.0)
 
     def share(self, points: Points, height: float) -> tuple[Array, Array]:

@@ -173,7 +173,7 @@ class ContactNewton:
         return lowest.in_words(self.tyre.model.mesh.X)
 
     def depth(self) -> str:
-        """In words, how far down the last load reached has pressed the tyre; "" before any."""
+        """How far down the last load reached has pressed the tyre, in words; "" before any."""
         down, most = self.free_radius - self.height, self.free_radius - self.flat
         return f" ({1e3 * down:.0f} of {1e3 * most:.0f} mm down to the rim)" if self.load else ""
 
@@ -204,8 +204,8 @@ class ContactNewton:
         return self.tyre.potential() + contact.energy + load / 2 * height
 
     def _newton(self, load: float) -> PressedState:
-        """With Coulomb's friction from where the last load's stiffness points; where that does not
-        converge, by Tresca's friction, with the last normal forces, to where it does."""
+        """Solve with Coulomb's friction from where the last load's stiffness points; where that
+        does not converge, with Tresca's friction, with the last normal forces, to where it does."""
         state = self._from_first_guess(load)
         parts, height = self.parts, self.height
         self._stale = self._factor is not None and load > SAME_FACTOR * self._formed_at
@@ -268,7 +268,7 @@ class ContactNewton:
     def _solve_tresca(
         self, parts: Array, height: float, load: float, bound: Bound, tolerance: float
     ) -> tuple[Array, float, Contact]:
-        """By Tresca's friction; a hard stick is approached by softer ones."""
+        """Solve with Tresca's friction; a hard stick is approached by softer ones."""
         road = self.road
         slips = [road.elastic_slip]
         while slips[0] < SOFT_ELASTIC_SLIP:
@@ -414,7 +414,7 @@ class Tangent:
 
     @classmethod
     def of(cls, contact: Contact, symmetry: HalfTurn) -> Tangent:
-        """At a contact."""
+        """The tangent at a contact."""
         column, row = (symmetry.gather(f) for f in (contact.by_height(), contact.force_by_height()))
         return cls(contact, contact.matrix(), column, row, contact.stiffness)
 

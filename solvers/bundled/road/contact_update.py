@@ -35,7 +35,7 @@ class ContactUpdate:
         self._active = np.zeros(0, int)
 
     def copy(self) -> ContactUpdate:
-        """The same, whose further columns are its own."""
+        """A copy whose further columns are its own."""
         other = copy(self)
         other._column, other._blocks = self._column.copy(), list(self._blocks)
         return other

@@ -61,7 +61,8 @@ class Dissection:
         self._functions = _ranges(pieces, symmetry.mask.shape[1])
 
     def fronts(self, coupled: int) -> list[Front]:
-        """In the order of elimination; from the column ``coupled`` on the parts go together."""
+        """Fronts in the order of elimination; from the column ``coupled`` on the parts go
+        together."""
         fronts: list[Front] = []
         columns, pieces = len(self.columns), len(self.symmetry.around.pieces)
         self._cut(fronts, (0, 1), (0, columns), (0, pieces), coupled)
@@ -134,7 +135,8 @@ def _ranges(groups: list[Array], count: int) -> Array:
 
 
 def _columns(connectivities: list[Array], symmetry: HalfTurn) -> tuple[list[Column], Array, Array]:
-    """From the bead on; the nodes (q,) in that order, and of each the first and last column."""
+    """Columns from the bead on; the nodes (q,) in that order, and of each the first and last
+    column."""
     place = np.full(symmetry.shape[1], -1)
     place[symmetry.nodes] = np.arange(len(symmetry.nodes))
     other = symmetry.other

@@ -71,7 +71,7 @@ class HalfTurn:
         return U
 
     def gather(self, F: Array) -> Array:
-        """Its transpose: forces on the two parts, zero on what is held."""
+        """Transpose of `spread`: forces on the two parts, zero on what is held."""
         here, there = F[:, self.nodes], self.parity * MIRROR_SIGNS * F[:, self.beyond]
         there[:, self._middle] = 0.0
         return self._both(here, there) * self.mask

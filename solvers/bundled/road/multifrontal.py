@@ -84,7 +84,7 @@ class Elimination:
         return stiff.reshape(int(np.prod(size)), -1)
 
     def _cell(self, tangents: Tangents, parts: tuple[int, ...], column: int, piece: int) -> Array:
-        """The same of one cell (g, f, m, g, f, m)."""
+        """Stiffness of the elements of one cell (g, f, m, g, f, m)."""
         its, around = self.dissection.columns[column], self.symmetry.around.pieces[piece]
         f = around.functions.stop - around.functions.start
         m = 3 * (its.nodes.stop - its.nodes.start)

@@ -54,7 +54,7 @@ class Slopes:
         self.paths = {name: _Path(own, around, faces, road) for name, own in numbers.items()}
 
     def follow(self, work: ContactNewton, state: PressedState) -> None:
-        """To the state that slip counts from next. Raises NoEquilibrium."""
+        """Follow the paths to the state from which slip counts next. Raises NoEquilibrium."""
         if self.paths:
             tangent = Tangent.of(state.contact, work.symmetry)
         for path in self.paths.values():
@@ -88,7 +88,7 @@ class _Path:
         self.since: dict[str, Array | float] = {}  # of the road: the state before
 
     def follow(self, work: ContactNewton, state: PressedState, tangent: Tangent) -> None:
-        """From the state before to this one."""
+        """Follow the path from the state before to this one."""
         contact = state.contact
         self.since = {"U": self.U, "elastic": self.elastic, "height": self.height}
         self.U, self.height = 0 * self.U, 0.0

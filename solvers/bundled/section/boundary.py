@@ -124,7 +124,7 @@ def _free(mesh: DeckMesh, step: DeckStep) -> Array:
 
 
 def rim_freedoms(mesh: DeckMesh, step: DeckStep, reference: int) -> set[int]:
-    """Those of the degrees of freedom 1 to 6 of a rim's reference node that are not held."""
+    """Degrees of freedom 1 to 6 of a rim's reference node that are not held."""
     held: set[int] = set()
     for row in step.held:
         if _names(mesh, row, reference):

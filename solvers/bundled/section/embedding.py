@@ -43,11 +43,11 @@ class Guest:
         return self.nodes[self.kept]
 
     def renumbered(self, new: Array) -> Guest:
-        """The same with the nodes' new rows."""
+        """A copy with the nodes' new rows."""
         return replace(self, nodes=new[self.nodes])
 
     def weights(self, X: Array) -> Array:
-        """Those of `rows`; X (n, 2) of all nodes, with tangents or without."""
+        """Weights of the nodes in `rows`; X (n, 2) of all nodes, with tangents or without."""
         xi = self.xi
         for _ in range(2 if np.iscomplexobj(X) or np.iscomplexobj(self.X) else 0):
             xi = xi + _step(self.kind, X[self.nodes], self.X, xi)
@@ -76,7 +76,7 @@ class Embedded:
         return result
 
     def renumbered(self, new: Array) -> Embedded:
-        """The same with the nodes' new rows."""
+        """A copy with the nodes' new rows."""
         points = np.where(self.points < 0, self.points, new[self.points])
         return replace(self, points=points, rows=new[self.rows])
 

@@ -25,7 +25,7 @@ def half_mesh(mesh: DeckMesh) -> DeckMesh | None:
 
 
 def _half_like(mesh: DeckMesh, like: DeckMesh) -> DeckMesh | None:
-    """That of a mesh whose nodes' tangents alone are others."""
+    """Half mesh of a mesh that differs in the nodes' tangents alone."""
     if (half := half_mesh(like)) is None:
         return None
     assert isinstance(half.symmetry, MirrorHalf)

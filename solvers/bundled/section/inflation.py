@@ -134,7 +134,8 @@ class _Solver:
 
 
 def _by_stiffness(solve: _Solver, start: Array, check: Callable[[], None]) -> Array | None:
-    """From rubber ``STIFFENING`` times as stiff down to its own stiffness, in adaptive factors."""
+    """Inflate from rubber ``STIFFENING`` times as stiff down to its own stiffness, in adaptive
+    factors."""
     stiffness, factor = STIFFENING, STIFFENING
     U = solve(start, 1.0, stiffness, MAX_ITERATIONS)
     while U is not None and stiffness > 1.0:

@@ -26,7 +26,7 @@ class Model:
     tables: list[ModulusTable] = field(default_factory=list)  # moduli at each mode's own frequency
 
     def with_laws(self, change: Callable[[EnergyLaw], EnergyLaw]) -> Model:
-        """The same with changed laws."""
+        """The model with changed laws."""
         parts = [replace(p, law=change(p.law)) if isinstance(p, Elastic) else p for p in self.parts]
         return replace(self, parts=parts)
 

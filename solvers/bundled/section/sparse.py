@@ -68,7 +68,7 @@ class Sparse:
         return Sparse(self.entries.imag[keep], self.columns[keep], starts)
 
     def diagonal(self) -> Array:
-        """Its entries (n,) on the diagonal; 0 where there is none."""
+        """Entries (n,) on the diagonal; 0 where there is none."""
         diagonal = np.zeros(len(self.starts) - 1, self.entries.dtype)
         on = self._rows == self.columns
         diagonal[self.columns[on]] = self.entries[on]

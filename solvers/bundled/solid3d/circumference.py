@@ -54,7 +54,7 @@ class Piece:
 
 @dataclass(frozen=True)
 class HalfCircle(Circumference):
-    """From the road's side (angle 0) to the top (pi).
+    """Functions and stations from the road's side (angle 0) to the top (pi).
 
     A field's coefficients (k, ...) are its values at the nodes, then those of its even and of its
     odd waves: a field that is even about the patch has the rows ``even`` of them alone, an odd one
@@ -126,7 +126,7 @@ def half_circle(lengths: Array, highest: int = 0) -> HalfCircle:
 
 
 def waves_beyond(lengths: Array) -> HalfCircle:
-    """In place of elements from 0 to pi: the short ones near the patch, one more, then waves."""
+    """Elements near the patch, one more, then waves, in place of elements from 0 to pi."""
     short = list(takewhile(lambda length: length <= MAX_NEAR_LENGTH, lengths))
     near = [
         length

@@ -102,7 +102,7 @@ def _worst(fit: FitResult) -> str:
     if not fit.modes:
         return NOTHING
     worst = max(fit.modes, key=lambda mode: abs(mode.deviation_percent))
-    return f"{worst.label.said} {_graded(fit, _aim(worst))}{NB}%"
+    return f"{worst.label.display} {_graded(fit, _aim(worst))}{NB}%"
 
 
 def _aim(mode: FittedMode) -> tuple[str, str]:
@@ -123,7 +123,7 @@ def _variable(fit: FitResult, name: str) -> str:
 
 
 def _deviations(fit: FitResult) -> dict[tuple[str, str], float]:
-    """In %, by what was aimed at."""
+    """Deviations in per cent, by target."""
     return {_aim(mode): mode.deviation_percent for mode in fit.modes} | {
         (each.state, ROAD_QUANTITIES[each.quantity].name.split(",")[0]): each.deviation_percent
         for each in fit.others

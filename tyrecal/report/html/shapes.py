@@ -67,7 +67,7 @@ def _loaded(shapes: Shapes) -> dict[str, Any]:
 def _named(mode: Shape) -> dict[str, str]:
     symmetry = f" {mode.symmetry}" if mode.symmetry else ""
     return {
-        "name": Label(mode.c, mode.m, mode.kind).said + symmetry,
+        "name": Label(mode.c, mode.m, mode.kind).display + symmetry,
         "hertz": f"{mode.frequency_Hz:.2f} Hz",
         "words": mode.label.motion,
     }

@@ -117,7 +117,7 @@ def effect_words(effect: EffectResult) -> str:
 
 
 def sentence(words: str) -> str:
-    """With a capital and a full stop."""
+    """Make a sentence with a capital and a full stop."""
     return words[:1].upper() + words[1:] + ("" if words.endswith((".", "!", "?")) else ".")
 
 

@@ -20,7 +20,7 @@ from ...tyre.section.mesh import SectionMesh
 from .own import own_section
 
 FIRST_WHEEL_ELEMENT = 999_000_001  # beyond all that a revolve makes
-LOWEST_HZ, SHIFT = 1.0, -100.0  # of a free wheel's modes: above its rigid motions; 1/s2
+MIN_MODE_HZ, SHIFT = 1.0, -100.0  # of a free wheel's modes: above its rigid motions; 1/s2
 GAS = "CAVITY_GAS"
 ATMOSPHERE = 101_325.0  # Pa
 GASES = {  # specific gas constant (J/kg/K) and ratio of specific heats at 20 C
@@ -269,7 +269,7 @@ def wheel(rim: Rim) -> dict[str, Any]:
         },
         "springs": numbered,
         "held": [] if rim.free else [dof for dof in range(1, 7) if dof not in moving],
-        "search": {"lowest": LOWEST_HZ, "shift": SHIFT} if rim.free else None,
+        "search": {"lowest": MIN_MODE_HZ, "shift": SHIFT} if rim.free else None,
     }
 
 

@@ -45,7 +45,7 @@ class DecksDesign:
 
     @property
     def pressure_kPa(self) -> float:
-        """That of the case, which counts in place of the decks'."""
+        """Pressure of the case, which counts in place of the decks'."""
         return self.case.case.pressure_kPa
 
     @property

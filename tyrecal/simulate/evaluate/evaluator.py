@@ -356,7 +356,7 @@ class Evaluator:
         return answers
 
     def worker(self) -> Evaluator:
-        """The same for another process, wherever it is, with counts of its own."""
+        """A copy for another process, wherever it is, with counts of its own."""
         folder = self.folder.absolute() if self.folder else None
         return Evaluator(
             self.design,
@@ -370,7 +370,7 @@ class Evaluator:
         )
 
     def of(self, design: Design) -> Evaluator:
-        """The same, counts and listener too, for another tyre's designs."""
+        """A copy for another tyre's designs, with the same counts and listener."""
         other = self.worker()
         other.design, other.counts, other.on_progress = design, self.counts, self.on_progress
         return other

@@ -76,7 +76,7 @@ class Pool(ProcessPoolExecutor):
 
 
 def first_done(futures: Collection[Future[Any]]) -> set[Future[Any]]:
-    """Those that are done, once one is. An interruption does not meet the locks that are shared
+    """Futures that are done, once one is. An interruption does not meet the locks that are shared
     with the thread that reads the answers: torn there, it would end that thread."""
     while True:
         with defer_interrupts():
@@ -142,7 +142,7 @@ def _deaf_children() -> Iterator[None]:
 
 
 def _tell_to_end(worker: BaseProcess) -> None:
-    """With what it has started: `_work` sees to that where there are signals."""
+    """End a worker with what it has started: `_work` sees to that where there are signals."""
     if sys.platform == "win32":
         command = ["taskkill", "/T", "/F", "/PID", str(worker.pid)]
         subprocess.run(command, capture_output=True, check=False)

@@ -78,7 +78,7 @@ class _Failure(_Part):
 
 
 class _Mode(_Part):
-    """As `Solver.read` gives it: on the section (n, amplitude) or in three dimensions."""
+    """A mode as `Solver.read` gives it: on the section (n, amplitude) or in three dimensions."""
 
     frequency_Hz: Hertz
     multiplicity: Annotated[Any, _shaped("iu", least=0, most=2)]

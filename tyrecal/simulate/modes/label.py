@@ -71,7 +71,7 @@ class Label:
         return FAMILIES[self.m] if self.m < 2 else None
 
     @property
-    def said(self) -> str:
+    def display(self) -> str:
         """Name for people; files and options have the label itself: ``axial`` is lateral."""
         return in_words(str(self))
 

@@ -36,7 +36,7 @@ class Member:
     symmetry: str
 
     def __str__(self) -> str:
-        return f"{self.label.said} {self.symmetry}"
+        return f"{self.label.display} {self.symmetry}"
 
 
 @dataclass(frozen=True)

@@ -19,13 +19,13 @@ def match(modes: Sequence[Mode], targets: Sequence[Label]) -> dict[Label, Mode]:
     if lost:
         waves = {label.c for label in lost}
         near = [
-            f"{mode.label.said} at {mode.frequency_Hz:.2f} Hz"
+            f"{mode.label.display} at {mode.frequency_Hz:.2f} Hz"
             for mode in sorted(modes, key=lambda mode: mode.frequency_Hz)
             if mode.label.c in waves
         ]
         raise EvaluationFailed(
             "lost_label",
-            f"no mode is {', '.join(label.said for label in lost)}; with"
+            f"no mode is {', '.join(label.display for label in lost)}; with"
             f" {' or '.join(map(str, sorted(waves)))} waves round the circumference there"
             f" {'are ' + ', '.join(near) if near else 'is none'}",
         )

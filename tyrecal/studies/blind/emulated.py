@@ -35,7 +35,7 @@ HUBER, MIN_SCALE = 2.0, 1e-5  # a weight falls beyond so many medians; of ln f, 
 
 @dataclass(frozen=True)
 class Polynomial:
-    """In the design variables t."""
+    """Polynomial in the design variables t."""
 
     powers: Array  # (k, v)
     coefficients: Array  # (k, n)
@@ -89,7 +89,7 @@ class Emulated:
         self._couplings = couplings
 
     def answers(self, points: Sequence[Query]) -> list[Answer | Exception]:
-        """From the polynomials; from the model where an effect has none."""
+        """Answers from the polynomials; from the model where an effect has none."""
         far = [i for i, point in enumerate(points) if not set(point.effects) <= set(self._effects)]
         far_answers = self.model.answers([points[i] for i in far]) if far else []
         known = dict(zip(far, far_answers, strict=True))

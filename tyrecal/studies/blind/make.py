@@ -168,7 +168,7 @@ def _make(protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth) -> T
 def _again(
     truth: Truth, case: LoadedCase, protocol: Protocol, random: np.random.Generator
 ) -> Truth:
-    """The same trial with other design variables and constants."""
+    """A trial like the given one with other design variables and constants."""
     rules, own_sources = replace(protocol, counts={"none": 1}), sources(case)[0]
     (other,) = draw(rules, case, own_sources, {}, {}, int(random.integers(2**63)))
     return replace(truth, variables=other.variables, constants=other.constants)

@@ -30,7 +30,7 @@ class Maker(Protocol):
 
     @property
     def about(self) -> str:
-        """In words, for the protocol."""
+        """Description of the maker for the protocol."""
 
     @property
     def laws(self) -> Mapping[str, EffectLaw]:

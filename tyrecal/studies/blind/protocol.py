@@ -30,8 +30,8 @@ class Protocol:
     smallest: float = 0.2  # least size, as a share of an effect's range
 
     def about(self, pressure_kPa: float) -> Protocol:
-        """The same rules at two thirds, all and four thirds of a tyre's pressure, held out between
-        the first two."""
+        """Rules of the protocol at two thirds, all and four thirds of a tyre's pressure, held out
+        between the first two."""
         low, own, high, between = (round(k * pressure_kPa / 6) for k in (4, 6, 8, 5))
         return replace(self, given_kPa=(low, own, high), held_out_kPa=between)
 

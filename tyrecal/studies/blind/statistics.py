@@ -32,7 +32,7 @@ def _calibration_errors(stated: Array, right: Array) -> Array:
 
 
 def calibration_quantile(stated: Array, quantile: float = 0.95, seed: int = 0) -> float:
-    """That quantile of the ECE of as many trials whose stated probabilities are exactly right."""
+    """Quantile of the ECE of as many trials whose stated probabilities are exactly right."""
     random = np.random.default_rng(seed)
     drawn = random.random((SIMULATIONS, len(stated))) < stated
     return float(np.quantile(_calibration_errors(stated, drawn), quantile))

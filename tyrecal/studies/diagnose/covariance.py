@@ -41,7 +41,8 @@ def of_one_mode(rows: tuple[Observable, ...]) -> Array:
 
 @lru_cache(16)
 def between_runs(rows: tuple[Observable, ...]) -> Array:
-    """The same (n, n) of what is alike in all modes and states."""
+    """Correlation (n, n) of an error that is alike in all modes and states, within and between
+    runs."""
     run = np.array([row.run for row in rows])
     result = np.where(run[:, None] == run, 1.0, BETWEEN_RUNS)
     result.flags.writeable = False  # kept for all who ask

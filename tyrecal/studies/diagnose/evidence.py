@@ -294,7 +294,7 @@ def families(problem: InverseProblem) -> list[Family]:
     for label in sorted({row.label for row in rows if row.label}, key=str):
         hit = np.array([row.label == label for row in rows])
         misread = MISREAD**2 * same * np.outer(hit, hit)
-        result.append(Family(f"{label.said} is misread", misread, True))
+        result.append(Family(f"{label.display} is misread", misread, True))
     return result
 
 

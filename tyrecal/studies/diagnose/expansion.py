@@ -92,8 +92,8 @@ class EffectResponse:
         return self.shift_at(ends) / np.sqrt(3 * len(ends))
 
     def beside_at(self, e: Array) -> Array:
-        """By one standard deviation of what else its nature leaves open (q, n): in proportion to
-        the effect."""
+        """Shift by one standard deviation of what else the effect's nature leaves open (q, n): in
+        proportion to the effect."""
         more = np.zeros((len(e), self.shift.shape[1]))
         for end, each in self.beside.items():
             more += np.maximum(e / end, 0.0)[:, None] * each

@@ -87,7 +87,7 @@ class InverseProblem:
     def covariance(
         self, observations: Observations, constants: Array, mixed: Array | None = None
     ) -> Array:
-        """The same of other observations, whose constants (m, k) are given."""
+        """Covariance of other observations, whose constants (m, k) are given."""
         laws = self.expansion.material_laws
         return covariance(observations, constants, laws, self.assumed.form, mixed)
 
@@ -191,7 +191,8 @@ class InverseProblem:
         return by_mode + beside
 
     def laws(self, added: Added) -> tuple[Array, Array]:
-        """The same in two: by their laws mode by mode, and by what their nature leaves open."""
+        """The two parts: by the laws of the effects mode by mode, and by what their nature leaves
+        open."""
         off, beside = (each.transpose(1, 2, 0) for each in (added.off, added.beside))
         by_mode = off @ off.swapaxes(1, 2) * self._alike
         return np.asarray(by_mode), np.asarray(beside @ beside.swapaxes(1, 2))

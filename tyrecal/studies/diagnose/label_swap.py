@@ -80,7 +80,7 @@ def exchange_shifts(observations: Observations) -> Array:
 
 
 def with_exchanged(observations: Observations, a: Label, b: Label) -> Observations:
-    """The same values with labels a and b exchanged, wherever one of them was measured."""
+    """Observations with labels a and b exchanged, wherever one of them was measured."""
     other, rows = {a: b, b: a}, list(observations.rows)
     where = {(row.label, row.state, row.run): i for i, row in enumerate(rows)}
     order = np.arange(len(rows))

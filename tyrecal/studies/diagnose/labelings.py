@@ -118,5 +118,5 @@ def _told(readings: Sequence[Reading], p: Array, k: int, best: int) -> str:
     own = readings[k].labels
     differ = [each for each in own if each not in readings[other].labels]
     hertz = ", ".join(f for f, _ in differ)
-    words = ", ".join(label.said if label else FOREIGN_WORDS for _, label in differ)
+    words = ", ".join(label.display if label else FOREIGN_WORDS for _, label in differ)
     return f"the label of {hertz} ({words}, {p[k]:.2f} probable"

@@ -92,7 +92,7 @@ class ResponseModel(Protocol):
 
     @property
     def sloped_at_0(self) -> Collection[str]:
-        """Effects that it may name where they are 0, and nowhere else."""
+        """Effects that `Query.slopes` may name only where their parameter is 0."""
 
     def answers(self, points: Sequence[Query]) -> list[Answer | Exception]:
         """An answer for each point in order, or why there is none; rows as it was made for."""

@@ -198,7 +198,7 @@ def _absent(problem: InverseProblem, id: str) -> Toggle:
 
 
 def rows_shown(problem: InverseProblem, d: Array, sizes: Mapping[str, Sizes]) -> CandidateRows:
-    """At the rows that are there."""
+    """The measured rows as candidates."""
     shifts = {key: _shifts(problem, each, d) for key, each in sizes.items()}
     return CandidateRows(problem.sigma, problem.plain(d)[1], shifts)
 
@@ -220,7 +220,8 @@ def with_readings(
     ids: Sequence[str],
     sources: Sequence[int],
 ) -> CandidateRows:
-    """With readings of effects' sizes, over their ranges, and of sources of error themselves."""
+    """The rows with readings of effects' sizes, over their ranges, and of sources of error
+    themselves."""
     n, m = len(now.sigma), len(ids) + len(sources)
     spans = [problem.spans[id] for id in ids]
     far = [max(abs(span.low), abs(span.high)) for span in spans]
@@ -248,7 +249,7 @@ def again(
     sizes: Mapping[str, Sizes],
     changes: Sequence[Toggle] = (),
 ) -> CandidateRows:
-    """With one run more, in which something was switched."""
+    """The rows with one run more, in which something was switched."""
     o, run = problem.observations, 1 + max(row.run for row in problem.observations.rows)
     first = np.array([row.run == 0 for row in o.rows])
     more = np.concatenate([np.arange(len(first)), np.flatnonzero(first)])

@@ -41,7 +41,7 @@ def plain_fit(
     def descended(
         x: Array, evaluate: Callable[[Array], Answer | Exception], answer: Answer
     ) -> Array:
-        """From x, where ``answer`` is the model's."""
+        """Descend from x, where ``answer`` is the model's."""
 
         def misfit(x: Array, answer: Answer) -> float:
             r, off = observed.y - answer.eta[rows], (x - model.start) / model.spread
@@ -67,7 +67,7 @@ def plain_fit(
                 return x
         return x
 
-    def told(x: Array, constants: bool = False) -> Answer | Exception:
+    def answer_at(x: Array, constants: bool = False) -> Answer | Exception:
         return model.answers([Query(x, constants=constants)])[0]
 
     def weights(constants: Array) -> Array:
@@ -80,17 +80,17 @@ def plain_fit(
         inverse = weights(known.constants)
         expanded = lambda x: Answer(*known.plain(x), known.split)
         near = descended(x, expanded, expanded(x))
-        answer = told(near)
+        answer = answer_at(near)
         if isinstance(answer, Answer):
-            return descended(near, told, answer)
-        return descended(x, told, expanded(x))
+            return descended(near, answer_at, answer)
+        return descended(x, answer_at, expanded(x))
     for again in range(MAX_COVARIANCES):
-        answer = told(x, constants=True)
+        answer = answer_at(x, constants=True)
         if isinstance(answer, Exception):
             raise answer
         assert answer.constants is not None
         inverse, before = weights(answer.constants), x
-        x = descended(x, told, answer)
+        x = descended(x, answer_at, answer)
         if abs(x - before).max() < SAME_COVARIANCE:
             return before if again else x
     return x

@@ -121,7 +121,7 @@ def _of_deck(case: LoadedCase) -> tuple[LoadedCase, Mapping[str, str]]:
 
 
 def split_by_region(case: LoadedCase) -> tuple[LoadedCase, Mapping[str, str]]:
-    """The same tyre with a rubber of its own in every region, and names of the parts by material.
+    """The tyre with a rubber of its own in every region, and names of the parts by material.
 
     Cords keep their materials, which are parts too. Design variables set all copies.
     """

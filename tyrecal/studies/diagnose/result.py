@@ -346,6 +346,6 @@ def _explained(diagnosis: Diagnosis, key: str | None) -> EffectEstimate | None:
 
 
 def _listed(probabilities: Mapping[str, float]) -> dict[str, float]:
-    """Likeliest first; none and outside always."""
+    """Probabilities with the likeliest first; none and outside always."""
     order = sorted(probabilities.items(), key=lambda item: -item[1])
     return {key: p for key, p in order if p > MIN_LISTED_PROBABILITY or key in (NONE, OUTSIDE)}

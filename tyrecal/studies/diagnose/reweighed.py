@@ -24,7 +24,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Perturbation:
-    """The same data seen otherwise. words: what is other."""
+    """Other assumptions about the same data. words: what is other."""
 
     words: str
     problem: InverseProblem  # of the same rows
@@ -47,7 +47,7 @@ class LinearFit:
     slopes: Array  # (q, n, v) by x
     by_law: Array  # (q, n, n) covariance of what effects' laws are off by
     beside: Array  # (q, n, n) of what their nature leaves open
-    told: Array  # (q,) ln p of labels
+    ln_label: Array  # (q,) ln p of labels
     split: Array  # (q, n) of pairs
 
     def covariance(self, problem: InverseProblem, laws: float = 1.0) -> Array:
@@ -65,7 +65,7 @@ class LinearFit:
         w = np.linalg.solve(T, r[:, :, None])
         whole, taken = (w[:, :, 0] * r).sum(1), (J.transpose(0, 2, 1) @ w)[:, :, 0]
         ln = -(whole + np.linalg.slogdet(T)[1] + keep.sum() * np.log(2 * np.pi)) / 2
-        ln += self.told + problem.only(keep).splits.ln_likelihood(self.split[:, keep])
+        ln += self.ln_label + problem.only(keep).splits.ln_likelihood(self.split[:, keep])
         return ln, whole - (taken**2).sum(1)
 
 

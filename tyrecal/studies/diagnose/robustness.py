@@ -132,7 +132,7 @@ def _changes(problem: InverseProblem, sources: Sequence[str]) -> Iterator[Pertur
     for label in sorted({row.label for row in rows if row.label}, key=str):
         keep = np.array([row.label != label for row in rows])
         if keep.any():
-            yield Perturbation(f"without {label.said}", problem, keep)
+            yield Perturbation(f"without {label.display}", problem, keep)
 
 
 def _scaled(problem: InverseProblem, places: Sequence[int], factor: float) -> InverseProblem:
@@ -141,7 +141,8 @@ def _scaled(problem: InverseProblem, places: Sequence[int], factor: float) -> In
 
 
 def _weighty(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Those that carry weight, none and outside always; of sets of effects the points that do."""
+    """Hypotheses that carry weight, none and outside always; of sets of effects the points that
+    do."""
     ln = {h.key: h.ln_evidence + np.log(h.prior) for h in hypotheses}
     least = max(ln.values()) + np.log(MIN_WEIGHED)
     likely = [h for h in hypotheses if h.values and ln[h.key] > least]
@@ -182,8 +183,8 @@ def _again(
 def _outside(
     problem: InverseProblem, h: Hypothesis, changes: Sequence[Perturbation]
 ) -> list[Hypothesis]:
-    """The same for outside the catalogue, without families that concern no row that counts, as that
-    a label is misread which is left out."""
+    """Hypotheses outside the catalogue weighed anew, without families that concern no row that
+    counts, as that a label is misread which is left out."""
     extra = np.array([family.extra for family in families(problem)])
     added, start = problem.added({}, len(extra)), np.zeros((len(extra), len(problem.centre)))
     near = refit_at(problem, problem, added, extra, start, REFIT_STEPS).d

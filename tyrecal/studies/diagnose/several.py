@@ -53,7 +53,7 @@ def weigh(
 def _standing(
     problem: InverseProblem, before: InverseProblem, hypotheses: Sequence[Hypothesis]
 ) -> dict[str, Hypothesis]:
-    """By key, the hypotheses whose effects have not been evaluated again since."""
+    """Hypotheses, by key, whose effects have not been evaluated again since."""
     now, then = problem.expansion, before.expansion
     new = {frozenset([id]) for id, nodes in now.nodes.items() if nodes is not then.nodes[id]}
     new |= {frozenset(ids) for ids, each in now.joint.items() if each is not then.joint.get(ids)}

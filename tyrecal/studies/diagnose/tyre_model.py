@@ -214,7 +214,7 @@ class TyreModel:
             constants[:, k] = np.array(slopes).T @ field.values
 
     def _of(self, case: LoadedCase) -> TyreModel:
-        """The same of another tyre without sources of error or effects."""
+        """Model of another tyre without sources of error or effects."""
         return TyreModel(case, self.evaluator, self.rows, [], {}, self.jobs)
 
     def _has_slopes(self, id: str, span: Span) -> bool:
@@ -270,7 +270,7 @@ class TyreModel:
         """A design in a state, which wins over an effect that holds the rim otherwise, and those
         of the slopes ``names`` that it has there."""
         held = replace(state, pressure_kPa=None).numbers(self.case)
-        pressure = state.told(self.case).pressure_kPa or 0.0
+        pressure = state.with_defaults(self.case).pressure_kPa or 0.0
         left = without(self.case, dict.fromkeys(names, 0.0), held)
         there = {**without(self.case, design, held), "pressure_kPa": pressure, **held}
         return there, tuple(name for name in left if name not in held)

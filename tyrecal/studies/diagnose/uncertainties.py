@@ -93,7 +93,7 @@ def _usual(case: LoadedCase) -> Iterator[tuple[str, str, float, float]]:
 
 
 def _of_deck(numbers: Mapping[str, float]) -> Iterator[tuple[str, str, float, float]]:
-    """The same of plain numbers of a user's deck, by their paths."""
+    """Sources of plain numbers of a user's deck, by their paths."""
     rubbers = {path.split(" / ")[0] for path in numbers if " / HYPERELASTIC / " in path}
     for path in numbers:
         *heads, field = path.split(" / ")

@@ -90,7 +90,7 @@ def compare(
 def _grouped(
     readings: Sequence[Measurement],
 ) -> Iterator[tuple[float, dict[LoadedKey, tuple[float, float]]]]:
-    """By pressure: mean and its standard deviation by place."""
+    """Mean and its standard deviation by place, grouped by pressure."""
     every: defaultdict[float, defaultdict[LoadedKey, list[Measurement]]]
     every = defaultdict(lambda: defaultdict(list))
     for each in readings:

@@ -91,7 +91,8 @@ def decide(
 
 
 def no_gap_words(none: float) -> str:
-    """That no gap is seen, by the probability of no effect: below `SET` none is excluded either."""
+    """Sentence that no gap is seen, by the probability of no effect: below `SET` none is excluded
+    either."""
     return "no gap is seen" if none >= SET else f"not seen, not excluded: no effect {none:.2f}"
 
 

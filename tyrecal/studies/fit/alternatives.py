@@ -34,7 +34,7 @@ def other_states(problem: Problem, point: Point, keep: Array) -> list[Shift]:
     own_pressure = pressure_name(problem.case) == PRESSURE_PATH
     questions: list[tuple[Mapping[str, float], tuple[str, ...]]] = []
     for state in states:
-        stated = state.told(problem.case)
+        stated = state.with_defaults(problem.case)
         numbers = {PRESSURE_PATH: stated.pressure_kPa or 0.0} if own_pressure else {}
         numbers |= defaults if stated.rim == "free" else {}
         design = {**problem.question(point.values, state, ())[0], **numbers}
@@ -71,10 +71,10 @@ def _column(problem: Problem, state: TyreState, by_label: Mapping[Label, float])
 def _pressures(problem: Problem, rates: Mapping[tuple[TyreState, str], Array]) -> Iterator[Shift]:
     """Each state at another pressure; the variables can take the place of the only one."""
     states = [state for state, name in rates if name == PRESSURE_PATH]
-    several = len({state.told(problem.case).pressure_kPa for state in states}) > 1
+    several = len({state.with_defaults(problem.case).pressure_kPa for state in states}) > 1
     for (state, name), column in rates.items():
         if several and name == PRESSURE_PATH:
-            stated = state.told(problem.case)
+            stated = state.with_defaults(problem.case)
             yield Shift(
                 "pressure", column[:, None], np.zeros(len(column)), partial(_pressure_words, stated)
             )
@@ -121,10 +121,10 @@ def _rims(
 ) -> Iterator[Shift]:
     """Every rim that was stated taken for another one."""
     case = problem.case
-    for stated in dict.fromkeys(state.told(case).rim for state in states):
-        here = [state for state in states if state.told(case).rim == stated]
+    for stated in dict.fromkeys(state.with_defaults(case).rim for state in states):
+        here = [state for state in states if state.with_defaults(case).rim == stated]
         for rim in RIMS:
-            there = [replace(state.told(case), rim=rim).of(case) for state in here]
+            there = [replace(state.with_defaults(case), rim=rim).of(case) for state in here]
             if rim == stated or not all(is_possible(problem, state) for state in there):
                 continue
             questions = [problem.question(point.values, state, ()) for state in there]

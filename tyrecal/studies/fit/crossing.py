@@ -45,8 +45,8 @@ class Crossing:
 
 
 def order(problem: Problem, point: Point) -> dict[TyreState, float]:
-    """By state, 1 where the axial mode is above the torsional one, -1 below; of those states where
-    both have weight."""
+    """Order by state, 1 where the axial mode is above the torsional one, -1 below; of those states
+    where both have weight."""
     weighted = {(t.state, t.label) for t in problem.targets if t.scale}
     return {
         state: float(np.sign(gap(point, state)))

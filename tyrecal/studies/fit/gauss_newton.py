@@ -72,7 +72,7 @@ def descend(
 
 
 def promised(point: Point, curvature: Array, change: Array) -> float:
-    """By how much F^2 falls by the model."""
+    """Fall of F^2 that the model promises."""
     r = foreseen(point.jacobian, point.residuals, curvature, change)
     return float(point.objective**2 - r @ r)
 

@@ -88,7 +88,7 @@ def measured_rows(problem: Problem, readings: Sequence[Measurement] = ()) -> lis
     for target in problem.measured:
         quantity = "frequency_Hz" if isinstance(target, Target) else target.quantity
         label, member = _label(target)
-        state = target.state.told(case)
+        state = target.state.with_defaults(case)
         is_mass = quantity == "mass_kg"
         key = (quantity, label, state.load_N and member, target.state)
         rows.append(

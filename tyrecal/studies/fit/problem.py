@@ -53,7 +53,7 @@ class Point:
 
     @property
     def modes(self) -> dict[Label, Mode]:
-        """Those of the case's own state, or of the first one that was measured."""
+        """Modes of the case's own state, or of the first one that was measured."""
         return next(iter(self.states.values()), {})
 
     @property

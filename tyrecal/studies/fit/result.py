@@ -105,8 +105,8 @@ class FittedState(ResultPart):
     ratio: float | None = None  # of the standard errors with it to those without, their mean
 
     @property
-    def said(self) -> str:
-        """In words."""
+    def display(self) -> str:
+        """State in words."""
         return state_words(self.pressure_kPa, self.load_N, self.rim)
 
 
@@ -126,7 +126,7 @@ class FittedMode(Named):
 
     @property
     def state(self) -> str:
-        """In words; "" in a fit to one."""
+        """State in words; "" in a fit to one."""
         if self.pressure_kPa is None:
             return ""
         return state_words(self.pressure_kPa, self.load_N, self.rim or "")
@@ -158,7 +158,7 @@ class FittedFootprint(ResultPart):
 
     @property
     def state(self) -> str:
-        """In words, of the mass none; in a fit to one state the load."""
+        """State in words, of the mass none; in a fit to one state the load."""
         if self.quantity == "mass_kg":
             return ""
         if self.pressure_kPa is None:
@@ -344,7 +344,7 @@ class FitResult(Result):
         heads = [Column("left out", ""), Column("values", "d"), Column("rms, sigmas")]
         heads += [Column(in_lines(f"{name}, std. err. %")) for name in own]
         rows: list[list[Any]] = [
-            [each.said, f"{each.values}", heads[2].cell(each.rms_sigmas)]
+            [each.display, f"{each.values}", heads[2].cell(each.rms_sigmas)]
             + [self._percent(n, each.standard_errors_without[n]) for n in own]
             for each in self.states
         ]
@@ -353,7 +353,7 @@ class FitResult(Result):
         if self.next_states:
             heads = [Column("added", ""), Column("errors become"), *heads[3:]]
             rows = [
-                [each.said, f"{100 * (each.ratio or 0.0):.0f} %"]
+                [each.display, f"{100 * (each.ratio or 0.0):.0f} %"]
                 + [self._percent(n, each.standard_errors_with[n]) for n in own]
                 for each in self.next_states[:MAX_PROPOSED]
             ]
@@ -506,7 +506,7 @@ def _variables(
 
 
 def _modes(problem: Problem, initial: Point, point: Point, several: bool) -> list[FittedMode]:
-    """Those of the unloaded tyre, then those on the road."""
+    """Modes of the unloaded tyre, then those on the road."""
     result = []
     for target in problem.targets:
         before, after = (p.states[target.state][target.label] for p in (initial, point))

@@ -97,8 +97,8 @@ class _Run:
         return 0.5 * (point.objective / self.F0) ** 2
 
     def gradient(self, y: Array) -> Array:
-        """Its gradient at a design that SLSQP accepts. Raises StopIteration if it is no lower than
-        the one accepted before."""
+        """Gradient at a design that SLSQP accepts. Raises StopIteration if it is no lower than the
+        one accepted before."""
         try:
             point = self.evaluate(y)
         except EvaluationFailed:  # the line search has given up

@@ -123,9 +123,11 @@ def _others(problem: Problem) -> list[TyreState]:
     """Unloaded states in addition to those measured: their pressures, and one below and above, on
     every rim that the case can have."""
     measured_states = [
-        state.told(problem.case) for state, labels in problem.labels.items() if labels
+        state.with_defaults(problem.case) for state, labels in problem.labels.items() if labels
     ]
-    measured = [t.state.told(problem.case) for t in problem.measured if t not in problem.mass]
+    measured = [
+        t.state.with_defaults(problem.case) for t in problem.measured if t not in problem.mass
+    ]
     pressures = sorted(p for p in {state.pressure_kPa for state in measured} if p)
     ends = (pressures[0] / STEP_OUT, pressures[-1] * STEP_OUT)
     pressures += [ROUNDED_kPa * round(p / ROUNDED_kPa) for p in ends]
@@ -159,5 +161,5 @@ def _named(problem: Problem, errors: Sequence[float | None]) -> Errors:
 
 def plain(problem: Problem, state: TyreState) -> dict[str, Any]:
     """A state for result files, with nothing left to the case."""
-    complete = state.told(problem.case)
+    complete = state.with_defaults(problem.case)
     return {"pressure_kPa": complete.pressure_kPa, "load_N": complete.load_N, "rim": complete.rim}

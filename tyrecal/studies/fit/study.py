@@ -55,7 +55,7 @@ class FitStudy:
             check(self._problem)
 
     def _set_targets(self, readings: Sequence[Measurement]) -> None:
-        """Those of the case, or ``readings`` of the measured file that have labels. Raises
+        """Targets of the case, or ``readings`` of the measured file that have labels. Raises
         InputError."""
         self.used = readings
         if self.measured:

@@ -121,13 +121,13 @@ def states_of(case: LoadedCase) -> dict[str, Any]:
     loads: dict[str, Any] = {"load_N": case.case.targets.loads_N or 0.0}
     if not states.keys() - {AS_THE_CASE}:
         return loads
-    pressures = {state.told(case).pressure_kPa for state in states}
+    pressures = {state.with_defaults(case).pressure_kPa for state in states}
     return {**loads, "pressure_kPa": sorted(pressures), "rim": rims_of(case, states)}
 
 
 def rims_of(case: LoadedCase, states: Iterable[TyreState]) -> list[str]:
     """How their rims are held, as `provenance` takes it."""
-    rims = (state.told(case).rim or "" for state in states)
+    rims = (state.with_defaults(case).rim or "" for state in states)
     return list(dict.fromkeys(RIM_WORDS.get(rim, rim) for rim in rims))
 
 

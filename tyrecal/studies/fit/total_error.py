@@ -114,7 +114,7 @@ def _response(
 def _row(case: LoadedCase, target: object) -> Observable:
     if not isinstance(target, Target):
         return Observable("mass_kg", None, 0.0)
-    pressure = target.state.told(case).pressure_kPa or 0.0
+    pressure = target.state.with_defaults(case).pressure_kPa or 0.0
     return Observable("frequency_Hz", target.label, pressure, rim=target.state.rim)
 
 

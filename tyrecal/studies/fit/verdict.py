@@ -110,7 +110,7 @@ class Remainder:
 
     @cached_property
     def chi2(self) -> float:
-        """At the best design of the linear model."""
+        """Chi2 at the best design of the linear model."""
         return self.chi2_after(np.zeros(len(self.rows)))
 
     @property
@@ -134,7 +134,7 @@ def fit_verdict(is_good: bool, chi2_per_dof: float | None) -> FitVerdict:
 
 
 def does_not_fit_words(chi2_per_dof: float, reason: FitReason | None) -> str:
-    """That a model does not fit, and the likeliest reason."""
+    """Sentence that a model does not fit, and the likeliest reason."""
     words = f"THE MODEL DOES NOT FIT: chi2 per degree of freedom is {chi2_per_dof:.3g}"
     if reason is None:
         return f"{words}; no slip in the data or in the stated states explains it"

@@ -48,7 +48,7 @@ class Labelled:
 
     @property
     def readings(self) -> list[Measurement]:
-        """With the likeliest labels, see `under`."""
+        """Readings with the likeliest labels, see `under`."""
         return self.under(0)
 
     def under(self, place: int) -> list[Measurement]:

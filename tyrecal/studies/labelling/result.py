@@ -38,7 +38,7 @@ def labels_posterior(case: LoadedCase, labelled: Labelled) -> Labels:
     frequencies = []
     for i in own:
         reading = labelled.frequencies[i][0]
-        state = reading.state.of(case).told(case)
+        state = reading.state.of(case).with_defaults(case)
         j = int(all_labelings.modes[0, i])
         expected = places.get((at.labels[j], at.states[j])) if j >= 0 else None
         others = [
@@ -73,7 +73,8 @@ def labels_posterior(case: LoadedCase, labelled: Labelled) -> Labels:
     labelings = [
         Labeling(
             labels=[
-                each.said if (each := labelled.found.labels(k)[i]) else FOREIGN_WORDS for i in own
+                each.display if (each := labelled.found.labels(k)[i]) else FOREIGN_WORDS
+                for i in own
             ],
             probability=float(all_labelings.probabilities[k]),
         )
@@ -89,7 +90,7 @@ def labels_posterior(case: LoadedCase, labelled: Labelled) -> Labels:
 
 
 def labels_result(case: LoadedCase, labelled: Labelled) -> LabelsResult:
-    """As a result of its own."""
+    """Labels as a result of their own."""
     return LabelsResult.model_validate({"format": 1, "labels": labels_posterior(case, labelled)})
 
 
@@ -119,7 +120,7 @@ def shape_labels_result(run: ModalTest, case_modes: CaseModes, state: TyreState)
     pairs = [(f.frequency_Hz, f.expected_Hz) for f in frequencies if f.expected_Hz]
     off = np.log([measured / expected for measured, expected in pairs])
     together = Labeling(
-        labels=[each.said for each in frequencies],
+        labels=[each.display for each in frequencies],
         probability=float(np.prod([each.probability for each in frequencies if each.label])),
     )
     labels = Labels(

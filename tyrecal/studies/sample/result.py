@@ -199,7 +199,7 @@ class SampleResult(Result):
             f" {100 * e.stated_error:.2g} % in 99 of 100 designs",
         ]
         if e.widened >= LEAST_WIDENED:
-            told.append(
+            sentences.append(
                 "the emulator's error counts as an error of the measurement: it makes the largest"
                 f" standard deviation {100 * e.widened:.2g} % larger"
             )

@@ -250,7 +250,7 @@ def targets_as_readings(case: LoadedCase, noise_Hz: float | None) -> list[Measur
             "frequency_Hz",
             target.label,
             "",
-            target.state.told(case).pressure_kPa or 0.0,
+            target.state.with_defaults(case).pressure_kPa or 0.0,
             0.0,
             target.frequency_Hz,
             target.sigma_Hz or noise_Hz or 0.0,

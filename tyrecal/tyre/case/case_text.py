@@ -58,7 +58,7 @@ def new_case(
 
 
 def plain_text(words: str) -> str:
-    """As YAML has it: plain where it stays text, else in quotes."""
+    """Text as YAML has it: plain where it stays text, else in quotes."""
     plain = (
         re.fullmatch(r"\w[\w ./()-]*", words) and YAML(typ="safe", pure=True).load(words) == words
     )

@@ -57,7 +57,7 @@ class LoadedCase:
 
     @property
     def files(self) -> list[Path]:
-        """Those that the case names, but for its templates."""
+        """Files that the case names, except its templates."""
         named = [self.measured] if self.measured else []
         if own := self.deck or self.decks:
             return [*named, *(own.path.parent / name for name in own.texts)]

@@ -78,7 +78,7 @@ def from_size(
 
 
 def _rounded(load_N: float) -> float:
-    """To two digits."""
+    """Round to two digits."""
     return float(f"{load_N:.2g}")
 
 

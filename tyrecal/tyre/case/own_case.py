@@ -47,7 +47,7 @@ def own_decks_case(
     pressure_kPa: float | None,
     numbers: Mapping[str, float] = NO_NUMBERS,
 ) -> str:
-    """The same for decks in three dimensions. Raises InputError where they do not give the crown or
+    """The case of decks in three dimensions. Raises InputError where they do not give the crown or
     the pressure."""
     if decks.crown.rpartition(".")[2] not in decks.node_sets:
         known = ", ".join(decks.node_sets)

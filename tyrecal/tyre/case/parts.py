@@ -216,7 +216,7 @@ class DeckSource(Part):
     numbers: dict[Text, Number] = Field(default_factory=dict)
 
     def sets(self, part: str) -> list[str]:
-        """Those of a part, as decks compare names; none where it is not named."""
+        """Sets of a part, as decks compare names; none where it is not named."""
         return [name.upper() for key, names in self.parts.items() if key == part for name in names]
 
     @property
@@ -387,7 +387,7 @@ class RoadSpring(Part):
 
     @property
     def stiffnesses(self) -> dict[str, float]:
-        """Those that are there, N/m, by direction."""
+        """Stiffnesses that are there, N/m, by direction."""
         named = {
             "radial": self.radial_N_per_m,
             "lateral": self.lateral_N_per_m,

@@ -270,7 +270,7 @@ class Uncertainty(Part):
 
 
 def _every_effect(given: dict[str, float]) -> dict[str, float]:
-    """Those not given are absent: 0."""
+    """Effects of a case with those not given: they are absent, 0."""
     return {**dict.fromkeys(IDS, 0.0), **given}
 
 

@@ -61,7 +61,8 @@ class Effect:
         return times * self.low, times * self.high
 
     def of(self, case: LoadedCase) -> Callable[[LoadedCase, float], LoadedCase]:
-        """Its `add` for a case. Raises ValueError where the case has nothing that it changes."""
+        """The effect's `add` for a case. Raises ValueError where the case has nothing that it
+        changes."""
         if case.decks:
             raise ValueError("changes a section, and the tyre stands in decks in three dimensions")
         if case.deck is None or case.case.deck is None:

@@ -47,7 +47,7 @@ class FlatMesh:
 
 
 def _tolerances(block: Block, length: float) -> str:
-    """Those of an *EMBEDDED ELEMENT that are given, m."""
+    """Tolerances of an *EMBEDDED ELEMENT that are given, m."""
     tolerances = ""
     for name, scale in (
         ("ROUNDOFF TOLERANCE", 1.0),

@@ -74,7 +74,7 @@ def step_name(name: str) -> str:
 
 
 def words(content: dict[str, Any], mass_kg: float) -> Iterator[str]:
-    """The same in sentences."""
+    """Contents of a deck in sentences."""
     how = {"m": "m, kg, s, Pa", "mm": "mm, t, s, MPa"}[content["units"]]
     kinds = ", ".join(f"{count} {kind}" for kind, count in content["elements"].items())
     half = ", the half made whole" if content["reflected"] else ""

@@ -55,7 +55,7 @@ def build(deck: Sorted) -> Model:
 
 
 class _Builder:
-    """From what was collected to the model."""
+    """Builds the model from what was collected."""
 
     def __init__(self, made: Assembly, deck: Sorted):
         self.made, self.found, self.root = made, deck, made.root

@@ -46,7 +46,7 @@ class OwnDeck:
 
     @cached_property
     def marks(self) -> dict[str, Block]:
-        """Its marks."""
+        """Marks of the deck."""
         return numbers_of.marks(self.blocks)
 
     @cached_property
@@ -56,7 +56,7 @@ class OwnDeck:
 
     @cached_property
     def numbers(self) -> dict[str, float]:
-        """Its plain numbers by path, as the text has them."""
+        """Plain numbers of the deck by path, as the text has them."""
         values = {}
         for path, (place, i, j) in self.places.items():
             row = self.blocks[place].rows[i]

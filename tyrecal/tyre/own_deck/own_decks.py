@@ -50,7 +50,7 @@ class OwnDecks:
 
     @cached_property
     def texts(self) -> dict[str, str]:
-        """By file, relative to their folder."""
+        """Texts by file, relative to their folder."""
         return {file: text for deck in self.decks for file, text in deck.texts.items()}
 
     @cached_property

@@ -162,5 +162,5 @@ def _beyond(edge: Array, rho: float) -> Array:
 
 
 def _integral(f: Array, x: Array) -> Array:
-    """From the first point to each, by trapezia."""
+    """Integral from the first point to each, by trapezia."""
     return np.concatenate([[0.0], np.cumsum((f[1:] + f[:-1]) / 2 * np.diff(x))])

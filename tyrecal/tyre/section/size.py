@@ -134,8 +134,8 @@ class TyreSize:
         return (self.rim_code * INCH + (4.8e-3 if self.rim_code > 16 else -0.8e-3)) / 2
 
     def flange_radius(self, rim_width: float) -> float:
-        """To the top of the rim's flange, m: contour J, or B on rims narrower than 5 inches; of the
-        15 degree rim half an inch."""
+        """Radius of the top of the rim's flange, m: contour J, or B on rims narrower than 5 inches;
+        of the 15 degree rim half an inch."""
         if self.truck:
             return self.bead_seat_radius + INCH / 2
         return self.bead_seat_radius + (17.3e-3 if rim_width > 4.9 * INCH else 14.2e-3)

@@ -56,7 +56,7 @@ class EnergyLaw(ABC):
         return None
 
     def at_stations(self, points: int, stations: int) -> Self:
-        """With the constants of ``points`` Gauss points repeated for every station."""
+        """The law with the constants of ``points`` Gauss points repeated for every station."""
 
         def spread(constant: Array) -> Array:
             if constant.ndim == 2:

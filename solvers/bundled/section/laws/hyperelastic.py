@@ -82,7 +82,7 @@ class Hyperelastic(EnergyLaw):
         return not any(np.any(getattr(self, name)) for name in self.bulk_moduli)
 
     def nearly_incompressible(self) -> Self:
-        """The same with the bulk modulus 2 / D1 that stands for none."""
+        """The law with the bulk modulus 2 / D1 that stands for none."""
         own: dict[str, Any] = {self.bulk_moduli[0]: INCOMPRESSIBLE / 2 * self.shear_modulus}
         return replace(self, **own)
 
@@ -133,7 +133,7 @@ class Hyperelastic(EnergyLaw):
         return _less_stress(dynamic.tangent(z, weights), z, more, weights)
 
     def scaled(self, shear: Array | complex, bulk: Array | complex) -> Self:
-        """With other moduli; factors."""
+        """The law with its moduli multiplied by factors."""
         own = {name: getattr(self, name) * shear for name in self.shear_moduli}
         own |= {name: getattr(self, name) * bulk for name in self.bulk_moduli}
         if self.pressure is not None:

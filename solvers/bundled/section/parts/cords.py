@@ -107,7 +107,7 @@ class CompressedCords(NamedTuple):
     nodes: Array
 
     def in_words(self, X: Array) -> str:
-        """That they buckle, and where; X (n, 2): R, Z of all nodes, m."""
+        """Message that the cords buckle, and where; X (n, 2): R, Z of all nodes, m."""
         r, z = X[self.nodes].real.mean(0)
         return (
             f"the cords of layer {self.layer} buckle, compressed by {-100 * self.strain:.2g} % at"

@@ -103,7 +103,7 @@ class ElasticAtStations(AtStations):
         return z.swapaxes(2, 3)
 
     def _forces(self, P: Array) -> tuple[Array, Array]:
-        """From dW/dz times weights (e, g, s, k)."""
+        """Forces from dW/dz times weights (e, g, s, k)."""
         P = np.ascontiguousarray(P.swapaxes(2, 3))  # copied once for both products
         by_u = self.B0.swapaxes(1, 2) @ P.reshape(self.e, self.g * self.k, -1)
         P = P[:, :, self.rows.around]

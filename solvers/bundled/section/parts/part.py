@@ -36,7 +36,7 @@ class TyrePart(ABC):
 
     @abstractmethod
     def energy(self, U: Array) -> Any:
-        """Its share of the potential, J."""
+        """Share of the part in the potential, J."""
 
     @abstractmethod
     def force(self, U: Array) -> Array:
@@ -179,7 +179,7 @@ class ModeShapes:
         self.known: list[tuple[Rows, Array]] = []
 
     def replaced(self, real: Array, imag: Array) -> ModeShapes:
-        """The same sums of other shapes."""
+        """The sums with other shapes."""
         other = copy.copy(self)
         other._set(real, imag)
         return other

@@ -179,7 +179,7 @@ class PressureAtStations(AtStations):
         return self._forces(*change(*self.at, *self._fields(u, du)))
 
     def tangents(self, precision: Precision) -> tuple[Array, Array, Array]:
-        """By the product with unit displacements of each element's own nodes."""
+        """Tangents by the product with unit displacements of each element's own nodes."""
         lines = self.lines
         e, g, a = lines.slope.shape
         s = self.at[0].shape[2]
