@@ -65,7 +65,7 @@ def words(
 def _lines(
     effect_powers: Sequence[Power], ruler: Ruler, protocol: Protocol, spans: Mapping[str, Span]
 ) -> Iterator[str]:
-    labels = list(dict.fromkeys(label.said for label, _ in ruler.rows if label))
+    labels = list(dict.fromkeys(label.display for label, _ in ruler.rows if label))
     at = ", ".join(f"{p:g}" for p in protocol.given_kPa)
     yield (
         f"With {', '.join(labels)} at {at} kPa, every value to {protocol.noise:.1%} and the mass to"

@@ -101,7 +101,7 @@ def _response(
     response = dict(zip(names, column.tolist(), strict=True))
     if not isinstance(target, Target):
         return FitResponse(scatter=scatter, response=response)
-    state = target.state.told(problem.case)
+    state = target.state.with_defaults(problem.case)
     return FitResponse(
         **asdict(target.label),
         pressure_kPa=state.pressure_kPa or 0.0,
