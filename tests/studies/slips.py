@@ -1,6 +1,7 @@
 """Whether `fit --measured FILE` names a slip in a table of drawn tyres, and accuses no clean one.
 
     python -m tests.studies.slips [COUNT] [SEED] [SIZE ...] >> slips.jsonl
+    python -m tests.studies.slips slips.jsonl
 
 Each tyre, its scatter and its frequencies at two pressures are drawn as by `fit_errors`, written
 with one decimal. Its table is fitted twice, coarse mesh: as it is, and with one slip, the kinds in
@@ -16,7 +17,8 @@ A slip moves its values by at least 8 standard deviations or 3 %, those of excha
 average. Counted are the first sentence that the command prints about the data (a doubt before the
 fit, a refusal, or the fit's reason), and the refusal or the fit's reason alone. A sentence is right
 if it names the slip's row before any other and, of an exchange, its kind with both rows or
-pressures. One line of JSON is printed for each table, the counts to stderr.
+pressures. One line of JSON is printed for each table, the counts to stderr; the second command
+counts a record.
 """
 
 from __future__ import annotations
@@ -244,6 +246,9 @@ def main(count: int, seed: int, sizes: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    given = [int(x) for x in sys.argv[1:3]]
-    count, seed = [*given, *(100, 1)[len(given) :]]
-    main(count, seed, sys.argv[3:] or SIZES)
+    if sys.argv[1:] and Path(sys.argv[1]).is_file():
+        print(counts([json.loads(line) for line in Path(sys.argv[1]).read_text().splitlines()]))
+    else:
+        given = [int(x) for x in sys.argv[1:3]]
+        count, seed = [*given, *(100, 1)[len(given) :]]
+        main(count, seed, sys.argv[3:] or SIZES)
