@@ -169,6 +169,18 @@ def test_every_command_that_draws_offers_the_formats() -> None:
     assert drawing == names(cli, "--figure-format")
 
 
+def test_pictures_are_drawn_unless_they_are_not_wanted() -> None:
+    """`modes` alone draws on demand."""
+    defaults = {
+        name: parameter.default
+        for name, command in commands().items()
+        for parameter in command.params
+        if parameter.name == "pictures"
+    }
+    assert "fit" in defaults and "init" in defaults
+    assert {name for name, default in defaults.items() if not default} == {"modes"}
+
+
 def test_a_picture_in_another_format(tmp_path: Path) -> None:
     target = tmp_path / "t.yaml"
     assert run("init", "205/60R15", "--output", str(target), "--figure-format", "svg") == 0

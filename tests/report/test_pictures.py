@@ -104,6 +104,14 @@ def test_the_largest_motion_is_12_percent_and_stands_at_the_top(tyre):
     assert abs(x) < 1e-9
 
 
+def test_a_line_is_a_strip_of_its_width_along_it():
+    line = np.array([[[0.0, 0.0, 1.0]], [[3.0, 4.0, 2.0]]])
+    a, b, c, d = shapes._strips(line)[:, :2]
+    for one, other, middle in ((a, b, line[0, 0]), (d, c, line[1, 0])):
+        assert (one + other) / 2 == pytest.approx(middle[:2])
+        assert other - one == pytest.approx(shapes.LINE_WIDTH * np.array([-0.8, 0.6]))
+
+
 def test_a_scale_is_kept(tyre):
     mode = tyre.modes[Label(0, 0, "axial")]
     surface = shapes._surface(mode, tyre.mesh, 0.01)

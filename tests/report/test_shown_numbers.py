@@ -14,6 +14,7 @@ from tyrecal.report import diagnosis
 from tyrecal.report.convergence import draw_convergence, draw_deviations, draw_states
 from tyrecal.report.load import draw_load_sweep
 from tyrecal.report.measured import measured_table
+from tyrecal.report.pressure import draw_pressure_sweep
 from tyrecal.report.sample import draw_corner
 from tyrecal.report.signature import draw_signature
 from tyrecal.report.table import MINUS, nearness, shown
@@ -28,6 +29,7 @@ from tyrecal.studies.signature import Signature
 
 from .html import ring, ring_inference, ring_under_load
 from .test_measured import run_of
+from .test_pressure import rows as pressure_rows
 from .test_table import lines
 
 FIT = FitResult.model_validate(ring.fit())
@@ -192,3 +194,38 @@ def test_a_doctors_words_have_records_and_the_known_tyre() -> None:
     assert "x/record: 7 records, 2.1 MB" in text
     assert "[0,0] lateral    recorded 37.03, now 37.50 Hz (+1.275 %)" in text
     assert "now not found" in text and "NOT as recorded, within 0.01 %" in text
+
+
+def test_frequencies_over_pressure_have_values_slopes_and_units() -> None:
+    rows = pressure_rows()
+    upper, _, lower, _ = draw_pressure_sweep(rows).axes
+    hertz = {x for line in upper.lines for x in line.get_ydata()}
+    inner = {m.frequency_Hz for row in rows for m in row.modes if m.label.family == "in-plane"}
+    assert inner <= hertz
+    slopes = {x for line in lower.lines for x in line.get_ydata()}
+    assert {m.d_ln_f_d_ln_p for row in rows for m in row.modes if m.label.m == 0 < m.c} <= slopes
+    assert (upper.get_ylabel(), lower.get_ylabel()) == ("frequency, Hz", "d ln f / d ln p")
+    assert lower.get_xlabel().endswith("pressure, kPa")
+
+
+def test_what_was_not_computed_under_load_stays_empty() -> None:
+    row = SimpleNamespace(
+        pressure_kPa=240.0,
+        load_N=4e3,
+        quantity="contact_area_m2",
+        member=None,
+        value=0.0125,
+        sigma=1.25e-4,
+        off={"none": -0.021},
+    )
+    pressed = SimpleNamespace(
+        tyres=["none", "rim_width"],
+        rows=[row],
+        failed=["rim_width, 4000 N: too much"],
+        rms_percent=lambda key: 2.1 if key == "none" else None,
+    )
+    study: Any = SimpleNamespace(under_load=pressed)
+    text = "\n".join(diagnosis._under_load(study))
+    assert "calibrated 2.1 %" in text
+    assert "| 240 | 4000 | contact area 125.0 cm² ± 1.0 % | -2.1 |  |" in text
+    assert "with `rim_width`, 4000 N: too much" in text

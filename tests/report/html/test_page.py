@@ -128,6 +128,7 @@ def test_table_2_is_there(folder: Path) -> None:
         "Mind: not reached: fitted, 30000 N: rim on road",
         "Fitted: every mode rises; every curve",
         "Named: rim_width explains the gap. Probability 0.71",
+        "Diagnosis Named: rim_width",
         "weigh the tyre",
         "<b>measure</b> again",
         "upper sidewall",
