@@ -229,3 +229,14 @@ def test_what_was_not_computed_under_load_stays_empty() -> None:
     assert "calibrated 2.1 %" in text
     assert "| 240 | 4000 | contact area 125.0 cm² ± 1.0 % | -2.1 |  |" in text
     assert "with `rim_width`, 4000 N: too much" in text
+
+
+@pytest.mark.parametrize(("changes", "words"), [(0, "1 modes at 160, 240 kPa"), (2, ", 3 runs")])
+def test_a_diagnosis_counts_modes_pressures_and_runs(changes: int, words: str) -> None:
+    rows = [SimpleNamespace(label=Label(2, 0), pressure_kPa=p, rim=None) for p in (240.0, 160.0)]
+    rows.append(SimpleNamespace(label=None, pressure_kPa=0.0, rim=None))  # the mass
+    observations = SimpleNamespace(rows=rows)
+    problem = SimpleNamespace(observations=observations, changes=[None] * changes)
+    d: Any = SimpleNamespace(problem=problem)
+    text = diagnosis._counted(d)
+    assert text.endswith(words) and text.startswith("1 modes at 160, 240 kPa")

@@ -129,6 +129,8 @@ def test_table_2_is_there(folder: Path) -> None:
         "Fitted: every mode rises; every curve",
         "Named: rim_width explains the gap. Probability 0.71",
         "Diagnosis Named: rim_width",
+        "All numbers",
+        "initial: Hz at each pressure, kPa",
         "weigh the tyre",
         "<b>measure</b> again",
         "upper sidewall",
