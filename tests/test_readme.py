@@ -188,7 +188,8 @@ def test_ci_runs_the_readmes_test_command_then_what_it_leaves_out() -> None:
     script = (ROOT / ".ci/run").read_text().splitlines()
     debians = tuple(f"command -v {program} >/dev/null ||" for program in PACKAGED)
     asked_for = '[ -z "${FENICS-}" ] ||'
-    aside = ("#", "set ", "cd ", "export PYTEST_ADDOPTS=--durations=25", *debians, asked_for)
+    settings = "export PYTEST_ADDOPTS=--durations=25", "unset PYTHONDONTWRITEBYTECODE"
+    aside = ("#", "set ", "cd ", *settings, *debians, asked_for)
     assert [line for line in script if line and not line.startswith(aside)] == [
         f"{test_command} || failed=1",
         ".venv-test/bin/python -m tests.kernels || failed=1",

@@ -17,8 +17,8 @@ FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 VAGUE_NAMES = {"found", "told", "asked", "said"}
 # Counts may only fall: whoever rewords one of these places lowers its number here.
-VAGUE_DOCSTRINGS_LEFT = 272
-VAGUE_LOCALS_LEFT = 348
+VAGUE_DOCSTRINGS_LEFT = 0
+VAGUE_LOCALS_LEFT = 0
 HOOKS = YAML(typ="safe").load(ROOT / ".pre-commit-config.yaml")["repos"][0]["hooks"]
 
 

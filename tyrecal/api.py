@@ -67,7 +67,7 @@ __all__ = [
     "with_values",
 ]
 MAX_SHOWN_CHARACTERS = 60  # characters of a wrong argument
-SettingValue = TypeVar("SettingValue", bound=Setting)
+_SettingValue = TypeVar("_SettingValue", bound=Setting)
 
 
 def load_case(path: Path | str, mesh: str = "", allow_unusual: bool = False) -> LoadedCase:
@@ -445,7 +445,7 @@ def _count(name: str, value: int, least: int) -> int:
     return int(value)
 
 
-def _mapping(name: str, values: Mapping[str, SettingValue]) -> dict[str, SettingValue]:
+def _mapping(name: str, values: Mapping[str, _SettingValue]) -> dict[str, _SettingValue]:
     if isinstance(values, Mapping) and all(isinstance(key, str) for key in values):
         return dict(values)
     raise _wrong(name, "names with values, as in {'C10': 1e6}", values)

@@ -17,7 +17,7 @@ from .element_types import NODES_AND_SECTION
 from .spelling import full_keyword, full_parameters, named
 
 MAX_DECK_BYTES = 100_000_000  # of a deck and all that it includes
-MOST_KEYWORDS = 20_000  # of a deck and all that it includes; tyres have hundreds
+MAX_KEYWORDS = 20_000  # of a deck and all that it includes; tyres have hundreds
 MAX_CHARACTERS = 4096  # with those that continue it; ABAQUS reads 256 of each
 DEEPEST_INCLUDE = 5  # files that include others
 COMPLEX_STEP = 1e-30  # so small that its square vanishes against every real part
@@ -51,7 +51,7 @@ class DeckError(Refused):
 WHOLE_DECK = Place("deck", 0)
 
 
-LARGEST_LABEL = 999_999_999  # number of a node or element, by the manual
+MAX_LABEL = 999_999_999  # number of a node or element, by the manual
 
 
 def _plain(text: str) -> str:
@@ -201,8 +201,8 @@ class Reader:
                     raise start.error(f"data '{line[:40]}' before the first keyword")
                 self._rows.append(Row(start, line))
                 continue
-            if len(self.blocks) == MOST_KEYWORDS:
-                raise start.error(f"decks of more than {MOST_KEYWORDS} keywords are not read")
+            if len(self.blocks) == MAX_KEYWORDS:
+                raise start.error(f"decks of more than {MAX_KEYWORDS} keywords are not read")
             block = self._keyword(start, line)
             if only_data:
                 raise block.refused("stands in a file of data lines")

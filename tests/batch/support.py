@@ -45,9 +45,6 @@ def measured_elsewhere(path: Path) -> Path:
     return file
 
 
-def poison(path: Path, C10_Pa: float = 1e4) -> None:
-    """Make the rubber so soft that the inflated tyre is not stable; with a tenth of this C10 no
-    mesh can be inflated."""
-    text, old = path.read_text(), "start: 1.0e+6\n    lower: 1.0e+5"
-    assert text.count(old) == 1
-    path.write_text(text.replace(old, f"start: {C10_Pa}\n    lower: {C10_Pa / 10}"))
+def poison(path: Path) -> None:
+    """Let the tyre spin so fast, 280 rad/s, that it is not stable; its usual values end at 300."""
+    path.write_text(path.read_text() + "\nspin_rad_per_s: 280.0\n")

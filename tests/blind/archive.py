@@ -95,7 +95,8 @@ def pack(groups: Mapping[str, tuple[Path, Path]]) -> None:
 
 
 def read_by_scorers(answer: Mapping[str, Any]) -> dict[str, Any]:
-    """What the scorers read of an answer, numbers to `ANSWER_DIGITS` except sizes of effects."""
+    """The part of an answer that the scorers read: sizes of effects whole, other numbers to
+    `ANSWER_DIGITS`."""
     whole = answer["diagnosis"]
     part = {key: whole[key] for key in READ_OF_DIAGNOSIS if key in whole}
     own = lambda size: size and {key: size[key] for key in READ_OF_PARAMETER if key in size}

@@ -224,7 +224,7 @@ def test_wrong_options_of_fit(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     out = ["--output", str(tmp_path / "out"), "--no-pictures"]
     assert run("fit", CASE, *out, "--fix", "A_bolt") == 2
     assert "A_belt" in capsys.readouterr().err
-    assert run("fit", CASE, *out, "--set", "A_belt=1.5e-5") == 2
+    assert run("fit", CASE, *out, "--set", "A_belt=5e-8") == 2
     assert "bounds" in capsys.readouterr().err
     assert run("fit", CASE, *out, "--fix", "A_belt", "--fix", "A_carcass", "--fix", "C10") == 2
     assert "no variable is free" in capsys.readouterr().err

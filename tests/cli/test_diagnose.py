@@ -152,7 +152,7 @@ def test_an_added_effect_makes_a_case(
         (["--add", "bead_filler=1", "--set", "C10=1.1e6"], "no --set"),
         (["--add", "bead_filler=1", "--measured", "M"], "no --measured"),
         (["--measured", "BAD"], "line 2"),
-        (["--measured", "M", "--set", "A_belt=1.5e-5"], "must start within its bounds"),
+        (["--measured", "M", "--set", "A_belt=5e-8"], "must start within its bounds"),
         (["--add", "magic=1"], "magic"),
         (["--add", "bead_filler"], "NAME=VALUE"),
         (["--add", "bead_filler=-5"], "bead_filler"),

@@ -77,8 +77,8 @@ def test_results_of_an_earlier_run_in_a_batch(there: bool, tmp_path: Path) -> No
     case = CASES / "p235_75r17.yaml" if there else tmp_path / "gone.yaml"
     out = tmp_path / "out"
     earlier(out, "modes", "fit")
-    asked = Asked(None, PressureRange(None, None, 2))
-    report = run_case(CaseTask("a", case, out, ("modes",), asked))
+    options = Asked(None, PressureRange(None, None, 2))
+    report = run_case(CaseTask("a", case, out, ("modes",), options))
     assert report["studies"]["modes"]["status"] == "error"
     assert {path.name for path in out.iterdir()} == names("fit") | names("modes") | {"run.json"}
     assert json.loads((out / "run.json").read_text())["modes"]["finished"] is False

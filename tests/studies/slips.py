@@ -43,7 +43,7 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.fit.study import FitStudy
-from tyrecal.studies.fit.verdict import FITS, MOST_CHI2_PER_DOF
+from tyrecal.studies.fit.verdict import FITS, MAX_CHI2_PER_DOF
 from tyrecal.tyre.case import LoadedCase
 
 from .fit_errors import LABELS, SIZES, case_of, drawn
@@ -228,14 +228,14 @@ def counts(lines: Sequence[dict[str, Any]]) -> str:
     wrong = [
         line
         for line in lines
-        if line["verdict"] == FITS and (line["chi2_per_dof"] or 0) > MOST_CHI2_PER_DOF
+        if line["verdict"] == FITS and (line["chi2_per_dof"] or 0) > MAX_CHI2_PER_DOF
     ]
     return "\n".join(
         [
             "| tables | number | named by the first sentence | by the fit |",
             "|---|---|---|---|",
             *(f"| {kind} | {n} | {first} | {by_fit} |" for kind, n, (first, by_fit) in rows),
-            f"| 'fits' with chi2/dof above {MOST_CHI2_PER_DOF:g} | {len(wrong)} | | |",
+            f"| 'fits' with chi2/dof above {MAX_CHI2_PER_DOF:g} | {len(wrong)} | | |",
         ]
     )
 

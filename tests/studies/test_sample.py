@@ -192,4 +192,4 @@ def test_the_corner_picture_says_names_units_and_lines(
     (name, figure), *_ = figures(result(sampled(), 0)).items()
     with every_text_readable(monkeypatch) as texts:
         save(figure, tmp_path / f"{name}.png")
-    assert {"A", "B", "A, m2", "draws", "linear", "median", "90 %"} <= set(texts)
+    assert {"A", "B", "A, mm²", "draws", "linear", "median", "90 %"} <= set(texts)

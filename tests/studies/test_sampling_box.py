@@ -94,8 +94,8 @@ def test_bounds_are_no_edges() -> None:
 
 
 def test_a_box_is_tried_by_the_shares_that_draws_from_it_will_have(chance: Chance) -> None:
-    """A normal posterior cut by its box, by the closed form of the first variable. False failures:
-    1e-6."""
+    """A normal posterior cut by its box, by the closed form of the first variable.
+    False failures: 1e-6."""
     box = np.stack([CENTRE - [3, 7] * WIDTH, CENTRE + [2, 7] * WIDTH], 1)
     density = posterior(box)
     shares = np.array(

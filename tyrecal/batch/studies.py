@@ -23,6 +23,7 @@ from ..studies import footprint as pressed
 from ..studies import modes as evaluated
 from ..studies import pressure_result
 from ..studies.fit.calibrate import history_csv
+from ..studies.fit.prediction import FitResponses
 from ..studies.fit.study import FitStudy
 from ..studies.fit.verdict import DOES_NOT_FIT, does_not_fit_words
 from ..studies.fitted import NOT_CONVERGED
@@ -54,6 +55,7 @@ class Studied:
     designs: dict[str, dict[str, float]]
     asked: Asked
     no_fit: bool = False
+    responses: FitResponses | None = None  # of the fit to its data
 
     @property
     def measured(self) -> list[Path]:
@@ -79,6 +81,7 @@ def fit(state: Studied) -> StudyOutcome:
     fitted = FitStudy(state.case, state.evaluator).run()
     result = fitted.found
     state.no_fit = False
+    state.responses = FitResponses(responses=result.responses, chi2_per_dof=result.chi2_per_dof)
     state.designs["fitted"] = {n: fitted.fitted.values[n] for n in state.designs["initial"]}
     numbers = {"objective": result.objective_Hz, "mass_kg": result.mass_kg}
     numbers |= {f"variable {name}": each.value for name, each in result.variables.items()}
@@ -111,7 +114,9 @@ def modes(state: Studied) -> StudyOutcome:
 def sweep_pressure(state: Studied) -> StudyOutcome:
     """Every design over the pressure. Raises what `pressure_result.run` does."""
     pressures = state.asked.pressures.on(state.case)
-    result = pressure_result.run(state.case, state.evaluator, state.designs, pressures)
+    result = pressure_result.run(
+        state.case, state.evaluator, state.designs, pressures, fit=state.responses
+    )
     numbers = {
         f"frequency_Hz {row.design} {row.pressure_kPa:g} kPa {mode.label}": mode.frequency_Hz
         for row in result.rows

@@ -27,14 +27,14 @@ DRAWN_DIGITS = 6
 
 
 class Panel(TypedDict):
-    """What one panel of a figure draws."""
+    """Words and numbers that one panel of a figure draws."""
 
     words: list[str]
     numbers: list[list[float]]
 
 
 def drawn_numbers(figure: Figure) -> list[Panel]:
-    """What the figure's own texts and each of its panels say: ``words`` and ``numbers``.
+    """Words and numbers of the figure's own texts and of each of its panels.
 
     numbers: for every line, area, cloud of points and coloured field the count of its values, their
     least, greatest, mean and root mean square to `DRAWN_DIGITS` significant digits, in units of the

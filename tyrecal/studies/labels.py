@@ -91,7 +91,10 @@ class Labels(ResultPart):
     def csv_rows(self) -> list[CsvRow]:
         """A row a frequency, with each rival in words."""
         return [
-            {**each.model_dump(), "rivals": [f"{r.display} {r.probability:.4f}" for r in each.rivals]}
+            {
+                **each.model_dump(),
+                "rivals": [f"{rival.display} {rival.probability:.4f}" for rival in each.rivals],
+            }
             for each in self.frequencies
         ]
 

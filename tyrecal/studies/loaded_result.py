@@ -15,7 +15,7 @@ from ..tyre.case import LoadedCase
 from .loaded import Loaded, LoadedMode, LoadedTyre, LoadOutcome, load_tyres, progress
 from .modes import ModesFindings, ModesResult
 from .result import (
-    LEAST_NAMED_OVERLAP,
+    MIN_NAMED_OVERLAP,
     NAME_COLUMNS,
     CavityMode,
     Column,
@@ -321,7 +321,7 @@ def _doubts(loads: Sequence[Loaded]) -> list[str]:
         lost = [mode.member for mode in each.modes if _entry(mode).has_lost_name]
         if lost:
             words.append(
-                f"at {each.load_N:g} N less than {LEAST_NAMED_OVERLAP:g} of the unloaded shape is"
+                f"at {each.load_N:g} N less than {MIN_NAMED_OVERLAP:g} of the unloaded shape is"
                 f" left of {', '.join(map(str, lost))}: the name no longer describes it;"
                 " frequencies in brackets, or not named, continue its curve"
             )

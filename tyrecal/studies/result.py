@@ -47,7 +47,7 @@ class Deviation:
 
 
 Cell = str | Deviation | None  # None: there is no value
-LEAST_NAMED_OVERLAP = 0.15  # with the unloaded shape, of a mode on the road that has a name
+MIN_NAMED_OVERLAP = 0.15  # with the unloaded shape, of a mode on the road that has a name
 NAME_COLUMNS = (Column("mode", ""), Column("motion", ""))  # see `Named.named`
 
 
@@ -252,7 +252,7 @@ class ModeEntry(Named):
     @property
     def has_lost_name(self) -> bool:
         """Whether so little of the unloaded shape is left that its name describes nothing."""
-        return self.overlap is not None and self.overlap < LEAST_NAMED_OVERLAP
+        return self.overlap is not None and self.overlap < MIN_NAMED_OVERLAP
 
     def named(self) -> list[str]:
         """The cells of `NAME_COLUMNS`; a mode that has lost its name has that of its curve."""

@@ -202,7 +202,7 @@ STEEL_DENSITY = 5000.0  # kg/m3 from which a cord is steel, filled with rubber o
 THICKEST_CORD = (
     1.2  # diameter of a belt's cord over their spacing, for what a measured area may hold
 )
-LEAST_ANGLE = 5.0  # degrees from the circumference, of a belt that has a side
+MIN_ANGLE_OF_A_SIDE = 5.0  # degrees from the circumference, of a belt that has a side
 # slips of effects' parameters, whose ranges the catalogue has, by their unit
 OF_EFFECTS: dict[str, Slips] = {
     "": SHARE,
@@ -281,7 +281,7 @@ def area_beside(usual: Usual, spacing: float | None) -> Usual:
 def one_side(angles: Iterable[float]) -> str | None:
     """Why belts at ``angles`` degrees from the meridian are not a tyre's: all lie on one side of
     the circumference. None where they are, or where there are fewer than two."""
-    belts = [angle % 180 for angle in angles if abs(angle % 180 - 90) >= LEAST_ANGLE]
+    belts = [angle % 180 for angle in angles if abs(angle % 180 - 90) >= MIN_ANGLE_OF_A_SIDE]
     if len(belts) < 2 or len({angle > 90 for angle in belts}) > 1:
         return None
     return (

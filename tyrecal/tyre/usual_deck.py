@@ -47,7 +47,7 @@ OF_FIELD = {  # the end of a number's path: its range
 SHEAR_TERMS = {"C10": 2.0, "C01": 2.0, "mu": 1.0} | {f"mu{i}": 1.0 for i in range(1, 7)}
 """Constants of *HYPERELASTIC, and the factor with which each adds to the shear modulus."""
 OVER_THE_CROWN = 0.35  # of a section's height: how far down from the crown a belt may reach
-LEAST_BELT_ANGLE = 10.0  # degrees from the meridian; cords at less may be a piece of a carcass
+MIN_BELT_ANGLE = 10.0  # degrees from the meridian; cords at less may be a piece of a carcass
 ANY_CONSTANT = Usual(-1e9, 1e9, "Pa", STRESS)
 ANGULAR_SPACING = USUAL["rebar_layers.*.spacing_deg"]
 UNITS_mm = {  # in a deck in mm, t, s: the unit's name, and SI in one of it
@@ -155,7 +155,7 @@ def _angles(flat: Flat) -> dict[tuple[str, float], Usual]:
     ranges = {}
     for key, those in radii.items():
         low, high = ((r - lowest) / height for r in (min(those), max(those)))
-        if low > 1 - OVER_THE_CROWN and abs((key[1] + 90) % 180 - 90) >= LEAST_BELT_ANGLE:
+        if low > 1 - OVER_THE_CROWN and abs((key[1] + 90) % 180 - 90) >= MIN_BELT_ANGLE:
             ranges[key] = BELT_ANGLE
         elif low < OVER_THE_CROWN and high > 1 - OVER_THE_CROWN:
             ranges[key] = CARCASS_ANGLE

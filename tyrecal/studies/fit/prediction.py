@@ -31,7 +31,7 @@ from ..result import ResultPart
 from .responses import FitResponse, linear_answer
 
 Array = np.ndarray
-MOST_PRESSURES = 4  # at which a fitted design is evaluated with all sensitivities
+MAX_PRESSURES = 4  # at which a fitted design is evaluated with all sensitivities
 
 
 class FitResponses(ResultPart):
@@ -57,13 +57,13 @@ def predicted_errors(
 ) -> Array:
     """Standard deviations (m,) of ln f of modes (label, kPa) on the case's rim, as the design
     ``values`` of the fit has them. It is evaluated with its sensitivities to all sources of error
-    in the measured states and at ``MOST_PRESSURES`` pressures, between which these are interpolated
+    in the measured states and at ``MAX_PRESSURES`` pressures, between which these are interpolated
     in ln p. Raises DeckRefused, EvaluationFailed."""
     names = list(case.case.variables)
     measured = tuple(_observable(case, each) for each in fit.responses)
     others = tuple(Observable("frequency_Hz", label, p) for label, p in wanted)
     pressures = sorted({p for _, p in wanted})
-    chosen = np.linspace(0, len(pressures) - 1, min(len(pressures), MOST_PRESSURES)).round()
+    chosen = np.linspace(0, len(pressures) - 1, min(len(pressures), MAX_PRESSURES)).round()
     nodes = [pressures[int(i)] for i in chosen]
     labels = list(dict.fromkeys(label for label, _ in wanted))
     evaluated = tuple(Observable("frequency_Hz", label, p) for label in labels for p in nodes)

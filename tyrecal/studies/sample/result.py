@@ -21,11 +21,11 @@ from ..result import (
 )
 from .box import AT_EDGE
 from .chains import ENOUGH, enough_draws
-from .study import MOST_ERROR, Sample
+from .study import MAX_EMULATOR_ERROR, Sample
 
 Array = np.ndarray
 LOW, HIGH = 0.05, 0.95  # quantiles: 90 % lie between
-LEAST_WIDENED = 0.01  # share that is worth a sentence
+MIN_WIDENED = 0.01  # share that is worth a sentence
 NEARLY = 5.0  # of ln p below the highest: another optimum that is worth a word
 DENSITY_STEPS, PAIR_STEPS = 40, 30  # of histograms
 DIGITS = Column("", ".4g")
@@ -198,7 +198,7 @@ class SampleResult(Result):
             f"emulator of {e.evaluations} evaluations: off by less than"
             f" {100 * e.stated_error:.2g} % in 99 of 100 designs",
         ]
-        if e.widened >= LEAST_WIDENED:
+        if e.widened >= MIN_WIDENED:
             sentences.append(
                 "the emulator's error counts as an error of the measurement: it makes the largest"
                 f" standard deviation {100 * e.widened:.2g} % larger"
@@ -237,7 +237,7 @@ class SampleResult(Result):
                 f"{c.steps} steps are fewer than {ENOUGH} autocorrelation times of {tau:.1f}: give"
                 f" --draws {ceil(enough_draws(tau) / 1e4) * 10_000} or more"
             )
-        if self.emulator.widened > (1 + MOST_ERROR**2) ** 0.5 - 1:
+        if self.emulator.widened > (1 + MAX_EMULATOR_ERROR**2) ** 0.5 - 1:
             doubts.append(
                 "the emulator is rough: its error makes a standard deviation of what was measured"
                 f" {100 * self.emulator.widened:.2g} % larger"

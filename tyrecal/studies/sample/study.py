@@ -46,7 +46,7 @@ WIDEST_BOX = 0.7  # at first, of ln x: so far it was tried how good an emulator 
 ROUGH = 0.2  # of a row's standard deviation in Sigma: above, twice as many designs are evaluated
 # An emulator's rms error, of that standard deviation, up to which it is an error among others:
 # cords that go slack make frequencies jump, which no polynomial follows. It is 12 % larger then.
-MOST_ERROR = 0.5
+MAX_EMULATOR_ERROR = 0.5
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ def run(
         ask,
         first_box(x, J.T @ J, variables, bounds),
         bounds,
-        MOST_ERROR * spread,
+        MAX_EMULATOR_ERROR * spread,
         draws,
         seed,
         lambda sampling: stage(SAMPLE_STAGES[1 + sampling]),

@@ -20,8 +20,8 @@ from .text import Block, Row
 
 TOUCHING = 0.01  # of the section's size: a node that near to the rim touches it
 PUSHED = 0.1  # of the section's size: how far a rim pushes nodes of a bead that it is mounted on
-NODES_ON_A_LINE, MOST_NAMES = 12, 100
-MOST_TO_COMPARE = 5_000_000  # nodes times segments of a pair
+NODES_ON_A_LINE, MAX_NAMES = 12, 100
+MAX_DISTANCES = 5_000_000  # nodes times segments of a pair
 Array = np.ndarray
 
 
@@ -103,7 +103,7 @@ class Contact:
         if not (len(moved) and np.abs(moved).max() < FARTHEST):
             raise block.refused(f"{master} has no length, or lies where no tyre is", row)
         own = tuple(dict.fromkeys(self.tied.same.get(n, n) for n in nodes))
-        if len(own) * len(moved) > MOST_TO_COMPARE:
+        if len(own) * len(moved) > MAX_DISTANCES:
             raise block.refused(f"{slave} and {master} have too many nodes and segments", row)
         return Pair(block, row, f"{slave} and {master}", own, moved, body.reference)
 
@@ -151,7 +151,7 @@ class Contact:
 
     def _lines(self, nodes: Sequence[int]) -> str:
         """The lines that hold nodes, and where they belong."""
-        names = ("SEATED", *(f"SEATED_{k}" for k in range(2, MOST_NAMES)))
+        names = ("SEATED", *(f"SEATED_{k}" for k in range(2, MAX_NAMES)))
         name = next(each for each in names if each not in self.root.node_sets)
         of_instances: dict[str, list[int]] = {}
         known = self.made.instance_nodes

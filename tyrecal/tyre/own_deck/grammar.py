@@ -168,7 +168,7 @@ def _step(step: list[Block], deck: Sorted, is_inflation: bool) -> None:
 
 
 def _check_amplitudes(deck: Sorted, blocks: Sequence[Block], static: Block) -> None:
-    """What follows an amplitude has its full size at the step's end."""
+    """Refuse an amplitude that does not end at its full size."""
     tables = {block.need("NAME"): block for block in deck.model if block.name == "AMPLITUDE"}
     for block in blocks:
         name = block.get("AMPLITUDE")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .text import LARGEST_LABEL, Block, Row, is_label
+from .text import MAX_LABEL, Block, Row, is_label
 
 Point = tuple[float, float]
 CORNERS_OF = {3: 3, 4: 4, 6: 3, 8: 4}  # of solids by their number of nodes
@@ -121,8 +121,8 @@ class Scope:
 
 def _check_label(what: str, number: int, block: Block, row: Row | None) -> None:
     """Raises OwnDeckError for a number that no node or element can have."""
-    if not 1 <= number <= LARGEST_LABEL:
-        raise block.refused(f"{what} {number}: numbers go from 1 to {LARGEST_LABEL}", row)
+    if not 1 <= number <= MAX_LABEL:
+        raise block.refused(f"{what} {number}: numbers go from 1 to {MAX_LABEL}", row)
 
 
 def mirror_of(block: Block) -> Callable[[Point], Point]:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:  # mypy knows the folder by its own name
     from solvers.language.spelling import named
     from solvers.language.table import CONTACT_KEYWORDS, MATERIAL_OPTIONS, OUTPUT_KEYWORDS, RULES
     from solvers.language.text import (
-        LARGEST_LABEL,
+        MAX_LABEL,
         Block,
         Place,
         Reader,
@@ -33,7 +33,7 @@ else:
         RULES,
     )
     from tyrecal_solvers.language.text import (
-        LARGEST_LABEL,
+        MAX_LABEL,
         Block,
         Place,
         Reader,
@@ -48,8 +48,8 @@ from ...errors import InputError
 __all__ = [
     "CONTACT_KEYWORDS",
     "DIMENSIONS",
-    "LARGEST_LABEL",
     "MATERIAL_OPTIONS",
+    "MAX_LABEL",
     "NODES_AND_SECTION",
     "OUTPUT_KEYWORDS",
     "RULES",
