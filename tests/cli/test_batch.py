@@ -221,7 +221,7 @@ def test_a_fit_that_converged_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     fit = ["--studies", "fit", "--quiet"]
     assert batched([case], out, *fit) == 0
     good = contents(out / "tyre_00")
-    assert set(good) == {"fit.json", "fit.csv", "fit_history.csv"}
+    assert set(good) == {"fit.json", "fit.csv", "fit_variables.csv", "fit_history.csv"}
     case.write_text(case.read_text().replace("frequency_Hz: 31.7", "frequency_Hz: 31.8"))
     for answered in (False, True):
         with monkeypatch.context() as patch:
