@@ -44,6 +44,8 @@ def draw_corner(result: SampleResult) -> Figure:
             axes.set_xlim(*v.box)
             axes.minorticks_off()
             axes.set_xticks(_ticks(v), _tick_labels(v))
+            for label, side in zip(axes.get_xticklabels(), ("right", "left"), strict=True):
+                label.set_horizontalalignment(side)  # away from each other: the 90 % may be narrow
             axes.tick_params(labelbottom=i == n - 1, labelleft=j == 0 < i, left=j < i)
             if i == n - 1:
                 axes.set_xlabel(_named(column, v))
