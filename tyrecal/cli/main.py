@@ -195,7 +195,9 @@ def main(arguments: list[str] | None = None) -> None:
     try:
         with remember_interrupts():
             try:
-                code = cli.main(arguments, prog_name="tyrecal", standalone_mode=False)
+                code = cli.main(
+                    arguments, prog_name="tyrecal", standalone_mode=False, obj=arguments
+                )
             except (KeyboardInterrupt, click.Abort):  # just before or after the command
                 raise Interrupted from None
         sys.exit(code if isinstance(code, int) else 0)

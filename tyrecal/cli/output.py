@@ -236,7 +236,7 @@ class Run:
         entry = {
             **owner(self.folder, self.case, self.loaded),
             "command": self.command,
-            "arguments": sys.argv[1:],
+            "arguments": _arguments(),
             "started": self.started,
             "finished": self._finished,
             "seconds": round(time.monotonic() - self._clock, 3),
@@ -297,3 +297,10 @@ def refuse_other(folder: Path, case: Path) -> None:
             f"folder '{folder}' holds results of {named[0] if named else 'something else'};"
             " give another one with --output"
         )
+
+
+def _arguments() -> list[str]:
+    """The words of the present command line, as `main` was given them."""
+    context = click.get_current_context(silent=True)
+    given = context.find_root().obj if context else None
+    return list(sys.argv[1:] if given is None else given)
