@@ -24,9 +24,9 @@ from .state import with_states_kept
 from .usual import belts_on_one_side, refusal
 from .usual_deck import unusual_numbers
 
-MAX_MEANT = 3  # paths that are offered for a name that is none
-# numbers that stand alone: no other part of the case, and no mesh, depends on their values
-ALONE = {
+MAX_MEANT = 3  # paths that the error for an unknown name suggests
+# parts of a case whose numbers no other part and no mesh depends on: changes need no check
+INDEPENDENT_PARTS = {
     "pressure_kPa",
     "deck",
     "materials",
@@ -43,11 +43,12 @@ ALONE = {
 
 
 def with_values(loaded: LoadedCase, values: Mapping[str, Setting]) -> LoadedCase:
-    """A new case with variables (by name) or any of its numbers (by dotted path) set; a word among
-    others that the schema lists is set too, and None where the schema allows it.
+    """A new case with variables (by name) or any of its numbers (by dotted path) set.
 
-    Values are in the unit of the numbers they set; a variable's bounds are not enforced. Raises
-    ValueError, in one sentence, for an unknown name or a value that the case cannot have.
+    A value can also be one of the words that the schema lists for a key, or None if the schema
+    allows it. Values are in the unit of the numbers they set; a variable's bounds are not
+    enforced. Raises ValueError, in one sentence, for an unknown name or a value that the case
+    cannot have.
     """
     changed = set_values(loaded, values)
     resolved(changed)
@@ -74,25 +75,29 @@ def set_values(loaded: LoadedCase, values: Mapping[str, Setting]) -> LoadedCase:
         branch[keys[-1]] = setting
     case = _set(loaded.case, tree, ())
     has_words = any(isinstance(setting, str) for setting in targets.values())
-    touched = set(tree) - (set() if has_words else ALONE)
+    # a word, such as how the rim holds the bead, can change which rules and which mesh apply
+    parts_to_check = set(tree) - (set() if has_words else INDEPENDENT_PARTS)
     section = loaded.drawn
     redrawn = "outline" in tree.get("section", {})
     if redrawn:
         section = read_section_of(case.section, loaded.folder)
-    if touched:
+    if parts_to_check:
         data = case.plain()
         for wrong, reason in problems(data, section):
             raise ValueError(f"{dotted(wrong)} {reason}")
-        meshed = "mesh" in touched or redrawn or has_words
+        meshed = "mesh" in parts_to_check or redrawn or has_words
         if section and meshed and (message := folds(data, section)):
             raise ValueError(message)
     return replace(loaded, case=case, drawn=section, as_read=loaded.as_read or loaded)
 
 
 def overridden(loaded: LoadedCase, values: Mapping[str, Setting]) -> LoadedCase:
-    """The case as its user sets it: a variable starts at its value (`start_values`), any other
-    number has it, and ``overrides`` lists them. Targets keep the states that they were measured in.
-    Raises what `with_values` does, and ValueError for the path of a number that a variable sets."""
+    """The case with the values that its user gives for one run, listed in ``overrides``.
+
+    The value of a variable is its start (`start_values`). Targets keep the states in which they
+    were measured. Raises what `with_values` does, and ValueError for the path of a number that a
+    variable sets.
+    """
     values = {as_known(name, loaded.deck_numbers): value for name, value in values.items()}
     variables = loaded.case.variables
     for path in values.keys() - variables.keys():
@@ -106,8 +111,11 @@ def overridden(loaded: LoadedCase, values: Mapping[str, Setting]) -> LoadedCase:
 
 
 def unusual_value(loaded: LoadedCase, name: str, value: Setting) -> str | None:
-    """Why no user states ``value`` of a variable, or of the number at a dotted path: what is usual,
-    what was probably meant; None where it is usual. Raises ValueError for an unknown name."""
+    """Why ``value`` is unusual for a variable, or the number at a dotted path; None if it is not.
+
+    The sentence has the usual range and what was probably meant. Raises ValueError for an unknown
+    name.
+    """
     paths = paths_of(loaded, name)
     if value is None or isinstance(value, str):
         return None
@@ -124,24 +132,24 @@ def unusual_value(loaded: LoadedCase, name: str, value: Setting) -> str | None:
 
 
 def paths_of(loaded: LoadedCase, name: str) -> list[str]:
-    """Dotted paths of the numbers that the variable or the path ``name`` sets. Raises ValueError,
-    which says what was probably meant."""
+    """Dotted paths of the numbers that the variable or the path ``name`` sets. Raises ValueError
+    with a suggestion for an unknown name."""
     return [dotted(keys) for keys in _keys(loaded, name)]
 
 
 def value_at(loaded: LoadedCase, path: str) -> Any:
-    """The value in the case at a path of `paths_of`; None if it states no number."""
+    """The value at a path of `paths_of`; None if the case has no number there."""
     return at(loaded.case, find(loaded.case, path))
 
 
 def _keys(loaded: LoadedCase, name: str) -> list[Keys]:
-    """Where the variable or the dotted path ``name`` leads."""
+    """Keys of each number that the variable or the dotted path ``name`` sets."""
     variables = loaded.case.variables
     paths = variables[name].sets if name in variables else [name]
     try:
         return [find(loaded.case, path) for path in paths]
     except KeyError as error:
-        idle = loaded.deck.idle if loaded.deck else {}
+        idle = loaded.deck.idle if loaded.deck else {}  # deck parameters that set nothing here
         if (path := canonical(name, idle)) is not None:
             raise ValueError(f"{name} {idle[path]}") from None
         if meant := " or ".join(f"'{path}'" for path in _meant(loaded, name)):
@@ -153,8 +161,8 @@ def _keys(loaded: LoadedCase, name: str) -> list[Keys]:
 
 
 def _meant(loaded: LoadedCase, name: str) -> list[str]:
-    """Paths that end as ``name`` does; else, where it is one word, the variable or path whose last
-    word is like it."""
+    """Suggestions for an unknown name: paths that end with it, or else, if it is one word, the
+    variable or path whose last word is most like it."""
     dump = loaded.case.model_dump()
     numbers = dict.fromkeys([*_numbers(dump, ()), *(f"effects.{id}" for id in IDS)])
     if ends := [path for path in numbers if path.endswith(f".{name}")]:
@@ -174,19 +182,21 @@ def _numbers(part: Any, keys: Keys) -> Iterator[str]:
 
 
 def is_choice(keys: Keys) -> bool:
-    """Whether the schema lists the words for ``keys``; a deck is read before any word is set."""
+    """Whether the schema lists the words that can be set at ``keys``. None can be set in ``deck``,
+    because the deck has been read by then."""
     return get_origin(type_at(keys)) is Literal and keys[0] != "deck"
 
 
 def _setting(case: Case, keys: Keys, value: Setting) -> Setting:
-    """``value`` as the kind that is at ``keys`` of the case: a number, true or false, a word."""
+    """``value`` in the type of the value at ``keys`` of the case: a number, true or false, a word.
+    Raises ValueError if it has another type."""
     old = at(case, keys)
     if is_choice(keys) and (value is None or isinstance(value, str)):
         return value
     if isinstance(old, str):
         raise ValueError(f"{dotted(keys)} is text, '{old}': edit the case file")
     if value is None and isinstance(old, int | float | None):
-        return None  # the schema judges
+        return None  # the schema accepts or refuses it
     if isinstance(old, bool) or isinstance(value, bool):
         if isinstance(old, bool) and isinstance(value, bool):
             return value
@@ -201,9 +211,9 @@ def _setting(case: Case, keys: Keys, value: Setting) -> Setting:
 
 
 def _set(node: Any, tree: Any, keys: Keys) -> Any:
-    """``node`` at ``keys`` of the case with the numbers of ``tree`` in it.
+    """A copy of ``node``, at ``keys`` of the case, with the values of the nested dict ``tree``.
 
-    Only the parts on the way are copied and judged again; the rest is shared.
+    Only the parts that contain a new value are copied and validated again; the rest is shared.
     """
     if not isinstance(tree, dict):
         return tree

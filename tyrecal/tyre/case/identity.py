@@ -1,4 +1,7 @@
-"""Which tyre a case is of: one hash of all that makes it this tyre and no other."""
+"""Hash that identifies the tyre of a case: the same for two cases of one tyre in other states.
+
+Results record it, so that a command can refuse the results of another tyre.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +18,8 @@ from .checks import find
 from .loaded import LoadedCase
 from .mistakes import Keys
 
-# of a case; not among them: what it is called, its mesh, pressure and road, what is asked of it,
-# its targets and uncertainties, and solver
+# Parts of a case file that make the tyre. True: all keys of the part count; a dict: only its keys
+# count. Names, mesh, pressure, road, requested modes, targets, uncertainties and the solver do not.
 TYRE: dict[str, Any] = {
     "section": {"gauges": True, "outline": True},
     "deck": {"numbers": True, "parts": True, "gauges": True},
@@ -31,6 +34,8 @@ TYRE: dict[str, Any] = {
     "splice": True,
     "analysis": {"static_moduli": True, "vibration_frequency_Hz": True},
 }
+# Keys of these parts that do not make another tyre: how the rim is held, and the name of the
+# outline's file, whose curves are hashed themselves.
 STATE: tuple[Keys, ...] = (("rim", "free"), ("section", "outline", "file"))
 
 
@@ -47,11 +52,11 @@ def tyre_sha256(loaded: LoadedCase) -> str:
 
 
 def is_of_tyre(path: str) -> bool:
-    """Whether the number at a dotted path of a case makes a tyre another one. (A variable's name is
-    no path.)"""
+    """Whether another number at a dotted path of a case makes another tyre. ``path`` is not the
+    name of a variable."""
     if tuple(path.split(".")) in STATE:
         return False
-    if "/" in path:  # of a number of the deck
+    if "/" in path:  # a number of the user's deck, as material RUBBER / HYPERELASTIC / C10
         return True
     part, _, rest = path.partition(".")
     known = TYRE.get(part, part == "effects")
@@ -60,19 +65,19 @@ def is_of_tyre(path: str) -> bool:
 
 def _content(loaded: LoadedCase) -> dict[str, Any]:
     """The tyre as plain data, without the values of its variables."""
-    case, own = loaded.case, loaded.deck or loaded.decks
+    case, user_deck = loaded.case, loaded.deck or loaded.decks
     data: dict[str, Any] = case.model_dump(include=TYRE, exclude_defaults=True)
     data["effects"] = {id: value for id, value in case.effects.items() if value}
     for keys in STATE:
         _leave_out(data, keys)
     for variable in case.variables.values():
         for path in variable.sets:
-            with suppress(KeyError):  # a law may have divided the layer
+            with suppress(KeyError):  # an effect of a blind trial may have divided the layer
                 _leave_out(data, find(case, path))
     content = {
         "tyre": _plain(data),
         "variables": {name: sorted(v.sets) for name, v in case.variables.items()},
-        "drawn": own.sha256 if own else _drawn(loaded.section),
+        "drawn": user_deck.sha256 if user_deck else _section_sha256(loaded.section),
     }
     templates = _templates(loaded)
     return {**content, "templates": templates} if templates else content
@@ -89,7 +94,7 @@ def _templates(loaded: LoadedCase) -> dict[str, str]:
 
 
 def _leave_out(data: Any, keys: Keys) -> None:
-    """Take the value at ``keys`` out of ``data``, where it stands there."""
+    """Set the value at ``keys`` of ``data`` to None, which `_plain` leaves out, if it is there."""
     *way, last = keys
     for key in way:
         if not _has(data, key):
@@ -106,7 +111,7 @@ def _has(data: Any, key: str | int) -> bool:
 
 
 def _plain(value: Any) -> Any:
-    """Numbers as floats (one zero among them), and no key that holds nothing."""
+    """The value with numbers as floats, -0.0 as 0.0, and without keys that are empty."""
     if isinstance(value, Mapping):
         entries = {key: _plain(each) for key, each in value.items()}
         return {key: each for key, each in entries.items() if each not in (None, {}, [])}
@@ -118,10 +123,10 @@ def _plain(value: Any) -> Any:
 
 
 @lru_cache(maxsize=8)
-def _drawn(section: Section) -> str:
-    """Hash of what the section was drawn from, m: the curves of its outline, else its stations."""
+def _section_sha256(section: Section) -> str:
+    """Hash of the section's geometry in m: the curves of its outline, or else its stations."""
     content: Any = [curve.tolist() for curve in section.outline]
     if not section.outline:
-        points = section.points + 0.0  # which knows one zero only
+        points = section.points + 0.0  # -0.0 becomes 0.0
         content = [section.names, section.regions, section.rigid.tolist(), points.tolist()]
     return sha256(json.dumps(content).encode()).hexdigest()

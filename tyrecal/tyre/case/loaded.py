@@ -1,4 +1,4 @@
-"""A case that was read and judged, with the section that it names."""
+"""A case that was read and validated, with the section or the deck that it names."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ class LoadedCase:
 
     case: Case
     path: Path  # of the case file
-    drawn: Section | None  # None: the tyre stands in decks in three dimensions
+    drawn: Section | None  # as drawn, without effects; None: the tyre is in decks in 3-D
     folder: Path  # to which the case's own paths are relative
-    file_data: dict[str, Any]  # the file with what its deck adds, whatever is set later
-    # set by the user since, by name or path, for results to say
+    file_data: dict[str, Any]  # the file with the keys that its deck adds; never changed by values
+    # values that the user gave for this run, by name or path; results list them
     overrides: Mapping[str, Setting] = field(default_factory=dict)
-    as_read: LoadedCase | None = None  # before any number was set; None: none was
-    deck: OwnDeck | None = None  # that the section is of, where the case names one
-    decks: OwnDecks | None = None  # in three dimensions, in place of a section
-    measured: Path | None = None  # the file that its targets stand in, where it names one
+    as_read: LoadedCase | None = None  # the case before any number was set; None: this one
+    deck: OwnDeck | None = None  # the user's axisymmetric deck that the section comes from, if any
+    decks: OwnDecks | None = None  # the user's decks in 3-D, in place of a section
+    measured: Path | None = None  # the file with its targets, if the case names one
     assumed: Mapping[str, Any] = field(default_factory=dict)  # keys that its deck adds to the file
 
     def __repr__(self) -> str:

@@ -1,4 +1,4 @@
-"""An effect: what a plain model leaves out, as a change of the case with one parameter."""
+"""An effect: a property that a plain tyre model leaves out, added to a case by one parameter."""
 
 from __future__ import annotations
 
@@ -22,8 +22,9 @@ class Effect:
     title: str  # its name in words
     symbol: str  # of the parameter
     unit: str  # of the parameter ("" = a number)
-    low: float  # of the parameter's range on passenger tyres, taken as equally likely throughout
-    high: float  # of that range
+    # range of the parameter on passenger tyres; a diagnosis takes all values as equally probable
+    low: float
+    high: float
     changes: tuple[str, ...]  # keywords of the deck that it touches
     signature: str  # which modes move, which way and how far, as this model says
     toggle: str  # the experiment that would prove it
@@ -31,19 +32,19 @@ class Effect:
     # the case with the effect of that parameter (not 0) in it, written in the case's own numbers,
     # or ValueError ("must be ...")
     add: Callable[[LoadedCase, float], LoadedCase]
-    needs: str = ""  # what a solver must list among its capabilities to express it, "" = nothing
-    # where it comes among the tool's own, as they are listed and applied to a case (those of
-    # installed packages follow, by their ids)
+    needs: str = ""  # the capability that a solver must list to express it, "" = none
+    # position in the catalogue: effects are listed and applied to a case in this order; effects of
+    # installed packages come last, ordered by id
     place: int = 0
     # `add` for a case of a user's deck, None = it changes lines or regions of a section
     add_to_deck: Callable[[LoadedCase, float], LoadedCase] | None = None
     part: str = ""  # of ``deck.parts``, which a case of a user's deck must name for it, "" = none
-    # by how much of its shift of a mode a real one's may be off, as a standard deviation
+    # relative error of its shift of a mode against a real tyre's, one standard deviation
     law: float = 0.04
-    # `add` with one standard deviation more of what else its nature leaves open, as a filler's
-    # height, or None: a diagnosis integrates over it
+    # `add` with a second, uncertain number of the effect, such as the height of a filler, one
+    # standard deviation off; a diagnosis integrates over it; None: there is none
     beside: Callable[[LoadedCase, float], LoadedCase] | None = None
-    pressure_power: int = 0  # of the tyre's own pressure, with which its range goes: see `range_on`
+    pressure_power: int = 0  # power of the tyre's pressure that its range scales with: `range_on`
 
     def __repr__(self) -> str:
         return (
