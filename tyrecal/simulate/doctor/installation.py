@@ -19,25 +19,26 @@ GB = 1e9
 
 def packages() -> list[dict[str, Any]]:
     """Packages that tyrecal needs: ``name``, ``needed``, ``version`` (None: missing), ``ok``."""
-    return [_found(each) for each in _required("")]
+    return [_status(each) for each in _requirements("")]
 
 
 def extras() -> list[dict[str, Any]]:
-    """Extras that can be added: ``name``, ``missing`` packages, ``install``, the command for them
-    in a clone of tyrecal: no package index has it."""
-    named = {extra for text in _all() for extra in re.findall(r"extra == ['\"](.+?)['\"]", text)}
+    """Extras that can be installed: ``name``, ``missing`` packages, and ``install``, a command to
+    run in a clone of tyrecal, because no package index has tyrecal."""
+    texts = requires("tyrecal") or []
+    names = {extra for text in texts for extra in re.findall(r"extra == ['\"](.+?)['\"]", text)}
     entries = []
-    for extra in sorted(named):
-        missing = [e["name"] for e in map(_found, _required(extra)) if not e["ok"]]
+    for extra in sorted(names):
+        missing = [e["name"] for e in map(_status, _requirements(extra)) if not e["ok"]]
         install = f"pip install '.[{extra}]'"
         entries.append({"name": extra, "missing": missing, "install": install})
     return entries
 
 
 def machine() -> dict[str, Any]:
-    """``python``, ``system``, ``cores`` that this process may use, ``memory_GB``, of which
-    ``free_memory_GB`` (both None where the system does not say), ``free_disc_GB`` here,
-    ``threads``."""
+    """The machine: ``python``, ``system``, ``cores`` that this process may use, ``memory_GB`` and
+    ``free_memory_GB`` (None if the system does not report them), ``free_disc_GB`` of the current
+    folder, ``threads``: values of the environment variables `THREADS`, None if not set."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return {
         "python": platform.python_version(),
@@ -51,24 +52,21 @@ def machine() -> dict[str, Any]:
 
 
 def records(shared: Path | None) -> list[dict[str, Any]]:
-    """The record shared between cases, or those in the results folders here: ``folder``,
-    ``records``, ``MB``."""
+    """The evaluation store ``shared`` between cases, or else those in the results folders of the
+    current folder: ``folder``, ``records``, ``MB``."""
     from ..evaluate.store import Store
 
     folders = [shared] if shared else sorted(Path().glob("*/record"))
-    summaries = [Store(folder, opened=float("inf")).summary() for folder in folders]
+    summaries = [Store(folder).summary() for folder in folders]
     return [
         {"folder": each["folder"], "records": each["records"], "MB": round(each["bytes"] / 1e6, 1)}
         for each in summaries
     ]
 
 
-def _all() -> list[str]:
-    return requires("tyrecal") or []
-
-
-def _required(extra: str) -> Iterator[Requirement]:
-    for requirement in map(Requirement, _all()):
+def _requirements(extra: str) -> Iterator[Requirement]:
+    """Packages that tyrecal needs ("") or that only ``extra`` needs."""
+    for requirement in map(Requirement, requires("tyrecal") or []):
         marker = requirement.marker
         if extra and (not marker or marker.evaluate({"extra": ""})):
             continue  # needed without the extra, too
@@ -76,20 +74,21 @@ def _required(extra: str) -> Iterator[Requirement]:
             yield requirement
 
 
-def _found(requirement: Requirement) -> dict[str, Any]:
+def _status(requirement: Requirement) -> dict[str, Any]:
+    """An entry of `packages`."""
     try:
-        there: str | None = version(requirement.name)
+        installed: str | None = version(requirement.name)
     except PackageNotFoundError:
-        there = None
-    fits = there is not None and requirement.specifier.contains(there, prereleases=True)
+        installed = None
+    fits = installed is not None and requirement.specifier.contains(installed, prereleases=True)
     needed = str(requirement.specifier)
-    return {"name": requirement.name, "needed": needed, "version": there, "ok": fits}
+    return {"name": requirement.name, "needed": needed, "version": installed, "ok": fits}
 
 
 def _memory() -> float | None:
     try:
         return round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / GB, 1)
-    except (AttributeError, OSError, ValueError):  # Windows has no such question
+    except (AttributeError, OSError, ValueError):  # Windows has no sysconf
         return None
 
 

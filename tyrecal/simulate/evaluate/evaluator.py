@@ -32,9 +32,10 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Question:
-    """One evaluation: values of variables or of any number of the case, by name or path.
+    """One design to evaluate: values of variables or of any number of the case, by name or path.
 
-    gradients: names of variables whose slopes are wanted; modes_per_harmonic: None = the case's.
+    Variables that are not in ``values`` have their start values, so {} is the start design.
+    gradients: names of variables for sensitivities; modes_per_harmonic: None = the case's.
     """
 
     values: Mapping[str, float]

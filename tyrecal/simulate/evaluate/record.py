@@ -1,6 +1,8 @@
-"""One record as bytes: a checksum, a line of JSON, then the arrays as npz. No pickle anywhere.
+"""A record of the evaluation store as bytes: a checksum, a line of JSON, then arrays as npz.
 
-Not by joblib's Memory: it pickles, which runs what a stranger's file says, and has no checksum.
+A record holds the answer (frequencies, shapes, sensitivities) to one question: a deck, a solver and
+what is requested of it. Its key is a hash of the question. `Store` writes and reads the files.
+joblib's Memory is not used: it has no checksum, and unpickling a stranger's file can run code.
 """
 
 from __future__ import annotations
@@ -17,24 +19,27 @@ import numpy as np
 from ...errors import InputError
 
 ARRAY = "__array__"
-MAX_JSON_BYTES = 2_000_000  # bytes of JSON: a hundred times what an answer's longest one has
+MAX_JSON_BYTES = 2_000_000  # a hundred times the longest line of an answer
 MAX_ARRAYS = 5000
-DIGEST = 65  # bytes of the first line: 64 hexadecimal digits and its end
+DIGEST = 65  # bytes of the first line: 64 hexadecimal digits and the line's end
 
 
 class Damaged(InputError):
-    """The bytes are not those that were written."""
+    """The bytes of a record are not those that tyrecal wrote."""
 
 
 def pack(key: str, about: dict[str, Any], content: Any) -> bytes:
-    """``content``, the answer to the question ``key``: dicts with text keys, lists, text, finite
-    numbers, None and arrays, all kept to the last bit (tuples become lists, arrays of no dimension
-    numbers). ``about``: plain JSON, for lists of records.
+    """Bytes of a record: ``content``, the answer to the question with the hash ``key``.
+
+    content: dicts with text keys, lists, text, finite numbers, None and arrays, kept to the last
+    bit; tuples become lists, and arrays without a dimension become numbers. about: plain JSON on
+    the answer (the solver's name and version, the cause of a failure), which lists of records read
+    without the arrays.
 
     Raises TypeError for anything else, ValueError for a number that is not finite or more text or
     arrays than `unpack` reads.
     """
-    arrays: list[np.ndarray] = []  # one that stands in several places is kept once
+    arrays: list[np.ndarray] = []  # an array that content holds several times is stored once
     record = {"key": key, "about": about, "content": _plain(content, arrays)}
     line = json.dumps(record, allow_nan=False) + "\n"
     if len(line) > MAX_JSON_BYTES or len(arrays) > MAX_ARRAYS:
@@ -47,7 +52,8 @@ def pack(key: str, about: dict[str, Any], content: Any) -> bytes:
 
 
 def unpack(data: bytes, key: str) -> tuple[dict[str, Any], Any]:
-    """(about, content) of `pack`. Raises Damaged, also for the answer to another question."""
+    """``about`` and ``content`` of the bytes that `pack` made. Raises Damaged, also if they have
+    another key."""
     digest, body = data[: DIGEST - 1], data[DIGEST:]
     if sha256(body).hexdigest().encode() != digest:
         raise Damaged("its checksum does not match")
@@ -56,10 +62,10 @@ def unpack(data: bytes, key: str) -> tuple[dict[str, Any], Any]:
         if len(line) > MAX_JSON_BYTES:
             raise Damaged(f"its text is longer than {MAX_JSON_BYTES / 1e6:g} MB")
         record = json.loads(line, parse_constant=_not_finite)
-        about, content = record["about"], _filled(record["content"], _arrays(stored))
+        about, content = record["about"], _with_arrays(record["content"], _arrays(stored))
     except Damaged:
         raise
-    except Exception as error:  # whatever is in it, it is none that we wrote
+    except Exception as error:  # any content that tyrecal does not write
         raise Damaged(f"it is not what tyrecal writes ({type(error).__name__})") from None
     if record.get("key") != key:
         raise Damaged("it does not answer the question that it is named by")
@@ -73,7 +79,7 @@ def _not_finite(word: str) -> None:
 
 
 def _arrays(stored: bytes) -> dict[str, np.ndarray]:
-    """The arrays by name, as many bytes as stand there: nothing is unpacked. Raises Damaged."""
+    """Arrays by name, uncompressed only, so that none is larger than the file. Raises Damaged."""
     arrays: dict[str, np.ndarray] = {}
     if not stored:
         return arrays
@@ -98,7 +104,8 @@ def _arrays(stored: bytes) -> dict[str, np.ndarray]:
 
 
 def _plain(value: Any, arrays: list[np.ndarray]) -> Any:
-    """The value with arrays (NumPy's other numbers too) replaced by where they stand."""
+    """The value with each array, complex number and NumPy number except float64 moved to
+    ``arrays`` and replaced by its name there."""
     if isinstance(value, dict):
         if not all(isinstance(key, str) for key in value):
             raise TypeError("a dict whose keys are not text cannot be recorded")
@@ -118,10 +125,11 @@ def _plain(value: Any, arrays: list[np.ndarray]) -> Any:
     return value
 
 
-def _filled(value: Any, arrays: Any) -> Any:
+def _with_arrays(value: Any, arrays: dict[str, np.ndarray]) -> Any:
+    """The value with arrays in place of their names: the inverse of `_plain`."""
     if isinstance(value, dict):
         if ARRAY in value:
             array = arrays[value[ARRAY]]
             return array if array.ndim else array[()]
-        return {key: _filled(each, arrays) for key, each in value.items()}
-    return [_filled(each, arrays) for each in value] if isinstance(value, list) else value
+        return {key: _with_arrays(each, arrays) for key, each in value.items()}
+    return [_with_arrays(each, arrays) for each in value] if isinstance(value, list) else value
