@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from tyrecal.measured.covariance import half_widths, label_covariances
 from tyrecal.measured.labels import Judged, Labeller
-from tyrecal.measured.modal import LabelledMode, _labelled, label_in_turn, settled
+from tyrecal.measured.modal import LabelledMode, _labelled, label_in_turn, without_overtones
 from tyrecal.measured.sensors import MeasuredMode, Sensors, real_part
 from tyrecal.simulate.modes.label import Label
 
@@ -243,7 +243,7 @@ def test_doublets_have_two_members_and_overtones_no_label() -> None:
         told(80.0, Label(2, 0)),
         told(85.0, None),
     ]
-    rows = [(t.mode.frequency_Hz, t.judged.label, t.member) for t in settled(given)]
+    rows = [(t.mode.frequency_Hz, t.judged.label, t.member) for t in without_overtones(given)]
     assert rows == [
         (30.0, axial, ""),
         (30.4, None, ""),
@@ -253,7 +253,7 @@ def test_doublets_have_two_members_and_overtones_no_label() -> None:
         (85.0, None, ""),
         (120.0, None, ""),
     ]
-    assert "[2,1] stands at 66.10 Hz already" in settled(given)[-1].judged.why
+    assert "[2,1] stands at 66.10 Hz already" in without_overtones(given)[-1].judged.why
 
 
 def test_another_number_of_waves_holds_a_thousandth() -> None:

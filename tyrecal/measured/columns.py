@@ -50,12 +50,15 @@ LENGTHS = {name for name, table in units.QUANTITIES.items() if table is units.LE
 
 @dataclass(frozen=True)
 class TableColumn:
-    """Where a meaning stands in a line."""
+    """The column of a table that holds one meaning, a key of `HEADINGS`."""
 
     index: int
-    factor: float = 1.0  # to our unit
-    percent: bool = False  # of the value
-    of: tuple[str, ...] = ()  # quantities that a sigma's unit belongs to; () of none, and of %
+    # from the unit in the heading to that of the meaning's name; pressure: kPa, load: N
+    factor: float = 1.0
+    percent: bool = False  # whether a sigma is in % of the value
+    # quantities that the unit of a sigma fits, as frequency_Hz for 'sigma [Hz]'; () without a unit
+    # and for %
+    of: tuple[str, ...] = ()
 
 
 def meaning_of(heading: str) -> str | None:

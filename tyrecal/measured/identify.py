@@ -51,9 +51,9 @@ class Responses:
     """Frequency-response functions of one excitation."""
 
     frequency_Hz: Array  # (n,) evenly spaced
-    values: Array  # (k, n) complex, a signal each
+    values: Array  # (k, n) complex, one row per signal, all in one unit (its choice has no effect)
     form: str  # receptance, mobility or accelerance
-    points: Array  # (k,) of each signal, the number of its point
+    points: Array  # (k,) number of the point where each signal was measured
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Identified:
     """Modes that were identified from measured functions."""
 
     modes: tuple[MeasuredMode, ...]  # by rising frequency, their amplitudes the residues
-    fitted: Array  # (k, n) the functions that they make, NaN outside the band
+    fitted: Array  # (k, n) the functions of these modes, NaN outside the band
 
 
 def identify(measured: Responses, low_Hz: float, high_Hz: float) -> Identified:
@@ -124,7 +124,9 @@ def _poles(triangles: Array, f: Array) -> list[Array]:
     for j in range(1, size):
         below = solve_triangular(R[:j, :j], -R[:j, j])
         s = -np.log(np.roots(np.append(1.0, below[::-1]))) / T
-        turns = np.where(s.imag * T < -np.pi * (1 - ARC), 2 * np.pi / T, 0)  # round the circle
+        # the logarithm returns angles from -pi to pi, but the band has those from 0 to 2 pi ARC:
+        # angles below the middle of the free arc are those above pi
+        turns = np.where(s.imag * T < -np.pi * (1 - ARC), 2 * np.pi / T, 0)
         result.append(s + 1j * (turns + 2 * np.pi * f[0]))
     return result
 

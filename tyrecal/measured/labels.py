@@ -47,9 +47,9 @@ MIN_TAKEN = 0.03  # mean probability that a rival takes, to be named
 class Judged:
     """How a shape was judged."""
 
-    label: Label | None  # the most probable one, None where it is not told
+    label: Label | None  # the most probable one; None if it is too uncertain
     probabilities: dict[Label, float]  # of all labels, the largest first
-    why: str = ""  # it is not told, in a sentence
+    why: str = ""  # reason, in a sentence, if there is no label
 
     @property
     def confidence(self) -> float:
@@ -58,7 +58,7 @@ class Judged:
 
 
 class Labeller:
-    """Judges shapes on one layout of sensors.
+    """Finds the label of shapes on one layout of sensors, and its probability.
 
     highest: the largest c that is possible in the measured band; fewer leave less to confuse.
     case: whose belt, shapes and frequencies count, too.

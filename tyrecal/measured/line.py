@@ -1,4 +1,4 @@
-"""Measured values in one line of a table."""
+"""Measurements from one line of a table, whose columns `columns.read_columns` has identified."""
 
 from __future__ import annotations
 
@@ -25,20 +25,21 @@ LOADED_MEMBERS = ("symmetric", "antisymmetric")
 
 @dataclass(frozen=True)
 class Line:
-    """A line of a table. Its methods raise ValueError with what is wrong."""
+    """A line of a table. Its methods raise ValueError, whose text says what is wrong."""
 
     place: str  # file and line
-    cells: Mapping[str, str]  # by meaning
+    # by meaning, a key of `columns.HEADINGS`: a quantity, "pressure", "label", "sigma", ...
+    cells: Mapping[str, str]
     columns: Mapping[str, TableColumn]
-    marks: NumberMarks  # of the file's numbers
-    labelled: bool = True  # a frequency needs a label
+    marks: NumberMarks  # decimal mark and separator of thousands of the file
+    labelled: bool = True  # whether a frequency must have a label
 
     def cell(self, meaning: str) -> str:
-        """Empty where there is no such column."""
+        """Text of a cell; "" if there is no such column."""
         return self.cells.get(meaning, "")
 
     def number(self, meaning: str, default: float | None = None) -> float:
-        """Number in our unit; ``default`` for an empty cell."""
+        """Number of a cell in the unit of `TableColumn.factor`; ``default`` if it is empty."""
         cell = self.cell(meaning)
         if not cell and default is not None:
             return default
@@ -51,7 +52,10 @@ class Line:
         return value * self.columns[meaning].factor
 
     def measurements(self, pressure_kPa: float, run: str) -> Iterator[Measurement]:
-        """One for each quantity; ``pressure_kPa`` where the line does not give it."""
+        """One measurement for each quantity of the line.
+
+        pressure_kPa: used if the line has none; run: name of the test, before the line's own run.
+        """
         pressure, load = self.number("pressure", pressure_kPa), self.number("load", 0.0)
         if load < 0:
             raise ValueError(f"load is {load:g}, must be at least 0")
@@ -71,16 +75,26 @@ class Line:
             if quantity == "frequency_Hz":
                 label = self._label()
                 member = self._member(label, bool(load)) if label else ""
-            own = self.number("sigma") if sigma and (not sigma.of or quantity in sigma.of) else nan
+            has_sigma = sigma and (not sigma.of or quantity in sigma.of)
+            deviation = self.number("sigma") if has_sigma else nan
             if sigma and sigma.percent:
-                own *= 0.01 * value
-            elif sigma and not sigma.of:  # in the unit of the value
-                own *= self.columns["value" if self.cell("value") else quantity].factor
-            at, rim = pressure, self._rim()
-            if quantity == "mass_kg":
-                at, rim = 0.0, None
-            name = f"{run} {self.cell('run')}".rstrip()
-            yield Measurement(quantity, label, member, at, load, value, own, name, self.place, rim)
+                deviation *= 0.01 * value
+            elif sigma and not sigma.of:  # without a unit: in that of the value
+                deviation *= self.columns["value" if self.cell("value") else quantity].factor
+            rim = self._rim()
+            is_mass = quantity == "mass_kg"  # which neither the pressure nor the rim changes
+            yield Measurement(
+                quantity=quantity,
+                label=label,
+                member=member,
+                pressure_kPa=0.0 if is_mass else pressure,
+                load_N=load,
+                value=value,
+                sigma=deviation,
+                run=f"{run} {self.cell('run')}".rstrip(),
+                place=self.place,
+                rim=None if is_mass else rim,
+            )
 
     def _quantities(self) -> list[str]:
         if not self.cell("value"):
@@ -97,7 +111,7 @@ class Line:
         return [quantity]
 
     def _rim(self) -> RimSupport | None:
-        """Rim of the line: the case's where no column gives it; fixed where its cell is empty."""
+        """State of the rim: None, the case's, if there is no column; fixed if the cell is empty."""
         word = self.cell("rim").strip().lower() or RIMS[0]
         if "rim" not in self.columns or word == AS_CASE:
             return None
@@ -118,7 +132,8 @@ class Line:
             raise ValueError(f"label is '{self.cell('label')}', but c is {c} and m is {m}")
         if parts and kind and parts[2] and KIND_WORDS.get(kind) != KIND_WORDS.get(parts[2]):
             raise ValueError(f"label is '{self.cell('label')}', but kind is '{kind}'")
-        if self.cell("label") and "c" not in self.cells:  # beside c and m it is the mode's number
+        # in a table that has a column c, the label is the running number of the mode
+        if self.cell("label") and "c" not in self.cells:
             if not parts:
                 raise ValueError(
                     f"label is '{self.cell('label')}', must be like [2,1], or [0,0] lateral or"
@@ -137,6 +152,7 @@ class Line:
         zero = int(c) == int(m) == 0
         if zero and not word:
             raise ValueError("[0,0] needs a kind, lateral (axial) or torsional")
+        # in tables of other programs the column may describe every mode; only [0,0] needs it
         if word and not zero and self.cell("value"):
             raise ValueError(f"kind is '{kind}', must be empty: only [0,0] has one")
         return Label(int(c), int(m), KIND_WORDS[word] if zero else None)

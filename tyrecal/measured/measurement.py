@@ -26,9 +26,9 @@ class Measurement:
     """A value that was measured, or the mean of several, in the unit of ``quantity``."""
 
     quantity: str  # one of USUAL_MEASUREMENTS
-    label: Label | None  # None of what is no frequency, or has none yet
+    label: Label | None  # None if it is not a frequency, or has no label yet
     member: str  # 1 or 2 of a doublet, symmetric or antisymmetric under load; "": one for both
-    pressure_kPa: float  # 0 of the mass
+    pressure_kPa: float  # 0 for the mass
     load_N: float
     value: float
     sigma: float = nan  # standard deviation, NaN where it is not stated

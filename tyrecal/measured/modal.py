@@ -1,5 +1,9 @@
-"""The modes of one universal file, with their labels: from shapes that are in it, or from
-frequency-response functions."""
+"""Labelled modes of one universal file: from its mode shapes, or else from its frequency-response
+functions.
+
+A `Labeller` compares shapes on one layout of sensors with those of all labels [c,m]. Files may not
+say what directions 1, 2, 3 are, so there is one Labeller for each possible meaning.
+"""
 
 from __future__ import annotations
 
@@ -23,35 +27,36 @@ from .universal import Function, MeasuredShape, Place, Signal, Universal, channe
 Array = np.ndarray
 
 MAX_DOUBLET_SPLIT = 0.05  # relative distance of a doublet's members, at most
-MIN_COLLINEARITY = 0.5  # modal phase collinearity below which a shape has no real part to speak of
-# ln of the odds from which on one meaning of the directions is clearly the better: of all modes
-# together, and of one mode in the mean
+MIN_COLLINEARITY = 0.5  # modal phase collinearity below which a shape is too complex for a label
+# ln of the odds above which one meaning of the directions is clearly better than another: for all
+# modes together, and for each mode on average
 LN_ODDS_OF_DIRECTIONS, LN_ODDS_OF_DIRECTIONS_PER_MODE = 10.0, 1.0
-FAR_LARGER = 10.0  # times the others' median size, of a suspected channel
-MAX_NOISE = 0.5  # share of noise in a bad channel's mean square
+FAR_LARGER = 10.0  # times the median size of the channels: such a channel is suspected
+MAX_NOISE = 0.5  # share of noise in the mean square of a channel, above which it is left out
 
 
 @dataclass(frozen=True)
 class Layout:
-    """How a test's coordinates and directions are meant, and what can be in its band.
+    """What the user states about a test: its coordinates and directions, and its band.
 
-    directions: of 1, 2, 3: ``stated`` as the file's coordinate systems say, ``cartesian`` along x,
-    y, z, or ``cylindrical``, radial, tangential, axial; "": stated where nodes have systems of
-    their own, else cartesian or cylindrical, whichever the shapes clearly fit better.
+    directions 1, 2, 3 are ``stated`` (by the file's coordinate systems), ``cartesian`` (x, y, z) or
+    ``cylindrical`` (radial, tangential, axial). "": stated if nodes have systems of their own, else
+    cartesian or cylindrical, whichever the shapes clearly fit better.
     """
 
-    axle: str = ""  # x, y or z; "": told by the sensors' places
-    centre: Place = (0.0, 0.0, 0.0)  # m
+    axle: str = ""  # direction of the axle, x, y or z; "": from the places of the sensors
+    centre: Place = (0.0, 0.0, 0.0)  # of the wheel, m
     directions: str = ""
-    highest: int = MAX_SAMPLED_HARMONIC  # the largest c that is possible
+    highest: int = MAX_SAMPLED_HARMONIC  # the largest c that a mode can have
     band: tuple[float, float] | None = None  # Hz; None: all
-    form: str = ""  # of functions that do not say theirs
-    case: CaseModes | None = None  # by which shapes and frequencies are judged, too
+    # receptance, mobility or accelerance (`identify.FORMS`), for functions that do not state theirs
+    form: str = ""
+    case: CaseModes | None = None  # a case whose shapes and frequencies help to find labels
 
 
 @dataclass(frozen=True)
 class Geometry:
-    """Where nodes are, and where the directions of those with a system of their own point."""
+    """Places of the nodes, m, and unit vectors (3, 3) of directions 1 to 3."""
 
     nodes: Mapping[int, Place]
     axes: Mapping[int, Array]
@@ -63,28 +68,28 @@ class LabelledMode:
 
     mode: MeasuredMode
     sensors: Sensors
-    shape: Array  # (k,) real, of unit largest value
+    shape: Array  # (k,) real, largest value 1
     collinearity: float
     judged: Judged
     place: str  # file and data set
-    member: str = ""  # 1 or 2 where both of a doublet were found
+    member: str = ""  # 1 or 2 if both modes of a doublet were measured
 
 
 @dataclass(frozen=True)
 class ModalTest:
-    """All of one test; the functions are None where it holds shapes."""
+    """Modes of one test. The functions are None if the file has mode shapes."""
 
     name: str
     modes: tuple[LabelledMode, ...]
     frequency_Hz: Array | None = None  # (n,)
     functions: Array | None = None  # (k, n) from which the modes were identified
-    fitted: Array | None = None  # (k, n) what the modes make, NaN outside the band
+    fitted: Array | None = None  # (k, n) the functions of the modes, NaN outside the band
     channels: tuple[str, ...] = ()  # (k,) names
-    notes: tuple[str, ...] = ()  # what a user has to know
+    notes: tuple[str, ...] = ()  # warnings for the user
 
     @property
     def explained(self) -> float:
-        """Share of the functions' mean square that the modes make, in the band."""
+        """Share of the mean square of the functions that the modes reproduce, in the band."""
         if self.functions is None or self.fitted is None:
             return 1.0
         rest = np.nansum(np.abs(self.functions - self.fitted) ** 2)
@@ -92,7 +97,7 @@ class ModalTest:
 
     @property
     def least_explained(self) -> str:
-        """The channel that has more than half of what the modes do not make, "" if none has."""
+        """The channel with more than half of what the modes do not reproduce, "" if none has."""
         if self.functions is None or self.fitted is None or not self.channels:
             return ""
         rest = np.nansum(np.abs(self.functions - self.fitted) ** 2, axis=1)
@@ -100,8 +105,8 @@ class ModalTest:
 
 
 @dataclass(frozen=True)
-class _Found:
-    """A mode before its label."""
+class _UnlabelledMode:
+    """A mode before its label; ``signals``: node and direction of each value of its amplitude."""
 
     mode: MeasuredMode
     signals: tuple[Signal, ...]
@@ -117,14 +122,17 @@ def read_modal_test(file: Universal, geometry: Geometry, layout: Layout) -> Moda
         if file.shapes:
             identified, test = _from_shapes(file), ModalTest(str(file.path), ())
         else:
-            identified, test = _identified(file, layout)
-        judged, note = _judges_by_directions(identified, geometry, layout)
+            identified, test = _from_functions(file, layout)
+        judged, note = _with_labellers(identified, geometry, layout)
         modes = tuple(label_in_turn(judged))
         return replace(test, modes=modes, notes=test.notes + (note,) * bool(note))
 
 
 def sensors_in(file: Universal, layout: Layout) -> Labeller:
-    """Judge of the sensors of a file. Raises InputError."""
+    """Labeller for the sensors of a file.
+
+    Raises InputError if the file does not state the directions and they matter for labels.
+    """
     with _naming(file):
         signals = tuple(_signals(file.shapes[0])) if file.shapes else ()
         if file.functions and not signals:
@@ -132,9 +140,9 @@ def sensors_in(file: Universal, layout: Layout) -> Labeller:
         if not signals:
             raise InputError("nothing was measured in it")
         first, *others = _readings(signals, Geometry(file.nodes, file.axes), layout).values()
-        apart = first.looks_like()
+        confused = first.looks_like()  # labels that these sensors cannot distinguish
         others = [] if layout.directions else others
-        if any(each is not first and each.looks_like() != apart for each in others):
+        if any(each is not first and each.looks_like() != confused for each in others):
             raise InputError(f"the file does not say what its directions are; {_ASK}")
         return first
 
@@ -143,43 +151,44 @@ _ASK = "give --directions cartesian (along x, y, z) or cylindrical (radial, tang
 
 
 def _readings(signals: Sequence[Signal], geometry: Geometry, layout: Layout) -> dict[str, Labeller]:
-    """Judges of the signals by what the directions can mean: first what the user gives, or else the
-    file or the format. Where two meanings put the sensors in the same directions, one judge has
-    both."""
+    """A Labeller for each meaning of the directions: first that of the user, or else of the file,
+    or else of the format. Two meanings that give the same directions share one."""
     names = ["stated", "cartesian"] if geometry.axes else ["cartesian", "cylindrical"]
     names = list(dict.fromkeys([layout.directions or names[0], *names]))
-    judges: dict[str, Labeller] = {}
+    labellers: dict[str, Labeller] = {}
     for name in names:
         axes = geometry.axes if name == "stated" else {}
         place = (geometry.nodes, layout.axle, layout.centre, name == "cylindrical", axes)
         sensors = sensors_of(signals, *place)
         known = [
-            j for j in judges.values() if np.allclose(j.sensors.directions, sensors.directions)
+            j for j in labellers.values() if np.allclose(j.sensors.directions, sensors.directions)
         ]
-        judges[name] = known[0] if known else Labeller(sensors, layout.highest, layout.case)
-    return judges
+        labellers[name] = known[0] if known else Labeller(sensors, layout.highest, layout.case)
+    return labellers
 
 
-def _judges_by_directions(
-    modes: Sequence[_Found], geometry: Geometry, layout: Layout
+def _with_labellers(
+    modes: Sequence[_UnlabelledMode], geometry: Geometry, layout: Layout
 ) -> tuple[list[tuple[MeasuredMode, Labeller, str]], str]:
-    """Modes with the judges of their sensors and their places in the file, by the meaning of the
-    directions that the shapes fit; and a sentence where that is not the format's. Raises InputError
-    where no meaning is clearly right."""
-    judges = {s: _readings(s, geometry, layout) for s in {each.signals for each in modes}}
-    names = list(next(iter(judges.values())))
+    """Each mode with the Labeller of its sensors and its place in the file, by the meaning of the
+    directions that the shapes fit; and a note for the user, or "". Raises InputError if no meaning
+    is clearly right."""
+    labellers = {s: _readings(s, geometry, layout) for s in {each.signals for each in modes}}
+    names = list(next(iter(labellers.values())))
     chosen, note = names[0], ""
-    if any(len(set(each.values())) > 1 for each in judges.values()):
-        shapes = [(judges[each.signals], _unit(each.mode)[0]) for each in modes]
-        evidence = {n: sum(judge[n].ln_evidence(u) for judge, u in shapes) for n in names}
+    if any(len(set(each.values())) > 1 for each in labellers.values()):
+        shapes = [(labellers[each.signals], _unit(each.mode)[0]) for each in modes]
+        evidence = {n: sum(own[n].ln_evidence(u) for own, u in shapes) for n in names}
         chosen, note = _meaning(evidence, len(modes), layout.directions)
-    return [(each.mode, judges[each.signals][chosen], each.place) for each in modes], note
+    return [(each.mode, labellers[each.signals][chosen], each.place) for each in modes], note
 
 
 def _meaning(evidence: Mapping[str, float], count: int, given: str) -> tuple[str, str]:
-    """The meaning of the directions, and a sentence where that is not the format's or not what the
-    shapes fit. evidence: by meaning, ln of the probability of ``count`` shapes, first that of
-    ``given``, or else of the file or the format. Raises InputError where none is clearly right."""
+    """The meaning of the directions, and a note if it is not the format's or the shapes do not fit.
+
+    evidence: ln of the probability of ``count`` shapes by meaning, first that of the user
+    (``given``), or else of the file or the format. Raises InputError if none is clearly right.
+    """
     first, *others = evidence
     best = max(others, key=lambda name: evidence[name])
     lead = evidence[best] - evidence[first]
@@ -218,7 +227,7 @@ def _signals(shape: MeasuredShape) -> tuple[Signal, ...]:
     return tuple((shape.nodes[i], int(k) + 1) for i, k in zip(rows, columns, strict=True))
 
 
-def _from_shapes(file: Universal) -> list[_Found]:
+def _from_shapes(file: Universal) -> list[_UnlabelledMode]:
     modes = []
     for shape in file.shapes:
         signals = _signals(shape)
@@ -226,11 +235,11 @@ def _from_shapes(file: Universal) -> list[_Found]:
             raise InputError(f"{shape.place}: every value is 0")
         amplitude = shape.values[np.isfinite(shape.values)]
         mode = MeasuredMode(shape.frequency_Hz, amplitude, shape.damping)
-        modes.append(_Found(mode, signals, shape.place))
+        modes.append(_UnlabelledMode(mode, signals, shape.place))
     return modes
 
 
-def _identified(file: Universal, layout: Layout) -> tuple[list[_Found], ModalTest]:
+def _from_functions(file: Universal, layout: Layout) -> tuple[list[_UnlabelledMode], ModalTest]:
     if not file.functions:
         others = ", ".join(f"{count} x {what}" for what, count in file.skipped.items())
         raise InputError(
@@ -263,10 +272,11 @@ def _identified(file: Universal, layout: Layout) -> tuple[list[_Found], ModalTes
     modes = []
     for mode in identified.modes:
         parts = np.split(mode.amplitude, np.cumsum([len(row) for row in table.values()])[:-1])
+        # a mode is known on the signals of one reference (exciter): the one that excites it most
         strongest = int(np.argmax([np.linalg.norm(part) for part in parts]))
         signals = tuple(list(table.values())[strongest])
-        moved = replace(mode, amplitude=parts[strongest])
-        modes.append(_Found(moved, signals, str(file.path)))
+        own = replace(mode, amplitude=parts[strongest])
+        modes.append(_UnlabelledMode(own, signals, str(file.path)))
     name = str(file.path)
     return modes, ModalTest(name, (), f, values, identified.fitted, tuple(names), tuple(notes))
 
@@ -326,10 +336,10 @@ def _by_reference(functions: Sequence[Function]) -> dict[Signal, dict[Signal, Fu
 
 
 def label_in_turn(identified: Sequence[tuple[MeasuredMode, Labeller, str]]) -> list[LabelledMode]:
-    """The modes of a run with their labels, lowest frequency first: each is judged by its shape
-    and by what was found clearly below it.
+    """The modes of a run with their labels, lowest frequency first. A label depends on the shape
+    and on the labels of clearly lower modes.
 
-    identified: of each mode the judge of its sensors, and its place in the file."""
+    identified: each mode with the Labeller of its sensors and its place in the file."""
     modes: list[LabelledMode] = []
     lowest: dict[Label, float] = {}  # Hz
     for mode, labeller, place in sorted(identified, key=lambda each: each[0].frequency_Hz):
@@ -338,7 +348,7 @@ def label_in_turn(identified: Sequence[tuple[MeasuredMode, Labeller, str]]) -> l
         modes.append(_labelled(mode, labeller, place, below))
         if label := modes[-1].judged.label:
             lowest.setdefault(label, mode.frequency_Hz)
-    return settled(modes)
+    return without_overtones(modes)
 
 
 def _labelled(
@@ -347,9 +357,9 @@ def _labelled(
     shape, collinearity = _unit(mode)
     judged = labeller.judge(shape, below, mode.frequency_Hz)
     R = labeller.sensors.points[:, 0]
-    belt = R / R.max() > BELT
-    part = np.mean(shape[belt] ** 2) / (np.mean(shape**2) or 1.0)
-    if judged.label and part < TAKES_PART:
+    belt = R / R.max() > BELT  # sensors on the belt and not on a sidewall
+    belt_share = np.mean(shape[belt] ** 2) / (np.mean(shape**2) or 1.0)
+    if judged.label and belt_share < TAKES_PART:
         judged = replace(judged, label=None, why="the belt hardly moves: a mode of the sidewalls")
     if judged.label and collinearity < MIN_COLLINEARITY:
         why = f"the shape is complex (collinearity {collinearity:.2f})"
@@ -358,16 +368,15 @@ def _labelled(
 
 
 def _unit(mode: MeasuredMode) -> tuple[Array, float]:
-    """The real part of a shape (k,), of unit largest value, and its collinearity."""
+    """The real part of a shape (k,), with largest value 1, and its collinearity."""
     shape, collinearity = real_part(mode.amplitude)
     return shape / (np.abs(shape).max() or 1.0), collinearity
 
 
-def settled(labelled: list[LabelledMode]) -> list[LabelledMode]:
-    """Each label once in a run, or twice where both members of a doublet were found.
+def without_overtones(labelled: list[LabelledMode]) -> list[LabelledMode]:
+    """The modes of a run, each label on its lowest mode only, or on both modes of a doublet.
 
-    As in ``modes.label``, the lowest mode on an order has its label; what comes above is an
-    overtone, which has none here.
+    Higher modes with the same label are overtones, and lose it, as in ``modes.label``.
     """
     hertz = lambda each: each.mode.frequency_Hz
     result: list[LabelledMode] = []
@@ -392,18 +401,18 @@ def settled(labelled: list[LabelledMode]) -> list[LabelledMode]:
 
 
 def measurements_of(test: ModalTest, pressure_kPa: float) -> list[Measurement]:
-    """The frequencies of all modes; those that have no label go without one."""
+    """The frequencies of all modes, also of those without a label."""
     return [
         Measurement(
-            "frequency_Hz",
-            each.judged.label,
-            each.member,
-            pressure_kPa,
-            0.0,
-            each.mode.frequency_Hz,
-            each.mode.sigma_Hz,
-            test.name,
-            each.place,
+            quantity="frequency_Hz",
+            label=each.judged.label,
+            member=each.member,
+            pressure_kPa=pressure_kPa,
+            load_N=0.0,
+            value=each.mode.frequency_Hz,
+            sigma=each.mode.sigma_Hz,
+            run=test.name,
+            place=each.place,
         )
         for each in test.modes
     ]
