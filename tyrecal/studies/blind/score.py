@@ -1,6 +1,8 @@
-"""Answers against the truth, trial by trial: difficulty by the ruler, right or wrong, held out.
+"""Score of each blind trial: its answer against the truth, its difficulty, its held-out error.
 
-Nothing here is shared with the diagnosis but the names of modes and the form error on record.
+The ruler is a record of sensitivities and effects that was made before the study; it gives the
+difficulty of a trial without the diagnosis. Code of the diagnosis is not used here, except the
+names of modes and the recorded form error.
 """
 
 from __future__ import annotations
@@ -28,41 +30,45 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Scored:
-    """A trial, its answer next to the truth."""
+    """One trial: the truth, the answer, and how they compare."""
 
     id: str
-    kind: str
-    law: str
-    size: float
-    swapped: bool
+    kind: str  # "effect", "none" or "outside"
+    law: str  # id of the true effect, or name of the family outside the catalogue, "" for none
+    size: float  # true parameter, in the unit of the effect
+    swapped: bool  # whether two labels were exchanged in the measurements
     truth: str  # the true key: "none", "outside" or an id
-    group: tuple[str, ...]  # keys that count as right
-    lam: float  # lambda, 0 without an effect
-    band: float  # min(lambda, min_j delta_j^2), likewise
+    group: tuple[str, ...]  # keys that count as right: the truth, and effects that look the same
+    lam: float  # detectability lambda, 0 without an effect
+    # min(lambda, min_j delta_j^2), 0 without an effect; delta_j: distance from effect j (`ruler`)
+    band: float
     verdict: str
     named: str | None
     ranked: tuple[str, ...]  # keys by falling probability
     probabilities: dict[str, float]
-    on_truth: float  # probability
-    on_group: float
-    in_set: bool
-    parameter_held: bool | None  # whether its interval holds the equivalent one; None: not named
-    before: float  # rms error held out, in ln f
+    on_truth: float  # probability of ``truth`` in the answer
+    on_group: float  # and of all keys of ``group``
+    in_set: bool  # whether ``truth`` is one of the answer's candidates
+    # whether the interval of the named parameter holds `Difficulty.equivalent`, the catalogue's
+    # parameter that is closest to the true effect; None: the true effect is not named
+    parameter_held: bool | None
+    # rms error of held-out values in ln f, without and with the named effect
+    before: float
     after: float
-    baselines: dict[str, str]
+    baselines: dict[str, str]  # answers of simple rules, by their name
 
     @property
     def right(self) -> bool:
-        """The likeliest answer is of the true group."""
+        """Whether the likeliest key is in the true group."""
         return self.ranked[0] in self.group
 
     @property
     def shrinkage(self) -> float:
-        """1 - after / before."""
+        """Reduction of the held-out error, 1 - after / before."""
         return 1 - self.after / self.before
 
     def plain(self) -> dict[str, Any]:
-        """For JSON."""
+        """The trial as plain data for JSON."""
         kept = {k: v for k, v in asdict(self).items() if k not in ("probabilities", "ranked")}
         kept["top"] = list(self.ranked[:3])
         kept["band"] = min(self.band, 1e9)
@@ -70,12 +76,12 @@ class Scored:
 
 
 def score(folder: Path, sealed: Path) -> list[Scored]:
-    """Every trial, scored. Raises InputError."""
+    """Scores of all trials of a study. Raises InputError."""
     return rescored(folder, sealed, sorted((folder / "answers").glob("*.json")))
 
 
 def rescored(folder: Path, sealed: Path, answers: Sequence[Path]) -> list[Scored]:
-    """Other answers, to some of the trials of a folder whose own are sealed. Raises InputError."""
+    """Scores of answers from another folder to trials of this one. Raises InputError."""
     content, answered = open_truth(folder, sealed), {path.stem: path for path in answers}
     protocol = read_protocol(folder)
     labels = labels_of(case_of(folder))
@@ -102,20 +108,20 @@ def scored(
     protocol: Protocol,
     labels: Sequence[Label],
 ) -> Scored:
-    """One trial."""
+    """Score of one trial."""
     y, places, counts = means(readings, ruler)
     d = np.array([log(v) for v in truth["variables"].values()]) - ruler.x0
     key = truth["law"] if truth["kind"] == "effect" else truth["kind"]
-    hard = Difficulty(0.0, 0.0, (key,), None)
+    rated = Difficulty(0.0, 0.0, (key,), None)
     if truth["kind"] != "none":
         shift, split = true_shift(truth, ruler, places, labels)
-        hard = difficulty(ruler, protocol, truth["law"], d, places, counts, shift, split)
-    group = hard.group if truth["kind"] == "effect" else (key,)
+        rated = difficulty(ruler, protocol, truth["law"], d, places, counts, shift, split)
+    group = rated.group if truth["kind"] == "effect" else (key,)
     diagnosis = answer["diagnosis"]
     p = diagnosis["probabilities"]
     named, held = diagnosis["effect"], None
-    if truth["kind"] == "effect" and named == key and hard.equivalent is not None:
-        held = diagnosis["parameter"]["low"] <= hard.equivalent <= diagnosis["parameter"]["high"]
+    if truth["kind"] == "effect" and named == key and rated.equivalent is not None:
+        held = diagnosis["parameter"]["low"] <= rated.equivalent <= diagnosis["parameter"]["high"]
     out = answer["held_out"]
     sigma = ruler.sigma(places, counts, protocol, constants=False)
     return Scored(
@@ -126,8 +132,8 @@ def scored(
         truth["swapped"],
         key,
         group,
-        hard.lam,
-        hard.band,
+        rated.lam,
+        rated.band,
         diagnosis["verdict"],
         named,
         tuple(sorted(p, key=lambda k: -p[k])),
@@ -143,7 +149,7 @@ def scored(
 
 
 def means(readings: Sequence[Measurement], ruler: Ruler) -> tuple[Array, Array, Array]:
-    """ln of each row's mean of members (n,), its place in the ruler (n,), number of values (n,)."""
+    """For each of n rows: mean of ln f over its members, index in the ruler, number of members."""
     logarithms: dict[tuple[Label | None, float], list[float]] = {}
     for each in readings:
         pressure = each.pressure_kPa if each.label else 0.0
@@ -159,7 +165,8 @@ def means(readings: Sequence[Measurement], ruler: Ruler) -> tuple[Array, Array, 
 def true_shift(
     truth: Mapping[str, Any], ruler: Ruler, places: Array, labels: Sequence[Label]
 ) -> tuple[Array, Array]:
-    """Shift of the effect (n,), and how far it splits pairs (n,), from runs without noise."""
+    """Shift of ln f by the true effect (n,), and by how much it moves pairs apart (n,), from the
+    maker's runs without noise."""
     names = {str(label) for label in labels}
     tables: list[dict[tuple[str, float], list[float]]] = []
     for key in ("with_effect", "without"):
@@ -176,7 +183,7 @@ def true_shift(
 def held_out_error(
     measured: Mapping[str, Sequence[float]], predicted: Mapping[str, float]
 ) -> float:
-    """RMS of ln measured (mean of members) - ln predicted."""
+    """Root mean square of ln measured (mean of members) - ln predicted."""
     errors = [
         np.mean(np.log(values)) - log(predicted[name])
         for name, values in measured.items()

@@ -3,7 +3,8 @@
     ln Z(e) = -r^T S^-1 r / 2 - ln|2 pi S| / 2 - x^T x / 2 - ln|I + J^T S^-1 J| / 2 + ln p(splits)
 
 at the re-fitted x, counted from its centre in units of its spread (Laplace's approximation;
-MacKay, Information Theory, ch. 27-28); S: Sigma, and what the effect's law may be off. Then
+MacKay, Information Theory, ch. 27-28). r: residual in ln f; S: the problem's Sigma plus the
+covariance of the error of the effect's law. Then
 Z = integral of Z(e) p(e) de, p(e) uniform over the range, by Gauss and Legendre's rule.
 """
 
@@ -28,41 +29,41 @@ Array = np.ndarray
 NONE: Final = "none"
 OUTSIDE: Final = "outside"
 PRIOR_OUTSIDE: Final = 0.10
-RULE_POINTS = {1: 25, 2: 15, 3: 9}  # of the rule in each parameter, by how many effects there are
+RULE_POINTS = {1: 25, 2: 15, 3: 9}  # of the rule in each parameter, by the number of effects
 FEW_POINTS = {2: 7, 3: 5}  # that show which sets of effects matter: ln Z within 0.5
 COVERAGE = 2.0  # standard deviations within which a stated number may be off (GUM, k = 2)
-SHARP_FALL = 2.0  # of ln Z from the best point to its neighbours, which asks for more points
+SHARP_FALL = 2.0  # of ln Z from the best point to its neighbours, above which points are added
 MAX_ZOOMS = 6
 REFIT_STEPS = 16  # of Gauss and Newton, halved where they rise, in a model that is quadratic
 COUPLED_STEPS = 8  # more where near modes are coupled
-REFITTED = 1e-6  # of the misfit, a fall that is not worth a step
-FAR_BELOW, ABOVE_POINTS = 20.0, 1.0  # of ln Z: how far a spline may fall, and rise above its points
-UNKNOWN = (0.005, 0.01, 0.02, 0.04)  # shift of modes by what no catalogue holds
+REFITTED = 1e-6  # expected fall of the misfit below which a re-fit has converged
+FAR_BELOW, ABOVE_POINTS = 20.0, 1.0  # limits of a spline in ln Z: below and above its best point
+UNKNOWN = (0.005, 0.01, 0.02, 0.04)  # shifts of ln f by causes outside the catalogue
 UNKNOWN_ALIKE = 0.9  # correlation of such a shift of a mode in two states
-SMOOTH_HARMONICS, SMOOTH_LN_F = 2.0, 0.5  # over which trends change
-INFLATION = (2.0, 4.0)  # all of Sigma's standard deviations
-MISREAD = 0.2  # of a frequency whose label is another mode's
+SMOOTH_HARMONICS, SMOOTH_LN_F = 2.0, 0.5  # correlation lengths of smooth shifts, in c and in ln f
+INFLATION = (2.0, 4.0)  # factors on all standard deviations of Sigma
+MISREAD = 0.2  # standard deviation of ln f of a frequency that has the label of another mode
 
 
 class Fitted(NamedTuple):
-    """Re-fits at parameters (q,)."""
+    """Re-fits of the variables x at each of q parameters, integrated over zeta of `veering`."""
 
     ln_evidence: Array  # (q,)
-    d: Array  # x - x0 (q, v)
+    d: Array  # x - x0 (q, v), at the likeliest zeta
     chi2: Array  # (q,)
     covariance: Array  # of d (q, v, v): the inverse of its posterior information
-    coupled: Array  # (q, k) Z at each zeta of the rule, times exp(-zeta^2 / 2), over that of all
+    coupled: Array  # (q, k) share of Z at each zeta of `veering.rule`; k = 0: no coupled modes
 
     @property
     def zeta(self) -> Array:
-        """(q,) by which near modes are coupled, the likeliest; 0 where none are."""
+        """The likeliest zeta (q,), the coupling of near modes; 0 if none are coupled."""
         count, points = self.coupled.shape
         return rule()[0][self.coupled.argmax(1)] if points else np.zeros(count)
 
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """An explanation, over the grid (q,) of its parameters."""
+    """An explanation of the data, over a grid of q parameters."""
 
     key: str  # "none", "outside", an id, "id1+id2", "id1+id2+id3"
     prior: float
@@ -71,7 +72,8 @@ class Hypothesis:
     ln_weights: Array  # ln of weight times prior density (q,)
     fitted: Fitted
     words: str = ""
-    ends: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # of the grid, by id
+    # first and last parameter of the whole grid by id: ``values`` may be a part of it
+    ends: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     stated: Mapping[str, float] = field(default_factory=dict)  # by id, see `Span.stated`
     few: bool = False  # whether its grid has `FEW_POINTS`
 
@@ -84,13 +86,13 @@ class Hypothesis:
 
     @property
     def best(self) -> int:
-        """The most probable parameters' place on the grid, its weights aside."""
+        """Index of the parameters with the largest evidence; weights of the grid do not count."""
         return int(np.argmax(self.fitted.ln_evidence))
 
     @property
     def at_bound(self) -> list[str]:
-        """Effects whose most probable parameter is the last one of the grid: more would fit
-        better."""
+        """Effects whose best parameter is the last one of the grid, so that a larger size would
+        fit better."""
         bounded = []
         for id, values in self.values.items():
             e = values[self.best]
@@ -142,10 +144,10 @@ def refit(
     among: Mapping[int, float] | None = None,
     near: Array | None = None,
 ) -> Fitted:
-    """x re-fitted at each of ``count`` parameters, integrated over what couples near modes.
+    """x re-fitted at each of ``count`` parameters, integrated over the coupling zeta of near modes.
 
-    extra (n, n) or (q, n, n): more covariance; among: {place in the rule: see `Fitted.coupled`},
-    where some of its points stand for all; near: x - x0 (q, v) near which it is known to lie.
+    extra (n, n) or (q, n, n): more covariance; among: {index in `veering.rule`: share of Z}, to use
+    only these points of the rule (`coupled_most`); near: x - x0 (q, v) to start from.
     """
     added = problem.added(effects, count)
     if near is None or not problem.integrand:
@@ -172,8 +174,8 @@ def refit(
 
 
 def over_zeta(ln: Array, among: Mapping[int, float] | None = None) -> Array:
-    """ln of the integral (q,) over what couples near modes of an integrand whose ln at the points
-    of the rule, or those ``among`` that stand for all, is ln (k, q)."""
+    """ln of the integral (q,) over zeta of an integrand, from its logarithms ln (k, q) at the
+    points of `veering.rule`, or at those of ``among`` only."""
     zeta, between, ln_weights = rule()
     if among:
         ln_prior = -(zeta[list(among), None] ** 2) / 2
@@ -186,8 +188,11 @@ def over_zeta(ln: Array, among: Mapping[int, float] | None = None) -> Array:
 def model_of(
     problem: InverseProblem, at: InverseProblem, added: Added
 ) -> Callable[[Array], tuple[Array, Array, Array]]:
-    """eta (q, n), its slopes (q, n, v) and ln p of its labels (q,) by d (q, v), with what effects
-    add to uncoupled modes, coupled as ``at`` has them."""
+    """The model as a function of d = x - x0 (q, v): eta (q, n), d eta / dx (q, n, v) and ln p of
+    the labels (q,).
+
+    Effects are ``added`` to uncoupled modes; then modes are coupled with the zeta of ``at``.
+    """
     eta0, J0 = problem.plain(np.zeros_like(problem.centre))
     H = problem.expansion.hessian[problem.places]
     by_variable = H.transpose(2, 0, 1).reshape(len(problem.centre), -1)
@@ -208,7 +213,7 @@ def refit_at(
     d: Array,
     steps: int,
 ) -> Fitted:
-    """x re-fitted from x0 + d (q, v) with what effects add to uncoupled modes, at one zeta."""
+    """x re-fitted from x0 + d (q, v) at the zeta of ``at``; other arguments as in `model_of`."""
     y, model = problem.observations.y, model_of(problem, at, added)
     S = at.sigma + problem.law(at.with_mixed_laws(added))
     if extra is not None:
@@ -248,11 +253,11 @@ def refit_at(
 
 
 class Family(NamedTuple):
-    """Family of errors outside the catalogue: more covariance (n, n) of ln f, in words."""
+    """A family of errors outside the catalogue, as additional covariance (n, n) of ln f."""
 
     words: str
     extra: Array
-    reading: bool  # an error of reading, not of the model
+    reading: bool  # whether it is an error of reading, and not of the model
 
 
 def outside(problem: InverseProblem) -> Hypothesis:
@@ -299,7 +304,7 @@ def families(problem: InverseProblem) -> list[Family]:
 
 
 def ln_shares(known: Sequence[Family]) -> Array:
-    """ln of what each has of the prior: half for unknown effects, half for errors of reading."""
+    """ln of the prior of each family: half for unknown effects, half for errors of reading."""
     reading = np.array([each.reading for each in known])
     return np.asarray(-np.log(2 * np.where(reading, reading.sum(), (~reading).sum())))
 
@@ -323,11 +328,11 @@ def explain(
     among: Mapping[int, float] | None = None,
     few: bool = False,
 ) -> Hypothesis:
-    """One to three effects over their ranges; what they add is added up.
+    """Hypothesis of one to three effects over their ranges; their contributions are added.
 
-    Where a peak is narrow, points gather about it: those within two places of the best one give way
-    to a rule of their own on the box between, until ln Z falls gently from the best point to its
-    neighbours. ``among``: see `refit`; few: by few points.
+    If the peak of ln Z is narrow, the grid is refined: the points within two places of the best one
+    are replaced by a new rule on their box, until ln Z falls gently from the best point to its
+    neighbours. ``among``: see `refit`; few: use `FEW_POINTS`.
     """
     box = [problem.expansion.nodes[id].reach for id in ids]
     widths = [high - low for low, high in box]
@@ -379,24 +384,24 @@ def _fall(ln: Array, best: Sequence[int]) -> float:
 
 
 def _grid(axes: Sequence[Array]) -> Array:
-    """All combinations (axes, q) of what stands on the axes."""
+    """All combinations (axes, q) of the values on the axes."""
     return np.array([each.ravel() for each in np.meshgrid(*axes, indexing="ij")])
 
 
 def _rule(low: float, high: float, count: int) -> tuple[Array, Array]:
-    """Gauss and Legendre's points and weights (count,) on an interval."""
+    """Points and weights (count,) of Gauss-Legendre quadrature on an interval."""
     points, weights = _gauss_legendre(count)
     return low + (high - low) * (points + 1) / 2, weights * (high - low) / 2
 
 
 @lru_cache
 def _gauss_legendre(count: int) -> tuple[Array, Array]:
-    """Points and weights (count,) on -1 to 1, not to be changed."""
+    """Points and weights (count,) on -1 to 1, kept: callers must not change them."""
     return np.polynomial.legendre.leggauss(count)
 
 
 def grid(nodes: EffectResponse) -> tuple[Array, Array]:
-    """Parameters over the reach and ln of weight times density, which sum to 1."""
+    """Parameters over the range of an effect, and ln of their prior weights, whose sum is 1."""
     low, high = nodes.reach
     points, weights = _rule(low, high, RULE_POINTS[1])
     return points, np.log(weights / (high - low))

@@ -39,40 +39,42 @@ class Toggle:
 class Assumed:
     """Numbers, all of them relative, that the diagnosis takes for granted and states."""
 
-    form: float | None = None  # model-form error of every mode; None: on record, and laws
-    split: float = 0.003  # of pairs, by the non-uniformity of this kind of tyre
-    law: float | None = None  # of an effect's shift, that may be off; None: by effect
-    further: float = 0.05  # probability of a further effect over that of one less, from one on
+    # error of the model in ln f of every mode; None: the recorded one, and that of material laws
+    form: float | None = None
+    split: float = 0.003  # distance of the two modes of a pair by non-uniformity, in ln f
+    law: float | None = None  # error of an effect's shift over that shift; None: `Effect.law`
+    further: float = 0.05  # prior of k + 1 effects over that of k, from k = 1 on
 
 
 class Added(NamedTuple):
-    """Contribution of effects at parameters (q,), and how far each of the k may be off it."""
+    """Contribution of k effects to eta = ln f at parameters (q,), and its uncertainty."""
 
-    shift: Array  # (q, n)
-    tilt: Array  # (q, n, v) by x
-    split: Array  # (q, n) of pairs with them
-    off: Array  # (k, q, n) standard deviation of its law, mode by mode
-    beside: Array  # (k, q, n) by one standard deviation of what else its nature leaves open
+    shift: Array  # (q, n) change of eta at x0
+    tilt: Array  # (q, n, v) change of the sensitivities d eta / dx
+    split: Array  # (q, n) distance of the two modes of a pair with the effects, in ln f
+    off: Array  # (k, q, n) standard deviation of the shift by the effect's law, mode by mode
+    beside: Array  # (k, q, n) shift by one standard deviation of its second number: `Effect.beside`
 
 
 @dataclass(frozen=True)
 class InverseProblem:
-    """n observations and the model that explains them."""
+    """n observations and the model of them, in v variables x (as logarithms)."""
 
     observations: Observations
     expansion: Expansion
     spans: Mapping[str, Span]
     places: Array  # (n,) of the observations among the model's rows
-    centre: Array  # (v,) of x before any measurement
-    spread: Array  # (v,) likewise
-    changes: tuple[Toggle, ...] = ()  # what was switched in runs 1, 2, ...
+    centre: Array  # (v,) mean of the prior of x
+    spread: Array  # (v,) standard deviation of the prior of x
+    changes: tuple[Toggle, ...] = ()  # the effect that was switched in each of runs 1, 2, ...
     assumed: Assumed = Assumed()
-    reduced: Mapping[int, float] = field(default_factory=dict)  # factors of sources of error
-    zeta: float = 0.0  # by which near modes are coupled, in standard deviations
+    # factors on the standard deviations of some sources of error, by their index
+    reduced: Mapping[int, float] = field(default_factory=dict)
+    zeta: float = 0.0  # coupling of near modes, in its standard deviations: see `veering`
 
     @property
     def constants(self) -> Array:
-        """s_k g_k (n, k) of the rows."""
+        """Change (n, k) of eta by one standard deviation of each of k sources of error."""
         known = self.expansion.constants[self.places].copy()
         for k, factor in self.reduced.items():
             known[:, k] *= factor
@@ -98,7 +100,7 @@ class InverseProblem:
 
     @cached_property
     def integrand(self) -> list[InverseProblem]:
-        """The problem at the points of the rule in zeta; empty where no modes are coupled."""
+        """The problem at each zeta of `veering.rule`; empty if no modes are coupled."""
         if not self.veering.active:
             return []
         return [replace(self, zeta=float(z)) for z in rule()[0]]
@@ -123,7 +125,7 @@ class InverseProblem:
         return replace(self, observations=replace(self.observations, y=y))
 
     def plain(self, d: Array) -> tuple[Array, Array]:
-        """eta (n,), J (n, v) at x0 + d without effects, whatever was switched."""
+        """eta (n,) and J = d eta / dx (n, v) at x0 + d without any effect, switched or not."""
         eta, jacobian = self.expansion.plain(self.expansion.x0 + d)
         eta, jacobian, _ = self.coupled(eta[None, self.places], jacobian[None, self.places])
         return eta[0], jacobian[0]
@@ -186,13 +188,13 @@ class InverseProblem:
         return added._replace(off=off, beside=beside)
 
     def law(self, added: Added) -> Array:
-        """Covariance (q, n, n) by which effects may be off what they add."""
+        """Covariance (q, n, n) of the errors of what effects add to eta."""
         by_mode, beside = self.laws(added)
         return by_mode + beside
 
     def laws(self, added: Added) -> tuple[Array, Array]:
-        """The two parts: by the laws of the effects mode by mode, and by what their nature leaves
-        open."""
+        """The two parts of `law`: by the laws of the effects mode by mode, and by their second
+        numbers."""
         off, beside = (each.transpose(1, 2, 0) for each in (added.off, added.beside))
         by_mode = off @ off.swapaxes(1, 2) * self._alike
         return np.asarray(by_mode), np.asarray(beside @ beside.swapaxes(1, 2))

@@ -1,4 +1,4 @@
-"""Evidence of fits that are known, by another covariance, another prior of x or with rows left out.
+"""Evidence of known fits under another covariance, another prior of x or with rows left out.
 
 About a fit eta is linear in x, whose prior is normal with spread S_x: integrated over x
 
@@ -24,25 +24,25 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Perturbation:
-    """Other assumptions about the same data. words: what is other."""
+    """The problem with one changed assumption, which ``words`` names."""
 
     words: str
-    problem: InverseProblem  # of the same rows
-    keep: Array  # (n,) rows that count
-    laws: float = 1.0  # times which effects' laws may be off
+    problem: InverseProblem  # with the same rows
+    keep: Array  # (n,) mask of the rows that are used
+    laws: float = 1.0  # factor on the allowance for the laws of effects
 
     @property
     def parts_near_modes(self) -> bool:
-        """Whether a row that is left out is one of two that are coupled: what the data show of
-        their labels, and what the other is mixed with, is then not what it was."""
+        """Whether a row is left out that is coupled with another mode (`veering`). The evidence of
+        the labels and the partner's frequency then change, so linear fits do not hold."""
         return bool(self.problem.veering.size[~self.keep].any())
 
 
 @dataclass(frozen=True)
 class LinearFit:
-    """An explanation at parameters (q,) about its re-fits, near modes coupled in one way."""
+    """A hypothesis at parameters (q,), linear in x about its re-fits, at one zeta of `veering`."""
 
-    place: int | None  # in the rule of what couples them; None: none are
+    place: int | None  # index of zeta in `veering.rule`; None: no modes are coupled
     residual: Array  # (q, n) at the centre of x
     slopes: Array  # (q, n, v) by x
     by_law: Array  # (q, n, n) covariance of what effects' laws are off by

@@ -1,11 +1,12 @@
-"""Dependence of a verdict on the assumptions: the same data, judged with other numbers than were
-assumed.
+"""Dependence of a verdict on the assumptions: the verdict on the same data with other assumptions.
 
-Every prior, every constant's standard deviation, what laws are off and how far variables may be
-from their start half and twice as large, the model's own form and the section beyond doubt, each
-label left out in turn. The scatter of the data stands, of which the check of the fit speaks.
-Hypotheses that carry weight are weighed anew about their fits, on their grids, of several effects
-on the part that does.
+Every prior, the standard deviation of every constant, the allowance for laws and the spread of the
+variables are halved and doubled. The model's form error and the section's errors are set to zero.
+Each label is left out in turn. The scatter of the data stays: the check of the fit tests it.
+
+Only hypotheses with enough probability are evaluated again, on the grids of their parameters, with
+the model linear in the variables about the fits that are known (`reweighed`). For several effects,
+only the grid points with enough probability are kept.
 """
 
 from __future__ import annotations
@@ -35,19 +36,21 @@ from .verdict import NAMED, NO_GAP, UNDECIDED, Verdict, decide, holds
 
 Array = np.ndarray
 FACTORS = {0.5: "half", 2.0: "twice"}
-MIN_WEIGHED = 1e-5  # of the likeliest explanation's probability, from which one is weighed again
-MAX_WEIGHED = 20  # explanations
-KEPT_BELOW = 8.0  # of ln posterior of a grid's points below the best, that are
+# least probability of a hypothesis that is evaluated again, over that of the likeliest one
+MIN_WEIGHED = 1e-5
+MAX_WEIGHED = 20  # hypotheses with effects that are evaluated again
+MAX_LN_BELOW_BEST = 8.0  # of the ln posterior of grid points that are kept
 JUDGED = {UNDECIDED: "undecided", NO_GAP: "no gap", "outside": "outside the catalogue"}
 
 
 @dataclass(frozen=True)
 class Robustness:
-    """Robustness of a verdict against other assumptions."""
+    """How much a verdict depends on its assumptions."""
 
-    robust: bool  # it is the same with all of these numbers
-    hangs_on: tuple[str, ...]  # what changes it, and to what
-    low: float  # range of the probability of what it says, see `verdict_probability`
+    robust: bool  # whether no change of an assumption changes the verdict
+    hangs_on: tuple[str, ...]  # the changes that do, each with the verdict that follows
+    # range of `verdict_probability` over all changes
+    low: float
     high: float
 
 
@@ -57,8 +60,11 @@ def robustness(
     verdict: Verdict,
     sources: Sequence[str],
 ) -> Robustness:
-    """Robustness of the verdict on these hypotheses. sources: names of the sources of error."""
-    kept = _weighty(hypotheses)
+    """Robustness of the verdict on these hypotheses.
+
+    sources: names of the sources of error, in the order of `InverseProblem.constants`.
+    """
+    kept = _probable(hypotheses)
     p = [verdict_probability(probabilities(hypotheses), verdict)]
     changes: list[str] = []
     for words, judged, rows in _variants(problem, kept, verdict, sources):
@@ -71,8 +77,11 @@ def robustness(
 
 
 def verdict_probability(p: Mapping[str, float], verdict: Verdict) -> float:
-    """Probability of a verdict: that what is named, or else likeliest, is there; that nothing is;
-    that something outside is."""
+    """Probability that the verdict is right.
+
+    Named or undecided: that the named, or else the likeliest, effects are present, alone or with
+    others. No gap: that there is no effect. Outside: that the cause is not in the catalogue.
+    """
     if verdict.kind in (NAMED, UNDECIDED):
         key = verdict.key or verdict.best
         return present(p, key.split("+")) if key else 0.0
@@ -82,21 +91,21 @@ def verdict_probability(p: Mapping[str, float], verdict: Verdict) -> float:
 def _variants(
     problem: InverseProblem, kept: Sequence[Hypothesis], verdict: Verdict, sources: Sequence[str]
 ) -> Iterator[tuple[str, list[Hypothesis], int]]:
-    """Variants of the assumptions: the change in words, the hypotheses then, and the number of rows
-    that count."""
+    """For each change of an assumption: the change in words, the hypotheses with it, and the number
+    of rows that are used."""
     count = len(problem.places)
-    for words, of in _priors(verdict):
+    for words, power in _priors(verdict):
         for factor, times in FACTORS.items():
-            changed = [replace(h, prior=h.prior * factor ** of(h)) for h in kept]
+            changed = [replace(h, prior=h.prior * factor ** power(h)) for h in kept]
             yield f"the prior of {words} {times} as large", changed, count
     changes = list(_changes(problem, sources))
-    again = [_again(problem, h, changes) for h in kept]
-    for other, *changed in zip(changes, *again, strict=True):
+    by_hypothesis = [_reevaluate(problem, h, changes) for h in kept]
+    for other, *changed in zip(changes, *by_hypothesis, strict=True):
         yield other.words, changed, int(other.keep.sum())
 
 
 def _priors(verdict: Verdict) -> Iterator[tuple[str, Callable[[Hypothesis], int]]]:
-    """Priors in words, and how many times a hypothesis has the factor."""
+    """Priors in words, and the power to which a hypothesis's prior contains each."""
     yield "no effect", lambda h: int(h.key == NONE)
     yield "what is outside the catalogue", lambda h: int(h.key == OUTSIDE)
     yield "every further effect", lambda h: max(len(h.values) - 1, 0)
@@ -106,7 +115,7 @@ def _priors(verdict: Verdict) -> Iterator[tuple[str, Callable[[Hypothesis], int]
 
 
 def _changes(problem: InverseProblem, sources: Sequence[str]) -> Iterator[Perturbation]:
-    """Changes of the numbers that were assumed."""
+    """All changes of the assumptions except the priors."""
     rows = problem.observations.rows
     every = np.ones(len(rows), bool)
     of_section = [k for k, name in enumerate(sources) if name.startswith(SECTION)]
@@ -140,9 +149,9 @@ def _scaled(problem: InverseProblem, places: Sequence[int], factor: float) -> In
     return replace(problem, reduced={**problem.reduced, **dict.fromkeys(places, factor)})
 
 
-def _weighty(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Hypotheses that carry weight, none and outside always; of sets of effects the points that
-    do."""
+def _probable(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Hypotheses that are evaluated again: "none", "outside", and the likeliest with effects. Those
+    with several effects keep only their probable grid points."""
     ln = {h.key: h.ln_evidence + np.log(h.prior) for h in hypotheses}
     least = max(ln.values()) + np.log(MIN_WEIGHED)
     likely = [h for h in hypotheses if h.values and ln[h.key] > least]
@@ -150,28 +159,29 @@ def _weighty(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
     kept = [h for h in hypotheses if not h.values]
     for h in likely:
         p = h.posterior
-        on = p > p.max() * np.exp(-KEPT_BELOW)
+        is_kept = p > p.max() * np.exp(-MAX_LN_BELOW_BEST)
         if len(h.values) > 1:
-            values = {id: e[on] for id, e in h.values.items()}
-            fitted = Fitted(*(each[on] for each in h.fitted))
-            h = replace(h, values=values, ln_weights=h.ln_weights[on], fitted=fitted)
+            values = {id: e[is_kept] for id, e in h.values.items()}
+            fitted = Fitted(*(each[is_kept] for each in h.fitted))
+            h = replace(h, values=values, ln_weights=h.ln_weights[is_kept], fitted=fitted)
         kept.append(h)
     return kept
 
 
-def _again(
+def _reevaluate(
     problem: InverseProblem, h: Hypothesis, changes: Sequence[Perturbation]
 ) -> list[Hypothesis]:
-    """A hypothesis weighed anew with each change."""
+    """The hypothesis with its evidence under each of the changes."""
     if h.key == OUTSIDE:
-        return _outside(problem, h, changes)
+        return _reevaluate_outside(problem, h, changes)
+    # only the few values of zeta, the coupling of near modes, that have most of the evidence
     d, among, result = h.fitted.d, coupled_most([h]), []
     fits = lines(problem, h.values, d, among)
     for other in changes:
-        if other.parts_near_modes:
+        if other.parts_near_modes:  # the linear fits do not hold: fit again
             fewer = other.problem.only(other.keep)
-            anew = refit(fewer, h.values, len(d), among=among, near=d)
-            ln, chi2 = anew.ln_evidence, anew.chi2
+            refitted = refit(fewer, h.values, len(d), among=among, near=d)
+            ln, chi2 = refitted.ln_evidence, refitted.chi2
         else:
             ln, chi2 = reweighed(fits, other, among)
         total = float(np.logaddexp.reduce(ln + h.ln_weights))
@@ -180,11 +190,11 @@ def _again(
     return result
 
 
-def _outside(
+def _reevaluate_outside(
     problem: InverseProblem, h: Hypothesis, changes: Sequence[Perturbation]
 ) -> list[Hypothesis]:
-    """Hypotheses outside the catalogue weighed anew, without families that concern no row that
-    counts, as that a label is misread which is left out."""
+    """The hypothesis "outside" with its evidence under each of the changes. Families of errors that
+    concern only rows that are left out, such as the misreading of their label, do not count."""
     extra = np.array([family.extra for family in families(problem)])
     added, start = problem.added({}, len(extra)), np.zeros((len(extra), len(problem.centre)))
     near = refit_at(problem, problem, added, extra, start, REFIT_STEPS).d

@@ -153,8 +153,8 @@ def with_sets(
 
 
 def coupled_most(known: Sequence[Hypothesis]) -> dict[int, float]:
-    """The points of the rule in what couples modes that stand for all, with their shares on the
-    mean of some hypotheses; empty where none are coupled."""
+    """The values of zeta (`veering.rule`) with most of the evidence, which stand for all of them:
+    {index in the rule: share of the evidence, mean over ``known``}; {} if no modes are coupled."""
     share = np.mean([h.fitted.coupled.T @ h.posterior for h in known], axis=0)
     return {int(k): float(share[k]) for k in np.argsort(-share)[:COUPLED_POINTS]}
 

@@ -33,12 +33,13 @@ class Verdict:
     """Verdict of a diagnosis."""
 
     kind: VerdictKind
-    key: str | None  # of what is named, "id1", "id1+id2", ...: whatever else there is
+    key: str | None  # the named effects, "id1", "id1+id2", ...; others may be present too
     candidates: tuple[str, ...]  # keys that hold 90 % of the probability together
     check: float  # p-value of the likeliest effect's own fit
     words: str  # one sentence
-    best: str | None = None  # the likeliest explanation, of those that have what is named
-    also: tuple[Further, ...] = ()  # perhaps there too, likeliest first
+    # key of the likeliest set of effects, of those with the named effects if any are named
+    best: str | None = None
+    also: tuple[Further, ...] = ()  # effects that may be present too, likeliest first
 
 
 def decide(
