@@ -1,4 +1,4 @@
-"""How a fit went: objective and variables, design point by design point."""
+"""Pictures of a fit: its course over the design points, and its deviations from targets."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ from .figure import COLOURS, GREY, MARKERS, headline, in_house_style, new_figure
 
 @in_house_style
 def draw_convergence(history: Sequence[Mapping[str, Any]], unit: str = "Hz") -> Figure:
-    """The objective and, below, every variable over its start value, both logarithmic.
+    """Draw the objective and, below it, every variable over its start value; both logarithmic.
 
-    history: ``point``, ``objective_Hz`` (None: the design failed), ``values``, in order; where
-    there is a ``start``, new starts are marked; ``unit`` is the objective's. Variables that start
-    at 0 or change sign have no such ratio and are only named.
+    history: rows of fit_history.csv in order: ``point``, ``objective_Hz`` (None: the design could
+    not be evaluated) and ``values``; lines mark where the number ``start`` changes. The objective
+    is in ``unit``, whatever its key says. Variables that start at 0 or change sign have no such
+    ratio; only the legend lists them.
     """
     point = np.array([row["point"] for row in history])
     objective = np.array([row["objective_Hz"] or np.nan for row in history], float)
@@ -78,7 +79,7 @@ def draw_convergence(history: Sequence[Mapping[str, Any]], unit: str = "Hz") -> 
         axes.legend(frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
         axes.grid(True, which="major", color="0.9", lw=0.6)
         low, high = axes.get_ylim()
-        if high / low < 5:  # few or none of these would lie in so short a range
+        if high / low < 5:  # a logarithmic axis would have at most one number
             axes.yaxis.set_major_locator(MaxNLocator(5))
             axes.yaxis.set_minor_locator(NullLocator())
         elif high / low < 100:  # powers of ten alone would leave the axis without numbers
@@ -89,6 +90,7 @@ def draw_convergence(history: Sequence[Mapping[str, Any]], unit: str = "Hz") -> 
 
 
 def _summary(objective: np.ndarray, unit: str) -> str:
+    """Title: the first and the best objective."""
     if np.isnan(objective).all():
         return f"none of {len(objective)} design points could be evaluated"
     first, best = objective[~np.isnan(objective)][0], np.nanmin(objective)
@@ -97,7 +99,7 @@ def _summary(objective: np.ndarray, unit: str) -> str:
 
 @in_house_style
 def draw_deviations(modes: Sequence[FittedMode]) -> Figure:
-    """Frequencies over their targets before and after the fit, a line a mode of fit.json."""
+    """Draw deviations in % from the targets before and after the fit, one row per mode."""
     figure = new_figure(5.2, 0.9 + 0.26 * len(modes))
     axes = figure.add_subplot()
     after = [mode.deviation_percent for mode in modes]
@@ -116,8 +118,10 @@ def draw_deviations(modes: Sequence[FittedMode]) -> Figure:
 
 @in_house_style
 def draw_states(fit: FitResult) -> Figure:
-    """Deviations after a fit over several states, a column a state; bars: one standard deviation of
-    the measured value."""
+    """Draw deviations in % after a fit over several states, one column per state.
+
+    Bars: one standard deviation of the measured value.
+    """
     states = list(dict.fromkeys(each.state for each in fit.modes))
     name = lambda mode: f"{mode.label.display} {mode.symmetry or ''}".rstrip()
     names = list(dict.fromkeys(map(name, fit.modes)))

@@ -1,4 +1,4 @@
-"""The catalogue of effects in words: as a table, and one effect at length."""
+"""The catalogue of effects as a table, and the full description of one effect."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ WIDTH = 98
 
 
 def effects_table(effects: Sequence[CatalogueEntry]) -> Table:
-    """The catalogue of effects: parameter's range, solvers that can express it."""
-    ends = Column("from", "g"), Column("to", "g")
-    words = [Column(name, "") for name in ("effect", "what", "unit", "solvers")]
+    """Table of all effects: id, title, range and unit of the parameter, solvers that support it."""
+    ends = Column("from", form="g"), Column("to", form="g")
+    words = [Column(name, form="") for name in ("effect", "what", "unit", "solvers")]
     rows = [
         [
             each.id,
@@ -29,9 +29,9 @@ def effects_table(effects: Sequence[CatalogueEntry]) -> Table:
 
 
 def effect_text(entry: CatalogueEntry) -> str:
-    """One effect at length."""
+    """Full description of one effect: paragraphs, then a list of its properties."""
     unit = f" {entry.unit}" if entry.unit else ""
-    size = max(entry.high, entry.low, key=abs)
+    size = max(entry.high, entry.low, key=abs)  # the example in "case file"
     rows = {
         "parameter": f"{entry.symbol}, {entry.low:.4g} to {entry.high:.4g}{unit}; 0: absent",
         "case file": f"effects: {{{entry.id}: {size:.4g}}}",
@@ -42,11 +42,12 @@ def effect_text(entry: CatalogueEntry) -> str:
         "solvers": ", ".join(entry.solvers) or "none",
     }
     paragraphs = [f"{entry.title} ({entry.id})", *entry.about]
-    text = "\n\n".join(_filled(" ".join(part.split()), "") for part in paragraphs)
-    return text + "\n\n" + "\n".join(_filled(words, f"{key:19}") for key, words in rows.items())
+    text = "\n\n".join(_wrapped(" ".join(part.split()), "") for part in paragraphs)
+    return text + "\n\n" + "\n".join(_wrapped(words, f"{key:19}") for key, words in rows.items())
 
 
-def _filled(words: str, head: str) -> str:
+def _wrapped(words: str, head: str) -> str:
+    """``words`` in lines of `WIDTH`: ``head`` before the first one, an indent before the others."""
     return fill(
         words, WIDTH, initial_indent=head, subsequent_indent=" " * len(head), break_long_words=False
     )

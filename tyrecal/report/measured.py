@@ -1,4 +1,4 @@
-"""Measured modes as a table, as words and as a picture."""
+"""Measured modes as a table, in words and as a picture."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 Array = np.ndarray
 
 COMPONENTS = ("radial", "tangential", "axial")
-MIN_COSINE = 0.9  # of a sensor's direction, for its motion to be drawn as that component
-AMPLITUDE = 0.35  # of the ring's radius, the largest motion drawn
-PER_ROW = 5
+MIN_COSINE = 0.9  # of the angle between a sensor and a component that it is drawn as
+AMPLITUDE = 0.35  # largest motion drawn, over the radius of the ring
+PER_ROW = 5  # shapes in a row of a picture
 MAX_SHAPES = 20  # shapes in a picture
 
 
@@ -53,17 +53,20 @@ def measured_table(runs: Sequence[ModalTest]) -> Table:
 
 
 def sensors_words(alike_labels: Mapping[Label, Sequence[Label]]) -> str:
-    """Labels that sensors distinguish, and those that look like others: a line for each c."""
+    """Labels that sensors can and cannot distinguish, one line per c.
+
+    alike_labels: for each label the others that look like it, from `Labeller.looks_like`.
+    """
     lines = []
     for c in sorted({label.c for label in alike_labels}):
         mine = {label: alike for label, alike in alike_labels.items() if label.c == c}
-        right = ", ".join(label.display for label, alike in mine.items() if not alike)
-        wrong = [
+        distinct = ", ".join(label.display for label, alike in mine.items() if not alike)
+        confused = [
             f"cannot tell {label.display}, it looks like {_few(alike)}"
             for label, alike in mine.items()
             if alike
         ]
-        lines.append("; ".join([f"can tell {right}"] * bool(right) + wrong))
+        lines.append("; ".join([f"can tell {distinct}"] * bool(distinct) + confused))
     return "\n".join(lines)
 
 
@@ -75,9 +78,11 @@ def _few(labels: Sequence[Label], most: int = 4) -> str:
 
 
 def draw_measured(path: Path, runs: Sequence[ModalTest]) -> None:
-    """Draw the functions of the first run that has some, with its modes, and the shapes of the
-    same run on the ring: the tread's sensors, moved by what they measured, and c waves through
-    them."""
+    """Draw one run: its functions with the modes, and each shape on a ring, with the sensors of the
+    belt displaced by their motion and c waves through them.
+
+    The run is the first one with functions, or else the first one.
+    """
     from .figure import in_house_style
 
     in_house_style(_draw)(path, runs)
@@ -101,14 +106,14 @@ def _draw(path: Path, runs: Sequence[ModalTest]) -> None:
 
 
 def _draw_functions(axes: Axes, run: ModalTest) -> None:
-    """The root mean square over all signals, measured and made by the modes."""
+    """Draw the root mean square over all functions, as measured and as the modes reproduce it."""
     from .figure import COLOURS, GREY
 
     assert run.functions is not None and run.fitted is not None and run.frequency_Hz is not None
     size = lambda H: np.sqrt(np.mean(np.abs(H) ** 2, axis=0))  # NaN outside the band
-    f, measured, made = run.frequency_Hz, size(run.functions), size(run.fitted)
+    f, measured, fitted = run.frequency_Hz, size(run.functions), size(run.fitted)
     axes.semilogy(f, measured, color=GREY, lw=2.6, alpha=0.6, label="measured")
-    axes.semilogy(f, made, color=COLOURS[1], lw=1.1, label="made by the modes")
+    axes.semilogy(f, fitted, color=COLOURS[1], lw=1.1, label="made by the modes")
     inside = [labelled.mode.frequency_Hz for labelled in run.modes]
     axes.set_ylim(0.5 * measured[measured > 0].min(), 6.0 * measured.max())
     before, level = -np.inf, 0
@@ -136,26 +141,30 @@ def _draw_functions(axes: Axes, run: ModalTest) -> None:
     axes.legend(loc="lower right", facecolor="white", edgecolor="none", framealpha=1)
 
 
-def _shown(label: Label | None, size: Sequence[float]) -> int:
-    """The component whose waves do not change sign over the tread's width, where it was measured:
-    axial for odd m, where the belt tilts, else the larger of the others."""
-    order = [int(k) for k in np.argsort(-np.array(size))]
+def _component_to_draw(label: Label | None, mean_squares: Sequence[float]) -> int:
+    """Index in `COMPONENTS` of the motion that has the same sign over the width of the tread.
+
+    It is axial for odd m and [0,0] lateral, where the belt tilts or shifts, else the larger of the
+    other two. If no sensor measured it (mean square 0), the largest one is drawn.
+    """
+    order = [int(k) for k in np.argsort(-np.array(mean_squares))]
     if label is not None:
         tilts = label.m % 2 == 1 or label.kind == "axial"
         order = [2] if tilts else [k for k in order if k != 2]
-    return next((k for k in order if size[k] > 0), int(np.argmax(size)))
+    return next((k for k in order if mean_squares[k] > 0), int(np.argmax(mean_squares)))
 
 
 def _draw_shape(axes: Axes, labelled: LabelledMode) -> None:
-    """One component of the tread's motion, as a radial displacement of its sensors."""
+    """Draw one component of the belt's motion, as a radial displacement of its sensors."""
     from .figure import COLOURS, GREY
 
     R, angle, _ = labelled.sensors.points.T
-    belt = R / R.max() > BELT
-    along = labelled.sensors.directions
+    belt = R / R.max() > BELT  # sensors on the belt and not on a sidewall
+    along = labelled.sensors.directions  # (k, 3) unit vectors in COMPONENTS
     rows = [np.flatnonzero(belt & (np.abs(along[:, k]) > MIN_COSINE)) for k in range(3)]
     motion = [labelled.shape[rows[k]] * np.sign(along[rows[k], k]) for k in range(3)]
-    k = _shown(labelled.judged.label, [np.mean(u**2) if len(u) else 0.0 for u in motion])
+    mean_squares = [np.mean(u**2) if len(u) else 0.0 for u in motion]
+    k = _component_to_draw(labelled.judged.label, mean_squares)
     u, at = motion[k], angle[rows[k]]
     turn = np.linspace(0, 2 * np.pi, 361)
     axes.plot(np.cos(turn), np.sin(turn), color="0.8", lw=0.8)
@@ -178,7 +187,7 @@ def _draw_shape(axes: Axes, labelled: LabelledMode) -> None:
     axes.set_xlim(-1.45, 1.45)
     axes.set_ylim(-1.45, 1.45)
     member = f" {labelled.member}" if labelled.member else ""
-    name = f"{label.display if label else 'not told'}{member}"
+    name = f"{label.display if label else 'no label'}{member}"
     axes.set_title(f"{name}, {labelled.mode.frequency_Hz:.2f} Hz", fontsize=9)
     axes.text(
         0,

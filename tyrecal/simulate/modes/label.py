@@ -37,13 +37,16 @@ KNOWN = {
 }
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
 Array = np.ndarray
-BELT = 0.94  # of the largest radius: a belt is nearly flat, a sidewall leaves this height at once
+# radius over the largest radius above which a point is on the belt: a belt is nearly flat, and a
+# sidewall soon leaves this height
+BELT = 0.94
 DEGREE = 3
 CONDITION = 30.0  # of the polynomials on the points at hand; fewer rings carry a lower degree
 MAX_SAMPLED_HARMONIC = 12  # that is looked for in sampled shapes
 ALIASED = 1e-4  # of what a harmonic holds: solvers print angles and shapes with six digits
 SUBSTANTIAL = 0.2  # share of the belt's motion below which a mode cannot claim an order
-TAKES_PART = 0.1  # the belt's mean square motion over that of all points, likewise
+# mean square motion of the belt over that of all points below which a mode is not the belt's
+TAKES_PART = 0.1
 # column of z P0 on c = 0; columns 0 to 3 are the orders, 0 on c = 0 being theta P0
 AXIAL_COLUMN = 4
 PARITY = (0, 1, 0, 1, 1)  # axial motion is the c = 0 member of the out-of-plane family
