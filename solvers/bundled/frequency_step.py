@@ -1,6 +1,6 @@
-"""A frequency step: modes of the inflated tyre, and how fast their eigenvalues change.
+"""A frequency step: modes of the inflated tyre, and the derivatives of their eigenvalues.
 
-Of a tyre that is not the same all round, or that turns, one thing at a time is honoured.
+A tyre may have point masses and springs, or a stiff sector, or turn: only one of the three.
 """
 
 from __future__ import annotations
@@ -34,24 +34,22 @@ from .section.stability import stable_factor
 
 Array = np.ndarray
 Models = Callable[[float | None, bool, bool], Model]
-"""The section's model by `model.build`'s arguments dynamic_Hz, long_term, own_frequency."""
+"""Builds the section's model from the arguments dynamic_Hz, long_term, own_frequency of `build`."""
 
 
 @dataclass
 class Inflated:
-    """A deck's tyre, and what is requested of it."""
+    """The inflated tyre of a deck, and the requested results."""
 
     deck: Deck
     request: Request
-    # model blocks: of the section's job; of the job that revolves it, of the section in a splice,
-    # both empty where there is none
-    section: list[Block]
-    revolve: list[Block]
-    sector: list[Block]
+    section: list[Block]  # model blocks of the job of the section
+    revolve: list[Block]  # of the job that revolves it; empty if there is none
+    sector: list[Block]  # of the section of a stiff sector (splice); empty if there is none
     models: Models
-    half: bool  # they are of half the section, which stands for the whole
+    half: bool  # whether the models have half of a symmetric section
     U: Array  # displacements (nodes, 3), m
-    check: Callable[[], None]  # raises where the time is over
+    check: Callable[[], None]  # raises if the time limit is exceeded
 
     @property
     def model(self) -> Model:
@@ -59,13 +57,13 @@ class Inflated:
         return self.models(None, True, False)
 
     def attached(self) -> PointElements:
-        """Masses and springs on the tyre. Raises DeckError."""
+        """Point masses and springs on the tyre. Raises DeckError."""
         return read_point_elements(self.revolve, read_mesh(self.section))
 
     def wheel_and_cavity(
         self, model: Model, step: DeckStep
     ) -> tuple[Wheel | None, GasCavity | None]:
-        """The rim that moves in a step and the gas in the cavity, where there are such."""
+        """The rim, if it moves in the step, and the gas in the cavity, if it is modelled."""
         wheel = read_wheel(self.revolve, model.mesh, step) if step.revolved else None
         cavity = self.request.cavity
         if not cavity:
@@ -74,7 +72,7 @@ class Inflated:
 
 
 class FrequencyStep:
-    """A step of the tyre; ``place``: its own among all of the deck.
+    """Modes and derivatives of one frequency step; ``place``: its index among the deck's steps.
 
     Raises DeckError, RunFailed.
     """
@@ -97,7 +95,7 @@ class FrequencyStep:
             lowest_Hz=self.row.number(1, 0.0),
         )
         self.factor = self.vibration.factor(0)
-        self.newton = self._static_factor()
+        self.static_factor = self._static_factor()
 
     def modes(self) -> list[HarmonicModes]:
         """Modes by harmonic."""
@@ -125,10 +123,12 @@ class FrequencyStep:
         return modes
 
     def rates(self, modes: list[HarmonicModes]) -> tuple[dict[str, list[Array]], dict[str, float]]:
-        """d lambda / d variable per harmonic, and d mass / d variable, by variable."""
+        """Derivatives by each variable: of the eigenvalues omega^2 (1/s2), one array per entry of
+        ``modes``, and of the mass (kg)."""
         sensitivities = self.tyre.request.sensitivities
         if not sensitivities:
             return {}, {}
+        # a mode can be a sum of shapes of several harmonics; owner: the mode of each shape
         forms = [m.forms() for m in modes]
         n, shapes, owner, eigenvalues = (np.concatenate(x) for x in zip(*forms, strict=True))
         before = np.cumsum([0, *(len(values) for *_, values in forms[:-1])])
@@ -142,7 +142,8 @@ class FrequencyStep:
         }
 
     def _static_factor(self) -> Factor:
-        """`stable_factor` of the inflated tyre, or that of its vibration if it is the same."""
+        """Factor of the static tangent at U, for dU / d variable; the vibration's if it is the same
+        matrix."""
         if self.dynamic_Hz is not None or self.vibration.shift:
             still = _model(self.tyre, self.step, None, False)
             return stable_factor(still, self.tyre.U, loads(still, self.step), self.equations)
@@ -155,18 +156,22 @@ class FrequencyStep:
         fields: ModeShapes,
         eigenvalues: Array,
     ) -> tuple[list[Array], float]:
-        """Per harmonic, and the mass's; the deck's numbers carry the variable's tangent."""
+        """Derivatives by one variable, as in `rates`, by complex steps.
+
+        tangents: the numbers of the deck that depend on it, with their derivatives.
+        """
         section, revolve, steps = self.tyre.deck.read(tangents)
         models = partial(build, section, half=self.tyre.half)
         seeded = replace(self.tyre, section=section, revolve=revolve, models=models)
         step, U, own = steps[self.place], seeded.U, seeded.request.own_frequency
         still = moving = _model(seeded, step, None, False)
-        V = state_rate(still, U, loads(still, step), self.equations, self.newton)
+        V = state_rate(still, U, loads(still, step), self.equations, self.static_factor)
         if self.dynamic_Hz is not None or own:
             moving = _model(seeded, step, self.dynamic_Hz, own)
         wheel, air = seeded.wheel_and_cavity(moving, step)
         rim_and_air = None
         if wheel or air:
+            # amplitudes of the rim's motions and of the gas flow in each mode
             rim, flow = [q for m in modes for q in m.rim], [w for m in modes for w in m.air]
             rim_and_air = RimAndAir(wheel, air, rim, flow)
         acting = loads(moving, step)
@@ -187,7 +192,7 @@ def _model(tyre: Inflated, step: DeckStep, dynamic_Hz: float | None, own: bool) 
 
 
 def is_nonuniform(tyre: Inflated, step: DeckStep) -> bool:
-    """Whether the tyre is not the same all round, or turns."""
+    """Whether the tyre has point elements or a sector, or turns, so that harmonics are coupled."""
     return bool(_turns(step) or tyre.sector or tyre.attached())
 
 
@@ -227,7 +232,7 @@ def nonuniform_modes(
 def _sector_modes(
     tyre: Inflated, step: DeckStep, vibration: Vibration, harmonics: list[int], count: int
 ) -> list[HarmonicModes]:
-    """Modes with a sector of other stuff, at the static moduli."""
+    """Modes of a tyre with a stiff sector, at the static moduli."""
     place = step.procedure.place
     if step.procedure.number("PROPERTY EVALUATION") is not None or vibration.shift:
         raise DeckError(place, "a sector of other stuff is honoured at the static moduli")

@@ -55,7 +55,7 @@ class SeededTyre:
 
 @dataclass
 class HarmonicModes:
-    """Modes of one harmonic: omega^2 (m,) in 1/s2 and shapes (m, n, 3), u^H M u = 1.
+    """The m modes of harmonic n: omega^2 (m,), 1/s2, and shapes (m, nodes, 3), u^H M u = 1.
 
     M is the mass per radian: over the whole circle the kinetic mass is 2 pi for n = 0, pi else.
     """
@@ -72,8 +72,9 @@ class HarmonicModes:
     combination: Combination | None = None  # what modes that are more than that are made of
 
     def forms(self) -> tuple[Array, Array, Array, Array]:
-        """Harmonics (p,), shapes (p, nodes, 3), the mode (p,) that each is part of, and lambda (m,)
-        of the forms phi^H (K' - lambda M') phi that the eigenvalues' derivatives are made of."""
+        """Shapes that the modes are sums of, for the derivatives phi^H (K' - lambda M') phi: their
+        harmonics (p,), the shapes (p, nodes, 3), the index of each one's mode (p,), and lambda of
+        all modes (m,)."""
         if self.combination is not None:
             return self.combination.forms()
         modes = len(self.eigenvalues)

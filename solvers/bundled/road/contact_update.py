@@ -41,8 +41,8 @@ class ContactUpdate:
         return other
 
     def to(self, contact: csr_matrix) -> None:
-        """Take ``contact`` (2 k q 3, 2 k q 3), N/m, not necessarily symmetric, in place of the
-        last."""
+        """Replace the contact stiffness by ``contact`` (2 f q 3, 2 f q 3), N/m, between the parts
+        of `HalfTurn`; it need not be symmetric."""
         change = csr_matrix(contact - self.factor.contact)
         size = abs(change)
         largest = np.maximum(size.max(0).toarray()[0], size.max(1).toarray()[:, 0])

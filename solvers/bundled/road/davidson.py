@@ -25,7 +25,7 @@ MIN_LENGTH2 = 1e-10  # of a direction's squared length, below which it is in the
 
 @dataclass(frozen=True)
 class Basis:
-    """Vectors (b, size), M-orthonormal, and K times them."""
+    """M-orthonormal vectors (b, size), and their images K x (b, size)."""
 
     vectors: Array
     images: Array

@@ -29,10 +29,11 @@ ODD = np.array([[False, True, False], [True, False, True]])  # of a and b, under
 
 
 class HalfTurn:
-    """Fields (k, n, 3) on half the circumference as parts (2, f, q, 3) on the nodes z >= 0.
+    """Converts fields (k, n, 3) on half the circumference to two parts (2, f, q, 3) and back.
 
-    mesh; free (n, 3); functions round the tyre ``around``, of which a part has f; parity p;
-    ``other`` (n,): each node's mirror image. Raises Refused.
+    The parts a and b live on the q nodes with z >= 0, and each has f of the k functions round the
+    tyre ``around``. free (n, 3): components that are not held; parity: p; ``other`` (n,): mirror
+    image of each node; ``mask``: entries of the parts that are free. Raises Refused.
     """
 
     def __init__(self, mesh: DeckMesh, free: Array, around: HalfCircle, parity: int = 1):

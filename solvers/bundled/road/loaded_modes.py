@@ -1,10 +1,14 @@
-"""Modes of the pressed tyre: small vibrations about its deflected state, the patch held.
+"""Modes of the pressed tyre: small vibrations about its deflected state, with the patch held.
 
-    K = tangent of the tyre + hold,   M = (N^T w N round the circumference) x (the section's mass)
+    K = tangent of the tyre + hold,   M = kron(N^T w N, M_section)
 
-Displacements are components in the frame of the reference angle, so the mass does not depend on
-it. The pressed tyre keeps the half turn about the vertical, which every mode keeps or reverses.
-A wheel that is free along the load adds one unknown, its shift down, to modes that keep it.
+N (s, k) and w (s,): functions of the angle and weights at Gauss stations (`Circumference`). Fields
+(k, n, 3) have k functions of the angle, n nodes of the section and the components r, theta, z in
+the frame of the reference angle, so the mass does not depend on the angle.
+
+The pressed tyre is unchanged by a half turn about the vertical. So each mode is unchanged (parity
+1) or changes its sign (parity -1), and the two kinds are computed apart (`HalfTurn`). A wheel that
+is free along the load adds one unknown, its shift down, to modes of parity 1.
 """
 
 from __future__ import annotations
@@ -30,16 +34,16 @@ from .half_turn_symmetry import HalfTurn
 from .multifrontal import Elimination, Factor
 
 Array = np.ndarray
-SPARE = 3  # modes of each kind beyond half of the wanted ones
+SPARE = 3  # modes of each parity in addition to half of the requested number
 
 
 @dataclass(frozen=True)
 class LoadedModes:
-    """Modes m, ascending; the whole tyre has modal mass 1."""
+    """The m lowest modes, ascending; the modal mass of the whole tyre is 1."""
 
     eigenvalues: Array  # omega^2 (m,), 1/s2
-    parity: Array  # (m,): 1 for modes that keep the half turn, -1 for those that it reverses
-    shapes: Array  # (m, k, n, 3) on half the tyre
+    parity: Array  # (m,): 1 if the half turn leaves a mode as it is, -1 if it changes its sign
+    shapes: Array  # (m, k, n, 3) fields on half the circumference
 
 
 def loaded_modes(
@@ -52,26 +56,27 @@ def loaded_modes(
     check: Callable[[], None],
     wheel_kg: float | None = None,
 ) -> list[LoadedModes]:
-    """The ``count`` lowest modes about U (k, n, 3) with each of ``holds`` (k n 3, k n 3), what
-    holds the patch, N/m.
+    """The ``count`` lowest modes about the field U (k, n, 3), m, for each stiffness of ``holds`` (k
+    n 3, k n 3), N/m, which holds the patch.
 
-    pressed: what U keeps; unloaded: the inflated tyre's modes, to start from; wheel_kg: of a wheel
-    that is free along the load, None: it is held. Raises RunFailed; what ``check`` raises to stop.
+    pressed: the symmetry of U; unloaded: modes of the inflated tyre, to start from; wheel_kg: mass
+    of a wheel that is free along the load, None: it is held. Raises RunFailed, and what ``check``
+    raises to stop.
     """
     tyre.residual(U)
 
-    def kind(parity: int, wanted: int) -> list[tuple[Array, Array]]:
+    def lowest(parity: int, wanted: int) -> list[tuple[Array, Array]]:
         symmetry = HalfTurn(tyre.model.mesh, pressed.free, pressed.around, parity)
-        its = _Kind(tyre, symmetry, holds[0], unloaded, wheel_kg if parity == 1 else None, check)
-        return its.lowest(holds, wanted)
+        own_kg = wheel_kg if parity == 1 else None
+        return _Vibrations(tyre, symmetry, holds[0], unloaded, own_kg, check).lowest(holds, wanted)
 
     wanted = {1: count // 2 + SPARE, -1: count // 2 + SPARE}
-    kinds = {parity: kind(parity, number) for parity, number in wanted.items()}
-    while (short := _short(kinds, count)) is not None:
+    by_parity = {parity: lowest(parity, number) for parity, number in wanted.items()}
+    while (short := _parity_with_too_few(by_parity, count)) is not None:
         wanted[short] += SPARE
-        kinds[short] = kind(short, wanted[short])
+        by_parity[short] = lowest(short, wanted[short])
     result = []
-    for keeping, reversing in zip(kinds[1], kinds[-1], strict=True):
+    for keeping, reversing in zip(by_parity[1], by_parity[-1], strict=True):
         values = np.concatenate([keeping[0], reversing[0]])
         order = np.argsort(values, kind="stable")[:count]
         parity = np.repeat([1, -1], [len(keeping[0]), len(reversing[0])])
@@ -80,19 +85,19 @@ def loaded_modes(
     return result
 
 
-def _short(kinds: dict[int, list[tuple[Array, Array]]], count: int) -> int | None:
-    """The kind of which more must be known, for modes of its beyond the last may be among the
-    ``count`` lowest of a hold; None where all are."""
-    for keeping, reversing in zip(kinds[1], kinds[-1], strict=True):
+def _parity_with_too_few(by_parity: dict[int, list[tuple[Array, Array]]], count: int) -> int | None:
+    """The parity of which more modes are needed, because its next mode may be among the ``count``
+    lowest of both for some hold; None if there are enough."""
+    for keeping, reversing in zip(by_parity[1], by_parity[-1], strict=True):
         values = np.sort(np.concatenate([keeping[0], reversing[0]]))
         if values[count - 1] > min(keeping[0][-1], reversing[0][-1]):
             return 1 if keeping[0][-1] < reversing[0][-1] else -1
     return None
 
 
-class _Kind:
-    """Vibrations that keep the half turn, or are reversed by it, as vectors: the two parts, and
-    where the wheel is free its shift."""
+class _Vibrations:
+    """Vibrations of one parity. A vector has the two parts of a field (`HalfTurn`), flattened, and
+    last, if the wheel is free, its shift down, m."""
 
     def __init__(
         self,
@@ -118,20 +123,21 @@ class _Kind:
         self.down = down * ~symmetry.free  # the rim's nodes (k, n, 3), by 1 m
 
     def lowest(self, holds: Sequence[csr_matrix], count: int) -> list[tuple[Array, Array]]:
-        """For each hold omega^2 (count,) and shapes (count, k, n, 3); each search starts from the
-        result of the one before."""
+        """For each hold omega^2 (count,) and shapes (count, k, n, 3). Each search starts from the
+        basis of the one before."""
         kg = self.wheel_kg or 0.0
-        inertia = self._each(Inertia(self.tyre.model, self.symmetry.around), kg / 2)
+        mass = Inertia(self.tyre.model, self.symmetry.around)
+        inertia = self._operator(mass, kg / 2)  # half the tyre carries half the wheel
         result: list[tuple[Array, Array]] = []
         basis = None
         for before, hold in pairwise([holds[0], *holds]):
             self.factor.to(self.symmetry.fold(hold))
-            stiffness = self._each(partial(self._forces_of, hold), 0.0)
+            stiffness = self._operator(partial(self._forces_of, hold), 0.0)
             inverse, start = self._inverse(hold)
             if basis is None:
                 basis = davidson.basis_of(start, stiffness, inertia)
-            else:
-                images = self._each(partial(_times, hold - before), 0.0)(basis.vectors)
+            else:  # the images K x of the basis change by the change of the hold
+                images = self._operator(partial(_times, hold - before), 0.0)(basis.vectors)
                 basis = davidson.Basis(basis.vectors, basis.images + images)
             values, x, basis = davidson.lowest(stiffness, inertia, inverse, basis, count)
             # the half tyre has half of the modal mass
@@ -139,21 +145,23 @@ class _Kind:
         return result
 
     def _forces_of(self, hold: csr_matrix, V: Array) -> Array:
-        """The tyre's and the hold's (k, n, 3), N/m."""
+        """Forces (k, n, 3) of the tyre and the hold on the field V, N for V in m."""
         return self.tyre.product(V) + _times(hold, V)
 
     def _field(self, vector: Array) -> Array:
+        """The field (k, n, 3) of a vector."""
         size = self.symmetry.mask.size
         field = self.symmetry.spread(vector[:size].reshape(self.symmetry.mask.shape))
         return field if self.wheel_kg is None else field + vector[size] * self.down
 
     def _forces(self, F: Array) -> Array:
-        """The transpose of `_field`."""
+        """The vector of nodal forces F (k, n, 3): the transpose of `_field`."""
         forces = self.symmetry.gather(F).ravel()
         return forces if self.wheel_kg is None else np.append(forces, (F * self.down).sum())
 
-    def _each(self, image: Callable[[Array], Array], of_shift: float) -> davidson.Operator:
-        """An operator on blocks from one on fields, and what the wheel's shift has by itself."""
+    def _operator(self, image: Callable[[Array], Array], of_shift: float) -> davidson.Operator:
+        """An operator on blocks (b, size) of vectors from one on fields. of_shift: its diagonal
+        entry for the wheel's shift that fields do not have."""
 
         def apply(block: Array) -> Array:
             self.check()
@@ -165,7 +173,7 @@ class _Kind:
         return apply
 
     def _inverse(self, hold: csr_matrix) -> tuple[davidson.Operator, Array]:
-        """About K^-1, and vectors to start from."""
+        """An approximate K^-1 (`ContactUpdate`), and vectors to start from."""
         shape = self.symmetry.mask.shape
         start = np.array([V.ravel() for V in self.start])
 
@@ -174,7 +182,8 @@ class _Kind:
 
         if self.wheel_kg is None:
             return inner, start
-        # the wheel eliminated last: what follows its shift, and the stiffness that is left
+        # the wheel is eliminated last: the tyre's vector per unit of its shift is -follows, and
+        # ``left`` is the Schur complement, the stiffness of the wheel on the tyre
         border = self._forces(self._forces_of(hold, self.down))
         follows = inner(border[None, :-1])[0]
         left = border[-1] - border[:-1] @ follows
@@ -188,12 +197,12 @@ class _Kind:
 
 
 def _times(hold: csr_matrix, V: Array) -> Array:
-    """A hold's forces on the field V (k, n, 3), of its shape."""
+    """Forces (k, n, 3) of a hold on the field V (k, n, 3)."""
     return (hold @ V.ravel()).reshape(V.shape)
 
 
 class Inertia:
-    """Mass times a field (k, n, 3) of half the tyre."""
+    """Operator: mass of half the tyre times a field (k, n, 3)."""
 
     def __init__(self, model: Model, around: Circumference):
         self._around = around.N.T @ (around.weights[:, None] * around.N)
@@ -207,7 +216,7 @@ class Inertia:
 
 
 def standing_waves(unloaded: list[HarmonicModes], symmetry: HalfTurn) -> list[Array]:
-    """Components of the inflated tyre's modes that have the fold's parity, fields (k, n, 3)."""
+    """Standing waves of the inflated tyre's modes with the parity of ``symmetry``, (k, n, 3)."""
     waves = []
     for modes in unloaded:
         turn = symmetry.around.turn(modes.n)[:, None, None]

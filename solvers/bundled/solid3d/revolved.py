@@ -1,9 +1,13 @@
-"""The tyre in three dimensions: residual, tangent product and station tangents.
+"""The tyre in three dimensions: residual, tangent product and tangents at Gauss stations.
 
-State U (k, n, 3) in m at the angles of a `Circumference`; the section's operators serve at every
-Gauss station with the station's displacement and its derivative by the angle:
+A state U (k, n, 3), m, has coefficients of k functions of the angle (`Circumference`) at n nodes of
+the section. At each of s Gauss stations round the tyre, the operators of the section act on the
+displacement u there and its derivative by the angle:
 
-    F = 1 + B0 u + B1 du/dTheta,   q = a + b0 u + hoop du/dTheta
+    F = 1 + B0 u + B1 du/dTheta,   q = q0 + b0 u + b1 du/dTheta
+
+F: deformation gradient of rubber; q: deformed vector along a cord, q0 before. In the shapes below,
+e is the number of elements of a part and a the number of nodes of one element.
 """
 
 from __future__ import annotations
@@ -17,11 +21,11 @@ from ..section.parts.part import Precision, TyrePart
 from .circumference import Circumference
 
 Array = np.ndarray
-Tangents = tuple[Array, Array, Array, Array]
+Tangents = tuple[Array, Array, Array, Array]  # connectivity (e, a), three of (s, e, 3a, 3a)
 
 
 class Revolved:
-    """Mechanics about the last state that `residual` was given."""
+    """Forces and tangents of the revolved tyre about the state that `residual` was last given."""
 
     def __init__(self, model: Model, loads: Sequence[TyrePart], around: Circumference):
         self.model, self.loads, self.around = model, loads, around
@@ -29,12 +33,13 @@ class Revolved:
         self.parts = [part.at_stations(nodes) for part in (*model.parts, *loads)]
 
     def _stations(self, U: Array) -> tuple[Array, Array]:
-        """Displacement and its derivative by the angle at the stations (3n, s)."""
+        """Displacements (3n, s) at the stations, and their derivatives by the angle."""
         flat = U.reshape(len(U), -1).T
         return flat @ self.around.N.T, flat @ self.around.slope.T
 
     def _nodes(self, forces: list[tuple[Array, Array]]) -> Array:
-        """Nodal forces (k, n, 3) from each part's, by u and by du/dTheta (e, 3a, s)."""
+        """Nodal forces (k, n, 3) from the derivatives (e, 3a, s) of each part's energy by u and by
+        du/dTheta."""
         by_u, by_du = (
             sum(part.gather(f) for part, f in zip(self.parts, each, strict=True))
             for each in zip(*forces, strict=True)
@@ -44,15 +49,16 @@ class Revolved:
         return np.ascontiguousarray(result.T).reshape(len(result.T), -1, 3)
 
     def residual(self, U: Array) -> Array:
-        """Internal force less that of the pressure (k, n, 3), N; the tangents follow U.
+        """Internal forces less those of the pressure (k, n, 3), N; U becomes the state.
 
-        Raises Inverted."""
+        Raises Inverted.
+        """
         self._U = U
         u, du = self._stations(U)
         return self._nodes([p.force(u, du) for p in self.parts])
 
     def potential(self) -> float:
-        """Strain energy less the pressure's work at the last state, J."""
+        """Strain energy less the pressure's work at the state, J."""
         return sum(float(p.energy() @ self.around.weights) for p in self.parts)
 
     def product(self, V: Array) -> Array:
@@ -61,5 +67,6 @@ class Revolved:
         return self._nodes([p.product(u, du) for p in self.parts])
 
     def tangents(self, precision: Precision = np.float64) -> list[Tangents]:
-        """Per part: connectivity; d2W/du du, du dv and dv dv, v = du/dTheta, (s, e, 3a, 3a)."""
+        """For each part: connectivity (e, a), and second derivatives of its energy (s, e, 3a, 3a)
+        by u u, u v and v v, v = du/dTheta."""
         return [(p.connectivity, *p.tangents(precision)) for p in self.parts]
