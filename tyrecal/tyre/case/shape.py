@@ -1,4 +1,8 @@
-"""Mistakes in plain data by the schema, in the user's words."""
+"""The schema of a case applied to plain data: mistakes in the words of a user, types and defaults.
+
+Checks go on after a mistake: `without` puts WRONG in place of a wrong value, and later checks skip
+it.
+"""
 
 from __future__ import annotations
 
@@ -51,8 +55,8 @@ ONE_LINE = "must be text without line breaks, control characters or marks of dir
 def explain(
     error: ValidationError, start: Keys = (), known: Iterable[str] | None = None
 ) -> Iterator[tuple[Keys, str]]:
-    """Keys and messages of the schema's complaint about the part at ``start`` of the case, or about
-    another file, which has the keys ``known``."""
+    """Keys and message of each mistake in the part at ``start`` of the case. For another file,
+    ``known``: its keys."""
     for item in error.errors(include_url=False, include_input=False):
         keys, kind, context = (*start, *item["loc"]), item["type"], item.get("ctx", {})
         material: type[BaseModel] | None = None
@@ -75,7 +79,7 @@ def explain(
 
 
 def type_at(keys: Keys) -> Any:
-    """The schema's type of the value at ``keys``; None where the schema has no such place."""
+    """The type of the value at ``keys`` in the schema; None if it does not have these keys."""
     here: Any = Case
     for key in keys:
         here = _plain(here)
@@ -89,7 +93,7 @@ def type_at(keys: Keys) -> Any:
 
 
 def _plain(annotation: Any) -> Any:
-    """Without Annotated and None; a material stays a union of its kinds."""
+    """The annotation without Annotated and None; a material stays a union of its kinds."""
     while get_origin(annotation) is Annotated:
         annotation = get_args(annotation)[0]
     if get_origin(annotation) in UNIONS:
@@ -99,13 +103,13 @@ def _plain(annotation: Any) -> Any:
 
 
 def fields_at(keys: Keys, material: type[BaseModel] | None = None) -> list[str]:
-    """The keys that the schema knows at ``keys``."""
+    """Names of the fields of the part at ``keys``, for a material those of its kind."""
     part = material if material and len(keys) == 2 else type_at(keys)
     return list(getattr(part, "model_fields", {}))
 
 
 def with_defaults(data: Any, kind: Any = Case) -> Any:
-    """Plain data of ``kind`` with what it leaves out, as the schema has it."""
+    """Plain data of the type ``kind`` with the schema's defaults for missing keys."""
     kind = _plain(kind)
     if get_origin(kind) is dict and isinstance(data, dict):
         return {key: with_defaults(value, get_args(kind)[-1]) for key, value in data.items()}
@@ -126,7 +130,8 @@ def with_defaults(data: Any, kind: Any = Case) -> Any:
 
 
 def disagreements(data: Mapping[str, Any]) -> Iterator[tuple[Keys, str]]:
-    """Disagreements between the keys of one part, in data whose wrong values are WRONG."""
+    """Keys and messages of values that contradict other values of the same part; WRONG ones are
+    skipped."""
     parts: list[tuple[Keys, Any, type[Any]]] = []
     for name, part in table(data, "materials").items():
         if isinstance(part, dict) and part.get("kind") == "rubber":
@@ -161,7 +166,7 @@ def entries(data: Any, key: str) -> list[Any]:
 
 
 def without(data: dict[str, Any], mistakes: list[Keys]) -> None:
-    """Put WRONG in the place of every value that ``mistakes`` lead to, in ``data`` itself."""
+    """Put WRONG in place of every value at the keys ``mistakes``, in ``data`` itself."""
     for keys in mistakes:
         here: Any = data
         for key in keys[:-1]:

@@ -1,4 +1,7 @@
-"""Files that a case names: they must lie in its folder and be what they should be."""
+"""Checks of the files that a case names, and the section that is read from its stations or outline.
+
+Files must be in the folder of the case. Mistakes are added to the `Document` of the case file.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ MIN_RADIUS_MM, MAX_RADIUS_MM = 50, 5000  # outer radius of a tyre
 
 
 def inside(folder: Path, name: str) -> Path:
-    """The path of ``name`` in ``folder``; ValueError when it leads outside, links included."""
+    """The path of ``name`` in ``folder``. Raises ValueError if it leads outside, also by a link."""
     path = Path(name)
     if not name.strip() or path.is_absolute() or ".." in path.parts:
         raise ValueError("must be a path inside the case's folder")
@@ -34,7 +37,7 @@ def inside(folder: Path, name: str) -> Path:
 
 
 def check_templates(document: Document, data: dict[str, Any], folder: Path) -> None:
-    """Record what is wrong with the case's folder of templates, if it names one."""
+    """Add a mistake to ``document`` if the case names a folder of templates that is not usable."""
     name = data.get("templates")
     if isinstance(name, str):
         try:
@@ -45,8 +48,8 @@ def check_templates(document: Document, data: dict[str, Any], folder: Path) -> N
 
 
 def measured_file(document: Document, data: dict[str, Any], folder: Path) -> Path | None:
-    """The file of measurements that the case's targets stand in; None where there is none, or,
-    with the mistake recorded, it is no file of the case's folder."""
+    """The file of measurements with the case's targets; None if the case names none, or if it is
+    not usable, with a mistake added to ``document``."""
     name = table(data, "targets").get("file")
     if not isinstance(name, str):
         return None
@@ -63,8 +66,7 @@ def measured_file(document: Document, data: dict[str, Any], folder: Path) -> Pat
 
 
 def read_stations(document: Document, data: dict[str, Any], folder: Path) -> Section | None:
-    """The section that the case names; None, with the mistakes recorded, where it is wrong."""
-
+    """The section that the case names; None if it is wrong, with mistakes added to ``document``."""
     source = data.get("section")
     source = source if isinstance(source, dict) else {}
     outline = source.get("outline")
@@ -80,12 +82,12 @@ def read_stations(document: Document, data: dict[str, Any], folder: Path) -> Sec
             return None  # reported by the schema already
         given = {"outline": outline} if outline else {"stations": name}
         section = read_section_of(SectionSource.model_validate(given), folder)
-    except ValidationError:  # this too
+    except ValidationError:  # the schema has reported this already
         return None
     except InputError as error:
         message = shortened(str(error), 300)
         if error.line:
-            value = document.places.get(keys, (1, name))[1]
+            _, value = document.places.get(keys, (1, name))  # line and text in the case file
             document.mistakes.append(Mistake(str(path), error.line, dotted(keys), value, message))
         else:
             document.add(keys, message)
@@ -99,7 +101,7 @@ def read_stations(document: Document, data: dict[str, Any], folder: Path) -> Sec
 
 
 def read_section_of(source: SectionSource, folder: Path) -> Section:
-    """The section that part of a case describes. Raises SectionError, ValueError, OSError."""
+    """The section of the part ``section`` of a case. Raises SectionError, ValueError, OSError."""
     from ..section.section import fill_lines, read_section
 
     path = inside(folder, source.file)
@@ -109,7 +111,7 @@ def read_section_of(source: SectionSource, folder: Path) -> Section:
     if not given:
         _check_columns(path)
         section = read_section(path)
-        fill_lines(section)
+        fill_lines(section)  # raises SectionError if its lines cannot be meshed
     else:
         from ..section.outline import read_outline, section_of_outline
 
@@ -127,7 +129,8 @@ def read_section_of(source: SectionSource, folder: Path) -> Section:
 
 
 def _check_columns(path: Path) -> None:
-    """Raises InputError where a column is not known: a misspelled one would be missed."""
+    """Refuse columns that are not known, because a misspelled one would be ignored. Raises
+    InputError."""
     from ..number_table import read_named_table
     from ..section.section import GAUGE, gauged_lines
 
@@ -144,6 +147,7 @@ def _check_columns(path: Path) -> None:
 
 
 def _check_section(section: Section) -> None:
+    """Raises SectionError for names, regions, sizes or a rim that no mesh can have."""
     from ..section.section import SectionError
 
     for name in [*section.names, *(region for region, _ in section.regions)]:
@@ -155,7 +159,7 @@ def _check_section(section: Section) -> None:
     for name, count in section.regions:
         if count < 1:
             raise SectionError(f"region '{name}' has no two stations: it needs one more")
-    reach = 1e3 * section.points[-1, 0, 0]  # mm; a tyre of inches, cm or m would pass else
+    reach = 1e3 * section.points[-1, 0, 0]  # mm; refuses inches, cm and m
     if not MIN_RADIUS_MM < reach < MAX_RADIUS_MM:
         raise SectionError(
             f"the tyre's outer radius is {reach:.3g} mm: r and z must be in mm, and a tyre's radius"

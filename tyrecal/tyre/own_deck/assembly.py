@@ -1,4 +1,4 @@
-"""Parts and instances made one: nodes, elements and sets, and the options that act on them."""
+"""The parts and instances of a deck joined into one set of nodes, elements, sets and options."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from .text import Block
 
 @dataclass
 class Assembly:
-    """Contents of the deck, parts under their instances' names."""
+    """Contents of a deck. A name in an instance gets the prefix "INSTANCE." of that instance; a
+    block comes with the prefix ("" outside instances) that the names in its data need."""
 
     root: Scope = field(default_factory=Scope)
     taken: dict[str, set[int]] = field(default_factory=dict)  # numbers outside parts, by keyword
-    sections: list[tuple[Block, str]] = field(default_factory=list)  # with names' prefix
+    sections: list[tuple[Block, str]] = field(default_factory=list)  # with the prefix
     surfaces: dict[str, tuple[Block, str]] = field(default_factory=dict)
     rebars: list[tuple[Block, str]] = field(default_factory=list)
     rules: list[tuple[Block, str]] = field(default_factory=list)  # rigid bodies, ties, embedded

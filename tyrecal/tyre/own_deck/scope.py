@@ -157,7 +157,7 @@ def reflected(element: Element, nodes: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def faces_of(element: Element) -> Iterator[tuple[str, tuple[int, ...]]]:
-    """Names and nodes of a solid's faces, its area on their left."""
+    """Names and nodes of a solid's faces, in the order that has the solid on the left in r, z."""
     corners = CORNERS_OF[len(element.nodes)]
     for i in range(corners):
         ends = element.nodes[i], element.nodes[(i + 1) % corners]

@@ -1,4 +1,5 @@
-"""Faces and nodes of a deck's surfaces."""
+"""Faces and nodes of the surfaces of a user's axisymmetric deck. Coordinates are r, z, in the
+deck's unit of length."""
 
 from __future__ import annotations
 
@@ -8,12 +9,16 @@ from .assembly import Assembly
 from .scope import Scope, along_arc, faces_of
 from .text import Block, Row
 
-PIECES_OF_ARC = 16
-Face = tuple[int, str, tuple[int, ...]]  # of a solid: its number, the face, its nodes
+PIECES_OF_ARC = 16  # straight pieces for a circular or parabolic arc
+# number of the element, name of its face, nodes of the face in the order of `faces_of`
+Face = tuple[int, str, tuple[int, ...]]
 
 
 def surface_faces(made: Assembly, name: str, block: Block, row: Row | None = None) -> list[Face]:
-    """Faces of a surface; of a ply, the ply's with its face."""
+    """Faces of a surface. A ply (a line element) is its own face, SPOS or SNEG.
+
+    ``block`` and ``row`` use the surface: an error names their place. Raises OwnDeckError.
+    """
     if name not in made.surfaces:
         raise block.refused(f"the surface {name} is not defined", row)
     surface, prefix = made.surfaces[name]
@@ -45,7 +50,7 @@ def surface_faces(made: Assembly, name: str, block: Block, row: Row | None = Non
 
 
 def boundary_of(root: Scope) -> tuple[Face, ...]:
-    """Faces of one solid alone."""
+    """Faces that belong to one solid only."""
     seen: dict[frozenset[int], list[Face]] = {}
     for n, element in root.elements.items():
         for face, nodes in faces_of(element) if element.is_solid else ():
@@ -54,7 +59,7 @@ def boundary_of(root: Scope) -> tuple[Face, ...]:
 
 
 def surface_nodes(made: Assembly, name: str, block: Block, row: Row) -> list[int]:
-    """Nodes of a surface of elements or of nodes."""
+    """Nodes of a surface of elements or of nodes. Raises OwnDeckError."""
     surface, prefix = made.surfaces.get(name, (None, ""))
     if surface and surface.get("TYPE") == "NODE":
         return [
@@ -68,7 +73,7 @@ def surface_nodes(made: Assembly, name: str, block: Block, row: Row) -> list[int
 
 
 def is_rigid(made: Assembly, surface: Block, prefix: str) -> bool:
-    """Whether a surface is of RAX2 alone."""
+    """Whether all elements of a surface are rigid lines (RAX2)."""
     if surface.get("TYPE") in ("NODE", "SEGMENTS"):
         return False
     members = [
@@ -88,8 +93,8 @@ def rigid_nodes(made: Assembly, surface: Block, prefix: str) -> set[int]:
 
 
 def rigid_pieces(made: Assembly, surface: Block, prefix: str) -> np.ndarray:
-    """Straight pieces (k, 2, 2) of a rigid surface, from start to end, what may touch it on their
-    left. Raises OwnDeckError."""
+    """Straight pieces (piece, start or end, r or z) of a rigid surface, in the order that has the
+    touching body on the left. Raises OwnDeckError."""
     if surface.get("TYPE") == "SEGMENTS":
         profile = _profile(surface) + np.array(made.shifts.get(prefix, (0.0, 0.0)))
         pieces = np.stack([profile[:-1], profile[1:]], axis=1)
