@@ -1,6 +1,6 @@
-"""Which mode belongs to which: the pairs of the largest total weight.
+"""Pairs of rows and columns with the largest total weight, to match modes with labels.
 
-SciPy's `linear_sum_assignment` would do, but importing it takes longer than most answers.
+SciPy's `linear_sum_assignment` gives the same, but its import takes longer than most evaluations.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ def assignment(weight: Array) -> list[tuple[int, int]]:
     owner = np.full(columns, -1)
     for row in range(rows):
         distance, came_from = np.full(columns, np.inf), np.full(columns, -1)
-        open_, at, i, reached = np.ones(columns, bool), -1, row, 0.0
+        unvisited, at, i, reached = np.ones(columns, bool), -1, row, 0.0
         while i >= 0:
             through = reached + cost[i] - u[i] - v
-            nearer = open_ & (through < distance)
+            nearer = unvisited & (through < distance)
             distance[nearer], came_from[nearer] = through[nearer], at
-            at = int(np.argmin(np.where(open_, distance, np.inf)))
-            reached, open_[at], i = distance[at], False, owner[at]
-        closed = ~open_
+            at = int(np.argmin(np.where(unvisited, distance, np.inf)))
+            reached, unvisited[at], i = distance[at], False, owner[at]
+        visited = ~unvisited
         u[row] += reached
-        for j in np.flatnonzero(closed & (owner >= 0)):
+        for j in np.flatnonzero(visited & (owner >= 0)):
             u[owner[j]] += reached - distance[j]
-        v[closed] -= reached - distance[closed]
+        v[visited] -= reached - distance[visited]
         while at >= 0:  # each on the path takes the column of the one before it
             before = int(came_from[at])
             owner[at] = owner[before] if before >= 0 else row

@@ -1,4 +1,4 @@
-"""Labelled modes of designs; more modes are computed where a wanted label is not among them."""
+"""Labelled modes of designs; more modes are computed if a wanted label is not among the first."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from ..evaluate.results import Evaluation
 from .label import Label, Mode, paired_labels
 from .match import margin, match
 
-MORE_MODES = (4, 8)  # per harmonic, where a label is not among the modes first asked for
-Wanted = Callable[[int, Sequence[Mode]], Sequence[Label]]  # of a question's place, and its modes
+MORE_MODES = (4, 8)  # per harmonic, if a label is not among the modes first computed
+# labels that are wanted of a question, from its index and its modes
+Wanted = Callable[[int, Sequence[Mode]], Sequence[Label]]
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class LabelledModes:
 
     @property
     def clarity(self) -> float:
-        """The smallest of the wanted modes', 0 (some label is a tie) to 1."""
+        """The smallest clarity of a wanted mode, 0 (two labels fit equally well) to 1."""
         return margin(self.wanted)
 
 
@@ -38,9 +39,10 @@ def find_modes(
     wanted: Sequence[Label] | Wanted,
     jobs: int = 1,
 ) -> Iterator[tuple[int, ModesAnswer]]:
-    """Place and answer of each question as they come, those without a wanted label at the end.
+    """Index and answer of each question as they are ready; those that lack a wanted label are
+    evaluated again with more modes, and come last.
 
-    wanted: labels, or what tells them from a question's place and its modes.
+    wanted: labels, or a function that gives them.
     """
     lost = dict.fromkeys(range(len(questions)), EvaluationFailed("lost_label", ""))
     for count in (None, *MORE_MODES):

@@ -210,7 +210,8 @@ def labelled(evaluation: Evaluation) -> list[Mode]:
 
 
 def paired_labels(modes: Sequence[RawMode]) -> list[Mode]:
-    """`label_modes`, with the halves of sampled pairs joined first; harmonic shapes come in pairs.
+    """`label_modes`, after the two modes of each pair are joined into one if shapes are sampled on
+    rings; a harmonic shape stands for a pair already.
 
     Raises ValueError as ``belt_motion``.
     """
