@@ -1,8 +1,8 @@
-"""The modes of a case, as they count in the labels of measured shapes.
+"""The modes of a case, which help to find the labels of measured shapes; ``labels`` calls this.
 
 A mode's shape at the sensors is most of the covariance of its label, and its frequency a part of
-the label's prior. A case that is not calibrated is off: its frequencies by `FREQUENCY_OFF`, its
-shapes by `SHAPE_OFF`, which leaves the rest to ``covariance``. ``labels`` calls this.
+the label's prior. A case that is not calibrated has errors: `FREQUENCY_OFF` of its frequencies, and
+`SHAPE_OFF` of its shapes, which is the weight of the label's covariance without a case.
 """
 
 from __future__ import annotations
@@ -28,27 +28,27 @@ if TYPE_CHECKING:
 Array = np.ndarray
 
 FREQUENCY_OFF = 0.15  # standard deviation of ln frequency
-SHAPE_OFF = 0.05  # mean square of what is not the case's shape, of the shape's
-MAX_OFF_TYRE = 0.03  # m, of a sensor from the case's tyre
+SHAPE_OFF = 0.05  # mean square error of a shape of the case over its mean square
+MAX_OFF_TYRE = 0.03  # m, largest distance of a sensor from the case's tyre
 PER_HARMONIC = 4  # modes evaluated: orders 0 to 3
 
 
 @dataclass(frozen=True)
 class CaseModes:
-    """modes: with harmonic shapes, the lowest of each label."""
+    """Frequencies and shapes of the labels that a case has."""
 
-    modes: Sequence[Mode]
+    modes: Sequence[Mode]  # with harmonic shapes, the lowest mode of each label
 
     @property
     def half_width(self) -> float:
-        """The belt's half width (m)."""
+        """Half the width of the belt, m."""
         R, Z = self._points.T
         return float(np.abs(Z[R / R.max() > BELT]).max())
 
     def covariance(self, label: Label, sensors: Sensors, S: Array) -> Array:
-        """Covariance (k, k) of a label's signals, with unit mean diagonal; S: without a case.
+        """Covariance (k, k) of the signals of k sensors for a label; the mean of its diagonal is 1.
 
-        Raises InputError where a sensor is not on the tyre.
+        S (k, k): the covariance without a case. Raises InputError if a sensor is not on the tyre.
         """
         mode = self._by_label.get(label)
         if mode is None:
@@ -58,8 +58,8 @@ class CaseModes:
         return (u @ u.T / whole + SHAPE_OFF * S) / (1 + SHAPE_OFF) if whole else S
 
     def likelihood(self, label: Label, frequency_Hz: float) -> float:
-        """How likely a frequency is under a label, 1 at most. A label that the case lacks is above
-        its modes of the same c."""
+        """Likelihood of a frequency for a label, at most 1. A label that the case does not have is
+        expected above the case's modes of the same c."""
         mode = self._by_label.get(label)
         above = [each.frequency_Hz for each in self.modes if each.label.c == label.c]
         expected = mode.frequency_Hz if mode else max(above, default=frequency_Hz)
@@ -67,7 +67,7 @@ class CaseModes:
         return 1.0 if mode is None and off > 0 else exp(-0.5 * off**2)
 
     def expected_Hz(self, label: Label | None) -> float | None:
-        """The case's frequency of a label."""
+        """The case's frequency of a label, None if it has none."""
         mode = self._by_label.get(label) if label else None
         return mode.frequency_Hz if mode else None
 
@@ -80,7 +80,7 @@ class CaseModes:
         return _shape(self.modes[0]).points
 
     def _signals(self, mode: Mode, sensors: Sensors) -> Array:
-        """Both members of a doublet at the sensors, (k, 2); on c = 0 one is 0."""
+        """Signals (k, 2) of both modes of a doublet at the sensors; for c = 0 one mode, then 0."""
         R, angle, Z = sensors.points.T
         distance, node = KDTree(self._points).query(np.column_stack([R, Z]))
         if distance.max() > MAX_OFF_TYRE:

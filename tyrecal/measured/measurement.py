@@ -1,4 +1,4 @@
-"""One measured value, and the measurements CSV, which holds several."""
+"""One measured value, and the text of a measurements CSV."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from ..tyre.usual import USUAL, USUAL_MEASUREMENTS, Usual
 from ..units import PRESSURE
 
 CSV_COLUMNS = ("quantity", "c", "m", "kind", "member", "pressure_kPa", "load_N", "value", "sigma")
-RIM_COLUMN = "rim"  # where some stand on another rim than the case's
+RIM_COLUMN = "rim"  # written only if a value was measured on another rim than the case's
 AS_CASE = "case"
 PRESSURE_USUAL = Usual(20, 2000, "kPa", PRESSURE)
-MIN_CARRIED, MAX_CARRIED = 0.05, 3.0  # contact area times pressure, of the load
+MIN_CARRIED, MAX_CARRIED = 0.05, 3.0  # contact area times pressure over the load
 MeasurementKey = tuple[str, Label | None, str, float, float, RimSupport | None]
 
 
@@ -31,8 +31,8 @@ class Measurement:
     pressure_kPa: float  # 0 for the mass
     load_N: float
     value: float
-    sigma: float = nan  # standard deviation, NaN where it is not stated
-    run: str = ""  # what was mounted and measured once
+    sigma: float = nan  # standard deviation; NaN: not stated
+    run: str = ""  # name of the test: the tyre mounted once and measured
     place: str = ""  # file and line
     rim: RimSupport | None = None  # None: as the case has it
 
@@ -59,7 +59,7 @@ class Measurement:
 
     @property
     def mistake(self) -> str | None:
-        """A sentence, where no tyre has such a value."""
+        """What is wrong, in a sentence, if no tyre can have this value; None if one can."""
         if not self.value > 0:
             return f"{self.quantity} is {self.value:g}, must be greater than 0"
         if refusal := USUAL_MEASUREMENTS[self.quantity].refusal(self.value):
@@ -88,7 +88,7 @@ class Measurement:
 
 
 def measurements_csv(measurements: Sequence[Measurement]) -> str:
-    """The measurements CSV."""
+    """Text of a measurements CSV, as `tables.read_measurements` reads it."""
     on_rims = any(each.rim for each in measurements)
     lines = [",".join([*CSV_COLUMNS, *[RIM_COLUMN] * on_rims])]
     for each in measurements:

@@ -1,4 +1,4 @@
-"""Repeats that contradict each other: found before any of them is averaged.
+"""Slips: repeated measurements of one value that contradict each other.
 
 All repeats of one quantity together show how far two runs of one thing may differ. With y = ln x,
 run i of n runs of one label differs from the mean of the other n - 1 by d_i; its studentised
@@ -8,8 +8,8 @@ deviation is
 
 The largest is taken away, then the largest of the rest, and so on; the slips are those up to the
 last that Student's t does not allow (Rosner's generalised extreme studentised deviate). So two
-slips do not hide each other, and none makes the scatter that judges it. `combined` must never
-average what stands here.
+slips do not hide each other, and no slip adds to the scatter that it is compared with.
+`repeats.combined`, which averages repeats, must leave out all runs that are reported here.
 """
 
 from __future__ import annotations
@@ -22,28 +22,24 @@ import numpy as np
 
 from .measurement import Measurement
 
-FALSE_REPORTS = 0.002  # of files without a slip
-FEW_REPEATS = (
-    3  # degrees of freedom; with fewer, the file itself does not show what its repeats scatter
-)
-MAX_REPEAT_STEP = {
-    "frequency_Hz": 0.05,
-    "mass_kg": 0.05,
-}  # relative, between repeats of such a file
-MAX_REPEAT_STEP_ELSE = 0.25
+FALSE_REPORTS = 0.002  # share of files without a slip in which one is reported
+FEW_REPEATS = 3  # degrees of freedom below which a file does not show the scatter of its repeats
+# relative difference between repeats of such a file above which one is a slip
+MAX_REPEAT_STEP = {"frequency_Hz": 0.05, "mass_kg": 0.05}
+MAX_REPEAT_STEP_ELSE = 0.25  # of all other quantities
 MIN_COMMON, MIN_SHIFT = 3, 0.02  # labels of two runs, and their mean ln ratio
 MAX_SLIPS = 12  # slips that are looked for
 USUAL_STEPS = [digit * 10.0**power for power in range(2, -8, -1) for digit in (5, 2.5, 2, 1.25, 1)]
-MIN_SCATTER = 1e-4  # of the value: what no two set-ups of a test go below
+MIN_SCATTER = 1e-4  # relative scatter that repeats of a test have at least
 
 
 @dataclass(frozen=True)
 class Contradiction:
-    """Runs of one thing, of which one is off by more than repeats of its file are."""
+    """Repeats of one value, one of which differs by more than repeats of its file do."""
 
     slip: Measurement  # the run that is off; of two runs, the later one
-    others: tuple[Measurement, ...]  # the other runs of the same thing
-    usual: float  # relative standard deviation of all other repeats; 0 where there are too few
+    others: tuple[Measurement, ...]  # the other repeats of the same value
+    usual: float  # standard deviation of all other repeats, %; 0 if there are too few
 
     @property
     def left_out(self) -> tuple[Measurement, ...]:
@@ -112,6 +108,7 @@ def common_shifts(values: Sequence[Measurement]) -> list[str]:
 
 
 def _of_quantity(values: list[Measurement]) -> list[Contradiction]:
+    """Slips among the values of one quantity, in the order of ``values``."""
     from scipy.stats import t as student
 
     groups: dict[object, list[Measurement]] = {}
@@ -167,8 +164,8 @@ def _deviations(runs: Sequence[Measurement]) -> np.ndarray:
 
 
 def _step(values: Sequence[float]) -> float:
-    """The largest usual step that all values are multiples of: the last digit that was written, or
-    a spectrum's line. 0 where there is none."""
+    """The largest usual step of which all values are multiples: the last written digit, or the line
+    spacing of a spectrum. 0 if there is none."""
     x = np.array(values)
     for step in USUAL_STEPS:
         if np.all(abs(x / step - np.rint(x / step)) < 1e-6):
