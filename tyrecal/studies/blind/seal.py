@@ -1,8 +1,8 @@
-"""The seal: the truth lies in a folder of its own, its sha256 next to the trials.
+"""The seal of a blind study: its truth is in a separate folder, and its sha256 is with the trials.
 
-truth.json holds a nonce, so that nobody can find the truth by trying; ``answer`` never opens its
-folder and refuses to work where a truth lies among the trials; answers are hashed before ``score``
-opens the truth and checks that it is the one that was sealed.
+truth.json has a random number, so that the truth cannot be guessed from its hash. ``answer`` never
+opens its folder, and refuses to work if a truth is among the trials. Answers are hashed before
+``score`` opens the truth and checks its hash.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ def seal(folder: Path, sealed: Path, content: dict[str, Any]) -> str:
 
 
 def open_truth(folder: Path, sealed: Path) -> dict[str, Any]:
-    """The truth, if it is the sealed one and the answers are in. Raises InputError."""
+    """Content of truth.json. Raises InputError if it is not the sealed one, or an answer is missing
+    or was changed."""
     check_answers(folder)
     content = read_json(sealed / TRUTH)
     if _sha256(sealed / TRUTH) != read_json(folder / SEAL).get("sha256"):
@@ -40,7 +41,7 @@ def open_truth(folder: Path, sealed: Path) -> dict[str, Any]:
 
 
 def refuse_open_truth(folder: Path) -> None:
-    """Raises InputError where the truth can be read from the folder that is answered."""
+    """Raises InputError if a truth is in ``folder``, where answers are computed, or no seal is."""
     paths = sorted(folder.rglob(TRUTH))
     if paths:
         raise InputError(f"{paths[0]} lies open among the trials; move it elsewhere")
@@ -48,14 +49,15 @@ def refuse_open_truth(folder: Path) -> None:
 
 
 def seal_answers(folder: Path, files: list[Path]) -> str:
-    """Write one sha256 over all answers, by name; returns it."""
+    """Write the sha256 of all answers together to ``folder``; returns it."""
     mark = _of_all(files)
     write_json(folder / ANSWERS, {"sha256": mark, "count": len(files)})
     return mark
 
 
 def check_answers(folder: Path) -> list[Path]:
-    """The answers, if all are in and none was changed since. Raises InputError."""
+    """Files of the answers. Raises InputError if one is missing or was changed since
+    `seal_answers`."""
     stated = read_json(folder / ANSWERS)
     files = sorted((folder / "answers").glob("*.json"))
     names = {path.stem for path in (folder / "trials").glob("*.csv")}

@@ -1,4 +1,4 @@
-"""Measurements as numbers: logarithms with their scatter, pairs as mean and split, several runs.
+"""Measurements of one tyre as vectors: logarithms, their scatter, and the splits of pairs.
 
 A pair f_a, f_b becomes mu = (ln f_a + ln f_b)/2 with variance (s_a^2 + s_b^2)/4 and the split
 s = |ln f_a - ln f_b|, whose scatter is tau^2 = s_a^2 + s_b^2; s_a, s_b are relative.
@@ -25,12 +25,12 @@ ObservationKey = tuple[str, Label | None, float, RimSupport | None]
 
 @dataclass(frozen=True)
 class Observable:
-    """Identity of one number: quantity, mode, state and run."""
+    """What one row of the observations is: quantity, mode, state and run."""
 
     quantity: str
     label: Label | None  # of the mode; None: the mass
     pressure_kPa: float
-    run: int = 0  # 0 is the tyre as it is, in 1, 2, ... something was switched
+    run: int = 0  # 0: the tyre as it is; 1, 2, ...: toggled runs, in which one thing was switched
     rim: RimSupport | None = None  # None: as the case has it
 
     def __str__(self) -> str:
@@ -40,7 +40,7 @@ class Observable:
 
     @classmethod
     def of(cls, row: ModelRow) -> Observable:
-        """The mode, or the mass, of a model's row."""
+        """The observable of a row of the model."""
         label, state = row[0], state_of(row[1])
         quantity = "frequency_Hz" if label else "mass_kg"
         return cls(quantity, label, state.pressure_kPa or 0.0, rim=state.rim)
@@ -52,24 +52,26 @@ class Observable:
 
     @property
     def row(self) -> ModelRow:
-        """Row of the model to which it belongs."""
+        """Row of the model that predicts it: label, and the pressure (kPa) or, on another rim than
+        the case's, the whole state."""
         return self.label, self.state if self.rim else self.pressure_kPa
 
 
 @dataclass(frozen=True)
 class Observations:
-    """All that was measured of one tyre."""
+    """The n frequencies and masses that were measured on one tyre."""
 
     rows: tuple[Observable, ...]
     y: Array  # (n,) ln value
-    scatter: Array  # (n,) standard deviation of y by repeatability
-    common: float  # the part of it that all frequencies of one run share
-    split: Array  # (n,) of pairs with both members measured, else NaN
-    split_scatter: Array  # (n,) likewise
-    left_out: tuple[str, ...] = ()  # measurements that are not used, why
+    scatter: Array  # (n,) standard deviation of y by repeatability, without ``common``
+    # standard deviation of a shift that all frequencies of one run share, in addition to scatter
+    common: float
+    split: Array  # (n,) distance of the two modes of a pair in ln f; NaN unless both were measured
+    split_scatter: Array  # (n,) its standard deviation
+    left_out: tuple[str, ...] = ()  # sentences about measurements that are not used
 
     def at(self, places: Array) -> Observations:
-        """The numbers at these places, the rows as they are."""
+        """The numbers at these indices; ``rows`` stays."""
         names = ("y", "scatter", "split", "split_scatter")
         return replace(self, **{name: getattr(self, name)[places] for name in names})
 
@@ -85,12 +87,12 @@ def observe(
     toggled: Sequence[Sequence[Measurement]] = (),
     split: float = 0.0,
 ) -> Observations:
-    """Observations of a tyre.
+    """Observations of a tyre from its measurements.
 
-    repeats: the same measured again after dismounting, whose mean is used, and whose scatter
-    takes the place of the stated sigma; toggled: runs 1, 2, ...; split: the relative split that
-    this kind of tyre has by non-uniformity, which a lone member of a pair is off by half of. What
-    was measured under load is left out of toggled runs; of others it is `under_load`'s.
+    repeats: the same measurements after mounting the tyre again; their mean is used, and their
+    scatter replaces the stated sigma. toggled: measurements of runs 1, 2, ... split: relative
+    distance of the modes of a pair by non-uniformity; if only one was measured, it is off by half
+    of that. Values under load are not used; `under_load` compares those of ``readings``.
     """
     left_out: list[str] = []
     unloaded = [[r for r in run if not r.load_N] for run in (readings, *repeats)]
@@ -127,7 +129,7 @@ def _used(run: Sequence[Measurement], left_out: list[str]) -> dict[tuple[str, ..
 
 
 def _unrepeated(runs: Sequence[dict]) -> Iterator[str]:
-    """Repeats that `_scatter` cannot use, because a value has to be in every file."""
+    """Sentences about repeats that `_scatter` cannot use, because a value is not in every file."""
     keys = dict.fromkeys(key for run in runs for key in run)
     some = [key for key in keys if not all(key in run for run in runs)]
     first, later = [k for k in some if k in runs[0]], [k for k in some if k not in runs[0]]
@@ -149,10 +151,10 @@ def _stated(run: dict) -> dict:
 
 
 def _scatter(runs: Sequence[dict]) -> tuple[dict, float]:
-    """Mean over repeats and its standard deviation by key, and the common part.
+    """Mean over repeats and its standard deviation by key, and that of the shift of a whole run.
 
-    Analysis of variance in two ways: y_ik = m_i + b_k + e_ik, values i, runs k. var e of each
-    value is drawn towards that of all, being known from few repeats.
+    Two-way analysis of variance: y_ik = m_i + b_k + e_ik, values i, runs k. With few repeats, var e
+    of one value is uncertain, so the variance of all values counts as `PRIOR_REPEATS` more repeats.
     """
     stated = [_stated(run) for run in runs]
     keys = [key for key in stated[0] if key[0] == "frequency_Hz" and all(key in s for s in stated)]
@@ -173,7 +175,7 @@ def _scatter(runs: Sequence[dict]) -> tuple[dict, float]:
 
 
 def _pair(run: dict, key: ObservationKey, split: float) -> tuple[float, float, float, float]:
-    """y, its scatter, split, its scatter."""
+    """y, its scatter, the split and its scatter, from one value or from the two of a pair."""
     if (*key, "") in run:
         return (*run[(*key, "")], np.nan, np.nan)
     members = [run[(*key, m)] for m in "12" if (*key, m) in run]

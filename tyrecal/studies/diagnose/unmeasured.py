@@ -1,12 +1,12 @@
-"""Predictions of an explanation for modes that were not measured, and how sure they are.
+"""Predictions for modes that were not measured, with their standard deviations.
 
-Of rows that are jointly normal, covariance T as in `reweighed`, those measured are known:
+All rows together are normal with covariance T, as in `reweighed`. Given the m measured ones:
 
     E y' = m' + T'm T_mm^-1 (y - m),   var y' = T'' - T'm T_mm^-1 T_m'
 
 (Rasmussen and Williams, Gaussian Processes for Machine Learning, eq. 2.19), m at the prior's
-centre: so what the data say of constants and of the section is carried over. Over the sizes of
-effects, and over explanations, means and variances are pooled.
+centre. So the errors of constants and of the section that the data show correct the predictions,
+too. Means and variances are pooled over the sizes of effects and over explanations.
 """
 
 from __future__ import annotations
@@ -25,20 +25,21 @@ from .reweighed import LinearFit, line_about
 from .veering import ZETA_POINTS, rule
 
 Array = np.ndarray
-NEGLIGIBLE = 1e-3  # of the likeliest size's, and explanation's, probability
-WORTH_COUPLING = 0.01  # share of a way in which near modes may be coupled, from which it counts
-HALF_90 = 1.6449  # of a 90 % interval, in standard deviations of a normal distribution
+# probability of a size or an explanation over that of the likeliest below which it is left out
+NEGLIGIBLE = 1e-3
+WORTH_COUPLING = 0.01  # share of a value of zeta (`veering`) above which it is used
+HALF_90 = 1.6449  # half of a 90 % interval of a normal distribution, in standard deviations
 
 
 @dataclass(frozen=True)
 class Expected:
-    """ln values of rows (m,), of the tyre itself, without scatter of a measurement."""
+    """Predicted ln values (m,) of the tyre itself, without the scatter of a measurement."""
 
     mean: Array
-    deviation: Array
+    deviation: Array  # standard deviation
 
     def interval(self) -> tuple[Array, Array]:
-        """Between which they lie with 90 %."""
+        """Lower and upper ends of the 90 % intervals."""
         half = HALF_90 * self.deviation
         return self.mean - half, self.mean + half
 
@@ -49,8 +50,8 @@ def expected(
     rows: Sequence[ModelRow],
     places: Array,
 ) -> Expected:
-    """Prediction of rows of the model at its ``places`` (m,), by all explanations in the
-    catalogue."""
+    """Prediction of the rows of the model with the indices ``places`` (m,), pooled over all
+    explanations except "outside"."""
     known = [h for h in hypotheses if h.key != OUTSIDE]
     ln = np.array([h.ln_evidence + np.log(h.prior) for h in known])
     p = np.exp(ln - ln.max())
@@ -64,8 +65,8 @@ def expected(
 def likeliest(
     problem: InverseProblem, hypothesis: Hypothesis, rows: Sequence[ModelRow], places: Array
 ) -> Array:
-    """ln values (m,) of rows of the model at its ``places``, at an explanation's likeliest sizes
-    and variables, constants as they are stated."""
+    """ln values (m,) of the rows with the indices ``places``, at the likeliest sizes and variables
+    of an explanation, with constants as they are stated."""
     best = int(np.argmax(hypothesis.posterior))
     eta, unknown = problem.expansion.eta[places], np.full(len(places), np.nan)
     unseen = tuple(Observable.of(rows[i]) for i in places)
@@ -73,14 +74,15 @@ def likeliest(
     effects = {id: e[[best]] for id, e in hypothesis.values.items()}
     d, zeta = hypothesis.fitted.d[[best]], float(hypothesis.fitted.zeta[best])
     there = replace(problem, observations=observations, places=places, zeta=0.0)
-    uncoupled = there.predicted(effects, d)[0]  # which of two is the upper there
+    uncoupled = there.predicted(effects, d)[0]  # decides which of two near modes is the upper one
     return replace(there.measured(uncoupled), zeta=zeta).predicted(effects, d)[0]
 
 
 def expected_by(
     problem: InverseProblem, hypothesis: Hypothesis, rows: Sequence[ModelRow], places: Array
 ) -> Expected:
-    """`expected` by one explanation."""
+    """`expected` by one explanation. Rows that were not measured join the problem with the values
+    of `likeliest`, from which `_conditional` counts their residuals."""
     p = hypothesis.posterior
     on = np.flatnonzero(p > NEGLIGIBLE * p.max())
     d = hypothesis.fitted.d[on]
@@ -109,8 +111,8 @@ def expected_by(
 
 
 def _coupled(coupled: Array) -> list[tuple[int | None, Array]]:
-    """Places in the rule of ways in which near modes may be coupled, with the share (q,) of each,
-    by `Fitted.coupled`; where no near modes were measured, as before any measurement."""
+    """Indices of zeta in `veering.rule` with the share (q,) of each, from `Fitted.coupled`, or from
+    the prior of zeta if no near modes were measured."""
     zeta, weights = rule()[0], leggauss(ZETA_POINTS)[1]
     if not coupled.shape[1]:
         coupled = np.tile(np.exp(-(zeta**2) / 2), (len(coupled), 1))
@@ -120,7 +122,7 @@ def _coupled(coupled: Array) -> list[tuple[int | None, Array]]:
 
 
 def _conditional(line: LinearFit, problem: InverseProblem, count: int) -> tuple[Array, Array]:
-    """Mean and variance (q, m) of all rows but the first ``count``, which are known."""
+    """Mean and variance (q, m) of the rows after the first ``count``, given these."""
     J = line.slopes * problem.spread
     T = line.covariance(problem) + J @ J.transpose(0, 2, 1)
     known, beside = T[:, :count, :count], T[:, :count, count:]
