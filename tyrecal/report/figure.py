@@ -1,4 +1,4 @@
-"""Canvas, type and colours of all pictures, and how they are written: PNG, SVG or PDF."""
+"""Canvas, fonts and colours of all pictures, and writing them as PNG, SVG or PDF."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ DPI = 150
 COMPRESSION = 3  # of 9: a third of the time of the usual 6, files 19 % larger
 COLOUR_MAP = colormaps["viridis"]
 GREY = "0.45"
-# Okabe and Ito: told apart by colour-blind readers; their yellow is left out, pale on paper
+# by Okabe and Ito: colour-blind readers can distinguish them; without yellow, pale on paper
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
+# pale, so that cords stand out
 RUBBER = ("#E3E3E3", "#C9DCEB", "#F5E6C0", "#D3C3B3", "#E2D3E8", "#CFE5CB", "#F2CFC9")
-# pale: cords stand out
 MARKERS = "os^Dv<>P"
-# a page's style sheet has its own shade of each, light, dark and for print
+# variables of the page's style sheet, which has a light, a dark and a printed shade of each colour
 THEMED = {colour.lower(): f"var(--s{k})" for k, colour in enumerate(COLOURS)}
 THEMED |= {colour.lower(): f"var(--r{k})" for k, colour in enumerate(RUBBER)}
-GREYS = {0x28: "ink", 0x60: "soft", 0xB0: "edge", 0xFE: "line", 0xFF: "panel"}  # up to a level
+GREYS = {0x28: "ink", 0x60: "soft", 0xB0: "edge", 0xFE: "line", 0xFF: "panel"}  # by highest level
 
 in_house_style = rc_context(
     {
@@ -62,7 +62,7 @@ def new_figure(width: float, height: float, layout: str | None = "constrained") 
 
 
 def headline(figure: Figure, words: str) -> None:
-    """A title above all panels, from the left edge, in as many lines as the width asks for."""
+    """Add a title above all panels, at the left edge, in as many lines as the width requires."""
     margin = 0.15 / figure.get_figwidth()
     title = figure.suptitle(words, x=margin, ha="left", fontsize=11)
     renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
@@ -118,9 +118,10 @@ def save(figure: Figure, path: Path) -> None:
 
 @in_house_style
 def svg(figure: Figure, words: str, key: str) -> Markup:
-    """The figure as part of a page, described in ``words`` for readers who do not see it. The same
-    figure gives the same text; ``key``: what its ids begin with, another one for each figure of a
-    page."""
+    """The figure as an SVG element of a page. The same figure gives the same text.
+
+    words: description for readers who cannot see it; key: prefix of its ids, unique on the page.
+    """
     use_plain_numbers(figure)
     file = io.StringIO()
     nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))
@@ -138,7 +139,7 @@ def svg(figure: Figure, words: str, key: str) -> Markup:
 
 
 def _themed(tag: str, ids: Mapping[str, str]) -> str:
-    """A tag with the page's ids and colours, to hundredths of a point."""
+    """An SVG tag with the ids and colours of the page, its numbers rounded to 0.01 pt."""
     tag = " ".join(tag.replace("xlink:", "").split())
     tag = re.sub(r' id="([^"]+)"', lambda m: f' id="{ids[m[1]]}"' if m[1] in ids else "", tag)
     tag = re.sub(r'(url\(|href=")#([\w-]+)', lambda m: f"{m[1]}#{ids[m[2]]}", tag)
@@ -147,6 +148,7 @@ def _themed(tag: str, ids: Mapping[str, str]) -> str:
 
 
 def _shade(colour: str) -> str:
+    """The style sheet's variable for a colour; a colour without one as it is."""
     if colour in THEMED or colour != f"#{3 * colour[1:3]}":
         return THEMED.get(colour, colour)
     level = int(colour[1:3], 16)

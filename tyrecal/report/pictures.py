@@ -29,17 +29,17 @@ def draw_evaluation(
     modes: Sequence[Mode],
     kind: str = "png",
 ) -> None:
-    """STUDY_section, the lowest modes (`MAX_IN_OVERVIEW`) in modes or STUDY_modes and, per mode,
-    STUDY_mode_C_M[_KIND], in a format ``kind`` of `files.PICTURE_FORMATS`; each mode as VTU too.
+    """Draw the section (STUDY_section), the lowest `MAX_IN_OVERVIEW` modes (modes or STUDY_modes)
+    and each mode (STUDY_mode_C_M[_KIND]), also as VTU.
 
-    Only modes known on the whole section are drawn: a 3-D solver gives them on the crown alone.
-    Of a tyre without a section nothing is.
+    kind: one of `files.PICTURE_FORMATS`. Modes are drawn only if the solver gives them on the whole
+    section; a 3-D solver gives them on the crown only. Nothing is drawn without a section.
     """
     if case.drawn is None:
         return
     mesh = resolved(case).mesh
-    moved, modes = placed(evaluation, modes, mesh)
-    section = section_data(case, mesh, moved)
+    inflation, modes = placed(evaluation, modes, mesh)  # displacements on the nodes of this mesh
+    section = section_data(case, mesh, inflation)
     figure = draw_section(section, case.case.name, evaluation.pressure_kPa)
     save(figure, folder / f"{study}_section.{kind}")
     if modes:
@@ -61,8 +61,10 @@ def draw_fit(
     fit: FitResult,
     kind: str = "png",
 ) -> None:
-    """The pictures of the fitted design, of the convergence and, over several states, fit_states;
-    ``kind``: their format."""
+    """Draw the fitted design, the convergence and, for a fit to several states, fit_states.
+
+    kind: one of `files.PICTURE_FORMATS`.
+    """
     draw_evaluation(folder, "fit", with_values(case, values), evaluation, modes, kind)
     save(draw_convergence(history, fit.objective_unit), folder / f"convergence.{kind}")
     if fit.states and fit.modes:
@@ -70,5 +72,5 @@ def draw_fit(
 
 
 def file_name(label: Label) -> str:
-    """mode_2_1, mode_0_0_axial ..."""
+    """Name of a mode's files: mode_2_1, mode_0_0_axial, ..."""
     return f"mode_{label.c}_{label.m}" + (f"_{label.kind}" if label.kind else "")

@@ -1,4 +1,4 @@
-"""Data that a page draws: the section, mode shapes, pressure in the patch."""
+"""Data from which the report page draws the section, mode shapes and the pressure in the patch."""
 
 from __future__ import annotations
 
@@ -25,21 +25,20 @@ from ..tyre.section.mesh import SectionMesh
 from .revolve import placed
 
 Array = np.ndarray
-Flat = list[float]  # points z, r in mm, one after the other
-SHAPE_DIGITS = 6  # of a shape, over its largest component
-TOLERANCE_HZ = 1e-6  # of a table's frequencies against the shapes'
+Flat = list[float]  # points as z, r, z, r, ... in mm
+SHAPE_DIGITS = 6  # decimals of a shape, whose largest component is 1
+TOLERANCE_HZ = 1e-6  # between frequencies in a table and those of the shapes
 
 
 class PatchData(ResultPart):
-    """Contact pressure on lines of nodes, (ring along, node across), and the patch's edge as closed
-    lines, points across and along in turn."""
+    """Contact pressure on a grid of nodes (ring, node): a ring per angle, its nodes across."""
 
     design: str
     load_N: float
     across_mm: list[list[float]]
     along_mm: list[list[float]]
     pressure_kPa: list[list[float]]
-    edge_mm: list[Flat]
+    edge_mm: list[Flat]  # closed lines round the patch, points as across, along, across, ...
 
 
 class Patches(Result):
@@ -50,50 +49,54 @@ class Patches(Result):
 
 
 class Cords(ResultPart):
-    """A layer as lines."""
+    """The cords of a layer as lines along the section."""
 
     angle_deg: float
     lines: list[Flat]
 
 
 class SectionData(ResultPart):
-    """The section as elements by region, cords by layer, what the rim holds (elements, and lines of
-    the outline of others), and its outline before and after the inflation."""
+    """The section of a tyre as polygons and lines."""
 
-    areas: dict[str, list[Flat]]
-    cords: dict[str, Cords]
-    rim: list[Flat]
-    outline: Flat
-    inflated: Flat | None
+    areas: dict[str, list[Flat]]  # elements by region or compound
+    cords: dict[str, Cords]  # by layer
+    rim: list[Flat]  # elements that the rim holds, and held lines of the outline of other elements
+    outline: Flat  # before the inflation
+    inflated: Flat | None  # the outline after the inflation; None: not known
 
 
 class Shape(Named):
-    """A mode on the section, or on the surface of the loaded tyre."""
+    """A mode of the unloaded tyre on its section, or of the loaded tyre on its surface. Components
+    are r, theta, z, the largest one 1."""
 
+    # unloaded: amplitude (node, 3) of Re[amplitude exp(i n Theta)]
     n: Wave = 0
     real: list[list[float]] = Field(default=[])
     imaginary: list[list[float]] = Field(default=[])
+    # loaded: symmetric or antisymmetric about the patch, and displacement (ring, node, 3)
     symmetry: str | None = None
     displacement: list[list[list[float]]] = Field(default=[])
 
 
 class Shapes(Result):
-    """fit_shapes.json, modes_shapes.json"""
+    """Content of fit_shapes.json and modes_shapes.json: the outer surface, and the modes there."""
 
     case: str
     pressure_kPa: float
     load_N: float = 0.0
-    variables: dict[str, list[str]] = Field(default={})
+    variables: dict[str, list[str]] = Field(default={})  # paths that each variable sets
     section: SectionData | None = None
+    # unloaded: nodes (node,) of `Shape.real`
     R_m: list[float] = Field(default=[])
     Z_m: list[float] = Field(default=[])
+    # loaded: angles (ring,) from the middle of the patch, rad; points (ring, node, 3): r, theta, z
     angles: list[float] = Field(default=[])
     surface_m: list[list[list[float]]] = Field(default=[])
     modes: list[Shape]
 
     def are_of(self, table: Sequence[Named]) -> bool:
-        """Whether these are the modes that a table lists, and not those of another run; a split
-        doublet has its mean here, both members there."""
+        """Whether ``table`` lists these modes, and not those of another run. A split doublet has
+        its mean frequency here, and both of them in the table."""
         for mode in self.modes:
             hertz = [
                 each.frequency_Hz
@@ -108,7 +111,7 @@ class Shapes(Result):
 
 
 class DiagnosisSection(Result):
-    """diagnosis_section.json"""
+    """Content of diagnosis_section.json: elements and cords by part of the section."""
 
     case: str
     areas: dict[str, list[Flat]]
@@ -116,11 +119,11 @@ class DiagnosisSection(Result):
 
 
 def tyre_data(case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode]) -> dict[str, Any]:
-    """The content of fit_shapes.json and modes_shapes.json: the section, and the modes' shapes on
-    its outer surface, from one edge of the bead to the other; of a tyre without a section neither.
+    """The content of `Shapes`: the section, and the modes on its outer surface from bead to bead.
+    Both are left out for a tyre without a section.
 
-    A shape is u = Re[amplitude exp(i n Theta)], in r, theta, z; of a pair the member whose crest
-    stands at Theta = 0. Modes that are not known on the section are left out.
+    A shape is u = Re[amplitude exp(i n Theta)], in r, theta, z; for a pair the mode with its crest
+    at Theta = 0. Modes that are not known on the whole section are left out.
     """
     common = {
         "format": 1,
@@ -131,12 +134,12 @@ def tyre_data(case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode]) -
     if case.drawn is None:
         return {**common, "modes": []}
     mesh = resolved(case).mesh
-    moved, modes = placed(evaluation, modes, mesh)
+    inflation, modes = placed(evaluation, modes, mesh)  # displacements on the nodes of this mesh
     nodes = mesh.skin()
     R, Z = np.array([mesh.nodes[int(n)] for n in nodes]).T
     return {
         **common,
-        "section": section_data(case, mesh, moved).model_dump(),
+        "section": section_data(case, mesh, inflation).model_dump(),
         "R_m": _rounded(R),
         "Z_m": _rounded(Z),
         "modes": [{**_name(mode), **_amplitude(mode, nodes)} for mode in modes],
@@ -148,7 +151,7 @@ def section_data(
 ) -> SectionData:
     """The section on ``mesh``; displacement: node number to (r, theta, z) of the inflation, m;
     empty: unknown."""
-    case = resolved(case).written
+    case = resolved(case).written  # its effects written into its other numbers
     place = {n: np.array([z, r]) * 1e3 for n, (r, z) in mesh.nodes.items()}
     areas: dict[str, list[Flat]] = {}
     for number, name in areas_of(case, mesh).items():
@@ -176,8 +179,8 @@ def section_data(
 
 
 def _held(mesh: SectionMesh, around: list[int]) -> list[tuple[int, ...]]:
-    """Corners of the elements that the rim holds, and the lines of the outline that it holds of
-    others."""
+    """Corner nodes of the elements that the rim holds, and the held lines of the outline that
+    belong to other elements."""
     held = set(mesh.rim)
     whole = [nodes for nodes in mesh.solids.values() if held.issuperset(nodes)]
     sides = pairwise([*around, *around[:1]])
@@ -187,20 +190,24 @@ def _held(mesh: SectionMesh, around: list[int]) -> list[tuple[int, ...]]:
 
 
 def areas_of(case: LoadedCase, mesh: SectionMesh) -> dict[int, str]:
-    """Area as which each element is drawn: its region, or its compound where there are several."""
+    """Name under which each element is drawn: its region, or its compound if there are several."""
     solids = case.case.solids
     if len({solid.material for solid in solids}) < 2:
         order = [name for name, _ in case.section.regions]
         cells = sorted(mesh.cells.items(), key=lambda cell: order.index(cell[1][0]))
         return {number: region for number, (region, _) in cells}
     rows = tuple(case.case.mesh.levels[case.case.mesh.level].rows)
+    # an entry of ``solids`` names regions or two lines; the last one that fits an element counts
     claims, lines = solid_claims(case.case), case.section.names
     claimants = {n: claimed(claims, lines, rows, *cell) for n, cell in mesh.cells.items()}
     return {n: solids[i].material for n, i in claimants.items() if i is not None}
 
 
 def parts_data(case: LoadedCase, named: Iterable[str]) -> DiagnosisSection:
-    """The section's parts under the names that they have in the map of parts ``named``."""
+    """Elements and cords by part of the section.
+
+    named: names of parts in the diagnosis's section map, "region" or "region, detail".
+    """
     mesh = resolved(case).mesh
     place = {n: np.array([z, r]) * 1e3 for n, (r, z) in mesh.nodes.items()}
     cords: dict[str, list[Flat]] = {}
@@ -220,7 +227,7 @@ def parts_data(case: LoadedCase, named: Iterable[str]) -> DiagnosisSection:
 
 
 def turns(case: LoadedCase, mesh: SectionMesh, name: str) -> list[tuple[int, ...]]:
-    """Nodes of the elements to draw a layer with: layers on one line take turns."""
+    """Nodes of the elements with which a layer is drawn: layers on one line share them in turn."""
     layers = case.case.rebar_layers
     layer = layers[name]
     sharing = [
@@ -239,8 +246,11 @@ def turns(case: LoadedCase, mesh: SectionMesh, name: str) -> list[tuple[int, ...
 def rubber_parts(
     case: LoadedCase, mesh: SectionMesh, named: set[str]
 ) -> dict[str, list[tuple[int, ...]]]:
-    """Corner nodes of the elements of each part of the section, by the part's name in a map of
-    the parts ``named``. What the rim lets go of a bead is of it."""
+    """Corner nodes of the elements of each part, by its name in the section map.
+
+    The crown is divided into the tread and the rest, unless ``named`` has the crown. The part of a
+    bead that the rim does not hold counts as bead.
+    """
     regions = [name for name, _ in case.section.regions]
     crown = regions[0]
     rows = case.case.mesh.levels[case.case.mesh.level].rows
@@ -255,9 +265,8 @@ def rubber_parts(
 
 
 def loaded_data(tyre: LoadedTyre, case: LoadedCase) -> dict[str, Any]:
-    """The content of modes_shapes.json for the tyre on the road, at its last load: points of the
-    outer surface, deformed, and the modes' displacement there (ring, node, 3), in r, theta, z.
-    Angles in rad from the patch's middle."""
+    """The content of `Shapes` for the tyre on the road at its last load: points of the deformed
+    outer surface, and the displacement of the modes there."""
     last = tyre.loads[-1]
     assert tyre.angles is not None and last.surface is not None
     order = np.argsort(last.surface[0, :, 2])
@@ -286,8 +295,7 @@ def loaded_data(tyre: LoadedTyre, case: LoadedCase) -> dict[str, Any]:
 def patches_data(
     name: str, designs: Mapping[str, Pressed], meshes: Mapping[str, SectionMesh]
 ) -> Patches:
-    """The contact pressure of every design and load on the lines of nodes in and round the
-    patch."""
+    """The contact pressure of every design and load on the nodes in the patch and next to it."""
     patches = []
     for design, pressed in designs.items():
         for footprint in pressed.footprints:
@@ -307,19 +315,20 @@ def patches_data(
 
 
 def _grown(touches: Array) -> tuple[slice, slice]:
-    """Rows and columns of what touches and of the next beside it, which bear nothing: between them
-    contours close."""
+    """Rings and nodes of the patch, and one more on each side, without pressure, so that contours
+    are closed."""
     touched = [np.flatnonzero(touches.any(axis)) for axis in (1, 0)]
     rings, nodes = (slice(max(0, each[0] - 1), each[-1] + 2) for each in touched)
     return rings, nodes
 
 
 def _amplitude(mode: Mode, nodes: Array) -> dict[str, Any]:
+    """The fields of `Shape` for an unloaded mode."""
     shape = mode.raw.shape
     assert isinstance(shape, HarmonicShape)
     row = {int(n): k for k, n in enumerate(shape.nodes)}
     A = shape.amplitude[[row[int(n)] for n in nodes]]
-    if shape.n:  # r and z as real, theta as imaginary as they can be
+    if shape.n:  # turn the mode so that r and z are as real, and theta as imaginary, as possible
         A = A * np.exp(-0.5j * np.angle((A**2 * MIRROR).sum()))
     largest = np.argmax(abs(A.real))
     A = A * (np.sign(A.real.ravel()[largest]) or 1.0)
@@ -332,10 +341,12 @@ def _name(mode: Mode) -> dict[str, Any]:
 
 
 def _scaled(values: Array, over: Array | None = None) -> Any:
+    """Values over the largest size of ``over``, or of the values."""
     return _rounded(values / np.abs(values if over is None else over).max())
 
 
-def _line(place: Mapping[int, Array], nodes: Iterable[int]) -> list[float]:
+def _line(place: Mapping[int, Array], nodes: Iterable[int]) -> Flat:
+    """The points of nodes; ``place``: z, r in mm by node."""
     return _rounded(np.concatenate([place[n] for n in nodes]), 3)
 
 
