@@ -12,11 +12,12 @@ Array = np.ndarray
 
 
 class Numbering:
-    """Equations of the free displacement components, in the order of the deck's nodes or, where
-    that gives the narrower band, of reverse Cuthill and McKee; towards the nodes ``end`` (n,).
+    """Numbers of the equations of the free displacement components.
 
-    ``equation`` (n, 3): equation of each component, or ``size`` (a spare place that is dropped)
-    where it is held; ``bandwidth``: sub-diagonals; ``order``: flat component of each equation.
+    Nodes have the deck's order or that of reverse Cuthill and McKee, whichever gives the narrower
+    band; it is reversed if that brings the nodes of the mask ``end`` (n,) nearer to its end.
+    ``equation`` (n, 3): equation of each component; a held one has ``size``, a spare equation that
+    is dropped. ``bandwidth``: sub-diagonals; ``order``: flat component of each equation.
     """
 
     def __init__(self, connectivities: list[Array], free: Array, end: Array | None = None):
@@ -29,7 +30,7 @@ class Numbering:
         pairs = pairs[np.diff(pairs, prepend=-1) > 0]  # np.unique loads NumPy's masked arrays
         pairs = np.stack([pairs // n, pairs % n], 1)
         orders = [np.arange(n), narrow_order(pairs, n)]
-        nodes = min(orders, key=lambda order: _spread(pairs, order))
+        nodes = min(orders, key=lambda order: _largest_distance(pairs, order))
         if end is not None:
             there = np.flatnonzero(end[nodes[touching[nodes]]])
             if 2 * there.sum() < len(there) * touching.sum():  # nearer to the first node
@@ -53,7 +54,8 @@ class Numbering:
         return self.equation[connectivity].reshape(len(connectivity), -1)
 
     def lower(self, connectivity: Array) -> tuple[Array, Array]:
-        """Places of element-matrix entries: which flat entries stay, and where in the band."""
+        """Indices of the flat entries of element matrices that are assembled, and of their places
+        in the flat band."""
         key = connectivity.tobytes()
         if key not in self._scatter:
             e = self.elements(connectivity)
@@ -91,7 +93,8 @@ class Numbering:
         return full.reshape(self.equation.size, *full.shape[2:])[self.order]
 
     def apart(self, full: Array) -> Array:
-        """Coordinates (size, ...) that span fields (n, 3, ...)."""
+        """Coordinates (size, ...) whose span has the fields (n, 3, ...): those of `gather`, except
+        in `kept_fields`."""
         return self.gather(full)
 
     @property
@@ -104,20 +107,20 @@ class Numbering:
         return Cholesky(band)
 
     def times(self, mass: Sparse, x: Array) -> Array:
-        """M x for (size,) or (size, b); ``mass`` (n, n) is that of each component."""
+        """M x for x (size,) or (size, b); ``mass`` (n, n) applies to each component."""
         full = self.spread(x)
         return self.gather((mass @ full.reshape(len(full), -1)).reshape(full.shape))
 
 
-def _spread(pairs: Array, order: Array) -> int:
-    """Largest distance of two connected nodes in an order."""
+def _largest_distance(pairs: Array, order: Array) -> int:
+    """Largest distance of two connected nodes in an order; pairs (p, 2)."""
     place = np.empty(len(order), int)
     place[order] = np.arange(len(order))
     return int(abs(np.diff(place[pairs])).max(initial=0))
 
 
 class Cholesky:
-    """Factor of a symmetric or Hermitian positive definite band; overwrites the band given.
+    """Factor of a symmetric or Hermitian positive definite lower band, which it overwrites.
 
     Raises Indefinite.
     """

@@ -15,7 +15,7 @@ from typing import ClassVar
 import numpy as np
 
 from .hyperelastic import even_powers
-from .principal import PrincipalLaw, apart, over
+from .principal import PrincipalLaw, over, pairs_of
 
 Array = np.ndarray
 
@@ -61,7 +61,7 @@ class Ogden(PrincipalLaw):
 
     def stiffnesses(self, x: Array) -> tuple[Array, Array]:
         """x_b dY_a/dx_b = alpha / 2 (delta_ab - 1/3) Y_a, that of Y is alpha / 6 (Y_b - Y)."""
-        a, b, d = apart(x)
+        a, b, d = pairs_of(x)
         normal, shear, one = 0.0, 0.0, np.eye(3)
         for mu, alpha, Y, mean in self._terms(x):
             q = (alpha / 2)[..., None]

@@ -102,7 +102,7 @@ def over(difference: Array, d: Array, limit: Array | float) -> Array:
     return np.where(d == 0.0, limit, difference / np.where(d == 0.0, 1.0, d))
 
 
-def apart(x: Array) -> tuple[Array, Array, Array]:
-    """x_a, x_b and d = x_a / x_b - 1 (p, 3, 3): two stretches of a pair."""
+def pairs_of(x: Array) -> tuple[Array, Array, Array]:
+    """x_a, x_b and d = x_a / x_b - 1 (p, 3, 3) of all pairs a, b of squared stretches x (p, 3)."""
     a, b = x[:, :, None] + np.zeros(3), x[:, None, :] + np.zeros((3, 1))
     return a, b, (a - b) / b

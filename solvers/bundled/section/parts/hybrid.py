@@ -1,4 +1,4 @@
-"""Solids in whose elements the pressure is a polynomial, condensed element by element: the mixed
+"""Solids with a polynomial of pressure in each element, condensed element by element: the mixed
 method of Simo, Taylor and Pister (Computer Methods in Applied Mechanics 51, 1985), which does not
 lock where rubber is nearly incompressible.
 
@@ -7,6 +7,9 @@ The volume ratio theta and the pressure p are, in each element, mean-square fits
     W = sum of w (Wbar(F) + U(theta)),   theta = Pi J,   p = Pi U'(theta)
     dW = sum of w (dWbar/dF + p dJ/dF) : dF
     d2W = sum of w (dF : (d2Wbar/dFdF + p d2J/dFdF) : dF + U'' dtheta^2),   dtheta = Pi (dJ/dF : dF)
+
+F: deformation gradient; J = det F; dJ/dF = J G, G = F^-T; w: weights of the Gauss points g; Wbar
+and U: energies of shear and of volume.
 
 With one term this is the mean dilatation of Nagtegaal, Parks and Rice (1974).
 """
@@ -28,7 +31,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, kw_only=True)
 class Hybrid(Elastic):
-    """Elements with a pressure of their own."""
+    """Elements with a polynomial of pressure: e elements of a nodes and g Gauss points."""
 
     projection: Array  # Pi (e, g, g)
 
@@ -49,7 +52,7 @@ class Hybrid(Elastic):
         return super().energy(U) + (energy * self.rows.weights).sum()
 
     def _of_volume(self, U: Array) -> tuple[Array, Array]:
-        """dJ/dF (e, g, 9), and w U'' (e, g) of a vibration."""
+        """dJ/dF (e, g, 9) and w U'' (e, g), dynamic if the law has a dynamic bulk modulus."""
         J, G = determinant(square(self.at(U)))
         _, _, curvature = _volume(self.hyperelastic, J, self.projection)
         e, g = self.rows.weights.shape
@@ -84,11 +87,12 @@ class Hybrid(Elastic):
 
 
 def _volume(law: Hyperelastic, J: Array, projection: Array) -> tuple[Array, Array, Array]:
-    """U, p and U'' (e, g, ...) of the volume ratios J, in the order of the law's constants."""
+    """U, p and U'' (e, g) or (e, g, s) of the volume ratios J (e g,) or (e g s,), which are in the
+    order of the points of the law's constants."""
     e, g, _ = projection.shape
     theta = projection @ J.reshape(e, g, -1)
     U, slope, curvature = (v + 0 * theta.ravel() for v in law.volume(theta.ravel()))
-    if law.bulk_ratio is not None:
+    if law.bulk_ratio is not None:  # dynamic over static modulus of a small vibration
         curvature = law.bulk_ratio * curvature
     pressure = projection @ slope.reshape(theta.shape)
     values = U.reshape(theta.shape), pressure, curvature.reshape(theta.shape)
@@ -105,7 +109,7 @@ def volume_rows(part: Hybrid, by_F: Array) -> tuple[Array, Array]:
 
 
 class HybridAtStations(ElasticAtStations):
-    """The pressure's polynomial in the section, at every station."""
+    """Hybrid elements at s Gauss stations round the tyre; the polynomial is in the section."""
 
     def __init__(self, part: Hybrid, nodes: int):
         super().__init__(part, nodes)
