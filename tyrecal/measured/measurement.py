@@ -59,7 +59,7 @@ class Measurement:
 
     @property
     def mistake(self) -> str | None:
-        """What is wrong, in a sentence, if no tyre can have this value; None if one can."""
+        """Why no tyre can have this value, in a sentence; None if one can."""
         if not self.value > 0:
             return f"{self.quantity} is {self.value:g}, must be greater than 0"
         if refusal := USUAL_MEASUREMENTS[self.quantity].refusal(self.value):

@@ -37,7 +37,7 @@ MAX_NOISE = 0.5  # share of noise in the mean square of a channel, above which i
 
 @dataclass(frozen=True)
 class Layout:
-    """What the user states about a test: its coordinates and directions, and its band.
+    """Statements of the user about a test: coordinates, directions and band.
 
     directions 1, 2, 3 are ``stated`` (by the file's coordinate systems), ``cartesian`` (x, y, z) or
     ``cylindrical`` (radial, tangential, axial). "": stated if nodes have systems of their own, else

@@ -25,7 +25,7 @@ ObservationKey = tuple[str, Label | None, float, RimSupport | None]
 
 @dataclass(frozen=True)
 class Observable:
-    """What one row of the observations is: quantity, mode, state and run."""
+    """Identity of one row of the observations: quantity, mode, state and run."""
 
     quantity: str
     label: Label | None  # of the mode; None: the mass
