@@ -134,7 +134,9 @@ def test_the_command_ends_as_interrupted(
     assert run(*command) == 130
     message = capsys.readouterr().err
     assert (
-        "interrupted: " in message and "same command goes on" in message and "error" not in message
+        "interrupted: " in message
+        and "same command again to resume" in message
+        and "error" not in message
     )
     assert len(list(tmp_path.glob("record/*/*.record"))) == (met == "swallowed")
 

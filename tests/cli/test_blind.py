@@ -35,7 +35,7 @@ def test_steps_out_of_order_are_refused(
         ),
         (
             ["make", out, "--case", case, "--effect", "luck"],
-            "there is no such effect of this maker's",
+            "there is no such effect of these trials",
         ),
         (["make", out, "--case", case, *COUNTS, "--truth", out + "/truth"], "must not lie in"),
         (["answer", out, "--effect", "luck"], "--effect luck: there is no such effect; known: "),

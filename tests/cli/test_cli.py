@@ -288,7 +288,7 @@ def test_a_fit_on_this_machine_and_on_others_writes_nothing(
     out = tmp_path / "out"
     both = ["--jobs", "2", "--scheduler", "tcp://localhost:1"]
     assert run("fit", CASE, *both, "--output", str(out)) == 2
-    assert "--jobs is for this machine" in capsys.readouterr().err
+    assert "--jobs applies to this machine only" in capsys.readouterr().err
     assert not out.exists()
 
 
@@ -297,7 +297,7 @@ def test_a_scheduler_that_would_have_nothing_to_do_is_refused(
 ) -> None:
     out = tmp_path / "out"
     assert run("fit", CASE, "--scheduler", "tcp://localhost:1", "--output", str(out)) == 2
-    assert "--scheduler changes nothing here: " in capsys.readouterr().err
+    assert "--scheduler has no effect here: " in capsys.readouterr().err
     assert not out.exists()
 
 
@@ -307,7 +307,7 @@ def test_jobs_with_nothing_to_do_are_mentioned(
     """Scripts give --jobs to every command."""
     out = ["--output", str(tmp_path / "out"), "--no-pictures"]
     assert run("modes", CASE, "--mesh", "coarse", "--jobs", "2", *out) == 0
-    assert "--jobs changes nothing here: one design" in capsys.readouterr().err
+    assert "--jobs has no effect here: one design" in capsys.readouterr().err
 
 
 def test_a_template_that_runs_code_is_refused(

@@ -162,7 +162,9 @@ def test_ctrl_c_leaves_what_was_done_and_says_how_to_go_on(jobs: str, tmp_path: 
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does, to all processes
     words = process.communicate(timeout=200)[1]
     assert process.returncode == 130, words
-    assert "interrupted: " in words and "same command goes on" in words and str(out) in words
+    assert (
+        "interrupted: " in words and "same command again to resume" in words and str(out) in words
+    )
     assert "Traceback" not in words
     before = len(list(out.glob("record/*/*.record")))  # the nominal tyre's among them
     assert 3 <= before < 40
@@ -182,9 +184,9 @@ def test_ctrl_c_without_a_record_says_so(
 
     monkeypatch.setattr(Evaluator, "evaluate", stopped)
     assert run("modes", CASE, "--output", str(tmp_path), "--no-store") == 130
-    assert "--no-store nothing is on record" in capsys.readouterr().err
+    assert "no evaluation is stored (--no-store)" in capsys.readouterr().err
     assert run("modes", CASE, "--output", str(tmp_path)) == 130
-    assert "goes on from there" in capsys.readouterr().err
+    assert "again to resume" in capsys.readouterr().err
 
 
 def on_a_terminal(*arguments: str, **environment: str) -> str:

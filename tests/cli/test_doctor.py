@@ -33,7 +33,7 @@ def test_figures_that_are_not_the_recorded_ones(
     monkeypatch.setitem(self_check.RECORDED_HZ, "[1,0]", 66.9)
     assert run("doctor", "--json") == 3
     printed = capsys.readouterr()
-    assert "not the recorded ones" in printed.err
+    assert "differ from the recorded ones" in printed.err
     (off,) = [m for m in json.loads(printed.out)["self_check"]["modes"] if m["label"] == "[1,0]"]
     assert off["deviation_percent"] == pytest.approx(100 * (66.7627 / 66.9 - 1), abs=1e-3)
 

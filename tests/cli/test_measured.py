@@ -243,7 +243,7 @@ def test_options_of_universal_files_are_refused_with_a_table(
 ) -> None:
     case = str(CASES / "p235_75r17.yaml")
     assert run("measured", "label", case, str(TABLE), "--directions", "cylindrical") == 2
-    assert "280kPa_table.csv is a table, no universal file" in capsys.readouterr().err
+    assert "280kPa_table.csv is a table, not a universal file" in capsys.readouterr().err
 
 
 def mode_in_plane(c: int = 2) -> np.ndarray:

@@ -60,8 +60,8 @@ MISTAKES = {  # what is typed: what is said
     "measured import WHEELER --output full/x.csv": "cannot write to 'full/x.csv': Not a directory",
     "solvers --selftest abaqus --output full/x": "cannot write to 'full/x/plain': Not a directory",
     "batch CASE --output full/x": "cannot write to 'full/x': Not a directory",
-    "store cases": "'cases': there is no record of evaluations here (see",
-    "store .": "'.': there is no record of evaluations here; did you mean 'my'?",
+    "store cases": "'cases': there is no evaluation store here (see",
+    "store .": "'.': there is no evaluation store here; did you mean 'my'?",
     "deck CASE --loads-N 3000 --set road.loads_N.0=400": "road.loads_N.0=400: --loads-N give",
     "deck CASE --loads-N 100000 --output out": (
         "--loads-N 100000: usual is 100 to 34000 N, the load at which this tyre bottoms on its rim"

@@ -218,7 +218,7 @@ def test_store_verifies_and_prunes(tmp_path: Path, capsys: pytest.CaptureFixture
     first.write_bytes(first.read_bytes()[:-1])
     capsys.readouterr()
     assert run("store", str(tmp_path)) == 0
-    assert "3 records" in capsys.readouterr().out
+    assert "3 evaluations" in capsys.readouterr().out
     assert run("store", str(tmp_path), "--verify", "--json") == 0
     summary = json.loads(capsys.readouterr().out)
     assert (summary["records"], summary["damaged"]) == (2, 1)

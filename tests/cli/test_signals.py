@@ -86,7 +86,7 @@ def test_the_solver_ends_with_all_that_it_started(
     process.send_signal(how)
     words = process.communicate(timeout=200)[1]
     assert process.returncode == 128 + how, words
-    pattern = rf"\n{WORDS[how.name]}: evaluations .* the same command goes on from there\n"
+    pattern = rf"\n{WORDS[how.name]}: evaluations .* run the same command again to resume\n"
     assert re.fullmatch(pattern, words), words
     assert len(pids) == 2 * jobs and not [pid for pid in pids if alive(pid)]
     assert not (tmp_path / "out" / "runs").exists()

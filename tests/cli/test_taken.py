@@ -50,7 +50,7 @@ def test_several_cases_or_none_are_refused_with_a_list(here: Path) -> None:
         default_case(None, None, STUDY)
     for path in here.glob("*.yaml"):
         path.unlink()
-    with pytest.raises(click.UsageError, match="neither one here nor a finished fit"):
+    with pytest.raises(click.UsageError, match="neither a case nor a finished fit"):
         default_case(None, None, STUDY)
 
 
@@ -99,7 +99,7 @@ def test_the_case_of_a_fit_is_known_by_its_tyre_where_it_is_not_at_its_place(her
     assert default_case(None, Path("archive/results"), STUDY)[0] == Path("p235_75r17.yaml")
     for path in here.glob("*.yaml"):
         path.unlink()
-    with pytest.raises(click.UsageError, match="none is here that 'archive/results' is a fit of"):
+    with pytest.raises(click.UsageError, match="the case of 'archive/results' is not here"):
         default_case(None, Path("archive/results"), STUDY)
 
 

@@ -191,7 +191,7 @@ def test_a_doctors_words_have_records_and_the_known_tyre() -> None:
         )
     )
     assert "2 cores, 3.5 of 8 GB of memory, 9.5 GB" in text
-    assert "x/record: 7 records, 2.1 MB" in text
+    assert "x/record: 7 evaluations, 2.1 MB" in text
     assert "[0,0] lateral    recorded 37.03, now 37.50 Hz (+1.275 %)" in text
     assert "now not found" in text and "NOT as recorded, within 0.01 %" in text
 

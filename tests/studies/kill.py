@@ -33,7 +33,7 @@ COMMAND = [sys.executable, "-m", "tyrecal", "fit", str(CASE), "--no-pictures", "
 STARTS = ["--mesh", "coarse", "--starts", "3", "--seed", "1"]
 RESULTS = ("fit.json", "fit.csv", "fit_history.csv")
 WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated", signal.SIGHUP: "hung up"}
-SAID = r"\n{}: (nothing was c.*|nothing was computed.*|.*same command goes on.*)\n"
+SAID = r"\n{}: (nothing was c.*|nothing was computed.*|.*same command again to resume.*)\n"
 GONE_S = 5.0  # within which the processes of one that was killed outright have ended
 
 

@@ -26,7 +26,7 @@ def test_a_case_needs_no_more_than_its_deck(deck: Path, capsys: pytest.CaptureFi
     short, whole = deck.with_name("short.yaml"), deck.with_name("whole.yaml")
     short.write_text("format: 1\ndeck: {file: tyre.inp}\n", encoding="utf-8")
     assert run("validate", str(short)) == 0
-    lines = capsys.readouterr().err.partition("lines that it leaves out:\n")[2].split("\n")[:7]
+    lines = capsys.readouterr().err.partition("lines that are left out:\n")[2].split("\n")[:7]
     assert "analysis: {static_moduli: long_term}" in lines
     assert "pressure_kPa: 200" in lines
     whole.write_text(

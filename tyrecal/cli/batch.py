@@ -32,20 +32,25 @@ FILE_PATH = Place(folder=False)
     default="fit",
     metavar="S1,S2,...",
     show_default=True,
-    help=f"Of {', '.join(STUDY_NAMES)}. After a fit, sweep and footprint study the fitted"
-    " design too.",
+    help=f"Studies to run, of {', '.join(STUDY_NAMES)}. After a fit, sweep and footprint study the"
+    " fitted design too.",
 )
-@option("--junit", type=FILE_PATH, metavar="FILE", help="Write JUnit XML for a CI server.")
+@option(
+    "--junit",
+    type=FILE_PATH,
+    metavar="FILE",
+    help="JUnit XML file for a CI server, such as junit.xml.",
+)
 @option(
     "--baseline",
     type=FILE_PATH,
     metavar="FILE",
-    help="Numbers to compare with, and how far each may drift.",
+    help="Baseline file: numbers to compare with, and their tolerances.",
 )
 @option(
     "--write-baseline",
     is_flag=True,
-    help="Write the numbers to --baseline instead; its tolerances stay.",
+    help="Write the numbers to --baseline instead of comparing; its tolerances are kept.",
 )
 @options.loads
 @options.pressures
@@ -55,7 +60,7 @@ FILE_PATH = Place(folder=False)
     default=1,
     metavar="N",
     show_default=True,
-    help="Cases at a time, on this machine.",
+    help="Number of cases at a time, on this machine.",
 )
 @options.scheduler
 @options.every(
@@ -66,7 +71,7 @@ FILE_PATH = Place(folder=False)
         "--output",
         type=Place(),
         metavar="DIR",
-        help="Folder for the results, one in it for each case (default: batch).",
+        help="Folder for the results, with one folder for each case (default: batch).",
     ),
     options.store,
     options.no_store,
@@ -94,10 +99,10 @@ def command(
     allow_unusual: bool,
     terminal: Terminal,
 ) -> int:
-    """Study many CASES, each on its own: one that fails stops no other.
+    """Study many CASES. If one fails, the others are still studied.
 
-    Writes DIR/batch.json, and the results of each case to a folder of its name in DIR. The same
-    command again goes on where it was interrupted: finished cases are answered by their folders.
+    Writes DIR/batch.json, and the results of each case to a folder of its name in DIR. Run the same
+    command again to resume: finished cases are read from their folders.
 
     \b
     tyrecal batch cases/*.yaml --jobs 2

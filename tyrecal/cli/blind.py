@@ -17,7 +17,7 @@ truth = option(
     "--truth",
     type=Place(file=False),
     metavar="DIR",
-    help="Where the sealed truth lies (default: DIR-truth, beside DIR).",
+    help="Folder of the sealed truth (default: DIR-truth, next to DIR).",
 )
 
 
@@ -32,7 +32,7 @@ def trials(flag: str, name: str, default: int, what: str) -> Any:
 
 @click.group()
 def command() -> None:
-    """Try the diagnosis on data whose effect is withheld.
+    """Test the diagnosis on synthetic data with a hidden effect.
 
     \b
     tyrecal blind power cases/p235_75r17.yaml
@@ -50,7 +50,8 @@ def command() -> None:
     type=NumberWithin(0, min_open=True),
     multiple=True,
     metavar="KPA",
-    help="Measured at this pressure; repeatable (default: 2/3, all and 4/3 of the case's).",
+    help="Pressure of the measurements, kPa; repeatable (default: 2/3, 1 and 4/3 times the"
+    " case's).",
 )
 @option(
     "--noise-percent",
@@ -58,7 +59,7 @@ def command() -> None:
     default=0.2,
     show_default=True,
     metavar="PERCENT",
-    help="Scatter of every frequency.",
+    help="Scatter of every frequency, one standard deviation in per cent.",
 )
 @options.every(options.mesh, options.jobs, options.store, options.allow_unusual)
 @options.with_terminal
@@ -72,9 +73,10 @@ def power(
     allow_unusual: bool,
     terminal: Terminal,
 ) -> int:
-    """Say which effects could be found on a tyre, and from what size on, before it is measured.
+    """List the effects that could be found on a tyre, and their smallest sizes, before it is
+    measured.
 
-    Modes are the case's targets or, where it has none, [0,0] to [4,0].
+    The modes are the case's targets. If it has none, they are [0,0] to [4,0].
 
     \b
     tyrecal blind power cases/p235_75r17.yaml --pressure-kPa 160 --pressure-kPa 240
@@ -115,20 +117,22 @@ def power(
     required=True,
     metavar="CASE",
     shell_complete=complete.cases,
-    help="The plain model, its uncertainties and the modes measured.",
+    help="Case with the plain model, its uncertainties and the measured modes.",
 )
 @trials("--effects", "effects", 300, "with an effect of the catalogue")
 @trials("--none", "plain", 200, "without any")
-@trials("--outside", "outside", 80, "with what the catalogue does not hold")
+@trials("--outside", "outside", 80, "with an error that the catalogue does not list")
 @option(
     "--effect",
     "drawn",
     multiple=True,
     metavar="EFFECT",
     shell_complete=complete.effects,
-    help="Draw these effects only; repeatable (default: all it can).",
+    help="Effect to draw; repeatable (default: all that the case allows).",
 )
-@option("--seed", type=Whole(0), metavar="N", help="Of all that is drawn (default: a secret one).")
+@option(
+    "--seed", type=Whole(0), metavar="N", help="Seed of the random numbers (default: a secret one)."
+)
 @truth
 @options.every(options.jobs, options.allow_unusual)
 @options.with_terminal
@@ -147,10 +151,10 @@ def make(
 ) -> int:
     """Draw tyres, compute them, seal the truth and write measurements to DIR.
 
-    They are the model's own, by its own laws of the effects: an inverse crime, which shows what the
-    case's measurements can tell at best.
+    The measurements are computed by the model itself. The trials show the best that a diagnosis can
+    reach (an inverse crime).
 
-    The same command goes on where it was stopped.
+    Run the same command again to resume.
 
     \b
     tyrecal blind make trials --case cases/p235_75r17.yaml --effects 60 --none 40 --outside 20
@@ -172,11 +176,11 @@ def make(
     if not effects + plain + outside:
         raise click.UsageError("there must be at least one trial")
     case, sealed = load_case(case_path, allow_unusual), _sealed(folder, truth)
-    resume("trials that were made are kept; the same command goes on from there")
+    resume("finished trials are kept; run the same command again to resume")
     store = Store((sealed / "record").resolve())
     maker = bundled_maker(case, store)
     for id in drawn:
-        arguments.refuse_unknown("--effect", id, maker.laws, "effect of this maker's")
+        arguments.refuse_unknown("--effect", id, maker.laws, "effect of these trials")
     if drawn:
         maker = replace(maker, laws={id: maker.laws[id] for id in drawn})
     counts = {"effect": effects, "none": plain, "outside": outside}
@@ -205,7 +209,7 @@ def make(
     "--emulated/--asked",
     default=True,
     show_default=True,
-    help="Ask the model at some designs once, or for each trial.",
+    help="Surrogate model for all trials, or runs of the model for each trial.",
 )
 @option(
     "--effect",
@@ -213,7 +217,7 @@ def make(
     multiple=True,
     metavar="EFFECT",
     shell_complete=complete.effects,
-    help="Consider these effects only; repeatable.",
+    help="Effect to consider; repeatable (default: all).",
 )
 @options.every(options.jobs, options.store)
 @options.with_terminal
@@ -225,9 +229,9 @@ def answer(
     store: Path | None,
     terminal: Terminal,
 ) -> int:
-    """Answer every trial of DIR with the diagnosis; needs nothing but DIR.
+    """Answer every trial of DIR with the diagnosis; reads only DIR.
 
-    Answers that are there stay; the same command goes on where it was stopped.
+    Finished answers are kept. Run the same command again to resume.
 
     \b
     tyrecal blind answer trials --jobs 2
@@ -246,7 +250,7 @@ def answer(
         arguments.refuse_unknown("--effect", id, catalogue(), "effect")
     refuse_open_truth(folder)
     protocol, case = read_protocol(folder), blind.case_of(folder)
-    resume("answers that were given are kept; the same command goes on from there")
+    resume("finished answers are kept; run the same command again to resume")
     evaluator = Evaluator(TyreDesign(case), store=Store((store or folder / "record").resolve()))
     model: ResponseModel = blind.tyre_model(case, evaluator, protocol, jobs, effects or None)
     if emulated:
@@ -266,7 +270,7 @@ def answer(
 def score(folder: Path, truth: Path | None, terminal: Terminal) -> int:
     """Open the truth and score the answers of DIR: score.json, score.md.
 
-    The seals are checked first: the truth must be what was sealed, and answers what was hashed.
+    The seals are checked first: neither the truth nor the answers may have changed.
 
     \b
     tyrecal blind score trials --json

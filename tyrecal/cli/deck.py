@@ -28,7 +28,7 @@ MAX_DECK_DOUBTS = 10  # doubts about a deck
 @option(
     "--check",
     is_flag=True,
-    help="Only say what is in CASE, a case or an ABAQUS deck of your own (FILE.inp).",
+    help="List the content of CASE, a case or your own ABAQUS deck (FILE.inp), and write nothing.",
 )
 @options.every(
     options.case_argument,
@@ -126,7 +126,7 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
             refused = content["abaqus"]["refuses"] and loaded.case.solver.name != "calculix"
             return EXIT_INPUT if refused else 0
         if loaded.deck is None:
-            raise click.UsageError(f"'{path}' names no deck of your own: 'tyrecal validate' judges")
+            raise click.UsageError(f"'{path}' names no deck; to check it, run 'tyrecal validate'")
         deck, numbers = loaded.deck, loaded.deck_numbers
         gauges = loaded.case.deck.thickened if loaded.case.deck else ()
     else:
@@ -188,7 +188,7 @@ def known_of_decks(loaded: LoadedCase, decks: OwnDecks, terminal: Terminal) -> d
     lacking = lacking_in_calculix(before)
     places = [f"{row.place.file}, line {row.place.line}" for _, row, *_ in decks.pressures]
     added = {solver: added_words(decks, solver) for solver in OUTPUT}
-    jobs = [f"{job}, which goes on from {old}" if old else job for job, old in decks.jobs]
+    jobs = [f"{job}, which continues {old}" if old else job for job, old in decks.jobs]
     terminal.say(f"jobs: {'; '.join(jobs)}; units {decks.units}")
     terminal.say(f"modes: {decks.modes or 'those in a range'}, named by the node set {decks.crown}")
     terminal.say(f"pressure: {'; '.join(places) or 'by its mark'}")

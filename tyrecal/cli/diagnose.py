@@ -18,21 +18,21 @@ file = Place(exists=True, folder=False)
     "--measured",
     type=file,
     metavar="FILE",
-    help="Measurements (CSV), labels or not (default: targets.file of the case).",
+    help="Measurements (CSV), with or without labels (default: targets.file of the case).",
 )
 @option(
     "--repeats",
     multiple=True,
     type=file,
     metavar="FILE",
-    help="The same measured again after dismounting; repeatable.",
+    help="Measurements (CSV) of the same tyre after dismounting it; repeatable.",
 )
 @option(
     "--toggled",
     multiple=True,
     type=(file, str),
     metavar="FILE CHANGE",
-    help="A run of the same tyre with one thing switched: EFFECT=VALUE (0: absent) or"
+    help="Measurements (CSV) of the same tyre with one thing changed: EFFECT=VALUE (0: absent) or"
     " EFFECT*FACTOR; repeatable.",
 )
 @option(
@@ -41,21 +41,21 @@ file = Place(exists=True, folder=False)
     multiple=True,
     metavar="EFFECT",
     shell_complete=complete.effects,
-    help="Consider these effects only; repeatable.",
+    help="Effect to consider; repeatable (default: all).",
 )
 @option(
     "--without",
     multiple=True,
     metavar="EFFECT",
     shell_complete=complete.effects,
-    help="Leave out an effect that is ruled out; repeatable.",
+    help="Effect to leave out, because it is ruled out; repeatable.",
 )
 @option(
     "--form-percent",
     type=NumberWithin(0, 20),
     metavar="PERCENT",
-    help="Error of the model's own form in every frequency (default: of its mesh, mode by mode, and"
-    " of material laws, where the section is not exact).",
+    help="Error of the model's own form in every frequency (default: of its mesh, mode by mode,"
+    " and of material laws, if the section is not exact).",
 )
 @option(
     "--split-percent",
@@ -63,7 +63,7 @@ file = Place(exists=True, folder=False)
     default=0.3,
     show_default=True,
     metavar="PERCENT",
-    help="Split of pairs that every such tyre has.",
+    help="Split of pairs that every such tyre has, per cent.",
 )
 @option(
     "--further",
@@ -71,7 +71,7 @@ file = Place(exists=True, folder=False)
     default=0.05,
     show_default=True,
     metavar="SHARE",
-    help="Prior of two effects over that of one, and of three over that of two.",
+    help="Prior odds of two effects against one, and of three against two.",
 )
 @option(
     "--add",
@@ -79,9 +79,10 @@ file = Place(exists=True, folder=False)
     multiple=True,
     metavar="EFFECT=VALUE",
     shell_complete=complete.effect_values,
-    help="Write a case with the effect in it, and do nothing else; repeatable.",
+    help="Effect to add to the case: a new case is written, and nothing else; repeatable. Example:"
+    " bead_filler=1.5.",
 )
-@option("--pictures/--no-pictures", default=True, help="Draw what was found.")
+@option("--pictures/--no-pictures", default=True, help="Draw the result.")
 @options.figure_format
 @options.study
 def command(
@@ -99,10 +100,10 @@ def command(
     pictures: bool,
     study: options.Study,
 ) -> int:
-    """Find where CASE and measurements part, and which effect explains it.
+    """Find where CASE and measurements differ, and which effect explains it.
 
     Writes diagnosis.json, diagnosis.md (one page in words) and pictures. The model is calibrated
-    to the measurements first; targets that stand in the case file play no part.
+    to the measurements first; targets in the case file are not used.
 
     \b
     tyrecal diagnose cases/p235_75r17.yaml --measured cases/p235_75r17_wheeler.csv
@@ -116,7 +117,7 @@ def command(
         from ..simulate.program import join_command
 
         for flag in options.given("--add", "--output", "--allow-unusual"):
-            raise click.UsageError(f"--add writes a case and nothing else: no {flag}")
+            raise click.UsageError(f"--add only writes a case, so it takes no {flag}")
         path = _with_effects(case, added, study.output, study.allow_unusual)
         terminal.result({"case": str(path)})
         what = "the effect" if len(added) == 1 else "the effects"

@@ -14,7 +14,7 @@ from .solvers import command_words, settings_file, settings_words
 from .terminal import Terminal
 
 HINTS = {
-    "abaqus": "'commands: {abaqus: ...}' of your settings says how it is started",
+    "abaqus": "set 'commands: {abaqus: ...}' in your settings to start it",
     "calculix": "on Debian 'apt-get install calculix-ccx'",
 }
 
@@ -26,21 +26,21 @@ HINTS = {
     show_default=True,
     metavar="NAME",
     shell_complete=complete.solvers,
-    help="Solver that the known tyre is given to.",
+    help="Solver that evaluates the known tyre.",
 )
 @option(
     "--store",
     type=Place(file=False),
     envvar="TYRECAL_STORE",
     metavar="DIR",
-    help="Record to look at (default: those of the results folders here; also from TYRECAL_STORE).",
+    help="Evaluation store to list (default: those of the results folders here, or TYRECAL_STORE).",
 )
 @options.with_terminal
 def command(solver: str, store: Path | None, terminal: Terminal) -> int:
-    """Check the installation: packages, solvers, machine, records, and a known tyre's frequencies.
+    """Check the installation: packages, solvers, machine, stores, and a known tyre's frequencies.
 
-    The tyre takes a second or two. Exit code 3 where a package is missing or too old, or where the
-    frequencies are not the recorded ones.
+    The tyre takes a second or two. Exit code 3 if a package is missing or too old, or if the
+    frequencies differ from the recorded ones.
 
     \b
     tyrecal doctor
@@ -77,7 +77,7 @@ def command(solver: str, store: Path | None, terminal: Terminal) -> int:
             terminal.error(f"{package['name']} must be {package['needed']}, it is {there}")
     if not check["ok"]:
         terminal.error(
-            f"the known tyre: {check['problem'] or 'its figures are not the recorded ones'}"
+            f"the known tyre: {check['problem'] or 'its numbers differ from the recorded ones'}"
         )
     return 0 if report["ok"] else EXIT_SOLVER
 
@@ -90,7 +90,7 @@ def _words(report: dict[str, Any]) -> list[str]:
     of = " of ".join(f"{each:g}" for each in known) or "unknown"
     lines = [f"tyrecal {report['tyrecal']} in {report['installed_in']}"]
     lines += [f"Python {here['python']}, {here['system']}"]
-    lines += [f"{here['cores']} cores, {of} GB of memory, {here['free_disc_GB']:g} GB of disc free"]
+    lines += [f"{here['cores']} cores, {of} GB of memory, {here['free_disc_GB']:g} GB of disk free"]
     lines += [
         "",
         "packages: " + ", ".join(f"{p['name']} {p['version']}" for p in report["packages"]),
@@ -104,11 +104,11 @@ def _words(report: dict[str, Any]) -> list[str]:
         hint = HINTS.get(solver["name"]) if solver["problem"] else None
         about = "; ".join(filter(None, (state, command_words(solver), hint)))
         lines.append(f"  {solver['name']}: {about}")
-    lines += ["", "records of evaluations:"]
+    lines += ["", "evaluation stores:"]
     for record in report["records"]:
-        lines.append(f"  {record['folder']}: {record['records']} records, {record['MB']:g} MB")
+        lines.append(f"  {record['folder']}: {record['records']} evaluations, {record['MB']:g} MB")
     if not report["records"]:
-        lines.append("  none here yet; each goes beside its results, or to --store DIR")
+        lines.append("  none here yet; each is next to its results, or in --store DIR")
     lines += ["", f"a known tyre by solver '{check['solver']}', {check['seconds']:g} s:"]
     for mode in check["modes"]:
         hertz, off = mode["frequency_Hz"], mode["deviation_percent"]

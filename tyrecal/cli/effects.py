@@ -20,9 +20,9 @@ from .parameters import Number, Place, option
     type=Place(),
     metavar="CASE",
     shell_complete=complete.cases,
-    help="Compute what the effect does to this tyre.",
+    help="Case: compute the change of this tyre's frequencies.",
 )
-@options.fitted("Compute it for the design that 'tyrecal fit' found for the case.")
+@options.fitted("fit.json of the case: compute the effect for the fitted design.")
 @option(
     "--value",
     type=Number(),
@@ -33,7 +33,7 @@ from .parameters import Number, Place, option
     "--pressures-kPa",
     "pressures",
     metavar="P1,P2,...",
-    help="Default: two thirds of the case's, the case's, four thirds.",
+    help="Pressures (default: two thirds of the case's, the case's, four thirds).",
 )
 @option("--pictures/--no-pictures", default=True, help="Draw each signature.")
 @options.assignments
@@ -52,8 +52,8 @@ def command(
 ) -> int:
     """List what a plain tyre model leaves out, or explain the effect NAME.
 
-    With --case, effects.json holds what it does to the modes of that tyre, before and after the
-    best re-fit of the case's variables, and effect_ID.png shows it.
+    With --case, effects.json holds the changes of that tyre's modes, before and after the best
+    re-fit of the case's variables. effect_ID.png shows them.
 
     \b
     tyrecal effects
@@ -95,7 +95,9 @@ def command(
     evaluator = study.evaluator(loaded)
     adapter = evaluator.solver
     if not evaluator.has_gradients:
-        raise click.UsageError(f"solver '{adapter.name}' gives no slopes, which a re-fit needs")
+        raise click.UsageError(
+            f"solver '{adapter.name}' gives no sensitivities, which a re-fit needs"
+        )
     kPa = _pressures(loaded, pressures, study.allow_unusual)
     if fitted:
         values = arguments.fitted_values(fitted, loaded, terminal)

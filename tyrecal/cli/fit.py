@@ -28,23 +28,23 @@ if TYPE_CHECKING:
     type=OneOf(["slsqp", "gauss-newton"]),
     default="slsqp",
     show_default=True,
-    help="Method of the loop: SciPy's SLSQP, or a damped Gauss-Newton method, which needs about a"
-    " third of the designs, for solvers whose runs take minutes.",
+    help="Method: SciPy's SLSQP, or damped Gauss-Newton, which needs about a third of the designs"
+    " (for slow solvers).",
 )
 @option(
     "--measured",
     type=Place(exists=True, folder=False),
     metavar="FILE",
-    help="Measurements (CSV) in place of the case's targets, each in its own state (pressure, load,"
-    " rim); with --pressure-kPa, those at that pressure alone. Frequencies without c and m get the"
-    " likeliest labels.",
+    help="Measurements (CSV) in place of the case's targets, in their states (pressure, load,"
+    " rim); with --pressure-kPa, only those at that pressure. Frequencies without c and m get"
+    " the likeliest labels.",
 )
 @option(
     "--fix",
     multiple=True,
     metavar="NAME",
     shell_complete=complete.variables,
-    help="Hold a variable at its start value.",
+    help="Variable to hold at its start value; repeatable.",
 )
 @option(
     "--starts",
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     default=1,
     metavar="N",
     show_default=True,
-    help="Starts: the case's own, the others drawn within the bounds.",
+    help="Number of starts: the case's, and others drawn within the bounds.",
 )
 @option(
     "--seed",
@@ -87,7 +87,7 @@ def command(
     Writes fit.json, fit.csv, fit_history.csv and pictures. If the model does not fit (chi2 per
     degree of freedom above 5), a warning gives the likeliest reason. --set NAME=VALUE on a variable
     changes where the fit starts. --pressure-kPa and --set rim.free=true choose the targets that
-    were measured so.
+    were measured in that state.
 
     \b
     tyrecal fit cases/p235_75r17.yaml
@@ -119,9 +119,9 @@ def command(
         terminal.warn(doubt)
     evaluator = calibration.evaluator
     if calibration.evaluates_one_by_one and starts == 1:
-        why = f"a fit from one start asks solver '{evaluator.solver.name}' for one design at a time"
+        why = "a fit from one start evaluates one design at a time"
         if scheduler:
-            raise click.UsageError(f"--scheduler changes nothing here: {why}; give --starts too")
+            raise click.UsageError(f"--scheduler has no effect here: {why}; give --starts too")
         options.say_idle(terminal, study.jobs, why)
     if method == "slsqp" and not evaluator.has_gradients:
         name = evaluator.solver.name
@@ -167,14 +167,14 @@ def command(
         raise
     finish()
     if earlier:
-        terminal.warn(f"the fit in '{run.folder}' had converged: it stays")
+        terminal.warn(f"the fit in '{run.folder}' had converged: it is kept")
     study.finish(run)
     words = ["tyrecal", "diagnose", str(case)]
     if measured or not loaded.measured:
         words += ["--measured", str(measured or "FILE")]
     next_ = join_command(words)
     if good and not fit.found.reason and not loaded.case.deck and read_targets(loaded):
-        terminal.say(f"next: {next_} says what the model lacks")
+        terminal.say(f"next: {next_} finds what the model lacks")
     return 0 if good else EXIT_FIT
 
 

@@ -18,11 +18,11 @@ DESIGNS = ("initial", "fitted")
 
 @click.command()
 @options.every(options.case_or_last, options.assignments, options.pressure, options.loads)
-@options.fitted("Press the design that 'tyrecal fit' found for this case, too.")
+@options.fitted("fit.json of the case: press the fitted design too.")
 @option(
     "--compare",
     metavar="initial,fitted",
-    help="Designs to press (default: initial, and fitted where --fitted is given).",
+    help="Designs to press (default: initial, and fitted with --fitted).",
 )
 @option("--pictures/--no-pictures", default=True, help="Draw the patches; write VTU.")
 @options.dry_run
@@ -43,8 +43,9 @@ def command(
 
     Writes footprint.json, .csv and .png: contact area, length, width, mean and peak pressure,
     deflection and vertical stiffness; the pressure in the patch as a picture, the deformed tyre as
-    VTU. --set NAME=VALUE on a variable changes the initial design, on any other number both.
-    Without CASE it is that of the last fit here, whose design is pressed too, or the only one here.
+    VTU. --set NAME=VALUE on a variable changes the initial design, on any other number both
+    designs. Without CASE, the case is that of the last fit here, or the only one here. A fitted
+    design is pressed too.
 
     \b
     tyrecal footprint

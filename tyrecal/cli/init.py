@@ -46,18 +46,19 @@ def _length(flag: str, text: str, unit: str = "mm") -> Any:
     type=Place(exists=True, folder=False),
     multiple=True,
     metavar="FILE.inp",
-    help="ABAQUS deck of your own axisymmetric section; or those of your tyre in three dimensions,"
-    " in the order in which they are run, each with --deck.",
+    help="ABAQUS deck of your axisymmetric section, or those of your tyre in three dimensions in"
+    " the order of their runs, each with --deck.",
 )
 @option(
     "--crown-set",
     metavar="NSET",
-    help="Of decks in three dimensions: the node set round the tyre (default: CROWN).",
+    help="Node set round the tyre, for decks in three dimensions (default: CROWN).",
 )
 @option(
     "--units",
     type=OneOf(["m", "mm"]),
-    help="Of the deck: m, kg, s, Pa, or mm, t, s, MPa (default: told by its densities).",
+    help="Units of the deck: m, kg, s, Pa, or mm, t, s, MPa (default: inferred from its"
+    " densities).",
 )
 @option(
     "--set",
@@ -109,10 +110,11 @@ def command(
     figure_format: str,
     terminal: Terminal,
 ) -> int:
-    """Write the case of a tyre: from its SIZE code, or with a section of its own.
+    """Write the case of a tyre: from its SIZE code, your section or your deck.
 
-    Writes CASE.yaml with comments, its section as CSV and a picture of it. What the size code
-    leaves open has usual values by type of tyre; the section is an estimate to start from.
+    Writes CASE.yaml with comments, its section as CSV and a picture of it. Values that the size
+    code does not give are usual ones for the type of tyre. The section is an estimate to start
+    from.
 
     \b
     tyrecal init 205/60R15
@@ -155,7 +157,7 @@ def command(
             numbers = _numbers_of_marks(decks, assigned)
             _from_decks(decks, numbers, words, pressure_kPa, output, force, terminal)
         elif crown_set:
-            raise click.UsageError("--crown-set is of decks in three dimensions")
+            raise click.UsageError("--crown-set is for decks in three dimensions")
         else:
             numbers = _numbers_of_marks(read, assigned)
             _from_deck(
@@ -327,7 +329,7 @@ def _beside(file: Path, output: Path | None, suffix: str, force: bool) -> tuple[
     """Where the case of a deck goes, and its picture. Raises InputError, UsageError."""
     target = output or file.with_suffix(".yaml")
     if target.resolve().parent != file.resolve().parent:
-        raise click.UsageError(f"--output '{target}': the case stands in its deck's folder")
+        raise click.UsageError(f"--output '{target}': the case must be in its deck's folder")
     picture = target.with_suffix(suffix) if suffix else None
     for path in [target, *([picture] if picture else [])]:
         if path.exists() and not force:

@@ -30,19 +30,19 @@ COMMANDS = {  # name: one line of help, so that the overview imports no command
     "deck": "Write the decks of a case, to read or to run elsewhere.",
     "modes": "Evaluate one design, unloaded or on a road: frequencies with their labels.",
     "fit": "Calibrate the case's variables to its target frequencies.",
-    "sample": "Draw the variables that the measurements leave open, and what they predict.",
+    "sample": "Sample the variables that fit the measurements, and predict frequencies.",
     "sweep-pressure": "Follow every mode over the inflation pressure.",
     "footprint": "Press the tyre on a road: contact area and pressure over load.",
-    "effects": "List and explain what a plain model leaves out, and what it does.",
+    "effects": "List and explain effects that a plain model leaves out.",
     "measured": "Turn modal tables, mode shapes and response functions into measurements.",
-    "diagnose": "Say where model and measurements part, and which effect explains it.",
-    "blind": "Try the diagnosis on data whose effect is withheld: make, answer, score.",
-    "report": "Tell the results of one or several folders on one HTML page.",
+    "diagnose": "Find where model and measurements differ, and which effect explains it.",
+    "blind": "Test the diagnosis on synthetic data with a hidden effect.",
+    "report": "Show the results of one or several folders on one HTML page.",
     "batch": "Study many cases at once, compare with a baseline, report to CI.",
     "solvers": "List the installed solvers and what they can do.",
-    "store": "Look at a record of evaluations, check it, prune it.",
+    "store": "List, check or prune an evaluation store.",
     "doctor": "Check the installation: packages, solvers, machine, a known tyre.",
-    "completion": "Print what makes a shell complete commands, cases and names.",
+    "completion": "Print a script for shell completion of commands, cases and names.",
 }
 NO_MEMORY = "there is not enough memory: use fewer --jobs, a coarser --mesh or another machine"
 EXIT_INPUT, EXIT_SOLVER, EXIT_FIT, EXIT_BATCH = 2, 3, 4, 5
@@ -128,7 +128,7 @@ class Commands(click.Group):
             ):
                 raise
         # the error is forgotten by now, and with it what was under way: its processes have ended
-        changed = "each file is whole or absent; the same command writes them again"
+        changed = "no file is half written; run the same command again to write them all"
         raise Interrupted(
             ctx.meta.get(RESUME, changed if CHANGED.is_set() else "nothing was changed")
         )

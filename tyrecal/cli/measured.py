@@ -23,7 +23,8 @@ files = click.argument(
 axle = option(
     "--axle",
     type=OneOf(["x", "y", "z"]),
-    help="Axis of the test's coordinates along the axle (default: told by the sensors' places).",
+    help="Axis of the test's coordinates along the axle (default: inferred from the sensors'"
+    " places).",
 )
 centre = option(
     "--centre",
@@ -35,37 +36,41 @@ centre = option(
 directions = option(
     "--directions",
     type=OneOf(["stated", "cartesian", "cylindrical"]),
-    help="Directions 1, 2, 3 of a sensor: as the file's coordinate systems say, along x, y, z, or"
-    " radial, tangential, axial (default: as the file says; if it does not, what the shapes fit).",
+    help="Directions 1, 2, 3 of a sensor: those of the file's coordinate systems, along x, y, z,"
+    " or radial, tangential, lateral (default: as stated in the file, else those that fit the"
+    " shapes).",
 )
 leave_out = option(
     "--leave-out",
     multiple=True,
     metavar="CHANNEL",
-    help="Leave a channel out: NODE, NODE:DIRECTION or COMPONENT, such as 12:3 or hub; repeatable.",
+    help="Channel to leave out: NODE, NODE:DIRECTION or COMPONENT, such as 12:3 or hub;"
+    " repeatable.",
 )
 highest = option(
     "--highest-harmonic",
     "highest",
     type=Whole(0, 20),
     metavar="C",
-    help="The most waves round the circumference that a mode of the band can have (default: 12).",
+    help="Largest number of waves round the circumference of a mode in the band (default: 12).",
 )
 
 band = option(
-    "--band", metavar="F1,F2", help="Look for modes between these frequencies, Hz (default: all)."
+    "--band",
+    metavar="F1,F2",
+    help="Frequency band to search for modes, Hz (default: all). Example: 25,135.",
 )
 assumed = option(
     "--sigma-percent",
     "assumed",
     type=NumberWithin(0, 20, min_open=True),
     metavar="P",
-    help="Standard deviation of one run that states none, in per cent.",
+    help="Standard deviation of one run without a stated one, per cent.",
 )
 response = option(
     "--response",
     type=OneOf(["receptance", "mobility", "accelerance"]),
-    help="What functions are that do not say it.",
+    help="Type of the response functions if the file does not state it.",
 )
 
 
@@ -89,14 +94,14 @@ def command() -> None:
     metavar="FILE",
     default="measured.csv",
     show_default=True,
-    help="The measurements CSV.",
+    help="Measurements file to write (CSV).",
 )
 @option(
     "--pressure-kPa",
     "pressure_kPa",
     type=Number(),
     metavar="P",
-    help="Inflation pressure of files that do not say it.",
+    help="Inflation pressure if the files do not state it.",
 )
 @options.every(band, assumed)
 @option(
@@ -106,7 +111,7 @@ def command() -> None:
     default=0.1,
     show_default=True,
     metavar="P",
-    help="No sigma below this, in per cent: what repeats do not show.",
+    help="Smallest sigma, per cent: scatter that repeats do not show.",
 )
 @options.every(axle, centre, directions, highest, leave_out, response)
 @option(
@@ -114,7 +119,7 @@ def command() -> None:
     is_flag=True,
     help="Leave out repeats that contradict each other, and list them, instead of stopping.",
 )
-@option("--pictures/--no-pictures", default=True, help="Draw functions and shapes beside the CSV.")
+@option("--pictures/--no-pictures", default=True, help="Draw functions and shapes next to the CSV.")
 @options.figure_format
 @options.with_terminal
 def import_files(
@@ -135,17 +140,16 @@ def import_files(
     figure_format: str,
     terminal: Terminal,
 ) -> int:
-    """Write the measurements in FILEs to one CSV, which 'tyrecal diagnose --measured' and
-    'tyrecal fit --measured' read.
+    """Write the measurements in FILEs to one CSV, for --measured of 'tyrecal fit' and 'diagnose'.
 
     FILE: a modal table (CSV), or a universal file with mode shapes (data sets 55, 2414) or
-    frequency-response functions (58) and their geometry (15, 2411, 18, 2420). What several
-    files, or lines of a table, measure of one thing are repeats: the value is their mean, sigma
-    that mean's standard deviation. Repeats that differ by more than the file's other repeats
-    stop the import. Frequencies that fall with pressure, labels that look exchanged and single
-    values far from a smooth curve are reported. If the sensors do not determine a label, the
-    frequency is written without one; 'tyrecal fit' and 'tyrecal measured label' label it by the
-    model. Files that share a reference and hold other channels are parts of one test.
+    frequency-response functions (58) and their geometry (15, 2411, 18, 2420). Several measurements
+    of one quantity are repeats: the value is their mean, sigma that mean's standard deviation.
+    Repeats that differ by more than the file's other repeats stop the import. Frequencies that fall
+    with pressure, labels that look exchanged and single values far from a smooth curve are
+    reported. If the sensors do not determine a label, the frequency is written without one;
+    'tyrecal fit' and 'tyrecal measured label' label it by the model. Files with a common reference
+    and different channels are parts of one test.
 
     \b
     tyrecal measured import modes.csv --pressure-kPa 240 --sigma-percent 0.3
@@ -193,9 +197,9 @@ def sensors(
     leave_out: tuple[str, ...],
     terminal: Terminal,
 ) -> int:
-    """Say which modes the sensors of a universal FILE can tell apart.
+    """List the modes that the sensors of a universal FILE can distinguish.
 
-    Needs no good data: run it on a first measurement, and move sensors before the others.
+    Rough data are enough: run it on a first measurement, and move sensors before the others.
 
     \b
     tyrecal measured sensors run1.uff --directions cylindrical
@@ -227,7 +231,9 @@ def sensors(
 @click.argument("file", type=Place(exists=True, folder=False))
 @options.every(
     options.assignments,
-    options.fitted("Expect the variables where this fit of CASE has them, as sure as it is."),
+    options.fitted(
+        "fit.json of CASE: expect the fitted values of the variables, within their standard errors."
+    ),
     axle,
     centre,
     directions,
@@ -251,16 +257,16 @@ def label_file(
     assumed: float | None,
     study: options.Study,
 ) -> int:
-    """Tell which mode each frequency in FILE is, by CASE, and how probable it is.
+    """Find the mode of each frequency in FILE by the model of CASE, and its probability.
 
-    FILE: a measurements CSV whose frequencies have no label (c and m), or a universal file as for
-    'tyrecal measured import', measured at the case's pressure. The shapes of a universal file are
-    compared with those of the case. The case's frequencies are expected to be right within 15 % (a
-    standard deviation). Where neither decides, a mode gets no label.
+    FILE: a measurements CSV without labels (c and m), or a universal file as for 'tyrecal measured
+    import', measured at the case's pressure. The shapes of a universal file are compared with those
+    of the case. The case's frequencies are expected to be right within 15 % (a standard deviation).
+    If neither decides, a mode gets no label.
 
-    Writes labels.json, labels.csv, and labelled.csv: the measurements with the likeliest labels,
-    those left out that are no mode of the tyre. The variables are expected about their start
-    values, within a factor of 1.6 (a standard deviation), or as --fitted says.
+    Writes labels.json, labels.csv, and labelled.csv: the measurements with the likeliest labels.
+    Frequencies that are no mode of the tyre are left out. The variables are expected near their
+    start values, within a factor of 1.6 (a standard deviation), or near those of --fitted.
 
     \b
     tyrecal measured label cases/p235_75r17.yaml unlabelled.csv
@@ -338,7 +344,7 @@ def _refuse_universal_options(file: Path) -> None:
     for parameter in context.command.params:
         source = context.get_parameter_source(parameter.name or "")
         if parameter.name in names and source is ParameterSource.COMMANDLINE:
-            raise click.UsageError(f"{parameter.opts[0]}: {file} is a table, no universal file")
+            raise click.UsageError(f"{parameter.opts[0]}: {file} is a table, not a universal file")
 
 
 def _print_labels(labels: LabelsResult, run: Run, study: options.Study) -> None:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     options.one_load,
     options.sweep_load,
     options.wheel,
-    options.fitted("With --sweep-load: the design that 'tyrecal fit' found for this case, too."),
+    options.fitted("fit.json of the case: with --sweep-load, evaluate the fitted design too."),
 )
 @option(
     "--pictures/--no-pictures",
@@ -51,11 +51,11 @@ def command(
 ) -> int:
     """Evaluate one design of CASE: frequencies with their labels, in modes.json.
 
-    With --load-N the tyre stands on a flat road, and vibrates about its deflected state while the
-    patch is held: doublets split in a member symmetric about the patch and an antisymmetric one.
-    sliding_Hz is the frequency where nothing holds the patch along the road, grip_mm the largest
-    motion of the crown that friction can bear while the patch sticks.
-    --sweep-load follows them over the load: load_sweep.json, .csv and .png.
+    With --load-N the tyre is on a flat road, and vibrates about its deflected state. The contact
+    patch sticks to the road. Pairs split into a member symmetric about the patch and an
+    antisymmetric one. sliding_Hz is the frequency if nothing holds the patch along the road.
+    grip_mm is the largest motion of the crown before the patch slides. --sweep-load follows the
+    modes over the load: load_sweep.json, .csv and .png.
 
     \b
     tyrecal modes cases/p235_75r17.yaml --set A_belt=3e-7 --pressure-kPa 200
@@ -79,7 +79,7 @@ def command(
         raise click.UsageError("--pictures goes with --sweep-load, or without a load")
     terminal = study.terminal
     if not fitted:
-        why = "one design is evaluated alone; --sweep-load with --fitted has two"
+        why = "only one design is evaluated; --sweep-load with --fitted evaluates two"
         options.say_idle(terminal, study.jobs, why)
     loaded, values = study.load(case, assignments, pressure_kPa)
     if wheel:

@@ -48,21 +48,22 @@ solver = option(
     "--solver",
     default="",
     metavar="NAME",
-    help="Solver (default: your settings', else the case's).",
+    help="Solver, such as bundled (default: from your settings, else the case).",
     shell_complete=complete.solvers,
 )
 solver_command = option(
     "--solver-command",
     callback=lambda ctx, param, value: _words(value),
     metavar="COMMAND",
-    help="Program that the solver starts (default: TYRECAL_SOLVER_COMMAND, your settings file's,"
-    " the solver's own; see tyrecal solvers).",
+    help="Program that the solver starts (default: from TYRECAL_SOLVER_COMMAND, your settings file"
+    " or the solver; see tyrecal solvers).",
 )
 output = option(
     "--output",
     type=Place(),
     metavar="DIR",
-    help="Folder for the results (default: NAME-of-case, here or in your settings' output).",
+    help="Folder for the results (default: named after the case, here or in the output of your"
+    " settings).",
 )
 mesh = option(
     "--mesh",
@@ -77,37 +78,37 @@ as_json = option(
     is_flag=True,
     help="Result as JSON on standard output, all else on standard error.",
 )
-quiet = option("--quiet", is_flag=True, help="Print nothing but errors.")
-verbose = option("--verbose", is_flag=True, help="Say more; keep run folders.")
+quiet = option("--quiet", is_flag=True, help="Print errors only.")
+verbose = option("--verbose", is_flag=True, help="Print more, and keep run folders.")
 jobs = option(
     "--jobs",
     type=Whole(1, 256),
     default=1,
     metavar="N",
     show_default=True,
-    help="Designs evaluated at a time.",
+    help="Number of designs evaluated at a time.",
 )
 store = option(
     "--store",
     type=Place(file=False),
     envvar="TYRECAL_STORE",
     metavar="DIR",
-    help="Record of evaluations, which answers what was asked before (default: the folder 'record'"
-    " of the results; also from TYRECAL_STORE).",
+    help="Evaluation store: finished evaluations are read from it (default: the folder 'record' of"
+    " the results, or TYRECAL_STORE).",
 )
-no_store = option("--no-store", is_flag=True, help="Neither ask nor keep a record.")
+no_store = option(
+    "--no-store", is_flag=True, help="No evaluation store: evaluate every design, and keep none."
+)
 allow_unusual = option(
-    "--allow-unusual",
-    is_flag=True,
-    help="Compute with numbers that no tyre has, too: those outside their usual ranges.",
+    "--allow-unusual", is_flag=True, help="Accept numbers outside their usual ranges."
 )
 assignments = option(
     "--set",
     "assignments",
     multiple=True,
     metavar="NAME=VALUE",
-    help="Set a variable or any number of the case, a switch (true, false), a word among those that"
-    " its key takes, or null; repeatable. Example: rim.holds=bead_surface.",
+    help="Value of a variable or of any key of the case: a number, true, false, null, or a word"
+    " that the key allows; repeatable. Example: rim.holds=bead_surface.",
     shell_complete=complete.assignments,
 )
 pressure = option(
@@ -115,35 +116,35 @@ pressure = option(
     "pressure_kPa",
     type=Number(),
     metavar="P",
-    help="Inflation pressure (default: the case's).",
+    help="Inflation pressure, kPa (default: the case's). Example: 200.",
 )
 loads = option(
     "--loads-N",
     "loads",
     metavar="F1,F2,...",
-    help="Vertical loads on the road, rising (footprint's default: road.loads_N of the case, and"
-    " the loads of its targets).",
+    help="Vertical loads on the road, N, rising (default of footprint: road.loads_N of the case,"
+    " and the loads of its targets).",
 )
 one_load = option(
     "--load-N",
     "load_N",
     type=Number(),
     metavar="F",
-    help="Modes of the tyre on a flat road under this vertical load, about its deflected state.",
+    help="Vertical load on a flat road, N: modes about the deflected state (default: no load).",
 )
 sweep_load = option(
     "--sweep-load",
     "sweep",
     metavar="F1,F2,...",
-    help="The same at several loads, rising; 0: the unloaded tyre.",
+    help="Several vertical loads, N, rising; 0: the unloaded tyre. Example: 0,2000,4000.",
 )
 
 
 wheel = option(
     "--wheel",
     type=OneOf(["held", "free-along-load"]),
-    help="Under a load: the wheel's centre is held while the tyre vibrates, or free along the load"
-    " with the rim's mass (default: road.wheel of the case).",
+    help="Wheel under a load: its centre is held, or free along the load with the rim's mass"
+    " (default: road.wheel of the case).",
 )
 
 
@@ -152,14 +153,14 @@ _from = option(
     "from_kPa",
     type=Number(),
     metavar="A",
-    help="Lowest pressure of a sweep (default: 5/12 of the case's, as 100 of 240 kPa).",
+    help="Lowest pressure of a sweep, kPa (default: 5/12 times the case's, 100 for 240 kPa).",
 )
 _to = option(
     "--to-kPa",
     "to_kPa",
     type=Number(),
     metavar="B",
-    help="Highest pressure of a sweep (default: 4/3 of the case's, as 320 of 240 kPa).",
+    help="Highest pressure of a sweep, kPa (default: 4/3 times the case's, 320 for 240 kPa).",
 )
 _steps = option(
     "--steps",
@@ -167,14 +168,15 @@ _steps = option(
     default=12,
     metavar="N",
     show_default=True,
-    help="Pressures of a sweep, both ends among them.",
+    help="Number of pressures of a sweep, both ends included.",
 )
 scheduler = option(
     "--scheduler",
     default="",
     metavar="ADDRESS|FILE",
-    help="Have the workers of a Dask scheduler do it: its address, or a settings file (.yaml) for"
-    " jobs of SLURM or PBS. Needs Dask: run pip install '.[cluster]' in a clone of tyrecal.",
+    help="Dask scheduler that distributes the evaluations: its address, or a settings file (.yaml)"
+    " for jobs of SLURM or PBS. Needs Dask: run pip install '.[cluster]' in a clone of"
+    " tyrecal.",
 )
 
 
@@ -192,14 +194,12 @@ def every(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
 dry_run = option(
     "--dry-run",
     is_flag=True,
-    help="Print the size of the problem of the tyre on the road, the number of runs, about how long"
-    " they take and their memory; run and write nothing.",
+    help="Print the problem size on the road, the number of runs, and their approximate time and"
+    " memory; run and write nothing.",
 )
 pressures = every(_from, _to, _steps)
 report = option(
-    "--report",
-    is_flag=True,
-    help="Write report.html, a page of all that the folder of results holds.",
+    "--report", is_flag=True, help="Write report.html, a page with all results in the folder."
 )
 figure_format = option(
     "--figure-format",
@@ -312,7 +312,7 @@ class Study:
         evaluator.folder, evaluator.keep = run.runs, self.terminal.verbose
         evaluator.store = run.open_store(self.store, self.no_store)
         run.counts = counts = evaluator.counts
-        words = "{0.runs} runs of the solver, {0.recorded} answers from the record"
+        words = "{0.runs} runs of the solver, {0.recorded} results from the evaluation store"
         context = click.get_current_context()
         context.call_on_close(lambda: self.terminal.detail(words.format(counts)))
         context.call_on_close(lambda: self._say_earlier(run))
@@ -416,7 +416,7 @@ def given(*without: str) -> list[str]:
 def say_idle(terminal: Terminal, jobs: int, why: str) -> None:
     """Note that --jobs has no effect here, which is no error: scripts may give it everywhere."""
     if jobs > 1 and not _by_settings("jobs"):
-        terminal.note(f"--jobs changes nothing here: {why}")
+        terminal.note(f"--jobs has no effect here: {why}")
 
 
 def _by_settings(option: str) -> bool:
@@ -437,4 +437,6 @@ def _words(command: str | None) -> tuple[str, ...]:
 def not_both(jobs: int, scheduler: str) -> None:
     """Raises click.UsageError where this machine and a scheduler's are both requested."""
     if scheduler and jobs > 1 and not _by_settings("jobs"):
-        raise click.UsageError("--jobs is for this machine; with --scheduler its workers count")
+        raise click.UsageError(
+            "--jobs applies to this machine only; with --scheduler, its number of workers applies"
+        )

@@ -96,7 +96,7 @@ def lock(folder: Path, command: str, started: str) -> Lock | None:
         if isinstance(error, PermissionError):
             raise NotWritten(error.errno, error.strerror, str(folder)) from None
         log.warning(
-            "folder '%s' cannot be locked (%s): give no second command there meanwhile",
+            "folder '%s' cannot be locked (%s): start no second command there until this one ends",
             folder,
             getattr(error, "strerror", None) or error,
         )
@@ -162,7 +162,7 @@ class Run:
 
     def open_store(self, folder: Path | None, none: bool) -> Store | None:
         """The evaluation store: in ``folder``, or next to the results, or ``none``."""
-        words = "with --no-store nothing is on record; the same command starts from the beginning"
+        words = "no evaluation is stored (--no-store); the same command starts from the beginning"
         if not none:
             from ..simulate.evaluate.store import Store
 
@@ -170,8 +170,8 @@ class Run:
                 refuse_link(self.folder / "record")
             self.store = Store((folder or self.folder / "record").resolve())
             words = (
-                f"evaluations that had finished are on record in '{self.store.folder}'; the same"
-                " command goes on from there"
+                f"finished evaluations are stored in '{self.store.folder}'; run the same command"
+                " again to resume"
             )
         resume(words)
         return self.store

@@ -17,17 +17,18 @@ from .terminal import Terminal
     "--output",
     type=Place(),
     metavar="FILE",
-    help="The page (default: report.html in DIR, of several in the present folder).",
+    help="HTML file to write (default: report.html in DIR; for several DIRs, in the current"
+    " folder).",
 )
 @option("--author", default="", metavar="NAME", help="Name under the title (default: none).")
 @options.with_terminal
 def command(folders: tuple[Path, ...], output: Path | None, author: str, terminal: Terminal) -> int:
-    """Tell the results in DIR (of fit, modes, sweep-pressure, footprint, diagnose: whatever is
-    found) on one HTML page.
+    """Show the results in DIR (of fit, modes, sweep-pressure, footprint, effects, sample, diagnose)
+    on one HTML page.
 
     The page is one file that needs no network: summary, tables, plots, and mode shapes that turn
-    and vibrate; it prints, and reads on a telephone. Fits and diagnoses of several folders stand
-    side by side. Every study writes it too, with --report.
+    and vibrate. It prints on A4 and works on a phone. Fits and diagnoses of several folders are
+    shown side by side. Every study also writes it with --report.
 
     \b
     tyrecal report p235_75r17

@@ -16,7 +16,7 @@ from .parameters import Number, Place, Whole, option
     "--measured",
     type=Place(exists=True, folder=False),
     metavar="FILE",
-    help="Measurements (CSV), at any pressures, on any rims, in place of the case's targets.",
+    help="Measurements (CSV) in place of the case's targets, at any pressures and on any rims.",
 )
 @option(
     "--draws",
@@ -24,8 +24,8 @@ from .parameters import Number, Place, Whole, option
     default=100_000,
     metavar="N",
     show_default=True,
-    help="Draws in all; more are drawn, up to 20 times as many, until 20 autocorrelation times are"
-    " reached.",
+    help="Number of draws; up to 20 times as many are made, until the chains are 20"
+    " autocorrelation times long.",
 )
 @option(
     "--seed",
@@ -41,8 +41,8 @@ from .parameters import Number, Place, Whole, option
     type=Number(),
     multiple=True,
     metavar="P",
-    help="Predict frequencies at this pressure, too; repeatable (default: a fifth below and above"
-    " the case's).",
+    help="Pressure at which frequencies are predicted, kPa; repeatable (default: a fifth below and"
+    " above the case's).",
 )
 @option("--pictures/--no-pictures", default=True, help="Draw the corner picture.")
 @options.figure_format
@@ -58,12 +58,12 @@ def command(
     pictures: bool,
     study: options.Study,
 ) -> int:
-    """Draw the variables of CASE that the measurements leave open, under their sigmas and the
-    case's uncertainties, and predict frequencies, with 90 % intervals.
+    """Sample the variables of CASE that fit the measurements, and predict frequencies with 90 %
+    intervals. Sigmas and the case's uncertainties are the assumptions.
 
-    Writes sample.json, sample.csv (frequencies), sample_draws.csv and a corner picture. The model
-    is an emulator of 60 to 100 evaluations as a rule; its error is reported. Needs the package
-    emcee: run pip install '.[sample]' in a clone of tyrecal.
+    Writes sample.json, sample.csv (frequencies), sample_draws.csv and a corner picture. An
+    emulator, usually of 60 to 100 evaluations, replaces the model; its error is reported. Needs the
+    package emcee: run pip install '.[sample]' in a clone of tyrecal.
 
     \b
     tyrecal sample cases/p235_75r17.yaml --measured cases/p235_75r17_wheeler.csv

@@ -16,13 +16,14 @@ from .terminal import Terminal
 @option(
     "--selftest",
     type=OneOf(["abaqus"]),
-    help="Write decks with expected frequencies, for somebody who has this program to run.",
+    help="Solver for which decks with expected frequencies are written, to be run where the"
+    " program is installed.",
 )
 @option("--output", type=Place(file=False), help="Folder of the selftest.")
 @options.with_terminal
 def command(selftest: str | None, output: Path | None, terminal: Terminal) -> int:
-    """List the installed solvers: version, what they can do, why one cannot be used, which program
-    each starts, and the settings file that says so.
+    """List the installed solvers: version, abilities, problems, program that each starts, and the
+    settings file.
 
     \b
     tyrecal solvers
@@ -34,7 +35,7 @@ def command(selftest: str | None, output: Path | None, terminal: Terminal) -> in
 
         paths = write_selftest(output or Path(f"{selftest}_selftest"))
         terminal.result([str(path) for path in paths])
-        terminal.say("\n".join(map(str, paths)) + f"\n'{paths[0]}' says what to run")
+        terminal.say("\n".join(map(str, paths)) + f"\nrun the commands in '{paths[0]}'")
         return 0
     from ..report.table import shown, solvers_table
     from ..simulate.evaluate.solver import installed

@@ -16,7 +16,7 @@ from .taken import default_case
 @click.command()
 @options.every(options.case_or_last, options.assignments)
 @options.pressures
-@options.fitted("Sweep the design that 'tyrecal fit' found for this case, too.")
+@options.fitted("fit.json of the case: sweep the fitted design too.")
 @option("--pictures/--no-pictures", default=True, help="Draw frequencies over pressure.")
 @options.figure_format
 @options.study
@@ -30,13 +30,13 @@ def command(
     pictures: bool,
     study: options.Study,
 ) -> int:
-    """Follow every mode of CASE over the inflation pressure, by default from 5/12 to 4/3 of the
-    case's own.
+    """Follow every mode of CASE over the inflation pressure, by default from 5/12 to 4/3 times the
+    case's.
 
-    Writes pressure_sweep.json, .csv and .png: frequencies, their slopes d ln f / d ln p, what they
-    say, and the standard errors of a fitted design's frequencies. --set NAME=VALUE on a variable
-    changes the initial design, on any other number both.
-    Without CASE it is that of the last fit here, whose design is swept too, or the only one here.
+    Writes pressure_sweep.json, .csv and .png: frequencies, their sensitivities d ln f / d ln p,
+    findings in words, and the standard errors of a fitted design's frequencies. --set NAME=VALUE on
+    a variable changes the initial design, on any other number both designs. Without CASE, the case
+    is that of the last fit here, or the only one here. A fitted design is swept too.
 
     \b
     tyrecal sweep-pressure

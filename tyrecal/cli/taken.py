@@ -36,12 +36,12 @@ def default_case(
         if not fitted:
             study.terminal.note(f"the fit in '{folder}' is left out: its case is not here")
     if fitted:
-        raise click.UsageError(f"give the CASE too: none is here that '{fitted}' is a fit of")
+        raise click.UsageError(f"give the CASE too: the case of '{fitted}' is not here")
     cases = sorted(_cases([Path()]))
     if len(cases) > 1:
         raise click.UsageError(f"give a CASE: there are several here, {_listed(cases)}")
     if not cases:
-        raise click.UsageError("give a CASE: there is neither one here nor a finished fit of one")
+        raise click.UsageError("give a CASE: this folder has neither a case nor a finished fit")
     study.terminal.note(f"{cases[0]}, the only case here")
     return cases[0], None, study
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
     """Check CASE and report every mistake: file, line, key, value, what would be right.
 
-    Numbers that no tyre has are mistakes, too: most often they stand in another unit.
+    Numbers that no tyre has are reported too: most often their unit is wrong.
 
     \b
     tyrecal validate cases/p235_75r17.yaml
@@ -57,7 +57,7 @@ def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
         terminal.warn(sentence)
     terminal.say(f"{case}: no mistakes")
     if loaded.assumed:
-        terminal.note(f"lines that it leaves out:\n{flow_lines(loaded.assumed)}")
+        terminal.note(f"lines that are left out:\n{flow_lines(loaded.assumed)}")
     if not (loaded.case.targets.weights or loaded.measured):
         terminal.note("it has no targets: 'tyrecal fit' needs some, or --measured FILE")
     if "road" in loaded.file_data and (hint := slack_cord_hint(loaded)):
