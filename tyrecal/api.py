@@ -265,7 +265,7 @@ def diagnose_case(
     case = _case(case)
     file = case.measured if measured is None else _file("measured", measured)
     if file is None:
-        raise ValueError("measured must be given: the case's targets stand in no file")
+        raise ValueError("measured must be given: the case's targets are not in a file")
     again = [repeats] if isinstance(repeats, str | PathLike) else repeats
     others = [_file("repeats", path) for path in _listed("repeats", again, "a file")]
     ids = None if effects is None else _names("effects", effects)

@@ -67,7 +67,7 @@ def test_what_is_found_is_said_and_what_is_hidden_too() -> None:
     louder = replace(RULES, noise=1.0, mass=1.0)
     hidden = words(powers(RULER, louder), RULER, louder, SCALE.spans)
     last = hidden.splitlines()[-1]
-    assert "within its whole range" in last and all(f"`{id}`" in last for id in SCALE.g)
+    assert "at any size in their range" in last and all(f"`{id}`" in last for id in SCALE.g)
 
 
 def test_pressures_lie_about_the_tyres_own_and_any_tyre_has_modes() -> None:

@@ -123,11 +123,11 @@ def test_the_same_seed_gives_another_seal_but_the_same_trials(tmp_path: Path) ->
 
 def test_answering_refuses_where_the_truth_lies_open(tmp_path: Path) -> None:
     folder, sealed = made(tmp_path, protocol(none=1))
-    with pytest.raises(InputError, match="must not lie in"):
+    with pytest.raises(InputError, match="must not be in"):
         make(folder / "x", folder / "x" / "truth", CASE, protocol(1), MAKER, ruler)
     (folder / "notes").mkdir()
     (folder / "notes" / TRUTH).write_bytes((sealed / TRUTH).read_bytes())
-    with pytest.raises(InputError, match="lies open among the trials"):
+    with pytest.raises(InputError, match="is open among the trials"):
         answer(folder, SCALE, SCALE.model_rows)
 
 

@@ -37,7 +37,7 @@ def test_steps_out_of_order_are_refused(
             ["make", out, "--case", case, "--effect", "luck"],
             "there is no such effect of these trials",
         ),
-        (["make", out, "--case", case, *COUNTS, "--truth", out + "/truth"], "must not lie in"),
+        (["make", out, "--case", case, *COUNTS, "--truth", out + "/truth"], "must not be in"),
         (["answer", out, "--effect", "luck"], "--effect luck: there is no such effect; known: "),
     ):
         assert refused(*command), command

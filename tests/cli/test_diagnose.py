@@ -64,7 +64,7 @@ def test_a_diagnosis_in_files_and_again_from_the_record(
     assert diagnosis == json.loads((out / "diagnosis.json").read_text())
     assert diagnosis["verdict"] == "named" and diagnosis["effect"] == "bead_filler"
     assert diagnosis["parameter"]["low"] < 2.0 < diagnosis["parameter"]["high"]
-    assert "cannot show a cause" in printed.err or diagnosis["rung"] == 4
+    assert "cannot prove a cause" in printed.err or diagnosis["rung"] == 4
     for name in PICTURES:
         assert (out / f"diagnosis_{name}.png").stat().st_size > 3000
     before = {name: (out / name).read_bytes() for name in FILES}
@@ -121,7 +121,7 @@ def test_what_was_measured_under_load_is_compared(
     assert road["effect_rms_percent"] < 0.3 * road["calibrated_rms_percent"]
     assert set(diagnosis["gap"]["by_load"]) == {"200", "500"}
     words = (out / "diagnosis.md").read_text()
-    assert "Under load nothing was fitted" in words
+    assert "Measurements under load were not fitted" in words
     off = road["rows"][1]["calibrated_percent"]
     stiffness = road["rows"][1]["measured"] / 1000
     assert f"| 240 | 200 | vertical stiffness {stiffness:.1f} N/mm ± 1.0 % | {off:+.1f} |" in words
@@ -147,7 +147,7 @@ def test_an_added_effect_makes_a_case(
         (["--measured", "M", "--toggled", "M", "magic=0"], "there is no effect 'magic'"),
         (["--measured", "M", "--solver", "calculix"], "no exact slopes"),
         (["--measured", "M", "--toggled", "M", "bead_filler=nan"], "is not a number"),
-        (["--measured", "M", "--toggled", "M", "bead_filler*1"], "switches nothing"),
+        (["--measured", "M", "--toggled", "M", "bead_filler*1"], "changes nothing"),
         (["--measured", "M", "--effect", "belt_width", "--without", "belt_width"], "no effect"),
         (["--add", "bead_filler=1", "--set", "C10=1.1e6"], "no --set"),
         (["--add", "bead_filler=1", "--measured", "M"], "no --measured"),

@@ -64,7 +64,7 @@ def test_a_fit_to_frequencies_without_labels(
     assert len(result["modes"]) == len(modes) - 1
     for name, truth in TRUTH.items():
         assert result["variables"][name]["value"] == pytest.approx(truth, rel=1e-3)
-    words = "Labels of frequencies that came without"
+    words = "Labels of frequencies without a label"
     assert words in shown and words in (tmp_path / "report.html").read_text()
 
     fit = str(tmp_path / "fit.json")

@@ -91,7 +91,7 @@ def test_the_report_tells_the_modified_tyre_from_the_fit(project: Path) -> None:
     assert run("report", str(project / "out"), "--quiet", "--author", "A. Engineer") == 0
     page = (project / "out/report.html").read_text()
     assert ", A. Engineer</p>" in page and f"--set {TURNED}=68" in page
-    assert f"{TURNED} = 68" in page and "not all of one tyre" in page
+    assert f"{TURNED} = 68" in page and "belong to different tyres" in page
 
 
 def test_several_measured_files_have_one_hash(tmp_path: Path) -> None:
@@ -188,7 +188,7 @@ def test_another_mesh_is_taken_and_said(
     ]
     assert run(*sweep) == 0
     level = load_case(case).case.mesh.level
-    words = f"the fit was made on the mesh 'another', this study takes '{level}'"
+    words = f"the fit was made on the mesh 'another', this study uses '{level}'"
     assert words in capsys.readouterr().err
 
 

@@ -94,7 +94,7 @@ def test_both_designs_against_the_reference(
         assert findings["disagreements"] == [] and findings["least_mac"] > 0.9
     output = capsys.readouterr().out
     assert "fitted: every mode rises from 100 to 320 kPa" in output
-    assert "fitted: labels stay with the shapes throughout" in output
+    assert "fitted: labels follow the shapes throughout" in output
     lines = (out / "pressure_sweep.csv").read_text().splitlines()
     assert len(lines) == 1 + 2 * 12 * 10
     assert lines[0] == "design,pressure_kPa,c,m,kind,multiplicity,frequency_Hz,d_ln_f_d_ln_p"

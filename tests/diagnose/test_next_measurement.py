@@ -63,9 +63,9 @@ def test_the_menu_of_measurements() -> None:
         OtherStates(further, 240.0),
     )
     assert {c.what: c.hours for c in candidates} == {
-        "measure by itself: rubber density": 1.0,
+        "measure separately: rubber density": 1.0,
         "cut the tyre and measure its section": 8.0,
-        "dismount the tyre, mount it again and measure all once more": 3.0,
+        "dismount the tyre, mount it again and repeat all measurements": 3.0,
         "take e0 out": 4.0,
         "measure again without e1": 4.0,
         "measure again without e2": 4.0,
@@ -147,13 +147,13 @@ def test_the_gains_of_what_is_switched_and_checked_by_their_formula() -> None:
     now = apart(p.sigma, toy.J, off)
     left = CHECKED**2 / (1 + CHECKED**2)  # of its variance
     S = p.sigma - (1 - left) * np.outer(toy.constants[:, 1], toy.constants[:, 1])
-    checked = candidates["measure by itself: gauge"]
+    checked = candidates["measure separately: gauge"]
     assert checked.gain == pytest.approx(bound(apart(S, toy.J, off) - now), rel=1e-6)
     both = problem(toy, changes=(Toggle("e0", 0.0),))
     twice = np.vstack([toy.J, toy.J])
     for words, moved, hours in (
         ("measure again without e0", -toy.g["e1"], 4.0),
-        ("dismount the tyre, mount it again and measure all once more", off, 3.0),
+        ("dismount the tyre, mount it again and repeat all measurements", off, 3.0),
     ):
         squared = apart(both.sigma, twice, np.concatenate([off, moved])) - now
         assert candidates[words].gain == pytest.approx(bound(squared) / hours, rel=1e-6)
@@ -207,14 +207,14 @@ def test_tools_of_a_laboratory_are_offered_for_what_they_show() -> None:
     assert {c.what: c.hours for c in candidates} == {
         "measure the rim between its flanges": 0.2,
         "clamp the rim rigidly in place of the spindle and measure again": 3.0,
-        "dismount the tyre, mount it again and measure all once more": 3.0,
+        "dismount the tyre, mount it again and repeat all measurements": 3.0,
     }
     assert "rim" in candidates[0].what
     air = rank(p, np.zeros(3), {"none": 0.5, "cavity_air": 0.3, "belt_angle": 0.2}, sizes, ())
     assert {c.what: c.hours for c in air} == {
         "cut the tyre and measure its section": 8.0,
         "inflate with helium and measure again": 1.0,
-        "dismount the tyre, mount it again and measure all once more": 3.0,
+        "dismount the tyre, mount it again and repeat all measurements": 3.0,
     }
     assert all(c.gain > 0 for c in (*candidates, *air))
 

@@ -68,7 +68,7 @@ def test_splits_count_from_what_the_case_has() -> None:
 
 def test_a_splice_in_the_case_is_refused_in_words_that_help() -> None:
     case = with_values(CASE, {"effects.stiffness_splice": 0.5})
-    with pytest.raises(DeckRefused, match=r"\(a splice\) .* take it out of the case"):
+    with pytest.raises(DeckRefused, match=r"with a splice.*: take the splice out of the case"):
         TyreModel(case, Evaluator(TyreDesign(case)), ROWS, [], {})
 
 
@@ -103,8 +103,8 @@ def test_a_part_of_an_effect_in_the_case_leaves_the_rest_to_be_found(tmp_path: P
     ]
     assert abs(seen[1]) == pytest.approx(seen[0], rel=0.8)  # nearest to the case, up or down
     words = page(some, "tyre", "a.csv")
-    assert "counting the 0.9 that the case has already" in words
-    assert "that the case has already" not in page(none, "tyre", "a.csv")
+    assert "including the 0.9 of the case" in words
+    assert "including the" not in page(none, "tyre", "a.csv")
 
 
 @pytest.mark.slow
@@ -178,8 +178,11 @@ def test_an_effect_that_a_variable_sets_is_no_candidate(tmp_path: Path) -> None:
     assert not result.diagnosis.problem.expansion.failed
     assert "bead_filler" not in result.diagnosis.probabilities
     words = page(result, "tyre", "a.csv")
-    assert "Not considered, being calibrated by a variable of the case: `bead_filler`." in words
-    assert "Considered, as asked: only `tread_density`, `pressure_offset` of the catalogue" in words
+    assert "Not considered, because a variable of the case calibrates them: `bead_filler`." in words
+    assert (
+        "Considered, by your choice: only `tread_density`, `pressure_offset` of the catalogue"
+        in words
+    )
     variable = variable.model_copy(
         update={"sets": ["pressure_kPa"], "start": 200.0, "lower": 100.0, "upper": 400.0}
     )
@@ -193,7 +196,7 @@ def test_what_is_wrong_with_a_file_names_that_file(tmp_path: Path) -> None:
     one = written(tmp_path / "a.csv", asked(Query(X)).eta)
     copy = tmp_path / "copy.csv"
     copy.write_text(one.read_text())
-    with pytest.raises(InputError, match=r"copy.csv: holds the same values as .*a.csv"):
+    with pytest.raises(InputError, match=r"copy.csv: has the same values as .*a.csv"):
         study(CASE, Evaluator(TyreDesign(CASE)), one, [copy], effects=EFFECTS)
     high = written(tmp_path / "high.csv", asked(Query(X)).eta[:-1] + 1.0, ROWS[:-1])
     with pytest.raises(InputError, match=r"high.csv: .* right unit"):

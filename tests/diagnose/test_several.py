@@ -250,11 +250,11 @@ def test_the_page_says_what_it_hangs_on_and_what_is_perhaps_there_first() -> Non
     first = words.partition("## Is there a gap?")[0]
     assert "## Named: e0, and perhaps e1" in first
     assert "Perhaps there too: e1 (`e1`), probability 0.25." in first
-    assert "The verdict hangs on the standard deviation of gauge twice as large" in first
-    assert "times the standard deviation that the case states" in first
+    assert "The verdict depends on the standard deviation of gauge twice as large" in first
+    assert "times the standard deviation of the case" in first
     assert f"between {d.robustness.low:.2f} and {d.robustness.high:.2f}" in first
-    assert "The case states `e0` as uncertain: within 2 standard deviations" in words
+    assert "The case states `e0` as uncertain. Within 2 standard deviations" in words
     plain = exact(toy, {"e0": 0.01})
     text = page(DiagnosedCase(plain, (), False, {}, (), toy), "tyre", "a.csv")  # type: ignore[arg-type]
     assert text.startswith("# The model of tyre against its measurements")
-    assert "the probability of no effect lies between" in text
+    assert "the probability of no effect is between" in text

@@ -102,7 +102,7 @@ def test_coordinates_of_a_linear_and_a_logarithmic_variable() -> None:
 def test_a_solver_that_gives_no_slopes_of_the_mass_is_refused_where_that_was_measured() -> None:
     silent = SimpleNamespace(mass_kg=10.0, gradients={"C10": np.ones(1)}, mass_gradients={})
     own = TyreModel(CASE, Evaluator(TyreDesign(CASE)), [(None, 0.0)], [], {})
-    with pytest.raises(DeckRefused, match="gives no slopes of the mass, which was measured"):
+    with pytest.raises(DeckRefused, match="gives no sensitivities of the mass, which was measured"):
         own._mass_slopes(own.start, [SimpleNamespace(evaluation=silent)])  # type: ignore[list-item]
 
 

@@ -213,7 +213,7 @@ def test_a_fit_takes_the_likeliest_labels_and_tells_them(tmp_path: Path) -> None
     for name, truth in TRUTH.items():
         assert fit.result["variables"][name]["value"] == pytest.approx(truth, rel=1e-3)
     assert fit.result["labels"]["settled"] and len(fit.result["labels"]["frequencies"]) == 16
-    assert "Labels of frequencies that came without" in [t.title for t in fit.found.tables()]
+    assert "Labels of frequencies without a label" in [t.title for t in fit.found.tables()]
 
 
 def test_what_a_fit_leaves_open_is_the_prior_of_the_next() -> None:

@@ -213,7 +213,7 @@ def test_frequencies_of_a_design_and_what_is_refused() -> None:
     low, high = (START["C10"] * np.exp(each) for each in (-0.2, 0.2))
     for edge in (low, high):
         emulated.frequencies({"C10": edge})
-    with pytest.raises(ValueError, match=r"C10 is 1\.3e\+06: the emulator knows 818731 to"):
+    with pytest.raises(ValueError, match=r"C10 is 1\.3e\+06: the emulator covers 818731 to"):
         emulated.frequencies({"C10": 1.3e6})
     with pytest.raises(ValueError, match="C10 is 700000: the"):
         emulated.frequencies({"C10": 7e5})

@@ -122,11 +122,11 @@ def test_findings_in_words() -> None:
     assert "0.30, [2,0] symmetric at 900 N (the load changes shapes" in content["words"][2]
     assert content["least_overlap"] == 0.3
     back = findings("initial", [*loads, loaded(2000.0, 90.0, 91.0)]).words
-    assert "but for [2,0] (900 N) from the load named on" in back[0]
+    assert "except [2,0] (900 N) from the given load on" in back[0]
     assert back[1] == "every frequency rises with the load, but for [2,0] antisymmetric"
     lost = Loaded(900.0, 0.01, (), (Member(Label(3, 0), "symmetric"),), ())
     assert (
-        "at 900 N no shape could be told to be [3,0] symmetric"
+        "at 900 N no shape could be identified as [3,0] symmetric"
         in findings("initial", [lost]).words[-1]
     )
 
@@ -161,7 +161,7 @@ def test_the_most_that_friction_does_is_said() -> None:
     ]
     words = findings("initial", [Loaded(900.0, 0.01, tuple(modes))]).words
     assert any("[2,0] antisymmetric at 900 N has 81.00 Hz, 11.00 Hz less" in x for x in words)
-    assert any("moves less than 0.25 mm" in x for x in words)
+    assert any("up to a crown amplitude of 0.25 mm" in x for x in words)
     entry = loaded_modes_result({}, LoadedTyre(240.0, 12.0, (Loaded(900.0, 0.01, tuple(modes)),)))
     first = entry.content()["modes"][0]
     assert (first["sliding_Hz"], first["grip_mm"]) == (84.0, 0.25)

@@ -81,10 +81,10 @@ def test_findings_name_every_exception():
     assert "the rise grows with c, but for [3,0]" in text
     assert "but for [0,0] lateral (convex), [0,0] torsional (neither)" in text
     assert content["disagreements"] == [] and content["least_mac"] == pytest.approx(1.0)
-    assert "labels stay with the shapes" in text and "three pressures" not in text
+    assert "labels follow the shapes" in text and "three pressures" not in text
     two = findings(states(curves)[:2], list(curves)).model_dump()
     assert {m["curvature"] for m in two["modes"]} == {"unknown"}
-    assert "how the curves bend takes three pressures to tell" in two["words"]
+    assert "the curvature needs three pressures" in two["words"]
 
 
 def test_modes_that_cross_keep_their_labels_and_modes_that_mix_are_told():
@@ -106,7 +106,7 @@ def test_modes_that_cross_keep_their_labels_and_modes_that_mix_are_told():
         (str(TORSIONAL), str(AXIAL)),
     }
     assert mixing["least_mac"] == pytest.approx(np.cos(np.pi / 6) ** 2)
-    assert "goes on under the label" in mixing["words"][-1]
+    assert "continues under the label" in mixing["words"][-1]
 
 
 def test_families() -> None:
@@ -172,7 +172,7 @@ FIT = {
         ({"variables": [1, 2]}, "not the fit.json"),
         ({"pressure_kPa": None}, "not the fit.json"),
         ({"provenance": None}, "not the fit.json"),
-        ({"provenance": {}}, "does not say which tyre it is of"),
+        ({"provenance": {}}, "does not state its tyre"),
         ({"provenance": {"tyre_sha256": "0"}}, "of another tyre: .* has been edited since"),
     ],
 )

@@ -61,7 +61,7 @@ def test_a_tyre_on_two_rims_is_sampled_and_predicted_on_both() -> None:
     assert titles == ["Hz at 240 kPa", "Hz at 240 kPa, rim free"]
     spindle = {"s": case.case.variables["C10"].model_copy(update={"sets": [SPRINGS[0]]})}
     held = replace(case, case=case.case.model_copy(update={"variables": spindle}))
-    with pytest.raises(InputError, match=r"^s sets what holds the rim"):
+    with pytest.raises(InputError, match=r"^s sets the rim's compliance"):
         check(held, evaluator, readings)
 
 
@@ -172,7 +172,7 @@ def test_doubts_of_a_result() -> None:
     short = replace(sample.drawn.chains, draws=sample.drawn.chains.draws[:9])
     poor = replace(sample.drawn, at_edge=at_edge, stopped="why", chains=short)
     words = " ".join(result(replace(sample, drawn=poor, widened=0.13), 0).doubts())
-    assert "0.3 % of the draws lie at the edge of the box, which could not grow: why" in words
+    assert "0.3 % of the draws are at the edge of the box, which could not grow: why" in words
     assert "steps are fewer than 20 autocorrelation times" in words and "--draws" in words
     assert "makes a standard deviation of what was measured 13 % larger" in words
     assert len(result(replace(sample, noise_Hz=1.2), 0).sentences()) == 3

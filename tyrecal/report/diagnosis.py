@@ -19,12 +19,17 @@ from ..units import display_unit, in_engineers_units
 from .table import map_resolution
 
 RUNGS = {
-    1: "consistent with the data it was fitted to; no more than that",
-    2: "predictive: it lowers the error on data that were held out by more than chance does",
+    1: "consistent with the data to which it was fitted",
+    2: "predictive: it lowers the error on held-out data by more than chance",
     3: "corroborated: its size agrees with an independent measurement",
-    4: "shown to be the cause: switching it moved the frequencies as predicted",
+    4: "shown to be the cause: changing it moved the frequencies as predicted",
 }
 SHOWN = 6
+GROUP_WORDS = {  # names in diagnosis.json that the page has in the words of the guides
+    "lateral": "out-of-plane",
+    "lateral less in-plane": "out-of-plane less in-plane",
+    "slope over the harmonic, c = 4 over c = 1": "growth over the harmonic, c = 4 over c = 1",
+}
 
 
 def page(study: DiagnosedCase, case: str, measured: str) -> str:
@@ -40,19 +45,19 @@ def page(study: DiagnosedCase, case: str, measured: str) -> str:
         *_labels(study),
         "## Is there a gap?",
         *_gap(d),
-        "## Where does it lie?",
+        "## Where is it?",
         *_where(d),
         *_fields(study),
         *_under_load(study),
         "## Which effect?",
         *_which(study),
-        "## How far does it shrink?",
+        "## How far does the error shrink?",
         *_shrinkage(d),
         "## The calibrated variables",
         *_variables(study),
         "## What to measure next",
         *_next(d),
-        "## What this rests on",
+        "## Assumptions",
         *_assumptions(study),
     ]
     return "\n\n".join(parts) + "\n"
@@ -71,7 +76,7 @@ def _counted(d: Diagnosis) -> str:
 
 def _title(study: DiagnosedCase, key: str) -> str:
     spans = study.diagnosis.problem.spans
-    words = {NONE: "no effect at all", OUTSIDE: "something outside the catalogue"}
+    words = {NONE: "no effect at all", OUTSIDE: "not explained by the catalogue"}
     if key in words:
         return words[key]
     return " and ".join(spans[id].title or id for id in key.split("+"))
@@ -86,7 +91,7 @@ def _headline(study: DiagnosedCase) -> str:
         return "Undecided"
     if v.kind == NO_GAP:
         return no_gap_words(study.diagnosis.probabilities[NONE]).capitalize()
-    return "Outside the catalogue"
+    return "Not explained by the catalogue"
 
 
 def _answer(study: DiagnosedCase) -> Iterator[str]:
@@ -94,12 +99,12 @@ def _answer(study: DiagnosedCase) -> Iterator[str]:
     v, p = d.verdict, d.probabilities
     if study.asked_for is not None:
         names = ", ".join(f"`{id}`" for id in study.asked_for) or "nothing"
-        yield f"Considered, as asked: only {names} of the catalogue, no other effect."
+        yield f"Considered, by your choice: only {names} of the catalogue, no other effect."
     if d.exchanged:
         a, b = d.exchanged
         yield (
-            f"The file has the labels {a.display} and {b.display} the wrong way round, as far as"
-            " the model can tell (look at the shapes again); what follows has them exchanged."
+            f"By the model, the labels {a.display} and {b.display} are exchanged in the file;"
+            " check the shapes. The results below use the exchanged labels."
         )
     if v.kind == NAMED and v.key:
         ids = v.key.split("+")
@@ -116,8 +121,8 @@ def _answer(study: DiagnosedCase) -> Iterator[str]:
             )
     elif v.kind == NO_GAP:
         yield (
-            "What calibration leaves is no more than repeatability, the model's own form and the"
-            " constants that nobody calibrates explain."
+            "Repeatability, model error and uncalibrated constants explain what the calibration"
+            " leaves."
         )
     else:
         yield v.words[0].upper() + v.words[1:] + "."
@@ -125,16 +130,16 @@ def _answer(study: DiagnosedCase) -> Iterator[str]:
         names = ", ".join(f"`{key}`" for key in v.candidates[:SHOWN])
         more = len(v.candidates) - SHOWN
         tail = f" and {more} more" if more > 0 else ""
-        yield f"90 % of the probability lies with {names}{tail}."
+        yield f"These explanations have 90 % of the probability: {names}{tail}."
     yield _robust(d)
     yield from _constants(d)
     if v.kind == NAMED:
-        yield f"Rung {d.rung} of 4 on the ladder of proof: {RUNGS[d.rung]}."
+        yield f"Rung {d.rung} of 4 (strength of the proof): {RUNGS[d.rung]}."
         if d.rung < 4 and v.key:
             ways = [d.problem.spans[id].toggle or f"measure again without {id}" for id in ids]
             yield (
-                "Frequencies of one state of the tyre cannot show a cause. What would: "
-                f"{'; and '.join(ways)}; hand the second run over with `--toggled`."
+                "Frequencies of one state of the tyre cannot prove a cause. To prove it:"
+                f" {'; and '.join(ways)}. Give the second run with `--toggled`."
             )
 
 
@@ -148,33 +153,36 @@ def _labels(study: DiagnosedCase) -> Iterator[str]:
     yield "\n".join(f"| {' | '.join(str(cell or '') for cell in row)} |" for row in rows)
     words = "; ".join(study.labels.sentences())
     yield (
-        f"{words[0].upper()}{words[1:]}. These labels are told together with the effects, whose"
-        " probabilities are averages over all labelings of at least 1 % about the plain tyre; all"
-        " else is told with the likeliest."
+        f"{words[0].upper()}{words[1:]}. Labels and effects are found together. The probabilities"
+        " of the effects are averages over all labelings of at least 1 % for the plain tyre. All"
+        " other results use the likeliest labeling."
     )
 
 
 def _robust(d: Diagnosis) -> str:
     """Dependence of the verdict on the assumptions."""
     robust, key = d.robustness, d.verdict.key or d.verdict.best
-    words = {NO_GAP: "no effect", OUTSIDE: "something outside"}
+    words = {NO_GAP: "no effect", OUTSIDE: "an unlisted cause"}
     of = words.get(d.verdict.kind, f"`{key}`")
-    between = f"the probability of {of} lies between {robust.low:.2f} and {robust.high:.2f}"
+    between = f"the probability of {of} is between {robust.low:.2f} and {robust.high:.2f}"
     if robust.robust and d.exchanged:
         return (
-            "The verdict rests on labels that were exchanged here: correct the file before it is"
-            f" used; {between}."
+            "The verdict depends on labels that are exchanged here: correct the file before you"
+            f" use the verdict; {between}."
         )
     if robust.robust:
-        labels = " and under every likely labeling," if len(d.readings) > 1 else ""
+        labels = " under every likely labeling," if len(d.readings) > 1 else ""
         return (
-            f"Robust: with every prior and every constant's standard deviation half and twice as"
-            f" large, without the model's own error of form, and with each mode left out,{labels}"
-            f" the verdict is the same; {between}."
+            "Robust: the verdict does not change with every prior and every constant's standard"
+            f" deviation half and twice as large, without model error,{labels} and with each mode"
+            f" left out; {between}."
         )
     more = len(robust.hangs_on) - SHOWN
     tail = f"; and {more} more" if more > 0 else ""
-    return f"The verdict hangs on {'; '.join(robust.hangs_on[:SHOWN])}{tail}. In all, {between}."
+    return (
+        f"The verdict depends on {'; '.join(robust.hangs_on[:SHOWN])}{tail}. In all cases,"
+        f" {between}."
+    )
 
 
 def _constants(d: Diagnosis) -> Iterator[str]:
@@ -183,8 +191,7 @@ def _constants(d: Diagnosis) -> Iterator[str]:
     if moved:
         names = ", ".join(f"{e.name.replace('_', ' ')} {e.shift_in_sd:+.1f}" for e in moved[:SHOWN])
         yield (
-            "No causes, but where the data move what is uncertain anyway by one of its standard"
-            f" deviations or more: {names}."
+            f"Constants that the data move by one standard deviation or more (not causes): {names}."
         )
 
 
@@ -193,12 +200,12 @@ def _sized(d: Diagnosis, key: str, id: str) -> str:
     q, base = d.parameter(key, id), d.problem.spans[id].base
     whose = f"the size of `{id}`" if "+" in key else "its size"
     has = in_engineers_units(base, q["unit"])
-    held = f", counting the {has} that the case has already" if base else ""
+    held = f", including the {has} of the case" if base else ""
     unit, factor = display_unit(q["unit"])
     value, low, high = (f"{factor * q[key]:.3g}" for key in ("value", "low", "high"))
     sd = d.problem.spans[id].stated
     times = abs(q["value"] - base) / sd if sd else 0.0
-    beyond = f", {times:.1f} times the standard deviation that the case states" if sd else ""
+    beyond = f", {times:.1f} times the standard deviation of the case" if sd else ""
     return f"{whose} is {f'{value} {unit}'.rstrip()}, 90 % between {low} and {high}{beyond}{held}"
 
 
@@ -206,10 +213,10 @@ def _gap(d: Diagnosis) -> Iterator[str]:
     g = d.gap
     seen = "larger than" if g.p_value < 0.05 else "within"
     yield (
-        f"After calibration {g.rms_percent:.2f} % (rms) is left. That is {seen} what repeatability,"
-        f" the model's own form and the constants that nobody calibrates explain: chi2"
-        f" {g.chi2:.1f} for {g.freedom} degrees of freedom, p = {g.p_value:.2g}. (A figure for"
-        " orientation: it is weak against a single effect, so the verdict does not rest on it.)"
+        f"The misfit after calibration is {g.rms_percent:.2f} % (rms). That is {seen} what"
+        f" repeatability, model error and uncalibrated constants explain: chi2 {g.chi2:.1f} for"
+        f" {g.freedom} degrees of freedom, p = {g.p_value:.2g}. The verdict does not depend on"
+        " this figure, because it is weak against a single effect."
     )
     yield OTHER_RESIDUALS
     hidden = sorted((id for id, a in g.absorbed.items() if a > 0.9), key=lambda id: -g.absorbed[id])
@@ -218,21 +225,31 @@ def _gap(d: Diagnosis) -> Iterator[str]:
         worst = max(moved, key=lambda name: abs(moved[name]))
         if abs(moved[worst]) > 1:
             yield (
-                f"Calibration hides {100 * g.absorbed[id]:.0f} % of `{id}`: at full size and"
-                f" ignored it would move {worst} by {moved[worst]:+.0f} %."
+                f"Calibration hides {100 * g.absorbed[id]:.0f} % of `{id}`: ignored at full size,"
+                f" it would move {worst} by {moved[worst]:+.0f} %."
             )
 
 
 def _where(d: Diagnosis) -> Iterator[str]:
     groups = [g for g in d.gap.groups if g.corrected < 0.05]
     if groups:
-        words = ", ".join(f"{g.kind} {g.name} (rms {g.rms_percent:.2f} %)" for g in groups)
-        yield f"Beyond chance, corrected for looking at {len(d.gap.groups)} groups: {words}."
+        words = ", ".join(
+            f"{g.kind} {GROUP_WORDS.get(g.name, g.name)} (rms {g.rms_percent:.2f} %)"
+            for g in groups
+        )
+        yield (
+            f"Groups with a misfit beyond chance (corrected for {len(d.gap.groups)} groups):"
+            f" {words}."
+        )
     else:
-        yield f"No group of modes stands out among {len(d.gap.groups)} (corrected for that many)."
+        yield (
+            f"None of {len(d.gap.groups)} groups of modes has a misfit beyond chance (corrected"
+            " for their number)."
+        )
     strange = [c for c in d.gap.contrasts if c.p_value < 0.05 / max(1, len(d.gap.contrasts))]
     for c in strange:
-        yield f"{c.name[0].upper() + c.name[1:]}: {c.percent:+.2f} % ± {c.sigma_percent:.2f} %."
+        name = GROUP_WORDS.get(c.name, c.name)
+        yield f"{name[0].upper() + name[1:]}: {c.percent:+.2f} % ± {c.sigma_percent:.2f} %."
     if d.parts:
         best = d.parts[0]
         heavier = abs(best.mass_percent / best.mass_sigma) > abs(
@@ -246,12 +263,15 @@ def _where(d: Diagnosis) -> Iterator[str]:
         same = f" (looks the same as {', '.join(best.same_as)})" if best.same_as else ""
         if best.evidence > 1:
             yield (
-                f"In the section a change of one part that would serve best: {best.region}{same},"
-                f" {change}, ln evidence {best.evidence:+.1f}."
+                f"Best change of a single part of the section: {best.region}{same}, {change}, ln"
+                f" evidence {best.evidence:+.1f}."
             )
         else:
-            yield "No single part of the section, softer, stiffer, heavier or lighter, explains it."
-        finer = " A finer map would be invented." if d.effective_rank else ""
+            yield (
+                "No change in stiffness or mass of a single part of the section explains the"
+                " misfit."
+            )
+        finer = " The data do not support a finer map." if d.effective_rank else ""
         yield map_resolution(d.effective_rank) + finer
 
 
@@ -262,8 +282,8 @@ def _fields(study: DiagnosedCase) -> Iterator[str]:
         for v in study.section
     ]
     if rows:
-        yield "The section as these data have it, where nothing else is wrong:"
-        head = "| | where | likeliest | standard deviation | before the data |"
+        yield "The section by these data, if nothing else is wrong:"
+        head = "| | where | likeliest | standard deviation | prior |"
         yield "\n".join([head, "|---|---|---|---|---|", *rows])
 
 
@@ -276,7 +296,7 @@ def _under_load(study: DiagnosedCase) -> Iterator[str]:
     off = [f"{heads[key]} {each:.1f} %" for key, each in rms.items() if each is not None]
     if off:
         yield (
-            "Under load nothing was fitted. How far what was measured there is from the tyre, rms:"
+            "Measurements under load were not fitted. Their deviation from the model, rms:"
             f" {', '.join(off)}."
         )
         rows = [f"| kPa | N | measured | {' | '.join(f'{head}, %' for head in heads.values())} |"]
@@ -316,8 +336,8 @@ def _which(study: DiagnosedCase) -> Iterator[str]:
         rows.append(f"| {_title(study, key)} | {p:.2f} | {size} | {seen} |")
     yield "\n".join(rows)
     yield (
-        "lambda: squared distance from the plain model, in standard deviations, that calibration"
-        " cannot absorb; below 10 an effect can hide, from 25 on it is named as a rule."
+        "Detectability lambda: squared change by an effect that calibration cannot absorb, in"
+        " standard deviations. Below 10 an effect can hide; from 25 on it is usually named."
     )
     for group in d.separability.groups():
         if not set(group) & {id for key in d.verdict.candidates for id in key.split("+")}:
@@ -331,8 +351,8 @@ def _which(study: DiagnosedCase) -> Iterator[str]:
     ]
     if held:
         yield (
-            f"The case has {', '.join(held)} already: sizes count that in, the smallest that would"
-            " be seen is a change from it."
+            f"The case already contains {', '.join(held)}. Sizes include it; the smallest"
+            " detectable sizes below are changes from it."
         )
     likeliest = set((d.verdict.key or d.verdict.best or "").split("+"))
     unseen = [id for id, e in d.separability.smallest.items() if e is None]
@@ -343,15 +363,15 @@ def _which(study: DiagnosedCase) -> Iterator[str]:
         if e is not None
     ]
     if sizes:
-        yield f"The smallest that would be seen (lambda = 10): {', '.join(sizes)}."
+        yield f"Smallest detectable sizes (lambda = 10): {', '.join(sizes)}."
     if blind:
         names = ", ".join(f"`{id}`" for id in blind)
-        yield f"Not to be seen with these data at any size in its range: {names}."
+        yield f"Not detectable with these data at any size in their range: {names}."
     for id in unseen:
         if id in likeliest:
             yield (
-                f"`{id}` is the likeliest effect, but these data cannot show it (lambda below 10 at"
-                " every size in its range): its probability is mostly that of the assumptions."
+                f"`{id}` is the likeliest effect, but these data cannot detect it (lambda is below"
+                " 10 at every size in its range). Its probability is mostly prior probability."
             )
 
 
@@ -364,26 +384,28 @@ def _ranged(q: Mapping[str, Any]) -> str:
 def _shrinkage(d: Diagnosis) -> Iterator[str]:
     s = d.shrinkage
     if s is None:
-        yield "There are too few data to hold any out."
+        yield "There are too few data for held-out data."
         return
     if d.leading is None:
         yield (
-            f"Held out by rule: {s.held_out}. The error there is {s.before_percent:.2f} %, of which"
-            f" repeatability alone leaves {s.floor_percent:.2f} %. There is no gap for an effect to"
-            f" close; `{s.effect}`, the likeliest, would make it {s.after_percent:.2f} %."
+            f"Held-out data (by rule): {s.held_out}. Their error is {s.before_percent:.2f} %;"
+            f" repeatability alone would leave {s.floor_percent:.2f} %. There is no gap for an"
+            f" effect to close. With the likeliest one, `{s.effect}`, the error would be"
+            f" {s.after_percent:.2f} %."
         )
         return
     yield (
-        f"Held out by rule: {s.held_out}. Without an effect the error there is"
-        f" {s.before_percent:.2f} %, with `{s.effect}` {s.after_percent:.2f} %: it shrinks by"
-        f" {100 * s.fraction:.0f} % at its likeliest size ({100 * s.low:.0f} to {100 * s.high:.0f}"
-        " % over 90 % of the sizes and designs that the other data leave open). On tyres"
-        f" without any effect chance shrinks it by up to {100 * s.placebo_95:.0f} % (95 %"
-        f" quantile); repeatability alone leaves {s.floor_percent:.2f} %."
+        f"Held-out data (by rule): {s.held_out}. Their error is {s.before_percent:.2f} % without"
+        f" an effect and {s.after_percent:.2f} % with `{s.effect}`. It shrinks by"
+        f" {100 * s.fraction:.0f} % at the likeliest size ({100 * s.low:.0f} to {100 * s.high:.0f}"
+        " % for 90 % of the sizes and designs that fit the other data). On tyres without any"
+        f" effect, chance shrinks it by up to {100 * s.placebo_95:.0f} % (95 % quantile)."
+        f" Repeatability alone would leave {s.floor_percent:.2f} %."
     )
     yield (
-        "These fits leave to the uncalibrated constants what is theirs. Calibrated as usual, by"
-        f" least squares, the error there is {s.least_squares_before_percent:.2f} % without the"
+        "In these fits the uncalibrated constants may vary within their uncertainty. After an"
+        " ordinary least-squares fit the error of the held-out data is"
+        f" {s.least_squares_before_percent:.2f} % without the"
         f" effect and {s.least_squares_after_percent:.2f} % with it."
     )
 
@@ -400,8 +422,8 @@ def _variables(study: DiagnosedCase) -> Iterator[str]:
     ]
     yield "\n".join(rows)
     yield (
-        "Values, and one standard error of each by all that is uncertain; `tyrecal fit` weighs by"
-        " the scatter of its targets only."
+        "Values with one standard error from all uncertainties; `tyrecal fit` weights by the"
+        " scatter of its targets only."
     )
 
 
@@ -414,7 +436,7 @@ def _calibrated(variable: Mapping[str, Any]) -> str:
 def _next(d: Diagnosis) -> Iterator[str]:
     worth = [c for c in d.choices if c.gain > 0][:4]
     if not worth:
-        yield "Nothing on the menu would tell the explanations further apart."
+        yield "None of the possible measurements would separate the explanations further."
         return
     yield "\n".join(
         f"{i}. {c.what} (about {c.hours:g} h; gain {c.gain:.2g} per hour)"
@@ -424,15 +446,15 @@ def _next(d: Diagnosis) -> Iterator[str]:
 
 def _assumptions(study: DiagnosedCase) -> Iterator[str]:
     d = study.diagnosis
-    kind = "assumed, as the case states none" if study.assumed_sources else "stated by the case"
+    kind = "assumed, not in the case" if study.assumed_sources else "stated by the case"
     words = ", ".join(source.words for source in study.sources if source.words) or "none"
-    yield f"Constants that nobody calibrates, one standard deviation each ({kind}): {words}."
+    yield f"Uncalibrated constants, one standard deviation each ({kind}): {words}."
     a = d.problem.assumed
     form = "as recorded for every mode" if a.form is None else f"{100 * a.form:g} % in every mode"
     if a.form is None and (material := d.problem.expansion.material_laws):
         form += (
-            f", and by material laws {100 * material:g} % in all modes"
-            " alike, as much in each family and as much in every mode by itself"
+            f"; material laws {100 * material:g} % in all modes alike, as much in each family and"
+            " in every single mode"
         )
     form += "; smooth over the pressure"
     spans = d.problem.spans
@@ -440,20 +462,20 @@ def _assumptions(study: DiagnosedCase) -> Iterator[str]:
     law = f"{100 * laws[0]:g} to {100 * laws[-1]:g}" if a.law is None and laws else "0"
     second = ", ".join(f"`{id}`" for id, span in spans.items() if span.second) or "none"
     yield (
-        f"The model's own form: {form}; an effect's law may be off by {law} % of its shift, effect"
-        f" by effect; integrated over what else there is to it: {second}; every tyre splits its"
-        f" pairs by {100 * a.split:g} %."
+        f"Model error: {form}. Error of an effect's law: {law} % of its shift, effect by effect."
+        f" Effects with uncertain details, averaged over: {second}. Split of the pairs of every"
+        f" tyre: {100 * a.split:g} %."
     )
     yield (
-        f"Before the data: no effect {PRIOR_NONE:g}, something outside the catalogue"
-        f" {PRIOR_OUTSIDE:g}; of the rest two effects have {a.further:g} of the probability of one,"
-        " three that of two."
+        f"Prior probabilities: no effect {PRIOR_NONE:g}, not explained by the catalogue"
+        f" {PRIOR_OUTSIDE:g}. Two effects have {a.further:g} times the probability of one, and"
+        f" three {a.further:g} times that of two."
     )
     stated = [f"`{id}`" for id, span in d.problem.spans.items() if span.stated]
     if stated:
         yield (
-            f"The case states {', '.join(stated)} as uncertain: within {COVERAGE:g} standard"
-            " deviations they are constants like the others, beyond they are effects."
+            f"The case states {', '.join(stated)} as uncertain. Within {COVERAGE:g} standard"
+            " deviations they are uncalibrated constants, beyond that they are effects."
         )
     for id, why in d.problem.expansion.failed.items():
         yield f"`{id}` could not be evaluated: {why}."
@@ -462,6 +484,6 @@ def _assumptions(study: DiagnosedCase) -> Iterator[str]:
         yield f"Not considered, {why}: {', '.join(ids)}."
     if study.calibrated:
         names = ", ".join(f"`{id}`" for id in study.calibrated)
-        yield f"Not considered, being calibrated by a variable of the case: {names}."
+        yield f"Not considered, because a variable of the case calibrates them: {names}."
     for left in d.problem.observations.left_out:
         yield f"Left out: {left}."

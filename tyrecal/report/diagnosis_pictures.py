@@ -27,7 +27,7 @@ MIN_SHOWN_PROBABILITY = 0.005  # of one that is shown
 PROBABILITY_TITLES = {
     "named": "What explains the gap",
     "undecided": "Undecided: how likely each explanation is",
-    "outside": "Outside the catalogue: how likely each explanation is",
+    "outside": "Not explained by the catalogue: how likely each explanation is",
 }
 MAX_LETTERS = 24  # letters of a bar's name in a line
 
@@ -120,7 +120,7 @@ def draw_probabilities(d: Diagnosis) -> Figure:
     p = [d.probabilities[h.key] for h in order]
     axes.barh(place, p, color=colours, height=0.7)
     prior = [before(d.hypotheses)[h.key] for h in order]
-    axes.plot(prior, place, "|", color="black", ms=13, mew=1.5, label="before the data")
+    axes.plot(prior, place, "|", color="black", ms=13, mew=1.5, label="prior")
     for y, value, least in zip(place, p, prior, strict=True):
         axes.text(max(value, least) + 0.01, y, f"{value:.2f}", va="center", fontsize=8)
     axes.axvline(0.7, color=GREY, lw=0.8, ls=":", label="named from here on, alone or summed")
@@ -185,7 +185,7 @@ def _place(label: Label | None) -> float:
 def _short(d: Diagnosis, key: str | None) -> str:
     spans = d.problem.spans
     if key in (NONE, OUTSIDE) or key is None:
-        return {NONE: "No effect", OUTSIDE: "Outside the catalogue"}.get(key or "", "")
+        return {NONE: "No effect", OUTSIDE: "Not explained by the catalogue"}.get(key or "", "")
     return " + ".join((spans[id].title or id) for id in key.split("+"))
 
 

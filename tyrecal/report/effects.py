@@ -38,7 +38,7 @@ def effect_text(entry: CatalogueEntry) -> str:
         "in the deck": ", ".join(entry.changes),
         "modes": entry.signature,
         "proof": entry.toggle,
-        "hard to tell from": ", ".join(entry.aliases) or "no other",
+        "similar effects": ", ".join(entry.aliases) or "none",
         "solvers": ", ".join(entry.solvers) or "none",
     }
     paragraphs = [f"{entry.title} ({entry.id})", *entry.about]

@@ -80,7 +80,7 @@ def draw_patches(patches: Sequence[PatchData], highest_kPa: float) -> Figure:
         format="%.0f",
         label="contact pressure, kPa",
     )
-    headline(figure, f"{patches[0].design}: contact pressure at each load; dots: nodes that touch")
+    headline(figure, f"{patches[0].design}: contact pressure at each load; dots: nodes in contact")
     return figure
 
 

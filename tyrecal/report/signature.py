@@ -24,8 +24,8 @@ def draw_signature(signature: Signature) -> Figure:
     digits = 1 if np.nanmax(abs(signature.before)) >= 1 else 2
     for k, axes in enumerate(panels):
         for side, rows, colour, words in (
-            (-1, signature.before, COLOURS[0], "as it comes"),
-            (1, signature.after, COLOURS[1], "left after the variables are fitted again"),
+            (-1, signature.before, COLOURS[0], "before the re-fit"),
+            (1, signature.after, COLOURS[1], "after the re-fit of the variables"),
         ):
             bars = axes.bar(places + side * BAR / 2, rows[k], BAR, color=colour, label=words)
             look = {"fontsize": 7, "color": "0.3"}

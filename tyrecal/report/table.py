@@ -121,7 +121,7 @@ def fit_doubts(result: Mapping[str, Any]) -> list[str]:
     for name, variable in result["variables"].items():
         if variable["at_bound"]:
             seen = variable["standard_error"] is not None
-            why = "the data want it beyond" if seen else "the data do not see it"
+            why = "the misfit would be lower beyond it" if seen else "the data do not determine it"
             doubts.append(f"{name} ended at a bound: {why}")
         elif variable["standard_error"] is None:
             doubts.append(f"the data do not determine {name}: fix it, or add targets")
@@ -161,8 +161,8 @@ def map_resolution(combinations: int) -> str:
     """Resolution of the map on the section: its effective rank in words."""
     if not combinations:
         return (
-            "A change of 20 % in stiffness or 10 % in mass of any parts would stay within the"
-            " scatter of these data: the map is a hint at most, of a larger change of one part."
+            "A change of 20 % in stiffness or 10 % in mass of any parts would be within the"
+            " scatter of these data. The map is at most a hint of a larger change of one part."
         )
     return (
         f"The data see {combinations} independent combination{'s' if combinations > 1 else ''} of"

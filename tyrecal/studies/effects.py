@@ -178,8 +178,8 @@ class Effects(Result):
             for each in self.rows
         ]
         caption = (
-            "rms change of all modes, as it comes and after the best linear re-fit of the"
-            " variables; how far that moves them"
+            "rms change of all modes, before and after the best linear re-fit of the variables,"
+            " and the change of the variables"
         )
         names = [Column(name) for name in self.rows[0].refitted]
         words = [Column("effect", ""), size, Column("unit", ""), mass]
@@ -203,9 +203,9 @@ class Effects(Result):
                 cells.append(change.cell(mode and mode.after_percent))
             rows.append([each.title, size, *cells, share.cell(each.absorbed)])
         caption = (
-            f"Change of frequency, %, at {middle:g} kPa: as the effect comes, and what is left once"
-            " the variables are fitted again. Absorbed: the share of it, over all pressures, that"
-            " calibration hides."
+            f"Change of frequency, %, at {middle:g} kPa: before and after a re-fit of the"
+            " variables. Absorbed: share of the change, over all pressures, that calibration"
+            " hides."
         )
         return [Table([Column("effect", ""), Column("", ""), *heads, share], rows, "", caption)]
 

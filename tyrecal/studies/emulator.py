@@ -108,7 +108,7 @@ class Emulator:
             if not abs(t) <= 1 + 1e-9:
                 low, high = map(v.value, edges)
                 raise ValueError(
-                    f"{v.name} is {values.get(v.name, v.start):g}: the emulator knows"
+                    f"{v.name} is {values.get(v.name, v.start):g}: the emulator covers"
                     f" {low:g} to {high:g}"
                 )
         hertz = np.exp(self.ln_f(x[None])[0])
@@ -239,8 +239,8 @@ def needs_slopes(evaluator: Evaluator) -> None:
     """Raises InputError where the solver gives no exact slopes."""
     if not evaluator.has_gradients:
         raise InputError(
-            f"solver '{evaluator.solver.name}' gives no exact slopes of this case, which an"
-            " emulator is made of: 'tyrecal solvers' shows which one does (gradients)"
+            f"solver '{evaluator.solver.name}' gives no exact sensitivities of this case, which an"
+            " emulator needs: 'tyrecal solvers' shows which one does (gradients)"
         )
 
 

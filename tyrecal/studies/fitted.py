@@ -34,14 +34,14 @@ def read_fitted(path: Path, case: LoadedCase) -> tuple[dict[str, float], list[st
         raise InputError(f"'{path}' is not the fit.json that 'tyrecal fit' writes") from None
     names = set(start_values(case))
     for name in [*sorted(names - set(fitted_values)), *sorted(set(fitted_values) - names)]:
-        where = "is missing from" if name in names else "of this case is not known, but stands in"
+        where = "is missing from" if name in names else "of this case is not known, but is in"
         raise InputError(
             f"variable '{name}' {where} '{path}'; give a fit of this case, which has"
             f" {', '.join(sorted(names))}"
         )
     if tyre is None:
         raise InputError(
-            f"'{path}' does not say which tyre it is of, as an older tyrecal wrote it; run"
+            f"'{path}' does not state its tyre, because an older tyrecal wrote it; run"
             f" 'tyrecal fit {case.path}' again"
         )
     if tyre != tyre_sha256(case):
@@ -56,7 +56,7 @@ def read_fitted(path: Path, case: LoadedCase) -> tuple[dict[str, float], list[st
     try:
         with_values(case, design)
     except ValueError as error:
-        raise InputError(f"'{path}' holds a design that this case cannot have: {error}") from None
+        raise InputError(f"'{path}' has a design that this case cannot have: {error}") from None
     return values, _made_otherwise(of, case)
 
 
@@ -75,7 +75,8 @@ def _difference(theirs: Mapping[str, Any], case: LoadedCase) -> str:
         ]
         differences.append(", ".join(sets))
     return "; ".join(differences) or (
-        f"'{case.path}', or a file that it names, has been edited since; run 'tyrecal fit' again"
+        f"'{case.path}', or a file that it names, has been edited since the fit; run 'tyrecal fit'"
+        " again"
     )
 
 
@@ -83,7 +84,7 @@ def _made_otherwise(of: Mapping[str, Any], case: LoadedCase) -> list[str]:
     mesh = case.case.mesh.level
     if of.get("mesh") == mesh:
         return []
-    return [f"the fit was made on the mesh '{of.get('mesh')}', this study takes '{mesh}'"]
+    return [f"the fit was made on the mesh '{of.get('mesh')}', this study uses '{mesh}'"]
 
 
 def is_good(fit: Mapping[str, Any]) -> bool:

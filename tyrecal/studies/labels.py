@@ -86,7 +86,7 @@ class Labels(ResultPart):
             ]
             for each in self.frequencies
         ]
-        return Table(heads, rows, title="Labels of frequencies that came without")
+        return Table(heads, rows, title="Labels of frequencies without a label")
 
     def csv_rows(self) -> list[CsvRow]:
         """A row a frequency, with each rival in words."""
@@ -114,10 +114,7 @@ class Labels(ResultPart):
             where = ", ".join(f"{each.frequency_Hz:g} Hz" for each in self.doubtful)
             doubts.append(f"labels less than {SURE_LABEL:.0%} probable: {where}")
         if not self.settled:
-            doubts.append(
-                "several labelings each lead to a design at which another is likelier: give labels"
-                " that you know"
-            )
+            doubts.append("no labeling is consistent with its own fit: give labels that you know")
         return doubts
 
 

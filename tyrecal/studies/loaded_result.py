@@ -226,7 +226,7 @@ def findings(design: str, loads: Sequence[Loaded]) -> LoadFindings:
         words.append(
             f"least overlap of a loaded shape with the unloaded one of its name:"
             f" {least.overlap:.2f}, {least.member} at {_load_of(loads, least):g} N (the load"
-            " changes shapes; modes are followed load by load); the modes at the load before"
+            " changes shapes; modes are followed from load to load); the modes at the load before"
             f" make up {min(m.spanned for m in loaded):.2f} of each shape or more"
         )
     return LoadFindings(
@@ -275,7 +275,7 @@ def _splitting(splits: Sequence[Mapping[str, Any]]) -> list[str]:
     )
     claim = "every doublet's split grows with the load"
     if odd:
-        claim += f", but for {', '.join(odd)} from the load named on"
+        claim += f", except {', '.join(odd)} from the given load on"
     return [f"{claim}; antisymmetric less symmetric at the last, Hz: {last}"]
 
 
@@ -292,7 +292,7 @@ def _rising(tables: Mapping[float, Mapping[Any, float]]) -> list[str]:
     if len(tables) < 2:
         return []
     claim = "every frequency rises with the load"
-    return [claim + (f", but for {', '.join(falling)}" if falling else "")]
+    return [claim + (f", except {', '.join(falling)}" if falling else "")]
 
 
 def _held_by_friction(loads: Sequence[Loaded]) -> list[str]:
@@ -307,10 +307,10 @@ def _held_by_friction(loads: Sequence[Loaded]) -> list[str]:
         return []
     shift, load, most = max(rises, key=lambda each: each[0])
     return [
-        f"the patch is taken to stick; with nothing along the road {most.member} at {load:g} N has"
-        f" {most.sliding_Hz:.2f} Hz, {shift:.2f} Hz less, and friction holds it only while the"
-        f" crown moves less than {most.grip_mm:.2g} mm: beyond, or on a slippery road, the"
-        " truth lies between"
+        f"the patch is assumed to stick; without friction {most.member} at {load:g} N has"
+        f" {most.sliding_Hz:.2f} Hz, {shift:.2f} Hz less; the patch sticks up to a crown amplitude"
+        f" of {most.grip_mm:.2g} mm: above it, or on a low-friction road, the frequency is between"
+        " the two values"
     ]
 
 
@@ -327,8 +327,8 @@ def _doubts(loads: Sequence[Loaded]) -> list[str]:
             )
         if each.unnamed:
             words.append(
-                f"at {each.load_N:g} N no shape could be told to be"
-                f" {', '.join(map(str, each.unnamed))}: take loads in between (--sweep-load)"
+                f"at {each.load_N:g} N no shape could be identified as"
+                f" {', '.join(map(str, each.unnamed))}: add loads in between (--sweep-load)"
             )
         if each.disputed:
             words.append(

@@ -104,7 +104,7 @@ class PressingPlan:
 
     def __str__(self) -> str:
         if not self.states:
-            return "no target is of a tyre on the road: nothing is pressed"
+            return "no target is on the road: nothing is pressed"
         loads = sorted({each.loads for each in self.states})
         about = "about " * self.is_estimate
         size = (

@@ -196,7 +196,7 @@ def _words(findings: Mapping[str, Any], labels: Sequence[Label]) -> list[str]:
             words.append(f"{grows}: {first}, {last}")
     bent = {name: mode["curvature"] for name, mode in modes if mode["curvature"] in BENT}
     if any(mode["curvature"] == "unknown" for _, mode in modes):
-        words.append("how the curves bend takes three pressures to tell")
+        words.append("the curvature needs three pressures")
     if bent:
         odd = [
             f"{name} ({bent.get(name, 'neither')})"
@@ -206,13 +206,13 @@ def _words(findings: Mapping[str, Any], labels: Sequence[Label]) -> list[str]:
         words.append(_all_but("every curve is concave, steeper at low pressure", odd))
     if not findings["disagreements"]:
         words.append(
-            "labels stay with the shapes throughout; least MAC between neighbouring pressures"
+            "labels follow the shapes throughout; least MAC between neighbouring pressures"
             f" {findings['least_mac']:.3f}"
         )
     for odd_step in findings["disagreements"]:
         words.append(
             f"from {odd_step['from_kPa']:g} to {odd_step['to_kPa']:g} kPa the shape of"
-            f" {names.get(odd_step['label'], odd_step['label'])} goes on under the label"
+            f" {names.get(odd_step['label'], odd_step['label'])} continues under the label"
             f" {names.get(odd_step['followed_to'], odd_step['followed_to'])}"
             f" (MAC {odd_step['mac']:.2f})"
         )
@@ -220,4 +220,4 @@ def _words(findings: Mapping[str, Any], labels: Sequence[Label]) -> list[str]:
 
 
 def _all_but(claim: str, exceptions: Sequence[str]) -> str:
-    return f"{claim}, but for {', '.join(exceptions)}" if exceptions else claim
+    return f"{claim}, except {', '.join(exceptions)}" if exceptions else claim

@@ -109,7 +109,7 @@ class PressureSweep(Result):
                     mode["curvature"],
                 ]
             )
-        caption = f"slope: d ln f / d ln p, at {findings.from_kPa:g} and {high}"
+        caption = f"sensitivity: d ln f / d ln p, at {findings.from_kPa:g} and {high}"
         if any(mode.standard_error_Hz is not None for mode in own[0].modes):
             caption += "; ±: 90 % interval of the tyre's own frequency"
         return Table(columns, rows, findings.design, caption)

@@ -183,7 +183,7 @@ def test_the_same_results_give_the_same_bytes(copy: Path, tmp_path: Path) -> Non
     [
         ("fit.json", "Not in it: results of fit."),
         ("fit_shapes.json", "'tyrecal fit --report' keeps them"),
-        ("fit_history.csv", "The way of the fit (fit_history.csv) is not in this folder"),
+        ("fit_history.csv", "The history of the fit (fit_history.csv) is not in this folder"),
         ("modes.json", "Not in it: results of modes."),
         ("modes_shapes.json", "'tyrecal modes --report' keeps them"),
         ("pressure_sweep.json", "Not in it: results of sweep-pressure."),
@@ -282,7 +282,7 @@ def test_shapes_of_another_run_are_not_shown(copy: Path) -> None:
     fit = json.loads((copy / "fit.json").read_text())
     fit["modes"][2]["frequency_Hz"] += 0.01
     (copy / "fit.json").write_text(json.dumps(fit))
-    assert "are those of another run: not shown" in words_of(text_of(copy))
+    assert "are from another run: not shown" in words_of(text_of(copy))
     assert text_of(copy).count('class="viewer"') == 1
 
 
@@ -387,7 +387,7 @@ def test_a_page_too_large_and_places_not_to_write_to(
 ) -> None:
     other = tmp_path / "fit.json"
     other.write_text("precious")
-    with pytest.raises(InputError, match="no page of tyrecal's"):
+    with pytest.raises(InputError, match="not a page of tyrecal"):
         write_page(other, [folder])
     assert other.read_text() == "precious"
     with pytest.raises(InputError, match="is a folder"):
@@ -444,7 +444,7 @@ def test_the_page_says_what_its_results_are_of(copy: Path) -> None:
         "2026-01-01 00:00 UTC, here: tyrecal fit 'my cases/toy.yaml'",
     ):
         assert entry in words, entry
-    assert "not all of one tyre" not in words and "did not finish" not in words
+    assert "belong to different tyres" not in words and "did not finish" not in words
     modes = json.loads((copy / "modes.json").read_text())
     modes["provenance"]["tyre_sha256"] = "f" * 64
     (copy / "modes.json").write_text(json.dumps(modes))
@@ -452,6 +452,6 @@ def test_the_page_says_what_its_results_are_of(copy: Path) -> None:
     runs["modes"] = {**runs["fit"], "finished": False}
     (copy / "run.json").write_text(json.dumps(runs))
     words = words_of(text_of(copy))
-    assert "not all of one tyre" in words and "ffffffff" in words
+    assert "belong to different tyres" in words and "ffffffff" in words
     assert "The last run of modes did not finish" in words and words.count("00:00 UTC") == 1
     assert "2026-01-01, A. <Engineer>" in words_of(page([read_results(copy)], "A. <Engineer>"))

@@ -90,7 +90,7 @@ def _refuse(path: Path) -> None:
     except FileNotFoundError:
         ours = True
     if not ours:
-        raise InputError(f"'{path}' is no page of tyrecal's; give another file with --output")
+        raise InputError(f"'{path}' is not a page of tyrecal; give another file with --output")
     if not path.parent.is_dir():
         raise InputError(f"'{path}' cannot be written: there is no folder '{path.parent}'")
 
@@ -218,9 +218,9 @@ def _shapes(
     if shapes is None:
         why = f"The mode shapes are not in this folder; 'tyrecal {what} --report' keeps them."
     elif not shapes.are_of(table):
-        why, shapes = "The mode shapes in this folder are those of another run: not shown.", None
+        why, shapes = "The mode shapes in this folder are from another run: not shown.", None
     elif not shapes.modes:
-        why = "This solver gives shapes on the crown alone, so there is no section to revolve."
+        why = "This solver gives shapes on the crown only, so there is no section to revolve."
     data = None
     with _lists_of(results.folder / f"{what}_shapes.json"):
         if shapes and shapes.modes:

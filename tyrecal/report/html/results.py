@@ -112,7 +112,7 @@ def read_results(folder: Path) -> Results:
         run = max(results.runs.values(), key=lambda each: each.started, default=RunFacts())
         last = "" if run.finished else f": its last run, 'tyrecal {run.command}', did not finish"
         if (folder / "batch.json").exists():
-            last = "; it is a batch's: give the folders of its cases, which stand in it"
+            last = "; it is a folder of a batch: give the folders of the cases in it"
         raise InputError(
             f"'{folder}' holds no results of fit, modes, sweep-pressure, footprint,"
             f" effects, sample or diagnose{last}"

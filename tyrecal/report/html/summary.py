@@ -16,7 +16,11 @@ from ...studies.result import Result
 from ...units import display_unit
 from ..table import ended_words, nearness
 
-VERDICT_WORDS = {"named": "Named", "undecided": "Undecided", "outside": "Outside the catalogue"}
+VERDICT_WORDS = {
+    "named": "Named",
+    "undecided": "Undecided",
+    "outside": "Not explained by the catalogue",
+}
 
 
 def summary(result: Result) -> list[str]:
@@ -62,7 +66,7 @@ def modes_words(modes: ModesResult) -> list[str]:
         f" tyre weighs {modes.mass_kg:.2f} kg."
     ]
     if modes.deflection_m is not None:
-        words.append(f"The axle comes {1e3 * modes.deflection_m:.1f} mm down.")
+        words.append(f"The axle moves {1e3 * modes.deflection_m:.1f} mm down.")
     return [*words, *map(sentence, modes.findings.words)]
 
 
@@ -75,11 +79,11 @@ def diagnosis_words(result: DiagnosisResult) -> list[str]:
     if result.robust:
         least, most = result.robust.range
         words.append(
-            "It rests on labels that were exchanged: correct the file first."
+            "It depends on labels that were exchanged: correct the file first."
             if result.exchanged_labels
             else f"Robust: {least:.2f} to {most:.2f} with other priors and standard deviations."
             if result.robust.robust
-            else sentence(f"It hangs on {result.robust.hangs_on[0]}")
+            else sentence(f"It depends on {result.robust.hangs_on[0]}")
         )
     if result.effect and result.parameter:
         p = result.parameter

@@ -69,9 +69,9 @@ def make(
     stopped. Raises InputError where the folder holds trials already, or the truth would lie in it.
     """
     if (folder / SEAL).exists():
-        raise InputError(f"{folder} holds sealed trials already; make others in another folder")
+        raise InputError(f"{folder} has sealed trials already; make others in another folder")
     if sealed.resolve().is_relative_to(folder.resolve()):
-        raise InputError(f"the truth must not lie in {folder}, which is answered")
+        raise InputError(f"the truth must not be in {folder}, the folder of the trials")
     make_folder(folder)
     make_folder(sealed)
     for path in (*folder.rglob("*"), sealed / "made", sealed / "record"):
@@ -259,7 +259,7 @@ def kept_seed(sealed: Path, seed: int | None) -> int:
     if path.exists():
         known = int(read_json(path)["seed"])
         if seed is not None and seed != known:
-            raise InputError(f"{path} holds another seed; give another folder for the truth")
+            raise InputError(f"{path} has another seed; give another folder with --truth")
         return known
     seed = secrets.randbits(63) if seed is None else seed
     write_json(path, {"seed": seed})

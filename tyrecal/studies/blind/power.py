@@ -72,7 +72,7 @@ def _lines(
         f" {protocol.mass:.1%}, you could find:"
     )
     yield ""
-    yield "| effect | named as a rule from | seen from | lambda at most | hardly told from |"
+    yield "| effect | usually named from | detectable from | largest lambda | similar effects |"
     yield "|---|---|---|---|---|"
     for power in effect_powers:
         if power.seen is not None:
@@ -87,4 +87,4 @@ def _lines(
     hidden = (
         ", ".join(f"`{power.id}`" for power in effect_powers if power.seen is None) or "nothing"
     )
-    yield f"What could hide within its whole range: {hidden}."
+    yield f"Not detectable at any size in their range: {hidden}."

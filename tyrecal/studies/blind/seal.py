@@ -44,7 +44,7 @@ def refuse_open_truth(folder: Path) -> None:
     """Raises InputError if a truth is in ``folder``, where answers are computed, or no seal is."""
     paths = sorted(folder.rglob(TRUTH))
     if paths:
-        raise InputError(f"{paths[0]} lies open among the trials; move it elsewhere")
+        raise InputError(f"{paths[0]} is open among the trials; move it to another folder")
     read_json(folder / SEAL)
 
 

@@ -136,8 +136,10 @@ def _lines(f: dict[str, Any], maker: str) -> Iterator[str]:
         yield f"| {span} | {band['top_1']['count']} | {' | '.join(cells)} |"
     yield "\n| lambda alone, from | trials | top 1, group |\n|---|---|---|"
     for band in f["by_lambda"]:
-        yield f"| {band['low']:g} | {band['top_1_group']['count']} | {_rate(band['top_1_group'])} |"
-    yield "\n| what | measured |\n|---|---|"
+        yield (
+            f"| {band['low']:g} | {band['top_1_group']['count']} | {_rate(band['top_1_group'])} |"
+        )
+    yield "\n| quantity | measured |\n|---|---|"
     for key in (
         "false_alarms",
         "named_right",
@@ -160,7 +162,7 @@ def _lines(f: dict[str, Any], maker: str) -> Iterator[str]:
         f" {_number(out['median_shrinkage'])} ({_number(out['placebo_95'])}), {out['count']}"
         " trials |"
     )
-    yield "\n| outside the catalogue | recognised | named as an effect |\n|---|---|---|"
+    yield "\n| not explained by the catalogue | recognised | named as an effect |\n|---|---|---|"
     for law, each in f["families"].items():
         yield f"| {law} | {_rate(each['recognised'])} | {_rate(each['named'])} |"
     yield "\n| on the same trials | right by group | false alarms |\n|---|---|---|"

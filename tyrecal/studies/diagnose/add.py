@@ -26,7 +26,9 @@ def add(path: Path, effects: Mapping[str, float], folder: Path | None = None) ->
     with_values(loaded, {f"effects.{id}": value for id, value in effects.items()})
     target = path.with_name(f"{'_'.join((path.stem, *effects))}{path.suffix}")
     if folder is not None and folder.resolve() != path.parent.resolve():
-        raise InputError(f"the new case goes beside the old one, to '{target}', not to '{folder}'")
+        raise InputError(
+            f"the new case must be next to the old one, in '{target}', not to '{folder}'"
+        )
     if target.exists():
         raise InputError(f"'{target}' exists already; move it away first")
     yaml = YAML()

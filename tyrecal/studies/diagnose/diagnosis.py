@@ -37,8 +37,8 @@ MAX_JOINT, CARRIES_WEIGHT = 3, 0.02  # sets of effects that are asked together; 
 MAX_ROUNDS = 2
 CARRIED_WITHIN = 0.7  # of x, from where effects are followed by their slopes
 STAGES = (
-    "calibrate and ask each effect",
-    "ask the likeliest effects again",
+    "calibrate and evaluate each effect",
+    "evaluate the likeliest effects again",
     "parts of the section",
     "the next measurements",
 )

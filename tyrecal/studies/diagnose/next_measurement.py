@@ -50,7 +50,7 @@ COST_HOURS = dict(
 """Of a laboratory, as an orientation."""
 DIRECT_READINGS = {
     "rim": ("measure the rim between its flanges", {"rim_width"}),
-    "seat": ("look how level the moulded line runs with the flange", {"bead_seat"}),
+    "seat": ("check that the moulded line runs level with the rim flange", {"bead_seat"}),
     "calliper": ("check gauges and widths with a calliper", {"tread_wear", "sidewall_gauge"}),
     "cut": (
         "cut the tyre and measure its section",
@@ -161,14 +161,14 @@ def rank(
     of_section = [k for k, name in enumerate(sources) if name.startswith(SECTION)]
     for k, source in enumerate(sources):
         if k not in of_section:
-            words = f"measure by itself: {source.replace('_', ' ')}"
+            words = f"measure separately: {source.replace('_', ' ')}"
             offered.append((words, COST_HOURS["check"], with_readings(problem, now, of, [], [k])))
     ids = list(dict.fromkeys(id for each in of.values() for id in each))
     for tool, (words, shown) in DIRECT_READINGS.items():
         here, known = [id for id in ids if id in shown], of_section if tool == "cut" else []
         if here or known:
             offered.append((words, COST_HOURS[tool], with_readings(problem, now, of, here, known)))
-    words = "dismount the tyre, mount it again and measure all once more"
+    words = "dismount the tyre, mount it again and repeat all measurements"
     offered.append((words, COST_HOURS["mount"], again(problem, now, d, of)))
     if clamped := [id for id in ids if id in HELD_BY]:
         words = "clamp the rim rigidly in place of the spindle and measure again"
@@ -301,7 +301,7 @@ def _more_rows(
     higher = [Label(top + 1, 0), Label(top + 1, 1)]
     measured_in = dict.fromkeys(row.row[1] for row in o.rows if row.label)
     more = [(label, where) for label in higher for where in measured_in]
-    offered.append((f"measure {higher[0]} and {higher[1]}, too", COST_HOURS["harmonics"], more))
+    offered.append((f"measure {higher[0]} and {higher[1]} too", COST_HOURS["harmonics"], more))
     if all(row.label for row in o.rows):
         offered.append(("weigh the tyre", COST_HOURS["weigh"], [(None, 0.0)]))
     rows = list(dict.fromkeys(row for _, _, more in offered for row in more))

@@ -138,7 +138,7 @@ def _unrepeated(runs: Sequence[dict]) -> Iterator[str]:
     if later:
         yield f"{_names(later)}: in repeats only"
     if len(runs) > 1 and len(keys) - len(some) < 2:
-        yield "all repeats: fewer than two values stand in every file"
+        yield "all repeats: fewer than two values are in every file"
 
 
 def _names(keys: Sequence[ObservationKey]) -> str:

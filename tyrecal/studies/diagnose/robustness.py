@@ -40,7 +40,7 @@ FACTORS = {0.5: "half", 2.0: "twice"}
 MIN_WEIGHED = 1e-5
 MAX_WEIGHED = 20  # hypotheses with effects that are evaluated again
 MAX_LN_BELOW_BEST = 8.0  # of the ln posterior of grid points that are kept
-JUDGED = {UNDECIDED: "undecided", NO_GAP: "no gap", "outside": "outside the catalogue"}
+JUDGED = {UNDECIDED: "undecided", NO_GAP: "no gap", "outside": "not explained by the catalogue"}
 
 
 @dataclass(frozen=True)
@@ -107,8 +107,8 @@ def _variants(
 def _priors(verdict: Verdict) -> Iterator[tuple[str, Callable[[Hypothesis], int]]]:
     """Priors in words, and the power to which a hypothesis's prior contains each."""
     yield "no effect", lambda h: int(h.key == NONE)
-    yield "what is outside the catalogue", lambda h: int(h.key == OUTSIDE)
-    yield "every further effect", lambda h: max(len(h.values) - 1, 0)
+    yield "an unlisted cause", lambda h: int(h.key == OUTSIDE)
+    yield "each further effect", lambda h: max(len(h.values) - 1, 0)
     if key := verdict.key or verdict.best:
         words = " and ".join(key.split("+"))
         yield words, lambda h: int(bool(h.values) and holds(h.key, key))
@@ -126,7 +126,7 @@ def _changes(problem: InverseProblem, sources: Sequence[str]) -> Iterator[Pertur
         constants["all constants"] = [k for (k,) in constants.values()]
     if of_section:
         constants["the section"] = of_section
-        yield Perturbation("the section beyond doubt", _scaled(problem, of_section, 0.0), every)
+        yield Perturbation("the section taken as exact", _scaled(problem, of_section, 0.0), every)
     for factor, times in FACTORS.items():
         for name, places in constants.items():
             words = f"the standard deviation of {name} {times} as large"
@@ -135,9 +135,11 @@ def _changes(problem: InverseProblem, sources: Sequence[str]) -> Iterator[Pertur
             f"the allowance for effects' laws {times} as large", problem, every, factor
         )
         looser = replace(problem, spread=factor * problem.spread)
-        yield Perturbation(f"what variables may be off their start {times} as large", looser, every)
+        yield Perturbation(
+            f"the prior standard deviation of variables {times} as large", looser, every
+        )
     sure = replace(problem, assumed=replace(problem.assumed, form=0.0))
-    yield Perturbation("the model's own form beyond doubt", sure, every)
+    yield Perturbation("no model error", sure, every)
     for label in sorted({row.label for row in rows if row.label}, key=str):
         keep = np.array([row.label != label for row in rows])
         if keep.any():

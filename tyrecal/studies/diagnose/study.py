@@ -117,7 +117,9 @@ def study(
         return replace(observations, left_out=(*observations.left_out, *elsewhere))
 
     if not any(each.quantity == "frequency_Hz" and not each.load_N for each in given):
-        raise InputError(f"{measured}: there is no frequency of the unloaded tyre in it")
+        raise InputError(
+            f"{measured}: it has no frequency of the unloaded tyre, which a diagnosis needs"
+        )
     ids = list(catalogue()) if effects is None else list(effects)
     fitted = tuple(id for id in ids if EFFECT_PATH + id in calibrated(case))
     if "pressure_kPa" in calibrated(case):
@@ -210,8 +212,7 @@ def spans_of(
     """
     if case.decks:
         raise InputError(
-            "a diagnosis weighs effects, which change a section: this tyre stands in decks in three"
-            " dimensions"
+            "a diagnosis needs a section, and this tyre is given by decks in three dimensions"
         )
     able: dict[str, Span] = {}
     unable: dict[str, str] = {}
@@ -259,7 +260,7 @@ def parse_change(text: str) -> Toggle:
     id, known = id.strip(), catalogue()
     if not separator:
         raise InputError(
-            f"'{text}' must say what was switched: EFFECT=VALUE or EFFECT*FACTOR, as in"
+            f"'{text}' must state what was changed: EFFECT=VALUE or EFFECT*FACTOR, as in"
             " spindle_lateral=0"
         )
     if id not in known:
@@ -271,7 +272,7 @@ def parse_change(text: str) -> Toggle:
     if not isfinite(number):
         raise InputError(f"'{text}': '{value.strip()}' is not a number")
     if mark == "*" and number == 1:
-        raise InputError(f"'{text}': a factor of 1 switches nothing")
+        raise InputError(f"'{text}': a factor of 1 changes nothing")
     return Toggle(id, number, mark == "*")
 
 
@@ -279,7 +280,7 @@ def _counted_from(change: Toggle, spans: Mapping[str, Span]) -> Toggle:
     """The change, from what the case has of its effect. Raises InputError."""
     if change.id not in spans:
         raise InputError(
-            f"'{change.id}' was switched in a toggled run, but is not among the effects that are"
+            f"'{change.id}' was changed in a toggled run, but is not among the effects that are"
             " considered: add it with --effect, or leave --without; the solver has to express it,"
             " and no variable may set it"
         )
@@ -301,7 +302,7 @@ def _check_copies(paths: Sequence[Path], runs: Mapping[Path, Sequence[Measuremen
         if contents[k] in contents[:k]:
             first = paths[contents.index(contents[k])]
             raise InputError(
-                f"{path}: holds the same values as {first}; a copy is no measurement of its own"
+                f"{path}: has the same values as {first}; a copy is not a second measurement"
             )
 
 

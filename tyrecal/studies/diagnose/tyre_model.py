@@ -59,12 +59,14 @@ class TyreModel:
     ):
         if not evaluator.has_gradients and "gradients" in evaluator.solver.capabilities:
             raise DeckRefused(
-                "with what the case has in it (a splice) the solver gives no exact slopes, which a"
-                " diagnosis needs: take it out of the case, the diagnosis weighs it as an effect"
+                "the solver gives no exact sensitivities of a case with a splice, and a diagnosis"
+                " needs them: take the splice out of the case, the diagnosis considers it as an"
+                " effect"
             )
         if not evaluator.has_gradients:
             raise DeckRefused(
-                f"solver '{evaluator.solver.name}' gives no exact slopes, which a diagnosis needs:"
+                f"solver '{evaluator.solver.name}' gives no exact sensitivities, which a diagnosis"
+                " needs:"
                 " 'tyrecal solvers' shows which one does (gradients)"
             )
         self.rows, self.found, self.jobs = list(rows), own_sources, jobs
@@ -381,8 +383,8 @@ class TyreModel:
             rates |= each.evaluation.mass_gradients
             if each.evaluation.gradients.keys() != each.evaluation.mass_gradients.keys():
                 raise DeckRefused(
-                    f"solver '{self.evaluator.solver.name}' gives no slopes of the mass, which was"
-                    " measured"
+                    f"solver '{self.evaluator.solver.name}' gives no sensitivities of the mass,"
+                    " which was measured"
                 )
         by_x = [rates.get(name, 0.0) * self._slope(name, values) for name in self.variables]
         by_source = [

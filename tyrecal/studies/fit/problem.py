@@ -235,7 +235,9 @@ class Problem:
             known |= each.evaluation.mass_gradients
         if not known:
             name = self.evaluator.solver.name
-            raise DeckRefused(f"solver '{name}' gives no slopes of the mass, which is a target")
+            raise DeckRefused(
+                f"solver '{name}' gives no sensitivities of the mass, which is a target"
+            )
         slopes = [known.get(v.name, 0.0) * v.slope(values[v.name]) for v in self.variables]
         return np.array(slopes)
 

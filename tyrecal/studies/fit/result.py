@@ -53,7 +53,7 @@ ROAD_QUANTITIES = {  # targets that are no modes
 OTHER_RESIDUALS = (
     "A fit and a diagnosis leave different residuals: the fit weighs them by the measurement's"
     " scatter alone, the diagnosis also by the model's own error and the uncalibrated constants,"
-    " so that it leaves what these explain."
+    " and leaves what these explain."
 )
 MAX_PROPOSED = 4  # states in a table
 HERTZ, RESULT_DIGITS = Column("Hz"), Column("", ".4g")
@@ -358,7 +358,7 @@ class FitResult(Result):
                 for each in self.next_states[:MAX_PROPOSED]
             ]
             tables.append(
-                Table(heads, rows, title="Which state would tell most next, of the same modes")
+                Table(heads, rows, title="Best state to measure next, for the same modes")
             )
         return tables
 

@@ -28,7 +28,9 @@ ALONG_RTOL = 0.1  # of the gradient: as much along the crossing counts as none
 CONVERGED = "converged"
 NO_LOWER = "no lower objective along the search direction"
 USED_UP = "designs used up"
-AT_CROSSING = "the two [0,0] modes meet: beyond, labels change places and the objective is higher"
+AT_CROSSING = (
+    "the two [0,0] modes meet: beyond it, labels change places and the objective is higher"
+)
 CAME_BACK = "came back over the crossing of the two [0,0] modes"
 
 

@@ -115,8 +115,8 @@ def label(
     """
     if not evaluator.has_gradients:
         raise InputError(
-            f"solver '{evaluator.solver.name}' gives no exact slopes of this case, by which labels"
-            " are found: 'tyrecal solvers' shows which one does (gradients)"
+            f"solver '{evaluator.solver.name}' gives no exact sensitivities of this case, which"
+            " labels need: 'tyrecal solvers' shows which one does (gradients)"
         )
     problem = Problem(case, evaluator, fixed)
     prior = prior or start_prior(problem.variables)

@@ -193,7 +193,7 @@ class SampleResult(Result):
     def sentences(self) -> list[str]:
         e, c = self.emulator, self.chains
         sentences = [
-            f"{c.draws} draws, worth {c.effective:.0f} independent ones (autocorrelation"
+            f"{c.draws} draws, equal to {c.effective:.0f} independent ones (autocorrelation"
             f" {max(c.autocorrelation.values()):.1f} steps, {100 * c.acceptance:.0f} % accepted)",
             f"emulator of {e.evaluations} evaluations: off by less than"
             f" {100 * e.stated_error:.2g} % in 99 of 100 designs",
@@ -205,8 +205,8 @@ class SampleResult(Result):
             )
         if self.noise_Hz is not None:
             sentences.append(
-                f"the targets state no sigma: {self.noise_Hz:.2f} Hz, as a fit leaves them, stands"
-                " for it"
+                f"the targets state no sigma: {self.noise_Hz:.2f} Hz, as a fit leaves them, is"
+                " used instead"
             )
         near = [each for each in self.optima if each.below < NEARLY]
         if len(near) > 1:
@@ -228,7 +228,7 @@ class SampleResult(Result):
         doubts = []
         if c.at_edge >= AT_EDGE:
             doubts.append(
-                f"{100 * c.at_edge:.2g} % of the draws lie at the edge of the box, which could not"
+                f"{100 * c.at_edge:.2g} % of the draws are at the edge of the box, which could not"
                 f" grow: {c.stopped}"
             )
         if not c.enough:

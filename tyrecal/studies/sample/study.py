@@ -36,7 +36,7 @@ from .posterior import Posterior
 from .predict import conditional
 
 Array = np.ndarray
-SAMPLE_STAGES = ("calibrate", "emulate", "sample", "ask for what is uncertain")
+SAMPLE_STAGES = ("calibrate", "emulate", "sample", "evaluate the uncertain numbers")
 PRESSURE_NAME = "pressure_kPa"
 MANY_DRAWS = 100_000  # where nobody says how many
 OTHER_PRESSURES = (0.8, 1.2)  # times the case's, where no others are asked for
@@ -200,8 +200,8 @@ def check(case: LoadedCase, evaluator: Evaluator, readings: Sequence[Measurement
     for name, variable in case.case.variables.items():
         if rims and not {*SPRINGS, WHEEL_FREE}.isdisjoint(variable.sets):
             raise InputError(
-                f"{name} sets what holds the rim, of which the measurements have several: take it"
-                " out of the variables, or what was measured on another rim out of the file"
+                f"{name} sets the rim's compliance, and the measurements have several rims: take"
+                " it out of the variables, or take the other rims out of the file"
             )
     if not (read_targets(case) if readings is None else modal(readings)):
         raise InputError("there is no frequency of the unloaded tyre to sample the variables by")
@@ -237,8 +237,8 @@ def noise_of_targets(case: LoadedCase, evaluator: Evaluator) -> float | None:
     noise = calibrate(case, evaluator).found.noise_Hz
     if noise is None:
         raise InputError(
-            "the targets have no sigma_Hz, and are too few to tell it from what a fit leaves: give"
-            " it to them, or measurements by --measured"
+            "the targets have no sigma_Hz, and are too few to estimate it from the residuals:"
+            " state sigma_Hz, or give measurements with --measured"
         )
     return noise
 
