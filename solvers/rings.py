@@ -52,7 +52,7 @@ def check_revolved(points: Array) -> None:
     gaps = np.diff(angles, append=angles[0] + 2 * np.pi)
     if R.min() < R.max() / 2 or gaps.max() > WIDEST_GAP:
         raise RunFailed(
-            "no_results", "the nodes with shapes do not lie round the axle, as those of a crown do"
+            "no_results", "the nodes with shapes are not round the axle, as those of a crown are"
         )
 
 

@@ -95,12 +95,12 @@ def _order(blocks: Sequence[Block], before: Sequence[Block]) -> Iterator[Finding
         if inside == "STEP" and not procedure:
             procedure = name
             if name not in STEP_PROCEDURES:
-                words = "stands where the step's procedure must, under *STEP"
+                words = "is under *STEP, the place of the step's procedure"
                 yield Finding(block, None, words, sure=bool(levels))
         elif inside == "STEP" and name in STEP_PROCEDURES:
             yield Finding(block, None, f"is a second procedure of a step of *{procedure}")
         if rule and rule.under and (parent is None or parent.name not in rule.under):
-            words = f"must stand under *{' or *'.join(rule.under)}"
+            words = f"must be directly under *{' or *'.join(rule.under)}"
             yield Finding(block, None, words, sure=not guessed)
         if rule and rule.after and not seen & set(rule.after):
             yield Finding(block, None, f"must come after *{' or *'.join(rule.after)}")
@@ -109,7 +109,7 @@ def _order(blocks: Sequence[Block], before: Sequence[Block]) -> Iterator[Finding
         if rule and rule.once:
             scope = {"job": blocks[0], "step": opened[-1] if opened else None, "parent": parent}
             if (key := (id(scope[rule.once]), name)) in once:
-                yield Finding(block, None, f"may stand once in a {rule.once}")
+                yield Finding(block, None, f"may be given once in a {rule.once}")
             once[key] = block
         if name == "STEP" or name in BEGIN_END:
             opened.append(block)
@@ -172,7 +172,7 @@ def _data(block: Block, rule: Rule, names: _Names) -> Iterator[Finding]:
         while fields and not fields[-1]:
             fields.pop()
         if len(fields) > len(kinds) and not rest:
-            yield Finding(block, row, f"'{fields[len(kinds)]}' is more than its data line holds")
+            yield Finding(block, row, f"'{fields[len(kinds)]}' is more than its data line takes")
         for j, (kind, may_lack) in enumerate(kinds):
             text = fields[j] if j < len(fields) else ""
             if text:

@@ -28,9 +28,9 @@ def checked_modes(path: Path, expected: int | None, table: DatTable) -> Modes:
     modes = read_fil(path)
     values = modes.eigenvalues
     if expected is not None and len(values) != expected:
-        raise _failed(f"{path.name} has {len(values)} modes, {expected} were asked")
+        raise _failed(f"{path.name} has {len(values)} modes, {expected} were requested")
     if not all(np.isfinite(part).all() for part in (values, modes.masses, modes.displacement)):
-        raise _failed(f"{path.name} holds numbers that are none")
+        raise _failed(f"{path.name} has values that are not numbers")
     if (values < 0).any():
         raise RunFailed("unstable", f"{path.name}: eigenvalue {values.min():g} is negative")
     if not (values.all() and (modes.masses > 0).all() and modes.displacement.any((1, 2)).all()):

@@ -55,7 +55,7 @@ def _modes(text: str) -> Modes:
         elif key == MODE:
             mode = int(a[0])
             if mode in mode_data:
-                raise ValueError(f"mode {mode} stands in it twice: two runs, or two steps of modes")
+                raise ValueError(f"mode {mode} is in it twice: two runs, or two steps of modes")
             mode_data[mode], shapes[mode] = (float(a[1]), float(a[2])), {}
         elif key == U and mode:
             shapes[mode][int(a[0])] = _vector(a)
@@ -76,7 +76,7 @@ def _arrays(
     shapes: dict[int, dict[int, list[float]]],
 ) -> Modes:
     if not mode_data:
-        raise ValueError("it holds no mode")
+        raise ValueError("it has no mode")
     order = sorted(mode_data)
     nodes = list(shapes[order[0]])
     if not nodes:

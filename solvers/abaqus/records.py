@@ -24,9 +24,7 @@ def records(text: str) -> Iterator[tuple[int, list[Item]]]:
     at = 0
     while at < len(data):
         if data[at] != "*":
-            raise ValueError(
-                f"line {at // RECORD_LINE + 1}: a record does not begin where it should"
-            )
+            raise ValueError(f"line {at // RECORD_LINE + 1}: an entry does not begin at its place")
         start, at = at, at + 1
         items: list[Item] = []
         try:
@@ -37,7 +35,7 @@ def records(text: str) -> Iterator[tuple[int, list[Item]]]:
             yield int(items[0]), items[1:]
         except (ValueError, IndexError):
             raise ValueError(
-                f"line {start // RECORD_LINE + 1}: a record is cut short or damaged"
+                f"line {start // RECORD_LINE + 1}: an entry is cut short or damaged"
             ) from None
         while at < len(data) and data[at] == " ":  # after 2001 the line is filled with blanks
             at += 1

@@ -207,7 +207,7 @@ def _inflated(path: Path) -> tuple[Fields, Array]:
         raise RunFailed(
             "unstable",
             f"CalculiX's inflated tyre is no body of revolution: node {fields.nodes[off.argmax()]}"
-            f" is {1e6 * off.max():.3g} micrometres off; element C3D20 may stand",
+            f" is {1e6 * off.max():.3g} micrometres off; element C3D20 may work",
         )
     return fields, front
 

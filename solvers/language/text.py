@@ -205,7 +205,7 @@ class Reader:
                 raise start.error(f"decks of more than {MAX_KEYWORDS} keywords are not read")
             block = self._keyword(start, line)
             if only_data:
-                raise block.refused("stands in a file of data lines")
+                raise block.refused("is in a file of data lines")
             if block.name != "INCLUDE":
                 self._rows = []
                 kept = {k: v for k, v in block.parameters.items() if k != "INPUT"}
@@ -325,12 +325,12 @@ def seed(blocks: Sequence[Block], tangents: Sequence[tuple[int, int, float]]) ->
             rows = [replace(row, tangents=by_line.pop(row.place.line, None)) for row in block.rows]
             for row in rows:
                 if row.tangents and max(row.tangents) >= len(row.fields):
-                    words = "a sensitivity is asked for, but the line has no such field"
+                    words = "a sensitivity is requested, but the line has no such field"
                     raise DeckError(row.place, words)
             block = replace(block, rows=rows)
         result.append(block)
     if by_line:
-        words = "a sensitivity is asked for, but the line holds no data"
+        words = "a sensitivity is requested, but the line holds no data"
         raise DeckError(Place(WHOLE_DECK.file, min(by_line)), words)
     return result
 

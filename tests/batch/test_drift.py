@@ -114,7 +114,7 @@ def test_a_study_that_is_new_in_a_baseline_brings_its_tolerances(tmp_path: Path)
         ("{", "is not a baseline"),
         ("[]", "format 1"),
         ('{"format": 2}', "format 1"),
-        ('{"format": 1, "tolerances": {}}', "cases are wanted"),
+        ('{"format": 1, "tolerances": {}}', "must have the keys tolerances and cases"),
         (json.dumps(one(1.0, {"relative": -1})), "tolerances.fit/f"),
         (json.dumps(one(1.0, {"realtive": 1})), "tolerances.fit/f"),
         (json.dumps(one(1.0, {"relative": float("nan")})), "tolerances.fit/f"),

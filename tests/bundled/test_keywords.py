@@ -108,7 +108,7 @@ def test_hourglass_stiffness_is_of_the_section_above_it() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "line", "words"),
     [
-        ("*DENSITY\n", "*HOURGLASS STIFFNESS\n3E4\n*DENSITY\n", 17, "right under the *SOLID"),
+        ("*DENSITY\n", "*HOURGLASS STIFFNESS\n3E4\n*DENSITY\n", 17, "directly under its *SOLID"),
         ("*DENSITY", "*DAMPING", 17, "DAMPING"),
         ("*NODE, NSET=ALL", "*NODE, NSET=ALL, SYSTEM=C", 4, "SYSTEM"),
         ("TYPE=CGAX4R", "TYPE=CGAX5R", 9, "CGAX5R"),

@@ -56,7 +56,7 @@ SPRING_ON = "*ELEMENT, TYPE=SPRING1, ELSET=K\n999000009, 900001\n*SPRING, ELSET=
         (WHEEL, "0.18, 0.2866666666667, 0.18", "0.18, 0.28, 0.19", "body of revolution"),
         (WHEEL, RELEASED, f"{RELEASED}900001, 1\n", "are free together"),
         (WHEEL, "WELL, P, 160000\n", "", "which is free along the axle"),
-        (WHEEL, "REFERENCE\n900001, 0, 0\n", "REFERENCE\n900001, 0.1, 0\n", "stands on the axle"),
+        (WHEEL, "REFERENCE\n900001, 0, 0\n", "REFERENCE\n900001, 0.1, 0\n", "must be on the axle"),
         (WHEEL, STEP, f"{SPRING_ON}1\n{STEP}", "*SPRING takes two lines"),
         (WHEEL, STEP, f"{SPRING_ON}1\n1E6\n{STEP}", "degrees of freedom (1, 3) of the rim"),
         (WHEEL, STEP, f"{SPRING_ON}2\n-1E6\n{STEP}", "are not negative"),

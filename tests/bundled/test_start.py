@@ -106,12 +106,12 @@ def test_the_deck_names_its_shape(tmp_path: Path, nominal: np.ndarray) -> None:
     assert read is not None and (read == nominal).all()
     assert read_start(tmp_path, "*HEADING\n** no start\n") is None
     (tmp_path / FILE).rename(tmp_path / "elsewhere.npy")
-    with pytest.raises(Refused, match="not beside it"):
+    with pytest.raises(Refused, match="not next to it"):
         read_start(tmp_path, line)
     write_start(tmp_path, 2 * nominal)
-    with pytest.raises(Refused, match="SHA-256 is another"):
+    with pytest.raises(Refused, match="SHA-256 differs"):
         read_start(tmp_path, line)
     with pytest.raises(Refused, match="four numbers a node"):
         read_start(tmp_path, write_start(tmp_path, nominal[:, :3]))
-    with pytest.raises(Refused, match="not beside it"):
+    with pytest.raises(Refused, match="not next to it"):
         read_start(tmp_path, line.replace(FILE, "/etc/passwd"))

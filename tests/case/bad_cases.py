@@ -271,7 +271,7 @@ edit("unknown_label", "targets.modes.0.kind", "'torsional'", AXIAL, AXIAL.replac
 edit(
     "no_label",
     "targets.modes.0.kind",
-    "axial or torsional",
+    "axial (lateral) or torsional",
     AXIAL,
     "{c: 0, m: 0, frequency_Hz: 31.7}",
 )

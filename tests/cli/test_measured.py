@@ -304,7 +304,7 @@ BAD: list[tuple[list[dict[str, Any]], list[str], str]] = [
     (
         [geometry(), function(np.ones(120) + 0j, F, ordinate_spec_data_type=0)],
         [],
-        "does not say whether displacement, velocity or acceleration was measured",
+        "does not state whether displacement, velocity or acceleration was measured",
     ),
     (
         [geometry(), function(np.ones(120) + 0j, F), function(np.ones(120) + 0j, F + 1, 2)],

@@ -94,13 +94,13 @@ def test_a_turning_tyre_is_as_stiff_as_the_frequency_says() -> None:
             "modes",
             "*MODAL FILE\n",
             "*FILE FORMAT, ASCII\n*MODAL FILE\n",
-            r"modes.inp, line \d+: \*FILE FORMAT may stand once in a job",
+            r"modes.inp, line \d+: \*FILE FORMAT may be given once in a job",
         ),
         (
             "inflate",
             "HOURGLASS=STIFFNESS\n",
             "HOURGLASS=STIFFNESS\n*HOURGLASS STIFFNESS\n3e4\n",
-            r"inflate.inp, line \d+: \*HOURGLASS STIFFNESS must stand right under the \*SOLID SEC",
+            r"inflate.inp, line \d+: \*HOURGLASS STIFFNESS must be directly under the \*SOLID SEC",
         ),
     ],
 )

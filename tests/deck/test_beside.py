@@ -161,7 +161,7 @@ def run_deck(folder: Path, *edits: tuple[str, str]) -> None:
         ("*MASS, ELSET=WHEEL_MASS", "*MASS, ELSET=WHEEL", "no set of MASS elements"),
         ("0.27, 0.43, 0.27", "0.27, 0.43, 0.26", "body of revolution"),
         ("*MASS, ELSET=WHEEL_MASS\n15", "*MASS, ELSET=WHEEL_MASS\n-15", "not negative"),
-        ("900001, 0, 0\n", "900001, 0.01, 0\n", "stands on the axle"),
+        ("900001, 0, 0\n", "900001, 0.01, 0\n", "must be on the axle"),
         ("WELL, SPOS", "WELL, SNEG", "SPOS"),
         ("*MASS, ELSET", "*MASS, ALPHA=1.0, ELSET", "MASS: the parameter ALPHA is not honoured"),
     ],

@@ -343,5 +343,5 @@ def test_without_its_load_the_second_job_is_not_inflated(case_folder: Path) -> N
     case = case_with_template(
         case_folder, "modes.inp.j2", "*DSLOAD\nCAVITY, P, {{ pressure | number }}\n", ""
     )
-    with pytest.raises(EvaluationFailed, match="it is of 0 kPa, 240 kPa were asked for"):
+    with pytest.raises(EvaluationFailed, match="it is of 0 kPa, 240 kPa were requested"):
         Evaluator(TyreDesign(case)).evaluate(Question({}))

@@ -294,10 +294,13 @@ LIES: dict[str, tuple[Edit, str]] = {
     "beyond all tyres": (lambda a: a["modes"][0].update(frequency_Hz=1e6), "at most 100000"),
     "next to nothing": (lambda a: a["modes"][0].update(frequency_Hz=1e-4), "above 0.001"),
     "no modes": (lambda a: a.update(modes=[], gradients={}), "at least 1"),
-    "another pressure": (lambda a: a.update(pressure_Pa=2.3e5), "of 230 kPa, 240 kPa were asked"),
+    "another pressure": (
+        lambda a: a.update(pressure_Pa=2.3e5),
+        "of 230 kPa, 240 kPa were requested",
+    ),
     "another harmonic": (
         lambda a: a["modes"][0].update(n=5),
-        "a mode of harmonic 5, the highest asked for is 4",
+        "a mode of harmonic 5, the highest requested is 4",
     ),
     "too many of one": (
         lambda a: a.update(modes=3 * a["modes"], gradients={}),
@@ -305,7 +308,7 @@ LIES: dict[str, tuple[Edit, str]] = {
     ),
     "too many": (
         lambda a: solid(a, modes=21 * [{"frequency_Hz": 9.0, "multiplicity": 1, **MOVED}]),
-        "21 modes, 20 at most were asked for",
+        "21 modes, 20 at most were requested",
     ),
     "no answer": (lambda a: a.clear(), "pressure_Pa: Field required"),
 }
@@ -326,7 +329,7 @@ def test_a_solvers_lie_is_a_failure_with_its_reason(kind: str, tmp_path: Path) -
     with pytest.raises(EvaluationFailed, match=words) as failure:
         ask(evaluator(tmp_path, Liar()))
     assert failure.value.cause == "no_results"
-    assert "the answer of solver 'stand-in' is not used" in failure.value.words
+    assert "the result of solver 'stand-in' is not used" in failure.value.words
     assert not list((tmp_path / "record").glob("*/*.record"))
 
 

@@ -270,7 +270,7 @@ def test_a_full_disc_does_not_spoil_an_evaluation(
     subject = evaluator(tmp_path)
     assert ask(subject).modes and ask(subject, 2e6).modes
     assert [r.levelno for r in caplog.records] == [logging.WARNING]  # said once
-    assert "No space left" in caplog.text and "not recorded" in caplog.text
+    assert "No space left" in caplog.text and "not stored" in caplog.text
     assert not list((tmp_path / "record").glob("*/*"))
 
 

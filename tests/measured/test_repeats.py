@@ -68,7 +68,7 @@ def test_no_sigma_is_below_the_floor() -> None:
 
 
 def test_a_single_value_without_sigma_is_refused() -> None:
-    with pytest.raises(InputError, match=r"nothing tells how far \[1,0\] may be off"):
+    with pytest.raises(InputError, match=r"nothing states how far \[1,0\] may be off"):
         combined([value(66.0, "1")])
 
 

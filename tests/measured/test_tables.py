@@ -136,7 +136,7 @@ def test_two_of_a_label_with_waves_are_a_doublet(tmp_path: Path) -> None:
         (Label(2, 1), "1"),
         (Label(2, 1), "2"),
     ]
-    with pytest.raises(InputError, match="repeats, or the two of a doublet"):
+    with pytest.raises(InputError, match="is given twice: add a column run"):
         read(tmp_path, "c,m,pressure [bar],f\n2,1,2.4,66.1\n2,1,2.4,66.3\n3,1,2.4,99\n")
 
 
@@ -390,7 +390,7 @@ def test_a_list_without_labels_is_imported_as_one(tmp_path: Path) -> None:
     assert [each.value for each in again] == [31.7, 31.7, 66.1]
     with pytest.raises(InputError, match="line 2: frequencies without labels were measured before"):
         gather([tmp_path / "t.csv", tmp_path / "again.csv"])
-    with pytest.raises(InputError, match="line 2: nothing tells how far frequency_Hz may be off"):
+    with pytest.raises(InputError, match="line 2: nothing states how far frequency_Hz may be off"):
         (tmp_path / "t.csv").write_text("f [Hz],pressure [kPa]\n66.1,240\n")
         gather([tmp_path / "t.csv"])
 

@@ -119,7 +119,7 @@ REFUSED = [
     ),
     (
         lambda: [nodes(), few(shapes(AXES)[3])],
-        r"the shapes do not tell whether directions .* give --directions cartesian \(along",
+        r"the shapes do not show whether directions .* give --directions cartesian \(along",
     ),
     (
         lambda: [nodes(), *functions(along_xyz()), functions(along_xyz())[3]],

@@ -127,7 +127,7 @@ FAULTS = [
     ("disc_full", "no_results", "cut short"),
     ("doubled", "no_results", "mode 1 stands in it twice"),
     ("zeros", "no_results", "is zero"),
-    ("nan", "no_results", "numbers that are none"),
+    ("nan", "no_results", "values that are not numbers"),
     ("negative", "unstable", "is negative"),
     ("few", "no_results", "has 19 modes, 20 were asked"),
     ("stale", "no_results", "older than the deck"),

@@ -191,7 +191,7 @@ def test_nodes_that_are_not_round_the_axle() -> None:
     ring = np.column_stack([0.3 * np.cos(theta), 0 * theta, -0.3 * np.sin(theta)])
     check_revolved(cylindrical(ring))
     for wrong in (ring[:, [1, 0, 2]], ring[:1], ring[:6]):
-        with pytest.raises(RunFailed, match="do not lie round the axle"):
+        with pytest.raises(RunFailed, match="are not round the axle"):
             check_revolved(cylindrical(wrong))
 
 

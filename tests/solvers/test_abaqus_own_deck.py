@@ -122,5 +122,5 @@ def test_parts_are_refused_by_name(tmp_path: Path) -> None:
     (tmp_path / "tyre.inp").write_text(own_decks.cae())
     deck = read_own_deck(tmp_path / "tyre.inp")
     (tmp_path / "tyre.yaml").write_text(own_case(deck, deck.flat({}), "P235/75R17", None))
-    with pytest.raises(TemplateFailed, match="do not use parts and assemblies"):
+    with pytest.raises(TemplateFailed, match="Do not use parts and assemblies"):
         Decks(TyreDesign(load_case(tmp_path / "tyre.yaml"))).texts(OWN_TEXT)

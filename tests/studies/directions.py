@@ -67,7 +67,7 @@ def outcome(rng: np.random.Generator) -> str:
     try:
         test = read_modal_test(file, Geometry(file.nodes, {}), layout)
     except InputError as error:
-        if "do not tell whether directions" not in str(error):
+        if "do not show whether directions" not in str(error):
             raise
         return "asked"
     taken = MEANINGS[any("--directions cylindrical is taken" in note for note in test.notes)]

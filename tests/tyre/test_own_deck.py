@@ -75,7 +75,7 @@ def test_what_abaqus_would_refuse(tmp_path: Path, capsys: pytest.CaptureFixture[
         "*VISCOELASTIC: its hyperelastic rubber does not relax",
     ]
     assert [re.sub(r".*?: ", "", words, count=1) for words in out["abaqus"]["refuses"]] == [
-        "*ELASTIC: must stand under *MATERIAL",
+        "*ELASTIC: must be directly under *MATERIAL",
         "*CLOAD: field 3, a number, is missing",
     ]
 
@@ -206,7 +206,7 @@ REFUSED = {
     "*END STEP": ("", "cut off"),
     "TYPE=CGAX8R": ("TYPE=CPS8R", "no element of a revolved tyre"),
     "*ELASTIC": ("*ELASTIC, MODULI=INSTANTANEOUS", "only LONG TERM"),
-    "*DSLOAD": ("*BOUNDARY, OP=NEW\n1001, ENCASTRE\n*DSLOAD", "must stand at every \\*BOUNDARY"),
+    "*DSLOAD": ("*BOUNDARY, OP=NEW\n1001, ENCASTRE\n*DSLOAD", "must be at every \\*BOUNDARY"),
 }
 
 
@@ -361,7 +361,7 @@ def test_a_deck_says_itself_what_the_rim_holds(tmp_path: Path) -> None:
     path = write(tmp_path, own_decks.plain())
     assert "rim:\n" in path.read_text()
     path.write_text(path.read_text().replace("rim:\n", "rim:\n  holds: bead_surface\n"))
-    with pytest.raises(CaseError, match=r"rim.*must not say holds with deck"):
+    with pytest.raises(CaseError, match=r"rim.*must be absent with deck, which names"):
         load_case(path)
 
 

@@ -72,7 +72,7 @@ def test_a_legal_spelling_is_the_same_deck(
         ("*ELASTIC", "*ELA, TYP=L", "TYPE=LAMINA is not honoured, only ISOTROPIC"),
         ("*DENSITY", "*DE", r"'DE' may be .*\*DEBOND or .*\*DENSITY"),
         ("TIE NSET=RIM", "P=RIM", "'P' may be PIN NSET or POSITION"),
-        ("*END STEP\n", "*END STEP\n*NSET, NSET=X\n1001\n", "stands after a step"),
+        ("*END STEP\n", "*END STEP\n*NSET, NSET=X\n1001\n", "is after a step"),
         ("*END STEP\n", "*END STEP\n1., 2.\n", "takes no data lines"),
         ("*END STEP\n", "*END STEP\n*STEP\n", "no \\*END STEP"),
         ("1100.0", "1_100.0", "'1_100.0' is not a number"),

@@ -83,7 +83,7 @@ def read_baseline(path: Path) -> dict[str, Any]:
         raise InputError(f"'{path}' is not a baseline of format 1")
     tolerances, cases = content.get("tolerances"), content.get("cases")
     if not isinstance(tolerances, dict) or not isinstance(cases, dict):
-        raise InputError(f"'{path}' is not a baseline: tolerances and cases are wanted")
+        raise InputError(f"'{path}' is not a baseline: must have the keys tolerances and cases")
     for name, tolerance in tolerances.items():
         known = isinstance(tolerance, dict) and set(tolerance) <= {"relative", "absolute"}
         if not known or not all(_number(x) and x >= 0 for x in tolerance.values()):

@@ -166,7 +166,7 @@ def diagnose(state: Studied) -> StudyOutcome:
     case, measured = state.case, state.case.measured
     if measured is None:
         raise InputError(
-            "the case names no file of measurements to be diagnosed with: give it one, as in"
+            "the case has no file of measurements to diagnose: add one, as in"
             " targets: {file: measured.csv}"
         )
     diagnosed = diagnosing.study(case, state.evaluator, measured)

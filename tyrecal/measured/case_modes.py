@@ -108,7 +108,7 @@ def evaluate_case_modes(
 
     if case.decks:
         raise InputError(
-            f"{case.path}: its shapes are of a deck in three dimensions; not supported"
+            f"{case.path}: its shapes belong to a deck in three dimensions, which is not supported"
         )
     analysis = case.case.analysis.model_copy(update={"highest_harmonic": highest})
     wide = replace(case, case=case.case.model_copy(update={"analysis": analysis}))

@@ -52,7 +52,7 @@ def gather(
     """
     for k, path in enumerate(paths):
         if path.resolve() in [other.resolve() for other in paths[:k]]:
-            raise InputError(f"{path}: is given twice; as its own repeat it would tell nothing")
+            raise InputError(f"{path}: is given twice; a file cannot be its own repeat")
     universal = [read_universal(path) for path in paths if is_universal(path)]
     axes = {node: each for file in universal for node, each in file.axes.items()}
     geometry = Geometry(all_nodes(universal), axes)
@@ -146,7 +146,7 @@ def all_nodes(files: Sequence[Universal]) -> dict[int, Place]:
         for number, place in file.nodes.items():
             if not is_same_place(nodes.setdefault(number, place), place):
                 raise InputError(
-                    f"{file.path}: node {number} stands elsewhere than in the files before"
+                    f"{file.path}: node {number} has other coordinates than in the files before"
                 )
     return nodes
 

@@ -75,7 +75,7 @@ def _axle(X: Array) -> str:
     order = np.argsort(spread)
     if not spread[order[0]] < MAX_ASPECT * spread[order[1]]:
         raise InputError(
-            "the sensors' places do not tell which axis is the axle; give --axle x, y or z"
+            "the sensors' places do not show which axis is the axle; give --axle x, y or z"
         )
     return AXIS_NAMES[order[0]]
 

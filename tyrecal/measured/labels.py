@@ -212,5 +212,5 @@ def _missing(sensors: Sensors) -> str:
     if lacking:
         return f"nothing {' or '.join(lacking)} was measured on the tread"
     if np.ptp(Z[belt]) < HALF_WIDTHS[0] * R.max():
-        return "they do not stand on both edges of the tread"
+        return "they are not on both edges of the tread"
     return "there are too few on the tread"

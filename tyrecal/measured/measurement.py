@@ -81,7 +81,10 @@ class Measurement:
         if self.rim not in (None, "fixed") and self.quantity != "frequency_Hz":
             return f"rim is {self.rim}, must be fixed or empty for {self.quantity}"
         if self.is_unlabelled and self.load_N:
-            return "c is '', must be a whole number under load: labels are found of unloaded tyres"
+            return (
+                "c is '', must be a whole number under load: labels are found for unloaded"
+                " tyres only"
+            )
         if self.sigma <= 0:
             return f"sigma is {self.sigma:g}, must be greater than 0"
         return None

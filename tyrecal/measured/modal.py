@@ -143,11 +143,11 @@ def sensors_in(file: Universal, layout: Layout) -> Labeller:
         confused = first.looks_like()  # labels that these sensors cannot distinguish
         others = [] if layout.directions else others
         if any(each is not first and each.looks_like() != confused for each in others):
-            raise InputError(f"the file does not say what its directions are; {_ASK}")
+            raise InputError(f"the file does not state its directions; {_ASK}")
         return first
 
 
-_ASK = "give --directions cartesian (along x, y, z) or cylindrical (radial, tangential, axial)"
+_ASK = "give --directions cartesian (along x, y, z) or cylindrical (radial, tangential, lateral)"
 
 
 def _readings(signals: Sequence[Signal], geometry: Geometry, layout: Layout) -> dict[str, Labeller]:
@@ -206,8 +206,8 @@ def _meaning(evidence: Mapping[str, float], count: int, given: str) -> tuple[str
         return first, ""
     if not clear:
         raise InputError(
-            "the shapes do not tell whether directions 1, 2, 3 are along x, y, z or radial,"
-            f" tangential, axial; {_ASK}"
+            "the shapes do not show whether directions 1, 2, 3 are along x, y, z or radial,"
+            f" tangential, lateral; {_ASK}"
         )
     return (best, f"{better}: --directions {best} is taken") if lead > 0 else (first, "")
 
@@ -250,7 +250,7 @@ def _from_functions(file: Universal, layout: Layout) -> tuple[list[_UnlabelledMo
     form = first.form or layout.form
     if form not in FORMS:
         raise InputError(
-            f"{first.place}: does not say whether displacement, velocity or acceleration was"
+            f"{first.place}: does not state whether displacement, velocity or acceleration was"
             " measured; give --response"
         )
     f = first.frequency_Hz
@@ -329,7 +329,7 @@ def _by_reference(functions: Sequence[Function]) -> dict[Signal, dict[Signal, Fu
         if not same or not np.allclose(each.frequency_Hz, first.frequency_Hz):
             raise InputError(f"{each.place}: its frequencies are not those of the first")
         if each.form != first.form:
-            words = [form or "function that does not say which" for form in (each.form, first.form)]
+            words = [form or "function of no stated type" for form in (each.form, first.form)]
             raise InputError(f"{each.place}: is a {words[0]}, the first a {words[1]}")
         table.setdefault(each.reference, {})[each.response] = each
     return {reference: {s: row[s] for s in sorted(row)} for reference, row in table.items()}
@@ -393,9 +393,7 @@ def without_overtones(labelled: list[LabelledMode]) -> list[LabelledMode]:
         for number, each in enumerate(pair, start=1):
             result.append(replace(each, member=str(number) if len(pair) == 2 else ""))
         for each in group[len(pair) :]:
-            why = (
-                f"{label.display} stands at {lowest:.2f} Hz already; an overtone, or another's pair"
-            )
+            why = f"{label.display} is at {lowest:.2f} Hz already; an overtone, or another's pair"
             result.append(replace(each, judged=replace(each.judged, label=None, why=why)))
     return sorted(result, key=hertz)
 

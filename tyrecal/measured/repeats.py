@@ -53,13 +53,13 @@ def combined(
             variances.append((PRIOR_REPEATS * every * mean**2 + own) / (PRIOR_REPEATS + n - 1) / n)
         if n == 1 and not stated[0]:
             raise InputError(
-                f"{runs[0].place}: nothing tells how far {runs[0].name} may be off: give repeats,"
+                f"{runs[0].place}: nothing states how far {runs[0].name} may be off: give repeats,"
                 " a column sigma, or --sigma-percent"
             )
         sigma = max(float(np.sqrt(max(variances))), floor * mean)
         if sigma > MAX_SIGMA * mean:
             raise InputError(
-                f"{runs[0].place}: sigma of {runs[0].name} comes to {sigma:.3g}, more than"
+                f"{runs[0].place}: sigma of {runs[0].name} is {sigma:.3g}, more than"
                 f" {MAX_SIGMA:.0%} of the value {mean:.4g}: is it a mistake, or another mode?"
             )
         rows.append(replace(runs[0], value=mean, sigma=sigma))

@@ -252,11 +252,11 @@ def _runs(values: list[Measurement], named: bool) -> list[Measurement]:
     members = worst == 2 and waves
     doubled = next(v for v in values if times[v.run, v.key] > 1)
     if named and not members:
-        raise InputError(f"{doubled.place}: {doubled.name} stands twice in one run")
+        raise InputError(f"{doubled.place}: {doubled.name} is given twice in one run")
     if members and not (flat or named):
         raise InputError(
-            f"{doubled.place}: {doubled.name} stands twice; repeats, or the two of a doublet?"
-            " Say it in a column run or member"
+            f"{doubled.place}: {doubled.name} is given twice: add a column run (repeats) or member"
+            " (the two modes of a pair)"
         )
     if members:  # the lower one is 1, whatever the order of the lines
         ranks: Counter[tuple[str, object]] = Counter()

@@ -21,7 +21,7 @@ CAPABILITIES = {
     "cavity": "the gas in the cavity",
     "coupled": "a mass, a spring or a splice that couples harmonics",
     "rotation": "a tyre that turns",
-    "own_deck": "a deck of one's own",
+    "own_deck": "your own deck",
 }
 
 

@@ -77,7 +77,7 @@ class TyreState:
         """
         state, numbers = self.of(case), dict[str, float]()
         if state.rim and case.decks:
-            raise ValueError("must be absent: how the rim is held stands in the decks")
+            raise ValueError("must be absent: the decks state how the rim is held")
         if state.pressure_kPa is not None:
             numbers["pressure_kPa"] = state.pressure_kPa
         if state.rim == "springs":

@@ -285,7 +285,7 @@ def one_side(angles: Iterable[float]) -> str | None:
     if len(belts) < 2 or len({angle > 90 for angle in belts}) > 1:
         return None
     return (
-        f"usual are belts on both sides of the circumference, all {len(belts)} lie on one; did you"
+        f"usual are belts on both sides of the circumference, all {len(belts)} are on one; did you"
         f" mean {180 - belts[-1]:g} degrees?"
     )
 

@@ -29,6 +29,8 @@ def check(keywords: list[Block], revolve: bool) -> tuple[list[Block], list[list[
         raise DeckError(steps[-1][0].place, "*STEP without *END STEP: the deck is cut off")
     formats = [keyword for keyword in keywords if keyword.name == "FILE FORMAT"]
     if len(formats) > 1:
-        words = f"*FILE FORMAT may stand once in a job: it is given in {formats[0].place} already"
+        words = (
+            f"*FILE FORMAT may be given once in a job: it is given in {formats[0].place} already"
+        )
         raise DeckError(formats[1].place, words)
     return model, steps

@@ -64,7 +64,7 @@ def _request(content: Any, folder: Path, jobs: Sequence[str]) -> Request:
                 _must(False, f"sensitivities.{variable}[{i}][0]", row[0], right)
     if request.sector:
         job = request.sector["job"]
-        _must((folder / f"{job}.inp").is_file(), "sector.job", job, "has no deck beside it")
+        _must((folder / f"{job}.inp").is_file(), "sector.job", job, "has no deck next to it")
     return request
 
 
@@ -96,7 +96,7 @@ def _harmonics(key: str, value: Any) -> None:
     _must(isinstance(value, list) and value, key, value, right)
     for i, n in enumerate(value):
         _whole(0, MAX_HARMONIC)(f"{key}[{i}]", n)
-        _must(n not in value[:i], f"{key}[{i}]", n, "must stand there once")
+        _must(n not in value[:i], f"{key}[{i}]", n, "must be there once")
 
 
 def _sensitivities(key: str, value: Any) -> None:

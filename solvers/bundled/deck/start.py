@@ -117,10 +117,10 @@ def read_start(folder: Path, text: str) -> Array | None:
         return None
     path = folder / FILE
     if comment[1] != FILE or not path.is_file():
-        raise Refused(f"the deck names a shape to start from, and {FILE} is not beside it")
+        raise Refused(f"the deck names a shape to start from, and {FILE} is not next to it")
     content = path.read_bytes()
     if _hash(content) != comment[2]:
-        raise Refused(f"{FILE} is not the shape that the deck names: its SHA-256 is another")
+        raise Refused(f"{FILE} is not the shape that the deck names: its SHA-256 differs")
     shape: Array = np.load(io.BytesIO(content), allow_pickle=False)
     if shape.ndim != 2 or shape.shape[1] != 4 or shape.dtype.kind != "f":
         raise Refused(f"{FILE} must have four numbers a node: its own, and its displacement")

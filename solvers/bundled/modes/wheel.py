@@ -91,7 +91,7 @@ def read_wheel(keywords: list[Block], mesh: DeckMesh, step: DeckStep) -> Wheel |
             continue
         if mesh.X[row, 0] != 0.0:
             raise DeckError(
-                step.procedure.place, "the reference point of a rim that moves stands on the axle"
+                step.procedure.place, "the reference point of a rim that moves must be on the axle"
             )
         rim = np.unique([mesh.index[node] for node in tied])
         wheels.append(Wheel(row, rim, free, *_properties(keywords, elements, reference)))

@@ -70,7 +70,7 @@ class Material:
             raise DeckError(self.place, words)
         E, nu = self.youngs_modulus, self.poissons_ratio
         if not -1 < np.real(nu) < 0.5:
-            words = f"Poisson's ratio of material {self.name} must lie above -1 and below 0.5"
+            words = f"Poisson's ratio of material {self.name} must be above -1 and below 0.5"
             raise DeckError(self.place, words)
         return LinearElastic(np.asarray(E / (2 + 2 * nu)), np.asarray(E / (3 - 6 * nu)))
 

@@ -173,7 +173,7 @@ def _with_embedded(mesh: DeckMesh, keywords: list[Block]) -> DeckMesh:
     blocks = {kind: block.renumbered(new) for kind, block in embedded.blocks.items()}
     for name, rows in mesh.edges.items():
         if (new[rows] < 0).any():
-            raise DeckError(keywords[0].place, f"surface {name} lies on an embedded element")
+            raise DeckError(keywords[0].place, f"surface {name} is on an embedded element")
     index = {number: int(new[row]) for number, row in mesh.index.items() if new[row] >= 0}
     sets = {name: [n for n in nodes if n in index] for name, nodes in mesh.node_sets.items()}
     return replace(
@@ -227,7 +227,7 @@ def _members(k: Block, sets: dict[str, list[int]], known: dict) -> list[int]:
             numbers = range(first, last + 1, max(row.integer(2, 1), 1))
             some = [n for n in in_order if n in numbers]  # a range may have gaps
             if not some:
-                raise DeckError(row.place, f"no member of the set lies from {first} to {last}")
+                raise DeckError(row.place, f"no member of the set is from {first} to {last}")
             members += some
             continue
         for position, text in enumerate(row.fields):

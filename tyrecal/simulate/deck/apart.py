@@ -127,7 +127,7 @@ def serve() -> None:
         except TemplateFailed as error:
             kind, text = BAD, str(error)[:2000].encode("utf-8", "replace")
         except UnicodeEncodeError:
-            kind, text = BAD, f"template '{template}' gives what is no text".encode()
+            kind, text = BAD, f"template '{template}' does not give text".encode()
         answers.write(kind + len(text).to_bytes(8, "big"))
         answers.write(text)
         answers.flush()

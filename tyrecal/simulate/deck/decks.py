@@ -167,7 +167,7 @@ class Decks:
                     for file in own
                 ):
                     raise TemplateFailed(
-                        f"{name} is 0, where keywords of the deck come and go: it has no slope"
+                        f"{name} is 0, where keywords of the deck change: it has no sensitivity"
                         " there, give it another value"
                     )
             result[name] = [

@@ -77,7 +77,7 @@ class DecksDesign:
 
     def neighbour(self, name: str, side: int) -> tuple[Design, float]:
         """None: a fit takes differences of frequencies."""
-        raise TemplateFailed(f"{name}: decks in three dimensions have no exact slopes")
+        raise TemplateFailed(f"{name}: decks in three dimensions have no exact sensitivities")
 
     def explained(self, refusal: str) -> str:
         """The solver's own words."""
@@ -92,7 +92,7 @@ class DecksDesign:
         """File name to text, without the header. Raises TemplateFailed."""
         if request["loads_N"]:
             raise TemplateFailed(
-                "decks in three dimensions are not pressed on a road: they say all"
+                "decks in three dimensions are not pressed on a road: put the road into the decks"
             )
         try:
             files = self.decks.filled(self.case.deck_numbers, 1e3 * self.pressure_kPa)
@@ -124,7 +124,7 @@ def output_lines(decks: OwnDecks, dialect: str) -> Added:
         whole = set(block.parameters) <= {"NSET", "GLOBAL"} and block.get("GLOBAL") != "NO"
         if block.get("NSET") != decks.crown or not whole or not {*of_nodes} <= fields:
             raise block.refused(
-                f"in the step of the modes only NSET={decks.crown} is asked for, with"
+                f"in the step of the modes only NSET={decks.crown} is requested, with"
                 f" {' and '.join(of_nodes)} of all modes in global directions: shapes there name"
                 " the modes"
             )
@@ -152,7 +152,7 @@ def _abaqus(decks: OwnDecks) -> Added:
     blocks = [block for deck in decks.restarted for block in deck.blocks]
     formats = [block for block in blocks if block.name == "FILE FORMAT"]
     if formats and "ASCII" not in formats[0].parameters:
-        raise formats[0].refused("must say ASCII: shapes are read from the results file as text")
+        raise formats[0].refused("must have ASCII: shapes are read from the results file as text")
     first = next(block for block in blocks if block.name == "STEP").place
     has_modal_file = any(block.name == "MODAL FILE" for block in decks.modes_step)
     return {

@@ -84,16 +84,14 @@ def _refuse_unrevolved(tyre: Tyre) -> None:
     point = c.rim.reference_point_m
     rings = {"spindle", "cavity", "coupled", "rotation"} & set(tyre.needs)
     why = {
-        "a revolve takes no *PART: have it written without (of ABAQUS/CAE an attribute of the"
-        " model, 'do not use parts and assemblies in input files')": "PART" in blocks,
+        "a revolve takes no *PART: have it written without (in ABAQUS/CAE: Model, Edit Attributes,"
+        " 'Do not use parts and assemblies in input files')": "PART" in blocks,
         "a half is not revolved: write the whole section": "SYMMETRIC MODEL GENERATION" in blocks,
-        "a revolve goes on from the restart file: put *RESTART, WRITE into the deck": not saved,
+        "a revolve continues from the restart file: put *RESTART, WRITE into the deck": not saved,
         "a revolve needs the rim again: hold it by one *RIGID BODY with TIE NSET": (
             len(bodies) != 1 or "TIE NSET" not in bodies[0].parameters
         ),
-        "a revolve takes contact along that is left out here, as the bead is held: delete it": bool(
-            flat.found.contact
-        ),
+        "a revolve keeps the contact, which is left out here: delete it": bool(flat.found.contact),
         "the pressure must be a *DSLOAD": any(b.name == "DLOAD" for b in flat.found.inflation),
         f"it has no node set {c.deck.crown}: name that of its crown in deck.crown": (
             named(c.deck.crown) not in flat.model.node_sets
@@ -105,8 +103,12 @@ def _refuse_unrevolved(tyre: Tyre) -> None:
         "analysis.static_moduli must be those of its *STATIC": (
             (c.analysis.static_moduli == "long_term") != flat.long_term
         ),
-        "its own text has its nodes where they are: deck.gauges must be 1": bool(c.deck.thickened),
-        f"ABAQUS gets its own text, which has nothing for: {', '.join(sorted(rings))}": bool(rings),
+        "ABAQUS gets the deck's own text with its nodes: deck.gauges must be 1": bool(
+            c.deck.thickened
+        ),
+        f"ABAQUS gets the deck's own text, which cannot express: {', '.join(sorted(rings))}": bool(
+            rings
+        ),
         "it includes a file of the name of a job": bool(
             {"inflate.inp", "modes.inp"} & ({*deck.texts} - {deck.path.name})
         ),

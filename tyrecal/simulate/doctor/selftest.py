@@ -35,30 +35,31 @@ PAGE = """A selftest of tyrecal's decks on ABAQUS/Standard
        abaqus job=modes oldjob=inflate interactive
 
    The first inflates a tyre's section, the second revolves it and finds {modes} modes.
-2. modes.dat lists frequencies in cycles per time (Hz). Modes come in pairs but for two.
-   Expected, of the solver that comes with tyrecal, whose section is the same mesh and whose
-   circumference is exact:
+2. modes.dat lists frequencies in cycles per time (Hz). Modes come in pairs, except two.
+   Expected frequencies, by tyrecal's solver with the same mesh of the section and an exact
+   circumference:
 
 {plain}
-   Within 1 % of them, the decks say what they should. The list holds other modes between and
-   above these, of more waves round the tyre.
+   If they agree within 1 %, the decks are right. The list has other modes between and above
+   these, of more waves round the tyre.
 3. In the folder angular the carcass has *REBAR LAYER, GEOMETRY=ANGULAR with the number {deg:g}.
-   Which column its frequencies are tells how the revolve reads that: in degrees times the
-   distance from the axle, as the manual says; as one spacing of 1 mm; in radians; as metres.
+   Compare its frequencies with these columns. The matching column shows how the revolve reads the
+   number: in degrees times the distance from the axle, as in the manual; as one spacing of 1 mm;
+   in radians; as metres.
 
 {angular}
-   The first two differ less than the mesh may: there divide by the frequency of the same mode in
-   the folder plain. {told} comes to {ratio:.4f} by the manual, to 1.0000 with one spacing. TOTAL
-   MASS OF MODEL in inflate.dat tells the section's reading by itself, that in modes.dat the
-   revolve's. A job that stops for want of an orientation is an answer, too: the manual asks for
-   a cylindrical one in three dimensions, which the revolve should make.
-4. Send back, of each folder: inflate.dat, inflate.msg, inflate.sta, modes.dat, modes.msg,
-   modes.sta, modes.fil, and what 'abaqus information=release' prints. Where a job stops, its
-   ***ERROR lines in .dat or .msg are what we want; stop there, change nothing.
+   The first two columns differ less than two meshes may. To separate them, divide by the frequency
+   of the same mode in the folder plain. {last} is {ratio:.4f} by the manual, and 1.0000 with one
+   spacing. TOTAL MASS OF MODEL in inflate.dat shows how the section reads the number, that in
+   modes.dat how the revolve does. A job that stops because an orientation is missing is a result,
+   too: the manual requires a cylindrical one in three dimensions, which the revolve should make.
+4. Send back, from each folder: inflate.dat, inflate.msg, inflate.sta, modes.dat, modes.msg,
+   modes.sta, modes.fil, and the output of 'abaqus information=release'. If a job stops, send its
+   ***ERROR lines in .dat or .msg, and change nothing.
 
-What it answers besides: whether ABAQUS accepts the decks as they are; whether the revolve takes the
-node set CROWN along and turns about y; whether shapes get into modes.fil without SIM=NO; and where
-the .dat file states the total mass, {mass_kg:.4f} kg in the folder plain.
+The selftest also shows: whether ABAQUS accepts the decks; whether the revolve keeps the node set
+CROWN and turns about y; whether shapes are written to modes.fil without SIM=NO; and where the .dat
+file states the total mass, {mass_kg:.4f} kg in the folder plain.
 """
 
 
@@ -83,7 +84,7 @@ def write_selftest(folder: Path) -> list[Path]:
         plain=_table({"Hz": answer}),
         angular=_table(answers),
         deg=FANNED_DEG,
-        told=last_label,
+        last=last_label,
         ratio=_hertz(answers["manual"])[last_label] / _hertz(answer)[last_label],
         mass_kg=answer.mass_kg,
     )

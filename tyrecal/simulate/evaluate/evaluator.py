@@ -387,7 +387,7 @@ class Evaluator:
         except Damaged as error:
             wrong = str(error)
         if wrong:
-            words = f"the answer of solver '{self.solver.name}' is not used: {wrong}"
+            words = f"the result of solver '{self.solver.name}' is not used: {wrong}"
             raise EvaluationFailed("no_results", words)
 
     def _recall(self, key: str, decks: Decks, folder: Path) -> dict[str, Any] | None:

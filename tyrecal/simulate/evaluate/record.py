@@ -68,14 +68,14 @@ def unpack(data: bytes, key: str) -> tuple[dict[str, Any], Any]:
     except Exception as error:  # any content that tyrecal does not write
         raise Damaged(f"it is not what tyrecal writes ({type(error).__name__})") from None
     if record.get("key") != key:
-        raise Damaged("it does not answer the question that it is named by")
+        raise Damaged("its content is of another evaluation than its name")
     if not isinstance(about, dict):
-        raise Damaged("it does not say which solver answered")
+        raise Damaged("it does not state its solver")
     return about, content
 
 
 def _not_finite(word: str) -> None:
-    raise Damaged(f"{word} stands for a number")
+    raise Damaged(f"{word} is not a number")
 
 
 def _arrays(stored: bytes) -> dict[str, np.ndarray]:
@@ -96,7 +96,7 @@ def _arrays(stored: bytes) -> dict[str, np.ndarray]:
                     raise Damaged("an array has another format")
                 shape, _, dtype = np.lib.format.read_array_header_1_0(file)
                 if dtype.hasobject or prod(shape) * dtype.itemsize != each.file_size - file.tell():
-                    raise Damaged("an array has another size than it says")
+                    raise Damaged("an array has another size than stated")
             with archive.open(each) as file:
                 array = np.lib.format.read_array(file, allow_pickle=False)
             arrays[each.filename.removesuffix(".npy")] = array

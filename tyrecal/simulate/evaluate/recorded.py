@@ -134,7 +134,7 @@ class _Modes(_Tyre):
         if self.pressure_Pa > 0 and len(self.displacement) and not np.any(self.displacement):
             raise ValueError("the inflated tyre is where it was without pressure")
         if any(len(slopes) != len(self.modes) for slopes in self.gradients.values()):
-            raise ValueError("not every mode has a slope")
+            raise ValueError("not every mode has a sensitivity")
         return self
 
 
@@ -230,18 +230,18 @@ def contradiction(answer: Mapping[str, Any], decks: Decks, folder: Path) -> str:
     asked_kPa, request = decks.design.pressure_kPa, decks.request
     pressure_kPa = answer["pressure_Pa"] / 1e3
     if not isclose(pressure_kPa, asked_kPa, rel_tol=1e-6, abs_tol=1e-9):
-        return f"it is of {pressure_kPa:g} kPa, {asked_kPa:g} kPa were asked for"
+        return f"it is of {pressure_kPa:g} kPa, {asked_kPa:g} kPa were requested"
     if "modes" in answer and "highest_harmonic" in request:
         highest, each = request["highest_harmonic"], request["modes_per_harmonic"]
         most = 2 * each * (highest + 1)  # of a solver that gives the two of a pair apart
         if len(answer["modes"]) > most:
-            return f"it has {len(answer['modes'])} modes, {most} at most were asked for"
+            return f"it has {len(answer['modes'])} modes, {most} at most were requested"
         counts = Counter(int(mode["n"]) for mode in answer["modes"] if "amplitude" in mode)
         for n, count in sorted(counts.items()):
             if n > highest:
-                return f"it has a mode of harmonic {n}, the highest asked for is {highest}"
+                return f"it has a mode of harmonic {n}, the highest requested is {highest}"
             if count > each:
-                return f"it has {count} modes of harmonic {n}, {each} were asked for"
+                return f"it has {count} modes of harmonic {n}, {each} were requested"
     return _other_nodes(answer, folder)
 
 

@@ -74,7 +74,7 @@ def find_solver(name: str, command: Sequence[str] = ()) -> Solver:
     if hasattr(solver, "command"):
         solver.command = resolve_program(command or command_of(name)[0] or solver.command)
     elif command:
-        raise InputError(f"solver '{name}' starts no program: it takes no --solver-command")
+        raise InputError(f"solver '{name}' starts no program: leave out --solver-command")
     return solver
 
 

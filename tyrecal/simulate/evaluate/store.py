@@ -95,8 +95,8 @@ class Store:
         with contextlib.suppress(OSError):  # it is not there yet
             if os.name == "posix" and self.folder.stat().st_mode & stat.S_IWOTH:
                 log.warning(
-                    "record '%s' can be written by everybody on this machine: whoever does decides"
-                    " on your numbers ('chmod o-w' ends that)",
+                    "evaluation store '%s' can be written by every user of this machine, who can"
+                    " change your results: run 'chmod o-w' on it",
                     self.folder,
                 )
 
@@ -132,7 +132,7 @@ class Store:
                 partial.write_bytes(data)
         except (OSError, TypeError, ValueError) as error:
             if not self._warned:
-                log.warning("evaluations are not recorded in '%s': %s", self.folder, error)
+                log.warning("evaluations are not stored in '%s': %s", self.folder, error)
             self._warned = True
 
     def prune(self, most_bytes: int = MAX_STORE_BYTES) -> int:
@@ -195,7 +195,7 @@ class Store:
 
     def set_aside(self, path: Path, why: str) -> None:
         """Set a record aside, so that it counts as absent, and report why."""
-        log.warning("record '%s' is damaged and not used: %s", path, why)
+        log.warning("evaluation '%s' is damaged and not used: %s", path, why)
         with contextlib.suppress(OSError):
             path.replace(path.with_suffix(".damaged"))
 
@@ -224,5 +224,5 @@ def _read(path: Path) -> tuple[dict[str, Any], Any]:
         raise Damaged(f"it {error.strerror}") from None
     check(content)
     if not {"solver", "version"} <= about.keys():
-        raise Damaged("it does not say which solver answered")
+        raise Damaged("it does not state its solver")
     return about, content

@@ -59,8 +59,8 @@ def _programs(data: Mapping[str, Any]) -> Problems:
         if key == "command":
             yield (
                 ("solver", "options", "command"),
-                "a case cannot say which program runs: that is the user's to say, by"
-                " --solver-command, TYRECAL_SOLVER_COMMAND or 'commands' of the settings file that"
+                "a case cannot say which program runs: set it with --solver-command,"
+                " TYRECAL_SOLVER_COMMAND or 'commands' of the settings file that"
                 " 'tyrecal solvers' names",
             )
 

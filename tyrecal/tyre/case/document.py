@@ -137,7 +137,7 @@ class _Harmless(Parser):
         if self.events > MAX_EVENTS:
             raise _Harmful(line, f"there are more than {MAX_EVENTS} keys and values")
         if getattr(event, "version", None) or getattr(event, "tags", None):
-            raise _Harmful(0, "a directive, as %YAML, must go: a case is plain YAML 1.2")
+            raise _Harmful(0, "remove the directive, as %YAML: a case is plain YAML 1.2")
         self.depth += isinstance(event, CollectionStartEvent)
         self.depth -= isinstance(event, CollectionEndEvent)
         if self.depth > DEEPEST:
@@ -195,7 +195,7 @@ class _Reader:
                         line + 1,
                         dotted((*keys, key)),
                         "given twice",
-                        f"it stands on line {first} already, one of the two must go",
+                        f"it is on line {first} already, remove one of the two",
                     )
                 )
             else:

@@ -45,8 +45,8 @@ class LoadedCase:
         """The section. Raises InputError where there is none."""
         if self.drawn is None:
             raise InputError(
-                f"'{self.path}' has no section, which this needs: its tyre stands in decks in three"
-                " dimensions"
+                f"'{self.path}' has no section, which this command needs: its tyre is given by"
+                " decks in three dimensions"
             )
         return self.drawn
 

@@ -165,7 +165,7 @@ class TargetMode(Part):
         if c is None or m is None:
             return
         if c == m == 0 and kind is None:
-            yield "kind", "must be axial or torsional for the mode [0,0]"
+            yield "kind", "must be axial (lateral) or torsional for the mode [0,0]"
         if (c or m) and kind is not None:
             yield "kind", f"must be absent: only [0,0] has a kind, this mode is [{c},{m}]"
         loaded = [key for key in ("load_N", "symmetry") if values.get(key) is not None]
@@ -201,7 +201,7 @@ class TargetFootprint(Part):
             every = " or ".join(FOOTPRINT_QUANTITIES)
             yield "load_N", f"must come with what was measured at this load, {every}"
         elif len(given) > 1:
-            yield given[1], f"must be a target of its own: this one holds {given[0]} already"
+            yield given[1], f"must be a separate target: this one holds {given[0]} already"
         else:
             own = FOOTPRINT_QUANTITIES[given[0]].sigma
             if values.get(own) is None:
@@ -332,7 +332,7 @@ class Case(Part):
         else:
             yield from ((key, "must be absent with deck") for key in IN_A_DECK if key in given)
             if part_values(values.get("rim")).get("holds", WHOLE_BEAD) != WHOLE_BEAD:
-                yield "rim", "must not say holds with deck, which names the nodes that it holds"
+                yield "rim", "must be absent with deck, which names the nodes that it holds"
         if part_values(values.get("deck")).get("decks"):
             yield from cls._beside_decks(values)
 
@@ -342,14 +342,14 @@ class Case(Part):
         case."""
         for key in IN_DECKS:
             if cls._is_given(key, values.get(key)):
-                yield key, "must be absent with deck.decks, where it stands"
+                yield key, "must be absent with deck.decks, which contain it"
         rim = part_values(values.get("rim"))
         spindle = part_values(rim.get("spindle"))
         if rim.get("free") is True or any(number(spindle, key) for key in spindle):
-            yield "rim", "must be held: with deck.decks, what moves stands there"
+            yield "rim", "must be held: the decks of deck.decks contain the parts that move"
         usual, given = Analysis().__dict__, part_values(values.get("analysis"))
         if any(given.get(key, usual[key]) != usual[key] for key in usual.keys() - {HIGHEST}):
-            yield "analysis", f"must say {HIGHEST} alone: with deck.decks, all else stands there"
+            yield "analysis", f"must say {HIGHEST} alone: the decks of deck.decks contain all else"
 
     @classmethod
     def _is_given(cls, key: str, value: Any) -> bool:

@@ -13,9 +13,9 @@ HIGHER_m = 0.010  # fillers of one size reach 30 to 60 mm above the rim
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
-    """Shear and bulk modulus of the rubber of lower sidewall and bead times 1 + value: of what lies
-    between the carcass and its turn-up, where it has one. A rim that holds the bead's surface
-    alone leaves the filler within it to give way."""
+    """Shear and bulk modulus of the rubber of lower sidewall and bead times 1 + value. If the
+    carcass has a turn-up, only the rubber between the two is meant. If the rim holds only the
+    bead's surface, the filler within the bead deforms."""
     if not value > -1:
         raise ValueError("must be greater than -1")
     return _stiffer(case, _place(case)[0], 1 + value)
@@ -23,7 +23,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 def higher(case: LoadedCase, value: float) -> LoadedCase:
     """The same, reaching 10 mm further: the region above as much stiffer on the whole. Raises
-    ValueError where none is above."""
+    ValueError if none is above."""
     top = stations(case.section, _place(case)[0][0])[0]
     above = [name for name in sidewall(case) if stations(case.section, name)[1] == top]
     if not above:

@@ -1,4 +1,4 @@
-"""The bead does not sit: there is a gap between it and the rim, from the flange's top down."""
+"""The bead is not seated: there is a gap between bead and rim, from the flange's top down."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ GAP_ENDING = "_gap"  # with which the region's name ends
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
-    """The rim lets go of a share ``value`` of the bead's length, and of `LEAST` of the rest: a
-    region of its own with the bead's rubbers and cords, and half as many elements."""
+    """The rim does not hold a share ``value`` of the bead's length, and `LEAST` of the rest. That
+    part is a separate region with the bead's rubbers and cords, and half as many elements."""
     if not 0 <= value < 1:
         raise ValueError("must be at least 0 and less than 1")
     section = case.section
     bead, *others = held_regions(section)
     first, last = stations(section, bead)
     if others or first != rim_edge(section):
-        raise ValueError(f"must be 0: what the rim holds is not one region, '{bead}'")
+        raise ValueError(f"must be 0: the rim must hold one region, '{bead}'")
     for name, there in zip(section.names, present(section)[:, first + 1 : last + 1], strict=True):
         if there.any() and not there.all():
             raise ValueError(f"must be 0: line '{name}' ends within the bead")
@@ -106,7 +106,7 @@ EFFECT = Effect(
         " the rest by 1 %; a re-fit leaves [1,1] 1.2 % too low, [1,0] 1 % too high"
     ),
     toggle="let the air out, wet both beads with soap, inflate until they snap onto their seats,"
-    " and look that the moulded line runs level with the flange all round",
+    " and check that the moulded line runs level with the flange all round",
     aliases=("rim_width",),
     add=add,
     # how far a bead rolls about its wires

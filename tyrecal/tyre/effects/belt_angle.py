@@ -1,4 +1,4 @@
-"""The belts' cords lie at another angle than stated: lift in the mould, or the cutter's setting."""
+"""The belts' cords have another angle than stated: lift in the mould, or the cutter's setting."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .parts import belts
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
-    """Every belt cord ``value`` degrees further from the circumference, mirrored as they are."""
+    """Every belt cord ``value`` degrees further from the circumference, mirrored as before."""
     moved = {}
     for name in belts(case):
         layer = case.case.rebar_layers[name]
@@ -30,7 +30,7 @@ def _turned(name: str, angle_deg: float, value: float) -> float:
 
 
 def add_to_deck(case: LoadedCase, value: float) -> LoadedCase:
-    """The same of the layers of ``deck.parts.belts``."""
+    """In a deck: the layers of ``deck.parts.belts``."""
     return with_angles(case, "belts", lambda name, angle_deg: _turned(name, angle_deg, value))
 
 

@@ -1,4 +1,4 @@
-"""A textile layer over the belt, its cords round the tyre."""
+"""A textile layer over the belt, with cords round the tyre."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ EFFECT = Effect(
         "pressure; [0,0] and [1,1] down 1 % by its mass; a re-fit leaves [0,0] torsional "
         "3 % too low"
     ),
-    toggle="section a tyre of the same build, or look the construction up on its sidewall",
+    toggle="section a tyre of the same build, or read the construction on its sidewall",
     aliases=("belt_width", "bead_filler", "belt_angle"),
     add=add,
     # one layer or more at the edges; wound at 0 to 5 degrees; its width is integrated over

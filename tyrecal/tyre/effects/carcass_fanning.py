@@ -1,4 +1,4 @@
-"""Cords of a radial carcass keep their number round the tyre: they stand closer at the bead."""
+"""A radial carcass has the same number of cords at every radius: they are closer at the bead."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from .parts import carcass, carcass_line, rim_edge
 def add(case: LoadedCase, value: float) -> LoadedCase:
     """A share ``value`` of the carcass' cords at a constant angle, the rest at constant spacing.
 
-    A/s = A/s0 (1 - value + value R_bead / R). Equal at the bead, because the spacing in a
-    tyre's specification is that on the building drum, whose diameter is about the bead's.
+    A/s = A/s0 (1 - value + value R_bead / R). Equal at the bead, because a tyre's specification
+    states the spacing on the building drum, of about the bead's diameter.
     """
     if not 0 < value <= 1:
         raise ValueError("must be between 0 and 1")
@@ -52,8 +52,7 @@ EFFECT = Effect(
     changes=("*REBAR LAYER",),
     signature=(
         "all down, most those that the sidewall's tension holds: [1,0] and [0,0] lateral -3"
-        " %, [4,0] -0.6 % at e = 1, more at higher pressure; A_carcass takes up all but "
-        "0.1 %"
+        " %, [4,0] -0.6 % at e = 1, more at higher pressure; A_carcass absorbs all but 0.1 %"
     ),
     toggle="count the cords per length at the crown and at the bead of a tyre that is cut open",
     aliases=("temperature_drift",),

@@ -17,7 +17,7 @@ from .parts import carcass, carcass_line, held_regions, lower_sidewall, present,
 def add(case: LoadedCase, value: float) -> LoadedCase:
     """The carcass once more, ``value`` times as stiff and heavy, up to the widest point.
 
-    It lies on the next line outside the carcass, which goes on to the bead for it.
+    It is on the next line outside the carcass, and this line continues to the bead.
     """
     if not value > 0:
         raise ValueError("must be at least 0")
@@ -73,7 +73,7 @@ EFFECT = Effect(
     changes=("*REBAR LAYER", "*ELEMENT", "*SURFACE SECTION"),
     signature=(
         "all up, [0,0] lateral and [1,1] most: +3 % at e = 1 and a soft carcass (0.7 MN/m),"
-        " [c,0] +1 to +2 %; A_carcass takes up all but 0.4 %"
+        " [c,0] +1 to +2 %; A_carcass absorbs all but 0.4 %"
     ),
     toggle="section a tyre of the same build and measure the height at which the turn-up ends",
     aliases=("rim_width",),

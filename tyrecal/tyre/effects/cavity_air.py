@@ -1,4 +1,4 @@
-"""The air in the tyre has inertia and stiffness of its own, beside its pressure."""
+"""The air in the tyre has inertia and stiffness, in addition to its pressure."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from .effect import Effect
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
-    """``value`` times the density and the bulk modulus of the gas; 1 = as it is."""
+    """``value`` times the density and the bulk modulus of the gas; 1 = air at the stated
+    pressure."""
     cavity = case.case.cavity
     return changed(case, cavity=with_part(cavity, share=cavity.share + value))
 

@@ -16,7 +16,7 @@ FREQUENCY_HZ, TAU_S = 100.0, 1000.0
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
-    """Shear modulus of the vibration times 1 + value; that of the inflated state stays."""
+    """Shear modulus of the vibration times 1 + value; that of the inflated state is unchanged."""
     analysis = case.case.analysis
     long_term = analysis.static_moduli == "long_term"
 
@@ -45,7 +45,7 @@ def _fast(case: LoadedCase) -> LoadedCase:
 
 
 def add_to_deck(case: LoadedCase, value: float) -> LoadedCase:
-    """The same of all compounds, by the Prony series that they have."""
+    """In a deck: all compounds, by their Prony series."""
     analysis = case.case.analysis
     if analysis.static_moduli != "long_term" or analysis.vibration_frequency_Hz is not None:
         raise ValueError("needs static_moduli: long_term and vibration_frequency_Hz: null")
@@ -82,7 +82,7 @@ EFFECT = Effect(
     changes=("*VISCOELASTIC", "*FREQUENCY"),
     signature=(
         "all up, [0,0] torsional most: +12 % at e = 1, [2,1] and [3,1] +7 %, [0,0] lateral "
-        "least, +3 %; a little less at higher pressure; C10 takes up all but 0.4 %"
+        "least, +3 %; a little less at higher pressure; C10 absorbs all but 0.4 %"
     ),
     toggle="excite ten times harder: the modulus of filled rubber falls with strain amplitude",
     aliases=("temperature", "bead_filler"),

@@ -65,7 +65,9 @@ class Effect:
         """The effect's `add` for a case. Raises ValueError where the case has nothing that it
         changes."""
         if case.decks:
-            raise ValueError("changes a section, and the tyre stands in decks in three dimensions")
+            raise ValueError(
+                "changes a section, and the tyre is given by decks in three dimensions"
+            )
         if case.deck is None or case.case.deck is None:
             return self.add
         if self.add_to_deck is None:

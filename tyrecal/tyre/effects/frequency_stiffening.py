@@ -1,4 +1,5 @@
-"""Rubber grows stiffer with frequency: low modes are softer than one modulus says, high stiffer."""
+"""Rubber grows stiffer with frequency: low modes are softer and high modes stiffer than with one
+modulus."""
 
 from __future__ import annotations
 
@@ -8,7 +9,7 @@ from .effect import Effect
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
-    """Each mode's shear modulus times (f / f_ref)^value, f its own frequency.
+    """Each mode's shear modulus times (f / f_ref)^value, at the mode's frequency f.
 
     f_ref is each rubber's ``reference_frequency_Hz`` (60 Hz): a tilt over the modes, no level.
     """

@@ -8,7 +8,7 @@ from .effect import Effect
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
-    """A mass more on the middle of the tread."""
+    """An additional mass on the middle of the tread."""
     if value < 0:
         raise ValueError("must be at least 0")
     point = case.case.point_mass
@@ -25,10 +25,10 @@ EFFECT = Effect(
     high=0.1,
     changes=("*MASS",),
     signature=(
-        "one member of each doublet falls, the other hardly does: -1.1 to -2.5 % and 0 at 0.1 kg, "
+        "one member of each pair falls, the other hardly does: -1.1 to -2.5 % and 0 at 0.1 kg, "
         "in plane by up to -0.9 %; both [0,0] -0.6 %; the re-fit leaves 0.2 % of the means"
     ),
-    toggle="measure again without it, or with twice of it",
+    toggle="measure again without it, or with twice the mass",
     aliases=("tread_density",),
     add=add,
     add_to_deck=add,

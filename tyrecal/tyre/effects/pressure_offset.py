@@ -1,4 +1,4 @@
-"""The gauge reads wrong: the tyre's true pressure is the stated one plus an offset."""
+"""The gauge has an error: the tyre's true pressure is the stated one plus an offset."""
 
 from __future__ import annotations
 

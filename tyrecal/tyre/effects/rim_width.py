@@ -16,11 +16,11 @@ Array = np.ndarray
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
-    """Beads ``value`` further apart, the sidewall bent to them with its carcass as long as it was.
+    """Beads ``value`` further apart. The sidewall bends to them, and its carcass keeps its length.
 
-    What the mounting alone would do to a carcass that bends but does not stretch. The stresses
-    of that bending are left out: with them, by pushing the solver's rim apart, the frequencies
-    of the fitted P235/75R17 differ by less than 0.07 % at half an inch.
+    This is the shape of a mounted carcass that bends but does not stretch. The stresses of the
+    bending are left out. With them, the frequencies of the fitted P235/75R17 differ by less than
+    0.07 % at half an inch.
     """
     section = case.section
     line = section.names.index(carcass_line(case))
@@ -88,7 +88,7 @@ EFFECT = Effect(
     changes=("*NODE",),
     signature=(
         "[0,0] lateral and [1,1] up 7 %, [2,1] up 4 %, [3,1] up 3 % at +12.7 mm, in-plane "
-        "modes up 1 to 2 %; half of it is left after a re-fit"
+        "modes up 1 to 2 %; half of it remains after a re-fit"
     ),
     toggle="measure the rim between its flanges; mount the tyre on the next wider rim",
     aliases=("carcass_turn_up", "bead_seat"),

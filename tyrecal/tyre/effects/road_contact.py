@@ -1,4 +1,4 @@
-"""The tyre stands on a road, barely: a small patch that sticks to it."""
+"""The tyre touches a road lightly, with a small patch that sticks to it."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from .effect import Effect
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
-    """Springs more from the tread to the ground, as stiff along the road as down: the road holds
-    what sticks to it alike in all directions, and how the rubber gives way is the tyre's own; it
-    stays round."""
+    """Additional springs from the tread to the ground, as stiff along the road as vertically,
+    because the patch sticks. The tyre stays round."""
     if value < 0:
         raise ValueError("must be at least 0")
     spring = case.case.road_spring
@@ -33,9 +32,10 @@ EFFECT = Effect(
     high=6e5,
     changes=("*SPRING",),
     signature=(
-        "at 0.31 MN/m as under a load of 100 N: of each [c,1] the member symmetric about the patch "
-        "rises, [1,1] by 24 %, [2,1] by 11 %, the other one stays; both of [c,0] rise, [1,0] by 4 "
-        "and 8 %; [0,0] torsional by 16, axial by 5 %"
+        "at 0.31 MN/m as under a load of 100 N: the member of [c,1] symmetric about the patch"
+        " rises, [1,1] by 24 %, [2,1] by 11 %, the other does not move; both members of [c,0]"
+        " rise, [1,0] by 4 "
+        "and 8 %; [0,0] torsional by 16, lateral by 5 %"
     ),
     toggle="lift the tyre off, or turn it between two measurements",
     aliases=("bead_filler",),

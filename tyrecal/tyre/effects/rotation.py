@@ -1,4 +1,4 @@
-"""The tyre turns: its waves run forward and backward at different frequencies."""
+"""The tyre rotates: its waves run forward and backward at different frequencies."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ EFFECT = Effect(
     high=80.0,
     changes=("*DLOAD", "*COMPLEX FREQUENCY"),
     signature=(
-        "doublets split by +-(n - 2 n/(n^2 + 1)) Omega in plane, +-0.96 Omega for [1,1]; the mean "
+        "pairs split by +-(n - 2 n/(n^2 + 1)) Omega in plane, +-0.96 Omega for [1,1]; the mean "
         "of the two rises by 1 to 8 % at 80 rad/s, least [1,0] and [0,0] torsional"
     ),
     toggle="measure again at another speed, or at rest",

@@ -22,7 +22,7 @@ def _factor(value: float) -> float:
 
 
 def add_to_deck(case: LoadedCase, value: float) -> LoadedCase:
-    """The same of what ``deck.parts.sidewall`` is thick outside the cords."""
+    """In a deck: the thickness of ``deck.parts.sidewall`` outside the cords."""
     return with_thickness(case, "sidewall", _factor(value))
 
 

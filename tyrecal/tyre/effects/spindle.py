@@ -1,4 +1,4 @@
-"""Compliance of the spindle that holds the wheel: the rim moves with its own mass."""
+"""Compliance of the spindle that holds the wheel: the rim moves with its mass."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ EFFECTS = (
         symbol="c_y",
         unit="m/N",
         high=4e-07,
-        signature="[0,0] lateral down, -10 % at 4e-7 m/N and 240 kPa, the more the higher the"
-        " pressure; no other mode; a re-fit hides a quarter",
+        signature="[0,0] lateral down, -10 % at 4e-7 m/N and 240 kPa, more at higher pressure; no"
+        " other mode; a re-fit hides a quarter",
         toggle="press on the hub along the axle and read a dial gauge; or use a stiffer clamp",
         aliases=(),
     ),
@@ -71,7 +71,7 @@ EFFECTS = (
         symbol="c_r",
         unit="m/N",
         high=1e-07,
-        signature="[1,0] down, -7 % at 1e-7 m/N and 240 kPa, the more the higher the pressure;"
+        signature="[1,0] down, -7 % at 1e-7 m/N and 240 kPa, more at higher pressure;"
         " [1,1] hardly, no other mode; a re-fit hides two fifths",
         toggle="press on the hub radially and read a dial gauge; or use a stiffer clamp",
         aliases=("cavity_air",),
@@ -84,8 +84,8 @@ EFFECTS = (
         symbol="c_t",
         unit="rad/(N m)",
         high=2e-06,
-        signature="[0,0] torsional down, -6 % at 2e-6 rad/(N m) and 240 kPa, the more the higher"
-        " the pressure; no other mode; a re-fit hides a quarter",
+        signature="[0,0] torsional down, -6 % at 2e-6 rad/(N m) and 240 kPa, more at higher"
+        " pressure; no other mode; a re-fit hides a quarter",
         toggle="turn the locked hub with a torque wrench and read a dial gauge;"
         " or lock it elsewhere",
         aliases=("belt_width", "cap_ply", "temperature", "frequency_stiffening"),
@@ -98,8 +98,8 @@ EFFECTS = (
         symbol="c_d",
         unit="rad/(N m)",
         high=4e-06,
-        signature="[1,1] down, -9 % at 4e-6 rad/(N m) and 240 kPa, the more the higher the"
-        " pressure; [1,0] hardly, no other mode; a re-fit hides a quarter",
+        signature="[1,1] down, -9 % at 4e-6 rad/(N m) and 240 kPa, more at higher pressure; [1,0]"
+        " hardly, no other mode; a re-fit hides a quarter",
         toggle="press on the flange sideways and read two dial gauges; or use a stiffer clamp",
         aliases=(),
     ),

@@ -1,4 +1,4 @@
-"""Effect of a stiff sector: plies or tread overlap at a splice."""
+"""A splice: plies or tread overlap in a sector, which is stiffer than the rest."""
 
 from __future__ import annotations
 
@@ -10,18 +10,17 @@ from .effect import Effect
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
-    """The case with C10 and C01 of rubber and E of cords times 1 + value in one sector, which is
-    ``splice.width_deg`` wide."""
+    """Stiffness of rubber (C10, C01) and cords (E) times 1 + value, in a sector of the case's
+    width."""
     numbers = []
     for name, material in case.case.materials.items():
         rubber = isinstance(material, Rubber)
         keys = ("C10_Pa", "C01_Pa") if rubber else ("youngs_modulus_Pa",)
         numbers += [f"materials.{name}.{key}" for key in keys]
-    return _with_sector(case, value, numbers)
+    return _spliced(case, value, numbers)
 
 
-def _with_sector(case: LoadedCase, value: float, numbers: list[str]) -> LoadedCase:
-    """The case with the numbers at these paths times 1 + value in the sector."""
+def _spliced(case: LoadedCase, value: float, numbers: list[str]) -> LoadedCase:
     if not value > -1:
         raise ValueError("must be greater than -1")
     splice = case.case.splice
@@ -31,9 +30,8 @@ def _with_sector(case: LoadedCase, value: float, numbers: list[str]) -> LoadedCa
 
 
 def add_to_deck(case: LoadedCase, value: float) -> LoadedCase:
-    """The case with all shear constants and moduli of the deck's materials times 1 + value in one
-    sector."""
-    return _with_sector(case, value, stresses(case))
+    """In a deck: all shear constants and moduli of its materials."""
+    return _spliced(case, value, stresses(case))
 
 
 EFFECT = Effect(
@@ -44,16 +42,17 @@ EFFECT = Effect(
     unit="",
     low=0.0,
     high=1.0,
-    changes=("a second section deck, of the sector",),
+    changes=("the section of the sector, next to the deck",),
     signature=(
-        "all up by 0.2 to 0.4 % at e = 1, doublets split by 0.2 to 0.4 %, [c,1] most; calibration "
-        "of C10 absorbs the means, the splits remain"
+        "all up by 0.2 to 0.4 % at e = 1, pairs split by 0.2 to 0.4 %, [c,1] most; C10 absorbs the"
+        " means, the splits remain"
     ),
-    toggle="find the sector by hand or X-ray; excite at it, then 90/c degrees from it",
+    toggle="find the sector by hand or X-ray; excite at the sector and next to it to measure each"
+    " member alone",
     aliases=("point_mass",),
     add=add,
     add_to_deck=add_to_deck,
     needs="coupled",
-    # plies and tread overlap over different widths, so a real splice differs from this one sector
+    # plies and tread overlap by widths of their own
     law=0.10,
 )

@@ -1,4 +1,4 @@
-"""The rubber is warmer or colder than where its modulus was calibrated: softer or stiffer."""
+"""The rubber is warmer or colder than at the calibration of its modulus: softer or stiffer."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ PER_KELVIN = -0.0075  # of the shear modulus; filled tread rubbers at 20 to 60 C
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
-    """C10 and C01 times 1 - 0.0075 value; the bulk modulus 2 / D1 stays."""
+    """C10 and C01 times 1 - 0.0075 value; the bulk modulus 2 / D1 is unchanged."""
     factor = _factor(value)
     return with_rubbers(
         case, lambda m: with_part(m, C10_Pa=factor * m.C10_Pa, C01_Pa=factor * m.C01_Pa)
@@ -26,7 +26,7 @@ def _factor(value: float) -> float:
 
 
 def add_to_deck(case: LoadedCase, value: float) -> LoadedCase:
-    """The same of all compounds' shear constants."""
+    """In a deck: the shear constants of all compounds."""
     return with_compounds(case, "", "HYPERELASTIC", stiffer(_factor(value), bulk=False))
 
 
@@ -42,7 +42,7 @@ EFFECT = Effect(
     changes=("*HYPERELASTIC",),
     signature=(
         "all down, [0,0] torsional most: -1.5 % at +15 K, [2,1] and [3,1] -1 %, [0,0] "
-        "lateral least; just as C10"
+        "lateral least; as with C10"
     ),
     toggle="measure again with the tyre soaked at another temperature, at the same pressure "
     "(sealed, 15 K warmer, it gains 17 kPa at 240 kPa: +2.5 %)",

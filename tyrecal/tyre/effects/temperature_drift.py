@@ -29,9 +29,9 @@ EFFECT = Effect(
     pressure_power=-1,
     changes=("*HYPERELASTIC",),
     signature=(
-        "nothing at the case's own pressure, below it all up, above it all down by the "
+        "no change at the case's pressure, below it all up, above it all down by the "
         "pattern of the temperature: [0,0] torsional -0.3 % at 320 kPa for 5 K per 100 "
-        "kPa; a slope over pressure that is a little too low"
+        "kPa; the growth with pressure is a little too low"
     ),
     toggle="measure the first pressure once more at the end of the run",
     aliases=("carcass_fanning",),

@@ -23,7 +23,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 
 def as_voids(case: LoadedCase, value: float) -> LoadedCase:
-    """The same by voids, which take as much stiffness; a compound takes none."""
+    """The same by voids, which reduce the stiffness as much; a compound does not."""
     factor = 1 + value
     return with_rubbers_at(
         add(case, value),
@@ -37,7 +37,7 @@ def as_voids(case: LoadedCase, value: float) -> LoadedCase:
 
 
 def add_to_deck(case: LoadedCase, value: float) -> LoadedCase:
-    """The same of the compounds of ``deck.parts.tread``."""
+    """In a deck: the compounds of ``deck.parts.tread``."""
     if not value > -1:
         raise ValueError("must be greater than -1")
     return with_compounds(case, "tread", "DENSITY", lambda _, number: (1 + value) * number)
@@ -56,7 +56,7 @@ EFFECT = Effect(
     changes=("*DENSITY", "*SOLID SECTION"),
     signature=(
         "all up alike as it gets lighter: +6 to +8 % at e = -0.25 and every pressure; "
-        "A_belt, whose mass it resembles, takes up all but 0.3 %"
+        "A_belt resembles it by its mass, and absorbs all but 0.3 %"
     ),
     toggle="weigh the tyre; buff the tread smooth, weigh and measure again",
     aliases=("sidewall_gauge", "pressure_offset"),

@@ -26,13 +26,13 @@ def _factor(value: float) -> float:
 
 
 def add_to_deck(case: LoadedCase, value: float) -> LoadedCase:
-    """The same of ``deck.parts.tread``."""
+    """In a deck: the gauge of ``deck.parts.tread``."""
     return with_thickness(case, "tread", _factor(value))
 
 
 def at_shoulders(case: LoadedCase, value: float) -> LoadedCase:
-    """As much in the mean, by a parabola 1.4 times that at the tread's edges and 0.8 in its
-    middle."""
+    """The same wear on average, distributed by a parabola: 1.4 times at the tread's edges and 0.8
+    in its middle."""
     section, worn = case.section, add(case, value)
     last = max(stations(section, name)[1] for name in crown(case))
     inner = section.names.index(tread(case)[0])
@@ -58,7 +58,7 @@ EFFECT = Effect(
     changes=("*NODE",),
     signature=(
         "all up: +13 to +18 % at w = 0.5, in-plane modes more than [2,1] and [3,1]; "
-        "A_belt takes up all but 0.7 %"
+        "A_belt absorbs all but 0.7 %"
     ),
     toggle="measure the groove depth; buff the tread by a known depth and measure again",
     aliases=("tread_density", "rim_width"),

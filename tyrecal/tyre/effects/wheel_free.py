@@ -1,4 +1,4 @@
-"""The wheel is not fixed at all: it hangs in soft cords and moves with its own mass."""
+"""The wheel is not fixed: it is suspended in soft cords and moves with its mass."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .effect import Effect
 def add(case: LoadedCase, value: float) -> LoadedCase:
     """Nothing holds the rim; its mass is 1 / ``value``, its radii of gyration are the case's.
 
-    So value -> 0 is a wheel so heavy that it stands still.
+    At value -> 0 the wheel is so heavy that it does not move.
     """
     rim = case.case.rim
     if value < 0:
@@ -41,9 +41,9 @@ EFFECT = Effect(
     changes=("*BOUNDARY", "*MASS", "*ROTARY INERTIA"),
     signature=(
         "[0,0] lateral +37 %, [0,0] torsional +114 %, [1,1] +105 %, [1,0] +33 % with a wheel of "
-        "10 kg, at any pressure alike; all of c >= 2 stay to the last digit"
+        "10 kg, at any pressure alike; modes of c >= 2 do not change"
     ),
-    toggle="bolt the hub to a heavy block, or hang the wheel in soft cords: the other support",
+    toggle="bolt the hub to a heavy block, or suspend the wheel in soft cords: the other support",
     aliases=("bead_filler",),
     add=add,
     add_to_deck=add,

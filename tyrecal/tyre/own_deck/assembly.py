@@ -59,7 +59,7 @@ def collect(blocks: Sequence[Block]) -> Assembly:
             instance = part = None
         elif part is not None:
             if instance and part.instances:
-                raise block.refused("stands in an *INSTANCE: give it in the *PART")
+                raise block.refused("is in an *INSTANCE: give it in the *PART")
             if block.name in MESH_READERS:
                 read(part.scope, block)
             part.other.append(block)
@@ -166,5 +166,5 @@ def _other(made: Assembly, block: Block, prefix: str, parts: dict[str, Part]) ->
         made.held.append(block)
     elif name == "SYMMETRIC MODEL GENERATION":
         if made.reflect:
-            raise block.refused("stands there twice")
+            raise block.refused("is there twice")
         made.reflect = block

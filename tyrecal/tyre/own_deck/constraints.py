@@ -126,7 +126,7 @@ class Constraints:
                 slaves, surface_nodes(self.made, name, block, row)
             ).items():
                 raise block.refused(
-                    f"node {n} lies {distance:.3g} from the nearest node that it could be tied to:"
+                    f"node {n} is {distance:.3g} from the nearest node that it could be tied to:"
                     " only nodes in the same place are, mesh both alike",
                     row,
                 )
@@ -150,7 +150,7 @@ class Constraints:
         for n, distance in zip(slaves, away, strict=True):
             if distance > max(allowed, self.near):
                 raise block.refused(
-                    f"node {n} lies {distance:.3g} from the rim: ABAQUS leaves it free, or moves"
+                    f"node {n} is {distance:.3g} from the rim: ABAQUS leaves it free, or moves"
                     " it there; with ADJUST=NO and a POSITION TOLERANCE as large it is held",
                     row,
                 )

@@ -58,7 +58,7 @@ class Contact:
                 if len(touching):
                     raise pair.block.refused(
                         f"the contact of {pair.name} is not honoured, only that of a bead with its"
-                        f" rim: node {touching[0]} lies {distance[0]:.3g} from it",
+                        f" rim: node {touching[0]} is {distance[0]:.3g} from it",
                         pair.row,
                     )
                 words.append(f"contact of {pair.name}, which do not touch in this step")
@@ -101,7 +101,7 @@ class Contact:
         motion = self.tied.motions.get(body.reference, {})
         moved = pieces + np.array([motion.get(1, 0.0), motion.get(2, 0.0)])
         if not (len(moved) and np.abs(moved).max() < FARTHEST):
-            raise block.refused(f"{master} has no length, or lies where no tyre is", row)
+            raise block.refused(f"{master} has no length, or is where no tyre is", row)
         own = tuple(dict.fromkeys(self.tied.same.get(n, n) for n in nodes))
         if len(own) * len(moved) > MAX_DISTANCES:
             raise block.refused(f"{slave} and {master} have too many nodes and segments", row)
@@ -127,7 +127,8 @@ class Contact:
         for each, touching, _ in free:
             if not {1, 2} <= self.tied.motions.get(each.reference, {1: 0.0, 2: 0.0}).keys():
                 raise each.block.refused(
-                    f"contact of {each.name} is not honoured, and where the rim is cannot be known:"
+                    f"contact of {each.name} is not honoured, and the place of the rim is not"
+                    " known:"
                     f" *BOUNDARY must hold or move its node {each.reference} in 1 and 2",
                     each.row,
                 )
@@ -135,9 +136,10 @@ class Contact:
                 X = np.array([self.root.nodes[n] for n in each.nodes])
                 away, _ = nearest(X, each.pieces)
                 raise each.block.refused(
-                    f"contact of {each.name} is not honoured, and none of the nodes touches the rim"
-                    f" where it is after its last motion: node {each.nodes[int(away.argmin())]} is"
-                    f" the nearest, {away.min():.3g} away; hold the bead by *BOUNDARY, ENCASTRE",
+                    f"contact of {each.name} is not honoured, and none of the nodes touches the"
+                    " rim at its place after its last motion: node"
+                    f" {each.nodes[int(away.argmin())]} is the nearest, {away.min():.3g} away;"
+                    " hold the bead by *BOUNDARY, ENCASTRE",
                     each.row,
                 )
         nodes = sorted({int(n) for _, touching, _ in free for n in touching})

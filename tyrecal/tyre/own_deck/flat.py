@@ -191,7 +191,7 @@ def _materials(blocks: Sequence[Block]) -> dict[str, list[Block]]:
             current = by_name[name] = [block]
         elif block.name in MATERIAL_OPTIONS:
             if any(each.name == block.name for each in current):
-                raise block.refused(f"stands twice under {current[0].get('NAME')}")
+                raise block.refused(f"is given twice under {current[0].get('NAME')}")
             fields_of(block)
             current.append(block)
     return by_name

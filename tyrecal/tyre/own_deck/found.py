@@ -109,8 +109,9 @@ def words(content: dict[str, Any], mass_kg: float) -> Iterator[str]:
     if content["left_out"]:
         yield f"left out: {'; '.join(content['left_out'])}"
     if content["passed_over"]:
-        yield f"passed over, as they change no answer: *{', *'.join(content['passed_over'])}"
+        yield f"ignored, because they change no result: *{', *'.join(content['passed_over'])}"
     if content["later_steps"]:
         yield (
-            f"left out, as they come after the inflation: steps {', '.join(content['later_steps'])}"
+            "left out, because they come after the inflation: steps"
+            f" {', '.join(content['later_steps'])}"
         )

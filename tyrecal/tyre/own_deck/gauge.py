@@ -62,7 +62,7 @@ def _growth(model: Model, sets: Sets) -> Mapping[int, Point]:
         lines = [model.elements[n].nodes for n in ply.elements]
         if any(set(members).issuperset(line) and not below.issuperset(line) for line in lines):
             raise sections[0].block.refused(
-                f"a gauge needs a part outside all cords, {ply.name} lies in {sets[0]}"
+                f"a gauge needs a part outside all cords, {ply.name} is in {sets[0]}"
             )
     X = np.array([model.nodes[n] for n in members])
     distance, _ = nearest(X, _segments(model, inner))

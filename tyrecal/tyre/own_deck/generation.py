@@ -22,7 +22,7 @@ def _node(scope: Scope, block: Block) -> None:
     for row in block.rows:
         r, z = row.number(1, 0.0), row.number(2, 0.0)
         if any(row.fields[3:]) and row.number(3, 0.0):
-            raise block.refused("a third coordinate is not honoured: a section lies in r, z", row)
+            raise block.refused("a third coordinate is not honoured: a section is in r, z", row)
         if any(row.fields[4:]):
             raise block.refused(f"data '{row.fields[4]}' is not honoured", row)
         point = (
@@ -218,7 +218,7 @@ def _element(scope: Scope, block: Block) -> None:
     if count is None:
         raise block.refused(
             f"TYPE={kind} is no element of a revolved tyre: CGAX for rubber, SFMGAX or MGAX"
-            " for plies, RAX2 for a rim; decks in three dimensions stand in deck.decks of a case"
+            " for plies, RAX2 for a rim; give decks in three dimensions in deck.decks of a case"
         )
     numbers = []
     for row in block.rows:

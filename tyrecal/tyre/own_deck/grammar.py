@@ -39,11 +39,11 @@ def sort(blocks: Sequence[Block]) -> Sorted:
         name = block.name
         if step is None and name == "STEP":
             if part or assembly or instance:
-                raise block.refused("stands inside a *PART or *ASSEMBLY that does not end")
+                raise block.refused("is inside a *PART or *ASSEMBLY that does not end")
             step = []
         if step is not None:
             if name == "STEP" and step:
-                raise block.refused("stands inside a step: *END STEP is missing")
+                raise block.refused("is inside a step: *END STEP is missing")
             step.append(block)
             if name == "END STEP":
                 steps.append(step)
@@ -53,9 +53,9 @@ def sort(blocks: Sequence[Block]) -> Sorted:
             deck.passed.append(block)
             continue
         if name in RULES and [*RULES[name].options_at] == ["deck step"]:
-            raise block.refused("stands outside a step")
+            raise block.refused("is outside a step")
         if after_a_step:
-            raise block.refused("stands after a step: the model's keywords stand before *STEP")
+            raise block.refused("is after a step: the model's keywords must be before *STEP")
         if name in CONTACT_KEYWORDS:
             deck.contact.append(block)
             continue
@@ -69,13 +69,13 @@ def sort(blocks: Sequence[Block]) -> Sorted:
                 raise block.refused("must follow a *SURFACE SECTION or *MEMBRANE SECTION")
         elif name == "HOURGLASS STIFFNESS":
             if over is None or over.name != "SOLID SECTION":
-                raise block.refused("must stand right under the *SOLID SECTION that it is of")
+                raise block.refused("must be directly under its *SOLID SECTION")
         else:
             over = block
         if name in ("PART", "ASSEMBLY") and (part or assembly):
-            raise block.refused("stands inside another *PART or *ASSEMBLY")
+            raise block.refused("is inside another *PART or *ASSEMBLY")
         if name == "INSTANCE" and (instance or not assembly):
-            raise block.refused("stands in an *ASSEMBLY, not in another *INSTANCE")
+            raise block.refused("must be in an *ASSEMBLY, not in another *INSTANCE")
         if name in ("END PART", "END ASSEMBLY", "END INSTANCE"):
             opened = {"END PART": part, "END ASSEMBLY": assembly, "END INSTANCE": instance}[name]
             if not opened or (name == "END ASSEMBLY" and instance):
@@ -150,7 +150,7 @@ def _step(step: list[Block], deck: Sorted, is_inflation: bool) -> None:
     held = [block for block in kept if block.name == "BOUNDARY"]
     if new := [block for block in held if block.get("OP") == "NEW"]:
         if len(new) < len(held):
-            raise new[0].refused("OP=NEW must stand at every *BOUNDARY of the step, or at none")
+            raise new[0].refused("OP=NEW must be at every *BOUNDARY of the step, or at none")
         deck.model = [block for block in deck.model if block.name != "BOUNDARY"]  # released
     procedures = [block for block in kept if block.name == "STATIC"]
     if len(procedures) != 1:

@@ -273,13 +273,13 @@ class _Builder:
         shift = max(root.nodes)
         image = {n: n if self.tied.on_plane(root.nodes[n]) else n + shift for n in used}
         if all(n != m for n, m in image.items()):
-            raise self.made.reflect.refused("no node lies on the line: the halves do not meet")
+            raise self.made.reflect.refused("no node is on the line: the halves do not meet")
         sides = {
             np.sign(round((mirror(root.nodes[n])[1] - root.nodes[n][1]) / self.tied.near))
             for n in used
         } - {0}
         if len(sides) > 1:
-            raise self.made.reflect.refused("nodes lie on both sides of the line: it is no half")
+            raise self.made.reflect.refused("nodes are on both sides of the line: it is no half")
         for n, m in image.items():
             if n != m:
                 root.nodes[m] = mirror(root.nodes[n])

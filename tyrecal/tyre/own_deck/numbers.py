@@ -120,7 +120,7 @@ def marks(blocks: Sequence[Block]) -> dict[str, Block]:
                     by_mark.setdefault(name, block)
         for value in block.parameters.values():
             if "{{" in value:
-                raise block.refused(f"a mark stands in data lines, not in {value}")
+                raise block.refused(f"a mark must be in a data line, not in {value}")
     return by_mark
 
 

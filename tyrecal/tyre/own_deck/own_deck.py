@@ -168,5 +168,7 @@ def recognised(blocks: Sequence[Block]) -> Units:
     ]
     if not fits:
         block = values[0][0] if values else blocks[0]
-        raise block.refused("the densities do not tell the units: give --units m or --units mm")
+        raise block.refused(
+            "the units cannot be inferred from the densities: give --units m or --units mm"
+        )
     return "m" if fits[0] == "m" else "mm"

@@ -83,7 +83,7 @@ class OwnDecks:
         for deck in self.decks:
             reads = next((b for b in deck.blocks if b.name in CONTINUES or _restarts(b)), None)
             if reads and not jobs:
-                raise reads.refused("goes on from a job that no deck before this one is of")
+                raise reads.refused("continues a job, and no deck before this one has its name")
             jobs.append((deck.path.stem, jobs[-1][0] if reads else ""))
         return jobs
 

@@ -101,7 +101,7 @@ class Scope:
         if len(self.nodes) > MOST:
             raise block.refused(f"there are more than {MOST} nodes", row)
         if not max(map(abs, point)) < FARTHEST:
-            raise block.refused(f"node {number} lies at {point}: no tyre is so large", row)
+            raise block.refused(f"node {number} is at {point}: no tyre is so large", row)
         self.nodes[number] = point
 
     def make(self, block: Block, row: Row, number: int, kind: str, nodes: tuple[int, ...]) -> None:

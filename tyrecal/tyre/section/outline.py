@@ -82,7 +82,7 @@ def section_of_outline(
     edge = belt_width / 2
     if not len(below) or not widest < below[0] < len(arc) - 1:
         raise SectionError(
-            f"the rim holds what lies below r = {1e3 * rim_radius:.1f} mm: this must lie between"
+            f"the rim holds the tyre below r = {1e3 * rim_radius:.1f} mm: this must be between"
             f" the bead, at {1e3 * carcass[-1, 0]:.1f} mm, and the widest point,"
             f" at {1e3 * carcass[widest, 0]:.1f} mm"
         )
@@ -111,7 +111,7 @@ def section_of_outline(
         ]
     )
     if (distances[3] >= thickness)[arc <= edge].any():
-        raise SectionError("the belts do not lie inside the tyre: it is thinner than their depth")
+        raise SectionError("the belts are not inside the tyre: it is thinner than their depth")
     lines = inner + distances[..., None] * rays
     points = np.stack([np.stack([np.interp(s, arc, x) for x in line.T], -1) for line in lines])
     points[2, s > edge + 1e-9] = points[3, s > edge - belt_step / 2 + 1e-9] = np.nan
@@ -153,6 +153,6 @@ def _thickness(start: Array, rays: Array, outer: Array) -> Array:
     if len(missed):
         r, z = 1e3 * start[missed[0]]
         raise SectionError(
-            f"no outer surface lies opposite the inner one at r = {r:.1f} mm, z = {z:.1f} mm"
+            f"no outer surface is opposite the inner one at r = {r:.1f} mm, z = {z:.1f} mm"
         )
     return nearest

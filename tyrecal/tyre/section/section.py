@@ -69,7 +69,7 @@ def read_section(path: Path) -> Section:
             raise SectionError(f"column '{needed}' is missing", 1)
     if gauged and len(drawn) != 1:
         raise SectionError(
-            "gauges are distances from one line, of which _r_mm and _z_mm must be given,"
+            "gauges are distances from one line: give its _r_mm and _z_mm,"
             f" got {', '.join(drawn) or 'none'}",
             1,
         )
@@ -100,7 +100,7 @@ def read_section(path: Path) -> Section:
             )
     if abs(lines[0, 0, 1]) > 1e-9:
         first = table.rows[0].line
-        raise SectionError("the first station must lie on the centre plane, z = 0", first)
+        raise SectionError("the first station must be on the centre plane, z = 0", first)
     regions = regions_of(labels, rigid)
     return Section(names, lines, regions, np.array(rigid))
 

@@ -256,8 +256,8 @@ def _check_build(name: str, build: str) -> None:
 
 def _run_flat(name: str) -> str:
     return (
-        f"'{name}' is a run-flat tyre: the insert that makes its sidewalls bear is not built, for"
-        " want of usual gauges and rubbers; give its section with --section or --deck, or the size"
+        f"'{name}' is a run-flat tyre: its sidewall insert is not built, because usual gauges and"
+        " rubbers are not known; give its section with --section or --deck, or the size"
         " with R for the tyre without it"
     )
 

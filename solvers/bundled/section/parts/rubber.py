@@ -67,8 +67,7 @@ def _sections(job: SectionJob) -> Iterator[tuple[str, _Section]]:
                 yield kind, _Section(rows, material, stiffness)
         elif k.name == "HOURGLASS STIFFNESS" and (before is None or before.name != "SOLID SECTION"):
             raise DeckError(
-                k.place,
-                "*HOURGLASS STIFFNESS must stand right under the *SOLID SECTION that it is of",
+                k.place, "*HOURGLASS STIFFNESS must be directly under its *SOLID SECTION"
             )
 
 
