@@ -1,19 +1,25 @@
-"""README and guides are short sentences in plain words: lengths, sums of words, words to avoid.
+"""README, guides, help, errors and the report page are short sentences in plain words.
 
-Tables and code are not sentences.
+Lengths, sums of words, words to avoid. Tables and code are not sentences.
 """
 
 from __future__ import annotations
 
+import ast
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from pathlib import Path
 
+import click
 import pytest
 from markdown_it import MarkdownIt
 
+from tyrecal.cli.main import cli
+from tyrecal.report.effects import effect_text
+from tyrecal.studies.effects import CatalogueEntry
 from tyrecal.tyre.case.schema import Case
+from tyrecal.tyre.effects import catalogue
 
 ROOT = Path(__file__).parents[1]
 GUIDES = sorted((ROOT / "cases").glob("*.md"))
@@ -46,6 +52,7 @@ AVOID = re.compile(  # the left column is what a reader stumbles over, the comme
     )\b""",
     re.VERBOSE | re.IGNORECASE,
 )
+KEYS = ["slope over the harmonic, c = 4 over c = 1"]  # of result files, with words to avoid
 
 
 def blocks(name: str) -> Iterator[tuple[str, str]]:
@@ -138,3 +145,76 @@ def test_every_picture_is_on_a_page() -> None:
     assert {path.name for path in ROOT.glob("cases/pictures/*")} == {
         *re.findall(r"pictures/([\w.]+)\)", texts)
     }
+
+
+def pages_of_help(command: click.Command, context: click.Context) -> Iterator[tuple[str, str]]:
+    """Name and help of a command and of all commands below it."""
+    yield context.command_path, command.get_help(context)
+    if isinstance(command, click.Group):
+        for name in command.list_commands(context):
+            below = command.get_command(context, name)
+            assert below
+            yield from pages_of_help(below, click.Context(below, context, name))
+
+
+def spoken_words(path: Path) -> Iterator[tuple[int, str]]:
+    """Line and text of each string of a module that has a blank, without its docstrings.
+
+    A value amid a formatted string is a blank.
+    """
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    apart = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            apart |= {id(part) for part in node.values}
+            parts = [part.value if isinstance(part, ast.Constant) else " " for part in node.values]
+            yield node.lineno, "".join(map(str, parts))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in apart:
+            yield node.lineno, node.value
+
+
+def avoided(texts: Iterable[tuple[str, str]]) -> list[tuple[str, str, str]]:
+    """Place, avoided word and text, on one line, of each text that has one."""
+    lines = [(place, " ".join(text.split())) for place, text in texts]
+    return [(place, hit[0], line) for place, line in lines for hit in AVOID.finditer(line)]
+
+
+def test_the_words_to_avoid_are_seen() -> None:
+    texts = [("a", "what the verdict hangs\n on"), ("b", "depends on"), ("c", "an axial mode")]
+    assert [(place, word) for place, word, _ in avoided(texts)] == [
+        ("a", "hangs on"),
+        ("c", "axial mode"),
+    ]
+
+
+def test_help_is_in_plain_words() -> None:
+    pages = list(pages_of_help(cli, click.Context(cli, info_name="tyrecal")))
+    assert len(pages) > 20
+    assert not avoided(pages)
+
+
+def test_effects_are_in_plain_words() -> None:
+    assert not avoided(
+        (id, effect_text(CatalogueEntry.of(effect, []))) for id, effect in catalogue().items()
+    )
+
+
+def test_the_report_page_is_in_plain_words() -> None:
+    templates = sorted(ROOT.glob("templates/report/*.j2"))
+    assert templates
+    assert not avoided(
+        (path.name, re.sub(r"{#.*?#}|<[^>]*>", " ", path.read_text(encoding="utf-8")))
+        for path in templates
+    )
+
+
+@pytest.mark.parametrize("package", ["tyrecal", "solvers"])
+def test_errors_and_results_are_in_plain_words(package: str) -> None:
+    texts = [
+        (f"{path.relative_to(ROOT)}:{line}", text)
+        for path in sorted((ROOT / package).rglob("*.py"))
+        for line, text in spoken_words(path)
+        if len(text.split()) > 2 and text not in KEYS
+    ]
+    assert len(texts) > 100 and not avoided(texts)
