@@ -200,8 +200,8 @@ def test_effects_are_in_plain_words() -> None:
     )
 
 
-def test_the_report_page_is_in_plain_words() -> None:
-    templates = sorted(ROOT.glob("templates/report/*.j2"))
+def test_templates_of_pages_and_cases_are_in_plain_words() -> None:
+    templates = [*ROOT.glob("templates/report/*.j2"), *ROOT.glob("templates/case/*.j2")]
     assert templates
     assert not avoided(
         (path.name, re.sub(r"{#.*?#}|<[^>]*>", " ", path.read_text(encoding="utf-8")))

@@ -100,7 +100,7 @@ def test_a_turning_tyre_is_as_stiff_as_the_frequency_says() -> None:
             "inflate",
             "HOURGLASS=STIFFNESS\n",
             "HOURGLASS=STIFFNESS\n*HOURGLASS STIFFNESS\n3e4\n",
-            r"inflate.inp, line \d+: \*HOURGLASS STIFFNESS must be directly under the \*SOLID SEC",
+            r"inflate.inp, line \d+: \*HOURGLASS STIFFNESS must be directly under its \*SOLID SEC",
         ),
     ],
 )

@@ -17,7 +17,7 @@ from .section.section import Section, with_gauges
 # What parts of a tyre ask of a solver: the capability, and what it is for, in words.
 CAPABILITIES = {
     "spindle": "a rim that moves",
-    "frequency_modulus": "rubber whose modulus follows each mode's frequency",
+    "frequency_modulus": "rubber with its modulus at each mode's frequency",
     "cavity": "the gas in the cavity",
     "coupled": "a mass, a spring or a splice that couples harmonics",
     "rotation": "a tyre that turns",

@@ -239,7 +239,7 @@ class SampleResult(Result):
             )
         if self.emulator.widened > (1 + MAX_EMULATOR_ERROR**2) ** 0.5 - 1:
             doubts.append(
-                "the emulator is rough: its error makes a standard deviation of what was measured"
+                "the emulator is rough: its error makes a standard deviation of the measurement"
                 f" {100 * self.emulator.widened:.2g} % larger"
             )
         return doubts

@@ -163,7 +163,7 @@ def _uncertainties(data: Mapping[str, Any]) -> Problems:
         elif keys and (keys[0] in FIXED or not _is_number(at(data, keys))):
             yield here, "leads to no number of the tyre"
         elif keys and at(data, keys) == 0 and number(data["uncertainties"][name], "percent"):
-            yield here, "is 0, of which per cent are nothing: state 'absolute'"
+            yield here, "is 0, and a share of 0 is 0: state 'absolute'"
 
 
 def _paths(data: Mapping[str, Any], part: str) -> Iterator[tuple[str, Keys, str, Keys, str]]:
