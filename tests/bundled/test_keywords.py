@@ -134,7 +134,7 @@ def test_hourglass_stiffness_is_of_the_section_above_it() -> None:
         ("1100.\n", "1100.\n*STEP, NLGEOM=YES\n*STEP\n", 20, "*STEP inside a step"),
         ("*SURFACE", "*NSET, NSET=A\n1, B\n*SURFACE", 12, "set B is not defined"),
         ("*SURFACE", "*NSET, NSET=A\n1, 9\n*SURFACE", 11, "member 9 of the set"),
-        ("*SURFACE", "*ELSET, ELSET=A, GENERATE\n2, 9\n*SURFACE", 12, "lies from 2 to 9"),
+        ("*SURFACE", "*ELSET, ELSET=A, GENERATE\n2, 9\n*SURFACE", 12, "is from 2 to 9"),
         ("RUBBER, S4", "RUBBER, SPOS", 12, "of type CGAX4R has no face SPOS"),
         ("ELSET=RUBBER, MATERIAL=GUM", "MATERIAL=GUM", 13, "*SOLID SECTION: needs ELSET="),
         ("MATERIAL=GUM\n", "MATERIAL=GUM, CONTROLS=C\n", 13, "section controls C are not"),

@@ -307,7 +307,7 @@ def test_jobs_with_nothing_to_do_are_mentioned(
     """Scripts give --jobs to every command."""
     out = ["--output", str(tmp_path / "out"), "--no-pictures"]
     assert run("modes", CASE, "--mesh", "coarse", "--jobs", "2", *out) == 0
-    assert "--jobs has no effect here: one design" in capsys.readouterr().err
+    assert "--jobs has no effect here: only one design" in capsys.readouterr().err
 
 
 def test_a_template_that_runs_code_is_refused(

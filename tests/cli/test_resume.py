@@ -224,7 +224,7 @@ def test_store_verifies_and_prunes(tmp_path: Path, capsys: pytest.CaptureFixture
     assert (summary["records"], summary["damaged"]) == (2, 1)
     assert run("store", str(tmp_path), "--prune", "0.4") == 0
     output = capsys.readouterr().out
-    assert "1 record," in output and "removed: 1" in output and "damaged: 0" in output
+    assert "1 evaluation," in output and "removed: 1" in output and "damaged: 0" in output
     assert run("store") == 2 and run("store", str(tmp_path / "none")) == 2
     assert "Traceback" not in capsys.readouterr().err
 

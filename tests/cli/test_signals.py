@@ -86,7 +86,9 @@ def test_the_solver_ends_with_all_that_it_started(
     process.send_signal(how)
     words = process.communicate(timeout=200)[1]
     assert process.returncode == 128 + how, words
-    pattern = rf"\n{WORDS[how.name]}: evaluations .* run the same command again to resume\n"
+    pattern = (
+        rf"\n{WORDS[how.name]}: finished evaluations .* run the same command again to resume\n"
+    )
     assert re.fullmatch(pattern, words), words
     assert len(pids) == 2 * jobs and not [pid for pid in pids if alive(pid)]
     assert not (tmp_path / "out" / "runs").exists()
@@ -102,7 +104,9 @@ def test_workers_that_have_done_some_clear_up_too(tmp_path: Path) -> None:
     process.terminate()
     words = process.communicate(timeout=200)[1]
     assert process.returncode == 143
-    assert re.fullmatch(r"\nterminated: evaluations .* goes on from there\n", words), words
+    assert re.fullmatch(
+        r"\nterminated: finished evaluations .* run the same command again to resume\n", words
+    ), words
     assert not (out / "runs").exists()
 
 
@@ -277,7 +281,7 @@ def test_a_batch_whose_workers_are_jobs(tmp_path: Path) -> None:
     process.terminate()
     words = process.communicate(timeout=200)[1]
     assert process.returncode == 143, words
-    assert "terminated: evaluations" in words and "Traceback" not in words
+    assert "terminated: finished evaluations" in words and "Traceback" not in words
     for _ in range(100):
         theirs = [
             each for each in Path("/proc").glob("[0-9]*/environ") if mark in environment(each)

@@ -71,7 +71,7 @@ def test_the_menu_of_measurements() -> None:
         "measure again without e2": 4.0,
         "measure the same modes at 100 kPa": 1.0,
         "measure the same modes at 320 kPa": 1.0,
-        "measure [5,0] and [5,1], too": 1.0,
+        "measure [5,0] and [5,1] too": 1.0,
         "weigh the tyre": 0.1,
     }
     assert [c.gain for c in candidates] == sorted((c.gain for c in candidates), reverse=True)
@@ -301,7 +301,7 @@ def test_the_gains_of_further_rows_by_their_formula() -> None:
     for what, hours, at, form in (
         ("weigh the tyre", 0.1, [rows.index((None, 0.0))], 0.0),
         (
-            "measure [5,0] and [5,1], too",
+            "measure [5,0] and [5,1] too",
             1.0,
             [rows.index((Label(5, m), 240.0)) for m in (0, 1)],
             0.001,

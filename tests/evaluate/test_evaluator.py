@@ -304,7 +304,7 @@ LIES: dict[str, tuple[Edit, str]] = {
     ),
     "too many of one": (
         lambda a: a.update(modes=3 * a["modes"], gradients={}),
-        "3 modes of harmonic 2, 2 were asked for",
+        "3 modes of harmonic 2, 2 were requested",
     ),
     "too many": (
         lambda a: solid(a, modes=21 * [{"frequency_Hz": 9.0, "multiplicity": 1, **MOVED}]),

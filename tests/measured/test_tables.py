@@ -199,7 +199,10 @@ def test_sigma_is_that_of_its_unit_or_of_all_in_percent(tmp_path: Path) -> None:
             "m,c,f,pressure [kPa]\n2,0,79.5,240\n3,0,97.6,240\n3,1,102.7,240\n2,1,66.1,240\n",
             "line 2: most modes have m above c; are the columns c and m swapped",
         ),
-        ("run,c,m,f,pressure [bar]\n1,0,2,99,2.4\n1,0,2,98,2.4\n", r"line 2: \[0,2\] stands twice"),
+        (
+            "run,c,m,f,pressure [bar]\n1,0,2,99,2.4\n1,0,2,98,2.4\n",
+            r"line 2: \[0,2\] is given twice",
+        ),
     ],
 )
 def test_mistakes_are_named_with_their_line(tmp_path: Path, text: str | bytes, words: str) -> None:

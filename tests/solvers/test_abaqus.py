@@ -125,7 +125,7 @@ FAULTS = [
     ("no_fil", "no_results", "lists 20 frequencies, but there is no modes.fil.*SIM=NO"),
     ("truncated", "no_results", "cut short|same nodes"),
     ("disc_full", "no_results", "cut short"),
-    ("doubled", "no_results", "mode 1 stands in it twice"),
+    ("doubled", "no_results", "mode 1 is in it twice"),
     ("zeros", "no_results", "is zero"),
     ("nan", "no_results", "values that are not numbers"),
     ("negative", "unstable", "is negative"),

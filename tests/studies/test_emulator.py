@@ -282,7 +282,7 @@ def test_where_the_last_variables_are_known_fewer_are_left() -> None:
 def test_solvers_without_slopes_and_too_few_evaluations_are_refused() -> None:
     bare = evaluator(has_gradients=False)
     bare.solver = type("Bare", (), {"name": "bare"})  # type: ignore[assignment]
-    with pytest.raises(InputError, match="solver 'bare' gives no exact slopes"):
+    with pytest.raises(InputError, match="solver 'bare' gives no exact sensitivities"):
         made(bare)
     with pytest.raises(InputError, match="needs 3 evaluations at least, got 2"):
         made(evaluator(), 0.3, 2)

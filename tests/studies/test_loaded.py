@@ -123,7 +123,7 @@ def test_findings_in_words() -> None:
     assert content["least_overlap"] == 0.3
     back = findings("initial", [*loads, loaded(2000.0, 90.0, 91.0)]).words
     assert "except [2,0] (900 N) from the given load on" in back[0]
-    assert back[1] == "every frequency rises with the load, but for [2,0] antisymmetric"
+    assert back[1] == "every frequency rises with the load, except [2,0] antisymmetric"
     lost = Loaded(900.0, 0.01, (), (Member(Label(3, 0), "symmetric"),), ())
     assert (
         "at 900 N no shape could be identified as [3,0] symmetric"

@@ -77,9 +77,9 @@ def test_findings_name_every_exception():
     assert not inner["grows_with_c"] and inner["exceptions"] == ["[3,0]"]
     assert outer["members"] == ["[0,0] axial"] and outer["grows_with_c"]
     text = "\n".join(content["words"])
-    assert "every mode rises, but for [0,0] torsional from 100 to 320 kPa" in text
-    assert "the rise grows with c, but for [3,0]" in text
-    assert "but for [0,0] lateral (convex), [0,0] torsional (neither)" in text
+    assert "every mode rises, except [0,0] torsional from 100 to 320 kPa" in text
+    assert "the rise grows with c, except [3,0]" in text
+    assert "except [0,0] lateral (convex), [0,0] torsional (neither)" in text
     assert content["disagreements"] == [] and content["least_mac"] == pytest.approx(1.0)
     assert "labels follow the shapes" in text and "three pressures" not in text
     two = findings(states(curves)[:2], list(curves)).model_dump()

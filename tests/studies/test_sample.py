@@ -174,7 +174,7 @@ def test_doubts_of_a_result() -> None:
     words = " ".join(result(replace(sample, drawn=poor, widened=0.13), 0).doubts())
     assert "0.3 % of the draws are at the edge of the box, which could not grow: why" in words
     assert "steps are fewer than 20 autocorrelation times" in words and "--draws" in words
-    assert "makes a standard deviation of what was measured 13 % larger" in words
+    assert "makes a standard deviation of the measurement 13 % larger" in words
     assert len(result(replace(sample, noise_Hz=1.2), 0).sentences()) == 3
     usual = result(replace(sample, widened=0.02), 0)
     assert usual.sentences()[-1].endswith("it makes the largest standard deviation 2 % larger")

@@ -226,7 +226,7 @@ def test_a_seat_far_from_the_rim_is_refused(tmp_path: Path) -> None:
     path, tied = tmp_path / "tyre.inp", own_decks.rax_rim()
     for seat in ("ADJUST=NO, POSITION TOLERANCE=0.01", "POSITION TOLERANCE=0.04"):
         path.write_text(tied.replace("ADJUST=NO, POSITION TOLERANCE=0.04", seat))
-        with pytest.raises(OwnDeckError, match=r"line \d+: \*TIE: node \d+ lies .* from the rim"):
+        with pytest.raises(OwnDeckError, match=r"line \d+: \*TIE: node \d+ is .* from the rim"):
             read_own_deck(path).flat({})
 
 
