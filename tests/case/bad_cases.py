@@ -310,12 +310,18 @@ _footprint("area_without_sigma", ".0.sigma_m2", "must be given: the standard", S
 _footprint("sigma_zero", ".0.sigma_m2", "greater than 0", "0.0003", "0.0")
 _footprint("sigma_of_other", ".0.sigma_m2", "must be absent", AREA, STIFF)
 _footprint("stiffness_without_sigma", ".0.sigma_N_per_m", "must be given", AREA, STIFF)
-_footprint("two_in_one", ".0.vertical_stiffness_N_per_m", "of its own", AREA, f"{AREA}, {STIFF}")
+_footprint(
+    "two_in_one", ".0.vertical_stiffness_N_per_m", "a separate target", AREA, f"{AREA}, {STIFF}"
+)
 LENGTH = "contact_length_m: 0.132"
 _footprint("length_without_sigma", ".0.sigma_m", "must be given", f"{AREA}{SIGMA}", LENGTH)
 _footprint("sigma_of_area", ".0.sigma_m2", "absent", AREA, f"{LENGTH}, sigma_m: 0.002")
 _footprint(
-    "length_and_width", ".0.contact_width_m", "of its own", AREA, f"{LENGTH}, contact_width_m: 0.1"
+    "length_and_width",
+    ".0.contact_width_m",
+    "a separate target",
+    AREA,
+    f"{LENGTH}, contact_width_m: 0.1",
 )
 _footprint("area_key", ".0.area_m2", "did you mean", "contact_area_m2", "area_m2")
 _footprint("area_text", ".0.contact_area_m2", "must be a number", "0.0158", "158 cm2")

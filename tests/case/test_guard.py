@@ -56,7 +56,7 @@ SLIPS = {  # name: text of the good case, text in its place, key, what was meant
         "angle_deg: 110.0",
         "angle_deg: 70.0",
         "rebar_layers.belt_2.angle_deg",
-        "usual are belts on both sides of the circumference, all 2 lie on one; did you mean 110",
+        "usual are belts on both sides of the circumference, all 2 are on one; did you mean 110",
     ),
     "1/MPa": ("5.085e-8", "5.085e-2", "materials.rubber.D1_per_Pa", "0.05085 1/MPa, 5.085e-08"),
     "bulk modulus": ("5.085e-8", "3.9e7", "materials.rubber.D1_per_Pa", "bulk modulus K, D1 = 2/K"),

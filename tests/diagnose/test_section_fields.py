@@ -58,7 +58,7 @@ def test_a_case_that_does_not_say_what_its_section_is_known_from_has_it_from_a_d
         [source for source in sources(case)[0] if source.field] for case in (STATED, silent)
     )
     assert "drawing: meridian 0.8 mm" in stated[0].words
-    assert "drawing, as the case does not say: meridian 0.8 mm" in unsaid[0].words
+    assert "drawing, not stated in the case: meridian 0.8 mm" in unsaid[0].words
     assert not any(source.words for source in (*stated[1:], *unsaid[1:]))
     for a, b in zip(stated, unsaid, strict=True):
         assert a.field and b.field and a.name == b.name

@@ -111,7 +111,7 @@ def test_a_reference_need_not_have_every_signal(tmp_path: Path) -> None:
 def test_files_must_agree_on_where_a_node_is(tmp_path: Path) -> None:
     one = write(tmp_path / "1.uff", nodes(), shape(np.ones((8, 3)) + 0j))
     two = write(tmp_path / "2.uff", nodes(0.01), shape(np.ones((8, 3)) + 0j))
-    with pytest.raises(InputError, match=r"2\.uff: node 1 stands elsewhere"):
+    with pytest.raises(InputError, match=r"2\.uff: node 1 has other coordinates"):
         gather([one, two], 240.0, LAYOUT)
 
 

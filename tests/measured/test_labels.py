@@ -253,7 +253,7 @@ def test_doublets_have_two_members_and_overtones_no_label() -> None:
         (85.0, None, ""),
         (120.0, None, ""),
     ]
-    assert "[2,1] stands at 66.10 Hz already" in without_overtones(given)[-1].judged.why
+    assert "[2,1] is at 66.10 Hz already" in without_overtones(given)[-1].judged.why
 
 
 def test_another_number_of_waves_holds_a_thousandth() -> None:

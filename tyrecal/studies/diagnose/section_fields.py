@@ -138,7 +138,7 @@ def words(case: LoadedCase) -> str:
     meridian, filler, gauge, stiffness, density = sizes(case)
     tip = f" bead filler's tip {1e3 * filler:.2g} mm," if len(higher_filler(case)) else ""
     hold = 1e3 * HOLD * bead_thickness(case)
-    unsaid = "" if case.case.section.known_from else ", because the case does not state it"
+    unsaid = "" if case.case.section.known_from else ", not stated in the case"
     return (
         f"section known from {known.replace('_', ' ')}{unsaid}: meridian {1e3 * meridian:.2g} mm,"
         f"{tip} rim's hold {hold:.2g} mm, gauges {gauge:.0%}, compounds' stiffness {stiffness:.0%}"
