@@ -53,15 +53,15 @@ DRAWN = [
         [
             f"fit {CASE}",
             f"sweep-pressure {CASE} --fitted p235_75r17/fit.json",
-            f"effects bead_filler --case {CASE} --fitted p235_75r17/fit.json --output effects",
-            f"effects spindle_tilt --case {CASE} --fitted p235_75r17/fit.json --output effects",
+            f"effects bead_filler --case {CASE} --fitted p235_75r17/fit.json --output bead_filler",
+            f"effects spindle_tilt --case {CASE} --fitted p235_75r17/fit.json --output spindle_tilt",
         ],
         {
             "modes.png": "p235_75r17/fit_modes.png",
             "section.png": "p235_75r17/fit_section.png",
             "pressure_sweep.png": "p235_75r17/pressure_sweep.png",
-            "effect_bead_filler.png": "effects/effect_bead_filler.png",
-            "effect_spindle_tilt.png": "effects/effect_spindle_tilt.png",
+            "effect_bead_filler.png": "bead_filler/effect_bead_filler.png",
+            "effect_spindle_tilt.png": "spindle_tilt/effect_spindle_tilt.png",
         },
     ),
     Drawn(
