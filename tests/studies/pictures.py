@@ -24,6 +24,7 @@ from tyrecal.report.drawn import Panel, read_drawn_numbers
 ROOT = Path(__file__).parents[2]
 PICTURES = ROOT / "cases" / "pictures"
 CASE = "cases/p235_75r17.yaml"
+FITTED = "--fitted p235_75r17/fit.json"
 WITHIN = 0.01  # of the largest number of a panel: what a picture may differ by
 
 
@@ -52,9 +53,9 @@ DRAWN = [
     Drawn(
         [
             f"fit {CASE}",
-            f"sweep-pressure {CASE} --fitted p235_75r17/fit.json",
-            f"effects bead_filler --case {CASE} --fitted p235_75r17/fit.json --output bead_filler",
-            f"effects spindle_tilt --case {CASE} --fitted p235_75r17/fit.json --output spindle_tilt",
+            f"sweep-pressure {CASE} {FITTED}",
+            f"effects bead_filler --case {CASE} {FITTED} --output bead_filler",
+            f"effects spindle_tilt --case {CASE} {FITTED} --output spindle_tilt",
         ],
         {
             "modes.png": "p235_75r17/fit_modes.png",
