@@ -129,7 +129,7 @@ FAULTS = [
     ("zeros", "no_results", "is zero"),
     ("nan", "no_results", "values that are not numbers"),
     ("negative", "unstable", "is negative"),
-    ("few", "no_results", "has 19 modes, 20 were asked"),
+    ("few", "no_results", "has 19 modes, 20 were requested"),
     ("stale", "no_results", "older than the deck"),
     ("other_dat", "no_results", "disagree on mode 1"),
     ("no_mass", "no_results", "no TOTAL MASS"),
