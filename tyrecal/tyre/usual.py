@@ -199,9 +199,8 @@ BELT_ANGLE = Usual(25, 155, "degrees from the meridian", FROM_CIRCUMFERENCE)
 SHEAR_MODULUS_Pa = 3e5, 4e7  # of rubber
 RUBBER_DENSITY = Usual(700, 2500, "kg/m3", DENSITY, reason=" of rubber")
 STEEL_DENSITY = 5000.0  # kg/m3 from which a cord is steel, filled with rubber or not
-THICKEST_CORD = (
-    1.2  # diameter of a belt's cord over their spacing, for what a measured area may hold
-)
+# diameter of a belt's cord over their spacing, for what a measured area may hold
+THICKEST_CORD = 1.2
 MIN_ANGLE_OF_A_SIDE = 5.0  # degrees from the circumference, of a belt that has a side
 # slips of effects' parameters, whose ranges the catalogue has, by their unit
 OF_EFFECTS: dict[str, Slips] = {
