@@ -139,3 +139,43 @@ def test_a_constants_name_means_one_thing() -> None:
     twice = {name: sorted(values) for name, values in files.items() if len(values) > 1}
     assert len(twice) <= 10, twice
     assert not list(filter(re.compile(OTHER_LIMITS).match, files)), "name limits MAX_ or MIN_"
+
+
+KINDS = {"Stations", "SectionDeck", "DecksIn3D", "UserDecks", "OwnDeck", "OwnDecks", "OwnDeckMesh"}
+BRANCHES_BY_KIND_LEFT = 5  # may only fall: a tyre's kind answers (`tyre/case/kinds`)
+
+
+def conditions(path: Path) -> Iterator[ast.expr]:
+    """The expressions on which a file decides something."""
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.If | ast.IfExp | ast.While | ast.Assert):
+            yield node.test
+        elif isinstance(node, ast.comprehension):
+            yield from node.ifs
+        elif isinstance(node, ast.BoolOp):
+            yield from node.values
+
+
+def branches_by_kind(path: Path) -> Iterator[ast.expr]:
+    """Parts of a file that tell stations, section decks and decks in three dimensions apart."""
+    for node in (x for condition in conditions(path) for x in ast.walk(condition)):
+        if isinstance(node, ast.Attribute) and node.attr in ("deck", "decks", "drawn"):
+            yield node
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.Call):
+            words = set(re.findall(r"\w+", ast.unparse(node)))
+            called = ast.unparse(node.func)
+            if called == "stands_in_space" or (called == "isinstance" and words & KINDS):
+                yield node
+
+
+def test_few_branches_by_kind_of_tyre() -> None:
+    """Whoever needs to know how a case gives its tyre calls `TyreKind`."""
+    inside = ("tyrecal.tyre.case.kinds.", "tyrecal.tyre.own_deck.")
+    branches = {
+        (name, node.lineno, ast.unparse(node))
+        for name, path in modules().items()
+        if name.startswith("tyrecal.") and not name.startswith(inside)
+        for node in branches_by_kind(path)
+    }
+    assert len(branches) == BRANCHES_BY_KIND_LEFT, "\n".join(map(str, sorted(branches)))

@@ -126,8 +126,7 @@ def test_the_text_is_the_users_but_for_the_marks(solver: str, tmp_path: Path) ->
         texts = Decks(DecksDesign(case, values)).texts(solver)
         return {file: without_header(text.encode()).decode() for file, text in texts.items()}
 
-    assert case.decks
-    words = added_words(case.decks, solver)
+    words = added_words(case.kind.decks, solver)
     added = words.rpartition("modes: ")[2].replace(" / ", "\n") + "\n"
     same = written({})
     assert "modes.inp, line 8: added before it" in words
@@ -242,7 +241,7 @@ def test_a_case_is_made_of_decks(tmp_path: Path, capsys: pytest.CaptureFixture[s
     out = json.loads(capsys.readouterr().out)
     assert not out["abaqus"]["refuses"] and not out["abaqus"]["unknown"]
     loaded = load_case(tmp_path / "made.yaml")
-    assert loaded.decks and loaded.case.pressure_kPa == 50.0
+    assert loaded.kind.decks and loaded.case.pressure_kPa == 50.0
     assert loaded.case.variables["C10_RUBBER"].start == decks_3d.C10
     assert run("init", "--deck", pair[1], "--output", str(tmp_path / "one.yaml")) == 2
     assert "the last deck finds the modes" in capsys.readouterr().err

@@ -85,7 +85,7 @@ def test_a_spacing_at_a_radius_grows_with_the_radius(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_wrong_is_refused(old: str, new: str, words: str, tmp_path: Path) -> None:
-    from tyrecal.simulate.deck.own import trial
+    from tyrecal.tyre.case.kinds.section_deck import trial
 
     path = tmp_path / "tyre.inp"
     path.write_text(maker().replace(old, new), encoding="utf-8")

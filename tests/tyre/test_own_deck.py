@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from tyrecal.cli.main import main
-from tyrecal.simulate.deck.own import asked_by_abaqus, lacking_in_calculix, trial
+from tyrecal.simulate.deck.own import asked_by_abaqus, lacking_in_calculix
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.tyre.case import CaseError, LoadedCase, start_values
 from tyrecal.tyre.case.identity import tyre_sha256
+from tyrecal.tyre.case.kinds.section_deck import trial
 from tyrecal.tyre.case.own_case import own_case
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.own_deck.flat import Flat
@@ -166,8 +167,7 @@ def test_a_parameter_that_is_only_the_pressure_is_no_number_of_a_case(
     """The case's pressure counts in its place. One that sets more is a number."""
     text = own_decks.parameters().replace("p = 2*10**5", "bar = 1e5\nidle = 3.\np = 2*bar")
     case = write(tmp_path, text)
-    deck = load_case(case).deck
-    assert deck
+    deck = load_case(case).kind.deck
     assert deck.idle.keys() == {"parameter / bar", "parameter / idle"}
     assert {"parameter / shear", "parameter / share", "parameter / area"} <= {*deck.section_numbers}
     numbers = json.dumps({"parameter / bar": 9e4})

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..errors import InputError
 from . import arguments, options
 from .main import EXIT_INPUT
 from .parameters import option
@@ -110,7 +111,9 @@ def command(
 def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Terminal) -> int:
     """Print what a user's deck holds, which of its numbers have paths, what is wrong with it for
     the bundled solver and for ABAQUS, and what CalculiX lacks."""
-    from ..simulate.deck.own import asked_by_abaqus, lacking_in_calculix, trial
+    from ..simulate.deck.own import asked_by_abaqus, lacking_in_calculix
+    from ..tyre.case.kinds.decks_in_3d import DecksIn3D
+    from ..tyre.case.kinds.section_deck import trial
     from ..tyre.own_deck.found import contents, words
     from ..tyre.own_deck.own_deck import read_own_deck
     from ..tyre.own_deck.text import OwnDeckError
@@ -120,15 +123,17 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
     gauges: Gauges = ()
     if path.suffix in (".yaml", ".yml"):
         loaded, _ = arguments.load(path, mesh, assignments, None, terminal, True)
-        if loaded.decks:
-            content = known_of_decks(loaded, loaded.decks, terminal)
+        if isinstance(loaded.kind, DecksIn3D):
+            content = known_of_decks(loaded, loaded.kind.decks, terminal)
             terminal.result(content)
             refused = content["abaqus"]["refuses"] and loaded.case.solver.name != "calculix"
             return EXIT_INPUT if refused else 0
-        if loaded.deck is None:
-            raise click.UsageError(f"'{path}' names no deck; to check it, run 'tyrecal validate'")
-        deck, numbers = loaded.deck, loaded.deck_numbers
-        gauges = loaded.case.deck.thickened if loaded.case.deck else ()
+        try:
+            deck, gauges = loaded.kind.deck, loaded.kind.source(loaded.case).thickened
+        except InputError as error:
+            hint = f"'{path}' names no deck; to check it, run 'tyrecal validate'"
+            raise click.UsageError(hint) from error
+        numbers = loaded.deck_numbers
     else:
         if not path.is_file():
             raise click.UsageError(f"there is no file '{path}'")

@@ -173,7 +173,7 @@ def command(
     if measured or not loaded.measured:
         words += ["--measured", str(measured or "FILE")]
     next_ = join_command(words)
-    if good and not fit.found.reason and not loaded.case.deck and read_targets(loaded):
+    if good and not fit.found.reason and loaded.kind.names_its_parts and read_targets(loaded):
         terminal.say(f"next: {next_} finds what the model lacks")
     return 0 if good else EXIT_FIT
 

@@ -245,7 +245,6 @@ def lengths_given(stated: dict[str, Any]) -> bool:
 def _numbers_of_marks(deck: OwnDeck | OwnDecks, assigned: tuple[str, ...]) -> dict[str, float]:
     """Numbers of marks by --set. Raises InputError, UsageError for those that are missing."""
     from ..tyre.case import parse_assignment
-    from ..tyre.own_deck.own_decks import PRESSURE_MARK, OwnDecks
 
     try:
         given = dict(parse_assignment(text) for text in assigned)
@@ -254,8 +253,7 @@ def _numbers_of_marks(deck: OwnDeck | OwnDecks, assigned: tuple[str, ...]) -> di
     for name in given.keys() - deck.marks.keys():
         known = ", ".join(deck.marks) or "none"
         raise click.UsageError(f"--set {name}: the deck has no mark of this name, but {known}")
-    pressure = {PRESSURE_MARK} if isinstance(deck, OwnDecks) else set()
-    lacking = [name for name in deck.marks if name not in {*given, *pressure}]
+    lacking = [name for name in deck.marks if name not in given]
     if lacking:
         places = ", ".join(f"{{{{ {name} }}}} ({deck.marks[name].place})" for name in lacking)
         example = " ".join(f"--set {name}=VALUE" for name in lacking)
@@ -277,7 +275,7 @@ def _from_deck(
     """Write the case of a deck next to it, print what is in the deck, and draw it; ``suffix``: of
     the picture, "" for none."""
     from ..files import atomic_write
-    from ..simulate.deck.own import trial
+    from ..tyre.case.kinds.section_deck import trial
     from ..tyre.case.own_case import own_case
     from ..tyre.load import load_case
     from ..tyre.own_deck.found import contents, words

@@ -281,14 +281,13 @@ class Study:
 
     def evaluator(self, loaded: Any) -> Evaluator:
         """The evaluator with the requested solver. Raises InputError."""
-        from ..simulate.deck.decks_design import added_words, design_of
+        from ..simulate.deck.decks_design import design_of
         from ..simulate.evaluate.evaluator import Evaluator
 
         evaluator = Evaluator(design_of(loaded), self.solver, command=self.solver_command)
         evaluator.solver  # noqa: B018  a solver that is not there is refused before anything is written
-        if loaded.decks:
-            evaluator.refuse_lacking(evaluator.design)
-            self.terminal.note(added_words(loaded.decks, evaluator.solver.dialect))
+        for remark in evaluator.design.remarks(evaluator):
+            self.terminal.note(remark)
         return evaluator
 
     def run(

@@ -66,39 +66,20 @@ def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
 
 
 def _refused(loaded: LoadedCase) -> Mistake | None:
-    """Mistake for which the solver of the case refuses a user's deck, if it is the bundled one, or
-    decks in three dimensions."""
-    from ..simulate.deck.own import trial
-    from ..tyre.case.mistakes import Mistake
-    from ..tyre.own_deck.text import OwnDeckError
-    from ..tyre.resolve import resolved
-
-    own = loaded.deck or loaded.decks
-    try:
-        if loaded.decks:
-            return _lacking(loaded)
-        if loaded.deck and loaded.case.solver.name == "bundled":
-            trial(resolved(loaded).flat)
-    except OwnDeckError as error:
-        assert own
-        file = str(own.path.parent / error.place.file)
-        return Mistake(file, error.place.line, "", "", error.message)
-    return None
-
-
-def _lacking(loaded: LoadedCase) -> Mistake | None:
-    """Why the case's solver cannot run decks in three dimensions. Raises OwnDeckError where they
-    ask for shapes that name no modes."""
-    from ..simulate.deck.decks_design import design_of, output_lines
+    """Mistake for which the solver of the case refuses a user's decks."""
+    from ..simulate.deck.decks_design import design_of
     from ..simulate.evaluate.evaluator import Evaluator
     from ..simulate.evaluate.failure import DeckRefused
     from ..tyre.case.mistakes import Mistake
+    from ..tyre.own_deck.text import OwnDeckError
 
-    assert loaded.decks
-    evaluator = Evaluator(design_of(loaded))
-    output_lines(loaded.decks, evaluator.solver.dialect)
     try:
-        evaluator.refuse_lacking(evaluator.design)
+        evaluator = Evaluator(design_of(loaded))
+        evaluator.design.check(evaluator)
+    except OwnDeckError as error:
+        folder = loaded.kind.files(loaded.case, loaded.folder)[0].parent
+        file, line = error.place
+        return Mistake(str(folder / file), line, "", "", error.message)
     except DeckRefused as error:
         return Mistake(str(loaded.path), 0, "solver.name", loaded.case.solver.name, str(error))
     return None

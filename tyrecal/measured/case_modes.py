@@ -106,10 +106,9 @@ def evaluate_case_modes(
     from ..simulate.deck.tyre_design import TyreDesign
     from ..simulate.evaluate.evaluator import Question
 
-    if case.decks:
-        raise InputError(
-            f"{case.path}: its shapes belong to a deck in three dimensions, which is not supported"
-        )
+    case.kind.require_section(
+        f"{case.path}: its shapes belong to a deck in three dimensions, which is not supported"
+    )
     analysis = case.case.analysis.model_copy(update={"highest_harmonic": highest})
     wide = replace(case, case=case.case.model_copy(update={"analysis": analysis}))
     count = max(case.case.analysis.modes_per_harmonic, PER_HARMONIC)

@@ -19,7 +19,6 @@ from ..studies.patch import patch_of
 from ..studies.result import Named, Result, ResultPart, Wave
 from ..tyre.case import LoadedCase
 from ..tyre.effects.bead_seat import GAP_ENDING
-from ..tyre.own_deck.section_mesh import OwnDeckMesh
 from ..tyre.resolve import resolved
 from ..tyre.section.mesh import SectionMesh
 from .revolve import placed
@@ -163,8 +162,7 @@ def section_data(
         inflated = _line(moved, around)
     angles = {name: layer.angle_deg for name, layer in case.case.rebar_layers.items()}
     layers = {name: turns(case, mesh, name) for name in angles}
-    if isinstance(mesh, OwnDeckMesh):
-        angles, layers = mesh.angles, mesh.layers
+    angles, layers = {**angles, **mesh.angles}, {**layers, **mesh.layers}
     cords = {
         name: Cords(angle_deg=angles[name], lines=[_line(place, nodes) for nodes in lines])
         for name, lines in layers.items()
@@ -210,14 +208,8 @@ def parts_data(case: LoadedCase, named: Iterable[str]) -> DiagnosisSection:
     """
     mesh = resolved(case).mesh
     place = {n: np.array([z, r]) * 1e3 for n, (r, z) in mesh.nodes.items()}
-    cords: dict[str, list[Flat]] = {}
-    if isinstance(mesh, OwnDeckMesh):
-        parts = mesh.compounds
-        for ply in mesh.plies:
-            lines = mesh.cords[ply.set_name].values()
-            cords.setdefault(ply.material, []).extend(_line(place, x) for x in lines)
-    else:
-        parts = rubber_parts(case, mesh, {name.split(",")[0] for name in named})
+    parts = mesh.compounds or rubber_parts(case, mesh, {name.split(",")[0] for name in named})
+    cords = {k: [_line(place, x) for x in lines] for k, lines in mesh.lines_by_cord.items()}
     for layer in case.case.rebar_layers.values():
         lines = mesh.cords[layer.line].values()
         name = f"{layer.material.replace('_', ' ')}s"

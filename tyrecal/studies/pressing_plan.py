@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ..simulate.deck.tyre_design import TyreDesign
+from ..simulate.deck.decks_design import design_of
 from ..simulate.evaluate.evaluator import Evaluator
 from ..tyre.case import LoadedCase
 
@@ -147,7 +147,7 @@ def plan_pressing(
     dimensions, which are not, have no nodes of a section. At most ``at_once`` run side by side, and
     no more than the memory holds. Raises what the section's mesh does."""
     plan = PressingPlan(
-        nodes=0 if case.decks else len(TyreDesign(case).tyre.mesh.nodes),
+        nodes=design_of(case).section_nodes,
         places_round=2 * len(case.case.road.element_angles_deg) + 1,
         designs=designs,
         states=tuple(states),

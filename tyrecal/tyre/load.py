@@ -12,21 +12,19 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from .case.checks import folds, problems
-from .case.deck_file import completed, lines_of_the_deck, read_deck_of, section_of
+from .case.checks import problems
+from .case.deck_file import completed, read_kind
 from .case.document import Document, read_document
+from .case.kinds.user_decks import lines_of_a_deck
 from .case.loaded import LoadedCase
 from .case.mistakes import CaseError, Keys, Mistake, dotted
 from .case.schema import Case, cannot_fit
 from .case.shape import disagreements, explain, table, without
-from .case.stations import check_templates, measured_file, read_stations
+from .case.stations import check_templates, measured_file
 from .effects import EffectRefused
-from .own_deck.own_deck import OwnDeck
-from .own_deck.own_decks import OwnDecks
 from .resolve import resolved
 from .state import TyreState
 from .usual import unusual
-from .usual_deck import deck_slips
 
 TYRE_KEYS = {"section", "deck", "materials"}  # keys, one of which every case has
 
@@ -79,41 +77,34 @@ def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mist
         document.refuse(1, f"holds no tyre: write a case with {how}")
         return None, document.mistakes[-1:]
     file_data = deepcopy(data)
-    deck, is_known = read_deck_of(document, data, path.parent)
-    assumed: dict[str, Any] = {}
-    if table(data, "deck"):
-        lines = lines_of_the_deck(deck, data)
-        completed(data, lines)
-        assumed = completed(file_data, lines)
+    kind, is_known = read_kind(document, data, path.parent)
+    source = table(data, "deck")
+    lines = kind.usual_lines(source) if kind else lines_of_a_deck(source)
+    completed(data, lines)
+    assumed = completed(file_data, lines)
     case = _typed(document, data)
     _add(document, disagreements(data))
-    section = None
-    if isinstance(deck, OwnDeck):
-        section = section_of(deck, data)
-    elif not table(data, "deck"):
-        section = read_stations(document, data, path.parent)
+    section = kind.read_section(document, data, path.parent) if kind else None
     check_templates(document, data, path.parent)
     measured = measured_file(document, data, path.parent)
     if is_known:  # the numbers that all else names
         _add(document, problems(data, section))
-    meshable = not (deck or any(m.key.startswith(("mesh", "section")) for m in document.mistakes))
-    if section and meshable and (message := folds(data, section)):
+    meshable = not any(m.key.startswith(("mesh", "section")) for m in document.mistakes)
+    if kind and section and meshable and (message := kind.folds(data, section)):
         form = "outline" if data["section"].get("outline") else "stations"
         document.add(("section", form), message)
     if not allow_unusual:
         _add(document, unusual(data, section))
-        if isinstance(deck, OwnDeck):
-            stated = table(table(file_data, "deck"), "numbers")
-            for slip in deck_slips(deck, data["deck"]["numbers"]):
-                if slip.key in stated:
-                    document.add(("deck", "numbers", slip.key), slip.message)
-                else:
-                    document.mistakes.append(slip)
-    if case is None or not (section or isinstance(deck, OwnDecks)) or document.mistakes:
+        stated = table(table(file_data, "deck"), "numbers")
+        for slip in kind.slips(data) if kind else ():
+            if slip.key in stated:
+                document.add(("deck", "numbers", slip.key), slip.message)
+            else:
+                document.mistakes.append(slip)
+    if case is None or kind is None or document.mistakes:
         return None, sorted(document.mistakes, key=lambda m: (m.file != str(path), m.line))
-    own = {"decks": deck} if isinstance(deck, OwnDecks) else {"deck": deck}
     loaded = LoadedCase(
-        case, path, section, path.parent, file_data, measured=measured, assumed=assumed, **own
+        case, path, section, path.parent, file_data, kind=kind, measured=measured, assumed=assumed
     )
     try:
         resolved(loaded)

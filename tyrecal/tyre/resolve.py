@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 from .case import Case, LoadedCase
+from .case.kinds.stations import mesh_at_level, with_gauges_of
 from .case.parts import Rubber
 from .effects import EffectRefused, catalogue
 from .own_deck.flat import Flat
-from .own_deck.section_mesh import section_mesh as own_deck_mesh
 from .plugins import IDS
-from .section.mesh import SectionMesh, kept_mesh
-from .section.section import Section, with_gauges
+from .section.mesh import SectionMesh
+from .section.section import Section
 
 # What parts of a tyre ask of a solver: the capability, and what it is for, in words.
 CAPABILITIES = {
@@ -44,19 +44,19 @@ class Tyre:
 
     @cached_property
     def flat(self) -> Flat:
-        """The deck of the tyre's section, of a case that names one. Raises OwnDeckError."""
-        assert self.written.deck and self.case.deck
-        return self.written.deck.flat(self.written.deck_numbers, self.case.deck.thickened)
+        """The user's deck of the tyre's section. Raises InputError for a tyre without one."""
+        return self.written.kind.flat(self.case)
 
     @cached_property
     def gauged(self) -> Section:
         """The section with its gauges applied."""
-        return _gauged(self.case, self.section)
+        return with_gauges_of(self.case, self.section)
 
     @cached_property
     def mesh(self) -> SectionMesh:
         """The mesh of the section at the chosen level, the same one for tyres that share it."""
-        return _deck_mesh(self.flat) if self.written.deck else section_mesh(self.case, self.gauged)
+        self.section  # noqa: B018  a tyre without one is refused
+        return self.written.kind.mesh(self)
 
     @cached_property
     def needs(self) -> dict[str, str]:
@@ -69,7 +69,7 @@ class Tyre:
             "cavity": bool(c.cavity.share),
             "coupled": bool(c.point_mass.mass_kg or c.splice.share or c.road_spring.stiffnesses),
             "rotation": bool(c.spin_rad_per_s),
-            "own_deck": bool(c.deck),
+            **dict.fromkeys(self.written.kind.needs, True),
         }
         return {need: CAPABILITIES[need] for need, there in needed.items() if there}
 
@@ -83,30 +83,8 @@ def resolved(case: LoadedCase) -> Tyre:
         try:
             before, case = case, catalogue()[id].of(case)(case, present[id])
             if (case.section, case.case.section) != (before.section, before.case.section):
-                section_mesh(case.case, _gauged(case.case, case.section))  # refuses what folds over
+                gauged = with_gauges_of(case.case, case.section)
+                mesh_at_level(case.case, gauged)  # refuses what folds over
         except ValueError as error:
             raise EffectRefused(id, str(error), present[id]) from None
     return Tyre(case)
-
-
-def section_mesh(case: Case, gauged: Section) -> SectionMesh:
-    """The mesh of a gauged section at the case's level. Raises ValueError where it folds over."""
-    level = case.mesh.levels[case.mesh.level]
-    elements = tuple(level.elements[name] for name, _ in gauged.regions)
-    grading = tuple(level.grading) if level.grading else None
-    quadratic = case.mesh.element.startswith("CGAX8")
-    rows, whole_bead = tuple(level.rows), case.rim.holds_whole_bead
-    return kept_mesh(gauged, elements, rows, quadratic, grading, whole_bead)
-
-
-@lru_cache(maxsize=8)
-def _deck_mesh(flat: Flat) -> SectionMesh:
-    return own_deck_mesh(flat)
-
-
-def _gauged(case: Case, section: Section) -> Section:
-    gauges = case.section.gauges or []
-    return with_gauges(
-        section,
-        tuple((tuple(g.regions or ()), (g.between[0], g.between[1]), g.factor) for g in gauges),
-    )

@@ -76,8 +76,8 @@ class TyreState:
         Raises ValueError where the case cannot be in it.
         """
         state, numbers = self.of(case), dict[str, float]()
-        if state.rim and case.decks:
-            raise ValueError("must be absent: the decks state how the rim is held")
+        if state.rim:
+            case.kind.require_rim()
         if state.pressure_kPa is not None:
             numbers["pressure_kPa"] = state.pressure_kPa
         if state.rim == "springs":

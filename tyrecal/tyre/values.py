@@ -22,7 +22,6 @@ from .plugins import IDS
 from .resolve import resolved
 from .state import with_states_kept
 from .usual import belts_on_one_side, refusal
-from .usual_deck import unusual_numbers
 
 MAX_MEANT = 3  # paths that the error for an unknown name suggests
 # parts of a case whose numbers no other part and no mesh depends on: changes need no check
@@ -123,11 +122,9 @@ def unusual_value(loaded: LoadedCase, name: str, value: Setting) -> str | None:
     messages = [refusal(data, loaded.drawn, keys, value) for keys in _keys(loaded, name)]
     if any(path.startswith("rebar_layers.") and path.endswith("angle_deg") for path in paths):
         messages += [message for _, message in belts_on_one_side(data, loaded.drawn)]
-    if loaded.deck:
-        names = [path.removeprefix("deck.numbers.") for path in paths]
-        numbers = {**loaded.deck_numbers, **dict.fromkeys(names, value)}
-        of_deck = dict(unusual_numbers(loaded.deck, numbers))
-        messages += [of_deck[path] for path in names if path in of_deck]
+    names = [path.removeprefix("deck.numbers.") for path in paths]
+    of_deck = loaded.kind.unusual({**loaded.deck_numbers, **dict.fromkeys(names, value)})
+    messages += [of_deck[path] for path in names if path in of_deck]
     return next((message for message in messages if message), None)
 
 
@@ -149,7 +146,7 @@ def _keys(loaded: LoadedCase, name: str) -> list[Keys]:
     try:
         return [find(loaded.case, path) for path in paths]
     except KeyError as error:
-        idle = loaded.deck.idle if loaded.deck else {}  # deck parameters that set nothing here
+        idle = loaded.kind.idle
         if (path := canonical(name, idle)) is not None:
             raise ValueError(f"{name} {idle[path]}") from None
         if meant := " or ".join(f"'{path}'" for path in _meant(loaded, name)):

@@ -14,10 +14,8 @@ from ...tyre.case import Case
 from ...tyre.case.parts import Rim, Rubber
 from ...tyre.case.schema import Analysis
 from ...tyre.own_deck.flat_mesh import REFERENCE_NODE
-from ...tyre.own_deck.own_deck import UNIT_LENGTH, UNIT_MASS
 from ...tyre.resolve import Tyre
 from ...tyre.section.mesh import SectionMesh
-from .own import own_section
 
 FIRST_WHEEL_ELEMENT = 999_000_001  # beyond all that a revolve makes
 MIN_MODE_HZ, SHIFT = 1.0, -100.0  # of a free wheel's modes: above its rigid motions; 1/s2
@@ -40,7 +38,7 @@ def context(tyre: Tyre) -> dict[str, Any]:
     """Names for the templates; the guide to own templates lists them."""
     c, mesh = tyre.case, tyre.mesh
     gas = gas_material(c)
-    names = own_section(tyre) if c.deck else _section(tyre)
+    names = tyre.written.kind.template_names(tyre) or _section(tyre)
     return {
         **names,
         "name": c.name,
@@ -225,10 +223,7 @@ def _tables(
 def aside(tyre: Tyre) -> dict[str, Any]:
     """Requests that no deck of keywords holds: which surfaces hold the gas, whose frequency
     counts."""
-    request: dict[str, Any] = {}
-    if tyre.case.deck:
-        units = tyre.case.deck.units
-        request["own_deck"] = {"length_m": UNIT_LENGTH[units], "mass_kg": UNIT_MASS[units]}
+    request = tyre.written.kind.request()
     if "frequency_modulus" in tyre.needs:
         request["own_frequency"] = True
     if "cavity" in tyre.needs:

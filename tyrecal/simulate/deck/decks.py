@@ -6,7 +6,7 @@ Each begins with a comment that says what it is of.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -27,6 +27,17 @@ LEADS_OUTSIDE = re.compile(  # but for comments: an absolute path or one upwards
 )
 DesignKey = tuple[str, float, tuple[tuple[str, float], ...]]  # what tells designs apart
 DeckSlopes = dict[str, list[tuple[str, int, int, float]]]
+
+
+class DesignEvaluator(Protocol):
+    """An `Evaluator`, as a design needs it."""
+
+    @property
+    def solver(self) -> Any:
+        """The adapter."""
+
+    def refuse_lacking(self, design: Design) -> None:
+        """Raises DeckRefused if the solver cannot express what the design has."""
 
 
 class Design(Protocol):
@@ -77,6 +88,16 @@ class Design(Protocol):
 
     def neighbour(self, name: str, side: int) -> tuple[Design, float]:
         """The design a small step to one side (1, -1) of a variable, and its value there."""
+
+    @property
+    def section_nodes(self) -> int:
+        """Number of nodes of its section; 0: it has none."""
+
+    def check(self, evaluator: DesignEvaluator) -> None:
+        """Raises InputError if the solver of its case cannot run the decks of a user."""
+
+    def remarks(self, evaluator: DesignEvaluator) -> Iterable[str]:
+        """Sentences on its texts before the first run. Raises InputError as `check` does."""
 
     def explained(self, refusal: str) -> str:
         """A solver's refusal of its texts in words for who made it."""
@@ -223,11 +244,11 @@ def header(case: LoadedCase) -> str:
     tool; what else asks the same shares the record too, whose keys are of decks `without_header`.
     """
     c = case.case
-    units = case.decks.units if case.decks else "m"
+    units = UNITS_IN_WORDS[case.kind.units]
     return (
         f"{FIRST.decode()}{c.name[:MAX_NAME_LENGTH]}\n"
         f"** tyre_sha256 {tyre_sha256(case)}, mesh {c.mesh.level}\n"
-        f"** {UNITS_IN_WORDS[units]}; angles in degrees, of rebar layers from the meridian\n"
+        f"** {units}; angles in degrees, of rebar layers from the meridian\n"
     )
 
 

@@ -3,10 +3,11 @@ them, but for marks, numbers, the pressure, and what the labels of modes need pr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from ...tyre.case import LoadedCase
+from ...tyre.case.kinds.decks_in_3d import DecksIn3D
 from ...tyre.case.schema import SolverChoice
 from ...tyre.own_deck.own_deck import UNIT_LENGTH, UNIT_MASS
 from ...tyre.own_deck.own_decks import OwnDecks
@@ -14,7 +15,7 @@ from ...tyre.own_deck.text import OwnDeckError, Place, named
 from ...tyre.resolve import resolved
 from ...tyre.templates import TemplateFailed
 from ...tyre.values import set_values
-from .decks import Design, header, refuse_outside
+from .decks import Design, DesignEvaluator, header, refuse_outside
 from .tyre_design import TyreDesign
 
 Added = dict[Place, list[str]]  # lines that are written before these places
@@ -23,6 +24,7 @@ Added = dict[Place, list[str]]  # lines that are written before these places
 class DecksDesign:
     """A case at values of its variables, or of any of its numbers (see `decks.Design`)."""
 
+    section_nodes = 0
     nominal = None  # no solver of such decks can use a shape to start from
     is_nominal = False
     has_slopes = False
@@ -31,8 +33,7 @@ class DecksDesign:
         """Raises ValueError for an unknown name, or a value that the case cannot have."""
         self.values: Mapping[str, float] = dict(values or {})
         self.case = resolved(set_values(case, self.values)).written
-        assert self.case.decks
-        self.decks: OwnDecks = self.case.decks
+        self.decks = self.case.kind.decks
 
     def at(self, values: Mapping[str, float]) -> DecksDesign:
         """The case with these values. Raises ValueError."""
@@ -79,6 +80,17 @@ class DecksDesign:
         """None: a fit takes differences of frequencies."""
         raise TemplateFailed(f"{name}: decks in three dimensions have no exact sensitivities")
 
+    def check(self, evaluator: DesignEvaluator) -> None:
+        """Raises OwnDeckError if they ask for shapes that name no modes, DeckRefused if the solver
+        cannot run them."""
+        output_lines(self.decks, evaluator.solver.dialect)
+        evaluator.refuse_lacking(self)
+
+    def remarks(self, evaluator: DesignEvaluator) -> Iterator[str]:
+        """The lines that are added for the solver. Raises as `check` does."""
+        evaluator.refuse_lacking(self)
+        yield added_words(self.decks, evaluator.solver.dialect)
+
     def explained(self, refusal: str) -> str:
         """The solver's own words."""
         return refusal
@@ -109,7 +121,8 @@ class DecksDesign:
 
 def design_of(case: LoadedCase, values: Mapping[str, float] | None = None) -> Design:
     """The design of a case, at values of its variables or other numbers. Raises ValueError."""
-    return DecksDesign(case, values) if case.decks else TyreDesign(case, values)
+    is_in_3d = isinstance(case.kind, DecksIn3D)
+    return DecksDesign(case, values) if is_in_3d else TyreDesign(case, values)
 
 
 def output_lines(decks: OwnDecks, dialect: str) -> Added:

@@ -1,4 +1,4 @@
-"""A user's deck in the templates' words, and solvers' refusals in the user's places."""
+"""A user's deck as ABAQUS gets it, and solvers' refusals in the user's places."""
 
 from __future__ import annotations
 
@@ -8,11 +8,9 @@ from importlib import import_module
 from math import isclose
 from typing import Any
 
-from ...tyre.own_deck.flat import Flat
-from ...tyre.own_deck.flat_mesh import REFERENCE_NODE
 from ...tyre.own_deck.own_deck import UNIT_LENGTH, UNIT_MASS
 from ...tyre.own_deck.own_text import own_texts
-from ...tyre.own_deck.text import Block, OwnDeckError, Place, named
+from ...tyre.own_deck.text import Block, named
 from ...tyre.resolve import Tyre
 from ...tyre.templates import TemplateFailed
 
@@ -20,32 +18,11 @@ BEFORE = 3  # lines of the inflation's template before the mesh: heading, its te
 PLACE = re.compile(r"^inflate\.inp, line (\d+): ")
 
 
-def own_section(tyre: Tyre) -> dict[str, Any]:
-    """Names for the templates of a user's deck, all of whose text is the mesh's."""
-    flat = tyre.flat
-    point = tyre.case.rim.reference_point_m
-    return {
-        "mesh": {
-            "reference_node": REFERENCE_NODE,
-            "reference_r": point.r,
-            "reference_z": point.z,
-            "radius": max(point[0] for point in flat.mesh.nodes.values()),
-        },
-        "mesh_block": flat.text,
-        "sets": flat.set_names,
-        "solids": [],
-        "layers": [],
-        "materials": [],
-        "hourglass": None,
-    }
-
-
 def own_jobs(tyre: Tyre) -> tuple[dict[str, str], dict[str, Any]]:
     """Texts of the job that inflates, which is the user's deck, and of what it includes; and what
     the job that revolves it takes over: its step, node, sets, surfaces and pressure, in the deck's
     own units. Raises TemplateFailed."""
-    deck, flat, c = tyre.written.deck, tyre.flat, tyre.case
-    assert deck and c.deck
+    deck, flat, c = tyre.written.kind.deck, tyre.flat, tyre.case
     _refuse_unrevolved(tyre)
     (body,) = (block for block in flat.found.model if block.name == "RIGID BODY")
     steps = [block.place for block in deck.blocks if block.name == "STEP"]
@@ -67,15 +44,15 @@ def own_jobs(tyre: Tyre) -> tuple[dict[str, str], dict[str, Any]]:
         "rim": body.need("TIE NSET"),
         "surfaces": [row.name(0) for block in loads for row in block.rows],
         "pressure": pressure,
-        "crown": named(c.deck.crown),
+        "crown": named(tyre.written.kind.source(c).crown),
     }
 
 
 def _refuse_unrevolved(tyre: Tyre) -> None:
     """Raises TemplateFailed where ABAQUS would not revolve the deck as it stands, or into the tyre
     that the case describes."""
-    deck, flat, c = tyre.written.deck, tyre.flat, tyre.case
-    assert deck and c.deck
+    deck, flat, c = tyre.written.kind.deck, tyre.flat, tyre.case
+    source = tyre.written.kind.source(c)
     blocks = {block.name: block for block in deck.blocks}
     length = UNIT_LENGTH[deck.units]
     saved = any("WRITE" in block.parameters for block in deck.blocks if block.name == "RESTART")
@@ -93,8 +70,8 @@ def _refuse_unrevolved(tyre: Tyre) -> None:
         ),
         "a revolve keeps the contact, which is left out here: delete it": bool(flat.found.contact),
         "the pressure must be a *DSLOAD": any(b.name == "DLOAD" for b in flat.found.inflation),
-        f"it has no node set {c.deck.crown}: name that of its crown in deck.crown": (
-            named(c.deck.crown) not in flat.model.node_sets
+        f"it has no node set {source.crown}: name that of its crown in deck.crown": (
+            named(source.crown) not in flat.model.node_sets
         ),
         "rim.reference_point_m must be the reference node's place": not (
             isclose(point.r, r * length, abs_tol=1e-9)
@@ -104,7 +81,7 @@ def _refuse_unrevolved(tyre: Tyre) -> None:
             (c.analysis.static_moduli == "long_term") != flat.long_term
         ),
         "ABAQUS gets the deck's own text with its nodes: deck.gauges must be 1": bool(
-            c.deck.thickened
+            source.thickened
         ),
         f"ABAQUS gets the deck's own text, which cannot express: {', '.join(sorted(rings))}": bool(
             rings
@@ -115,19 +92,6 @@ def _refuse_unrevolved(tyre: Tyre) -> None:
     }
     for reason in (words for words, so in why.items() if so):
         raise TemplateFailed(f"{deck.path.name}: {reason}")
-
-
-def trial(flat: Flat) -> float:
-    """The mass, kg, of the tyre that the bundled solver makes of a flat deck.
-
-    Raises OwnDeckError where it refuses something.
-    """
-    bundled = import_module("tyrecal_solvers.bundled.adapter")
-    outcome = bundled.examine(flat.text, flat.long_term)
-    if isinstance(outcome, float):
-        return outcome
-    line, words = outcome
-    raise OwnDeckError(_origin(flat, line - 1) or flat.origins[0], words)
 
 
 def asked_by_abaqus(blocks: Sequence[Block], before: Sequence[Block] = ()) -> dict[str, list[str]]:
@@ -147,15 +111,9 @@ def lacking_in_calculix(blocks: Sequence[Block]) -> list[str]:
     return [str(block.refused(why)) for block, why in check.lacking(blocks)]
 
 
-def _origin(flat: Flat, line: int) -> Place | None:
-    """Where a line of the flat mesh and materials comes from."""
-    return flat.origins[line] if 0 <= line < len(flat.origins) else None
-
-
 def explained(tyre: Tyre, words: str, header_lines: int) -> str:
     """A solver's refusal with the line of the user's deck in place of that of the flat one."""
     match = PLACE.match(words)
-    if not match or not tyre.case.deck:
-        return words
-    place = _origin(tyre.flat, int(match[1]) - header_lines - BEFORE - 1)
-    return f"{place.file}, line {place.line}: {words[match.end() :]}" if place else words
+    line = int(match[1]) - header_lines - BEFORE - 1 if match else -1
+    place = tyre.written.kind.place_of_line(tyre, line)
+    return f"{place.file}, line {place.line}: {PLACE.sub('', words)}" if place else words

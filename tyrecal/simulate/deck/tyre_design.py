@@ -20,7 +20,7 @@ from ...tyre.values import set_values
 from .abaqus import aside, context
 from .apart import TemplateProcess
 from .calculix import calculix_context
-from .decks import HEADER_LINES, header, refuse_outside
+from .decks import HEADER_LINES, DesignEvaluator, header, refuse_outside
 from .own import explained, own_jobs
 
 ELEMENTS_A_WAVE = 7.5  # of quadratic ones: the frequencies are right to 0.4 %
@@ -46,8 +46,7 @@ class TyreDesign:
         self.plain = plain or case
         self.case = set_values(case, self.values)
         self.tyre = resolved(self.case)
-        if self.case.deck:  # numbers that it cannot have are refused here, as any others
-            self.tyre.flat.text  # noqa: B018
+        self.case.kind.check(self.tyre)
 
     def at(self, values: Mapping[str, float]) -> TyreDesign:
         """The case with these values. Raises ValueError."""
@@ -148,6 +147,20 @@ class TyreDesign:
         other.tyre = _with_splice_of(self.tyre, splice.share * splice.width_deg / 360)
         return other
 
+    @property
+    def section_nodes(self) -> int:
+        """Number of nodes of the mesh."""
+        return len(self.tyre.mesh.nodes)
+
+    def check(self, evaluator: DesignEvaluator) -> None:
+        """Raises OwnDeckError if the case's solver is the bundled one and refuses a user's deck."""
+        if self.solver.name == "bundled":
+            self.case.kind.check_with_solver(self.tyre)
+
+    def remarks(self, evaluator: DesignEvaluator) -> tuple[()]:
+        """None: its texts are tyrecal's own."""
+        return ()
+
     def explained(self, refusal: str) -> str:
         """A solver's refusal of a line, in the lines of the user's own deck."""
         return explained(self.tyre, refusal, HEADER_LINES)
@@ -190,7 +203,9 @@ def _abaqus(tyre: Tyre, env: Any, request: DeckRequest) -> dict[str, str]:
 
 def _with_mesh(tyre: Tyre, env: Any) -> dict[str, Any]:
     names = context(tyre)
-    return names if tyre.case.deck else {**names, "mesh_block": _mesh_block(env, names["mesh"])}
+    if "mesh_block" not in names:  # of a deck the block is the user's
+        names["mesh_block"] = _mesh_block(env, names["mesh"])
+    return names
 
 
 def _with_splice_of(tyre: Tyre, share: float) -> Tyre:

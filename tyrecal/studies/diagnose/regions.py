@@ -12,15 +12,11 @@ from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.modes.find import LabelledModes
 from ...tyre.case import LoadedCase, number_at
-from ...tyre.case.schema import Rubber, Solid
-from ...tyre.own_deck.numbers import moduli
-from ...tyre.resolve import resolved
 from ...tyre.state import TyreState
 from ..fit import problem as fit
 from .model import ModelRow, state_of
 
 Array = np.ndarray
-TREAD = "tread"
 
 
 @dataclass(frozen=True)
@@ -59,9 +55,9 @@ def regions(model: Parted, x: Array) -> list[SectionPart]:
     One evaluation a state, with exact slopes by the constants of each part. Raises
     EvaluationFailed.
     """
-    case, parts = split_by_region(model.case) if not model.case.deck else _of_deck(model.case)
-    signs = {material: _stiffness_of(case, material) for material in parts}
-    density = {material: _density_of(case, material) for material in parts}
+    case, parts = split_by_region(model.case)
+    signs = {material: case.kind.moduli(case.case, material) for material in parts}
+    density = {material: case.kind.density(material) for material in parts}
     paths = (path for material in parts for path in (*signs[material], density[material]))
     numbers = {path: float(number_at(case, path)) for path in paths}
     evaluator = model.evaluator.of(TyreDesign(case))
@@ -95,65 +91,8 @@ def regions(model: Parted, x: Array) -> list[SectionPart]:
     return result
 
 
-def _stiffness_of(case: LoadedCase, material: str) -> dict[str, int]:
-    """Paths of a material's moduli, -1 where it is their reciprocal."""
-    if case.deck:
-        return moduli(case.deck_numbers, material)
-    rubber = isinstance(case.case.materials[material], Rubber)
-    signs = {"C10_Pa": 1, "C01_Pa": 1, "D1_per_Pa": -1} if rubber else {"youngs_modulus_Pa": 1}
-    return {f"materials.{material}.{key}": sign for key, sign in signs.items()}
-
-
-def _density_of(case: LoadedCase, material: str) -> str:
-    if case.deck:
-        return f"material {material} / DENSITY / density"
-    return f"materials.{material}.density_kg_per_m3"
-
-
-def _of_deck(case: LoadedCase) -> tuple[LoadedCase, Mapping[str, str]]:
-    """The case of a user's deck, and names of its materials that have plain numbers, not marks."""
-    flat = resolved(case).flat
-    names = dict.fromkeys((*flat.materials, *(ply.material for ply in flat.plies)))
-    able = [
-        m for m in names if _stiffness_of(case, m) and _density_of(case, m) in case.deck_numbers
-    ]
-    return case, dict(zip(able, able, strict=True))
-
-
 def split_by_region(case: LoadedCase) -> tuple[LoadedCase, Mapping[str, str]]:
-    """The tyre with a rubber of its own in every region, and names of the parts by material.
-
-    Cords keep their materials, which are parts too. Design variables set all copies.
-    """
-    lines, names = case.section.names, [name for name, _ in case.section.regions]
-    materials, solids, parts = dict(case.case.materials), [], {}
-    copies: dict[str, list[str]] = {}
-    for i, solid in enumerate(case.case.solids):
-        for region in solid.regions or names:
-            pieces: list[tuple[str, list[str] | None]] = [(region, solid.between)]
-            if region == names[0] and solid.between is None:
-                pieces = [
-                    (f"{region} under the tread", [lines[0], lines[-2]]),
-                    (TREAD, [lines[-2], lines[-1]]),
-                ]
-            for words, between in pieces:
-                copy = f"part_{i}_{words.replace(' ', '_')}"
-                materials[copy] = case.case.materials[solid.material]
-                copies.setdefault(solid.material, []).append(copy)
-                solids.append(Solid(material=copy, regions=[region], between=between))
-                one = len(case.case.solids) == 1
-                parts[copy] = words.replace("_", " ") + ("" if one else f", {solid.material}")
-    for name, own in case.case.materials.items():
-        if not isinstance(own, Rubber):
-            parts[name] = name.replace("_", " ") + "s"
-    variables = {}
-    for name, variable in case.case.variables.items():
-        sets = []
-        for path in variable.sets:
-            head, _, rest = path.partition(".")
-            material, _, key = rest.partition(".")
-            same = copies.get(material, []) if head == "materials" else []
-            sets += [path, *(f"materials.{copy}.{key}" for copy in same)]
-        variables[name] = variable.model_copy(update={"sets": sets})
-    wanted = {"materials": materials, "solids": solids, "variables": variables}
-    return replace(case, case=case.case.model_copy(update=wanted)), parts
+    """The tyre with a material of its own in each of its parts, and the parts' names by material
+    (`TyreKind.parts`)."""
+    split, parts = case.kind.parts(case.case, case.section)
+    return replace(case, case=split), parts

@@ -70,7 +70,7 @@ class SectionField:
 
 def known_from(case: LoadedCase) -> SectionOrigin:
     """Origin of the section's data; "exact" for a user's decks, which have no stations."""
-    return "exact" if case.deck or case.decks else case.case.section.known_from or UNSAID
+    return case.kind.section_origin(case.case) or UNSAID
 
 
 def fields(case: LoadedCase) -> dict[str, SectionField]:

@@ -210,10 +210,9 @@ def spans_of(
     user's deck cannot have them. Raises ValueError where one of ``ids`` is no effect; InputError
     for decks in three dimensions.
     """
-    if case.decks:
-        raise InputError(
-            "a diagnosis needs a section, and this tyre is given by decks in three dimensions"
-        )
+    case.kind.require_section(
+        "a diagnosis needs a section, and this tyre is given by decks in three dimensions"
+    )
     able: dict[str, Span] = {}
     unable: dict[str, str] = {}
     stated = {path: abs(step) for each in sources(case)[0] for path, step in each.steps.items()}
@@ -237,17 +236,15 @@ def spans_of(
                 base,
                 law=effect.law,
                 stated=stated.get(EFFECT_PATH + id, 0.0),
-                second=effect.beside is not None and not (case.deck or case.decks),
+                second=case.kind.shape_uncertainty(effect) is not None,
             )
     return able, unable
 
 
 def _lacking(case: LoadedCase, effect: Effect) -> str:
     """Reason why a case of a user's deck cannot have an effect, "" = none."""
-    if not case.deck:
-        return ""
     try:
-        effect.of(case)(case, effect.high / 2 or effect.low / 2)
+        case.kind.check_effect(effect, case)
     except ValueError as error:
         return str(error)
     return ""

@@ -8,12 +8,10 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from contextlib import suppress
-from functools import lru_cache
 from hashlib import sha256
 from typing import Any
 
 from ...files import read_bytes
-from ..section.section import Section
 from .checks import find
 from .loaded import LoadedCase
 from .mistakes import Keys
@@ -65,7 +63,7 @@ def is_of_tyre(path: str) -> bool:
 
 def _content(loaded: LoadedCase) -> dict[str, Any]:
     """The tyre as plain data, without the values of its variables."""
-    case, user_deck = loaded.case, loaded.deck or loaded.decks
+    case = loaded.case
     data: dict[str, Any] = case.model_dump(include=TYRE, exclude_defaults=True)
     data["effects"] = {id: value for id, value in case.effects.items() if value}
     for keys in STATE:
@@ -77,7 +75,7 @@ def _content(loaded: LoadedCase) -> dict[str, Any]:
     content = {
         "tyre": _plain(data),
         "variables": {name: sorted(v.sets) for name, v in case.variables.items()},
-        "drawn": user_deck.sha256 if user_deck else _section_sha256(loaded.section),
+        "drawn": loaded.kind.content_sha256(loaded.drawn),
     }
     templates = _templates(loaded)
     return {**content, "templates": templates} if templates else content
@@ -120,13 +118,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return float(value) + 0.0
     return value
-
-
-@lru_cache(maxsize=8)
-def _section_sha256(section: Section) -> str:
-    """Hash of the section's geometry in m: the curves of its outline, or else its stations."""
-    content: Any = [curve.tolist() for curve in section.outline]
-    if not section.outline:
-        points = section.points + 0.0  # -0.0 becomes 0.0
-        content = [section.names, section.regions, section.rigid.tolist(), points.tolist()]
-    return sha256(json.dumps(content).encode()).hexdigest()

@@ -7,13 +7,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...errors import InputError
+from .kinds.kind import TyreKind
+from .kinds.stations import Stations
 from .parts import Setting, as_written
 from .schema import Case
 
 if TYPE_CHECKING:
-    from ..own_deck.own_deck import OwnDeck
-    from ..own_deck.own_decks import OwnDecks
     from ..section.section import Section
 
 
@@ -23,14 +22,13 @@ class LoadedCase:
 
     case: Case
     path: Path  # of the case file
-    drawn: Section | None  # as drawn, without effects; None: the tyre is in decks in 3-D
+    drawn: Section | None  # as drawn, without effects; None: its kind has none
     folder: Path  # to which the case's own paths are relative
     file_data: dict[str, Any]  # the file with the keys that its deck adds; never changed by values
     # values that the user gave for this run, by name or path; results list them
     overrides: Mapping[str, Setting] = field(default_factory=dict)
     as_read: LoadedCase | None = None  # the case before any number was set; None: this one
-    deck: OwnDeck | None = None  # the user's axisymmetric deck that the section comes from, if any
-    decks: OwnDecks | None = None  # the user's decks in 3-D, in place of a section
+    kind: TyreKind = field(default_factory=Stations)  # how the case gives its tyre
     measured: Path | None = None  # the file with its targets, if the case names one
     assumed: Mapping[str, Any] = field(default_factory=dict)  # keys that its deck adds to the file
 
@@ -43,25 +41,22 @@ class LoadedCase:
     @property
     def section(self) -> Section:
         """The section. Raises InputError where there is none."""
-        if self.drawn is None:
-            raise InputError(
-                f"'{self.path}' has no section, which this command needs: its tyre is given by"
-                " decks in three dimensions"
-            )
-        return self.drawn
+        return self.kind.section(
+            self.drawn,
+            f"'{self.path}' has no section, which this command needs: its tyre is given by"
+            " decks in three dimensions",
+        )
 
     @property
     def deck_numbers(self) -> Mapping[str, float]:
         """Numbers of the deck, by mark or path; none where the case names none."""
-        return self.case.deck.numbers if self.case.deck else {}
+        return self.kind.numbers(self.case)
 
     @property
     def files(self) -> list[Path]:
         """Files that the case names, except its templates."""
         named = [self.measured] if self.measured else []
-        if own := self.deck or self.decks:
-            return [*named, *(own.path.parent / name for name in own.texts)]
-        return [*named, self.folder / self.case.section.file]
+        return [*named, *self.kind.files(self.case, self.folder)]
 
     @property
     def template_files(self) -> list[Path]:

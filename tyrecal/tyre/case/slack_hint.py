@@ -18,9 +18,7 @@ MERIDIONAL_DEG = 45.0  # from the meridian: the carcass, and not the wires aroun
 
 def slack_cord_hint(case: LoadedCase) -> str:
     """One sentence that ends with the line that lets textile and carcass cords go slack; empty if
-    none of them bears compression, or the tyre has no section of layers."""
-    if case.drawn is None or case.deck:
-        return ""
+    none of them bears compression, or the case has no layers."""
     layers = case.case.rebar_layers
     stiff = {
         name: material

@@ -99,22 +99,20 @@ def with_angles(case: LoadedCase, part: str, change: Change) -> LoadedCase:
 def with_thickness(case: LoadedCase, part: str, factor: float) -> LoadedCase:
     """The case with a part so many times as thick. Raises ValueError."""
     numbers, flat, sets = _read(case, part)
-    deck = case.case.deck
-    assert case.deck and deck
+    deck = case.kind.source(case.case)
     _known(part, sets, [name.upper() for name in flat.sections])
     thicker = with_part(deck.gauges, **{part: factor * getattr(deck.gauges, part)})
     deck = with_part(deck, gauges=thicker)
     try:
-        case.deck.flat(numbers, deck.thickened)
+        case.kind.deck.flat(numbers, deck.thickened)
     except OwnDeckError as error:
         raise ValueError(f"cannot be: {error.message}") from None
     return changed(case, deck=deck)
 
 
 def _read(case: LoadedCase, part: str) -> tuple[dict[str, float], Flat, list[str]]:
-    assert case.deck and case.case.deck
     numbers = dict(case.deck_numbers)
-    return numbers, case.deck.flat(numbers), case.case.deck.sets(part)
+    return numbers, case.kind.deck.flat(numbers), case.kind.source(case.case).sets(part)
 
 
 def _known(part: str, sets: list[str], known: Collection[str]) -> list[str]:
@@ -128,5 +126,4 @@ def _known(part: str, sets: list[str], known: Collection[str]) -> list[str]:
 
 
 def _with(case: LoadedCase, numbers: dict[str, float]) -> LoadedCase:
-    assert case.case.deck
-    return changed(case, deck=with_part(case.case.deck, numbers=numbers))
+    return changed(case, deck=with_part(case.kind.source(case.case), numbers=numbers))

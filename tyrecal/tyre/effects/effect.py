@@ -64,17 +64,7 @@ class Effect:
     def of(self, case: LoadedCase) -> Callable[[LoadedCase, float], LoadedCase]:
         """The effect's `add` for a case. Raises ValueError where the case has nothing that it
         changes."""
-        if case.decks:
-            raise ValueError(
-                "changes a section, and the tyre is given by decks in three dimensions"
-            )
-        if case.deck is None or case.case.deck is None:
-            return self.add
-        if self.add_to_deck is None:
-            raise ValueError("changes lines or regions of a section or a law, not a deck's numbers")
-        if self.part and not case.case.deck.sets(self.part):
-            raise ValueError(f"needs the sets of {self.part}: name them in deck.parts.{self.part}")
-        return self.add_to_deck
+        return case.kind.change_of(self, case.case)
 
     def within(self, capabilities: Collection[str]) -> bool:
         """Whether a solver with these capabilities can express it."""

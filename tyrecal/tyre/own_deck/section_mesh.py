@@ -70,6 +70,14 @@ class OwnDeckMesh(SectionMesh):
             by_material.setdefault(material, []).append(nodes[: CORNERS_OF[len(nodes)]])
         return by_material
 
+    @property
+    def lines_by_cord(self) -> dict[str, list[tuple[int, ...]]]:
+        """Nodes of the elements of its layers, by their material."""
+        by_material: dict[str, list[tuple[int, ...]]] = {}
+        for ply in self.plies:
+            by_material.setdefault(ply.material, []).extend(self.cords[ply.set_name].values())
+        return by_material
+
     def _named(self) -> dict[str, Ply]:
         names = [ply.name for ply in self.plies]
         return {

@@ -60,6 +60,28 @@ class SectionMesh:
         walk += [(rows, j) for j in range(columns, 0, -1)] + [(i, 0) for i in range(rows, -1, -1)]
         return [1000 * (j + 1) + i + 1 for i, j in walk]
 
+    # of a mesh that comes with materials, as a deck's; else the case has them
+
+    @property
+    def angles(self) -> dict[str, float]:
+        """Angles of its own layers by name, degrees from the meridian."""
+        return {}
+
+    @property
+    def layers(self) -> dict[str, list[tuple[int, ...]]]:
+        """Nodes of the elements to draw each of its own layers with."""
+        return {}
+
+    @property
+    def compounds(self) -> dict[str, list[tuple[int, ...]]]:
+        """Corner nodes of the elements of each of its own compounds."""
+        return {}
+
+    @property
+    def lines_by_cord(self) -> dict[str, list[tuple[int, ...]]]:
+        """Nodes of the elements of its own layers, by their material."""
+        return {}
+
     @property
     def inner_ends(self) -> tuple[int, int]:
         """First and last node of the inner surface."""

@@ -1,0 +1,150 @@
+"""A tyre by the user's ABAQUS deck of its section."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from ...own_deck.flat import Flat
+from ...own_deck.flat_mesh import REFERENCE_NODE
+from ...own_deck.numbers import moduli
+from ...own_deck.own_deck import UNIT_LENGTH, UNIT_MASS, OwnDeck
+from ...own_deck.section_mesh import OwnDeckMesh, section, section_mesh
+from ...own_deck.text import OwnDeckError, Place
+from ...section.section import Section
+from ...usual_deck import deck_slips, unusual_numbers
+from ..document import Document
+from ..mistakes import Mistake
+from ..schema import Case
+from .kind import Change, Data
+from .user_decks import UserDecks, lines_of_a_deck
+
+
+@dataclass(frozen=True)
+class SectionDeck(UserDecks):
+    """Section, materials and inflation are those of one deck."""
+
+    own: OwnDeck
+
+    @property
+    def deck(self) -> OwnDeck:
+        """The deck."""
+        return self.own
+
+    @property
+    def idle(self) -> Mapping[str, str]:  # type: ignore[override]
+        """Parameters that set only the pressure, or nothing."""
+        return self.own.idle
+
+    @property
+    def known_numbers(self) -> Mapping[str, float]:
+        """Plain numbers that change the section."""
+        return self.own.section_numbers
+
+    def check_case(self, document: Document, numbers: Mapping[str, float]) -> None:
+        """Raises OwnDeckError for a deck that is no section with these numbers."""
+        self.own.flat(numbers)
+
+    def usual_lines(self, source: Data) -> dict[str, Any]:
+        """Pressure, reference node and moduli of the deck."""
+        flat = self.own.flat(source["numbers"])
+        reference = flat.mesh.reference
+        return lines_of_a_deck(source, flat.pressure_Pa / 1e3, reference, flat.static_moduli)
+
+    def read_section(self, document: Document, data: dict[str, Any], folder: Path) -> Section:
+        """The half of positive z of the deck's surfaces."""
+        return section(self.own.flat(data["deck"]["numbers"]))
+
+    def slips(self, data: Data) -> Iterator[Mistake]:
+        """Radius and numbers of the deck that no tyre has."""
+        return deck_slips(self.own, data["deck"]["numbers"])
+
+    def unusual(self, numbers: Mapping[str, float]) -> Mapping[str, str]:
+        """Why numbers are unusual beside all others."""
+        return dict(unusual_numbers(self.own, numbers))
+
+    def check(self, tyre: Any) -> None:
+        """Raises OwnDeckError for numbers with which the deck is no section."""
+        tyre.flat.text  # noqa: B018
+
+    def check_with_solver(self, tyre: Any) -> None:
+        """Raises OwnDeckError if the bundled solver refuses something."""
+        trial(tyre.flat)
+
+    def mesh(self, tyre: Any) -> OwnDeckMesh:
+        """The deck's own mesh."""
+        return _mesh(tyre.flat)
+
+    def place_of_line(self, tyre: Any, line: int) -> Place | None:
+        """The line of the deck that a line of the flat mesh and materials comes from."""
+        return _origin(tyre.flat, line)
+
+    def template_names(self, tyre: Any) -> dict[str, Any]:
+        """All text of the deck stands in the place of the mesh."""
+        flat, point = tyre.flat, tyre.case.rim.reference_point_m
+        return {
+            "mesh": {
+                "reference_node": REFERENCE_NODE,
+                "reference_r": point.r,
+                "reference_z": point.z,
+                "radius": max(r for r, _ in flat.mesh.nodes.values()),
+            },
+            "mesh_block": flat.text,
+            "sets": flat.set_names,
+            "solids": [],
+            "layers": [],
+            "materials": [],
+            "hourglass": None,
+        }
+
+    def request(self) -> dict[str, Any]:
+        """Units of the deck, m and kg."""
+        units = self.own.units
+        return {"own_deck": {"length_m": UNIT_LENGTH[units], "mass_kg": UNIT_MASS[units]}}
+
+    def change_of(self, effect: Any, case: Case) -> Change:
+        """The effect's change of numbers and named parts."""
+        if effect.add_to_deck is None:
+            raise ValueError("changes lines or regions of a section or a law, not a deck's numbers")
+        if effect.part and not self.source(case).sets(effect.part):
+            part = effect.part
+            raise ValueError(f"needs the sets of {part}: name them in deck.parts.{part}")
+        change: Change = effect.add_to_deck
+        return change
+
+    def parts(self, case: Case, section: Section) -> tuple[Case, Mapping[str, str]]:
+        """Compounds and cords with plain numbers, not marks, by their names in the deck."""
+        flat, numbers = self.flat(case), self.numbers(case)
+        names = dict.fromkeys((*flat.materials, *(ply.material for ply in flat.plies)))
+        able = [m for m in names if self.moduli(case, m) and self.density(m) in numbers]
+        return case, dict(zip(able, able, strict=True))
+
+    def moduli(self, case: Case, material: str) -> dict[str, int]:
+        """Paths of the moduli that are plain numbers."""
+        return moduli(self.numbers(case), material)
+
+
+def trial(flat: Flat) -> float:
+    """The mass, kg, of the tyre that the bundled solver makes of a flat deck.
+
+    Raises OwnDeckError where it refuses something.
+    """
+    bundled = import_module("tyrecal_solvers.bundled.adapter")
+    outcome = bundled.examine(flat.text, flat.long_term)
+    if isinstance(outcome, float):
+        return outcome
+    line, words = outcome
+    raise OwnDeckError(_origin(flat, line - 1) or flat.origins[0], words)
+
+
+def _origin(flat: Flat, line: int) -> Place | None:
+    return flat.origins[line] if 0 <= line < len(flat.origins) else None
+
+
+@lru_cache(maxsize=8)
+def _mesh(flat: Flat) -> OwnDeckMesh:
+    return section_mesh(flat)
