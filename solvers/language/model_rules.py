@@ -62,7 +62,7 @@ MODEL_RULES: dict[str, Rule] = {
         "part",
         "NSET=+nset; SYSTEM=R|C|S",
         "label 6*number?",
-        honoured={"deck": "NSET; SYSTEM=R", "section|revolve": "NSET"},
+        honoured={"deck": "NSET; SYSTEM=R", "section": "NSET", "revolve": "~NSET"},
     ),
     "SYSTEM": Rule(
         "part", fields="6*number?", rows=(0, 2), honoured={"deck": ""}, calculix=NO_GENERATION
@@ -408,7 +408,7 @@ MODEL_RULES: dict[str, Rule] = {
         "BULK MODULUS",
         "number 2*number?",
         under=OF_MATERIAL,
-        honoured={"section": "BULK MODULUS"},
+        honoured={"section": "~BULK MODULUS"},  # its only form
         data="bulk modulus:stress",
     ),
     "FLUID BEHAVIOR": Rule("model", "NAME=+fluid; USER", rows=NO_ROWS, needs=("NAME",)),

@@ -41,7 +41,7 @@ STEP_RULES: dict[str, Rule] = {
         rows=ANY_ROWS,
         honoured={
             "deck step": "~NAME; NLGEOM=YES|; ~INC; ~EXTRAPOLATION; ~UNSYMM; ~CONVERT SDI",
-            "step": "NAME; NLGEOM=YES|; INC; PERTURBATION",
+            "step": "~NAME; NLGEOM=YES|; ~INC; ~PERTURBATION",
         },
     ),
     "STATIC": Rule(
@@ -112,7 +112,7 @@ STEP_RULES: dict[str, Rule] = {
         ),
         "3*number?",
         rows=(0, 2),
-        honoured={"step": "SLAVE; MASTER; STABILIZE="},
+        honoured={"step": "~SLAVE; ~MASTER; ~STABILIZE="},
         is_contact=True,
     ),
     "FILE FORMAT": Rule(

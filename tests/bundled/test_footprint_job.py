@@ -13,8 +13,9 @@ import pytest
 from tyrecal_solvers.bundled import job
 from tyrecal_solvers.bundled.road import footprint_job
 from tyrecal_solvers.bundled.road.contact_newton import ContactNewton
+from tyrecal_solvers.bundled.road.road_data import read_road
 from tyrecal_solvers.errors import RunFailed
-from tyrecal_solvers.language.text import DeckError
+from tyrecal_solvers.language.text import DeckError, read_keywords
 
 from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
@@ -290,3 +291,16 @@ def test_incompressible_rubber_is_pressed(tmp_path: Path) -> None:
     assert stiffness == pytest.approx(
         (low["stiffness_N_per_m"] + high["stiffness_N_per_m"]) / 2, 0.01
     )
+
+
+def test_the_contact_has_the_properties_that_its_pair_names() -> None:
+    """Of several *SURFACE INTERACTION it takes the pair's own, wherever it stands."""
+    pair = texts(LOADS, 0.5)
+    at = pair["press.inp"].index("*SURFACE INTERACTION")
+    other = "*SURFACE INTERACTION, NAME=OTHER\n*FRICTION, ELASTIC SLIP=0.1\n0.9\n"
+    after = pair["press.inp"].index("*CONTACT PAIR")
+    road = [
+        read_road(read_keywords(pair["press.inp"][:k] + other + pair["press.inp"][k:]))
+        for k in (at, after)
+    ]
+    assert road[0] and road[1] and road[0].friction == road[1].friction == 0.5

@@ -151,6 +151,8 @@ def _check_transfer(section: list[Block], steps: list[DeckStep], revolve: list[B
     generation, transfer = (
         blocks[f"SYMMETRIC {n}"] for n in ("MODEL GENERATION", "RESULTS TRANSFER")
     )
+    if "REVOLVE" not in generation.parameters:
+        raise DeckError(generation.place, "the job must REVOLVE the section")
     segments = [row.number(0) for row in generation.rows[2:]]
     if not abs(sum(segments) - 360.0) < 1e-6:
         raise DeckError(generation.place, "the tyre is revolved by 360 degrees")

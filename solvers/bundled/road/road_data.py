@@ -53,7 +53,7 @@ def read_road(model: list[Block]) -> RoadData | None:
     if not bodies or not roads:
         raise DeckError(pair.place, f"{surface} is no analytical surface of a *RIGID BODY")
     _check_flat(roads[0])
-    blocks = {k.name: k for k in model if k.name in ("SURFACE BEHAVIOR", "FRICTION")}
+    blocks = _interaction(model, pair)
     if len(blocks) < 2:
         raise DeckError(pair.place, "the contact needs a *SURFACE BEHAVIOR and a *FRICTION")
     stiffness = blocks["SURFACE BEHAVIOR"].only_row().value(0)
@@ -68,6 +68,19 @@ def read_road(model: list[Block]) -> RoadData | None:
     return RoadData(
         bodies[0].need("REF NODE"), tread, stiffness, friction, slip, _half_lengths(model)
     )
+
+
+def _interaction(model: list[Block], pair: Block) -> dict[str, Block]:
+    """Properties of the pair's contact by keyword. Raises DeckError."""
+    name, owner, blocks = pair.need("INTERACTION"), "", dict[str, Block]()
+    if not any(k.name == "SURFACE INTERACTION" and k.get("NAME") == name for k in model):
+        raise DeckError(pair.place, f"the surface interaction {name} is not defined")
+    for k in model:
+        if k.name == "SURFACE INTERACTION":
+            owner = k.get("NAME")
+        elif k.name in ("SURFACE BEHAVIOR", "FRICTION") and owner == name:
+            blocks[k.name] = k
+    return blocks
 
 
 def _check_flat(surface: Block) -> None:

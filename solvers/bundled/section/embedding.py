@@ -221,7 +221,13 @@ def _guest(
             f" tolerance {tolerance:.3g} m",
         )
     host, nodes, xi = best
-    return Guest(X[node], host, nodes, xi, abs(host.at(xi[None])[0][0]) > roundoff)
+    kept = abs(host.at(xi[None])[0][0]) > roundoff
+    if not kept.any():
+        words = (
+            f"a ROUNDOFF TOLERANCE of {roundoff:g} leaves a node without a host: it is below 0.2"
+        )
+        raise DeckError(row.place, words)
+    return Guest(X[node], host, nodes, xi, kept)
 
 
 def _inverse(kind: ElementType, corners: Array, place: Array) -> Array | None:
