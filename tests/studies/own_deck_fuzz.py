@@ -22,8 +22,8 @@ from tempfile import TemporaryDirectory
 
 from tyrecal.simulate.deck.own import asked_by_abaqus, lacking_in_calculix
 from tyrecal.tyre.case.kinds.section_deck import trial
-from tyrecal.tyre.own_deck.found import contents
 from tyrecal.tyre.own_deck.own_deck import read_own_deck
+from tyrecal.tyre.own_deck.summary import contents
 from tyrecal.tyre.own_deck.text import OwnDeckError
 
 from ..tyre import maker_decks, own_decks, test_contact

@@ -9,8 +9,8 @@ import pytest
 
 from tyrecal.cli.main import main
 from tyrecal.simulate.deck.own import asked_by_abaqus
-from tyrecal.tyre.own_deck.found import contents, words
 from tyrecal.tyre.own_deck.own_deck import read_own_deck
+from tyrecal.tyre.own_deck.summary import contents, words
 from tyrecal.tyre.own_deck.text import OwnDeckError
 
 from . import own_decks

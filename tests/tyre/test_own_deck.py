@@ -19,9 +19,9 @@ from tyrecal.tyre.case.kinds.section_deck import trial
 from tyrecal.tyre.case.own_case import own_case
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.own_deck.flat import Flat
-from tyrecal.tyre.own_deck.found import contents
 from tyrecal.tyre.own_deck.own_deck import OwnDeck, Units, read_own_deck
 from tyrecal.tyre.own_deck.own_text import own_texts
+from tyrecal.tyre.own_deck.summary import contents
 from tyrecal.tyre.own_deck.text import OwnDeckError
 from tyrecal.tyre.resolve import resolved
 from tyrecal.tyre.values import with_values

@@ -114,8 +114,8 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
     from ..simulate.deck.own import asked_by_abaqus, lacking_in_calculix
     from ..tyre.case.kinds.decks_in_3d import DecksIn3D
     from ..tyre.case.kinds.section_deck import trial
-    from ..tyre.own_deck.found import contents, words
     from ..tyre.own_deck.own_deck import read_own_deck
+    from ..tyre.own_deck.summary import contents, words
     from ..tyre.own_deck.text import OwnDeckError
     from ..tyre.usual_deck import deck_slips
 

@@ -278,7 +278,7 @@ def _from_deck(
     from ..tyre.case.kinds.section_deck import trial
     from ..tyre.case.own_case import own_case
     from ..tyre.load import load_case
-    from ..tyre.own_deck.found import contents, words
+    from ..tyre.own_deck.summary import contents, words
     from ..tyre.usual_deck import deck_slips
 
     flat = deck.flat(numbers)
