@@ -15,8 +15,8 @@ from random import Random
 from tempfile import TemporaryDirectory
 
 from tyrecal.tyre.case.kinds.section_deck import trial
-from tyrecal.tyre.own_deck.flat import Flat
 from tyrecal.tyre.own_deck.own_deck import read_own_deck
+from tyrecal.tyre.own_deck.solver_deck import SolverDeck
 from tyrecal.tyre.own_deck.text import OwnDeckError
 
 from . import maker_decks, own_decks, test_contact
@@ -228,7 +228,7 @@ KINDS: dict[str, Mutant] = {
 }
 
 
-def judged(folder: Path, text: str, right: Flat) -> str:
+def judged(folder: Path, text: str, right: SolverDeck) -> str:
     """``refused`` by line, ``same``, or what is wrong."""
     path = folder / "tyre.inp"
     path.write_text(text, encoding="utf-8")

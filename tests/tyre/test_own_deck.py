@@ -18,9 +18,9 @@ from tyrecal.tyre.case.identity import tyre_sha256
 from tyrecal.tyre.case.kinds.section_deck import trial
 from tyrecal.tyre.case.own_case import own_case
 from tyrecal.tyre.load import load_case
-from tyrecal.tyre.own_deck.flat import Flat
 from tyrecal.tyre.own_deck.own_deck import OwnDeck, Units, read_own_deck
 from tyrecal.tyre.own_deck.own_text import own_texts
+from tyrecal.tyre.own_deck.solver_deck import SolverDeck
 from tyrecal.tyre.own_deck.summary import contents
 from tyrecal.tyre.own_deck.text import OwnDeckError
 from tyrecal.tyre.resolve import resolved
@@ -283,7 +283,7 @@ def test_laws_and_elements_in_either_units(tmp_path: Path) -> None:
             assert other == pytest.approx(first, rel=1e-12)
 
 
-def numbers_of(flat: Flat) -> list[list[float]]:
+def numbers_of(flat: SolverDeck) -> list[list[float]]:
     """Numbers in the data lines of the materials, and the nodes' coordinates."""
     lines = flat.lines[flat.lines.index("*MATERIAL, NAME=RUBBER") :]
     rows = [line.split(",") for line in lines if not line.startswith("*")]

@@ -9,7 +9,7 @@ from .case import Case, LoadedCase
 from .case.kinds.stations import mesh_at_level, with_gauges_of
 from .case.parts import Rubber
 from .effects import EffectRefused, catalogue
-from .own_deck.flat import Flat
+from .own_deck.solver_deck import SolverDeck
 from .plugins import IDS
 from .section.mesh import SectionMesh
 from .section.section import Section
@@ -43,7 +43,7 @@ class Tyre:
         return self.written.section
 
     @cached_property
-    def flat(self) -> Flat:
+    def flat(self) -> SolverDeck:
         """The user's deck of the tyre's section. Raises InputError for a tyre without one."""
         return self.written.kind.flat(self.case)
 

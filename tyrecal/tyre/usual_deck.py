@@ -12,8 +12,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from .case.mistakes import Mistake
-from .own_deck.flat import Flat, Ply
 from .own_deck.own_deck import UNIT_LENGTH, UNIT_MASS, OwnDeck
+from .own_deck.solver_deck import Ply, SolverDeck
 from .usual import (
     ALL_THE_SAME,
     BELT_ANGLE,
@@ -59,7 +59,9 @@ UNITS_mm = {  # in a deck in mm, t, s: the unit's name, and SI in one of it
 }
 
 
-def usual_numbers(deck: OwnDeck, numbers: Mapping[str, float], flat: Flat) -> dict[str, Usual]:
+def usual_numbers(
+    deck: OwnDeck, numbers: Mapping[str, float], flat: SolverDeck
+) -> dict[str, Usual]:
     """The usual ranges of a deck's plain numbers by path, of those that have one.
 
     numbers: of the deck, with those set in its place; flat: the deck that they make.
@@ -116,7 +118,9 @@ def deck_slips(deck: OwnDeck, numbers: Mapping[str, float]) -> Iterator[Mistake]
         yield Mistake(file, place.line, path, f"{numbers[path]:g}", message)
 
 
-def _unusual(deck: OwnDeck, numbers: Mapping[str, float], flat: Flat) -> Iterator[tuple[str, str]]:
+def _unusual(
+    deck: OwnDeck, numbers: Mapping[str, float], flat: SolverDeck
+) -> Iterator[tuple[str, str]]:
     """`unusual_numbers` of all numbers, and of the deck that they make."""
     last_belt = ""
     for path, usual in usual_numbers(deck, numbers, flat).items():
@@ -142,7 +146,7 @@ def _key(ply: Ply) -> tuple[str, float]:
     return ply.name, ply.angle_deg
 
 
-def _angles(flat: Flat) -> dict[tuple[str, float], Usual]:
+def _angles(flat: SolverDeck) -> dict[tuple[str, float], Usual]:
     """Usual angles of layers: of belts, which lie over the crown alone, and of carcasses, which
     reach from there to a bead."""
     mesh = flat.mesh

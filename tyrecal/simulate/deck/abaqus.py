@@ -13,7 +13,7 @@ import numpy as np
 from ...tyre.case import Case
 from ...tyre.case.parts import Rim, Rubber
 from ...tyre.case.schema import Analysis
-from ...tyre.own_deck.flat_mesh import REFERENCE_NODE
+from ...tyre.own_deck.solver_mesh import REFERENCE_NODE
 from ...tyre.resolve import Tyre
 from ...tyre.section.mesh import SectionMesh
 

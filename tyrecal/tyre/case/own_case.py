@@ -8,9 +8,9 @@ from types import MappingProxyType
 from typing import Any
 
 from ...errors import InputError
-from ..own_deck.flat import Flat
 from ..own_deck.own_deck import OwnDeck
 from ..own_deck.own_decks import OwnDecks
+from ..own_deck.solver_deck import SolverDeck
 from ..templates import environment, render
 from .case_text import plain_text
 
@@ -20,7 +20,7 @@ RANGE = 5.0  # a variable's bounds over its start, and under it
 
 def own_case(
     deck: OwnDeck,
-    flat: Flat,
+    flat: SolverDeck,
     size: str,
     pressure_kPa: float | None,
     numbers: Mapping[str, float] = NO_NUMBERS,

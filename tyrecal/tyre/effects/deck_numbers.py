@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 
 from ..case import LoadedCase
-from ..own_deck.flat import Flat
 from ..own_deck.numbers import moduli, modulus_sign
+from ..own_deck.solver_deck import SolverDeck
 from ..own_deck.text import OwnDeckError
 from .edit import changed, with_part
 
@@ -110,7 +110,7 @@ def with_thickness(case: LoadedCase, part: str, factor: float) -> LoadedCase:
     return changed(case, deck=deck)
 
 
-def _read(case: LoadedCase, part: str) -> tuple[dict[str, float], Flat, list[str]]:
+def _read(case: LoadedCase, part: str) -> tuple[dict[str, float], SolverDeck, list[str]]:
     numbers = dict(case.deck_numbers)
     return numbers, case.kind.deck.flat(numbers), case.kind.source(case.case).sets(part)
 

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 from . import numbers as numbers_of
-from .flat import SECTION_OPTIONS, Flat, flatten
 from .gauge import Gauges, thickened
 from .grammar import Sorted, sort
 from .model import Model, build
+from .solver_deck import SECTION_OPTIONS, SolverDeck, translate
 from .text import OUTPUT_KEYWORDS, RULES, Block, OwnDeckError, Place, number_from, read_blocks
 
 Units = Literal["m", "mm"]
@@ -134,13 +134,13 @@ class OwnDeck:
             self._models[key] = build(deck)
         return self._models[key]
 
-    def flat(self, numbers: Mapping[str, float], gauges: Gauges = ()) -> Flat:
+    def flat(self, numbers: Mapping[str, float], gauges: Gauges = ()) -> SolverDeck:
         """The flat deck with numbers set and ``gauges`` of its parts, in SI units.
 
         Raises OwnDeckError."""
         deck = sort(self.with_numbers(numbers))
         model = thickened(self.model(deck), gauges) if gauges else self.model(deck)
-        return flatten(deck, model, UNIT_LENGTH[self.units], UNIT_MASS[self.units])
+        return translate(deck, model, UNIT_LENGTH[self.units], UNIT_MASS[self.units])
 
 
 def read_own_deck(path: Path, units: Units | None = None) -> OwnDeck:

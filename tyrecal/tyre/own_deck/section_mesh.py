@@ -9,8 +9,8 @@ import numpy as np
 from ..section.curve import length_along
 from ..section.mesh import SectionMesh
 from ..section.section import Section
-from .flat import Flat, Ply
 from .scope import CORNERS_OF
+from .solver_deck import Ply, SolverDeck
 
 Array = np.ndarray
 DRAWN_STATIONS = 40  # of the drawn half
@@ -93,7 +93,7 @@ class OwnDeckMesh(SectionMesh):
         return self.around
 
 
-def section_mesh(flat: Flat) -> OwnDeckMesh:
+def section_mesh(flat: SolverDeck) -> OwnDeckMesh:
     """The mesh of a flat deck."""
     mesh = flat.mesh
     number = {name: k for k, name in enumerate(dict.fromkeys(flat.materials))}
@@ -118,7 +118,7 @@ def section_mesh(flat: Flat) -> OwnDeckMesh:
     )
 
 
-def section(flat: Flat) -> Section:
+def section(flat: SolverDeck) -> Section:
     """The half of positive z, of its inner and its outer surface."""
     mesh = flat.mesh
     lines = []

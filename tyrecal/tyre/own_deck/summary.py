@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from .flat import Flat
 from .own_deck import OwnDeck
+from .solver_deck import SolverDeck
 from .text import names_of
 
 
-def contents(deck: OwnDeck, flat: Flat) -> dict[str, Any]:
+def contents(deck: OwnDeck, flat: SolverDeck) -> dict[str, Any]:
     """The data."""
     mesh, model = flat.mesh, flat.model
     crown = np.array([mesh.nodes[n] for n in mesh.crown])
@@ -56,7 +56,7 @@ def contents(deck: OwnDeck, flat: Flat) -> dict[str, Any]:
     }
 
 
-def laws(flat: Flat, material: str) -> list[str]:
+def laws(flat: SolverDeck, material: str) -> list[str]:
     """The options of a material."""
     names: list[str] = []
     inside = False

@@ -16,9 +16,9 @@ from ..parts import DeckSource, SectionOrigin
 from ..schema import Case
 
 if TYPE_CHECKING:
-    from ...own_deck.flat import Flat
     from ...own_deck.own_deck import OwnDeck, Units
     from ...own_deck.own_decks import OwnDecks
+    from ...own_deck.solver_deck import SolverDeck
     from ...own_deck.text import Place
     from ...section.mesh import SectionMesh
     from ...section.section import Section
@@ -60,7 +60,7 @@ class TyreKind:
         """Numbers of its decks by mark or path."""
         return self.source(case).numbers
 
-    def flat(self, case: Case) -> Flat:
+    def flat(self, case: Case) -> SolverDeck:
         """The section deck as solvers read it. Raises InputError for a tyre without one."""
         source = self.source(case)
         return self.deck.flat(source.numbers, source.thickened)

@@ -9,11 +9,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from ...own_deck.flat import Flat
-from ...own_deck.flat_mesh import REFERENCE_NODE
 from ...own_deck.numbers import moduli
 from ...own_deck.own_deck import UNIT_LENGTH, UNIT_MASS, OwnDeck
 from ...own_deck.section_mesh import OwnDeckMesh, section, section_mesh
+from ...own_deck.solver_deck import SolverDeck
+from ...own_deck.solver_mesh import REFERENCE_NODE
 from ...own_deck.text import OwnDeckError, Place
 from ...section.section import Section
 from ...usual_deck import deck_slips, unusual_numbers
@@ -128,7 +128,7 @@ class SectionDeck(UserDecks):
         return moduli(self.numbers(case), material)
 
 
-def trial(flat: Flat) -> float:
+def trial(flat: SolverDeck) -> float:
     """The mass, kg, of the tyre that the bundled solver makes of a flat deck.
 
     Raises OwnDeckError where it refuses something.
@@ -141,10 +141,10 @@ def trial(flat: Flat) -> float:
     raise OwnDeckError(_origin(flat, line - 1) or flat.origins[0], words)
 
 
-def _origin(flat: Flat, line: int) -> Place | None:
+def _origin(flat: SolverDeck, line: int) -> Place | None:
     return flat.origins[line] if 0 <= line < len(flat.origins) else None
 
 
 @lru_cache(maxsize=8)
-def _mesh(flat: Flat) -> OwnDeckMesh:
+def _mesh(flat: SolverDeck) -> OwnDeckMesh:
     return section_mesh(flat)

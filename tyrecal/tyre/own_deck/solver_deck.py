@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .flat_mesh import FlatMesh, flat_mesh
 from .grammar import Sorted
 from .model import Assigned, Model
 from .numbers import written
+from .solver_mesh import SolverMesh, solver_mesh
 from .text import DIMENSIONS, MATERIAL_OPTIONS, Block, Place, Row, fields_of, placed_fields
 
 SECTION_OPTIONS = ("HOURGLASS STIFFNESS", "REBAR LAYER")
@@ -34,10 +34,10 @@ class Ply:
 
 
 @dataclass(frozen=True, eq=False)
-class Flat:
+class SolverDeck:
     """The flat deck without its step; ``origins``: of each line."""
 
-    mesh: FlatMesh
+    mesh: SolverMesh
     lines: tuple[str, ...]
     origins: tuple[Place, ...]
     materials: tuple[str, ...]  # of the solid sections, by their place
@@ -66,10 +66,10 @@ class Flat:
         return "\n".join(self.lines)
 
 
-def flatten(deck: Sorted, model: Model, length: float, mass: float) -> Flat:
+def translate(deck: Sorted, model: Model, length: float, mass: float) -> SolverDeck:
     """The flat deck of a model whose units of length and mass are so many m and kg. Raises
     OwnDeckError."""
-    mesh = flat_mesh(model, length)
+    mesh = solver_mesh(model, length)
     write = _Writer(length, mass)
     blocks = _materials(deck.model)
     options = _options(deck.model)
@@ -118,7 +118,7 @@ def flatten(deck: Sorted, model: Model, length: float, mass: float) -> Flat:
     static = next(block for block in deck.inflation if block.name == "STATIC")
     block, row, i = model.pressure[0]
     stress = mass / length
-    return Flat(
+    return SolverDeck(
         mesh,
         (*mesh.lines, *write.lines),
         (*mesh.origins, *write.origins),
@@ -218,7 +218,7 @@ def _layers(
     option: Block,
     blocks: Mapping[str, Sequence[Block]],
     used: dict[str, str],
-    mesh: FlatMesh,
+    mesh: SolverMesh,
     length: float,
 ) -> list[Ply]:
     if option.name != "REBAR LAYER":

@@ -17,7 +17,7 @@ OVER_THE_BELT = 0.94  # of the largest radius: nodes of the outer surface beyond
 
 
 @dataclass(frozen=True, eq=False)
-class FlatMesh:
+class SolverMesh:
     """Nodes and elements under the flat deck's numbers, m.
 
     outer, inner: nodes of the outer and of the inner surface in order, from -z to +z; around: of
@@ -59,12 +59,12 @@ def _tolerances(block: Block, length: float) -> str:
     return tolerances
 
 
-def flat_mesh(model: Model, length: float) -> FlatMesh:
+def solver_mesh(model: Model, length: float) -> SolverMesh:
     """The mesh of a model whose unit of length is so many m, remembered with it. Raises
     OwnDeckError."""
     known = getattr(model, "_flat", {})
     if length in known:
-        mesh: FlatMesh = known[length]
+        mesh: SolverMesh = known[length]
         return mesh
     number = {n: k for k, n in enumerate(sorted(model.nodes), start=1)}
     nodes = {number[n]: (length * r, length * z) for n, (r, z) in sorted(model.nodes.items())}
@@ -128,7 +128,7 @@ def flat_mesh(model: Model, length: float) -> FlatMesh:
         for j, (row, _) in enumerate(each.lines, start=1):
             line(f"EMBEDDED_{k}_{j}", row.place)
     line(f"*RIGID BODY, REF NODE={REFERENCE_NODE}, TIE NSET=RIM", start)
-    made = FlatMesh(
+    made = SolverMesh(
         nodes,
         solids,
         plies,
