@@ -24,7 +24,7 @@ def own_jobs(tyre: Tyre) -> tuple[dict[str, str], dict[str, Any]]:
     own units. Raises TemplateFailed."""
     deck, flat, c = tyre.written.kind.deck, tyre.flat, tyre.case
     _refuse_unrevolved(tyre)
-    (body,) = (block for block in flat.found.model if block.name == "RIGID BODY")
+    (body,) = (block for block in flat.blocks.model if block.name == "RIGID BODY")
     steps = [block.place for block in deck.blocks if block.name == "STEP"]
     _, row, field = flat.model.pressure[0]
     pressure = c.pressure_kPa * 1e3 * UNIT_LENGTH[deck.units] / UNIT_MASS[deck.units]
@@ -34,10 +34,10 @@ def own_jobs(tyre: Tyre) -> tuple[dict[str, str], dict[str, Any]]:
     numbers = tyre.written.deck_numbers
     files = own_texts(deck, numbers, [(row, i, pressure) for row, i in others])
     files["inflate.inp"] = files.pop(deck.path.name)
-    loads = [block for block in flat.found.inflation if block.name == "DSLOAD"]
+    loads = [block for block in flat.blocks.inflation if block.name == "DSLOAD"]
     node, (r, z) = flat.model.reference
     return files, {
-        "step": 1 + steps.index(flat.found.inflation[0].place),
+        "step": 1 + steps.index(flat.blocks.inflation[0].place),
         "node": node,
         "r": r,
         "z": z,
@@ -68,8 +68,8 @@ def _refuse_unrevolved(tyre: Tyre) -> None:
         "a revolve needs the rim again: hold it by one *RIGID BODY with TIE NSET": (
             len(bodies) != 1 or "TIE NSET" not in bodies[0].parameters
         ),
-        "a revolve keeps the contact, which is left out here: delete it": bool(flat.found.contact),
-        "the pressure must be a *DSLOAD": any(b.name == "DLOAD" for b in flat.found.inflation),
+        "a revolve keeps the contact, which is left out here: delete it": bool(flat.blocks.contact),
+        "the pressure must be a *DSLOAD": any(b.name == "DLOAD" for b in flat.blocks.inflation),
         f"it has no node set {source.crown}: name that of its crown in deck.crown": (
             named(source.crown) not in flat.model.node_sets
         ),

@@ -52,7 +52,7 @@ def with_prony(case: LoadedCase, shear: float, tau_s: float) -> LoadedCase:
     numbers, flat, _ = _read(case, "")
     long_term: set[str] = set()
     material = ""
-    for block in flat.found.model:
+    for block in flat.blocks.model:
         if block.name == "MATERIAL":
             material = block.get("NAME")
         elif block.name == "HYPERELASTIC" and block.get("MODULI") != "INSTANTANEOUS":

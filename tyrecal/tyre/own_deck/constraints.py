@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .assembly import Assembly
-from .grammar import Sorted
+from .classify import ClassifiedDeck
 from .scope import Point, mirror_of, nearest
 from .surfaces import is_rigid, rigid_nodes, surface_nodes
 from .text import Block, Row
@@ -45,8 +45,8 @@ class Constraints:
     nodes of those that only touch, by degree of freedom. Raises OwnDeckError.
     """
 
-    def __init__(self, made: Assembly, deck: Sorted):
-        self.made, self.found, self.root = made, deck, made.root
+    def __init__(self, made: Assembly, deck: ClassifiedDeck):
+        self.made, self.blocks, self.root = made, deck, made.root
         self.rim: dict[int, None] = {}
         self.reference: tuple[int, Point] | None = None
         self.same: dict[int, int] = {}
@@ -76,7 +76,7 @@ class Constraints:
         """The one rigid body that holds rubber; others only touch it."""
         rubber = {n for e in self.root.elements.values() if e.is_solid for n in e.nodes}
         rims = [b for b in self.bodies if b.nodes & rubber or self.seats & set(b.surfaces)]
-        if not rims and not self.found.contact:
+        if not rims and not self.blocks.contact:
             rims = self.bodies
         if len(rims) > 1:
             raise rims[1].block.refused("one rigid body is honoured, the rim")
@@ -200,7 +200,7 @@ class Constraints:
     def _held(self) -> None:
         """Collect what *BOUNDARY holds: the rim's reference node, the bead, or the plane of a
         half."""
-        blocks = [*self.made.held, *(b for b in self.found.inflation if b.name == "BOUNDARY")]
+        blocks = [*self.made.held, *(b for b in self.blocks.inflation if b.name == "BOUNDARY")]
         fixed: dict[int, set[int]] = {}
         for block in blocks:
             for row in block.rows:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .assembly import Assembly
+from .classify import ClassifiedDeck
 from .constraints import Constraints
-from .grammar import Sorted
 from .scope import FARTHEST, nearest
 from .surfaces import boundary_of, rigid_pieces, surface_nodes
 from .text import Block, Row
@@ -40,7 +40,7 @@ class Pair:
 class Contact:
     """The contact of a deck. Raises OwnDeckError."""
 
-    def __init__(self, made: Assembly, blocks: Sorted, tied: Constraints):
+    def __init__(self, made: Assembly, blocks: ClassifiedDeck, tied: Constraints):
         self.made, self.blocks, self.tied, self.root = made, blocks, tied, made.root
         rubber = {n for e in self.root.elements.values() if e.is_solid for n in e.nodes}
         points = np.array([self.root.nodes[n] for n in rubber])

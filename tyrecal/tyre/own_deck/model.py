@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .assembly import Assembly, collect
+from .classify import ClassifiedDeck
 from .constraints import Constraints, Embedded, lines_of_the_other_half
 from .contact import Contact
-from .grammar import Sorted
 from .scope import Element, Point, corner_areas, faces_of, mirror_of, reflected
 from .surfaces import Face, boundary_of, surface_faces
 from .text import NODES_AND_SECTION, Block, Row
@@ -48,7 +48,7 @@ class Model:
     left_out: tuple[str, ...] = ()  # contact that the held bead makes superfluous, in words
 
 
-def build(deck: Sorted) -> Model:
+def build(deck: ClassifiedDeck) -> Model:
     """The section. Raises OwnDeckError."""
     made = collect(deck.model)
     return _Builder(made, deck).model()
@@ -57,22 +57,22 @@ def build(deck: Sorted) -> Model:
 class _Builder:
     """Builds the model from what was collected."""
 
-    def __init__(self, made: Assembly, deck: Sorted):
-        self.made, self.found, self.root = made, deck, made.root
+    def __init__(self, made: Assembly, deck: ClassifiedDeck):
+        self.made, self.blocks, self.root = made, deck, made.root
 
     def model(self) -> Model:
         """Raises OwnDeckError."""
         if not any(e.is_solid for e in self.root.elements.values()):
-            raise self.found.model[-1].refused("is the last, but the deck has no CGAX element")
+            raise self.blocks.model[-1].refused("is the last, but the deck has no CGAX element")
         solids, plies = self._sections()
         node_sets = self._all_sets()
         pressed, name, places = self._pressure()
-        self.tied = Constraints(self.made, self.found)
+        self.tied = Constraints(self.made, self.blocks)
         left_out = (
-            Contact(self.made, self.found, self.tied).left_out() if self.found.contact else ()
+            Contact(self.made, self.blocks, self.tied).left_out() if self.blocks.contact else ()
         )
         if not self.tied.rim:
-            raise self.found.model[-1].refused(
+            raise self.blocks.model[-1].refused(
                 "is the last, but no *RIGID BODY or *BOUNDARY holds the bead on a rim"
             )
         for number, element in self.root.elements.items():
@@ -207,7 +207,7 @@ class _Builder:
         faces: list[Face] = []
         places: list[tuple[Block, Row, int]] = []
         names: list[str] = []
-        for block in self.found.inflation:
+        for block in self.blocks.inflation:
             for row in block.rows if block.name == "DSLOAD" else ():
                 if row.name(1) != "P":
                     raise block.refused(f"the load {row.text(1)} is not honoured, only P", row)
@@ -232,7 +232,7 @@ class _Builder:
                 if any(row.fields[3:]):
                     raise block.refused(f"data '{row.fields[3]}' is not honoured", row)
         if not places:
-            raise self.found.inflation[0].refused("has no pressure: *DSLOAD needs a data line")
+            raise self.blocks.inflation[0].refused("has no pressure: *DSLOAD needs a data line")
         values = {row.number(i) for _, row, i in places}
         if len(values) > 1:
             raise places[1][0].refused("one pressure is honoured, the same on all", places[1][1])
@@ -243,7 +243,7 @@ class _Builder:
     def _on_solids(self, pressed: list[Face], boundary: Sequence[Face]) -> tuple[Face, ...]:
         """The free faces of solids that a pressure acts on, those under plies among them."""
         free = {frozenset((f[2][0], f[2][-1])): f for f in boundary}
-        surface = self.found.inflation[0]
+        surface = self.blocks.inflation[0]
         faces: dict[int, Face] = {}
         for n, face, raw in pressed:
             nodes = tuple(self.tied.same.get(each, each) for each in raw)

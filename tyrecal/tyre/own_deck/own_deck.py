@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from . import numbers as numbers_of
+from .classify import ClassifiedDeck, classify
 from .gauge import Gauges, thickened
-from .grammar import Sorted, sort
 from .model import Model, build
 from .solver_deck import SECTION_OPTIONS, SolverDeck, translate
 from .text import OUTPUT_KEYWORDS, RULES, Block, OwnDeckError, Place, number_from, read_blocks
@@ -124,8 +124,8 @@ class OwnDeck:
         self._filled[place] = last
         return last
 
-    def model(self, deck: Sorted) -> Model:
-        """The section of sorted blocks, remembered while the mesh's own stay the same."""
+    def model(self, deck: ClassifiedDeck) -> Model:
+        """The section of classified blocks, remembered while the mesh's own stay the same."""
         mesh = (b for b in (*deck.model, *deck.inflation) if b.name in TOPOLOGY)
         key = (*mesh, *deck.contact)
         if key not in self._models:
@@ -138,7 +138,7 @@ class OwnDeck:
         """The flat deck with numbers set and ``gauges`` of its parts, in SI units.
 
         Raises OwnDeckError."""
-        deck = sort(self.with_numbers(numbers))
+        deck = classify(self.with_numbers(numbers))
         model = thickened(self.model(deck), gauges) if gauges else self.model(deck)
         return translate(deck, model, UNIT_LENGTH[self.units], UNIT_MASS[self.units])
 

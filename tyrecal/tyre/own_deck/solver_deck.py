@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .grammar import Sorted
+from .classify import ClassifiedDeck
 from .model import Assigned, Model
 from .numbers import written
 from .solver_mesh import SolverMesh, solver_mesh
@@ -45,7 +45,7 @@ class SolverDeck:
     plies: tuple[Ply, ...]
     pressure_Pa: float
     long_term: bool
-    found: Sorted
+    blocks: ClassifiedDeck
     model: Model
 
     @property
@@ -66,7 +66,7 @@ class SolverDeck:
         return "\n".join(self.lines)
 
 
-def translate(deck: Sorted, model: Model, length: float, mass: float) -> SolverDeck:
+def translate(deck: ClassifiedDeck, model: Model, length: float, mass: float) -> SolverDeck:
     """The flat deck of a model whose units of length and mass are so many m and kg. Raises
     OwnDeckError."""
     mesh = solver_mesh(model, length)

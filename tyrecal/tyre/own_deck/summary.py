@@ -41,7 +41,7 @@ def contents(deck: OwnDeck, flat: SolverDeck) -> dict[str, Any]:
         "rim": {"nodes": len(mesh.rim), "radius_m": float(held[:, 0].max())},
         "cavity": {"surface": model.cavity_name, "faces": len(mesh.cavity)},
         "pressure_kPa": flat.pressure_Pa / 1e3,
-        "inflation_step": step_name(flat.found.inflation[0].parameters.get("NAME", "")),
+        "inflation_step": step_name(flat.blocks.inflation[0].parameters.get("NAME", "")),
         "static_moduli": flat.static_moduli,
         "crown": {
             "nodes": len(crown),
@@ -51,8 +51,8 @@ def contents(deck: OwnDeck, flat: SolverDeck) -> dict[str, Any]:
         "reflected": model.reflected,
         "marks": list(deck.marks),
         "left_out": list(model.left_out),
-        "passed_over": names_of(flat.found.passed),
-        "later_steps": [step_name(block.parameters.get("NAME", "")) for block in flat.found.later],
+        "passed_over": names_of(flat.blocks.passed),
+        "later_steps": [step_name(block.parameters.get("NAME", "")) for block in flat.blocks.later],
     }
 
 
@@ -60,7 +60,7 @@ def laws(flat: SolverDeck, material: str) -> list[str]:
     """The options of a material."""
     names: list[str] = []
     inside = False
-    for block in flat.found.model:
+    for block in flat.blocks.model:
         if block.name == "MATERIAL":
             inside = block.get("NAME") == material
         elif inside and block.name in ("ELASTIC", "HYPERELASTIC", "VISCOELASTIC"):

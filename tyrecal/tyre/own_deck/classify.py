@@ -16,7 +16,7 @@ LOADS = ("DSLOAD", "DLOAD")
 
 
 @dataclass
-class Sorted:
+class ClassifiedDeck:
     """The blocks of a deck by what they are."""
 
     model: list[Block] = field(default_factory=list)
@@ -27,9 +27,9 @@ class Sorted:
     is_nonlinear: bool = False  # NLGEOM, which stays on in later steps
 
 
-def sort(blocks: Sequence[Block]) -> Sorted:
-    """Blocks checked and sorted. Raises OwnDeckError for what is not honoured."""
-    deck = Sorted()
+def classify(blocks: Sequence[Block]) -> ClassifiedDeck:
+    """Blocks checked and classified. Raises OwnDeckError for what is not honoured."""
+    deck = ClassifiedDeck()
     steps: list[list[Block]] = []
     step: list[Block] | None = None
     part = assembly = instance = False
@@ -133,7 +133,7 @@ def _pressures(loads: Sequence[Block]) -> dict[tuple[str, str], float] | None:
     return {(row.name(0), row.name(1)): row.number(2) for row in rows}
 
 
-def _step(step: list[Block], deck: Sorted, is_inflation: bool) -> None:
+def _step(step: list[Block], deck: ClassifiedDeck, is_inflation: bool) -> None:
     """A step up to the one that inflates: of those before it, what they hold stays held."""
     kept = []
     for block in step:
@@ -167,7 +167,7 @@ def _step(step: list[Block], deck: Sorted, is_inflation: bool) -> None:
     deck.inflation = kept
 
 
-def _check_amplitudes(deck: Sorted, blocks: Sequence[Block], static: Block) -> None:
+def _check_amplitudes(deck: ClassifiedDeck, blocks: Sequence[Block], static: Block) -> None:
     """Refuse an amplitude that does not end at its full size."""
     tables = {block.need("NAME"): block for block in deck.model if block.name == "AMPLITUDE"}
     for block in blocks:
