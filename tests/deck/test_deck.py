@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.simulate.deck.apart import TO_START, TemplateProcess
 from tyrecal.simulate.deck.decks import Decks, without_header
+from tyrecal.simulate.deck.template_process import TO_START, TemplateProcess
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed

@@ -18,10 +18,10 @@ from ...tyre.resolve import Tyre, resolved
 from ...tyre.templates import TemplateFailed, environment, render
 from ...tyre.values import set_values
 from .abaqus import aside, context
-from .apart import TemplateProcess
 from .calculix import calculix_context
 from .decks import HEADER_LINES, DesignEvaluator, header, refuse_outside
 from .own import explained, own_jobs
+from .template_process import TemplateProcess
 
 ELEMENTS_A_WAVE = 7.5  # of quadratic ones: the frequencies are right to 0.4 %
 DeckRequest = Mapping[str, Any]  # what is asked of a deck, see `Decks.request`
