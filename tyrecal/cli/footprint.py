@@ -8,9 +8,9 @@ from typing import Any
 import click
 
 from . import arguments, options
+from .default_case import default_case
 from .main import EXIT_SOLVER
 from .parameters import option
-from .taken import default_case
 from .terminal import Terminal
 
 DESIGNS = ("initial", "fitted")

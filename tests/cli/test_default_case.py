@@ -9,8 +9,8 @@ from pathlib import Path
 import click
 import pytest
 
+from tyrecal.cli.default_case import default_case
 from tyrecal.cli.options import Study
-from tyrecal.cli.taken import default_case
 from tyrecal.cli.terminal import Terminal
 from tyrecal.simulate.case_folder import owner
 from tyrecal.tyre.load import load_case
