@@ -31,7 +31,7 @@ TESTS = [
     "tests/cli/test_cli.py",
     "tests/cli/test_conventions.py",
     "tests/cli/test_suggestions.py",
-    "tests/cli/test_taken.py",
+    "tests/cli/test_default_case.py",
     "tests/case/test_bad_cases.py",  # what Pydantic refuses, and does not
     "tests/report/test_pictures.py",  # what Matplotlib leaves out
 ]

@@ -294,7 +294,7 @@ def test_incompressible_rubber_is_pressed(tmp_path: Path) -> None:
 
 
 def test_the_contact_has_the_properties_that_its_pair_names() -> None:
-    """Of several *SURFACE INTERACTION it takes the pair's own, wherever it stands."""
+    """A pair of several *SURFACE INTERACTION has those of its own, wherever it stands."""
     pair = texts(LOADS, 0.5)
     at = pair["press.inp"].index("*SURFACE INTERACTION")
     other = "*SURFACE INTERACTION, NAME=OTHER\n*FRICTION, ELASTIC SLIP=0.1\n0.9\n"
