@@ -10,9 +10,18 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .numbers import plain_number
-from .text import CONTACT_KEYWORDS, MATERIAL_OPTIONS, OUTPUT_KEYWORDS, RULES, Block, check_honoured
+from .text import Block, check_honoured, table
 
 LOADS = ("DSLOAD", "DLOAD")
+OF_THE_MODEL = ("MATERIAL", "PARAMETER", "AMPLITUDE", "BOUNDARY")
+OWNERS = {  # of options: the keywords that they follow, and words for one that does not
+    "MATERIAL OPTION": (("MATERIAL",), "must follow a *MATERIAL"),
+    "REBAR LAYER": (
+        ("SURFACE SECTION", "MEMBRANE SECTION"),
+        "must follow a *SURFACE SECTION or *MEMBRANE SECTION",
+    ),
+    "HOURGLASS STIFFNESS": (("SOLID SECTION",), "must be directly under its *SOLID SECTION"),
+}
 
 
 @dataclass
@@ -32,13 +41,13 @@ def classify(blocks: Sequence[Block]) -> ClassifiedDeck:
     deck = ClassifiedDeck()
     steps: list[list[Block]] = []
     step: list[Block] | None = None
-    part = assembly = instance = False
+    opened: list[str] = []  # *PART, *ASSEMBLY and *INSTANCE that have not ended
     after_a_step = False
     over: Block | None = None  # the *MATERIAL or section that options may follow
     for block in blocks:
         name = block.name
         if step is None and name == "STEP":
-            if part or assembly or instance:
+            if opened:
                 raise block.refused("is inside a *PART or *ASSEMBLY that does not end")
             step = []
         if step is not None:
@@ -49,48 +58,39 @@ def classify(blocks: Sequence[Block]) -> ClassifiedDeck:
                 steps.append(step)
                 step, after_a_step = None, True
             continue
-        if name in OUTPUT_KEYWORDS:
+        if name in table.OUTPUT_KEYWORDS:
             deck.passed.append(block)
             continue
-        if name in RULES and [*RULES[name].options_at] == ["deck step"]:
+        if name in table.RULES and [*table.RULES[name].options_at] == ["deck step"]:
             raise block.refused("is outside a step")
         if after_a_step:
             raise block.refused("is after a step: the model's keywords must be before *STEP")
-        if name in CONTACT_KEYWORDS:
+        if name in table.CONTACT_KEYWORDS:
             deck.contact.append(block)
             continue
         check_honoured(block, "deck")
+        is_of_material = name in table.MATERIAL_OPTIONS
         deck.model.append(block)
-        if name in MATERIAL_OPTIONS:
-            if over is None or over.name != "MATERIAL":
-                raise block.refused("must follow a *MATERIAL")
-        elif name == "REBAR LAYER":
-            if over is None or over.name not in ("SURFACE SECTION", "MEMBRANE SECTION"):
-                raise block.refused("must follow a *SURFACE SECTION or *MEMBRANE SECTION")
-        elif name == "HOURGLASS STIFFNESS":
-            if over is None or over.name != "SOLID SECTION":
-                raise block.refused("must be directly under its *SOLID SECTION")
-        else:
+        owners, words = OWNERS.get("MATERIAL OPTION" if is_of_material else name, ((), ""))
+        if not owners:
             over = block
-        if name in ("PART", "ASSEMBLY") and (part or assembly):
+        elif over is None or over.name not in owners:
+            raise block.refused(words)
+        if name in ("PART", "ASSEMBLY") and opened:
             raise block.refused("is inside another *PART or *ASSEMBLY")
-        if name == "INSTANCE" and (instance or not assembly):
+        if name == "INSTANCE" and opened != ["ASSEMBLY"]:
             raise block.refused("must be in an *ASSEMBLY, not in another *INSTANCE")
-        if name in ("END PART", "END ASSEMBLY", "END INSTANCE"):
-            opened = {"END PART": part, "END ASSEMBLY": assembly, "END INSTANCE": instance}[name]
-            if not opened or (name == "END ASSEMBLY" and instance):
+        if name in ("PART", "ASSEMBLY", "INSTANCE"):
+            opened.append(name)
+        elif name in ("END PART", "END ASSEMBLY", "END INSTANCE"):
+            if opened[-1:] != [name.removeprefix("END ")]:
                 raise block.refused("ends what did not begin, or not what began last")
-        part = name == "PART" or (part and name != "END PART")
-        assembly = name == "ASSEMBLY" or (assembly and name != "END ASSEMBLY")
-        instance = name == "INSTANCE" or (instance and name != "END INSTANCE")
-        inside = part or assembly
-        if inside and name in ("MATERIAL", "PARAMETER", "AMPLITUDE", "BOUNDARY"):
-            raise block.refused("belongs to the model, outside *PART and *ASSEMBLY")
-        if name in MATERIAL_OPTIONS and inside:
+            opened.pop()
+        elif opened and (is_of_material or name in OF_THE_MODEL):
             raise block.refused("belongs to the model, outside *PART and *ASSEMBLY")
     if step is not None:
         raise step[0].refused("has no *END STEP: the deck is cut off")
-    if part or assembly or instance:
+    if opened:
         raise blocks[-1].refused("is the last, but a *PART, *ASSEMBLY or *INSTANCE has no end")
     inflating = _last_that_raises_the_pressure(steps)
     for k, each in enumerate(steps[: len(steps) if inflating is None else inflating + 1]):
@@ -137,9 +137,9 @@ def _step(step: list[Block], deck: ClassifiedDeck, is_inflation: bool) -> None:
     """A step up to the one that inflates: of those before it, what they hold stays held."""
     kept = []
     for block in step:
-        if block.name in OUTPUT_KEYWORDS:
+        if block.name in table.OUTPUT_KEYWORDS:
             deck.passed.append(block)
-        elif block.name in CONTACT_KEYWORDS:
+        elif block.name in table.CONTACT_KEYWORDS:
             deck.contact.append(block)
         else:
             if (

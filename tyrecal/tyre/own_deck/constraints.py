@@ -10,7 +10,7 @@ import numpy as np
 from .assembly import Assembly
 from .classify import ClassifiedDeck
 from .scope import Point, mirror_of, nearest
-from .surfaces import is_rigid, rigid_nodes, surface_nodes
+from .surfaces import elements_of, is_rigid, rigid_nodes, surface_nodes
 from .text import Block, Row
 
 MERGED = 1e-6  # of the section's size: nodes closer than this are one where they are tied
@@ -74,7 +74,7 @@ class Constraints:
 
     def _choose_rim(self) -> None:
         """The one rigid body that holds rubber; others only touch it."""
-        rubber = {n for e in self.root.elements.values() if e.is_solid for n in e.nodes}
+        rubber = self.root.rubber_nodes()
         rims = [b for b in self.bodies if b.nodes & rubber or self.seats & set(b.surfaces)]
         if not rims and not self.blocks.contact:
             rims = self.bodies
@@ -135,14 +135,9 @@ class Constraints:
         self, slaves: Sequence[int], surface: tuple[Block, str], block: Block, row: Row
     ) -> None:
         """Nodes on the rim's elements, or as far from them as they may be without being moved."""
-        option, prefix = surface
-        segments = [
-            self.root.elements[n].nodes
-            for line in option.rows
-            for n in self.root.elements_in(prefix + line.name(0), option, line)
-        ]
-        ends = np.array([[self.root.nodes[n] for n in pair] for pair in segments])
-        away, _ = nearest(np.array([self.root.nodes[n] for n in slaves]), ends)
+        ends = [e.nodes for e, _ in elements_of(self.made, *surface)]
+        pieces = np.array([[self.root.nodes[n] for n in pair] for pair in ends])
+        away, _ = nearest(np.array([self.root.nodes[n] for n in slaves]), pieces)
         given = block.parameters.get("POSITION TOLERANCE", "")
         allowed = Row(block.place, given).number(0) if given else 0.0
         if block.get("ADJUST") != "NO":

@@ -42,7 +42,7 @@ class Contact:
 
     def __init__(self, made: Assembly, blocks: ClassifiedDeck, tied: Constraints):
         self.made, self.blocks, self.tied, self.root = made, blocks, tied, made.root
-        rubber = {n for e in self.root.elements.values() if e.is_solid for n in e.nodes}
+        rubber = self.root.rubber_nodes()
         points = np.array([self.root.nodes[n] for n in rubber])
         self.middle = points[:, 0].min() / 2 + points[:, 0].max() / 2
         self.size = float(np.ptp(points, axis=0).max())

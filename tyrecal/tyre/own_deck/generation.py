@@ -164,24 +164,15 @@ def _ncopy(scope: Scope, block: Block) -> None:
 
 
 def _nset(scope: Scope, block: Block) -> None:
-    name = block.need("NSET")
-    if of := block.get("ELSET"):
-        nodes = lambda: [n for e in scope.elements_in(of, block) for n in scope.elements[e].nodes]
-        scope._add(scope.node_sets, name, block, nodes)
-        return
-    scope._add(
-        scope.node_sets, name, block, lambda: _listed(scope, block, scope.nodes_in, scope.nodes)
-    )
+    of = block.get("ELSET")
+    nodes = lambda: [n for e in scope.elements_in(of, block) for n in scope.elements[e].nodes]
+    given = lambda: _listed(scope, block, scope.nodes_in, scope.nodes)
+    scope._add(scope.node_sets, block.need("NSET"), block, nodes if of else given)
 
 
 def _elset(scope: Scope, block: Block) -> None:
-    name = block.need("ELSET")
-    scope._add(
-        scope.element_sets,
-        name,
-        block,
-        lambda: _listed(scope, block, scope.elements_in, scope.elements),
-    )
+    given = lambda: _listed(scope, block, scope.elements_in, scope.elements)
+    scope._add(scope.element_sets, block.need("ELSET"), block, given)
 
 
 def _listed(scope: Scope, block: Block, members: Callable, known: dict) -> list[int]:
@@ -266,13 +257,8 @@ def _elcopy(scope: Scope, block: Block) -> None:
         shifted = tuple(node + nodes for node in element.nodes)
         if "REFLECT" in block.parameters:
             shifted = reflected(element, shifted)
-        scope.make(
-            block,
-            element.row if not block.rows else block.rows[0],
-            n + shift,
-            element.kind,
-            shifted,
-        )
+        row = block.rows[0] if block.rows else element.row
+        scope.make(block, row, n + shift, element.kind, shifted)
         made.append(n + shift)
     scope.add_elements(block, made, "NEW SET")
 

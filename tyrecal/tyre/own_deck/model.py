@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .assembly import Assembly, collect
-from .classify import ClassifiedDeck
+from .classify import LOADS, ClassifiedDeck
 from .constraints import Constraints, Embedded, lines_of_the_other_half
 from .contact import Contact
 from .scope import Element, Point, corner_areas, faces_of, mirror_of, reflected
 from .surfaces import Face, boundary_of, surface_faces
-from .text import NODES_AND_SECTION, Block, Row
+from .text import Block, Row, element_types
 
 AT_CROWN = 0.9  # of the largest radius: a cut that reaches it goes through the crown
 
@@ -92,7 +92,7 @@ class _Builder:
             self._check_whole(boundary)
         cavity = self._on_solids(pressed, boundary)
         reference = self.tied.reference or (0, (0.0, 0.0))
-        rubber = {n for e in self.root.elements.values() if e.is_solid for n in e.nodes}
+        rubber = self.root.rubber_nodes()
         if loose := used - rubber - self.tied.guests:
             number, element = next(
                 (k, e) for k, e in self.root.elements.items() if e.is_ply and loose & set(e.nodes)
@@ -131,7 +131,7 @@ class _Builder:
             solid = block.name == "SOLID SECTION"
             for n in elements:
                 element = self.root.elements[n]
-                if NODES_AND_SECTION[element.kind][1] != block.name:
+                if element_types.NODES_AND_SECTION[element.kind][1] != block.name:
                     raise block.refused(f"element {n} of {name} is a {element.kind}")
                 if n in owner:
                     before = owner[n].place
@@ -142,7 +142,7 @@ class _Builder:
             (solids if solid else plies).append(Assigned(block, name, tuple(elements)))
         for n, element in self.root.elements.items():
             if n not in owner and not element.kind.startswith("RAX"):
-                need = NODES_AND_SECTION[element.kind][1]
+                need = element_types.NODES_AND_SECTION[element.kind][1]
                 raise element.block.refused(f"element {n} has no *{need}", element.row)
         return tuple(solids), tuple(self._with_rebars(plies))
 
@@ -188,7 +188,7 @@ class _Builder:
     def _check_whole(self, boundary: Sequence[Face]) -> None:
         """The section does not end in a cut through the crown, as half a tyre does."""
         points = self.root.nodes
-        solid = {n for e in self.root.elements.values() if e.is_solid for n in e.nodes}
+        solid = self.root.rubber_nodes()
         crown = max(points[n][0] for n in solid)
         for z in (min(points[n][1] for n in solid), max(points[n][1] for n in solid)):
             cut = [
@@ -207,30 +207,26 @@ class _Builder:
         faces: list[Face] = []
         places: list[tuple[Block, Row, int]] = []
         names: list[str] = []
-        for block in self.blocks.inflation:
-            for row in block.rows if block.name == "DSLOAD" else ():
-                if row.name(1) != "P":
+        loads = [b for b in self.blocks.inflation if b.name in LOADS]
+        for block, row in [(load, row) for load in loads for row in load.rows]:
+            kind = row.name(1)
+            if block.name == "DSLOAD":
+                if kind != "P":
                     raise block.refused(f"the load {row.text(1)} is not honoured, only P", row)
                 faces += surface_faces(self.made, row.name(0), block, row)
-                names.append(row.name(0))
-                places.append((block, row, 2))
-            for row in block.rows if block.name == "DLOAD" else ():
-                kind = row.name(1)
-                if kind not in ("P1", "P2", "P3", "P4"):
-                    hint = ": set spin_rad_per_s in the case" if kind == "CENTRIF" else ""
-                    raise block.refused(
-                        f"the load {kind} is not honoured, only P1 to P4{hint}", row
-                    )
+            elif kind not in ("P1", "P2", "P3", "P4"):
+                hint = ": set spin_rad_per_s in the case" if kind == "CENTRIF" else ""
+                raise block.refused(f"the load {kind} is not honoured, only P1 to P4{hint}", row)
+            else:
                 for n in self.root.elements_in(row.name(0), block, row):
                     own = dict(faces_of(self.root.elements[n]))
                     if f"S{kind[1]}" not in own:
                         raise block.refused(f"element {n} has no face {kind[1]}", row)
                     faces.append((n, f"S{kind[1]}", own[f"S{kind[1]}"]))
-                names.append(row.name(0))
-                places.append((block, row, 2))
-            for row in block.rows if block.name in ("DSLOAD", "DLOAD") else ():
-                if any(row.fields[3:]):
-                    raise block.refused(f"data '{row.fields[3]}' is not honoured", row)
+            if any(row.fields[3:]):
+                raise block.refused(f"data '{row.fields[3]}' is not honoured", row)
+            names.append(row.name(0))
+            places.append((block, row, 2))
         if not places:
             raise self.blocks.inflation[0].refused("has no pressure: *DSLOAD needs a data line")
         values = {row.number(i) for _, row, i in places}

@@ -13,11 +13,11 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from .text import MATERIAL_OPTIONS, OUTPUT_KEYWORDS, Block, Row, named, number_from, placed_fields
+from .text import Block, Row, fields, named, number_from, table
 
 DECK_MARK = re.compile(r"\{\{\s*([A-Za-z][A-Za-z0-9_\-]*)\s*\}\}")
 PARAMETER = re.compile(r"<\s*(\w+)\s*>")
-IN_PATHS = {*MATERIAL_OPTIONS, "REBAR LAYER", "REBAR"}  # blocks whose numbers have paths
+IN_PATHS = {*table.MATERIAL_OPTIONS, "REBAR LAYER", "REBAR"}  # blocks whose numbers have paths
 Numbers = Mapping[str, float]
 
 
@@ -40,7 +40,7 @@ def paths(blocks: Sequence[Block]) -> dict[str, tuple[int, int, int]]:
                 if plain_number(value):
                     places[f"parameter / {name}"] = place, i, -1
             continue
-        for (name, *_), i, j in placed_fields(block) if block.name in IN_PATHS else ():
+        for (name, *_), i, j in fields.placed_fields(block) if block.name in IN_PATHS else ():
             row = block.rows[i]
             if not plain_number(row.text(j)):
                 continue
@@ -69,7 +69,7 @@ def acting_parameters(blocks: Sequence[Block]) -> set[str]:
     acting, in_step = set[str](), False
     for block in blocks:
         in_step = block.name != "END STEP" and (in_step or block.name == "STEP")
-        if (in_step and block.name != "BOUNDARY") or block.name in OUTPUT_KEYWORDS:
+        if (in_step and block.name != "BOUNDARY") or block.name in table.OUTPUT_KEYWORDS:
             continue
         texts = [*(row.line for row in block.rows), *block.parameters.values()]
         acting |= {name.upper() for text in texts for name in PARAMETER.findall(text)}

@@ -15,7 +15,7 @@ from .classify import ClassifiedDeck, classify
 from .gauge import Gauges, thickened
 from .model import Model, build
 from .solver_deck import SECTION_OPTIONS, SolverDeck, translate
-from .text import OUTPUT_KEYWORDS, RULES, Block, OwnDeckError, Place, number_from, read_blocks
+from .text import Block, OwnDeckError, Place, number_from, read_blocks, table
 
 Units = Literal["m", "mm"]
 UNIT_LENGTH = {"m": 1.0, "mm": 1e-3}  # of a unit of length, m
@@ -23,7 +23,7 @@ UNIT_MASS = {"m": 1.0, "mm": 1e3}  # of a unit of mass, kg: mm, t, s, MPa
 DENSITIES = {"m": (300.0, 2e4), "mm": (3e-10, 2e-8)}  # of tyres' materials
 TOPOLOGY = {"PART", "ASSEMBLY", "SYMMETRIC MODEL GENERATION", "BOUNDARY", "DSLOAD", "DLOAD"}
 TOPOLOGY |= {
-    name for name, rule in RULES.items() if rule.is_judged and "part" in rule.level.split()
+    name for name, rule in table.RULES.items() if rule.is_judged and "part" in rule.level.split()
 }
 TOPOLOGY -= {*SECTION_OPTIONS}
 
@@ -92,7 +92,7 @@ class OwnDeck:
                 for i, row in enumerate(block.rows)
                 for j, text in enumerate(row.fields)
             ]
-            if block.name not in OUTPUT_KEYWORDS:
+            if block.name not in table.OUTPUT_KEYWORDS:
                 parts.append((block.name, sorted(block.parameters.items()), fields))
         return sha256(json.dumps([self.units, parts]).encode()).hexdigest()
 

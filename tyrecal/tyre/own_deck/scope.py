@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .text import MAX_LABEL, Block, Row, is_label
+from .text import Block, Row, is_label, language
 
 Point = tuple[float, float]
+Sets = dict[str, list[tuple[Block, Callable[[], list[int]]]]]  # pieces of each, by name
 CORNERS_OF = {3: 3, 4: 4, 6: 3, 8: 4}  # of solids by their number of nodes
 FARTHEST = 1e9  # coordinate, in any unit
 MOST = 200_000  # nodes or elements that a deck generates
@@ -50,10 +51,8 @@ class Scope:
     name: str = ""
     nodes: dict[int, Point] = field(default_factory=dict)
     elements: dict[int, Element] = field(default_factory=dict)
-    node_sets: dict[str, list[tuple[Block, Callable[[], list[int]]]]] = field(default_factory=dict)
-    element_sets: dict[str, list[tuple[Block, Callable[[], list[int]]]]] = field(
-        default_factory=dict
-    )
+    node_sets: Sets = field(default_factory=dict)
+    element_sets: Sets = field(default_factory=dict)
     system: tuple[Point, Point] = (0.0, 0.0), (1.0, 0.0)  # origin, direction of its first axis
     _asked: list[str] = field(default_factory=list)
 
@@ -64,6 +63,10 @@ class Scope:
     def elements_in(self, name: str, block: Block, row: Row | None = None) -> list[int]:
         """Elements of a set, or the element of this number."""
         return self._members(name, self.element_sets, self.elements, "element", block, row)
+
+    def rubber_nodes(self) -> set[int]:
+        """Nodes of the solids."""
+        return {n for e in self.elements.values() if e.is_solid for n in e.nodes}
 
     def _members(
         self, name: str, sets: dict, known: dict, what: str, block: Block, row: Row | None
@@ -121,8 +124,8 @@ class Scope:
 
 def _check_label(what: str, number: int, block: Block, row: Row | None) -> None:
     """Raises OwnDeckError for a number that no node or element can have."""
-    if not 1 <= number <= MAX_LABEL:
-        raise block.refused(f"{what} {number}: numbers go from 1 to {MAX_LABEL}", row)
+    if not 1 <= number <= language.MAX_LABEL:
+        raise block.refused(f"{what} {number}: numbers go from 1 to {language.MAX_LABEL}", row)
 
 
 def mirror_of(block: Block) -> Callable[[Point], Point]:

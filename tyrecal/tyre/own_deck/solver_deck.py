@@ -13,8 +13,8 @@ import numpy as np
 from .classify import ClassifiedDeck
 from .model import Assigned, Model
 from .numbers import written
-from .solver_mesh import SolverMesh, solver_mesh
-from .text import DIMENSIONS, MATERIAL_OPTIONS, Block, Place, Row, fields_of, placed_fields
+from .solver_mesh import DeckLines, SolverMesh, solver_mesh
+from .text import Block, Place, Row, fields, table
 
 SECTION_OPTIONS = ("HOURGLASS STIFFNESS", "REBAR LAYER")
 
@@ -132,36 +132,31 @@ def translate(deck: ClassifiedDeck, model: Model, length: float, mass: float) ->
     )
 
 
-class _Writer:
-    """Lines with their origins, numbers in SI units."""
+class _Writer(DeckLines):
+    """Lines with numbers in SI units."""
 
     def __init__(self, length: float, mass: float):
+        super().__init__()
         self.length, self.mass = length, mass
-        self.lines: list[str] = []
-        self.origins: list[Place] = []
-
-    def line(self, text: str, place: Place) -> None:
-        self.lines.append(text)
-        self.origins.append(place)
 
     def scale(self, unit: str) -> float:
         """The factor to SI units on a field of a kind of unit."""
-        L, M, _ = DIMENSIONS.get(unit, (0, 0, 0))
+        L, M, _ = fields.DIMENSIONS.get(unit, (0, 0, 0))
         return self.length**L * self.mass**M
 
     def block(self, block: Block, head: str, angular: bool = False) -> None:
         """A keyword line, and the block's data."""
         self.line(head, block.place)
-        scales = {(i, j): self.scale(field.unit) for field, i, j in placed_fields(block)}
+        scales = {(i, j): self.scale(field.unit) for field, i, j in fields.placed_fields(block)}
         for i, row in enumerate(block.rows):
-            fields = list(row.fields)
-            for j, text in enumerate(fields):
+            texts = list(row.fields)
+            for j, text in enumerate(texts):
                 scale = scales.get((i, j), 1.0)
                 if angular and j == 2:
                     scale = 1.0
                 if scale != 1.0 and text:
-                    fields[j] = written(row.number(j) * scale)
-            self.line(", ".join(fields), row.place)
+                    texts[j] = written(row.number(j) * scale)
+            self.line(", ".join(texts), row.place)
 
 
 def _options(blocks: Sequence[Block]) -> dict[Block, list[Block]]:
@@ -189,10 +184,10 @@ def _materials(blocks: Sequence[Block]) -> dict[str, list[Block]]:
             if block.rows:
                 raise block.refused("takes no data")
             current = by_name[name] = [block]
-        elif block.name in MATERIAL_OPTIONS:
+        elif block.name in table.MATERIAL_OPTIONS:
             if any(each.name == block.name for each in current):
                 raise block.refused(f"is given twice under {current[0].get('NAME')}")
-            fields_of(block)
+            fields.fields_of(block)
             current.append(block)
     return by_name
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from .model import Model
@@ -46,6 +46,24 @@ class SolverMesh:
         return tuple(n for n in self.outer if self.nodes[n][0] > OVER_THE_BELT * most)
 
 
+@dataclass
+class DeckLines:
+    """Lines of a solver's deck, and the places in the user's that they come from."""
+
+    lines: list[str] = field(default_factory=list)
+    origins: list[Place] = field(default_factory=list)
+
+    def line(self, text: str, place: Place) -> None:
+        """Add a line."""
+        self.lines.append(text)
+        self.origins.append(place)
+
+    def numbers(self, numbers: Sequence[int], place: Place) -> None:
+        """Add data lines of labels."""
+        for k in range(0, len(numbers), 12):
+            self.line(", ".join(map(str, numbers[k : k + 12])), place)
+
+
 def _tolerances(block: Block, length: float) -> str:
     """Tolerances of an *EMBEDDED ELEMENT that are given, m."""
     tolerances = ""
@@ -68,12 +86,8 @@ def solver_mesh(model: Model, length: float) -> SolverMesh:
         return mesh
     number = {n: k for k, n in enumerate(sorted(model.nodes), start=1)}
     nodes = {number[n]: (length * r, length * z) for n, (r, z) in sorted(model.nodes.items())}
-    lines, origins = list[str](), list[Place]()
-
-    def line(text: str, place: Place) -> None:
-        lines.append(text)
-        origins.append(place)
-
+    write = DeckLines()
+    line = write.line
     start = model.solids[0].block.place
     line("*NODE, NSET=TYRE", start)
     for n, (r, z) in nodes.items():
@@ -110,20 +124,20 @@ def solver_mesh(model: Model, length: float) -> SolverMesh:
         raise OwnDeckError(start, "no free surface of the rubber is left for the tread")
     outer, inner = _chain(tread, nodes), _chain(cavity, nodes)
     line("*NSET, NSET=RIM", start)
-    _numbers(line, rim, start)
+    write.numbers(rim, start)
     most = max(nodes[n][0] for n in outer)
     line("*NSET, NSET=CROWN", start)
-    _numbers(line, [n for n in outer if nodes[n][0] > OVER_THE_BELT * most], start)
+    write.numbers([n for n in outer if nodes[n][0] > OVER_THE_BELT * most], start)
     for name, faces in (("CAVITY", cavity), ("TREAD", tread)):
         line(f"*SURFACE, NAME={name}, TYPE=ELEMENT", start)
         for n, face, _ in faces:
             line(f"{n}, {face}", start)
     for k, each in enumerate(model.embedded, start=1):
         line(f"*ELSET, ELSET=HOSTS_{k}", each.block.place)
-        _numbers(line, [element_at[n] for n in each.hosts], each.block.place)
+        write.numbers([element_at[n] for n in each.hosts], each.block.place)
         for j, (row, own_lines) in enumerate(each.lines, start=1):
             line(f"*ELSET, ELSET=EMBEDDED_{k}_{j}", row.place)
-            _numbers(line, [element_at[n] for n in own_lines], row.place)
+            write.numbers([element_at[n] for n in own_lines], row.place)
         line(f"*EMBEDDED ELEMENT, HOST ELSET=HOSTS_{k}{_tolerances(each.block, length)}", start)
         for j, (row, _) in enumerate(each.lines, start=1):
             line(f"EMBEDDED_{k}_{j}", row.place)
@@ -141,8 +155,8 @@ def solver_mesh(model: Model, length: float) -> SolverMesh:
         tuple(_around(boundary, inner)),
         reference,
         element_at,
-        tuple(lines),
-        tuple(origins),
+        tuple(write.lines),
+        tuple(write.origins),
     )
     object.__setattr__(model, "_flat", {**known, length: made})
     return made
@@ -157,11 +171,6 @@ def _around(boundary: Sequence[Face], inner: Sequence[int]) -> list[int]:
             break
         chain += following[chain[-1]]
     return chain if chain[1] == inner[1] else chain[::-1]
-
-
-def _numbers(line: object, numbers: Sequence[int], place: Place) -> None:
-    for k in range(0, len(numbers), 12):
-        line(", ".join(map(str, numbers[k : k + 12])), place)  # type: ignore[operator]
 
 
 def _chain(faces: Sequence[Face], nodes: Mapping[int, Point]) -> list[int]:

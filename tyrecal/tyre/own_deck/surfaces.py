@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from .assembly import Assembly
-from .scope import Scope, along_arc, faces_of
+from .scope import Element, Scope, along_arc, faces_of
 from .text import Block, Row
 
 PIECES_OF_ARC = 16  # straight pieces for a circular or parabolic arc
@@ -72,24 +72,26 @@ def surface_nodes(made: Assembly, name: str, block: Block, row: Row) -> list[int
     )
 
 
+def elements_of(made: Assembly, surface: Block, prefix: str) -> list[tuple[Element, str]]:
+    """Elements of a surface of elements, each with the face that is named ("": none)."""
+    return [
+        (made.root.elements[n], row.name(1))
+        for row in surface.rows
+        for n in made.root.elements_in(prefix + row.name(0), surface, row)
+    ]
+
+
 def is_rigid(made: Assembly, surface: Block, prefix: str) -> bool:
     """Whether all elements of a surface are rigid lines (RAX2)."""
     if surface.get("TYPE") in ("NODE", "SEGMENTS"):
         return False
-    members = [
-        n for row in surface.rows for n in made.root.elements_in(prefix + row.name(0), surface, row)
-    ]
-    return bool(members) and all(made.root.elements[n].kind == "RAX2" for n in members)
+    kinds = {element.kind for element, _ in elements_of(made, surface, prefix)}
+    return kinds == {"RAX2"}
 
 
 def rigid_nodes(made: Assembly, surface: Block, prefix: str) -> set[int]:
     """Nodes of the elements of a rigid surface."""
-    return {
-        node
-        for row in surface.rows
-        for n in made.root.elements_in(prefix + row.name(0), surface, row)
-        for node in made.root.elements[n].nodes
-    }
+    return {n for element, _ in elements_of(made, surface, prefix) for n in element.nodes}
 
 
 def rigid_pieces(made: Assembly, surface: Block, prefix: str) -> np.ndarray:
@@ -99,13 +101,9 @@ def rigid_pieces(made: Assembly, surface: Block, prefix: str) -> np.ndarray:
         profile = _profile(surface) + np.array(made.shifts.get(prefix, (0.0, 0.0)))
         pieces = np.stack([profile[:-1], profile[1:]], axis=1)
         return pieces[(pieces[:, 0] != pieces[:, 1]).any(1)]
-    ends_of = []
-    for row in surface.rows:
-        for n in made.root.elements_in(prefix + row.name(0), surface, row):
-            nodes = made.root.elements[n].nodes
-            ends = nodes[::-1] if row.name(1) == "SNEG" else nodes
-            ends_of.append([made.root.nodes[end] for end in ends])
-    return np.array(ends_of)
+    members = elements_of(made, surface, prefix)
+    ends_of = [e.nodes[::-1] if face == "SNEG" else e.nodes for e, face in members]
+    return np.array([[made.root.nodes[end] for end in ends] for ends in ends_of])
 
 
 def _profile(surface: Block) -> np.ndarray:

@@ -6,66 +6,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # mypy knows the folder by its own name
-    from solvers.language.element_types import NODES_AND_SECTION
-    from solvers.language.fields import DIMENSIONS, fields_of, placed_fields
-    from solvers.language.honour import check_honoured
-    from solvers.language.spelling import named
-    from solvers.language.table import CONTACT_KEYWORDS, MATERIAL_OPTIONS, OUTPUT_KEYWORDS, RULES
-    from solvers.language.text import (
-        MAX_LABEL,
-        Block,
-        Place,
-        Reader,
-        Row,
-        is_label,
-        names_of,
-        number_from,
-    )
+    from solvers.language import element_types, fields, honour, spelling, table
+    from solvers.language import text as language
 else:
-    from tyrecal_solvers.language.element_types import NODES_AND_SECTION
-    from tyrecal_solvers.language.fields import DIMENSIONS, fields_of, placed_fields
-    from tyrecal_solvers.language.honour import check_honoured
-    from tyrecal_solvers.language.spelling import named
-    from tyrecal_solvers.language.table import (
-        CONTACT_KEYWORDS,
-        MATERIAL_OPTIONS,
-        OUTPUT_KEYWORDS,
-        RULES,
-    )
-    from tyrecal_solvers.language.text import (
-        MAX_LABEL,
-        Block,
-        Place,
-        Reader,
-        Row,
-        is_label,
-        names_of,
-        number_from,
-    )
+    from tyrecal_solvers.language import element_types, fields, honour, spelling, table
+    from tyrecal_solvers.language import text as language
 
 from ...errors import InputError
 
-__all__ = [
-    "CONTACT_KEYWORDS",
-    "DIMENSIONS",
-    "MATERIAL_OPTIONS",
-    "MAX_LABEL",
-    "NODES_AND_SECTION",
-    "OUTPUT_KEYWORDS",
-    "RULES",
-    "Block",
-    "OwnDeckError",
-    "Place",
-    "Row",
-    "check_honoured",
-    "fields_of",
-    "is_label",
-    "named",
-    "names_of",
-    "number_from",
-    "placed_fields",
-    "read_blocks",
-]
+__all__ = ["element_types", "fields", "language", "table"]
+Block = language.Block
+Place = language.Place
+Row = language.Row
+is_label, names_of, number_from = language.is_label, language.names_of, language.number_from
+check_honoured, named = honour.check_honoured, spelling.named
 MAX_OWN_BYTES = 50_000_000  # of a deck and all that it includes
 
 
@@ -93,5 +47,5 @@ class OwnDeckError(InputError):
 
 def read_blocks(path: Path) -> tuple[list[Block], dict[str, str]]:
     """The blocks of a deck, and the texts of its files by name. Raises OwnDeckError, OSError."""
-    reader = Reader(path.parent, OwnPlace, MAX_OWN_BYTES).read(path.name)
+    reader = language.Reader(path.parent, OwnPlace, MAX_OWN_BYTES).read(path.name)
     return reader.blocks, reader.texts
