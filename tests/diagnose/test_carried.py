@@ -17,7 +17,7 @@ X = np.array([0.2, -0.1, 0.15])
 
 
 class Sloped(Toy):
-    """With slopes by the parameters of its effects, which go with their square, too."""
+    """With slopes by the parameters of its effects, whose shifts go with their square, too."""
 
     sloped = ("e0", "e1")
 
@@ -25,9 +25,9 @@ class Sloped(Toy):
         own = super()._answer(point)
         slopes = {}
         for id in point.slopes:
-            e, g = point.effects[id], self.g[id] + self.tilt[id] @ point.x
-            own = Answer(own.eta + e**2 * g, own.jacobian + e**2 * self.tilt[id], own.split)
-            slopes[id] = g * (1 + 2 * e)
+            e, g = point.effects[id], self.g[id]
+            own = Answer(own.eta + e**2 * g, own.jacobian, own.split)
+            slopes[id] = g * (1 + 2 * e) + self.tilt[id] @ point.x
         return Answer(own.eta, own.jacobian, own.split, self.constants, slopes)
 
 

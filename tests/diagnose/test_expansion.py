@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,13 +12,13 @@ from tyrecal.studies.diagnose.diagnosis import _asked_again
 from tyrecal.studies.diagnose.expansion import (
     EffectResponse,
     Expansion,
-    _more,
     _nodes,
     anchored,
     expand,
     hermite,
     lagrange,
     node_values,
+    refined,
 )
 from tyrecal.studies.diagnose.inverse_problem import Assumed, Toggle
 from tyrecal.studies.diagnose.model import Answer, Query, Span
@@ -33,13 +32,16 @@ pytestmark = pytest.mark.numbers
 Array = np.ndarray
 
 
-def test_where_an_effect_is_asked() -> None:
-    """At Lobatto's points of a cubic to the farther end, or at two places on either side."""
-    assert node_values(Span(0.0, 2.0)) == pytest.approx([0.5, 1.5, 2.0])
-    assert node_values(Span(-2.0, 0.0)) == pytest.approx([-2.0, -1.5, -0.5])
-    assert node_values(Span(-3.0, -1.0)) == pytest.approx([-3.0, -2.25, -0.75])
-    assert node_values(Span(-2.0, 4.0)) == pytest.approx([-2.0, -1.0, 2.0, 4.0])
-    assert node_values(Span(0.0, 2.0, also=(3.0,))) == pytest.approx([0.5, 1.5, 2.0, 3.0])
+def test_where_an_effect_is_evaluated_first() -> None:
+    """At the farther end of its range if a slope is known there or at 0, else half way, too; of a
+    two-sided range at both ends, or at the farther one if both slopes are known."""
+    assert node_values(Span(0.0, 2.0)).tolist() == [1.0, 2.0]
+    assert node_values(Span(-3.0, -1.0)).tolist() == [-3.0, -1.5]
+    assert node_values(Span(-3.0, -1.0), 1).tolist() == [-3.0]
+    assert node_values(Span(0.0, 2.0, also=(3.0,)), 2).tolist() == [2.0, 3.0]
+    for slopes, wanted in ((0, [-2.0, 4.0]), (1, [-2.0, 4.0]), (2, [4.0])):
+        assert node_values(Span(-2.0, 4.0), slopes).tolist() == wanted
+    assert node_values(Span(-2.0, 4.0, second=True), 2).tolist() == [-2.0, 4.0]
 
 
 def test_an_effect_reaches_as_far_as_there_are_solutions() -> None:
@@ -78,37 +80,52 @@ def test_hermites_polynomials_take_values_and_slopes() -> None:
 @pytest.mark.parametrize(
     ("at_0", "span", "power", "wanted"),
     [
-        (False, Span(0.0, 1.0), 4, [0, 0.25, 1]),
-        (False, Span(-2.0, 0.0), 4, [-2, -0.5, 0]),
+        (False, Span(0.0, 1.0), 2, [0, 1]),
+        (False, Span(-2.0, 0.0), 2, [-2, 0]),
         (False, Span(-0.5, 1.0), 4, [-0.5, 0, 1]),
-        (True, Span(0.0, 1.0), 3, [0, 0.25, 1]),
+        (True, Span(0.0, 1.0), 2, [0, 1]),
     ],
 )
-def test_two_sizes_and_their_slopes_make_a_quartic(
+def test_a_size_and_its_slope_make_a_quadratic(
     at_0: bool, span: Span, power: int, wanted: list[float]
 ) -> None:
-    """The slope where the effect is 0 and two sizes a cubic; no slope is asked in vain."""
+    """So do a size and the slope where the effect is 0; no slope is asked in vain."""
     toy = Sloped(power, at_0, span)
     nodes = expand(toy, np.zeros(3)).nodes["e0"]
     assert nodes.values.tolist() == pytest.approx(wanted)
     e = np.linspace(span.low, span.high, 7)
     assert nodes.at(e)[0][:, 0] == pytest.approx(toy.curve(e), abs=1e-12)
     queries = [q for q in toy.points if q.slopes]
-    assert [q.constants for q in queries] == ([True] if at_0 else [False, False])
+    assert [q.constants for q in queries] == ([True] if at_0 else [False] * (len(wanted) - 1))
     by_values = lagrange(nodes.values, e) @ toy.curve(nodes.values)
     assert nodes.at(e)[0][:, -1] == pytest.approx(by_values, abs=1e-12)
 
 
-def test_where_splits_do_not_matter_one_size_and_the_slope_at_0_make_a_quadratic() -> None:
-    toy = Sloped(2, at_0=True)
-    nodes = expand(toy, np.zeros(3), splits=False).nodes["e0"]
-    assert nodes.values.tolist() == [0, 1] and nodes.sloped.tolist() == [True, False]
+def test_one_end_of_the_range_stands_for_both_where_both_slopes_are_known() -> None:
+    """A cubic, which reaches to the other end."""
+    toy = Sloped(3, span=Span(-0.5, 1.0))
+    toy.sloped_at_0 = ("e0",)
+    plain, toy._answer = toy._answer, lambda point: both(point)  # type: ignore[method-assign]
+
+    def both(point: Query) -> Answer:
+        toy.at_0 = not point.effects
+        return plain(point)
+
+    nodes = expand(toy, np.zeros(3)).nodes["e0"]
+    assert nodes.values.tolist() == [0, 1] and nodes.reach == (-0.5, 1.0)
+    e = np.linspace(-0.5, 1, 7)
+    assert nodes.at(e)[0][:, 0] == pytest.approx(toy.curve(e), abs=1e-12)
+
+
+def test_one_more_size_and_its_slope_make_a_quartic() -> None:
+    """Of an effect that matters, at the calibration's x; exact at all sizes then."""
+    toy = Sloped(4)
+    expansion = expand(toy, np.zeros(3))
+    nodes = refined(expansion, toy, {"e0": 0.5}).nodes["e0"]
+    assert nodes.values.tolist() == [0, 0.5, 1] and nodes.reach == (0.0, 1.0)
     e = np.linspace(0, 1, 7)
     assert nodes.at(e)[0][:, 0] == pytest.approx(toy.curve(e), abs=1e-12)
-    both = Sloped(2, at_0=True, span=Span(-1.0, 1.0))
-    assert expand(both, np.zeros(3), splits=False).nodes["e0"].values.tolist() == [-1, 0, 1]
-    own = Sloped(2)
-    assert expand(own, np.zeros(3), splits=False).nodes["e0"].values.tolist() == [0, 0.25, 1]
+    assert abs(expansion.nodes["e0"].at(e)[0][:, 0] - toy.curve(e)).max() > 1e-5
 
 
 def test_a_nearer_size_is_asked_where_the_far_end_has_no_solution() -> None:
@@ -121,10 +138,10 @@ def test_a_nearer_size_is_asked_where_the_far_end_has_no_solution() -> None:
             return super()._answer(point)
 
     toy = Stops(2, at_0=True)
-    nodes = expand(toy, np.zeros(3), splits=False).nodes["e0"]
-    assert nodes.values.tolist() == [0, 0.25] and nodes.reach == (0.0, 0.25)
+    nodes = expand(toy, np.zeros(3)).nodes["e0"]
+    assert nodes.values.tolist() == [0, 0.25, 0.5] and nodes.reach == (0.0, 0.5)
     toy.far = 0.1
-    expansion = expand(toy, np.zeros(3), splits=False)
+    expansion = expand(toy, np.zeros(3))
     assert not expansion.nodes and expansion.failed == {"e0": "no such tyre"}
 
 
@@ -132,10 +149,10 @@ def test_an_effect_is_not_asked_again_where_it_was_asked() -> None:
     """Near a node, or 0, and near x0: what was asked there is known; elsewhere it is asked."""
     for size, move, wanted in (
         (1.0, 0.0, False),
-        (0.74, 0.02, False),
+        (0.49, 0.02, False),
         (0.02, 0.2, False),
         (1.0, 0.2, True),
-        (0.5, 0.0, True),
+        (0.74, 0.0, True),
         (0.64, 0.0, True),
     ):
         toy = Toy(effects=1, size=0.3, pressures=(160.0, 240.0), bend=0.0)
@@ -153,50 +170,6 @@ def test_an_effect_is_not_asked_again_where_it_was_asked() -> None:
         assert (anchor is not None) == wanted
         if wanted:  # and not a second time
             assert not _asked_again(again, toy, weigh(again))[1]
-
-
-def test_more_sizes_where_two_and_their_slopes_are_not_enough() -> None:
-    """At 60 % of the range, where the far slope is worth 0.1 % and more half way to it, of the
-    fifth order at 0, 1/4 and 1 (double): e (e - 1/4)^2 (e - 1) / (3/4)^2 at 5/8."""
-    last = 0.625 * 0.375**3 / 0.75**2
-    for slope, more in ((0.00099, []), (0.00101, [0.6])):
-        toy = Sloped(4)
-        own = Polynomial([0, 1]) * Polynomial([-0.25, 1]) ** 2 * Polynomial([-1, 1]) / 0.75**2
-        toy.curve = slope / last * own
-        values = expand(toy, np.zeros(3)).nodes["e0"].values
-        assert values.tolist() == pytest.approx([0, 0.25, *more, 1])
-
-
-def test_more_nodes_where_a_cubic_is_not_enough() -> None:
-    """At 8 % and at half of the range, where Newton's last term is 0.3 % and more."""
-    last = 0.875 * 0.625 * 0.125  # the bend's own part half way between the last two nodes
-    for size, more in ((0.0, False), (0.0029 / last, False), (0.0031 / last, True)):
-        toy = Toy(effects=1, size=1e-3, pressures=(240.0,))
-        plain = toy._answer
-
-        def bent(point: Query, size: float = size, plain: Any = plain) -> Answer:
-            answer = plain(point)
-            e = point.effects.get("e0", 0.0)
-            return replace(answer, eta=answer.eta + size * e * (e - 0.25) * (e - 0.75))
-
-        toy._answer = bent  # type: ignore[method-assign]
-        nodes = expand(toy, np.zeros(3)).nodes["e0"].values
-        wanted = [0, 0.08, 0.25, 0.5, 0.75, 1] if more else [0, 0.25, 0.75, 1]
-        assert nodes.tolist() == pytest.approx(wanted)
-
-
-def test_where_a_far_node_has_no_solution_the_rest_may_bend_too() -> None:
-    """Three nodes do, two cannot tell: asked more towards the farthest that has an answer."""
-    n, none = 2, np.zeros((2, 1))
-    answer = lambda e: Answer(np.full(n, e * e), none, np.zeros(n))
-    plain = Expansion(np.zeros(1), np.zeros(n), none, np.zeros((n, 1, 1)), np.zeros(n), none, {})
-    failed, span = ValueError("no such tyre"), Span(0.0, 1.0)
-    answers = {0.25: answer(0.25), 0.75: answer(0.75), 1.0: failed}
-    more = lambda span, known: _more(_nodes("e0", plain, span, known))
-    assert more(span, answers) == pytest.approx([0.75 * 0.08, 0.75 * 0.5])
-    assert more(span, {**answers, 0.75: failed}) == []
-    back = {-e: each for e, each in answers.items()}
-    assert more(Span(-1.0, 0.0), back) == pytest.approx([-0.75 * 0.08, -0.75 * 0.5])
 
 
 def test_curvature_is_that_of_two_slopes() -> None:

@@ -153,7 +153,7 @@ def test_slopes_by_effects_against_differences() -> None:
     none that parts pairs far."""
     own = with_slopes(WIDE, ("bead_filler", "temperature", SPLICE, "rotation", "rim_width"))
     assert own.sloped == {"bead_filler", "temperature", "rim_width"}
-    assert own.sloped_at_0 == {SPLICE}
+    assert own.sloped_at_0 == {SPLICE, "temperature", "rim_width"}
     for id, e, step in (("bead_filler", 0.5, 5e-4), ("rim_width", 6e-3, 1e-5)):
         points = [Query(X, {id: e + side * step}) for side in (1, -1)]
         above, below, answer = own.answers([*points, Query(X, {id: e}, slopes=(id,))])
@@ -176,23 +176,23 @@ def test_the_slope_by_a_splice_against_differences_of_spliced_tyres() -> None:
     assert (two > 0.01).all()
 
 
-def test_sources_that_are_effects_step_once_and_fail_alone() -> None:
-    """The shift by the step is added to the slope; where the step has no solution, the point has
-    none."""
+def test_sources_that_are_effects_step_once_and_fail_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a sensitivity at 0 the shift by the step is added to the slope; where the step has no
+    solution, the point has none."""
     n = len(ROWS)
     answer = Answer(np.zeros(n), np.zeros((n, 3)), np.zeros(n), np.full((n, 2), 0.5))
     moved = replace(answer, eta=np.arange(float(n)), constants=None)
     point, stepped = Query(X, constants=True), Query(X, {"rim_width": 1e-3})
-    steps = [(1, "rim_width", 1e-3)]
+    monkeypatch.setattr(MODEL, "_steps", [(1, "rim_width", 1e-3)])
     known: dict[Any, Any] = {_key(point): answer, _key(stepped): moved}
-    completed = MODEL._completed(point, known, steps)
+    completed = MODEL._completed(point, known)
     assert isinstance(completed, Answer) and completed.constants is not None
     assert completed.constants[:, 0] == pytest.approx(np.full(n, 0.5))
     assert completed.constants[:, 1] == pytest.approx(0.5 + np.arange(n))
     assert answer.constants is not None and (answer.constants == 0.5).all()  # its own stays
     failure = DeckRefused("no such rim")
-    assert MODEL._completed(point, {**known, _key(stepped): failure}, steps) is failure
-    assert MODEL._completed(Query(X), {_key(Query(X)): moved}, steps) is moved
+    assert MODEL._completed(point, {**known, _key(stepped): failure}) is failure
+    assert MODEL._completed(Query(X), {_key(Query(X)): moved}) is not moved
 
 
 def test_a_refusal_with_one_effect_is_that_points_answer() -> None:

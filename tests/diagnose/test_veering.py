@@ -33,13 +33,14 @@ def matrix(z: float) -> np.ndarray:
 
 
 def test_the_coupling_of_two_modes_is_found_from_their_frequencies() -> None:
-    ln_f = [np.log(np.linalg.eigvalsh(matrix(z)))[::-1, None] / 2 for z in (0, 1, -1)]
-    q, rise = coupling(*ln_f)
+    at_0, above = (np.log(np.linalg.eigvalsh(matrix(z)))[::-1, None] / 2 for z in (0, 1))
+    slopes = np.array([[0.004 / 1.01], [-0.003 / 0.98]]) / 2
+    q, rise = coupling(at_0, slopes, above)
     scale = np.sqrt(1.01 * 0.98)
     assert q == pytest.approx(0.02 / scale, rel=1e-9)
     assert rise == pytest.approx(0.0, abs=1e-12)
-    turned = [each[::-1] for each in ln_f[1:]]  # whichever has which label
-    assert coupling(ln_f[0], *turned)[0] == pytest.approx(q, rel=1e-9)
+    turned = above[::-1]  # whichever has which label
+    assert coupling(at_0, slopes, turned)[0] == pytest.approx(q, rel=1e-9)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
-from ..diagnose.expansion import lagrange
+from ..diagnose.expansion import derivatives, lagrange
 from ..diagnose.model import Answer, Coupling, Query, ResponseModel, Span
 from ..emulator import up_to
 
@@ -55,6 +55,12 @@ class EmulatedEffect:
     split: tuple[Polynomial, ...]
     beside: Mapping[float, Array]  # (n,) at the ends of the range, see `Answer.beside`
 
+    def slope(self, e: float, t: Array) -> Array:
+        """d eta / d e (n,) at parameter e."""
+        nodes = np.append(self.nodes, 0.0)
+        weights = (lagrange(nodes, np.array([e])) @ derivatives(nodes))[0, :-1]
+        return np.tensordot(weights, [p.at(t)[0] for p in self.added], 1)
+
     def at(self, e: float, t: Array) -> tuple[Array, Array, Array]:
         """Added eta (n,), slopes (n, v) by t, split (n,) at parameter e."""
         weights = lagrange(np.append(self.nodes, 0.0), np.array([e]))[0, :-1]
@@ -67,9 +73,6 @@ class EmulatedEffect:
 class Emulated:
     """A `ResponseModel` that stands for ``model`` within ``reach`` of its start, and for a straight
     one beyond."""
-
-    sloped: Collection[str] = ()  # by effects its slopes would be those of its own polynomials
-    sloped_at_0: Collection[str] = ()
 
     def __init__(
         self,
@@ -85,6 +88,8 @@ class Emulated:
         self.start, self.spread = model.start, model.spread
         self.material_laws = model.material_laws
         self.spans: Mapping[str, Span] = {k: s for k, s in model.spans.items() if k in effects}
+        self.sloped: Collection[str] = {id for id in model.sloped if id in effects}
+        self.sloped_at_0: Collection[str] = {id for id in model.sloped_at_0 if id in effects}
         self._plain, self._constants, self._effects = plain, constants, effects
         self._couplings = couplings
 
@@ -111,7 +116,10 @@ class Emulated:
         if point.coupled and self._couplings:
             coupling = min(self._couplings, key=lambda known: float(abs(known[0] - t).max()))[1]
         straight, slope = eta + slope @ (there - t), slope / self.reach
-        return Answer(straight, slope, split, constants, coupling=coupling, beside=beside)
+        by_effect = {
+            id: self._effects[id].slope(point.effects.get(id, 0.0), t) for id in point.slopes
+        }
+        return Answer(straight, slope, split, constants, by_effect, coupling, beside)
 
 
 def emulate(model: ResponseModel, reach: float = REACH) -> Emulated:

@@ -13,7 +13,7 @@ from ...errors import InputError
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.modes.label import Label
 from .evidence import NONE, Hypothesis, quantile, refit
-from .expansion import Expansion, anchored, carried, expand
+from .expansion import MIDDLE, Expansion, anchored, carried, expand, refined
 from .gap import Gap, chi2_tail, find_gap, projection
 from .inverse_problem import Assumed, InverseProblem, Toggle, places
 from .label_swap import exchange_shifts, exchanged, with_exchanged
@@ -34,7 +34,6 @@ Array = np.ndarray
 IN_PLAY_WITHIN = 8.0  # ln evidence behind the best, up to which an effect is asked again
 MAX_IN_PLAY = 6
 MAX_JOINT, CARRIES_WEIGHT = 3, 0.02  # sets of effects that are asked together; probability of one
-MAX_ROUNDS = 2
 CARRIED_WITHIN = 0.7  # of x, from where effects are followed by their slopes
 STAGES = (
     "calibrate and evaluate each effect",
@@ -214,11 +213,11 @@ def _calibrated(
     Where none does, an effect or an exchange of labels may have driven it far off: then about the
     tyre that fits them if any of these may have moved them.
     """
-    where, splits = places(observations, rows), bool(np.isfinite(observations.split).any())
+    where = places(observations, rows)
     given = expansion
     if given is None:
         x0 = plain_fit(model, observations, where, assumed.form, known)
-        expansion = carried(known, model, x0) if known else expand(model, x0, splits)
+        expansion = carried(known, model, x0) if known else expand(model, x0)
     assert expansion is not None
     problem = InverseProblem(
         observations, expansion, model.spans, where, model.start, model.spread, changes, assumed
@@ -230,7 +229,7 @@ def _calibrated(
     x0 = plain_fit(model, observations, where, assumed.form, known, moved)
     near = known or abs(x0 - expansion.x0).max() < CARRIED_WITHIN
     try:
-        there = carried(known or expansion, model, x0) if near else expand(model, x0, splits)
+        there = carried(known or expansion, model, x0) if near else expand(model, x0)
     except (EvaluationFailed, InputError):  # there is no such tyre
         return problem
     return replace(problem, expansion=there)
@@ -245,13 +244,45 @@ def _fits(problem: InverseProblem) -> bool:
 def _settled(
     problem: InverseProblem, model: ResponseModel, hypotheses: list[Hypothesis]
 ) -> tuple[InverseProblem, list[Hypothesis]]:
-    """The problem with the model evaluated again for active hypotheses, and all weighed by it."""
-    for _ in range(MAX_ROUNDS if problem.expansion.nodes else 0):
-        again, changed = _asked_again(problem, model, hypotheses)
-        if not changed:
-            break
-        problem, hypotheses = again, weigh(again, before=(problem, hypotheses))
+    """The problem with the model evaluated again for active hypotheses, and all weighed by it:
+    first at the calibration's x near their sizes, then where their re-fits are."""
+    for look in (_nearer_sizes, _asked_again) if problem.expansion.nodes else ():
+        again, changed = look(problem, model, hypotheses)
+        if changed:
+            problem, hypotheses = again, weigh(again, before=(problem, hypotheses))
     return problem, hypotheses
+
+
+def _in_play(problem: InverseProblem, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The likeliest effects, and after them the likeliest sets of effects."""
+    singles = [h for h in hypotheses if h.key in problem.expansion.nodes]
+    best = max(h.ln_evidence for h in hypotheses)
+    play = [h for h in singles if h.ln_evidence > best - IN_PLAY_WITHIN]
+    play = sorted(play, key=lambda h: -h.ln_evidence)[:MAX_IN_PLAY]
+    p = probabilities(hypotheses)
+    sets = [h for h in hypotheses if len(h.values) > 1 and p[h.key] > CARRIES_WEIGHT]
+    return play + sorted(sets, key=lambda h: -p[h.key])[:MAX_JOINT]
+
+
+def _nearer_sizes(
+    problem: InverseProblem, model: ResponseModel, hypotheses: Sequence[Hypothesis]
+) -> tuple[InverseProblem, bool]:
+    """The problem with each active effect evaluated at one more size near its likeliest one, at the
+    calibration's x; whether there was any to evaluate."""
+    expansion, wanted = problem.expansion, dict[str, float]()
+    for h in _in_play(problem, hypotheses):
+        for id, values in h.values.items():
+            e, nodes = float(values[h.best]), expansion.nodes[id]
+            low, high = nodes.reach
+            end = high if e > 0 else low
+            size = end * min(MIDDLE, key=lambda share: abs(share * end - e))
+            apart = min(abs(each - e) for each in nodes.values.tolist())
+            same = min(abs(each - size) for each in nodes.values.tolist())
+            if id not in wanted and apart > KNOWN_WITHIN * (high - low) and same > 0:
+                wanted[id] = size
+    if not wanted:
+        return problem, False
+    return replace(problem, expansion=refined(expansion, model, wanted)), True
 
 
 def _asked_again(
@@ -260,21 +291,14 @@ def _asked_again(
     """The problem with the model evaluated where the active effects have their re-fits, each at its
     likeliest size, and those of likely sets two by two; whether anything was left to evaluate."""
     expansion = problem.expansion
-    singles = [h for h in hypotheses if h.key in expansion.nodes]
-    best = max(h.ln_evidence for h in hypotheses)
-    play = [h for h in singles if h.ln_evidence > best - IN_PLAY_WITHIN]
-    play = sorted(play, key=lambda h: -h.ln_evidence)[:MAX_IN_PLAY]
-    p = probabilities(hypotheses)
-    sets = [h for h in hypotheses if len(h.values) > 1 and p[h.key] > CARRIES_WEIGHT]
-    play += sorted(sets, key=lambda h: -p[h.key])[:MAX_JOINT]
     wanted: dict[tuple[str, ...], Query] = {}
-    for h in play:
+    for h in _in_play(problem, hypotheses):
         d = h.fitted.d[h.best]
         size = {id: float(e[h.best]) for id, e in h.values.items()}
         for ids in combinations(size, min(len(size), 2)):
             here = {id: size[id] for id in ids}
             if ids not in wanted and not _known(expansion, here, d):
-                wanted[ids] = Query(expansion.x0 + d, here)
+                wanted[ids] = Query(expansion.x0 + d, here, near=expansion.x0)
     if not wanted:
         return problem, False
     return replace(problem, expansion=anchored(expansion, model, list(wanted.values()))), True

@@ -22,16 +22,9 @@ import numpy as np
 from .model import Answer, Coupling, Query, ResponseModel, Span
 
 Array = np.ndarray
-ONE_SIDED = (0.25, 0.75, 1.0)  # with 0 the Lobatto points of a cubic
-TWO_SIDED = (0.5, 1.0)  # on either side
-BENDING = (0.08, 0.5)  # more of them, of the range, where the cubic is not enough
-MAX_LAST_TERM = 0.003  # of ln f, by Newton's polynomial, where the cubic is enough
-# the same where there are slopes, or the slope at 0
-ONE_SIDED_SLOPED, TWO_SIDED_SLOPED, BENDING_SLOPED = (0.25, 1.0), (1.0,), (0.6,)
-FAR_END = (
-    1.0,
-)  # the one size beside the slope at 0; splits, of which that tells nothing, need two
-MAX_LAST_TERM_SLOPED = 0.001  # some five times what the curve is off by
+BY_VALUES = (0.5, 1.0)  # of a one-sided range, the sizes of an effect without any slope
+NEARER = (0.25, 0.5)  # of an end of the range that has no solution
+MIDDLE = (0.25, 0.5, 0.75)  # of an end of the range, where an effect that matters is refined
 CURVATURE_STEP = 0.05  # of a logarithm, for H from two Jacobians
 
 
@@ -85,6 +78,21 @@ class EffectResponse:
             tilt = tilt + grown[:, None, None] * self.anchor.tilt
         return shift, tilt, np.abs(weights @ self.split)
 
+    def with_size(self, id: str, e: float, answer: Answer, plain: Expansion) -> EffectResponse:
+        """The response with the effect's answer at one more size."""
+        place = int(np.searchsorted(self.values, e))
+        none = np.zeros_like(plain.eta)
+        put = lambda known, new: np.insert(known, place, new, axis=0)
+        return replace(
+            self,
+            values=put(self.values, e),
+            shift=put(self.shift, answer.eta - plain.eta),
+            slope=put(self.slope, answer.slopes.get(id, none)),
+            sloped=put(self.sloped, id in answer.slopes),
+            tilt=put(self.tilt, answer.jacobian - plain.jacobian),
+            split=put(self.split, answer.split),
+        )
+
     def range_shifts(self) -> Array:
         """Shifts (k, n) at the ends of its range over the square root of 3 k: what they make normal
         has the mean square of an effect that is uniform over the range."""
@@ -135,20 +143,19 @@ class Expansion:
         return np.vstack([np.zeros((0, len(places))), *every]).T
 
 
-def expand(model: ResponseModel, x0: Array, splits: bool = True) -> Expansion:
-    """Ask the model about x0: curvature by x, sources of error, every effect at its nodes.
+def expand(model: ResponseModel, x0: Array) -> Expansion:
+    """The expansion about x0: curvature by x, sources of error, every effect at a few sizes.
 
-    splits: whether those of pairs matter, or their means alone.
+    An effect that matters is evaluated at more sizes later, see `refined` and `anchored`.
     Raises what the model answered where it has no solution at x0 itself.
     """
     ids, count = list(model.spans), len(x0)
     steps = CURVATURE_STEP * np.eye(count)
     at_0 = tuple(id for id in ids if id in model.sloped_at_0)
-    shares = {id: ONE_SIDED_SLOPED if splits else FAR_END for id in at_0}
-    shares |= dict.fromkeys(model.sloped, ONE_SIDED_SLOPED)
-    values = {id: node_values(model.spans[id], shares.get(id, ())) for id in ids}
+    slopes = {id: (id in model.sloped_at_0) + (id in model.sloped) for id in ids}
+    values = {id: node_values(model.spans[id], slopes[id]) for id in ids}
     points = [Query(x0, constants=True, slopes=at_0, coupled=True)]
-    points += [Query(x0 + side * step) for step in steps for side in (1, -1)]
+    points += [Query(x0 + step, near=x0) for step in steps]
     pairs = [(id, float(e)) for id in ids for e in values[id]]
     points += [_with_effect(model, x0, id, e) for id, e in pairs]
     answers = model.answers(points)
@@ -157,9 +164,9 @@ def expand(model: ResponseModel, x0: Array, splits: bool = True) -> Expansion:
         raise first
     hessian = np.zeros((*first.jacobian.shape, count))
     for i in range(count):
-        above, below = answers[1 + 2 * i : 3 + 2 * i]
-        if isinstance(above, Answer) and isinstance(below, Answer):
-            hessian[:, :, i] = (above.jacobian - below.jacobian) / (2 * CURVATURE_STEP)
+        above = answers[1 + i]
+        if isinstance(above, Answer):
+            hessian[:, :, i] = (above.jacobian - first.jacobian) / CURVATURE_STEP
     hessian = (hessian + hessian.transpose(0, 2, 1)) / 2
     assert first.constants is not None
     plain = Expansion(
@@ -173,16 +180,11 @@ def expand(model: ResponseModel, x0: Array, splits: bool = True) -> Expansion:
         material_laws=model.material_laws,
     )
     nodes, failed = {}, {}
-    replies = dict(zip(pairs, answers[1 + 2 * count :], strict=True))
+    replies = dict(zip(pairs, answers[1 + count :], strict=True))
     by_effect = {
         id: {float(e): replies[id, float(e)] for e in values[id]} | {0.0: first} for id in ids
     }
-    more = [
-        (id, e)
-        for id in ids
-        for e in _more(_nodes(id, plain, model.spans[id], by_effect[id]))
-        or _nearer(model.spans[id], by_effect[id])
-    ]
+    more = [(id, e) for id in ids for e in _nearer(model.spans[id], by_effect[id])]
     again = model.answers([_with_effect(model, x0, id, e) for id, e in more]) if more else []
     for (id, e), answer in zip(more, again, strict=True):
         by_effect[id][e] = answer
@@ -225,14 +227,27 @@ def carried(known: Expansion, model: ResponseModel, x0: Array) -> Expansion:
     )
 
 
-def node_values(span: Span, sloped: Sequence[float] = ()) -> Array:
-    """Sizes at which an effect is evaluated: parameters other than 0, rising; where its slopes are
-    evaluated, too, of a one-sided range at the shares ``sloped``."""
-    if span.low < 0 < span.high:
-        shares = np.array(TWO_SIDED_SLOPED if sloped else TWO_SIDED)
-        return np.sort([*(shares * span.low), *(shares * span.high), *span.also])
+def node_values(span: Span, slopes: int = 0) -> Array:
+    """Sizes at which an effect is evaluated first: parameters other than 0, rising.
+
+    slopes: 1 if its slope is known at 0 or at these sizes, 2 if at both: then the farther end of
+    a two-sided range is enough.
+    """
     far = span.high if abs(span.high) >= abs(span.low) else span.low
-    return np.sort([*(far * np.array(sloped or ONE_SIDED)), *span.also])
+    if span.low < 0 < span.high and (slopes < 2 or span.second):
+        return np.sort([span.low, span.high, *span.also])
+    return np.sort([*(far * np.array([1.0] if slopes else BY_VALUES)), *span.also])
+
+
+def refined(expansion: Expansion, model: ResponseModel, sizes: Mapping[str, float]) -> Expansion:
+    """The expansion with effects evaluated at one more size each, by id, at x0; one that has no
+    solution there stays as it was."""
+    points = [_with_effect(model, expansion.x0, id, e) for id, e in sizes.items()]
+    nodes = dict(expansion.nodes)
+    for (id, e), answer in zip(sizes.items(), model.answers(points), strict=True):
+        if isinstance(answer, Answer):
+            nodes[id] = nodes[id].with_size(id, e, answer, expansion)
+    return replace(expansion, nodes=nodes)
 
 
 def anchored(expansion: Expansion, model: ResponseModel, wanted: Sequence[Query]) -> Expansion:
@@ -264,7 +279,8 @@ def _with_effect(model: ResponseModel, x: Array, id: str, e: float) -> Query:
     range, what else its nature leaves open."""
     span = model.spans[id]
     beside = span.second and e in (span.low, span.high)
-    return Query(x, {id: e}, slopes=(id,) if id in model.sloped else (), beside=beside)
+    slopes = (id,) if id in model.sloped else ()
+    return Query(x, {id: e}, slopes=slopes, beside=beside, near=x)
 
 
 def _nodes(
@@ -283,6 +299,9 @@ def _nodes(
                 reach[0 if side < 0 else 1] = e
     if len(good) == 1:
         return None
+    for place, end in enumerate((span.low, span.high)):  # a side that the other stands for
+        if span.low < 0 < span.high and not any(e * end > 0 for e in replies):
+            reach[place] = end
     low, high = sorted(reach)
     values = np.array(sorted(good))
     answers = [answer for e in values if isinstance(answer := known[float(e)], Answer)]
@@ -302,37 +321,14 @@ def _nodes(
     )
 
 
-def _more(made: EffectResponse | None) -> list[float]:
-    """Further parameters towards the far ends of the range, where the nodes do not follow the
-    effect closely: where what the farthest says last, its slope or its value, matters."""
-    if made is None or len(made.values) + sum(made.sloped) < 3:
-        return []
-    middles = (made.values[1:] + made.values[:-1]) / 2
-    last = len(made.values) - 1 if made.reach[1] > 0 else 0  # the farthest node
-    if made.sloped[last]:
-        fewer = replace(made, sloped=made.sloped & (np.arange(len(made.values)) != last))
-    else:
-        rest = lambda each: np.delete(each, last, 0)
-        fewer = replace(
-            made,
-            values=rest(made.values),
-            shift=rest(made.shift),
-            slope=rest(made.slope),
-            sloped=rest(made.sloped),
-        )
-    sloped = bool(made.sloped.any())
-    if abs(made.shift_at(middles) - fewer.shift_at(middles)).max() < (
-        MAX_LAST_TERM_SLOPED if sloped else MAX_LAST_TERM
-    ):
-        return []
-    return [far * f for far in made.reach if far for f in (BENDING_SLOPED if sloped else BENDING)]
-
-
 def _nearer(span: Span, replies: Mapping[float, Answer | Exception]) -> list[float]:
-    """Parameters nearer to 0 that were saved, where none beyond has a solution."""
+    """Parameters nearer to 0, and on its other side, where none so far has a solution."""
     if any(isinstance(reply, Answer) for e, reply in replies.items() if e):
         return []
-    return [e for e in map(float, node_values(span, ONE_SIDED_SLOPED)) if e not in replies]
+    far = span.high if abs(span.high) >= abs(span.low) else span.low
+    ends = [span.low, span.high] if span.low < 0 < span.high else [far]
+    sizes = [share * end for end in ends for share in (*NEARER, 1.0)]
+    return [e for e in map(float, sizes) if e not in replies]
 
 
 def hermite(nodes: Array, sloped: Array, e: Array) -> tuple[Array, Array]:

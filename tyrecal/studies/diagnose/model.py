@@ -47,6 +47,9 @@ class Query:
     slopes: tuple[str, ...] = ()  # effects for slopes by whose parameters, too
     coupled: bool = False  # whether for what couples modes, too
     beside: bool = False  # whether for what else the nature of its effect leaves open, too
+    # (v,) x of a plain tyre: a model may evaluate the lowest and the highest pressure only, and
+    # interpolate the shift from that tyre between them
+    near: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,7 @@ class Answer:
     slopes: Mapping[str, Array] = field(default_factory=dict)  # (n,) d eta / d e; NaN: unknown
     coupling: Coupling | None = None
     beside: Array | None = None  # (n,) more eta, by one standard deviation of that
+    by_pressure: Array | None = None  # (n,) d eta / d ln(pressure), if it was evaluated
 
 
 def state_of(where: Where) -> TyreState:
@@ -92,7 +96,7 @@ class ResponseModel(Protocol):
 
     @property
     def sloped_at_0(self) -> Collection[str]:
-        """Effects that `Query.slopes` may name only where their parameter is 0."""
+        """Effects that `Query.slopes` may name where their parameter is 0."""
 
     def answers(self, points: Sequence[Query]) -> list[Answer | Exception]:
         """An answer for each point in order, or why there is none; rows as it was made for."""

@@ -32,6 +32,7 @@ from .section_fields import SECTION
 Array = np.ndarray
 Sizes = Mapping[str, Array]  # equally probable parameters (q,) of an explanation's effects, by id
 MIN_PROBABILITY, MAX_EXPLANATIONS = 0.005, 10  # others do not count
+MAX_EVALUATED = 4  # explanations whose further rows need runs of the solver; others do not count
 SIZES = 7  # of each explanation
 COST_HOURS = dict(
     weigh=0.1,
@@ -187,10 +188,15 @@ def rank(
         offered += _more_rows(problem, now, d, of, further)
     there = len(now.sigma)
     choices = [
-        Choice(what, hours, after.information(there, likely, problem.spread) / hours)
+        Choice(what, hours, after.information(there, _among(likely, after), problem.spread) / hours)
         for what, hours, after in offered
     ]
     return sorted(choices, key=lambda choice: -choice.gain)
+
+
+def _among(likely: Mapping[str, float], after: CandidateRows) -> dict[str, float]:
+    """Probabilities of the explanations whose shifts of the rows are known."""
+    return {key: p for key, p in likely.items() if key in after.shifts}
 
 
 def _absent(problem: InverseProblem, id: str) -> Toggle:
@@ -308,16 +314,26 @@ def _more_rows(
     model = further.model(rows)
     x = problem.expansion.x0 + d
     means = [{id: float(e.mean()) for id, e in each.items()} for each in sizes.values()]
-    lines = tuple({id: 0.0 for each in means for id in each if id in model.sloped_at_0})
-    points = [Query(x, constants=True, slopes=lines)]
-    points += [Query(x, {id: e for id, e in each.items() if id not in lines}) for each in means]
+    bent = {id for id, each in problem.expansion.nodes.items() if each.sloped[each.values == 0]}
+    lines = tuple(
+        {id: 0.0 for each in means for id in each if id in model.sloped_at_0 and id in bent}
+    )
+    rest = [{id: e for id, e in each.items() if id not in lines} for each in means]
+    evaluated = [each for each in rest if each][:MAX_EVALUATED]
+    points = [
+        Query(x, constants=True, slopes=lines),
+        *(Query(x, each, near=x) for each in evaluated),
+    ]
     answers = model.answers(points)
     if not all(isinstance(answer, Answer) for answer in answers):
         return []
     plain, *others = [answer for answer in answers if isinstance(answer, Answer)]
     assert plain.constants is not None
     added = {}
-    for (key, each), mean, other in zip(sizes.items(), means, others, strict=True):
+    for (key, each), mean, own in zip(sizes.items(), means, rest, strict=True):
+        if own and own not in evaluated:
+            continue
+        other = others[evaluated.index(own)] if own else plain
         here = sum(
             (
                 _along(problem.expansion.nodes[id], mean[id], plain.slopes[id])
@@ -344,7 +360,7 @@ def _more_rows(
             join(o.split_scatter, none),
         )
         constants = np.vstack([problem.constants, plain.constants[at]])
-        shifts = {key: np.hstack([now.shifts[key], added[key][:, at]]) for key in sizes}
+        shifts = {key: np.hstack([now.shifts[key], more[:, at]]) for key, more in added.items()}
         jacobian = np.vstack([now.jacobian, plain.jacobian[at]])
         sigma = problem.covariance(both, constants)
         result.append((words, hours, CandidateRows(sigma, jacobian, shifts)))

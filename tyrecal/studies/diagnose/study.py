@@ -31,7 +31,6 @@ from .labelings import Reading, likely, weighed_anew
 from .model import Answer, Query, Span
 from .next_measurement import OtherStates
 from .observations import Observations, observe
-from .regions import regions
 from .result import DiagnosisResult, diagnosis_result
 from .section_told import section_posterior
 from .tyre_model import TyreModel
@@ -146,7 +145,7 @@ def study(
         readings if labelled else readings[0].observations,
         changes,
         assumed,
-        parts=(lambda x: regions(model, x)) if section_map else None,
+        parts=model.parts if section_map else None,
         further=OtherStates(
             lambda more: TyreModel(case, evaluator, more, own_sources, spans, jobs),
             case.case.pressure_kPa,
@@ -313,7 +312,7 @@ def check_units(
     InputError where the model has no answer with what was switched."""
     set_to = [c for c in changes if not c.times and c.value != c.base]
     points = [Query(model.start, {c.id: c.value - c.base}) for c in set_to]
-    answer, *others = model.answers([Query(model.start), *points])
+    answer, *others = model.answers([Query(model.start, constants=True), *points])
     if not isinstance(answer, Answer):
         raise answer
     for change, other in zip(set_to, others, strict=True):

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from itertools import product
 from math import exp, log
 
 import numpy as np
@@ -24,10 +23,11 @@ from ...tyre.templates import TemplateFailed
 from ...tyre.values import with_values
 from ..fit import problem as fit
 from ..fit.variable import read_variables
-from .expansion import ONE_SIDED_SLOPED, node_values
+from .between import Between
+from .expansion import node_values
 from .form_error import MATERIAL_LAWS
 from .model import Answer, Coupling, ModelRow, Query, Span, state_of
-from .regions import regions
+from .regions import SectionPart, regions
 from .section_design import SectionDesign
 from .section_fields import OF_COMPOUNDS, known_from
 from .uncertainties import Source, values_of
@@ -38,7 +38,9 @@ WORTH_A_POOL = 10  # evaluations, for processes to be started
 
 MAY_VEER = 0.15  # of ln f at some pressure, from which modes of one harmonic may veer
 
-QueryKey = tuple[bytes, tuple[tuple[str, float], ...], bool, tuple[str, ...]]  # of an evaluation
+SAME_PARTS = 0.1  # of x, within which sensitivities by the section's parts are not evaluated again
+
+QueryKey = tuple[bytes, tuple[tuple[str, float], ...], bool]  # of an evaluation
 
 
 class TyreModel:
@@ -93,19 +95,41 @@ class TyreModel:
         self._plain = values_of(case, own_sources)
         self._plain.setdefault("pressure_kPa", case.case.pressure_kPa)
         self._slopeless = {id for id, span in spans.items() if not self._has_slopes(id, span)}
+        self._between = Between.of(self.rows, self.states)
+        self._known_moves: dict[tuple[str, float], bool] = {}
+        self._plain_answers: dict[bytes, Answer] = {}
+        self._known_parts: list[tuple[Array, list[SectionPart]]] = []
 
     @cached_property
     def sloped(self) -> Collection[str]:
         """Effects with whose parameter numbers of the decks change, and no keywords."""
-        sizes = {
-            id: map(float, node_values(span, ONE_SIDED_SLOPED)) for id, span in self.spans.items()
-        }
-        return {id for id in self.spans if id not in self._slopeless and self._moves(id, sizes[id])}
+        ends = {id: node_values(span, 1).tolist() for id, span in self.spans.items()}
+        able = [id for id in self.spans if id not in self._slopeless]
+        return {id for id in able if all(self._moves(id, e) for e in ends[id])}
 
     @cached_property
     def sloped_at_0(self) -> Collection[str]:
-        """The splice: to first order it is its share of the circumference, all round."""
-        return {id for id in self._slopeless if self._moves(id, [0.0])}
+        """Effects that change numbers of the decks, and no keywords, from 0 on. A splice is to
+        first order its share of the circumference, all round."""
+        return {id for id in self.spans if self._moves(id, 0.0)}
+
+    @cached_property
+    def _sloped_sources(self) -> Collection[str]:
+        """Sources of error that are effects with exact sensitivities at 0."""
+        paths = {path for source in self.found for path in source.steps}
+        ids = [path.removeprefix(EFFECT_PATH) for path in paths if path.startswith(EFFECT_PATH)]
+        return {id for id in ids if self._moves(id, 0.0)}
+
+    @cached_property
+    def _steps(self) -> list[tuple[int, str, float]]:
+        """Place, effect and step of the sources that are effects without sensitivities at 0."""
+        return [
+            (k, path.removeprefix(EFFECT_PATH), step)
+            for k, source in enumerate(self.found)
+            for path, step in source.steps.items()
+            if path.startswith(EFFECT_PATH)
+            and path.removeprefix(EFFECT_PATH) not in self._sloped_sources
+        ]
 
     def values(self, x: Array) -> dict[str, float]:
         """Design variables at x, in their own units, bounds not enforced."""
@@ -132,20 +156,41 @@ class TyreModel:
         A plain point that the solver refuses raises DeckRefused, a licence that is denied
         SolverUnavailable: what was answered is in the record. With an effect that it gives no
         slopes with, the plain tyre's at the same x stand for them. Slopes by sources that are
-        effects: one step of each, one way.
+        effects without exact ones: one step of each, one way. The plain tyre is evaluated once at
+        each x.
         """
-        bare = [p for p in points if self._is_bare(p)]
-        stepped = [p for p in points if p.constants]
-        steps = [
-            (k, path.removeprefix(EFFECT_PATH), step)
-            for k, source in enumerate(self.found)
-            for path, step in source.steps.items()
-            if path.startswith(EFFECT_PATH)
+        saves = bool(self._between.inner.any())
+        points = [p if saves and _is_smooth(p) else replace(p, near=None) for p in points]
+        more = [Query(p.x) for p in points if self._is_bare(p)]
+        more += [Query(p.near) for p in points if p.near is not None]
+        more += [
+            Query(p.x, {id: e}) for p in points if _needs_constants(p) for _, id, e in self._steps
         ]
-        beside = [Query(p.x, {id: e}) for p in stepped for _, id, e in steps]
-        queries = {_key(p): p for p in (*points, *(Query(p.x) for p in bare), *beside)}
-        known = dict(zip(queries, self._evaluated(list(queries.values())), strict=True))
-        return [self._completed(point, known, steps) for point in points]
+        queries: dict[QueryKey, Query] = {}
+        for p in (*points, *more):
+            queries[_key(p)] = self._joined(p, queries.get(_key(p), p))
+        known: dict[QueryKey, Answer | Exception] = {}
+        for key, p in queries.items():
+            before = None if p.effects or key[2] else self._plain_answers.get(key[0])
+            if before and (before.constants is not None or not p.constants):
+                known[key] = before
+        fresh = {key: p for key, p in queries.items() if key not in known}
+        for (key, p), answer in zip(fresh.items(), self._evaluated([*fresh.values()]), strict=True):
+            known[key] = answer
+            if isinstance(answer, Answer) and not p.effects and not key[2]:
+                self._plain_answers[key[0]] = answer
+        return [self._completed(point, known) for point in points]
+
+    def _joined(self, one: Query, other: Query) -> Query:
+        """Both queries of one tyre in one; with the constants, all slopes that the plain tyre
+        has."""
+        constants = any(map(_needs_constants, (one, other)))
+        slopes = {*one.slopes, *other.slopes}
+        if not one.effects:
+            slopes |= {*self.sloped_at_0} if constants or slopes else set()
+            constants = constants or bool(slopes)
+        slopes = {id for id in slopes if self._moves(id, one.effects.get(id, 0.0))}
+        return replace(one, constants=constants, slopes=tuple(sorted(slopes)))
 
     def values_at(self, x: Array) -> Array:
         """eta (n,) alone, without slopes. Raises DeckRefused, EvaluationFailed."""
@@ -162,37 +207,58 @@ class TyreModel:
         )
 
     def _completed(
-        self,
-        point: Query,
-        known: Mapping[QueryKey, Answer | Exception],
-        steps: Sequence[tuple[int, str, float]],
+        self, point: Query, known: Mapping[QueryKey, Answer | Exception]
     ) -> Answer | Exception:
         """The answer with its slopes completed from other points."""
         answer = known[_key(point)]
-        if point.coupled and isinstance(answer, Answer):
-            answer = replace(answer, coupling=self._coupling(point.x, answer.eta))
-        if isinstance(answer, Answer) and self._is_bare(point):
+        if not isinstance(answer, Answer):
+            return answer
+        if point.near is not None:
+            plain = known[_key(Query(point.near))]
+            if not isinstance(plain, Answer):
+                return plain
+            answer = self._between.filled(answer, plain)
+        if self._is_bare(point):
             plain = known[_key(Query(point.x))]
             if not isinstance(plain, Answer):
                 return plain
             answer = replace(answer, jacobian=plain.jacobian)
-        if point.beside and isinstance(answer, Answer):
+        if point.beside:
             answer = replace(answer, beside=self._beside(point, answer.eta))
-        if not point.constants or not isinstance(answer, Answer):
-            return answer
-        assert answer.constants is not None
-        constants = answer.constants.copy()
-        for k, id, e in steps:
-            other = known[_key(Query(point.x, {id: e}))]
-            if not isinstance(other, Answer):
-                return other
-            constants[:, k] += other.eta - answer.eta
-        self._add_compounds(point.x, constants)
-        return replace(answer, constants=constants)
+        constants = None
+        if _needs_constants(point):
+            assert answer.constants is not None
+            constants = answer.constants.copy()
+            for k, id, e in self._steps:
+                other = known[_key(Query(point.x, {id: e}))]
+                if not isinstance(other, Answer):
+                    return other
+                constants[:, k] += other.eta - answer.eta
+            self._add_compounds(point.x, constants)
+        if point.coupled and constants is not None:
+            coupled = self._coupling(point.x, answer.eta, constants)
+            answer = replace(answer, coupling=coupled)
+        return self._asked_rows(replace(answer, constants=constants))
+
+    def _asked_rows(self, answer: Answer) -> Answer:
+        """The answer without the rows that only serve to interpolate."""
+        n = len(self.rows)
+        cut = lambda each: None if each is None else each[:n]
+        return replace(
+            answer,
+            eta=answer.eta[:n],
+            jacobian=answer.jacobian[:n],
+            split=answer.split[:n],
+            constants=cut(answer.constants),
+            slopes={id: slope[:n] for id, slope in answer.slopes.items()},
+            beside=cut(answer.beside),
+            by_pressure=cut(answer.by_pressure),
+        )
 
     def _beside(self, point: Query, eta: Array) -> Array | None:
-        """More eta (n,) by what else the nature of the point's effect leaves open; None where the
-        case cannot have it. The tyre at x is written first, so that all is of its numbers."""
+        """More eta (n,) by what else the nature of the point's effect leaves open, evaluated at the
+        highest pressure; None where the case cannot have it. The tyre at x is written first, so
+        that all is of its numbers."""
         ((id, e),) = point.effects.items()
         own = with_values(self.case, {**self.values(point.x), EFFECT_PATH + id: 0.0})
         add = catalogue()[id].beside
@@ -201,23 +267,30 @@ class TyreModel:
             made = add(own, self._present.get(id, 0.0) + e)
         except ValueError:
             return None
+        top = sorted(set(self._between.high.tolist()))
+        rows = [self._between.rows[i] for i in top]
         try:
-            return self._of(made).values_at(point.x) - eta
+            shift = TyreModel(made, self.evaluator, rows, [], {}, self.jobs).values_at(point.x)
         except EvaluationFailed:
             return None
+        return np.asarray((shift - eta[top])[np.searchsorted(top, self._between.high)])
 
     def _add_compounds(self, x: Array, constants: Array) -> None:
         """Fill in the columns of the compounds' fields, by the slopes of the section's parts."""
         known = [(k, each.field) for k, each in enumerate(self.found) if each.field]
         known = [(k, field) for k, field in known if field.kind in OF_COMPOUNDS]
-        parts = [p for p in regions(self, x) if p.rubber] if known else []
+        parts = [p for p in self.parts(x) if p.rubber] if known else []
         for k, field in known:
             slopes = [p.stiffness if field.kind == "stiffness" else p.mass for p in parts]
-            constants[:, k] = np.array(slopes).T @ field.values
+            constants[: len(self.rows), k] = np.array(slopes).T @ field.values
 
-    def _of(self, case: LoadedCase) -> TyreModel:
-        """Model of another tyre without sources of error or effects."""
-        return TyreModel(case, self.evaluator, self.rows, [], {}, self.jobs)
+    def parts(self, x: Array) -> list[SectionPart]:
+        """The parts of the section at x, or where they are known next to it."""
+        for there, parts in self._known_parts:
+            if abs(x - there).max() < SAME_PARTS:
+                return parts
+        self._known_parts.append((np.array(x), regions(self, x)))
+        return self._known_parts[-1][1]
 
     def _has_slopes(self, id: str, span: Span) -> bool:
         """Whether the solver gives slopes with an effect."""
@@ -227,20 +300,20 @@ class TyreModel:
         except ValueError:  # the case cannot have that much of it
             return True
 
-    def _moves(self, id: str, sizes: Iterable[float]) -> bool:
-        """Whether numbers of the decks are all that changes with an effect, about each of the
-        sizes. Not where waves part so far that the slope of a pair's mean is none of its geometric
-        mean."""
-        if catalogue()[id].needs == "rotation":
+    def _moves(self, id: str, e: float) -> bool:
+        """Whether numbers of the decks are all that changes with an effect about the size e. Not
+        where waves part so far that the slope of a pair's mean is none of its geometric mean."""
+        if catalogue()[id].needs == "rotation" or (e and id in self._slopeless):
             return False
-        path, base = EFFECT_PATH + id, self._present.get(id, 0.0)
-        try:
-            for e in sizes:
+        if (id, e) not in self._known_moves:
+            path, base = EFFECT_PATH + id, self._present.get(id, 0.0)
+            try:
                 design = self.evaluator.design.at({path: base + e})
                 Decks(design, (path,)).tangents(self.evaluator.solver.dialect)
-        except (ValueError, TemplateFailed):
-            return False
-        return True
+                self._known_moves[id, e] = True
+            except (ValueError, TemplateFailed):
+                self._known_moves[id, e] = False
+        return self._known_moves[id, e]
 
     def _is_bare(self, point: Query) -> bool:
         return not self._slopeless.isdisjoint(point.effects)
@@ -251,20 +324,31 @@ class TyreModel:
 
     def _evaluated(self, points: Sequence[Query]) -> list[Answer | Exception]:
         """Distinct points, slopes with those that have them."""
-        wanted = []
+        wanted, first = [], [0]
         constants = {**self._plain, **dict.fromkeys(self._moved, 0.0)}
-        for point, state in product(points, self.states):
+        for point in points:
+            ids = {*point.slopes, *(self._sloped_sources if point.constants else ())}
             known = constants if point.constants else {}
-            slopes = [EFFECT_PATH + id for id in point.slopes]
-            names = () if self._is_bare(point) else (*self.variables, *known, *slopes)
-            at_0 = {EFFECT_PATH + id: self._present.get(id, 0.0) for id in point.slopes}
-            wanted.append(self.in_state(state, {**known, **at_0, **self.design(point)}, names))
+            slopes = [EFFECT_PATH + id for id in sorted(ids)]
+            names = dict.fromkeys((*self.variables, *known, *slopes))
+            if self._between.inner.any():
+                names["pressure_kPa"] = None
+            if self._is_bare(point):
+                names = {}
+            at_0 = {EFFECT_PATH + id: self._present.get(id, 0.0) for id in ids}
+            for state in self._states_of(point):
+                design = {**known, **at_0, **self.design(point)}
+                wanted.append(self.in_state(state, design, list(names)))
+            first.append(len(wanted))
         modes = self._modes(wanted)
-        per, results = len(self.states), []
+        results = []
         for i, point in enumerate(points):
-            here = slice(i * per, (i + 1) * per)
+            here = slice(first[i], first[i + 1])
             results.append(self._answer(point, [design for design, _ in wanted[here]], modes[here]))
         return results
+
+    def _states_of(self, point: Query) -> Sequence[TyreState]:
+        return self.states if point.near is None else self._between.ends
 
     def in_state(
         self, state: TyreState, design: Mapping[str, float], names: Sequence[str] = ()
@@ -307,11 +391,15 @@ class TyreModel:
             if not isinstance(each, LabelledModes):
                 return each
             labelled.append(each)
-        at = dict(zip(self.states, zip(designs, labelled, strict=True), strict=True))
-        eta, jacobian = np.zeros(len(self.rows)), np.zeros((len(self.rows), len(self.variables)))
-        slopes, split = np.zeros((len(self.rows), len(self.found))), np.zeros(len(self.rows))
-        by_effect = {id: np.full(len(self.rows), np.nan) for id in point.slopes}  # not the mass
-        for i, (label, where) in enumerate(self.rows):
+        at = dict(zip(self._states_of(point), zip(designs, labelled, strict=True), strict=True))
+        rows = self._between.rows
+        eta, jacobian = np.zeros(len(rows)), np.zeros((len(rows), len(self.variables)))
+        slopes, split = np.zeros((len(rows), len(self.found))), np.zeros(len(rows))
+        by_pressure = np.zeros(len(rows))
+        by_effect = {id: np.full(len(rows), np.nan) for id in point.slopes}  # not the mass
+        for i, (label, where) in enumerate(rows):
+            if label and state_of(where) not in at:
+                continue  # between the ends
             if label is None:
                 eta[i] = log(labelled[0].evaluation.mass_kg)
                 jacobian[i], slopes[i] = self._mass_slopes(point.x, labelled)
@@ -325,6 +413,8 @@ class TyreModel:
             for id, slope in by_effect.items():
                 path = EFFECT_PATH + id  # a state may hold it at 0
                 slope[i] = gradients[path][place] / f if path in gradients else 0.0
+            if "pressure_kPa" in gradients:
+                by_pressure[i] = gradients["pressure_kPa"][place] * design["pressure_kPa"] / f
             for j, name in enumerate(self.variables):
                 if name in gradients:
                     jacobian[i, j] = gradients[name][place] * self._slope(name, design) / f
@@ -335,45 +425,57 @@ class TyreModel:
                         for path, step in _steps(source).items()
                         if path in gradients
                     )
-        return Answer(eta, jacobian, split, slopes if point.constants else None, by_effect)
+        known = by_pressure if self._between.inner.any() and not self._is_bare(point) else None
+        return Answer(
+            eta, jacobian, split, slopes if point.constants else None, by_effect, by_pressure=known
+        )
 
-    def _coupling(self, x: Array, eta: Array) -> Coupling | None:
+    def _coupling(self, x: Array, eta: Array, constants: Array) -> Coupling | None:
         """Coupling by turned cords of modes that are near each other at x; other constants move
-        modes, and couple hardly any. None where there are no such modes."""
-        places = {row: i for i, row in enumerate(self.rows)}
-        mates = np.array([places.get((partner(label), w), -1) for label, w in self.rows])
+        modes, and couple hardly any. None where there are no such modes.
+
+        One step of each, at the lowest and the highest pressure.
+        """
+        rows, count = self._between.rows, len(self.rows)
+        places = {(label, state_of(w) if label else w): i for i, (label, w) in enumerate(rows)}
+        mates = np.array([places.get((partner(x), state_of(w)), -1) if x else -1 for x, w in rows])
         near = {
             label
-            for i, (label, _) in enumerate(self.rows)
+            for i, (label, _) in enumerate(rows)
             if mates[i] >= 0 and abs(eta[i] - eta[mates[i]]) < MAY_VEER
         }
-        mates[[label not in near for label, _ in self.rows]] = -1
-        turned = [s for s in self.found if any(unit_of(path) == "degrees" for path in s.steps)]
+        mates[[label not in near for label, _ in rows]] = -1
+        turned = {
+            k: source
+            for k, source in enumerate(self.found)
+            if any(unit_of(path) == "degrees" for path in source.steps)
+        }
         if not near or not turned:
             return None
         own = {**self._plain, **self.values(x)}
-        sides = [
-            {**own, **{k: own[k] + side * step for k, step in source.steps.items() if k in own}}
-            for source in turned
-            for side in (1, -1)
+        stepped = [
+            {**own, **{k: own[k] + step for k, step in source.steps.items() if k in own}}
+            for source in turned.values()
         ]
-        designs = [self.in_state(state, each) for each in sides for state in self.states]
-        answers = iter(self._modes(designs))
-        square, rise = np.zeros(len(self.rows)), np.zeros(len(self.rows))
-        for _ in turned:
-            ln_f = [eta.copy(), eta.copy()]
-            for side, state in product((0, 1), self.states):
+        ends = self._between.ends
+        answers = iter(self._modes([self.in_state(s, each) for each in stepped for s in ends]))
+        square, rise = np.zeros(len(rows)), np.zeros(len(rows))
+        for k in turned:
+            ln_f = eta.copy()
+            for state in ends:
                 answer = next(answers)
                 if not isinstance(answer, LabelledModes):
                     raise answer
-                for i, (label, where) in enumerate(self.rows):
+                for i, (label, where) in enumerate(rows):
                     if label and mates[i] >= 0 and state_of(where) == state:
-                        ln_f[side][i] = log(answer.wanted[label].frequency_Hz)
-            pairs = [np.array([values, values[mates]]) for values in (eta, *ln_f)]
-            q, more = coupling(*pairs)
+                        ln_f[i] = log(answer.wanted[label].frequency_Hz)
+            slope = constants[:, k]
+            q, more = coupling(*(np.array([v, v[mates]]) for v in (eta, slope, ln_f)))
             square, rise = square + q**2, rise + q**2 * more
-        size = np.where(mates >= 0, np.sqrt(square), 0.0)
-        return Coupling(mates, size, np.where(size > 0, rise / np.maximum(square, 1e-300), 0.0))
+        square, rise = (self._between.straight(each) for each in (square, rise))
+        size = np.where(mates >= 0, np.sqrt(square), 0.0)[:count]
+        rise = np.where(size > 0, rise[:count] / np.maximum(square[:count], 1e-300), 0.0)
+        return Coupling(np.where(mates < count, mates, -1)[:count], size, rise)
 
     def _mass_slopes(self, x: Array, labelled: Sequence[LabelledModes]) -> tuple[Array, Array]:
         """d ln mass by x (v,) and by the sources of error (k,). Raises DeckRefused where the solver
@@ -412,8 +514,18 @@ def _steps(source: Source) -> Mapping[str, float]:
 
 def _key(point: Query) -> QueryKey:
     """Key that distinguishes two points."""
-    effects = tuple(point.effects.items())
-    return point.x.tobytes(), effects, point.constants, point.slopes
+    return point.x.tobytes(), tuple(point.effects.items()), point.near is not None
+
+
+def _is_smooth(point: Query) -> bool:
+    """Whether shifts change smoothly with the pressure: not where harmonics are coupled, or waves
+    part, and modes come near each other at some pressure."""
+    return not any(catalogue()[id].needs in ("coupled", "rotation") for id in point.effects)
+
+
+def _needs_constants(point: Query) -> bool:
+    """Whether a query needs the sensitivities by the sources of error."""
+    return point.constants or point.coupled
 
 
 def asked_for(case: LoadedCase, labels: Sequence[Label]) -> LoadedCase:

@@ -39,19 +39,20 @@ def partner(label: Label | None) -> Label | None:
     return Label(label.c, 1 - label.m)
 
 
-def coupling(at_0: Array, above: Array, below: Array) -> tuple[Array, Array]:
+def coupling(at_0: Array, slopes: Array, above: Array) -> tuple[Array, Array]:
     """|q| and the rise of (a + b)/2 over lambda for a constant, from ln f (2, pressures) of a pair
-    at x0 and where the constant is a standard deviation more and less.
+    at x0, its slopes there by a standard deviation of the constant, and ln f with that much more.
 
     delta^2 + q^2 is (delta0 + p z)^2 + (q z)^2 there, whichever mode has which label.
     """
     scale = at_0.mean(0)
-    squares = [np.exp(2 * (ln_f - scale)) for ln_f in (at_0, above, below)]
-    D2, up, down = (((a - b) / 2) ** 2 for a, b in squares)
-    mean, more, less = (s.mean(0) for s in squares)
-    both = np.maximum((up + down) / 2 - D2, 0.0)
-    p2 = (up - down) ** 2 / np.maximum(16 * D2, 1e-300)
-    return np.sqrt(np.maximum(both - np.minimum(p2, both), 0.0)), (more + less) / 2 - mean
+    here, there = (np.exp(2 * (ln_f - scale)) for ln_f in (at_0, above))
+    rates = 2 * here * slopes
+    delta, rate = (here[0] - here[1]) / 2, (rates[0] - rates[1]) / 2
+    up = ((there[0] - there[1]) / 2) ** 2
+    both = np.maximum(up - delta**2 - 2 * delta * rate, 0.0)
+    size = np.sqrt(np.maximum(both - np.minimum(rate**2, both), 0.0))
+    return size, there.mean(0) - here.mean(0) - rates.mean(0)
 
 
 @cache
