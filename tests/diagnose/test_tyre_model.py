@@ -112,7 +112,8 @@ def test_a_denied_licence_ends_the_study_and_is_no_answer_about_an_effect(
     """An effect that had no licence would be left out as if there were no such tyre."""
     own = TyreModel(CASE, Evaluator(TyreDesign(CASE)), ROWS, [], {})
     failures = [EvaluationFailed("no_equilibrium", "of 1 N 1 is left")]
-    monkeypatch.setattr(own._fit, "modes_of", lambda wanted: failures * len(wanted))
+    fail = lambda evaluator, wanted, *more: failures * len(wanted)
+    monkeypatch.setattr("tyrecal.studies.diagnose.tyre_model.modes_in_order", fail)
     queries = [Query(X, {"point_mass": 0.05})]
     assert own.answers(queries) == failures
     failures[:] = [EvaluationFailed("licence", "all tokens are in use")]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from ..evaluate.evaluator import Evaluator, Question
@@ -62,3 +62,15 @@ def find_modes(
         if not lost:
             break
     yield from lost.items()
+
+
+def modes_in_order(
+    evaluator: Evaluator,
+    designs: Sequence[tuple[Mapping[str, float], tuple[str, ...]]],
+    wanted: Sequence[Label] | Wanted,
+    jobs: int = 1,
+) -> list[ModesAnswer]:
+    """An answer for each design in order: its values, and the names of its sensitivities."""
+    questions = [Question(*each) for each in designs]
+    answers = dict(find_modes(evaluator, questions, wanted, jobs))
+    return [answers[place] for place in range(len(questions))]

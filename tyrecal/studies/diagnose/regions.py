@@ -10,10 +10,9 @@ import numpy as np
 
 from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator
-from ...simulate.modes.find import LabelledModes
+from ...simulate.modes.find import LabelledModes, modes_in_order
 from ...tyre.case import LoadedCase, number_at
 from ...tyre.state import TyreState
-from ..fit import problem as fit
 from .model import ModelRow, state_of
 
 Array = np.ndarray
@@ -61,13 +60,14 @@ def regions(model: Parted, x: Array) -> list[SectionPart]:
     paths = (path for material in parts for path in (*signs[material], density[material]))
     numbers = {path: float(number_at(case, path)) for path in paths}
     evaluator = model.evaluator.of(TyreDesign(case))
-    problem = fit.Problem(case, evaluator, jobs=model.jobs)
+    labels = sorted({label for label, _ in model.rows if label}, key=str)
     own = model.values(x)
     taken = {path: own[name] for name, v in case.case.variables.items() for path in v.sets}
     design = {**numbers, **taken}
     designs = [model.in_state(state, design, list(numbers)) for state in model.states]
     at: dict[TyreState, LabelledModes] = {}
-    for state, each in zip(model.states, problem.modes_of(designs), strict=True):
+    answers = modes_in_order(evaluator, designs, labels, model.jobs)
+    for state, each in zip(model.states, answers, strict=True):
         if not isinstance(each, LabelledModes):
             raise each
         at[state] = each

@@ -12,7 +12,7 @@ import numpy as np
 from ...simulate.deck.decks import Decks
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
-from ...simulate.modes.find import LabelledModes, ModesAnswer
+from ...simulate.modes.find import LabelledModes, ModesAnswer, modes_in_order
 from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase, start_values
 from ...tyre.case.schema import TargetMode, Targets
@@ -21,7 +21,6 @@ from ...tyre.number_units import EFFECT_PATH, unit_of
 from ...tyre.state import TyreState, without
 from ...tyre.templates import TemplateFailed
 from ...tyre.values import with_values
-from ..fit import problem as fit
 from ..fit.variable import read_variables
 from .between import Between
 from .expansion import node_values
@@ -85,7 +84,7 @@ class TyreModel:
             each.name: each.field for each in own_sources if each.field and each.field.moves
         }
         self.evaluator = evaluator = evaluator.of(SectionDesign(case, self._moved))
-        self._fit = fit.Problem(case, evaluator, jobs=jobs)
+        self._labels = labels
         self._variables = case.case.variables
         self.variables: Sequence[str] = list(self._variables)
         self.sources: Sequence[str] = [source.name for source in own_sources]
@@ -364,10 +363,11 @@ class TyreModel:
     def _modes(
         self, wanted: Sequence[tuple[dict[str, float], tuple[str, ...]]]
     ) -> list[ModesAnswer]:
-        self._fit.jobs = self.jobs if len(wanted) >= WORTH_A_POOL else 1
+        jobs = self.jobs if len(wanted) >= WORTH_A_POOL else 1
         # the longest first, so that the last ones end together
         order = sorted(range(len(wanted)), key=lambda i: -self._effort(wanted[i][0]))
-        answers = self._fit.modes_of([wanted[i] for i in order])
+        ordered = [wanted[i] for i in order]
+        answers = modes_in_order(self.evaluator, ordered, self._labels, jobs)
         for each in answers:
             if isinstance(each, EvaluationFailed) and each.denied:
                 raise SolverUnavailable(str(each))

@@ -21,9 +21,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...simulate.evaluate.evaluator import Evaluator, Question
+from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
-from ...simulate.modes.find import LabelledModes, ModesAnswer, find_modes
+from ...simulate.modes.find import LabelledModes, ModesAnswer, modes_in_order
 from ...simulate.modes.label import Label, Mode
 from ...tyre.case import LoadedCase
 from ...tyre.state import AS_THE_CASE, TyreState, without
@@ -285,9 +285,7 @@ class Problem:
         those of all targets; failures and refusals among them."""
         every = [t.label for t in self.targets]
         tell = lambda place, modes: labels[place] if labels else every
-        questions = [Question(*each) for each in wanted]
-        answers = dict(find_modes(self.evaluator, questions, tell, self.jobs))
-        return [answers[place] for place in range(len(wanted))]
+        return modes_in_order(self.evaluator, wanted, tell, self.jobs)
 
 
 def _mass_kg(by_state: Mapping[TyreState, LabelledModes]) -> float:
