@@ -103,6 +103,22 @@ def test_no_circle() -> None:
         visit(name, ())
 
 
+def test_studies_stand_on_inference_not_on_diagnosis() -> None:
+    """`inference` imports no room of the studies, and of them `blind` alone imports `diagnose`."""
+    studies = ROOT / "tyrecal" / "studies"
+    rooms = {path.parent.name for path in studies.glob("*/__init__.py")}
+    assert "inference" in rooms
+    uses: dict[str, set[str]] = {room: set() for room in rooms}
+    for name in modules():
+        here = name.split(".")[2:3] if name.startswith("tyrecal.studies.") else []
+        for other in imported(name) if set(here) & rooms else ():
+            there = other.split(".")[2] if other.startswith("tyrecal.studies.") else ""
+            if there in rooms - {here[0]}:
+                uses[here[0]].add(there)
+    assert not uses["inference"]
+    assert {room for room in rooms if "diagnose" in uses[room]} == {"blind"}
+
+
 @pytest.mark.parametrize("file", sorted(set(re.findall(r"`([\w/]+\.py)`", MAP))))
 def test_files_of_the_map(file: str) -> None:
     assert (ROOT / "tyrecal" / file).is_file() or (ROOT / file).is_file()

@@ -299,7 +299,7 @@ def emulate(
     True
     """
     from .studies.emulator import emulator
-    from .studies.fit.variable import DesignVariable, read_variables
+    from .studies.variable import DesignVariable, read_variables
 
     case = _case(case)
     if not _number("reach", reach) > 0:

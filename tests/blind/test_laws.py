@@ -12,7 +12,7 @@ from tyrecal.simulate.modes.label import Label, paired_labels
 from tyrecal.studies.blind.emulated import emulate
 from tyrecal.studies.blind.laws import EffectLaw
 from tyrecal.studies.blind.outside import OUTSIDE_FAMILIES
-from tyrecal.studies.diagnose.model import Answer, Query
+from tyrecal.studies.inference.model import Answer, Query
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.values import with_values

@@ -13,8 +13,8 @@ from tyrecal.studies.blind.make import USUAL_LABELS, labels_of
 from tyrecal.studies.blind.power import NAMED_AS_A_RULE, powers, words
 from tyrecal.studies.blind.protocol import Protocol
 from tyrecal.studies.blind.ruler import measure, ruler_of
-from tyrecal.studies.diagnose.model import Answer, Query
-from tyrecal.studies.diagnose.separability import VISIBLE
+from tyrecal.studies.inference.model import Answer, Query
+from tyrecal.studies.inference.separability import VISIBLE
 from tyrecal.tyre.case.schema import Targets
 
 from .toy import CASE, Scale, protocol

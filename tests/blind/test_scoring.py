@@ -21,7 +21,7 @@ from tyrecal.studies.blind.statistics import (
     clopper_pearson,
 )
 from tyrecal.studies.blind.tables import summary
-from tyrecal.studies.diagnose.model import Query
+from tyrecal.studies.inference.model import Query
 
 from ..chance import Chance
 from .toy import Scale

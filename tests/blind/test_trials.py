@@ -21,7 +21,7 @@ from tyrecal.studies.blind.ruler import measure
 from tyrecal.studies.blind.score import score
 from tyrecal.studies.blind.seal import ANSWERS, SEAL, TRUTH
 from tyrecal.studies.blind.tables import page, summary
-from tyrecal.studies.diagnose.uncertainties import sources
+from tyrecal.studies.inference.uncertainties import sources
 
 from .toy import CASE, Scale, ToyMaker, protocol
 

@@ -11,7 +11,7 @@ from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.blind.laws import EffectLaw
 from tyrecal.studies.blind.maker import Computed
 from tyrecal.studies.blind.protocol import Protocol
-from tyrecal.studies.diagnose.model import Answer, Query
+from tyrecal.studies.inference.model import Answer, Query
 from tyrecal.tyre.case import LoadedCase, number_at, start_values
 from tyrecal.tyre.effects.edit import changed
 

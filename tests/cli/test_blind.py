@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tyrecal.studies.blind.seal import SEAL, TRUTH
-from tyrecal.studies.diagnose.study import spans_of
+from tyrecal.studies.inference.spans import spans_of
 
 from .test_cli import run
 from .test_diagnose import coarse  # noqa: F401  the main case with a coarse mesh

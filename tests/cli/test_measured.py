@@ -15,7 +15,7 @@ import pyuff
 
 from tyrecal.measured.tables import read_measurements
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.diagnose.observations import observe
+from tyrecal.studies.inference.observations import observe
 
 from ..measured.test_universal import ANGLES, function, geometry, shape, units, write
 from ..studies.measured_data import (

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tyrecal.studies.diagnose.between import Between
-from tyrecal.studies.diagnose.model import Answer, ModelRow, Query
+from tyrecal.studies.inference.between import Between
+from tyrecal.studies.inference.model import Answer, ModelRow, Query
 from tyrecal.tyre.state import TyreState
 
 from .coarse_model import X, model

@@ -10,10 +10,10 @@ import pytest
 from tyrecal.report.diagnosis import page
 from tyrecal.studies.diagnose.calibrated import calibrated_variables
 from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
-from tyrecal.studies.diagnose.model import Answer, Query
 from tyrecal.studies.diagnose.result import diagnosis_result
 from tyrecal.studies.diagnose.study import DiagnosedCase
 from tyrecal.studies.diagnose.verdict import no_gap_words
+from tyrecal.studies.inference.model import Answer, Query
 from tyrecal.units import in_engineers_units
 
 from .toy import Toy, problem

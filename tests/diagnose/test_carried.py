@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tyrecal.studies.diagnose.diagnosis import diagnose
-from tyrecal.studies.diagnose.expansion import carried, derivatives, expand
-from tyrecal.studies.diagnose.inverse_problem import Assumed
-from tyrecal.studies.diagnose.model import Answer, Query
-from tyrecal.studies.diagnose.plain_fit import plain_fit
+from tyrecal.studies.inference.expansion import carried, derivatives, expand
+from tyrecal.studies.inference.inverse_problem import Assumed
+from tyrecal.studies.inference.model import Answer, Query
+from tyrecal.studies.inference.plain_fit import plain_fit
 
 from .toy import Toy, problem
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tyrecal.studies.diagnose.covariance import covariance, model_form
-from tyrecal.studies.diagnose.inverse_problem import Toggle
-from tyrecal.studies.diagnose.observations import Observable
+from tyrecal.studies.inference.covariance import covariance, model_form
+from tyrecal.studies.inference.inverse_problem import Toggle
+from tyrecal.studies.inference.observations import Observable
 
 from .toy import LABELS, Toy, problem
 

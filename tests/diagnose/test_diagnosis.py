@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from tyrecal.studies.diagnose.diagnosis import STAGES, Diagnosis, diagnose
-from tyrecal.studies.diagnose.inverse_problem import Assumed, Toggle
-from tyrecal.studies.diagnose.model import Answer, Query, Span
-from tyrecal.studies.diagnose.regions import SectionPart
 from tyrecal.studies.diagnose.result import diagnosis_result
+from tyrecal.studies.inference.inverse_problem import Assumed, Toggle
+from tyrecal.studies.inference.model import Answer, Query, Span
+from tyrecal.studies.inference.regions import SectionPart
 
 from ..chance import Chance, generator
 from .toy import LABELS, Toy, drawn, problem

@@ -11,10 +11,10 @@ from numpy.polynomial.hermite import hermgauss
 from scipy.stats import multivariate_normal
 
 from tyrecal.studies.diagnose.evidence import explain, grid, refit
-from tyrecal.studies.diagnose.expansion import expand
-from tyrecal.studies.diagnose.inverse_problem import Assumed
-from tyrecal.studies.diagnose.model import Answer, Query, Span
 from tyrecal.studies.diagnose.several import weigh
+from tyrecal.studies.inference.expansion import expand
+from tyrecal.studies.inference.inverse_problem import Assumed
+from tyrecal.studies.inference.model import Answer, Query, Span
 
 from ..chance import Chance, generator
 from .toy import Toy, drawn, flat, problem

@@ -9,7 +9,9 @@ import pytest
 from numpy.polynomial import Polynomial
 
 from tyrecal.studies.diagnose.diagnosis import _asked_again
-from tyrecal.studies.diagnose.expansion import (
+from tyrecal.studies.diagnose.several import weigh
+from tyrecal.studies.diagnose.study import _reaching
+from tyrecal.studies.inference.expansion import (
     EffectResponse,
     Expansion,
     _nodes,
@@ -20,10 +22,8 @@ from tyrecal.studies.diagnose.expansion import (
     node_values,
     refined,
 )
-from tyrecal.studies.diagnose.inverse_problem import Assumed, Toggle
-from tyrecal.studies.diagnose.model import Answer, Query, Span
-from tyrecal.studies.diagnose.several import weigh
-from tyrecal.studies.diagnose.study import _reaching
+from tyrecal.studies.inference.inverse_problem import Assumed, Toggle
+from tyrecal.studies.inference.model import Answer, Query, Span
 
 from .toy import Sloped, Toy, problem
 
@@ -118,7 +118,7 @@ def test_one_end_of_the_range_stands_for_both_where_both_slopes_are_known() -> N
 
 
 def test_one_more_size_and_its_slope_make_a_quartic() -> None:
-    """Of an effect that matters, at the calibration's x; exact at all sizes then."""
+    """An effect that matters is refined at the calibration's x; it is exact at all sizes then."""
     toy = Sloped(4)
     expansion = expand(toy, np.zeros(3))
     nodes = refined(expansion, toy, {"e0": 0.5}).nodes["e0"]

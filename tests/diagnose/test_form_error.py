@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.diagnose.form_error import (
+from tyrecal.studies.inference.form_error import (
     FORM_LENGTH,
     LAWS_LENGTH,
     MATERIAL_LAWS,

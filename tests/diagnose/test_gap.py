@@ -7,7 +7,7 @@ import pytest
 
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.gap import _as_number, _contrasts, family
-from tyrecal.studies.diagnose.observations import Observable
+from tyrecal.studies.inference.observations import Observable
 
 from ..chance import generator
 from .toy import LABELS

@@ -10,9 +10,9 @@ from scipy.stats import chi2, ncx2
 
 from tyrecal.studies.diagnose.evidence import NONE, refit
 from tyrecal.studies.diagnose.gap import find_gap, projection
-from tyrecal.studies.diagnose.inverse_problem import Toggle
-from tyrecal.studies.diagnose.separability import separate
 from tyrecal.studies.diagnose.several import probabilities, weigh
+from tyrecal.studies.inference.inverse_problem import Toggle
+from tyrecal.studies.inference.separability import separate
 
 from ..chance import Chance
 from .toy import drawn, flat, problem

@@ -13,10 +13,10 @@ from scipy.stats import multivariate_normal
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.diagnosis import diagnose
 from tyrecal.studies.diagnose.evidence import OUTSIDE, PRIOR_OUTSIDE, explain, outside
-from tyrecal.studies.diagnose.inverse_problem import Assumed, InverseProblem
 from tyrecal.studies.diagnose.label_swap import with_exchanged
 from tyrecal.studies.diagnose.labelings import Reading
 from tyrecal.studies.diagnose.several import PRIOR_NONE, priors, weigh, with_sets
+from tyrecal.studies.inference.inverse_problem import Assumed, InverseProblem
 
 from ..chance import generator
 from .toy import HERTZ, LABELS, Toy, problem

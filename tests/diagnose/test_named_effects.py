@@ -9,10 +9,10 @@ import pytest
 
 from tyrecal.studies.diagnose.evidence import NONE, Hypothesis, explain, refit
 from tyrecal.studies.diagnose.gap import projection
-from tyrecal.studies.diagnose.inverse_problem import Assumed, Toggle
-from tyrecal.studies.diagnose.separability import separate
 from tyrecal.studies.diagnose.several import PRIOR_NONE, probabilities, weigh
 from tyrecal.studies.diagnose.verdict import decide
+from tyrecal.studies.inference.inverse_problem import Assumed, Toggle
+from tyrecal.studies.inference.separability import separate
 
 from ..chance import Chance, generator
 from .toy import LABELS, Toy, drawn, flat, problem

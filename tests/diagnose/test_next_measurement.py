@@ -13,8 +13,6 @@ from numpy.polynomial import Polynomial
 from scipy.integrate import trapezoid
 
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.diagnose.inverse_problem import Toggle
-from tyrecal.studies.diagnose.model import Answer, Query, Span
 from tyrecal.studies.diagnose.next_measurement import (
     CHECKED,
     CandidateRows,
@@ -22,8 +20,10 @@ from tyrecal.studies.diagnose.next_measurement import (
     offered_kPa,
     rank,
 )
-from tyrecal.studies.diagnose.observations import Observable
-from tyrecal.studies.diagnose.separability import separate
+from tyrecal.studies.inference.inverse_problem import Toggle
+from tyrecal.studies.inference.model import Answer, Query, Span
+from tyrecal.studies.inference.observations import Observable
+from tyrecal.studies.inference.separability import separate
 
 from ..chance import generator
 from .toy import LABELS, Sloped, Toy, problem

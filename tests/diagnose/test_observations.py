@@ -9,7 +9,7 @@ import pytest
 
 from tyrecal.measured.measurement import Measurement
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.diagnose.observations import observe
+from tyrecal.studies.inference.observations import observe
 
 from ..chance import Chance
 from ..measured.test_measurements import GOOD, read

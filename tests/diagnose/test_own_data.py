@@ -13,16 +13,16 @@ from tyrecal.measured.tables import read_measurements
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.studies.diagnose.diagnosis import diagnose
-from tyrecal.studies.diagnose.expansion import expand
 from tyrecal.studies.diagnose.gap import find_gap, projection
-from tyrecal.studies.diagnose.inverse_problem import Assumed, InverseProblem, Toggle, places
-from tyrecal.studies.diagnose.model import Query
-from tyrecal.studies.diagnose.observations import observe
 from tyrecal.studies.diagnose.result import diagnosis_result
-from tyrecal.studies.diagnose.separability import separate
 from tyrecal.studies.diagnose.several import probabilities, weigh
 from tyrecal.studies.diagnose.study import study
 from tyrecal.studies.diagnose.verdict import decide
+from tyrecal.studies.inference.expansion import expand
+from tyrecal.studies.inference.inverse_problem import Assumed, InverseProblem, Toggle, places
+from tyrecal.studies.inference.model import Query
+from tyrecal.studies.inference.observations import observe
+from tyrecal.studies.inference.separability import separate
 
 from ..chance import Chance
 from .coarse_model import CASE, EFFECTS, MODEL, ROWS, X, asked, written

@@ -14,14 +14,15 @@ from tyrecal.report.diagnosis import page
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import DeckRefused
-from tyrecal.studies.diagnose.expansion import expand
-from tyrecal.studies.diagnose.inverse_problem import InverseProblem, Toggle
-from tyrecal.studies.diagnose.model import Answer, Query
-from tyrecal.studies.diagnose.observations import Observable, Observations
 from tyrecal.studies.diagnose.result import diagnosis_result
-from tyrecal.studies.diagnose.study import spans_of, study
-from tyrecal.studies.diagnose.tyre_model import TyreModel
-from tyrecal.studies.diagnose.uncertainties import sources
+from tyrecal.studies.diagnose.study import study
+from tyrecal.studies.inference.expansion import expand
+from tyrecal.studies.inference.inverse_problem import InverseProblem, Toggle
+from tyrecal.studies.inference.model import Answer, Query
+from tyrecal.studies.inference.observations import Observable, Observations
+from tyrecal.studies.inference.spans import spans_of
+from tyrecal.studies.inference.tyre_model import TyreModel
+from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.tyre.values import with_values
 
 from .coarse_model import CASE, EFFECTS, MODEL, ROWS, X, asked, written

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tyrecal.studies.diagnose.evidence import families, refit
-from tyrecal.studies.diagnose.inverse_problem import Assumed, InverseProblem
 from tyrecal.studies.diagnose.reweighed import Perturbation, lines, reweighed
+from tyrecal.studies.inference.inverse_problem import Assumed, InverseProblem
 
 from ..chance import generator
 from .test_veering import Near

@@ -15,13 +15,14 @@ from tyrecal.report.diagnosis_pictures import draw_residuals
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.diagnose.covariance import BETWEEN_SUPPORTS, alike
-from tyrecal.studies.diagnose.model import Answer, ModelRow, Query
-from tyrecal.studies.diagnose.observations import Observable, observe
 from tyrecal.studies.diagnose.result import Residual, diagnosis_result
-from tyrecal.studies.diagnose.study import spans_of, study
-from tyrecal.studies.diagnose.tyre_model import TyreModel
-from tyrecal.studies.diagnose.uncertainties import sources
+from tyrecal.studies.diagnose.study import study
+from tyrecal.studies.inference.covariance import BETWEEN_SUPPORTS, alike
+from tyrecal.studies.inference.model import Answer, ModelRow, Query
+from tyrecal.studies.inference.observations import Observable, observe
+from tyrecal.studies.inference.spans import spans_of
+from tyrecal.studies.inference.tyre_model import TyreModel
+from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.tyre.state import TyreState
 from tyrecal.tyre.values import with_values
 

@@ -11,14 +11,14 @@ from scipy.stats import chi2
 
 from tyrecal.studies.diagnose.evidence import INFLATION, UNKNOWN, explain, outside, refit
 from tyrecal.studies.diagnose.gap import ResidualGroup, _chi2, _corrected, find_gap
-from tyrecal.studies.diagnose.inverse_problem import Assumed, Toggle
 from tyrecal.studies.diagnose.label_swap import _near
-from tyrecal.studies.diagnose.model import Answer, Query, Span
-from tyrecal.studies.diagnose.observations import Observable, Observations
-from tyrecal.studies.diagnose.plain_fit import plain_fit
-from tyrecal.studies.diagnose.regions import SectionPart
 from tyrecal.studies.diagnose.several import HIDDEN_PAIRS, priors, weigh
 from tyrecal.studies.diagnose.where import section_map
+from tyrecal.studies.inference.inverse_problem import Assumed, Toggle
+from tyrecal.studies.inference.model import Answer, Query, Span
+from tyrecal.studies.inference.observations import Observable, Observations
+from tyrecal.studies.inference.plain_fit import plain_fit
+from tyrecal.studies.inference.regions import SectionPart
 from tyrecal.tyre.effects import catalogue
 
 from ..chance import generator

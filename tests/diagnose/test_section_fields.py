@@ -13,9 +13,10 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.modes.find import LabelledModes, find_modes
 from tyrecal.studies.diagnose.diagnosis import diagnose
-from tyrecal.studies.diagnose.inverse_problem import Assumed
-from tyrecal.studies.diagnose.model import Answer, Query
-from tyrecal.studies.diagnose.section_fields import (
+from tyrecal.studies.diagnose.section_told import section_posterior
+from tyrecal.studies.inference.inverse_problem import Assumed
+from tyrecal.studies.inference.model import Answer, Query
+from tyrecal.studies.inference.section_fields import (
     CORRELATION_LENGTH,
     SECTION,
     SECTION_SIZES,
@@ -27,9 +28,8 @@ from tyrecal.studies.diagnose.section_fields import (
     sizes,
     with_fields,
 )
-from tyrecal.studies.diagnose.section_told import section_posterior
-from tyrecal.studies.diagnose.tyre_model import TyreModel
-from tyrecal.studies.diagnose.uncertainties import RIM_WIDTH, sources
+from tyrecal.studies.inference.tyre_model import TyreModel
+from tyrecal.studies.inference.uncertainties import RIM_WIDTH, sources
 from tyrecal.studies.modes import modes_result
 from tyrecal.tyre.case import LoadedCase, start_values
 from tyrecal.tyre.case.identity import tyre_sha256

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tyrecal.studies.diagnose.separability import Separability, smallest
+from tyrecal.studies.inference.separability import Separability, smallest
 
 
 def judged(distances: np.ndarray, **lambdas: float) -> Separability:

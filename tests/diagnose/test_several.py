@@ -12,8 +12,6 @@ from tyrecal.report.diagnosis import page
 from tyrecal.studies.diagnose.constants_told import constants_posterior
 from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
 from tyrecal.studies.diagnose.evidence import COVERAGE, explain
-from tyrecal.studies.diagnose.expansion import anchored
-from tyrecal.studies.diagnose.model import Query
 from tyrecal.studies.diagnose.result import diagnosis_result
 from tyrecal.studies.diagnose.robustness import robustness
 from tyrecal.studies.diagnose.several import (
@@ -26,6 +24,8 @@ from tyrecal.studies.diagnose.several import (
 )
 from tyrecal.studies.diagnose.study import DiagnosedCase
 from tyrecal.studies.diagnose.verdict import Further, decide, most_sure, perhaps
+from tyrecal.studies.inference.expansion import anchored
+from tyrecal.studies.inference.model import Query
 
 from ..chance import generator
 from .toy import Toy, drawn, problem

@@ -8,11 +8,11 @@ from scipy.optimize import least_squares
 
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.evidence import explain, refit
-from tyrecal.studies.diagnose.inverse_problem import Assumed
-from tyrecal.studies.diagnose.model import Query, Span
-from tyrecal.studies.diagnose.observations import Observable
 from tyrecal.studies.diagnose.several import weigh
 from tyrecal.studies.diagnose.shrinkage import _placebo, held_out, shrink
+from tyrecal.studies.inference.inverse_problem import Assumed
+from tyrecal.studies.inference.model import Query, Span
+from tyrecal.studies.inference.observations import Observable
 
 from ..chance import Chance, generator
 from .test_diagnosis import diagnosed

@@ -9,8 +9,8 @@ import pytest
 from scipy.integrate import trapezoid
 
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.diagnose.observations import Observable, Observations
-from tyrecal.studies.diagnose.splits import Splits
+from tyrecal.studies.inference.observations import Observable, Observations
+from tyrecal.studies.inference.splits import Splits
 
 from ..chance import Chance, generator
 

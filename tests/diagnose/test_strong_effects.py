@@ -11,11 +11,11 @@ from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
 from tyrecal.studies.diagnose.evidence import refit
-from tyrecal.studies.diagnose.expansion import expand
-from tyrecal.studies.diagnose.inverse_problem import Assumed
 from tyrecal.studies.diagnose.label_swap import exchange_shifts, rows_if_exchanged, with_exchanged
-from tyrecal.studies.diagnose.model import Answer, Query, Span
-from tyrecal.studies.diagnose.plain_fit import plain_fit
+from tyrecal.studies.inference.expansion import expand
+from tyrecal.studies.inference.inverse_problem import Assumed
+from tyrecal.studies.inference.model import Answer, Query, Span
+from tyrecal.studies.inference.plain_fit import plain_fit
 
 from .toy import LABELS, Toy, problem
 

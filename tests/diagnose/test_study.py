@@ -12,10 +12,11 @@ import pytest
 from tyrecal.errors import InputError
 from tyrecal.simulate.evaluate.failure import DeckRefused
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.diagnose.inverse_problem import Toggle
-from tyrecal.studies.diagnose.model import Answer
-from tyrecal.studies.diagnose.observations import Observable, Observations
-from tyrecal.studies.diagnose.study import check_units, parse_change
+from tyrecal.studies.diagnose.study import parse_change
+from tyrecal.studies.inference.check_units import check_units
+from tyrecal.studies.inference.inverse_problem import Toggle
+from tyrecal.studies.inference.model import Answer
+from tyrecal.studies.inference.observations import Observable, Observations
 
 
 @pytest.mark.parametrize(

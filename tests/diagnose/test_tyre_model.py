@@ -14,11 +14,11 @@ import pytest
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
-from tyrecal.studies.diagnose.model import Answer, Query
-from tyrecal.studies.diagnose.regions import regions
-from tyrecal.studies.diagnose.study import spans_of
-from tyrecal.studies.diagnose.tyre_model import TyreModel, _key
-from tyrecal.studies.fit.variable import read_variables
+from tyrecal.studies.inference.model import Answer, Query
+from tyrecal.studies.inference.regions import regions
+from tyrecal.studies.inference.spans import spans_of
+from tyrecal.studies.inference.tyre_model import TyreModel, _key
+from tyrecal.studies.variable import read_variables
 from tyrecal.tyre.case import LoadedCase, start_values
 from tyrecal.tyre.values import with_values
 
@@ -113,7 +113,7 @@ def test_a_denied_licence_ends_the_study_and_is_no_answer_about_an_effect(
     own = TyreModel(CASE, Evaluator(TyreDesign(CASE)), ROWS, [], {})
     failures = [EvaluationFailed("no_equilibrium", "of 1 N 1 is left")]
     fail = lambda evaluator, wanted, *more: failures * len(wanted)
-    monkeypatch.setattr("tyrecal.studies.diagnose.tyre_model.modes_in_order", fail)
+    monkeypatch.setattr("tyrecal.studies.inference.tyre_model.modes_in_order", fail)
     queries = [Query(X, {"point_mass": 0.05})]
     assert own.answers(queries) == failures
     failures[:] = [EvaluationFailed("licence", "all tokens are in use")]

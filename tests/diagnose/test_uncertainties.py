@@ -6,7 +6,12 @@ from dataclasses import replace
 
 import pytest
 
-from tyrecal.studies.diagnose.uncertainties import DENSITY_PERCENT, PRESSURE_kPa, sources, values_of
+from tyrecal.studies.inference.uncertainties import (
+    DENSITY_PERCENT,
+    PRESSURE_kPa,
+    sources,
+    values_of,
+)
 from tyrecal.tyre.case.parts import Gauge
 from tyrecal.tyre.case.schema import Uncertainty
 

@@ -9,9 +9,9 @@ import pytest
 from scipy.stats import norm
 
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE, Hypothesis, explain, outside, refit
-from tyrecal.studies.diagnose.inverse_problem import InverseProblem
 from tyrecal.studies.diagnose.several import weigh
 from tyrecal.studies.diagnose.unmeasured import expected, expected_by, likeliest
+from tyrecal.studies.inference.inverse_problem import InverseProblem
 
 from ..chance import Chance, generator
 from .test_veering import Near

@@ -12,11 +12,11 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.evidence import explain, refit, refit_at
-from tyrecal.studies.diagnose.inverse_problem import InverseProblem
-from tyrecal.studies.diagnose.model import Answer, Coupling, Query
-from tyrecal.studies.diagnose.tyre_model import TyreModel
-from tyrecal.studies.diagnose.uncertainties import sources
-from tyrecal.studies.diagnose.veering import Veering, coupling, partner
+from tyrecal.studies.inference.inverse_problem import InverseProblem
+from tyrecal.studies.inference.model import Answer, Coupling, Query
+from tyrecal.studies.inference.tyre_model import TyreModel
+from tyrecal.studies.inference.uncertainties import sources
+from tyrecal.studies.inference.veering import Veering, coupling, partner
 from tyrecal.tyre.values import with_values
 
 from ..chance import Chance

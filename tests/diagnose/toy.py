@@ -9,10 +9,10 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.diagnose.expansion import Expansion, expand
-from tyrecal.studies.diagnose.inverse_problem import Assumed, InverseProblem, Toggle, places
-from tyrecal.studies.diagnose.model import Answer, Query, Span
-from tyrecal.studies.diagnose.observations import Observable, Observations
+from tyrecal.studies.inference.expansion import Expansion, expand
+from tyrecal.studies.inference.inverse_problem import Assumed, InverseProblem, Toggle, places
+from tyrecal.studies.inference.model import Answer, Query, Span
+from tyrecal.studies.inference.observations import Observable, Observations
 
 Array = np.ndarray
 LABELS = [

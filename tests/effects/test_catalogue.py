@@ -17,8 +17,8 @@ from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
-from tyrecal.studies.diagnose.study import spans_of
 from tyrecal.studies.fit.calibrate import calibrate
+from tyrecal.studies.inference.spans import spans_of
 from tyrecal.tyre import effects
 from tyrecal.tyre.case import CaseError
 from tyrecal.tyre.effects import IDS, Effect, catalogue

@@ -10,7 +10,7 @@ from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.modes.label import Label, paired_labels
-from tyrecal.studies.diagnose.tyre_model import TyreModel
+from tyrecal.studies.inference.tyre_model import TyreModel
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.effects.edit import changed, with_part, with_rubbers_at

@@ -9,7 +9,7 @@ import pytest
 
 from tyrecal.errors import InputError
 from tyrecal.simulate.deck.tyre_design import NEAR_ZERO
-from tyrecal.studies.fit.variable import DesignVariable, read_variable, read_variables
+from tyrecal.studies.variable import DesignVariable, read_variable, read_variables
 from tyrecal.tyre.case import start_values
 from tyrecal.tyre.case.schema import Variable
 from tyrecal.tyre.values import overridden

@@ -11,7 +11,7 @@ from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.differences import differences
 from tyrecal.studies.fit.problem import Problem
-from tyrecal.studies.fit.variable import DesignVariable
+from tyrecal.studies.variable import DesignVariable
 
 from .known_truth import CASE, START, START_X, evaluator
 

@@ -11,7 +11,7 @@ import pytest
 from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.problem import Point
 from tyrecal.studies.fit.uncertainty import uncertainty
-from tyrecal.studies.fit.variable import DesignVariable
+from tyrecal.studies.variable import DesignVariable
 
 from ..chance import Chance, generator
 from .known_truth import CASE, POWERS, evaluator, with_targets

@@ -47,7 +47,7 @@ from tyrecal.studies.blind.maker import Computed
 from tyrecal.studies.blind.outside import OUTSIDE_FAMILIES
 from tyrecal.studies.blind.protocol import Protocol
 from tyrecal.studies.blind.ruler import measure
-from tyrecal.studies.diagnose.uncertainties import sources
+from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.tyre.case import LoadedCase, number_at, start_values
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.resolve import resolved

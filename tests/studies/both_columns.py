@@ -25,7 +25,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.modes.find import LabelledModes, find_modes
 from tyrecal.studies.fit.targets import target_labels
-from tyrecal.studies.fit.variable import DesignVariable, read_variable
+from tyrecal.studies.variable import DesignVariable, read_variable
 from tyrecal.tyre.case import LoadedCase, with_level
 from tyrecal.tyre.case.schema import Variable
 from tyrecal.tyre.load import load_case

@@ -24,7 +24,7 @@ from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.store import Store
 from tyrecal.simulate.modes.label import Mode
 from tyrecal.studies.blind.draw import Truth, tyre
-from tyrecal.studies.diagnose.uncertainties import sources
+from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.resolve import resolved
 from tyrecal.tyre.values import with_values

@@ -25,14 +25,14 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.modes.find import LabelledModes, find_modes
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.diagnose.covariance import by_laws
-from tyrecal.studies.diagnose.form_error import MATERIAL_LAWS
-from tyrecal.studies.diagnose.observations import Observable
-from tyrecal.studies.diagnose.section_fields import fields, with_fields
-from tyrecal.studies.diagnose.uncertainties import sources, values_of
 from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.prediction import FitResponses, predicted_errors
 from tyrecal.studies.fit.result import FitResult
+from tyrecal.studies.inference.covariance import by_laws
+from tyrecal.studies.inference.form_error import MATERIAL_LAWS
+from tyrecal.studies.inference.observations import Observable
+from tyrecal.studies.inference.section_fields import fields, with_fields
+from tyrecal.studies.inference.uncertainties import sources, values_of
 from tyrecal.tyre.case import LoadedCase, start_values, with_level
 from tyrecal.tyre.case.schema import TargetMode, Targets
 from tyrecal.tyre.effects.edit import changed

@@ -24,8 +24,8 @@ from tests.conftest import CASES
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.diagnose.model import Answer, Query
-from tyrecal.studies.diagnose.tyre_model import TyreModel
+from tyrecal.studies.inference.model import Answer, Query
+from tyrecal.studies.inference.tyre_model import TyreModel
 from tyrecal.tyre.case import LoadedCase, start_values
 from tyrecal.tyre.case.parts import Level
 from tyrecal.tyre.load import load_case

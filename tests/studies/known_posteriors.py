@@ -8,8 +8,8 @@ import numpy as np
 
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.emulator import Evaluated, fitted, spread
-from tyrecal.studies.fit.variable import DesignVariable
 from tyrecal.studies.sample.posterior import Posterior
+from tyrecal.studies.variable import DesignVariable
 
 Array = np.ndarray
 LABELS = (Label(1, 0), Label(2, 0), Label(3, 0))

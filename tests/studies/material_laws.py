@@ -27,7 +27,7 @@ from tests.conftest import CASES
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.diagnose.tyre_model import TyreModel
+from tyrecal.studies.inference.tyre_model import TyreModel
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.load import load_case
 

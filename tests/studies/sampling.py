@@ -31,18 +31,18 @@ from tyrecal.measured.tables import read_measurements
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.modes.label import Label, labelled
-from tyrecal.studies.diagnose.covariance import alike, covariance
-from tyrecal.studies.diagnose.form_error import form_error
-from tyrecal.studies.diagnose.observations import Observable, Observations
-from tyrecal.studies.diagnose.tyre_model import TyreModel
-from tyrecal.studies.diagnose.uncertainties import sources
 from tyrecal.studies.emulator import emulator
 from tyrecal.studies.fit.targets import read_targets
-from tyrecal.studies.fit.variable import DesignVariable, read_variables
+from tyrecal.studies.inference.covariance import alike, covariance
+from tyrecal.studies.inference.form_error import form_error
+from tyrecal.studies.inference.observations import Observable, Observations
+from tyrecal.studies.inference.tyre_model import TyreModel
+from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.studies.sample.box import sample_box
 from tyrecal.studies.sample.posterior import Posterior
 from tyrecal.studies.sample.predict import conditional
 from tyrecal.studies.sample.study import _answer, rows_of, run
+from tyrecal.studies.variable import DesignVariable, read_variables
 from tyrecal.tyre.case import start_values
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.state import TyreState

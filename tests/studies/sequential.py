@@ -34,9 +34,6 @@ import numpy as np
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.studies.diagnose.evidence import NONE, Hypothesis
-from tyrecal.studies.diagnose.expansion import EffectResponse, Expansion, expand
-from tyrecal.studies.diagnose.inverse_problem import InverseProblem, Toggle
-from tyrecal.studies.diagnose.model import ModelRow
 from tyrecal.studies.diagnose.next_measurement import (
     CAVITY_GAS,
     CHECKED,
@@ -51,13 +48,16 @@ from tyrecal.studies.diagnose.next_measurement import (
     CandidateRows,
     offered_kPa,
 )
-from tyrecal.studies.diagnose.observations import Observable, Observations
-from tyrecal.studies.diagnose.section_fields import SECTION
 from tyrecal.studies.diagnose.several import probabilities, weigh
-from tyrecal.studies.diagnose.study import spans_of
-from tyrecal.studies.diagnose.tyre_model import TyreModel
-from tyrecal.studies.diagnose.uncertainties import sources
 from tyrecal.studies.fit.targets import target_labels
+from tyrecal.studies.inference.expansion import EffectResponse, Expansion, expand
+from tyrecal.studies.inference.inverse_problem import InverseProblem, Toggle
+from tyrecal.studies.inference.model import ModelRow
+from tyrecal.studies.inference.observations import Observable, Observations
+from tyrecal.studies.inference.section_fields import SECTION
+from tyrecal.studies.inference.spans import spans_of
+from tyrecal.studies.inference.tyre_model import TyreModel
+from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.tyre.effects.edit import changed, with_part
 from tyrecal.tyre.number_units import EFFECT_PATH
 from tyrecal.tyre.state import TyreState

@@ -24,16 +24,16 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE
-from tyrecal.studies.diagnose.expansion import expand
 from tyrecal.studies.diagnose.gap import projection
-from tyrecal.studies.diagnose.inverse_problem import InverseProblem, places
-from tyrecal.studies.diagnose.model import Answer, ModelRow, Query
-from tyrecal.studies.diagnose.observations import Observable, Observations
-from tyrecal.studies.diagnose.separability import separate
-from tyrecal.studies.diagnose.study import spans_of
-from tyrecal.studies.diagnose.tyre_model import TyreModel
-from tyrecal.studies.diagnose.uncertainties import sources
 from tyrecal.studies.fit.targets import target_labels
+from tyrecal.studies.inference.expansion import expand
+from tyrecal.studies.inference.inverse_problem import InverseProblem, places
+from tyrecal.studies.inference.model import Answer, ModelRow, Query
+from tyrecal.studies.inference.observations import Observable, Observations
+from tyrecal.studies.inference.separability import separate
+from tyrecal.studies.inference.spans import spans_of
+from tyrecal.studies.inference.tyre_model import TyreModel
+from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.tyre.effects.edit import changed, with_part
 
 from ..effects.support import coarse

@@ -22,9 +22,9 @@ import numpy as np
 from tyrecal.studies.blind.score import Scored, score
 from tyrecal.studies.blind.statistics import calibration_error
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE
-from tyrecal.studies.diagnose.inverse_problem import Assumed
 from tyrecal.studies.diagnose.several import priors
 from tyrecal.studies.diagnose.verdict import CHECK, RULED_OUT, SET, most_sure
+from tyrecal.studies.inference.inverse_problem import Assumed
 
 from ..blind.archive import STUDIES, unpack
 

@@ -54,8 +54,8 @@ from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.problem import Problem
 from tyrecal.studies.fit.targets import target_labels
 from tyrecal.studies.fit.uncertainty import uncertainty
-from tyrecal.studies.fit.variable import read_variables
 from tyrecal.studies.footprint import footprint_row
+from tyrecal.studies.variable import read_variables
 from tyrecal.tyre.case import LoadedCase, start_values, with_level
 from tyrecal.tyre.case.schema import TargetFootprint, TargetMode, Targets
 from tyrecal.tyre.load import load_case

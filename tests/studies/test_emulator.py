@@ -25,7 +25,7 @@ from tyrecal.studies.emulator import (
     spread,
     up_to,
 )
-from tyrecal.studies.fit.variable import DesignVariable
+from tyrecal.studies.variable import DesignVariable
 
 from ..chance import Chance, generator
 from ..fit.fake import LABELS, FakeEvaluator, shape

@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from tyrecal.errors import InputError
-from tyrecal.studies.diagnose.observations import Observable
+from tyrecal.studies.inference.observations import Observable
 from tyrecal.studies.sample.box import sample_box
 from tyrecal.studies.sample.chains import (
     ENOUGH,

@@ -14,7 +14,7 @@ from tyrecal.report.sample import figures
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.modes.label import Label, labelled
-from tyrecal.studies.diagnose.observations import Observable, Observations
+from tyrecal.studies.inference.observations import Observable, Observations
 from tyrecal.studies.sample.box import sample_box
 from tyrecal.studies.sample.predict import conditional
 from tyrecal.studies.sample.result import draws_csv, result

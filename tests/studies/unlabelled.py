@@ -31,9 +31,9 @@ from tyrecal.studies.blind.statistics import (
 )
 from tyrecal.studies.emulator import Emulator, emulator
 from tyrecal.studies.fit.targets import target_labels
-from tyrecal.studies.fit.variable import START_SPREAD, read_variables
 from tyrecal.studies.labelling.expansion import Expansion, Prior, admissible, find_labels
 from tyrecal.studies.labelling.tree import DISCREPANCIES, FOREIGN_MARGIN, Frequencies, discrepancy
+from tyrecal.studies.variable import START_SPREAD, read_variables
 from tyrecal.tyre.load import load_case
 
 Array = np.ndarray

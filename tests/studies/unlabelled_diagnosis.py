@@ -33,9 +33,7 @@ from tyrecal.studies.blind.statistics import (
     clopper_pearson,
 )
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE
-from tyrecal.studies.diagnose.expansion import expand
 from tyrecal.studies.diagnose.gap import projection
-from tyrecal.studies.diagnose.inverse_problem import InverseProblem, places
 from tyrecal.studies.diagnose.label_swap import exchanged, with_exchanged
 from tyrecal.studies.diagnose.labelings import (
     MAX_READINGS,
@@ -44,18 +42,20 @@ from tyrecal.studies.diagnose.labelings import (
     averaged,
     shares,
 )
-from tyrecal.studies.diagnose.model import ModelRow
-from tyrecal.studies.diagnose.observations import Observable, Observations
-from tyrecal.studies.diagnose.separability import separate
 from tyrecal.studies.diagnose.several import weigh
-from tyrecal.studies.diagnose.study import spans_of
-from tyrecal.studies.diagnose.tyre_model import TyreModel
-from tyrecal.studies.diagnose.uncertainties import sources
 from tyrecal.studies.diagnose.verdict import decide
 from tyrecal.studies.fit.targets import target_labels
-from tyrecal.studies.fit.variable import START_SPREAD
+from tyrecal.studies.inference.expansion import expand
+from tyrecal.studies.inference.inverse_problem import InverseProblem, places
+from tyrecal.studies.inference.model import ModelRow
+from tyrecal.studies.inference.observations import Observable, Observations
+from tyrecal.studies.inference.separability import separate
+from tyrecal.studies.inference.spans import spans_of
+from tyrecal.studies.inference.tyre_model import TyreModel
+from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.studies.labelling.expansion import Expansion, Prior, admissible, find_labels
 from tyrecal.studies.labelling.tree import FOREIGN_MARGIN, Frequencies
+from tyrecal.studies.variable import START_SPREAD
 from tyrecal.tyre.effects.edit import changed, with_part
 
 from ..effects.support import coarse

@@ -25,16 +25,16 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.modes.find import LabelledModes
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.diagnose.expansion import expand
-from tyrecal.studies.diagnose.inverse_problem import InverseProblem, places
-from tyrecal.studies.diagnose.model import ModelRow, Query
-from tyrecal.studies.diagnose.observations import Observable, Observations
 from tyrecal.studies.diagnose.several import probabilities, weigh
-from tyrecal.studies.diagnose.study import spans_of
-from tyrecal.studies.diagnose.tyre_model import TyreModel
-from tyrecal.studies.diagnose.uncertainties import sources
 from tyrecal.studies.diagnose.verdict import decide
 from tyrecal.studies.fit.targets import target_labels
+from tyrecal.studies.inference.expansion import expand
+from tyrecal.studies.inference.inverse_problem import InverseProblem, places
+from tyrecal.studies.inference.model import ModelRow, Query
+from tyrecal.studies.inference.observations import Observable, Observations
+from tyrecal.studies.inference.spans import spans_of
+from tyrecal.studies.inference.tyre_model import TyreModel
+from tyrecal.studies.inference.uncertainties import sources
 
 from ..effects.support import coarse
 

@@ -243,7 +243,7 @@ def answer(
     from ..studies.blind.emulated import emulate
     from ..studies.blind.protocol import read_protocol
     from ..studies.blind.seal import refuse_open_truth
-    from ..studies.diagnose.model import ResponseModel
+    from ..studies.inference.model import ResponseModel
     from ..tyre.effects import catalogue
 
     for id in effects:

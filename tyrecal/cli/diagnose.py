@@ -127,10 +127,10 @@ def command(
     from ..report.diagnosis import page
     from ..report.shape_data import parts_data
     from ..studies.diagnose.diagnosis import STAGES
-    from ..studies.diagnose.inverse_problem import Assumed
     from ..studies.diagnose.study import parse_change, states_measured
     from ..studies.diagnose.study import study as diagnosed
-    from ..studies.fit.variable import read_variables
+    from ..studies.inference.inverse_problem import Assumed
+    from ..studies.variable import read_variables
     from ..tyre.effects import catalogue
 
     loaded, _ = study.load(case, assignments)

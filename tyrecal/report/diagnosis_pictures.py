@@ -13,9 +13,9 @@ from ..simulate.modes.label import Label
 from ..studies.diagnose.diagnosis import Diagnosis
 from ..studies.diagnose.evidence import NONE, OUTSIDE
 from ..studies.diagnose.gap import family
-from ..studies.diagnose.observations import Observable
 from ..studies.diagnose.several import before
 from ..studies.diagnose.verdict import no_gap_words
+from ..studies.inference.observations import Observable
 from .figure import COLOURS, GREY, headline, in_house_style, new_figure
 from .section import draw_section_map
 from .shape_data import DiagnosisSection

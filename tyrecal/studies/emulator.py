@@ -40,7 +40,7 @@ from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from ..simulate.modes.find import LabelledModes, find_modes
 from ..simulate.modes.label import Label
 from .fit.crossing import AXIAL, PAIR, TORSIONAL
-from .fit.variable import DesignVariable
+from .variable import DesignVariable
 
 Array = np.ndarray
 DEGREES = range(1, 9)

@@ -40,7 +40,7 @@ from tyrecal.studies.blind.power import NAMED_AS_A_RULE, Power, powers
 from tyrecal.studies.blind.protocol import read_protocol
 from tyrecal.studies.blind.ruler import read_ruler
 from tyrecal.studies.blind.seal import ANSWERS, SEAL
-from tyrecal.studies.diagnose.tyre_model import TyreModel
+from tyrecal.studies.inference.tyre_model import TyreModel
 from tyrecal.tyre.effects.edit import changed, with_part
 
 from .cases import GROUPS, LABELS, LEARNED_FROM, Group, written

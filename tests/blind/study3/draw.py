@@ -13,7 +13,7 @@ from tyrecal.studies.blind.make import Trial, plain_trial
 from tyrecal.studies.blind.protocol import Protocol
 from tyrecal.studies.blind.ruler import Ruler, difficulty
 from tyrecal.studies.blind.score import true_shift
-from tyrecal.studies.diagnose.uncertainties import sources
+from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.tyre.case import LoadedCase
 
 from .cases import Group, with_exact_section

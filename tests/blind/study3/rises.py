@@ -18,7 +18,7 @@ from tyrecal.studies.blind.answer import case_of
 from tyrecal.studies.blind.make import labels_of
 from tyrecal.studies.blind.ruler import Ruler, read_ruler
 from tyrecal.studies.blind.seal import open_truth
-from tyrecal.studies.diagnose.uncertainties import sources
+from tyrecal.studies.inference.uncertainties import sources
 
 from .cases import Group, with_exact_section
 

@@ -21,9 +21,9 @@ from tyrecal.studies.blind.protocol import Protocol, read_json, read_protocol
 from tyrecal.studies.blind.ruler import Difficulty, Ruler, difficulty, read_ruler
 from tyrecal.studies.blind.score import held_out_error, means, true_shift
 from tyrecal.studies.blind.seal import open_truth
-from tyrecal.studies.diagnose.inverse_problem import Assumed
 from tyrecal.studies.diagnose.several import present
 from tyrecal.studies.diagnose.verdict import SET
+from tyrecal.studies.inference.inverse_problem import Assumed
 
 from ...studies.blind_least_squares import held_out, held_out_rms
 from .kinds import further, weighed_again

@@ -22,15 +22,15 @@ from ...simulate.evaluate.pool import process_pool
 from ...tyre.case import LoadedCase
 from ..diagnose.diagnosis import Diagnosis, diagnose
 from ..diagnose.evidence import NONE
-from ..diagnose.expansion import Expansion, expand
-from ..diagnose.inverse_problem import Assumed
-from ..diagnose.model import ModelRow, ResponseModel
-from ..diagnose.observations import observe
 from ..diagnose.result import diagnosis_result
-from ..diagnose.study import spans_of
-from ..diagnose.tyre_model import TyreModel
-from ..diagnose.uncertainties import sources
 from ..diagnose.unmeasured import expected, likeliest
+from ..inference.expansion import Expansion, expand
+from ..inference.inverse_problem import Assumed
+from ..inference.model import ModelRow, ResponseModel
+from ..inference.observations import observe
+from ..inference.spans import spans_of
+from ..inference.tyre_model import TyreModel
+from ..inference.uncertainties import sources
 from .make import labels_of
 from .protocol import Protocol, read_protocol, write_json
 from .seal import refuse_open_truth, seal_answers

@@ -11,8 +11,8 @@ import numpy as np
 from ...tyre.case import LoadedCase, start_values
 from ...tyre.number_units import EFFECT_PATH
 from ...tyre.values import with_values
-from ..diagnose.section_fields import with_fields
-from ..diagnose.uncertainties import Source, values_of
+from ..inference.section_fields import with_fields
+from ..inference.uncertainties import Source, values_of
 from .laws import EffectLaw
 from .protocol import Protocol
 

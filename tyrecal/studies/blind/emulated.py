@@ -19,9 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
-from ..diagnose.expansion import derivatives, lagrange
-from ..diagnose.model import Answer, Coupling, Query, ResponseModel, Span
 from ..emulator import up_to
+from ..inference.expansion import derivatives, lagrange
+from ..inference.model import Answer, Coupling, Query, ResponseModel, Span
 
 Array = np.ndarray
 REACH = 0.8  # of ln x: 40 % by the draw, the rest what an ignored effect moves a fit

@@ -24,8 +24,8 @@ from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.evaluate.pool import process_pool
 from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase
-from ..diagnose.uncertainties import sources
 from ..fit.targets import target_labels
+from ..inference.uncertainties import sources
 from .draw import SWAPPED_WITHIN, Truth, draw, tyre
 from .maker import Computed, Maker
 from .protocol import Protocol, read_json, write_json, write_protocol

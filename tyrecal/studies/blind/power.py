@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...units import in_engineers_units
-from ..diagnose.model import Span
-from ..diagnose.separability import VISIBLE, smallest
+from ..inference.model import Span
+from ..inference.separability import VISIBLE, smallest
 from .protocol import Protocol
 from .ruler import Ruler, difficulty
 

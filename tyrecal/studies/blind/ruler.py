@@ -23,8 +23,8 @@ import numpy as np
 
 from ...errors import InputError
 from ...simulate.modes.label import Label
-from ..diagnose.form_error import LAWS_LENGTH, form_error
-from ..diagnose.model import Answer, ModelRow, Query, ResponseModel, state_of
+from ..inference.form_error import LAWS_LENGTH, form_error
+from ..inference.model import Answer, ModelRow, Query, ResponseModel, state_of
 from .protocol import Protocol, read_json, write_json
 
 Array = np.ndarray

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from ..inference.tyre_model import TyreModel
 from .diagnosis import Diagnosis
 from .evidence import NONE
-from .tyre_model import TyreModel
 
 SLOPE_STEP = 1e-6  # of x, for the slope of a variable in its own unit
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from ..inference.section_fields import SECTION
 from .evidence import NONE
 from .gap import projection
-from .section_fields import SECTION
 
 if TYPE_CHECKING:
     from .diagnosis import Diagnosis

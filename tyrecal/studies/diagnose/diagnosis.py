@@ -12,19 +12,19 @@ import numpy as np
 from ...errors import InputError
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.modes.label import Label
+from ..inference.expansion import MIDDLE, Expansion, anchored, carried, expand, refined
+from ..inference.inverse_problem import Assumed, InverseProblem, Toggle, places
+from ..inference.model import ModelRow, Query, ResponseModel
+from ..inference.observations import Observations
+from ..inference.plain_fit import plain_fit
+from ..inference.regions import SectionPart
+from ..inference.separability import Separability, separate
 from .evidence import NONE, Hypothesis, quantile, refit
-from .expansion import MIDDLE, Expansion, anchored, carried, expand, refined
 from .gap import Gap, chi2_tail, find_gap, projection
-from .inverse_problem import Assumed, InverseProblem, Toggle, places
 from .label_swap import exchange_shifts, exchanged, with_exchanged
 from .labelings import REFUTED, Reading, averaged, over_labels, shares
-from .model import ModelRow, Query, ResponseModel
 from .next_measurement import SIZES, Choice, OtherStates, rank
-from .observations import Observations
-from .plain_fit import plain_fit
-from .regions import SectionPart
 from .robustness import Robustness, robustness
-from .separability import Separability, separate
 from .several import probabilities, weigh, with_sets
 from .shrinkage import Shrinkage, shrink
 from .verdict import CHECK, NAMED, NO_GAP, Verdict, decide, holds

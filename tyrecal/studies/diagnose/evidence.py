@@ -18,12 +18,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from .covariance import between_runs, of_one_mode
-from .expansion import EffectResponse
+from ..inference.covariance import between_runs, of_one_mode
+from ..inference.expansion import EffectResponse
+from ..inference.inverse_problem import Added, InverseProblem
+from ..inference.observations import Observable
+from ..inference.veering import rule
 from .gap import family
-from .inverse_problem import Added, InverseProblem
-from .observations import Observable
-from .veering import rule
 
 Array = np.ndarray
 NONE: Final = "none"

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc, ndtr
 
-from .inverse_problem import InverseProblem
-from .observations import Observable
+from ..inference.inverse_problem import InverseProblem
+from ..inference.observations import Observable
 
 Array = np.ndarray
 OWN_RIM = "as the case"  # how the rim is held

@@ -15,10 +15,10 @@ import numpy as np
 
 from ...simulate.modes.label import Label
 from ...tyre.state import TyreState
+from ..inference.inverse_problem import InverseProblem, places
+from ..inference.model import ModelRow
+from ..inference.observations import Observations
 from .evidence import NONE, OUTSIDE, Hypothesis, refit
-from .inverse_problem import InverseProblem, places
-from .model import ModelRow
-from .observations import Observations
 from .several import weigh
 
 Array = np.ndarray

@@ -19,10 +19,10 @@ import numpy as np
 
 from ...measured.measurement import Measurement
 from ...simulate.modes.label import Label
+from ..inference.observations import Observations
 from ..labelling.label import Labelled
 from ..labels import FOREIGN_WORDS
 from .evidence import Hypothesis
-from .observations import Observations
 from .robustness import Robustness, in_words, verdict_probability
 from .several import probabilities
 from .verdict import Verdict, decide

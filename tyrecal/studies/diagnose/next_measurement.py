@@ -22,12 +22,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...simulate.modes.label import Label
+from ..inference.expansion import EffectResponse
+from ..inference.inverse_problem import InverseProblem, Toggle
+from ..inference.model import Answer, ModelRow, Query, ResponseModel
+from ..inference.observations import Observable, Observations
+from ..inference.section_fields import SECTION
 from .evidence import NONE, OUTSIDE
-from .expansion import EffectResponse
-from .inverse_problem import InverseProblem, Toggle
-from .model import Answer, ModelRow, Query, ResponseModel
-from .observations import Observable, Observations
-from .section_fields import SECTION
 
 Array = np.ndarray
 Sizes = Mapping[str, Array]  # equally probable parameters (q,) of an explanation's effects, by id

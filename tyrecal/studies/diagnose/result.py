@@ -14,12 +14,12 @@ import numpy as np
 from pydantic import Field
 
 from ...simulate.modes.label import Label
+from ..inference.observations import Observable
 from ..labels import Labels
 from ..result import CsvRow, Result, ResultPart, rows_csv
 from .constants_told import ConstantShift, constants_posterior
 from .evidence import NONE, OUTSIDE
 from .gap import projection
-from .observations import Observable
 from .shrinkage import Shrinkage
 from .verdict import Further, VerdictKind, holds
 from .where import FieldValue, PartChange

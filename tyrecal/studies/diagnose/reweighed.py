@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..inference.inverse_problem import Added, InverseProblem
+from ..inference.veering import rule
 from .evidence import COUPLED_STEPS, model_of, over_zeta, refit_at
-from .inverse_problem import Added, InverseProblem
-from .veering import rule
 
 Array = np.ndarray
 

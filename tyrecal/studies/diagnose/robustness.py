@@ -16,6 +16,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..inference.inverse_problem import InverseProblem
+from ..inference.section_fields import SECTION
 from .evidence import (
     NONE,
     OUTSIDE,
@@ -28,9 +30,7 @@ from .evidence import (
     refit,
     refit_at,
 )
-from .inverse_problem import InverseProblem
 from .reweighed import Perturbation, lines, reweighed
-from .section_fields import SECTION
 from .several import coupled_most, present, probabilities
 from .verdict import NAMED, NO_GAP, UNDECIDED, Verdict, decide, holds
 

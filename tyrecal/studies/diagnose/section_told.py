@@ -12,11 +12,11 @@ import numpy as np
 
 from ...tyre.case import LoadedCase
 from ...tyre.effects.parts import rim_edge, stations
+from ..inference.section_fields import ALONG_CARCASS, FIELD_KINDS, filler_tip, rubber_parts
+from ..inference.uncertainties import Source
 from .diagnosis import Diagnosis
 from .evidence import NONE
 from .gap import projection
-from .section_fields import ALONG_CARCASS, FIELD_KINDS, filler_tip, rubber_parts
-from .uncertainties import Source
 from .where import FieldValue
 
 Array = np.ndarray

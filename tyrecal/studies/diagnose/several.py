@@ -17,8 +17,8 @@ from typing import Final
 
 import numpy as np
 
+from ..inference.inverse_problem import InverseProblem
 from .evidence import NONE, OUTSIDE, PRIOR_OUTSIDE, Hypothesis, explain, grid, outside, refit
-from .inverse_problem import InverseProblem
 
 Array = np.ndarray
 PRIOR_NONE: Final = 0.25

@@ -17,10 +17,10 @@ from functools import partial
 
 import numpy as np
 
+from ..inference.inverse_problem import InverseProblem
+from ..inference.observations import Observable
+from ..inference.plain_fit import MAX_STEP
 from .evidence import NONE, Hypothesis, explain, grid, refit
-from .inverse_problem import InverseProblem
-from .observations import Observable
-from .plain_fit import MAX_STEP
 
 Array = np.ndarray
 PLACEBOS, DRAWS = 200, 200

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import exp, isfinite, nan
+from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
@@ -12,33 +12,31 @@ from ...errors import InputError
 from ...measured.measurement import Measurement
 from ...measured.targets import in_states, readings_of
 from ...simulate.evaluate.evaluator import Evaluator
-from ...simulate.modes.label import in_words
 from ...tyre.case import LoadedCase
 from ...tyre.case.mistakes import suggestion
-from ...tyre.effects import Effect, catalogue
+from ...tyre.effects import catalogue
 from ...tyre.number_units import EFFECT_PATH
-from ..far_off import far_off
 from ..fit.targets import rims_of
+from ..inference.check_units import check_units
+from ..inference.inverse_problem import Assumed, Toggle
+from ..inference.model import Query, Span
+from ..inference.observations import Observations, observe
+from ..inference.spans import spans_of
+from ..inference.tyre_model import TyreModel
+from ..inference.uncertainties import Source, calibrated, sources
 from ..labelling.label import label
 from ..labelling.result import labels_posterior
 from ..labels import Labels
 from .calibrated import calibrated_variables
 from .diagnosis import Diagnosis, diagnose
 from .evidence import NONE
-from .inverse_problem import Assumed, Toggle
 from .label_swap import rows_if_exchanged
 from .labelings import Reading, likely, weighed_anew
-from .model import Answer, Query, Span
 from .next_measurement import OtherStates
-from .observations import Observations, observe
 from .result import DiagnosisResult, diagnosis_result
 from .section_told import section_posterior
-from .tyre_model import TyreModel
-from .uncertainties import Source, calibrated, sources
 from .under_load import UnderLoad, Values, compare
 from .where import FieldValue
-
-MAX_MASS_RATIO = 1.5  # as the mass: a rim weighs as much as its tyre
 
 
 @dataclass(frozen=True)
@@ -202,53 +200,6 @@ def _under_load(
     return compare(case, evaluator, readings, tyres)
 
 
-def spans_of(
-    case: LoadedCase, evaluator: Evaluator, ids: Sequence[str] | None = None
-) -> tuple[dict[str, Span], dict[str, str]]:
-    """Effects that the evaluator's solver can express, and why it cannot the others, or a case of a
-    user's deck cannot have them. Raises ValueError where one of ``ids`` is no effect; InputError
-    for decks in three dimensions.
-    """
-    case.kind.require_section(
-        "a diagnosis needs a section, and this tyre is given by decks in three dimensions"
-    )
-    able: dict[str, Span] = {}
-    unable: dict[str, str] = {}
-    stated = {path: abs(step) for each in sources(case)[0] for path, step in each.steps.items()}
-    for id in ids or ():
-        if id not in catalogue():
-            raise ValueError(f"'{id}' is not one of the effects{suggestion(id, catalogue())}")
-    for id, effect in catalogue().items():
-        if ids is not None and id not in ids:
-            continue
-        if not effect.within(evaluator.solver.capabilities):
-            unable[id] = "this solver cannot express it"
-        elif why := _lacking(case, effect):
-            unable[id] = why
-        else:
-            base, words = case.case.effects.get(id, 0.0), (effect.unit, effect.title, effect.toggle)
-            low, high = effect.range_on(case)
-            able[id] = Span(
-                low - base,
-                high - base,
-                *words,
-                base,
-                law=effect.law,
-                stated=stated.get(EFFECT_PATH + id, 0.0),
-                second=case.kind.shape_uncertainty(effect) is not None,
-            )
-    return able, unable
-
-
-def _lacking(case: LoadedCase, effect: Effect) -> str:
-    """Reason why a case of a user's deck cannot have an effect, "" = none."""
-    try:
-        case.kind.check_effect(effect, case)
-    except ValueError as error:
-        return str(error)
-    return ""
-
-
 def parse_change(text: str) -> Toggle:
     """``EFFECT=VALUE`` or ``EFFECT*FACTOR``. Raises InputError."""
     mark = "=" if "=" in text else "*"
@@ -299,33 +250,4 @@ def _check_copies(paths: Sequence[Path], runs: Mapping[Path, Sequence[Measuremen
             first = paths[contents.index(contents[k])]
             raise InputError(
                 f"{path}: has the same values as {first}; a copy is not a second measurement"
-            )
-
-
-def check_units(
-    model: TyreModel,
-    observations: Observations,
-    runs: Sequence[str],
-    changes: Sequence[Toggle] = (),
-) -> None:
-    """Raises InputError where a value of one of the ``runs`` is not even near the model's start;
-    InputError where the model has no answer with what was switched."""
-    set_to = [c for c in changes if not c.times and c.value != c.base]
-    points = [Query(model.start, {c.id: c.value - c.base}) for c in set_to]
-    answer, *others = model.answers([Query(model.start, constants=True), *points])
-    if not isinstance(answer, Answer):
-        raise answer
-    for change, other in zip(set_to, others, strict=True):
-        if isinstance(other, Exception):
-            raise InputError(f"'{change.id}={change.value:g}' cannot be evaluated: {other}")
-    at = dict(zip(model.rows, answer.eta.tolist(), strict=True))
-    values = zip(observations.rows, observations.y, strict=True)
-    for row, y in sorted(values, key=lambda each: each[0].label is None):  # frequencies first
-        ratio = exp(y - at[row.row])
-        if row.label and (words := far_off(in_words(str(row)), exp(y), exp(at[row.row]))):
-            raise InputError(f"{runs[row.run]}: {words}")
-        if not row.label and not 1 / MAX_MASS_RATIO < ratio < MAX_MASS_RATIO:
-            raise InputError(
-                f"{runs[row.run]}: the mass is {ratio:.2g} times the model's; is it in kg, and of"
-                " the tyre without its rim?"
             )

@@ -17,8 +17,8 @@ from ...tyre.case import LoadedCase
 from ...tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ...tyre.templates import TemplateFailed
 from ..footprint import footprint_row
+from ..inference.tyre_model import asked_for
 from ..loaded import load_tyres
-from .tyre_model import asked_for
 
 LoadedKey = tuple[str, Member | None, float]  # quantity, mode, load in N
 Values = Mapping[str, float]

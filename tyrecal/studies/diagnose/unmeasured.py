@@ -17,12 +17,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 
+from ..inference.inverse_problem import InverseProblem
+from ..inference.model import ModelRow
+from ..inference.observations import Observable, Observations
+from ..inference.veering import ZETA_POINTS, rule
 from .evidence import OUTSIDE, Hypothesis
-from .inverse_problem import InverseProblem
-from .model import ModelRow
-from .observations import Observable, Observations
 from .reweighed import LinearFit, line_about
-from .veering import ZETA_POINTS, rule
 
 Array = np.ndarray
 # probability of a size or an explanation over that of the likeliest below which it is left out

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .inverse_problem import InverseProblem
-from .regions import SectionPart
+from ..inference.inverse_problem import InverseProblem
+from ..inference.regions import SectionPart
 
 Array = np.ndarray
 STIFFNESS_PRIOR, MASS_PRIOR = 0.2, 0.1  # standard deviations of a part's relative change

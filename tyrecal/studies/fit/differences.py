@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 
 from ...simulate.evaluate.failure import EvaluationFailed
-from .variable import DesignVariable
+from ..variable import DesignVariable
 
 Array = np.ndarray
 DesignValues = Mapping[str, float]

@@ -24,9 +24,9 @@ from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase
 from ...tyre.state import TyreState
-from ..diagnose.covariance import model_form
-from ..diagnose.observations import Observable
-from ..diagnose.uncertainties import sources
+from ..inference.covariance import model_form
+from ..inference.observations import Observable
+from ..inference.uncertainties import sources
 from ..result import ResultPart
 from .responses import FitResponse, linear_answer
 

@@ -27,10 +27,10 @@ from ...simulate.modes.find import LabelledModes, ModesAnswer, modes_in_order
 from ...simulate.modes.label import Label, Mode
 from ...tyre.case import LoadedCase
 from ...tyre.state import AS_THE_CASE, TyreState, without
+from ..variable import read_variable
 from .differences import STEP, differences
 from .road import PRESS_STEP, press, press_with_slopes
 from .targets import Target, ValueTarget, read_mass_targets, read_road_targets, read_targets
-from .variable import read_variable
 
 Array = np.ndarray
 BOUND_MARGIN = 1e-6  # of a scaled variable

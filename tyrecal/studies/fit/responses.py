@@ -12,12 +12,12 @@ from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase
 from ...tyre.case.parts import RimSupport
-from ..diagnose.model import Answer, Query
-from ..diagnose.observations import Observable
-from ..diagnose.tyre_model import TyreModel
-from ..diagnose.uncertainties import Source
+from ..inference.model import Answer, Query
+from ..inference.observations import Observable
+from ..inference.tyre_model import TyreModel
+from ..inference.uncertainties import Source
 from ..result import ResultPart
-from .variable import read_variable
+from ..variable import read_variable
 
 Array = np.ndarray
 

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from ...tyre.case import LoadedCase
-from ..diagnose.covariance import covariance, model_form
-from ..diagnose.observations import Observable, Observations
-from ..diagnose.uncertainties import Source, sources
+from ..inference.covariance import covariance, model_form
+from ..inference.observations import Observable, Observations
+from ..inference.uncertainties import Source, sources
 from .problem import Point, Problem
 from .responses import FitResponse, linear_answer
 from .targets import Target, ValueTarget

@@ -19,7 +19,7 @@ from ...tyre.case import LoadedCase
 from ...tyre.state import TyreState
 from ..fit.problem import Problem
 from ..fit.result import FitResult
-from ..fit.variable import DesignVariable, read_variable
+from ..variable import DesignVariable, read_variable
 from .expansion import Expansion, LabelSearch, Prior, admissible, find_labels
 from .tree import Frequencies
 

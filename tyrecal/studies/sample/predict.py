@@ -17,8 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..diagnose.covariance import model_form
-from ..diagnose.observations import Observable
+from ..inference.covariance import model_form
+from ..inference.observations import Observable
 
 Array = np.ndarray
 

@@ -18,18 +18,18 @@ from ...tyre.case import LoadedCase
 from ...tyre.case.parts import RimSupport
 from ...tyre.state import AS_THE_CASE, SPRINGS, WHEEL_FREE, TyreState
 from ...tyre.values import set_values
-from ..diagnose.covariance import covariance
-from ..diagnose.inverse_problem import Assumed, places
-from ..diagnose.model import Answer, Query
-from ..diagnose.observations import Observable, Observations, observe
-from ..diagnose.plain_fit import plain_fit
-from ..diagnose.study import check_units
-from ..diagnose.tyre_model import TyreModel
-from ..diagnose.uncertainties import Source, calibrated, sources
 from ..emulator import Emulator, emulator, needs_slopes
 from ..fit.calibrate import calibrate
 from ..fit.targets import read_targets, rims_of
-from ..fit.variable import DesignVariable, read_variables
+from ..inference.check_units import check_units
+from ..inference.covariance import covariance
+from ..inference.inverse_problem import Assumed, places
+from ..inference.model import Answer, Query
+from ..inference.observations import Observable, Observations, observe
+from ..inference.plain_fit import plain_fit
+from ..inference.tyre_model import TyreModel
+from ..inference.uncertainties import Source, calibrated, sources
+from ..variable import DesignVariable, read_variables
 from .box import Draws, grow_box
 from .chains import needs_emcee
 from .posterior import Posterior

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ...errors import InputError
-from ...simulate.deck.tyre_design import NEAR_ZERO
-from ...tyre.case import LoadedCase, start_values
+from ..errors import InputError
+from ..simulate.deck.tyre_design import NEAR_ZERO
+from ..tyre.case import LoadedCase, start_values
 
 START_SPREAD = 0.5  # of ln of a variable that the case says no more of: 2.7 times at most, of 95 %
 

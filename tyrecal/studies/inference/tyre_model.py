@@ -21,7 +21,7 @@ from ...tyre.number_units import EFFECT_PATH, unit_of
 from ...tyre.state import TyreState, without
 from ...tyre.templates import TemplateFailed
 from ...tyre.values import with_values
-from ..fit.variable import read_variables
+from ..variable import read_variables
 from .between import Between
 from .expansion import node_values
 from .form_error import MATERIAL_LAWS

@@ -23,7 +23,7 @@ from .model import Answer, Coupling, Query, ResponseModel, Span
 
 Array = np.ndarray
 BY_VALUES = (0.5, 1.0)  # of a one-sided range, the sizes of an effect without any slope
-NEARER = (0.25, 0.5)  # of an end of the range that has no solution
+FALLBACK = (0.25, 0.5)  # of an end of the range that has no solution
 MIDDLE = (0.25, 0.5, 0.75)  # of an end of the range, where an effect that matters is refined
 CURVATURE_STEP = 0.05  # of a logarithm, for H from two Jacobians
 
@@ -327,7 +327,7 @@ def _nearer(span: Span, replies: Mapping[float, Answer | Exception]) -> list[flo
         return []
     far = span.high if abs(span.high) >= abs(span.low) else span.low
     ends = [span.low, span.high] if span.low < 0 < span.high else [far]
-    sizes = [share * end for end in ends for share in (*NEARER, 1.0)]
+    sizes = [share * end for end in ends for share in (*FALLBACK, 1.0)]
     return [e for e in map(float, sizes) if e not in replies]
 
 
