@@ -91,6 +91,7 @@ def test_a_size_and_its_slope_make_a_quadratic(
 ) -> None:
     """So do a size and the slope where the effect is 0; no slope is asked in vain."""
     toy = Sloped(power, at_0, span)
+    toy.curve = toy.curve / 10 + Polynomial([0.0, 2e-4])
     nodes = expand(toy, np.zeros(3)).nodes["e0"]
     assert nodes.values.tolist() == pytest.approx(wanted)
     e = np.linspace(span.low, span.high, 7)
@@ -117,15 +118,22 @@ def test_one_end_of_the_range_stands_for_both_where_both_slopes_are_known() -> N
     assert nodes.at(e)[0][:, 0] == pytest.approx(toy.curve(e), abs=1e-12)
 
 
+@pytest.mark.parametrize(("power", "wanted"), [(1, [0, 1]), (2, [0, 0.25, 1])])
+def test_a_bent_effect_is_evaluated_near_0_too(power: int, wanted: list[float]) -> None:
+    """Where its slope at the end differs from the chord's by 30 % of the shift."""
+    assert expand(Sloped(power), np.zeros(3)).nodes["e0"].values.tolist() == wanted
+
+
 def test_one_more_size_and_its_slope_make_a_quartic() -> None:
     """An effect that matters is refined at the calibration's x; it is exact at all sizes then."""
     toy = Sloped(4)
+    toy.curve = toy.curve / 10 + Polynomial([0.0, 2e-4])
     expansion = expand(toy, np.zeros(3))
     nodes = refined(expansion, toy, {"e0": 0.5}).nodes["e0"]
     assert nodes.values.tolist() == [0, 0.5, 1] and nodes.reach == (0.0, 1.0)
     e = np.linspace(0, 1, 7)
     assert nodes.at(e)[0][:, 0] == pytest.approx(toy.curve(e), abs=1e-12)
-    assert abs(expansion.nodes["e0"].at(e)[0][:, 0] - toy.curve(e)).max() > 1e-5
+    assert abs(expansion.nodes["e0"].at(e)[0][:, 0] - toy.curve(e)).max() > 1e-6
 
 
 def test_a_nearer_size_is_asked_where_the_far_end_has_no_solution() -> None:

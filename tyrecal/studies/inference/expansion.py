@@ -25,6 +25,7 @@ Array = np.ndarray
 BY_VALUES = (0.5, 1.0)  # of a one-sided range, the sizes of an effect without any slope
 FALLBACK = (0.25, 0.5)  # of an end of the range that has no solution
 MIDDLE = (0.25, 0.5, 0.75)  # of an end of the range, where an effect that matters is refined
+MAX_BEND = 0.3  # of a shift, by which the slope at the end may differ from the chord's
 CURVATURE_STEP = 0.05  # of a logarithm, for H from two Jacobians
 
 
@@ -184,7 +185,14 @@ def expand(model: ResponseModel, x0: Array) -> Expansion:
     by_effect = {
         id: {float(e): replies[id, float(e)] for e in values[id]} | {0.0: first} for id in ids
     }
-    more = [(id, e) for id in ids for e in _nearer(model.spans[id], by_effect[id])]
+    more = [
+        (id, e)
+        for id in ids
+        for e in (
+            *_nearer(model.spans[id], by_effect[id]),
+            *_bent(_nodes(id, plain, model.spans[id], by_effect[id])),
+        )
+    ]
     again = model.answers([_with_effect(model, x0, id, e) for id, e in more]) if more else []
     for (id, e), answer in zip(more, again, strict=True):
         by_effect[id][e] = answer
@@ -329,6 +337,19 @@ def _nearer(span: Span, replies: Mapping[float, Answer | Exception]) -> list[flo
     ends = [span.low, span.high] if span.low < 0 < span.high else [far]
     sizes = [share * end for end in ends for share in (*FALLBACK, 1.0)]
     return [e for e in map(float, sizes) if e not in replies]
+
+
+def _bent(made: EffectResponse | None) -> list[float]:
+    """A further size near 0 of an effect whose slope is known at its only size, if that is far from
+    the chord's: a quadratic would be off by a tenth of small shifts."""
+    if made is None or len(made.values) != 2 or made.sloped[made.values == 0]:
+        return []
+    far = int(np.flatnonzero(made.values)[0])
+    rise = made.slope[far] * made.values[far]
+    off = np.nan_to_num(abs(rise - made.shift[far]))
+    if not made.sloped[far] or off.max() < MAX_BEND * abs(made.shift[far]).max():
+        return []
+    return [FALLBACK[0] * float(made.values[far])]
 
 
 def hermite(nodes: Array, sloped: Array, e: Array) -> tuple[Array, Array]:
