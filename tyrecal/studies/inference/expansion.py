@@ -6,6 +6,8 @@ With d = x - x0, quadratic about the plain fit x0, plus what each effect adds:
 
 a_i, B_i: polynomials in e_i through its nodes, 0 at e_i = 0: differences of what the model says at
 x0 with and without the effect; a_i has its slopes there, too, where the model gives them (Hermite).
+First every effect is evaluated at the far end of its range, and near 0 if it is bent; those that
+matter get one size more (`refined`).
 An effect that is in play is asked once more where its re-fit lies, at x_a, e_a: what the expansion
 is off by there, eta_a and J_a, it gains (e / e_a)^3 times (once beyond e_a), being itself off by
 terms of third order. Effects add up, but for pairs that were asked together at e_i, e_j: what the

@@ -114,7 +114,10 @@ class TyreModel:
 
     @cached_property
     def _sloped_sources(self) -> Collection[str]:
-        """Sources of error that are effects with exact sensitivities at 0."""
+        """Sources of error that are effects with exact sensitivities at 0; none without effects to
+        weigh, because the standard errors of a fit are defined by the step."""
+        if not self.spans:
+            return set()
         paths = {path for source in self.found for path in source.steps}
         ids = [path.removeprefix(EFFECT_PATH) for path in paths if path.startswith(EFFECT_PATH)]
         return {id for id in ids if self._moves(id, 0.0)}
