@@ -16,14 +16,16 @@ Items = list[CompletionItem]
 SUFFIXES = (".yaml", ".yml")
 MAX_CASES = 200  # case files; a folder with more has the shell's own completion
 PLAIN = re.compile(r"[A-Za-z0-9_.\-]+=?")  # all that a shell takes as it stands
+PLAIN_PATH = re.compile(r"[A-Za-z0-9_.\-/]+")
 MAX_DEPTH = 3  # folders below the one typed in which cases are looked for
 
 
 def cases(ctx: click.Context, param: click.Parameter, incomplete: str) -> Items:
-    """Case files, those in folders below too; without any, the shell's own completion."""
+    """Case files, those in folders below too; the shell's own completion without any, or where a
+    name needs quotes, which only the shell adds."""
     start = Path(incomplete).parent
     paths = [str(path) for path in _yaml(start, MAX_DEPTH) if str(path).startswith(incomplete)]
-    if not paths or len(paths) > MAX_CASES:
+    if not 0 < len(paths) <= MAX_CASES or not all(map(PLAIN_PATH.fullmatch, paths)):
         return [CompletionItem(incomplete, type="file")]
     return [CompletionItem(path) for path in paths]
 
