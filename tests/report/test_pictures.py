@@ -14,7 +14,7 @@ from tyrecal.report.convergence import draw_convergence
 from tyrecal.report.figure import save
 from tyrecal.report.section import draw_section
 from tyrecal.report.shape_data import section_data
-from tyrecal.report.shapes import draw_mode, draw_modes_overview, title
+from tyrecal.report.shapes import draw_modes_overview, title
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.results import Evaluation
@@ -56,19 +56,13 @@ def ink(path, width: int, height: int, most_bytes: int) -> float:
         return float((np.asarray(image.convert("L")) < 245).mean())
 
 
-@pytest.mark.parametrize("label", [Label(0, 0, "torsional"), Label(3, 1)])
-def test_mode(tyre, tmp_path, label):
-    draw_mode(tmp_path / "mode.png", tyre.modes[label], tyre.mesh)
-    assert 0.25 < ink(tmp_path / "mode.png", 1380, 855, 300_000) < 0.6
-
-
 def test_a_twist_is_told_from_rest(tyre, tmp_path, written):
     """The outline stays where it is: the meridians at rest stand beside those that moved, in a
     colour that nothing else has, and only there; what colours and lines are is said."""
     orange = {}
     for kind in ("torsional", "axial"):
         written.clear()
-        draw_mode(tmp_path / f"{kind}.png", tyre.modes[Label(0, 0, kind)], tyre.mesh)
+        draw_modes_overview(tmp_path / f"{kind}.png", [tyre.modes[Label(0, 0, kind)]], tyre.mesh)
         assert "displacement over the largest" in written
         assert any("outline at rest" in text for text in written)
         with Image.open(tmp_path / f"{kind}.png") as image:
@@ -93,7 +87,7 @@ def test_modes_overview_is_no_larger_than_its_modes(tyre, tmp_path):
 
 
 def test_the_largest_motion_is_12_percent_and_stands_at_the_top(tyre):
-    surface = shapes._surface(tyre.modes[Label(2, 0)], tyre.mesh, None)
+    surface = shapes._surface(tyre.modes[Label(2, 0)], tyre.mesh)
     motion = np.linalg.norm(surface.moved - surface.rest, axis=-1)
     radius = np.hypot(surface.rest[..., 0], surface.rest[..., 2]).max()
     assert motion.max() == pytest.approx(0.12 * radius)
@@ -110,19 +104,6 @@ def test_a_line_is_a_strip_of_its_width_along_it():
     for one, other, middle in ((a, b, line[0, 0]), (d, c, line[1, 0])):
         assert (one + other) / 2 == pytest.approx(middle[:2])
         assert other - one == pytest.approx(shapes.LINE_WIDTH * np.array([-0.8, 0.6]))
-
-
-def test_a_scale_is_kept(tyre):
-    mode = tyre.modes[Label(0, 0, "axial")]
-    surface = shapes._surface(mode, tyre.mesh, 0.01)
-    assert (surface.moved - surface.rest)[..., 1] == pytest.approx(
-        0.01 * np.tile(_amplitude(mode, tyre.mesh)[:, 2:], shapes.ANGLES + 1)
-    )
-
-
-def _amplitude(mode: Mode, mesh: SectionMesh) -> np.ndarray:
-    rows = {int(n): k for k, n in enumerate(mode.raw.shape.nodes)}
-    return mode.raw.shape.amplitude[[rows[int(n)] for n in shapes._drawn(mesh)]].real
 
 
 def test_title(tyre):

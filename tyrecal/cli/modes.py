@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 @option(
     "--pictures/--no-pictures",
     default=None,
-    help="Draw the section and each mode (default: no); with --sweep-load the frequencies"
+    help="Draw the section and the modes (default: no); with --sweep-load the frequencies"
     " over the load (default: yes).",
 )
 @options.dry_run

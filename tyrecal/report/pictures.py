@@ -1,4 +1,4 @@
-"""The pictures of a study in its folder: section, modes from four views, VTU, convergence."""
+"""The pictures of a study in its folder: section, modes on one sheet, VTU, convergence."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .figure import save
 from .revolve import placed
 from .section import draw_section
 from .shape_data import section_data
-from .shapes import draw_mode, draw_modes_overview
+from .shapes import draw_modes_overview
 from .vtu import write_vtu
 
 
@@ -29,8 +29,8 @@ def draw_evaluation(
     modes: Sequence[Mode],
     kind: str = "png",
 ) -> None:
-    """Draw the section (STUDY_section), the lowest `MAX_IN_OVERVIEW` modes (modes or STUDY_modes)
-    and each mode (STUDY_mode_C_M[_KIND]), also as VTU.
+    """Draw the section (STUDY_section) and the lowest `MAX_IN_OVERVIEW` modes (modes or
+    STUDY_modes); write each mode as VTU (STUDY_mode_C_M[_KIND]).
 
     kind: one of `files.PICTURE_FORMATS`. Modes are drawn only if the solver gives them on the whole
     section; a 3-D solver gives them on the crown only. Nothing is drawn without a section.
@@ -46,9 +46,7 @@ def draw_evaluation(
         overview = f"modes.{kind}" if study == "modes" else f"{study}_modes.{kind}"
         draw_modes_overview(folder / overview, modes, mesh)
     for mode in modes:
-        stem = folder / f"{study}_{file_name(mode.label)}"
-        draw_mode(stem.with_suffix(f".{kind}"), mode, mesh)
-        write_vtu(stem.with_suffix(".vtu"), mode, mesh)
+        write_vtu(folder / f"{study}_{file_name(mode.label)}.vtu", mode, mesh)
 
 
 def draw_fit(

@@ -1,4 +1,4 @@
-"""Mode shapes as pictures, from four sides like Figure 3 of the paper."""
+"""Mode shapes on one sheet, in perspective."""
 
 from __future__ import annotations
 
@@ -26,30 +26,8 @@ MAX_IN_OVERVIEW = 12  # modes
 MAX_MOTION = 0.12  # displacement in the picture over the tyre's radius
 LINE_WIDTH = 0.009  # inches: meridians in bold
 NEARER = 0.1  # inches: these, to the viewer, so that only other parts of the tyre hide them
-VIEW = 1.3  # half a view's width over the tyre's radius
-PERSPECTIVE = (22.0, -55.0)
-
-
-@in_house_style
-def draw_mode(path: Path, mode: Mode, mesh: SectionMesh, scale: float | None = None) -> None:
-    """Draw a mode from the front (along the axle), the side, above, and in perspective.
-
-    scale: m in the picture per unit of the shape; by default the largest motion is drawn as 12 %
-    of the radius. Raises InputError.
-    """
-    surface = _surface(mode, mesh, scale)
-    sheet = _Sheet(new_figure(9.2, 5.7, None))
-    for name, x, y, half, below, elevation, azimuth in (
-        ("top", 1.9, 4.55, 1.85, 0.95, 90, -90),
-        ("front, along the axle", 1.9, 1.8, 1.85, 1.68, 0, -90),
-        ("side", 4.3, 1.8, 1.85, 1.68, 0, 0),
-        ("perspective", 7.1, 3.1, 2.3, 2.12, *PERSPECTIVE),
-    ):
-        _view(sheet, surface, (x, y), half, elevation, azimuth)
-        sheet.text(x, y - below, name, ha="center", va="center", color="0.3")
-    sheet.text(4.6, 5.5, title(mode), ha="center", va="center", fontsize=11)
-    _key(sheet, [mode], (5.6, 5.2))
-    save(sheet.figure, path)
+VIEW, HALF = 1.3, 1.45  # half a view's width: over the tyre's radius, and in inches
+ELEVATION, AZIMUTH = np.radians([22.0, -55.0])
 
 
 @in_house_style
@@ -60,7 +38,7 @@ def draw_modes_overview(path: Path, modes: Sequence[Mode], mesh: SectionMesh) ->
     sheet = _Sheet(new_figure(9.0, height, None))
     for k, mode in enumerate(lowest):
         x, y = 1.5 + 3 * (k % 3), height - 1.8 - 3.2 * (k // 3)
-        _view(sheet, _surface(mode, mesh, None), (x, y), 1.45, *PERSPECTIVE)
+        _view(sheet, _surface(mode, mesh), (x, y))
         sheet.text(x, y + 1.38, title(mode).replace(" - ", "\n"), ha="center")
     left_out = len(modes) - len(lowest)
     words = f"; the {len(lowest)} lowest of {len(modes)} modes" if left_out else ""
@@ -128,7 +106,7 @@ def _drawn(mesh: SectionMesh) -> Array:
     return nodes[np.linspace(0, len(nodes) - 1, count).round().astype(int)]
 
 
-def _surface(mode: Mode, mesh: SectionMesh, scale: float | None) -> _Surface:
+def _surface(mode: Mode, mesh: SectionMesh) -> _Surface:
     nodes = _drawn(mesh)
     angles = 2 * np.pi * np.arange(ANGLES + 1) / ANGLES
     rest = swept(nodes, mesh, angles)
@@ -142,7 +120,7 @@ def _surface(mode: Mode, mesh: SectionMesh, scale: float | None) -> _Surface:
         phase = np.arctan2(2 * a[k] @ b[k], a[k] @ a[k] - b[k] @ b[k]) / 2
         u = np.cos(phase) * u + np.sin(phase) * quarter
     size = np.linalg.norm(u, axis=-1)
-    scale = MAX_MOTION * np.abs(rest).max() / size.max() if scale is None else scale
+    scale = MAX_MOTION * np.abs(rest).max() / size.max()
     sides = int(np.argmin(rest[:, 0, 1])), int(np.argmax(rest[:, 0, 1]))
     return _Surface(rest, rest + scale * u, size / size.max(), _twists(mode), sides)
 
@@ -153,35 +131,25 @@ def title(mode: Mode) -> str:
     return f"[{label.c},{label.m}] {mode.frequency_Hz:.1f} Hz: {label.motion}"
 
 
-def _view(
-    sheet: _Sheet,
-    surface: _Surface,
-    centre: tuple[float, float],
-    half: float,
-    elevation: float,
-    azimuth: float,
-) -> None:
-    """One orthographic view, ``half`` inches to each side of ``centre``."""
-    up, round_ = np.radians([elevation, azimuth])
-    right = [-np.sin(round_), np.cos(round_), 0]
-    viewer = [np.cos(up) * np.cos(round_), np.cos(up) * np.sin(round_), np.sin(up)]
-    inches = half / VIEW / np.abs(surface.rest).max()
+def _view(sheet: _Sheet, surface: _Surface, centre: tuple[float, float]) -> None:
+    """One orthographic view, `HALF` inches to each side of ``centre``."""
+    right = np.array([-np.sin(AZIMUTH), np.cos(AZIMUTH), 0])
+    out = np.array([np.cos(AZIMUTH), np.sin(AZIMUTH), 0])
+    viewer = np.cos(ELEVATION) * out + np.sin(ELEVATION) * np.array([0, 0, 1])
+    inches = HALF / VIEW / np.abs(surface.rest).max()
     screen = inches * np.stack([right, np.cross(viewer, right), viewer], -1)
     rest, moved = (points @ screen + [*centre, 0] for points in (surface.rest, surface.moved))
     seen = replace(surface, rest=rest, moved=moved)
-    through_rim = 0.01 < abs(viewer[1]) < 0.99
-    sheet.add(_faces(seen, through_rim))
+    sheet.add(_faces(seen))
     sheet.add(_outline(seen))
 
 
-def _faces(seen: _Surface, through_rim: bool) -> TriMesh:
+def _faces(seen: _Surface) -> TriMesh:
     """A surface on the screen (right, upwards, towards the viewer), its meridians in bold, as they
-    show a twist; the farthest triangles first. Faces turned away are seen through the rim only."""
+    show a twist; the farthest triangles first."""
     rows, columns = seen.share.shape
     node = np.arange(rows * columns).reshape(rows, columns)
     quads = np.stack([node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], -1)
-    if not through_rim:
-        quads = quads[_towards(seen.moved)]
     points, triangles = [seen.moved.reshape(-1, 3)], [_halves(quads)]
     colours = [COLOUR_MAP(seen.share.ravel())]
     for line, colour in ((seen.moved, "black"), (seen.rest, COLOURS[1]))[: 1 + seen.twists]:
