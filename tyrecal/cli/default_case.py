@@ -1,11 +1,10 @@
-"""The case of a command that is given no CASE: the last fit of this folder, or its only case."""
+"""The case of a command that is given no CASE: of the last fit of this folder, or its only case."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -14,90 +13,39 @@ from ..files import read_runs
 if TYPE_CHECKING:
     from .options import Study
 
-FIT = "fit.json"
-OF_A_CASE = {"size", "pressure_kPa", "solver"}  # keys that tell a case from other YAML
+CASE_KEYS = {"size", "pressure_kPa", "solver"}  # that tell a case from other YAML
 
 
 def default_case(
     case: Path | None, fitted: Path | None, study: Study
 ) -> tuple[Path, Path | None, Study]:
-    """Case, fit.json to compare with and study: as given, else what lies in this folder, which is
-    reported; results go to the fit's folder. Raises click.UsageError where nothing, or too much,
-    does."""
-    if case is not None:
-        return case, fitted, study
-    folder = fitted if fitted is None or fitted.is_dir() else fitted.parent
-    fits = _fits([folder] if folder else [Path(), *_folders()])
-    for _, folder, entry in sorted(fits, key=lambda fit: fit[:2], reverse=True):
-        case = _case(entry, folder)
-        if case:
-            study.terminal.note(f"{case}, with the fit in '{folder}'; another CASE can be given")
-            return case, fitted or folder / FIT, replace(study, output=study.output or folder)
-        if not fitted:
-            study.terminal.note(f"the fit in '{folder}' is left out: its case is not here")
-    if fitted:
-        raise click.UsageError(f"give the CASE too: the case of '{fitted}' is not here")
-    cases = sorted(_cases([Path()]))
-    if len(cases) > 1:
-        raise click.UsageError(f"give a CASE: there are several here, {_listed(cases)}")
-    if not cases:
-        raise click.UsageError("give a CASE: this folder has neither a case nor a finished fit")
-    study.terminal.note(f"{cases[0]}, the only case here")
-    return cases[0], None, study
-
-
-def _listed(cases: list[Path]) -> str:
-    return ", ".join(map(str, cases[:10])) + (" ..." if len(cases) > 10 else "")
-
-
-def _folders() -> Iterator[Path]:
-    for path in Path().iterdir():
-        if path.is_dir() and not path.is_symlink():
-            yield path
-
-
-def _fits(folders: list[Path]) -> Iterator[tuple[str, Path, dict[str, Any]]]:
-    """Fits that converged: when they were started, their folder, and their entry in run.json."""
+    """Case, fit.json to compare with and study: as given; without a case, of the last fit that
+    converged in a folder here and whose case is at its place, with that folder for the results;
+    else the only case here. Raises click.UsageError."""
+    from ..simulate.case_folder import named_case
     from ..studies.fitted import has_good
-
-    for folder in folders:
-        entry = read_runs(folder).get("fit", {}) if (folder / FIT).is_file() else {}
-        started = entry.get("started")
-        if isinstance(started, str) and has_good(folder / FIT):
-            yield started, folder, entry
-
-
-def _case(entry: dict[str, Any], folder: Path) -> Path | None:
-    """The case of a fit: the file that its entry names, else one near by with the fit's tyre, None
-    if there is none. Raises click.UsageError where there are several."""
-    from ..simulate.case_folder import cases_with_tyre, named_case
-
-    named = named_case(entry, folder)
-    if named is None:
-        return None
-    if named.is_file():
-        return _from_here(named)
-    places = {each.resolve(): each for each in (named.parent, folder.parent, folder, Path())}
-    cases = sorted(cases_with_tyre(entry, _cases(places.values())))
-    if len(cases) > 1:
-        raise click.UsageError(
-            f"give a CASE: several have the tyre of the fit in '{folder}', {_listed(cases)}"
-        )
-    return _from_here(cases[0]) if cases else None
-
-
-def _from_here(path: Path) -> Path:
-    """``path`` as one would type it in this folder."""
-    path = path.absolute()
-    return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
-
-
-def _cases(folders: Iterable[Path]) -> Iterator[Path]:
-    """Case files of some folders."""
     from ..tyre.case.document import read_document
 
-    for path in (path for folder in folders if folder.is_dir() for path in folder.iterdir()):
-        if path.suffix in (".yaml", ".yml") and path.is_file():
-            data = read_document(path).data
-            if data and data.keys() >= OF_A_CASE:
-                yield path
+    if case is not None:
+        return case, fitted, study
+    given = fitted if fitted is None or fitted.is_dir() else fitted.parent
+    fits = []
+    for folder in [given] if given else [path for path in Path().iterdir() if path.is_dir()]:
+        entry = read_runs(folder).get("fit", {}) if has_good(folder / "fit.json") else {}
+        file = named_case(entry, folder)
+        if file and file.is_file():
+            fits.append((str(entry.get("started")), folder, file))
+    if fits:
+        _, folder, file = max(fits)
+        case = file.relative_to(Path.cwd()) if file.is_relative_to(Path.cwd()) else file
+        study.terminal.note(f"{case}, with the fit in '{folder}'; another CASE can be given")
+        return case, fitted or folder / "fit.json", replace(study, output=study.output or folder)
+    if fitted:
+        raise click.UsageError(f"give the CASE too: the case of '{fitted}' is not at its place")
+    files = [path for path in sorted(Path().glob("*.y*ml")) if path.is_file()]
+    cases = [path for path in files if (read_document(path).data or {}).keys() >= CASE_KEYS]
+    if len(cases) != 1:
+        listed = f"several here: {', '.join(map(str, cases[:10]))}" if cases else "no case here"
+        raise click.UsageError(f"give a CASE: there is no fit and {listed}")
+    study.terminal.note(f"{cases[0]}, the only case here")
+    return cases[0], None, study

@@ -8,7 +8,7 @@ tyre (``tyre_sha256``, without what the command line sets) decides.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -46,17 +46,9 @@ def belongs_to(entries: Sequence[Mapping[str, Any]], folder: Path, path: Path) -
     if there:
         return any(file.samefile(path) for file in there)
     return any(
-        cases_with_tyre(entry, [path]) if "tyre_sha256" in entry else file.name == path.name
+        entry["tyre_sha256"] == _tyre_of(path) if "tyre_sha256" in entry else file.name == path.name
         for entry, file in named
     )
-
-
-def cases_with_tyre(entry: Mapping[str, Any], paths: Iterable[Path]) -> list[Path]:
-    """The case files among ``paths`` that have the tyre of an entry; those with the file name that
-    it gives, if there are any."""
-    same = [path for path in paths if entry.get("tyre_sha256", "") == _tyre_of(path)]
-    name = Path(str(entry.get("case"))).name
-    return [path for path in same if path.name == name] or same
 
 
 def _tyre_of(path: Path) -> str | None:
