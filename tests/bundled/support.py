@@ -17,7 +17,6 @@ from tyrecal_solvers.bundled.section.band import Numbering
 from tyrecal_solvers.bundled.section.model import Model
 from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 from tyrecal_solvers.bundled.section.parts.spin import spinning
-from tyrecal_solvers.bundled.section.sparse import Sparse
 from tyrecal_solvers.errors import NoEquilibrium
 from tyrecal_solvers.language import text as language
 
@@ -41,9 +40,9 @@ def bears(patch: pytest.MonkeyPatch, most_N: float) -> None:
     patch.setattr(ContactNewton, "_newton", at_most)
 
 
-def full(matrix: Sparse) -> Array:
+def full(matrix: csr_array) -> Array:
     """All its entries (n, n)."""
-    return matrix @ np.eye(len(matrix.starts) - 1)
+    return np.asarray(matrix.toarray())
 
 
 @dataclass(frozen=True)

@@ -182,7 +182,7 @@ def test_a_road_before_waves(tyre: Round) -> None:
 def test_mass_of_rigid_motions(tyre: Round) -> None:
     """Half the tyre's mass for shifts down and along the axle, whatever the elements' lengths."""
     around = half_circle(LENGTHS)
-    weigh, total = Inertia(tyre.model, around), 2 * np.pi * mass(tyre.model).entries.sum()
+    weigh, total = Inertia(tyre.model, around), 2 * np.pi * mass(tyre.model).sum()
     c, s = np.cos(around.angles)[:, None], np.sin(around.angles)[:, None]
     ones = np.ones((1, len(tyre.U)))
     down = np.stack([c * ones, -s * ones, 0 * c * ones], -1)

@@ -145,7 +145,7 @@ def test_a_part_of_ones_own(monkeypatch: pytest.MonkeyPatch, quadratic: bool) ->
     np.testing.assert_allclose(works[1].product(phi) - works[0].product(phi), more, rtol=1e-5)
     spun = replace(bedded, parts=bedded.parts[-1:])
     assert mechanics.potential(spun, np.ones((len(b.X), 3)), []) == pytest.approx(
-        1.5 * SPRING * mechanics.mass(bare).entries.sum(), rel=1e-12
+        1.5 * SPRING * mechanics.mass(bare).sum(), rel=1e-12
     )
 
 
@@ -179,7 +179,7 @@ def test_an_element_of_ones_own(monkeypatch: pytest.MonkeyPatch) -> None:
     deck = "\n".join([head + "\n".join(nodes), "*ELEMENT" + start, *rows, after])
     models = [support.model_of(text) for text in (eight, deck)]
     assert [m.parts[0].connectivity.shape[1] for m in models] == [8, 9]
-    masses = [mechanics.mass(m).entries.sum() for m in models]
+    masses = [mechanics.mass(m).sum() for m in models]
     assert masses[1] == pytest.approx(masses[0], rel=1e-12)
     for n in range(3):
         values = []

@@ -92,7 +92,7 @@ def test_on_a_soft_spring_tyre_and_wheel_move_as_one(motion: str) -> None:
     r, w, z = X[:, 0], tyre.U[:, 1], X[:, 1]
     polar = 2 * np.pi * (r @ (mass @ r) + w @ (mass @ w))
     own = {
-        "axial": 2 * np.pi * mass.entries.sum(),
+        "axial": 2 * np.pi * mass.sum(),
         "spin": polar,
         "tilt": polar / 2 + 2 * np.pi * z @ (mass @ z),
     }

@@ -10,9 +10,10 @@ with its number p + i h dp, at the state u + i h v; no second derivative is writ
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from ...language.text import COMPLEX_STEP
 from ..section import mechanics
@@ -20,7 +21,6 @@ from ..section.kept_fields import Coordinates, Factor
 from ..section.model import Model
 from ..section.parts.part import IN_PLANE, ModeShapes, TyrePart
 from ..section.parts.spin import Spin
-from ..section.sparse import Sparse
 from .cavity import GasCavity, coupling
 from .wheel import Wheel
 
@@ -74,9 +74,7 @@ def eigenvalue_rates(
     M = mechanics.mass(model)
     total -= eigenvalues * _energies(M, fields).sum(1)
     if spins:  # of all parts at once, their mass being there
-        total -= _energies(replace(M, entries=spins[0].spin2 * M.entries), fields) @ np.diag(
-            IN_PLANE
-        )
+        total -= _energies(spins[0].spin2 * M, fields) @ np.diag(IN_PLANE)
     total *= copies
     if rim_and_air:
         total += rim_and_air.forms(model, state, loads, fields, eigenvalues)
@@ -133,9 +131,9 @@ class RimAndAir:
         return total
 
 
-def _energies(M: Sparse, fields: ModeShapes) -> Array:
+def _energies(M: csr_array, fields: ModeShapes) -> Array:
     """u^T M u (m, 3) per mode and component; of real shapes only p's tangent, imaginary."""
-    if not (fields.complex or np.iscomplexobj(M.entries)):
+    if not (fields.complex or np.iscomplexobj(M)):
         return np.zeros((len(fields.modes), 3), complex)
     if not fields.complex:
         M = M.imag

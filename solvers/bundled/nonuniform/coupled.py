@@ -258,6 +258,7 @@ def tell(
 
 def assigned(overlap: Array) -> Array:
     """The column of each row of ``overlap``, none twice, whose sum is the largest."""
+
     from scipy.optimize import linear_sum_assignment  # late: a third of a second
 
     columns: Array = linear_sum_assignment(overlap, maximize=True)[1]

@@ -149,7 +149,7 @@ class FullCircle:
         flat = field.swapaxes(0, 1).reshape(self.free.shape[0], -1)
         shape = self.free.shape[0], len(field), 3
         image = (self._each * (self.vibration.mass @ flat)).reshape(shape)
-        if self._more.entries.any():
+        if self._more.count_nonzero():
             image = image + np.einsum(
                 "kj,njc->nkc", self._waves, (self._more @ flat).reshape(shape)
             )

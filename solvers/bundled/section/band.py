@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg import lapack
+from scipy.sparse import csr_array
 
 from ...errors import Indefinite
-from .compiled import LAPACK
-from .sparse import Sparse, narrow_order
+from .sparse import narrow_order
 
 Array = np.ndarray
 
@@ -106,7 +107,7 @@ class Numbering:
         """Factor of an assembled band, which it overwrites. Raises Indefinite."""
         return Cholesky(band)
 
-    def times(self, mass: Sparse, x: Array) -> Array:
+    def times(self, mass: csr_array, x: Array) -> Array:
         """M x for x (size,) or (size, b); ``mass`` (n, n) applies to each component."""
         full = self.spread(x)
         return self.gather((mass @ full.reshape(len(full), -1)).reshape(full.shape))
@@ -126,8 +127,8 @@ class Cholesky:
     """
 
     def __init__(self, band: Array):
-        self._solve = LAPACK.zpbtrs if np.iscomplexobj(band) else LAPACK.dpbtrs
-        factorise = LAPACK.zpbtrf if np.iscomplexobj(band) else LAPACK.dpbtrf
+        self._solve = lapack.zpbtrs if np.iscomplexobj(band) else lapack.dpbtrs
+        factorise = lapack.zpbtrf if np.iscomplexobj(band) else lapack.dpbtrf
         self._factor, info = factorise(band, lower=1, overwrite_ab=1)
         if info:
             raise Indefinite(f"pivot {info} of {band.shape[1]} is not positive")

@@ -14,12 +14,12 @@ vector, so that it is real, as K is in them; those of the middle plane have zero
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg import lapack
+from scipy.sparse import csr_array
 
 from ...errors import Indefinite
 from .band import Cholesky, Numbering
-from .compiled import LAPACK
 from .mechanics import OfElements
-from .sparse import Sparse
 from .symmetry import MirrorHalf
 
 Array = np.ndarray
@@ -107,7 +107,7 @@ class KeptFields:
         turned = self.symmetry.turned(u)
         return np.hstack([self.gather((u + turned) / 2), self.gather((u - turned) / 2)])
 
-    def times(self, mass: Sparse, x: Array) -> Array:
+    def times(self, mass: csr_array, x: Array) -> Array:
         """M x; ``mass`` (n, n): of half the section."""
         pairs = x.reshape(len(self._order), -1) * self._weight
         full = self._spread(pairs, pairs.shape)
@@ -144,13 +144,13 @@ class KeptCholesky:
         root = ROOT2 * phase
         E = corner[:near] * root
         D = (root.conj()[:, None] * corner[near:] * root).real
-        factorise = LAPACK.zpbtrf if np.iscomplexobj(band) else LAPACK.dpbtrf
+        factorise = lapack.zpbtrf if np.iscomplexobj(band) else lapack.dpbtrf
         self._factor, info = factorise(band, lower=1, overwrite_ab=1)
         if info:
             raise Indefinite(f"pivot {info} of {band.shape[1]} is not positive")
         self._near = slice(band.shape[1] - near, None)
         self._W = _substituted(self._factor[:, self._near], E, "N")
-        self._schur, info = LAPACK.dpotrf(D - (self._W.conj().T @ self._W).real, lower=1)
+        self._schur, info = lapack.dpotrf(D - (self._W.conj().T @ self._W).real, lower=1)
         if info:
             raise Indefinite("a pivot of the middle plane is not positive")
 
@@ -160,7 +160,7 @@ class KeptCholesky:
         f = _substituted(self._factor, y[:s], "N")
         g = (self._phase.conj()[:, None] * y[s:]).real
         left = g - (self._W.conj().T @ f[self._near]).real
-        m = LAPACK.dpotrs(self._schur, left, lower=1)[0]
+        m = lapack.dpotrs(self._schur, left, lower=1)[0]
         f[self._near] -= self._W @ m
         y[:s], y[s:] = _substituted(self._factor, f, "C"), self._phase[:, None] * m
         return y.T.view(float).T.reshape(right.shape)
@@ -170,10 +170,10 @@ def _substituted(factor: Array, right: Array, trans: str) -> Array:
     """L^-1 ("N") or L^-H ("C") times a complex block (s, k)."""
     if np.iscomplexobj(factor):
         right = np.array(right, order="F")
-        return LAPACK.ztbtrs(factor, right, uplo="L", trans=trans, overwrite_b=1)[0]
+        return lapack.ztbtrs(factor, right, uplo="L", trans=trans, overwrite_b=1)[0]
     k = right.shape[1]
     parts = np.concatenate([right.real.T, right.imag.T]).T
-    x = LAPACK.dtbtrs(factor, parts, uplo="L", trans=trans, overwrite_b=1)[0]
+    x = lapack.dtbtrs(factor, parts, uplo="L", trans=trans, overwrite_b=1)[0]
     return x[:, :k] + 1j * x[:, k:]
 
 

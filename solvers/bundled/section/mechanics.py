@@ -9,11 +9,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from .band import Numbering
 from .model import Model
 from .parts.part import TyrePart
-from .sparse import Sparse
+from .sparse import assembled
 
 Array = np.ndarray
 OfElements = list[tuple[Array, Array]]  # connectivities with vectors or matrices of elements
@@ -58,9 +59,9 @@ def tangents(
     return three
 
 
-def mass(model: Model) -> Sparse:
+def mass(model: Model) -> csr_array:
     """Consistent mass (n, n), kg per radian, the same for each displacement component."""
-    return Sparse.assembled(mass_matrices(model), len(model.mesh.X))
+    return assembled(mass_matrices(model), len(model.mesh.X))
 
 
 def total_mass(model: Model) -> complex:

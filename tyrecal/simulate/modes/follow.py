@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..evaluate.results import HarmonicShape
-from .assignment import assignment
 from .label import Label, Mode
 from .rings import harmonic_of
 from .subspace import mac
@@ -33,12 +32,14 @@ def follow(before: Sequence[Mode], after: Sequence[Mode]) -> list[Step]:
     A sampled shape is taken as its pair, whatever angle it is turned by (``harmonic_of``).
     Raises ValueError when the points differ.
     """
+    from scipy.optimize import linear_sum_assignment  # late: longer than most evaluations
+
     steps = []
     for c in sorted({mode.label.c for mode in before} & {mode.label.c for mode in after}):
         old, new = ([mode for mode in modes if mode.label.c == c] for modes in (before, after))
         x, y = ([_harmonic(mode) for mode in modes] for modes in (old, new))
         macs = np.array([[mac(a, b) for b in y] for a in x])
-        for i, j in assignment(macs):
+        for i, j in zip(*linear_sum_assignment(macs, maximize=True), strict=True):
             steps.append(Step(old[i].label, new[j].label, float(macs[i, j])))
     return steps
 

@@ -25,7 +25,6 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from ..evaluate.results import Evaluation, HarmonicShape, RawMode, RingShape
-from .assignment import assignment
 
 FAMILIES = ("in-plane", "out-of-plane")
 KNOWN = {
@@ -173,6 +172,8 @@ def label_modes(evaluation_modes: Sequence[RawMode]) -> list[Mode]:
 
     Raises ValueError as ``belt_motion``.
     """
+    from scipy.optimize import linear_sum_assignment  # late: longer than most evaluations
+
     motions = [belt_motion(mode.shape) for mode in evaluation_modes]
     frequency = np.array([max(mode.frequency_Hz, 1e-6) for mode in evaluation_modes])
     labels: dict[int, Label] = {}
@@ -183,7 +184,9 @@ def label_modes(evaluation_modes: Sequence[RawMode]) -> list[Mode]:
         part = np.array([motions[i].participation for i in members])[:, None]
         weight = shares * part * (frequency[members[0]] / frequency[members])[:, None] ** 2
         weight[(shares < SUBSTANTIAL) | (part < TAKES_PART)] = 0.0
-        claims = {row: column for row, column in assignment(weight) if weight[row, column] > 0}
+        rows, columns = (each.tolist() for each in linear_sum_assignment(weight, maximize=True))
+        pairs = zip(rows, columns, strict=True)
+        claims = {row: column for row, column in pairs if weight[row, column] > 0}
         taken = {column for column in claims.values() if column != AXIAL_COLUMN}
         for row, i in enumerate(members):
             column = claims.get(row)

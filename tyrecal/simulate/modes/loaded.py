@@ -16,7 +16,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..evaluate.results import HarmonicShape
-from .assignment import assignment
 from .label import Label, Mode
 
 Array = np.ndarray
@@ -157,6 +156,8 @@ def follow(before: ModesAtLoad, after: ModesAtLoad, where: Rings) -> Followed:
 
 def _homotopy(f_before: Array, a: Array, f_after: Array, b: Array) -> Array:
     """For each column of a its column of b, or -1; both orthonormal, frequencies in Hz."""
+    from scipy.optimize import linear_sum_assignment  # late: longer than most evaluations
+
     u, size, _ = np.linalg.svd(np.hstack([a, b]), full_matrices=False)
     span = u[:, size > SPANNED * size[0]]
     a, b = span.T @ a, span.T @ b
@@ -168,7 +169,7 @@ def _homotopy(f_before: Array, a: Array, f_after: Array, b: Array) -> Array:
         ahead = min(t + step, 1.0)
         _, vectors = np.linalg.eigh((1 - ahead) * ends[0] + ahead * ends[1])
         overlap = (now.T @ vectors) ** 2
-        rows, to = np.array(assignment(overlap)).T
+        rows, to = linear_sum_assignment(overlap, maximize=True)
         if overlap[rows, to].min() < MIN_OVERLAP and step > MIN_LOAD_SHARE:
             step /= 2
             continue
