@@ -16,6 +16,7 @@ are free: a search may try what it likes.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from inspect import signature
 from itertools import pairwise
 from math import inf, log
 from numbers import Integral, Real
@@ -32,12 +33,14 @@ from .simulate.evaluate.failure import EvaluationFailed
 from .simulate.evaluate.pressed import Pressed
 from .simulate.evaluate.store import Store
 from .simulate.modes.label import Mode, labelled
+from .studies import study_class
 from .studies.diagnose.diagnosis import Diagnosis
 from .studies.emulator import Emulator
 from .studies.fit.calibrate import METHODS, Fit
 from .studies.fit.study import FitStudy
 from .studies.fit.targets import target_labels
 from .studies.pressure import State
+from .studies.result import Result, StudyInput
 from .tyre.case import CaseError, LoadedCase, as_written, start_values, with_level
 from .tyre.case.mistakes import suggestion
 from .tyre.case.parts import Setting
@@ -54,6 +57,7 @@ __all__ = [
     "Fit",
     "LoadedCase",
     "Mode",
+    "Result",
     "State",
     "diagnose_case",
     "emulate",
@@ -63,6 +67,7 @@ __all__ = [
     "list_effects",
     "load_case",
     "read_results",
+    "run",
     "sweep_pressure",
     "with_values",
 ]
@@ -326,6 +331,39 @@ def emulate(
     labels = target_labels(case)
     count = evaluations or 10 * len(variables)
     return emulator(_evaluator(case, solver, record), variables, box, labels, count, jobs)
+
+
+def run(
+    study: str,
+    case: LoadedCase | Path | str,
+    values: Mapping[str, float] | None = None,
+    *,
+    jobs: int = 1,
+    solver: str = "",
+    record: Path | str | None = None,
+    **options: Any,
+) -> Result:
+    """Run a study by its name, of the tool or from outside. ``values`` are the design's; options
+    are the study's own, such as ``pressures_kPa`` of "sweep-pressure", ``loads_N`` of "footprint",
+    and ``measured`` of "fit", "sample" and "diagnose".
+
+    The result has the numbers of its file as attributes, ``texts()`` its files by name and
+    ``quantities()`` what a batch compares.
+
+    >>> case = load_case("cases/p235_75r17.yaml", mesh="coarse")
+    >>> result = run("sweep-pressure", case, pressures_kPa=[160, 240])
+    >>> [f"{row.pressure_kPa:g} kPa: {row.modes[0].frequency_Hz:.1f} Hz" for row in result.rows]
+    ['160 kPa: 31.1 Hz', '240 kPa: 37.0 Hz']
+    """
+    kind = study_class(_text("study", study))
+    known = list(signature(kind.run).parameters)[1:]
+    for name in options:
+        if name not in known:
+            raise ValueError(f"{study} has no option '{name}': it has {', '.join(known) or 'none'}")
+    case = _case(case)
+    given = StudyInput(case, _evaluator(case, solver, record), {"initial": _design(case, values)})
+    given.jobs = _count("jobs", jobs, 1)
+    return kind.run(given, **options)
 
 
 def list_effects() -> dict[str, Effect]:

@@ -15,9 +15,10 @@ import pytest
 import xmlschema
 
 from tyrecal.batch.run import names_of
-from tyrecal.batch.studies import STUDIES
-from tyrecal.cli import batch, progress
+from tyrecal.cli import progress
 from tyrecal.cli.progress import seconds_left
+from tyrecal.studies import STUDIES, result_types
+from tyrecal.studies.result import Result
 
 from ..batch.data import entry, report
 from ..batch.support import measured_elsewhere, poison, vary
@@ -372,8 +373,10 @@ def test_names_tell_cases_apart() -> None:
         names_of([Path("x/a.yaml"), Path("x/a.yaml")])
 
 
-def test_the_command_names_the_librarys_studies() -> None:
-    assert tuple(STUDIES) == batch.STUDY_NAMES
+def test_studies_that_run_by_name_have_a_run() -> None:
+    for name, kind in result_types().items():
+        own = kind.run.__func__ is not Result.run.__func__  # type: ignore[attr-defined]
+        assert own == STUDIES[name].runs_by_name and kind.study == name
 
 
 def test_time_left_counts_what_ran(

@@ -412,7 +412,7 @@ def test_a_broken_command_or_study_of_a_package_costs_no_other(
     assert run("weigh") == 2
     assert "install a newer version of the package" in capsys.readouterr().err
     monkeypatch.setattr(studies, "entry_points", lambda group: [broken])
-    assert list(studies.result_types()) == list(studies.RESULT_TYPES)
+    assert list(studies.result_types()) == list(studies.STUDIES)
     assert "study 'weigh'" in caplog.text
 
 

@@ -47,6 +47,7 @@ from ..simulate.evaluate.sources import sources
 from ..simulate.evaluate.store import Store, solver_identity
 from ..simulate.provenance import provenance
 from ..studies.fitted import NOT_CONVERGED, has_good
+from ..studies.result import StudyInput
 from ..tyre.case import LoadedCase, start_values, with_level
 from ..tyre.values import unusual_value, with_values
 from .studies import Asked, Studied, StudyOutcome, study
@@ -122,7 +123,8 @@ def _studied(
     private_dir(task.folder)
     _write_runs(task, loaded, facts, (), {})
     evaluator.store = Store(task.record) if task.record else None
-    state = Studied(loaded, evaluator, {"initial": start_values(loaded)}, task.asked)
+    given = StudyInput(loaded, evaluator, {"initial": start_values(loaded)})
+    state = Studied(given, task.asked)
     entries: dict[str, Any] = {}
     files: list[str] = []
     aside: dict[str, str] = {}
@@ -210,7 +212,7 @@ def _entry(outcome: StudyOutcome, task: CaseTask) -> dict[str, Any]:
         "cause": outcome.cause,
         "words": words,
         "quantities": outcome.quantities,
-        **outcome.verdict,
+        **outcome.conclusion,
     }
 
 

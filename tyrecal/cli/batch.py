@@ -9,19 +9,13 @@ from typing import Any
 import click
 
 from ..files import json_text, make_folder, refuse_link, write_text
+from ..studies import STUDIES, runnable
 from . import arguments, options
 from .main import EXIT_BATCH
 from .parameters import Place, Whole, option
 from .terminal import Terminal
 
-STUDY_NAMES = (
-    "fit",
-    "modes",
-    "sweep-pressure",
-    "footprint",
-    "sample",
-    "diagnose",
-)  # without importing what they need
+STUDY_NAMES = [name for name, entry in STUDIES.items() if entry.runs_by_name]
 FILE_PATH = Place(folder=False)
 
 
@@ -199,10 +193,10 @@ def _names(cases: Sequence[Path]) -> list[str]:
 
 def _studies(text: str) -> tuple[str, ...]:
     """The requested studies, in the order in which they are done. Raises click.UsageError."""
-    names = [word.strip() for word in text.split(",")]
+    names, known = [word.strip() for word in text.split(",")], runnable()
     for word in names:
-        arguments.refuse_unknown("--studies", word, STUDY_NAMES, "study")
-    return tuple(name for name in STUDY_NAMES if name in names)
+        arguments.refuse_unknown("--studies", word, known, "study")
+    return tuple(name for name in known if name in names)
 
 
 def _prepare(tasks: Sequence[Any], folder: Path) -> None:

@@ -101,7 +101,6 @@ def command(
     from ..report.table import fit_doubts, fit_verdict, shown, tyre_doubts
     from ..simulate.evaluate.cluster import reached
     from ..simulate.program import join_command
-    from ..studies.fit.calibrate import history_csv
     from ..studies.fit.study import FitStudy
     from ..studies.fit.targets import objective_unit, read_targets
     from ..studies.fitted import NOT_CONVERGED, has_good
@@ -140,7 +139,6 @@ def command(
     loaded, run.provenance = calibration.case, calibration.provenance
     fit.found = run.write(fit.found)
     result = fit.result
-    run.write_text("fit_history.csv", history_csv(fit.history))
     terminal.result(result)
     tables = fit.found.tables()
     if fit.found.states or fit.found.labels:  # each as wide as it needs

@@ -14,6 +14,7 @@ import click
 from ..errors import InputError, TyrecalError
 from ..files import CHANGED, os_words
 from ..interrupt import SIGNALS, exit_code, pending_interrupt, remember_interrupts
+from ..studies import STUDIES
 from .terminal import RESUME, coloured, error, say
 
 if TYPE_CHECKING:
@@ -28,14 +29,8 @@ COMMANDS = {  # name: one line of help, so that the overview imports no command
     "init": "Write the case of a radial tyre, from its size code or its section.",
     "validate": "Check a case file and report every mistake.",
     "deck": "Write the decks of a case, to read or to run elsewhere.",
-    "modes": "Evaluate one design, unloaded or on a road: frequencies with their labels.",
-    "fit": "Calibrate the case's variables to its target frequencies.",
-    "sample": "Sample the variables that fit the measurements, and predict frequencies.",
-    "sweep-pressure": "Follow every mode over the inflation pressure.",
-    "footprint": "Press the tyre on a road: contact area and pressure over load.",
-    "effects": "List and explain effects that a plain model leaves out.",
+    **{name: entry.help for name, entry in STUDIES.items() if entry.help},
     "measured": "Turn modal tables, mode shapes and response functions into measurements.",
-    "diagnose": "Find where model and measurements differ, and which effect explains it.",
     "blind": "Test the diagnosis on synthetic data with a hidden effect.",
     "report": "Show the results of one or several folders on one HTML page.",
     "batch": "Study many cases at once, compare with a baseline, report to CI.",

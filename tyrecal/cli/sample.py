@@ -71,7 +71,7 @@ def command(
     """
     from ..report.table import shown
     from ..studies.sample.chains import needs_emcee
-    from ..studies.sample.result import draws_csv, result
+    from ..studies.sample.result import result
     from ..studies.sample.study import (
         SAMPLE_STAGES,
         check,
@@ -104,7 +104,6 @@ def command(
         from ..report.sample import figures
 
         output.write_figures(figures(summary))
-    output.write_text("sample_draws.csv", draws_csv(sample))
     output.finish()
     terminal.result(summary.content())
     for table in summary.tables():

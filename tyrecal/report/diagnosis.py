@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
+from ..files import json_text
 from ..studies.diagnose.constants_told import constants_posterior
 from ..studies.diagnose.diagnosis import Diagnosis
 from ..studies.diagnose.evidence import COVERAGE, NONE, OUTSIDE, PRIOR_OUTSIDE
 from ..studies.diagnose.gap import OWN_RIM
+from ..studies.diagnose.result import DiagnosisResult
 from ..studies.diagnose.several import PRIOR_NONE, present
 from ..studies.diagnose.study import DiagnosedCase
 from ..studies.diagnose.under_load import LoadedRow
@@ -16,6 +19,7 @@ from ..studies.diagnose.verdict import NAMED, NO_GAP, UNDECIDED, no_gap_words
 from ..studies.fit.result import OTHER_RESIDUALS
 from ..tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ..units import display_unit, in_engineers_units
+from .shape_data import parts_data
 from .table import map_resolution
 
 RUNGS = {
@@ -30,6 +34,17 @@ GROUP_WORDS = {  # names in diagnosis.json that the page has in the words of the
     "lateral less in-plane": "out-of-plane less in-plane",
     "slope over the harmonic, c = 4 over c = 1": "growth over the harmonic, c = 4 over c = 1",
 }
+
+
+def further_files(study: DiagnosedCase, result: DiagnosisResult, measured: Path) -> dict[str, str]:
+    """diagnosis.md, and diagnosis_section.json, the drawing of the section, by name."""
+    case, of = study.model.case, result.provenance
+    parts = parts_data(case, [part.region for part in result.section_map])
+    content = parts.model_copy(update={"provenance": of}).model_dump(exclude_unset=True)
+    return {
+        "diagnosis_section.json": json_text(content),
+        "diagnosis.md": page(study, case.case.name, measured.name),
+    }
 
 
 def page(study: DiagnosedCase, case: str, measured: str) -> str:

@@ -1,13 +1,13 @@
-"""Studies of a tyre. A study is a `Result` with a `run`, its figures in `report` and its command in
-`cli`. One from outside names its `Result` as an entry point ``tyrecal.studies`` and its command as
-one of ``tyrecal.commands``."""
+"""Studies of a tyre. A study is one class, a `Result`, with `run`, its figures in `report` and its
+command in `cli`. One from outside names its `Result` as an entry point ``tyrecal.studies`` and its
+command as one of ``tyrecal.commands``. Command line, batch, API and page know no study by name."""
 
 from __future__ import annotations
 
 import logging
 from importlib import import_module
 from importlib.metadata import entry_points
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import InputError
 
@@ -17,17 +17,69 @@ if TYPE_CHECKING:
 log = logging.getLogger("tyrecal")
 
 STUDY_GROUP = "tyrecal.studies"
-RESULT_TYPES = {  # in the order of a page
-    "fit": "tyrecal.studies.fit.result:FitResult",
-    "modes": "tyrecal.studies.modes:ModesResult",
-    "sweep-pressure": "tyrecal.studies.pressure_result:PressureSweep",
-    "footprint": "tyrecal.studies.footprint:FootprintResult",
-    "effects": "tyrecal.studies.effects:Effects",
-    "sweep-load": "tyrecal.studies.loaded_result:LoadSweep",
-    "sample": "tyrecal.studies.sample.result:SampleResult",
-    "labels": "tyrecal.studies.labels:LabelsResult",
-    "diagnose": "tyrecal.studies.diagnose.result:DiagnosisResult",
+
+
+class Entry(NamedTuple):
+    """A built-in study, known without importing it."""
+
+    place: str  # of its class, "module:name"
+    help: str = ""  # one line on its command; "": the command of another study runs it
+    runs_by_name: bool = False  # in a batch and by `api.run`: it has a `Result.run`
+
+
+STUDIES = {  # in the order of a page and of a batch
+    "fit": Entry(
+        "tyrecal.studies.fit.result:FitResult",
+        "Calibrate the case's variables to its target frequencies.",
+        True,
+    ),
+    "modes": Entry(
+        "tyrecal.studies.modes:ModesResult",
+        "Evaluate one design, unloaded or on a road: frequencies with their labels.",
+        True,
+    ),
+    "sweep-pressure": Entry(
+        "tyrecal.studies.pressure_result:PressureSweep",
+        "Follow every mode over the inflation pressure.",
+        True,
+    ),
+    "footprint": Entry(
+        "tyrecal.studies.footprint:FootprintResult",
+        "Press the tyre on a road: contact area and pressure over load.",
+        True,
+    ),
+    "effects": Entry(
+        "tyrecal.studies.effects:Effects", "List and explain effects that a plain model leaves out."
+    ),
+    "sweep-load": Entry("tyrecal.studies.loaded_result:LoadSweep"),
+    "sample": Entry(
+        "tyrecal.studies.sample.result:SampleResult",
+        "Sample the variables that fit the measurements, and predict frequencies.",
+        True,
+    ),
+    "labels": Entry("tyrecal.studies.labels:LabelsResult"),
+    "diagnose": Entry(
+        "tyrecal.studies.diagnose.result:DiagnosisResult",
+        "Find where model and measurements differ, and which effect explains it.",
+        True,
+    ),
 }
+
+
+def runnable() -> list[str]:
+    """Names of the studies that run by name, those from outside last."""
+    built_in = [name for name, entry in STUDIES.items() if entry.runs_by_name]
+    return [*built_in, *(entry.name for entry in entry_points(group=STUDY_GROUP))]
+
+
+def study_class(name: str) -> type[Result]:
+    """The class of a study. Raises InputError where there is no such study."""
+    from ..tyre.case.mistakes import suggestion
+
+    types = result_types()
+    if name not in types:
+        raise InputError(f"there is no study '{name}'{suggestion(name, types)}")
+    return types[name]
 
 
 def result_types() -> dict[str, type[Result]]:
@@ -35,7 +87,7 @@ def result_types() -> dict[str, type[Result]]:
     is named and left out."""
     from ..tyre.plugins import load_plugin
 
-    types = {name: named(place) for name, place in RESULT_TYPES.items()}
+    types = {name: named(entry.place) for name, entry in STUDIES.items()}
     for entry in entry_points(group=STUDY_GROUP):
         try:
             types[entry.name] = load_plugin(entry, "study")

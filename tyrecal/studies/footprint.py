@@ -21,6 +21,7 @@ from .result import (
     PositiveNumber,
     Result,
     ResultPart,
+    StudyInput,
     Table,
     csv_text,
     not_reached,
@@ -84,12 +85,28 @@ class FootprintResult(Result):
     """footprint.json"""
 
     study, stem, heading = "footprint", "footprint", "Footprint"
+    follows_fit = True
 
     pressure_kPa: dict[str, float] = Field(default={})  # by design
     designs: dict[str, dict[str, float]] = Field(default={})  # values of the variables
     rows: list[FootprintRow]
     failed: list[Failed]
     findings: FootprintFindings
+
+    @classmethod
+    def run(cls, given: StudyInput, *, loads_N: Sequence[float] | None = None) -> FootprintResult:
+        """Every design at rising loads, N; None: those of the case."""
+        given.evaluator.needs_road()
+        loads = loads_N or given.case.case.loads_N
+        result, _, _ = run(given.case, given.evaluator, given.designs, loads, given.jobs)
+        return given.stamped(result, load_N=loads)
+
+    def quantities(self) -> dict[str, float]:
+        return {
+            f"{kind} {row.design} {row.load_N:g} N": value
+            for row in self.rows
+            for kind, value in row.model_dump(exclude={"design", "load_N"}).items()
+        }
 
     def csv(self) -> str:
         return csv_text(list(FootprintRow.model_fields), (row.model_dump() for row in self.rows))

@@ -10,7 +10,17 @@ from pydantic import Field
 from ..simulate.evaluate.results import Evaluation
 from ..simulate.modes.label import Mode, labelled
 from ..tyre.case import LoadedCase
-from .result import NAME_COLUMNS, CavityMode, Column, ModeEntry, Result, ResultPart, Table, csv_text
+from .result import (
+    NAME_COLUMNS,
+    CavityMode,
+    Column,
+    ModeEntry,
+    Result,
+    ResultPart,
+    StudyInput,
+    Table,
+    csv_text,
+)
 
 if TYPE_CHECKING:
     from ..simulate.evaluate.evaluator import Evaluator
@@ -40,6 +50,18 @@ class ModesResult(Result):
     modes: Annotated[list[ModeEntry], Field(min_length=1)]
     cavity: list[CavityMode] = Field(default=[])  # of the tyre on the road
     findings: ModesFindings = ModesFindings()
+
+    @classmethod
+    def run(cls, given: StudyInput) -> ModesResult:
+        """Evaluate the initial design."""
+        return given.stamped(run(given.case, given.evaluator, given.designs["initial"])[0])
+
+    def quantities(self) -> dict[str, float]:
+        numbers = {"mass_kg": self.mass_kg}
+        for mode in self.modes:
+            member = f" member {mode.member}" if mode.member else ""
+            numbers[f"frequency_Hz {mode.label}{member}"] = mode.frequency_Hz
+        return numbers
 
     def csv(self) -> str:
         rows = [each.model_dump() for each in self.modes]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from pydantic import Field
@@ -15,6 +15,7 @@ from ..tyre.case import LoadedCase
 from .fit.targets import target_labels
 from .modes import mode_entry
 from .pressure import Failure, PressureFindings, State, SweepOutcome, findings, sweep
+from .pressure_range import PressureRange
 from .result import (
     NAME_COLUMNS,
     Column,
@@ -25,6 +26,7 @@ from .result import (
     PositiveNumber,
     Result,
     ResultPart,
+    StudyInput,
     Table,
     csv_text,
     silent,
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
 
 FITTED = "fitted"  # name of the design that a fit found
 QUANTILE_90 = 1.645
+AROUND_THE_CASE = PressureRange(None, None, 12)
 
 
 class PressureRow(ResultPart):
@@ -49,6 +52,7 @@ class PressureSweep(Result):
     """pressure_sweep.json"""
 
     study, stem, heading = "sweep-pressure", "pressure_sweep", "Frequencies over pressure"
+    follows_fit = True
 
     slopes: str = ""  # "exact", or by "differences"
     designs: dict[str, dict[str, float]] = Field(default={})  # values of the variables
@@ -56,6 +60,24 @@ class PressureSweep(Result):
     failed: list[Failed] = Field(default=[])
     standard_errors_unknown: str = ""  # why the fitted design has none
     findings: list[PressureFindings]  # of each design with two pressures or more
+
+    @classmethod
+    def run(
+        cls, given: StudyInput, *, pressures_kPa: PressureRange | Sequence[float] = AROUND_THE_CASE
+    ) -> PressureSweep:
+        """Every design at every pressure, kPa."""
+        case = given.case
+        p = pressures_kPa.on(case) if isinstance(pressures_kPa, PressureRange) else pressures_kPa
+        fit = cast("FitResponses | None", given.responses)
+        result = run(case, given.evaluator, given.designs, p, given.jobs, fit=fit)
+        return given.stamped(result, pressure_kPa=p)
+
+    def quantities(self) -> dict[str, float]:
+        return {
+            f"frequency_Hz {row.design} {row.pressure_kPa:g} kPa {mode.label}": mode.frequency_Hz
+            for row in self.rows
+            for mode in row.modes
+        }
 
     def csv(self) -> str:
         keys = ["design", "pressure_kPa", "c", "m", "kind", "multiplicity", "frequency_Hz"]

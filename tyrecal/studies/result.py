@@ -10,15 +10,21 @@ import csv
 import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr
 
+from ..errors import InputError
 from ..files import json_text
 from ..simulate.evaluate.failure import EvaluationFailed
 from ..simulate.modes.label import Label
 from ..tyre.case import as_written
 
+if TYPE_CHECKING:
+    from ..simulate.evaluate.evaluator import Evaluator
+    from ..tyre.case import LoadedCase
+
+AnyResult = TypeVar("AnyResult", bound="Result")
 PositiveNumber = Annotated[float, Field(gt=0)]
 Wave = Annotated[int, Field(ge=0, le=200)]
 
@@ -111,8 +117,25 @@ class Provenance(ResultPart):
         return ", ".join([f"tyre {self.tyre_sha256[:8]}", *given, f"mesh {self.mesh}", solver])
 
 
+@dataclass
+class StudyInput:
+    """The start of a study."""
+
+    case: LoadedCase
+    evaluator: Evaluator
+    designs: dict[str, dict[str, float]]  # values of the variables by name of the design
+    responses: ResultPart | None = None  # `FitResponses` of the fit that found the design "fitted"
+    jobs: int = 1
+
+    def stamped(self, result: AnyResult, **of: Any) -> AnyResult:
+        """The result with its provenance, whose state is the case's except for ``of``."""
+        from ..simulate.provenance import provenance  # late: not for those who read results
+
+        return result.stamped(provenance(self.case, self.evaluator.solver, **of))
+
+
 class Result(ResultPart):
-    """A result file; older ones do not record their origin."""
+    """A study: its result file, and how to run it. Older files do not record their origin."""
 
     study: ClassVar[str] = ""  # the command, as its entry in run.json
     stem: ClassVar[str] = ""  # of its files
@@ -120,9 +143,43 @@ class Result(ResultPart):
     heading: ClassVar[str] = ""  # on the page
     figures: ClassVar[str] = ""  # "module:function" of a study from outside, see `page`
     is_seldom: ClassVar[bool] = False  # a page does not say that it is absent
+    fits: ClassVar[bool] = False  # it finds a design, which it passes on
+    follows_fit: ClassVar[bool] = False  # it studies the design of a fit before it too
 
     format: Literal[1] = 1
     provenance: Provenance | None = None
+    _files: dict[str, str] = PrivateAttr(default_factory=dict)  # further texts, by file name
+
+    @classmethod
+    def run(cls, given: StudyInput) -> Self:
+        """Run the study; the result has its provenance. A study declares its options as further
+        arguments by keyword. Raises InputError, EvaluationFailed."""
+        raise InputError(f"the study '{cls.study}' is run by its command only")
+
+    def quantities(self) -> dict[str, float]:
+        """Numbers that a batch compares with a baseline, named ``KIND`` or ``KIND WHERE``:
+        ``mass_kg``, ``area_m2 fitted 4000 N``; the unit is in the kind's name."""
+        return {}
+
+    def shortfall(self) -> tuple[str, str] | None:
+        """Cause and words where the study has finished but not as it should; else None."""
+        failed: list[Failed] = getattr(self, "failed", [])
+        if not failed:
+            return None
+        more = f" (and {len(failed) - 1} more)" if len(failed) > 1 else ""
+        return failed[0].cause, f"{failed[0].place}: {failed[0].words}{more}"
+
+    def conclusion(self) -> dict[str, str | None]:
+        """Further entries of the study in batch.json, such as a verdict."""
+        return {}
+
+    def pass_on(self, given: StudyInput) -> None:
+        """Add what the studies after it need, such as a fitted design."""
+
+    def with_files(self, files: Mapping[str, str]) -> Self:
+        """The result with further text files, by name."""
+        self._files.update(files)
+        return self
 
     def content(self) -> dict[str, Any]:
         """Content of the JSON file."""
@@ -137,7 +194,8 @@ class Result(ResultPart):
         texts = {f"{self.stem}.json": json_text(self.content())}
         texts |= {f"{self.stem}.csv": table} if (table := self.csv()) else {}
         further = self.csv_rows().items()
-        return texts | {f"{self.stem}_{name}.csv": rows_csv(rows) for name, rows in further if rows}
+        texts |= {f"{self.stem}_{name}.csv": rows_csv(rows) for name, rows in further if rows}
+        return texts | self._files
 
     def csv(self) -> str:
         """The rows, all digits, in the units of the JSON file; "": there is no such file."""

@@ -8,15 +8,19 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import Field
 
+from ...errors import InputError
 from ...simulate.modes.label import Label
+from .. import named
 from ..inference.observations import Observable
 from ..labels import Labels
-from ..result import CsvRow, Result, ResultPart, rows_csv
+from ..result import CsvRow, Result, ResultPart, StudyInput, rows_csv
 from .constants_told import ConstantShift, constants_posterior
 from .evidence import NONE, OUTSIDE
 from .gap import projection
@@ -32,6 +36,9 @@ ROW_PATTERN = re.compile(
     r"\[(\d{1,3}),(\d{1,3})\](?: (axial|torsional))? at ([\d.]{1,9}) kPa"
     r"(?:, rim (fixed|springs|free))?"
 )
+# not imported by who reads results
+DIAGNOSE_STUDY = "tyrecal.studies.diagnose.study"
+FURTHER_FILES = "tyrecal.report.diagnosis:further_files"  # a room above
 MIN_LISTED_PROBABILITY = 1e-6  # of an effect that is listed
 
 
@@ -186,6 +193,45 @@ class DiagnosisResult(Result):
     labels: Labels | None = None  # of frequencies that came without
     left_out: list[str] = Field(default=[])
     not_evaluated: dict[str, str] = Field(default={})
+
+    @classmethod
+    def run(
+        cls,
+        given: StudyInput,
+        *,
+        measured: Path | None = None,
+        repeats: Sequence[Path] = (),
+        effects: Sequence[str] | None = None,
+    ) -> DiagnosisResult:
+        """Weigh the effects by a file of measurements, by default that of the case's targets."""
+        case, file = given.case, measured or given.case.measured
+        if file is None:
+            raise InputError(
+                "the case has no file of measurements to diagnose: add one, as in"
+                " targets: {file: measured.csv}"
+            )
+        study = import_module(DIAGNOSE_STUDY)
+        options = {"jobs": given.jobs, "effects": effects}
+        diagnosed = study.study(case, given.evaluator, file, repeats, **options)
+        states = study.states_measured(case, file, repeats)
+        result = given.stamped(diagnosed.result, measured=[file, *repeats], **states)
+        further: DiagnosisResult = result.with_files(named(FURTHER_FILES)(diagnosed, result, file))
+        return further
+
+    def quantities(self) -> dict[str, float]:
+        verdict = " ".join(filter(None, ("verdict", self.verdict, self.effect)))
+        numbers = {
+            verdict: 1.0,  # gone where it is another
+            "gap_p_value": self.gap.p_value,
+            "gap_rms_percent": self.gap.rms_percent,
+        }
+        for key in dict.fromkeys(filter(None, (NONE, OUTSIDE, self.likeliest))):
+            numbers[f"probability {key}"] = self.probabilities[key]
+        without = (self.calibrated or {}).get("without") or {}
+        return numbers | {f"calibrated {name}": each["value"] for name, each in without.items()}
+
+    def conclusion(self) -> dict[str, str | None]:
+        return {"verdict": self.verdict, "effect": self.effect, "words": self.words}
 
     def csv(self) -> str:
         residuals: list[CsvRow] = [each.model_dump() for each in self.gap.residuals]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -16,6 +17,8 @@ from ...tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ...tyre.number_units import unit_of
 from ...tyre.state import AS_THE_CASE
 from ...tyre.values import with_values
+from .. import named
+from ..fitted import NOT_CONVERGED
 from ..labels import Labels
 from ..result import (
     NAME_COLUMNS,
@@ -26,12 +29,14 @@ from ..result import (
     PositiveNumber,
     Result,
     ResultPart,
+    StudyInput,
     Table,
     csv_text,
     in_lines,
     state_words,
 )
 from .judge import judge
+from .prediction import FitResponses
 from .problem import Point, Problem
 from .responses import FitResponse
 from .search import projected_gradient
@@ -39,8 +44,9 @@ from .states import next_states, plain, state_reports
 from .targets import objective_unit
 from .total_error import TotalError, total_error
 from .uncertainty import FitUncertainty, uncertainty
-from .verdict import NOT_JUDGED, FitReason, FitVerdict
+from .verdict import DOES_NOT_FIT, NOT_JUDGED, FitReason, FitVerdict, does_not_fit_words
 
+FIT_STUDY = "tyrecal.studies.fit.study:FitStudy"  # not imported by who reads results
 MIN_STEP = 1e-6  # of a scaled variable, below which the fit did not move
 NEAR_BEST_HZ = 0.05  # of the objective: the fit could have ended there
 ROAD_QUANTITIES = {  # targets that are no modes
@@ -169,6 +175,7 @@ class FittedFootprint(ResultPart):
 class FitResult(Result):
     """fit.json"""
 
+    fits = True
     study, stem, heading = "fit", "fit", "Fit"
 
     method: str
@@ -206,10 +213,49 @@ class FitResult(Result):
     starts: list[dict[str, Any]]
     replaced_starts: int = 0
 
+    @classmethod
+    def run(
+        cls,
+        given: StudyInput,
+        *,
+        measured: Path | None = None,
+        fixed: Mapping[str, float] | None = None,
+        method: str = "slsqp",
+        starts: int = 1,
+        seed: int = 0,
+    ) -> FitResult:
+        """Calibrate the variables to the case's targets, or to a file of measurements."""
+        study = named(FIT_STUDY)(given.case, given.evaluator, measured, fixed)
+        result: FitResult = study.run(method, starts, seed, given.jobs).found
+        return result
+
     @property
     def is_good(self) -> bool:
         """Whether it converged and moved."""
         return self.converged and self.moved
+
+    def quantities(self) -> dict[str, float]:
+        numbers = {"objective": self.objective_Hz, "mass_kg": self.mass_kg}
+        numbers |= {f"variable {name}": each.value for name, each in self.variables.items()}
+        for mode in self.modes:
+            where = " ".join(filter(None, (str(mode.label), mode.symmetry, mode.state)))
+            numbers[f"fitted_Hz {where}"] = mode.fitted_Hz
+        for each in self.footprint:
+            numbers[f"fitted_{each.quantity} {each.state}"] = each.fitted
+        return numbers
+
+    def shortfall(self) -> tuple[str, str] | None:
+        if self.verdict == DOES_NOT_FIT and self.chi2_per_dof:
+            return DOES_NOT_FIT, does_not_fit_words(self.chi2_per_dof, self.reason)
+        if self.is_good:
+            return None
+        words = self.message if self.moved else "the fit did not move"
+        return NOT_CONVERGED, f"not converged: {words}"
+
+    def pass_on(self, given: StudyInput) -> None:
+        values = self.fixed | {name: each.value for name, each in self.variables.items()}
+        given.designs["fitted"] = {name: values[name] for name in given.designs["initial"]}
+        given.responses = FitResponses(responses=self.responses, chi2_per_dof=self.chi2_per_dof)
 
     def csv(self) -> str:
         keys = ["c", "m", "kind", "multiplicity", "initial_Hz", "fitted_Hz", "target_Hz"]

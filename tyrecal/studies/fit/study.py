@@ -19,7 +19,7 @@ from ...tyre.values import with_values
 from ..labelling.label import label
 from ..labelling.result import labels_posterior
 from ..pressing_plan import DESIGNS_OF_FIT, PressedState, PressingPlan, plan_pressing
-from .calibrate import Fit, FitNotify, calibrate, check
+from .calibrate import Fit, FitNotify, calibrate, check, history_csv
 from .problem import Problem
 from .targets import states_of
 
@@ -134,6 +134,7 @@ class FitStudy:
 
         fit = self._fit_with_labels(calibrated, jobs) if self.needs_labels else calibrated()
         fit.found, fit.left_out = fit.found.stamped(self.provenance), self.left_out
+        fit.found.with_files({"fit_history.csv": history_csv(fit.history)})
         return fit
 
     @property

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import ceil
+from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -16,12 +18,13 @@ from ..result import (
     PositiveNumber,
     Result,
     ResultPart,
+    StudyInput,
     Table,
     csv_text,
 )
 from .box import AT_EDGE
 from .chains import ENOUGH, enough_draws
-from .study import MAX_EMULATOR_ERROR, Sample
+from .study import MANY_DRAWS, MAX_EMULATOR_ERROR, Sample, measured_readings, run, states_sampled
 
 Array = np.ndarray
 LOW, HIGH = 0.05, 0.95  # quantiles: 90 % lie between
@@ -136,6 +139,33 @@ class SampleResult(Result):
     optima: list[Optimum]
     uncertain: list[str]  # what nobody calibrates
     noise_Hz: float | None = None
+
+    @classmethod
+    def run(
+        cls,
+        given: StudyInput,
+        *,
+        measured: Path | None = None,
+        draws: int = MANY_DRAWS,
+        seed: int = 0,
+        at_kPa: Sequence[float] = (),
+    ) -> SampleResult:
+        """Draw the variables under the case's targets, or under a file of measurements."""
+        case, file = given.case, measured or given.case.measured
+        readings = measured_readings(case, file)
+        drawn = run(case, given.evaluator, readings, draws, seed, at_kPa, given.jobs)
+        files = [file] if file else []
+        return given.stamped(result(drawn, seed), measured=files, **states_sampled(case, readings))
+
+    def quantities(self) -> dict[str, float]:
+        numbers = {f"median {name}": each.median for name, each in self.variables.items()}
+        for row in self.predicted:
+            numbers[f"predicted_Hz {row.pressure_kPa:g} kPa {row.label}"] = row.frequency_Hz
+        return numbers
+
+    def shortfall(self) -> tuple[str, str] | None:
+        doubts = self.doubts()
+        return ("not_sampled", "; ".join(doubts)) if doubts else None
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
@@ -305,7 +335,7 @@ def result(sample: Sample, seed: int) -> SampleResult:
         ],
         uncertain=[source.words for source in sample.sources if source.words],
         noise_Hz=sample.noise_Hz,
-    )
+    ).with_files({"sample_draws.csv": draws_csv(sample)})
 
 
 def draws_csv(sample: Sample) -> str:
