@@ -370,7 +370,7 @@ PRESSED: dict[str, tuple[dict[str, Any], str]] = {
     "moved nodes too few": (road(footprint(500.0, displacement=np.zeros((4, 2, 3)))), "not on"),
     "a place too many": (road(footprint(500.0, along_m=np.ones(3))), "lists do not go together"),
     "tractions too few": (road(footprint(500.0, traction_Pa=np.ones((1, 2)))), "lists do not go"),
-    "an unknown field": (road(footprint(500.0, more=1.0)), "Extra inputs"),
+    "an unknown field": (road(footprint(500.0, more=1.0)), "Unexpected keyword"),
     "modes without nodes": (
         road(footprint(500.0, **{**modes_told(2), "mode_node": None})),
         "a part is missing",

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import ConfigDict
 
+from . import answer_fields as of
 from .failure import EvaluationFailed
 
 Array = np.ndarray
@@ -17,37 +19,40 @@ BALANCE = 0.01  # of the load, by which the road's force may differ from it
 
 @dataclass(frozen=True)
 class Footprint:
-    """The tyre at one load, with its patch of p nodes and, where they were requested, m modes."""
+    """The tyre at one load, with its patch of p nodes and, where they were requested, m modes. The
+    fields are checked as the types state (`recorded.check`)."""
 
-    load_N: float
-    road_N: float  # resultant of the contact pressure
-    rim_N: Array  # (3,) reaction at the rim: down, then along y (the axle) and z
-    deflection_m: float  # of the axle since the tyre was free
-    stiffness_N_per_m: float  # tangent d force / d deflection
-    ring: Array  # (p,) place among the angles
-    node: Array  # (p,) deck number
-    along_m: Array  # (p,) in the road's plane
-    across_m: Array  # (p,) in the road's plane
-    pressure_Pa: Array  # (p,)
-    area_m2: Array  # (p,) that the node stands for
-    traction_Pa: Array  # (p, 2)
-    displacement: Array  # (ring, node, 3): r, theta, z at the reference angle, m
+    __pydantic_config__ = ConfigDict(extra="forbid", defer_build=True)
+
+    load_N: of.PositiveFinite
+    road_N: of.Finite  # resultant of the contact pressure
+    rim_N: Annotated[Array, of.shaped(of.REAL, 3)]  # reaction: down, then along y (axle) and z
+    deflection_m: of.Finite  # of the axle since the tyre was free
+    stiffness_N_per_m: of.Finite  # tangent d force / d deflection
+    ring: of.WholeArray  # (p,) place among the angles
+    node: of.WholeArray  # (p,) deck number
+    along_m: of.RealArray  # (p,) in the road's plane
+    across_m: of.RealArray  # (p,) in the road's plane
+    pressure_Pa: of.RealArray  # (p,)
+    area_m2: of.RealArray  # (p,) that the node stands for
+    traction_Pa: Annotated[Array, of.shaped(of.REAL, None, 2)]  # (p, 2)
+    displacement: of.Field3D  # (ring, node, 3): r, theta, z at the reference angle, m
     # this and the next two: of a solver that places the patch's edge between nodes, else None;
     # nodes next to the patch then have a share of it, too
-    contact_area_m2: float | None = None
-    contact_length_m: float | None = None
-    contact_width_m: float | None = None
-    mode_frequency_Hz: Array | None = None  # (m,); on a road with friction these modes stick
-    mode_node: Array | None = None  # (j,) the only nodes of the shapes
-    mode_shape: Array | None = None  # (m, ring, j, 3), as displacement
+    contact_area_m2: of.PositiveFinite | None = None
+    contact_length_m: of.PositiveFinite | None = None
+    contact_width_m: of.PositiveFinite | None = None
+    mode_frequency_Hz: of.HertzArray | None = None  # (m,); with friction these modes stick
+    mode_node: of.WholeArray | None = None  # (j,) the only nodes of the shapes
+    mode_shape: of.Shapes3D | None = None  # (m, ring, j, 3), as displacement
     # (m,) the patch's forces along the road in each shape, their sizes summed
-    mode_traction_N: Array | None = None
-    sliding_frequency_Hz: Array | None = None  # modes of a patch that slides freely
-    sliding_shape: Array | None = None
-    # (2,) the gas' first wave fore and aft, and up and down, between rigid walls
-    cavity_Hz: Array | None = None
+    mode_traction_N: of.RealArray | None = None
+    sliding_frequency_Hz: of.HertzArray | None = None  # modes of a patch that slides freely
+    sliding_shape: of.Shapes3D | None = None
+    # the gas' first wave fore and aft, and up and down, between rigid walls
+    cavity_Hz: of.HertzPair | None = None
     # by variable and name, derivatives of the numbers above by the requested variables
-    slopes: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    slopes: Mapping[str, Mapping[str, of.Finite]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -14,14 +14,13 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from ..deck.decks import Decks
+from . import answer_fields as of
+from .pressed import Footprint
 from .record import Damaged
 
-REAL = "fiu"  # NumPy's letters for kinds of number
-MIN_NUMBER_BYTES = 4  # of a number with decimals: half precision has three digits
-MIN_ANSWER_HZ, MAX_ANSWER_HZ = 1e-3, 1e5  # of a tyre's vibrations, and far beyond
 NODE_TOLERANCE = 1e-4  # of the largest coordinate: solvers write six digits
 NODE_BLOCK = re.compile(
     r"^\*NODE *(?:,[^\n]*)?\n((?:[^*\n][^\n]*\n)+)", re.MULTILINE | re.IGNORECASE
@@ -29,42 +28,6 @@ NODE_BLOCK = re.compile(
 GENERATED = re.compile(
     r"^\*(?:NGEN|NFILL|NCOPY|NMAP|SYSTEM|INCLUDE)\b", re.MULTILINE | re.IGNORECASE
 )
-
-
-def _shaped(
-    kinds: str, *shape: int | None, least: float = -np.inf, most: float = np.inf, nan: bool = False
-) -> AfterValidator:
-    """A number, or an array or list of them, of ``shape`` (None: any length), finite unless
-    ``nan``, above ``least``, at most ``most``."""
-
-    def check(value: Any) -> Any:
-        array = np.asarray(value)
-        if array.dtype.kind not in kinds or array.ndim != len(shape):
-            raise ValueError("is not such a number or array")
-        if array.dtype.kind in "fc" and array.dtype.itemsize < MIN_NUMBER_BYTES:
-            raise ValueError("has half precision only")
-        if not all(n in (None, m) for n, m in zip(shape, array.shape, strict=True)):
-            raise ValueError(f"has the shape {array.shape}")
-        if not (nan or np.isfinite(array).all()):
-            raise ValueError("holds a number that is not finite")
-        if least > -np.inf and not (array > least).all():
-            raise ValueError(f"must be above {least:g}")
-        if most < np.inf and not (array <= most).all():
-            raise ValueError(f"must be at most {most:g}")
-        return value
-
-    return AfterValidator(check)
-
-
-Finite = Annotated[Any, _shaped(REAL)]
-PositiveFinite = Annotated[Any, _shaped(REAL, least=0.0)]
-Hertz = Annotated[Any, _shaped(REAL, least=MIN_ANSWER_HZ, most=MAX_ANSWER_HZ)]
-HertzPair = Annotated[Any, _shaped(REAL, 2, least=MIN_ANSWER_HZ, most=MAX_ANSWER_HZ)]
-HertzArray = Annotated[Any, _shaped(REAL, None, least=MIN_ANSWER_HZ, most=MAX_ANSWER_HZ)]
-Points = Annotated[Any, _shaped(REAL, None, 3)]
-Triple = Annotated[Any, _shaped(REAL, None)]
-FiniteArray = Annotated[Any, _shaped("iu", None)]
-Field3D = Annotated[Any, _shaped(REAL, None, None, 3)]
 
 
 class _Part(BaseModel):
@@ -80,12 +43,12 @@ class _Failure(_Part):
 class _Mode(_Part):
     """A mode as `Solver.read` gives it: on the section (n, amplitude) or in three dimensions."""
 
-    frequency_Hz: Hertz
-    multiplicity: Annotated[Any, _shaped("iu", least=0, most=2)]
-    n: Annotated[Any, _shaped("iu", least=-1)] = 0
-    amplitude: Annotated[Any, _shaped("c" + REAL, None, 3)] = None
-    displacement: Annotated[Any, _shaped(REAL, None, 3, nan=True)] = None
-    members: HertzPair | None = None
+    frequency_Hz: of.Hertz
+    multiplicity: Annotated[Any, of.shaped("iu", least=0, most=2)]
+    n: Annotated[Any, of.shaped("iu", least=-1)] = 0
+    amplitude: Annotated[Any, of.shaped("c" + of.REAL, None, 3)] = None
+    displacement: Annotated[Any, of.shaped(of.REAL, None, 3, nan=True)] = None
+    members: of.HertzPair | None = None
 
     @property
     def points(self) -> int:
@@ -102,10 +65,10 @@ class _Mode(_Part):
 
 
 class _Tyre(_Part):
-    pressure_Pa: Annotated[Any, _shaped(REAL, least=-1e-9)]
-    mass_kg: PositiveFinite
-    nodes: FiniteArray
-    points: Annotated[Any, _shaped(REAL, None, None)]
+    pressure_Pa: Annotated[Any, of.shaped(of.REAL, least=-1e-9)]
+    mass_kg: of.PositiveFinite
+    nodes: of.WholeArray
+    points: Annotated[Any, of.shaped(of.REAL, None, None)]
 
     @model_validator(mode="after")
     def _span_a_section(self) -> Self:
@@ -117,9 +80,9 @@ class _Tyre(_Part):
 
 class _Modes(_Tyre):
     modes: Annotated[list[_Mode], Field(min_length=1)]
-    gradients: dict[str, Triple]
-    displacement: Points
-    mass_gradients: dict[str, Finite] = Field(default_factory=dict)
+    gradients: dict[str, of.RealArray]
+    displacement: of.Points
+    mass_gradients: dict[str, of.Finite] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _go_together(self) -> Self:
@@ -138,45 +101,15 @@ class _Modes(_Tyre):
         return self
 
 
-class _Footprint(_Part):
-    """The fields of `pressed.Footprint`."""
-
-    model_config = ConfigDict(extra="forbid")
-    load_N: PositiveFinite
-    road_N: Finite
-    rim_N: Annotated[Any, _shaped(REAL, 3)]
-    deflection_m: Finite
-    stiffness_N_per_m: Finite
-    ring: FiniteArray
-    node: FiniteArray
-    along_m: Triple
-    across_m: Triple
-    pressure_Pa: Triple
-    area_m2: Triple
-    traction_Pa: Annotated[Any, _shaped(REAL, None, 2)]
-    displacement: Field3D
-    contact_area_m2: PositiveFinite | None = None
-    contact_length_m: PositiveFinite | None = None
-    contact_width_m: PositiveFinite | None = None
-    mode_frequency_Hz: HertzArray | None = None
-    mode_node: FiniteArray | None = None
-    mode_shape: Annotated[Any, _shaped(REAL, None, None, None, 3)] | None = None
-    mode_traction_N: Triple | None = None
-    sliding_frequency_Hz: HertzArray | None = None
-    sliding_shape: Annotated[Any, _shaped(REAL, None, None, None, 3)] | None = None
-    cavity_Hz: HertzPair | None = None
-    slopes: dict[str, dict[str, Finite]] = Field(default_factory=dict)
-
-
 def _shape(array: Any) -> tuple[int, ...]:
     return np.shape(array)
 
 
 class _Pressed(_Tyre):
-    angles: Triple
-    free_radius_m: PositiveFinite
-    footprints: Annotated[list[_Footprint], Field(min_length=1)]
-    cavity_Hz: Hertz | None = None
+    angles: of.RealArray
+    free_radius_m: of.PositiveFinite
+    footprints: Annotated[list[Footprint], Field(min_length=1)]
+    cavity_Hz: of.Hertz | None = None
     failure: Annotated[str, Field(max_length=100_000)]
     cause: Literal["no_equilibrium", "unstable"] = "no_equilibrium"
 
