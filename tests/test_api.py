@@ -94,6 +94,12 @@ def test_the_example_of(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
         (lambda case: tyrecal.evaluate_footprint(case, [2e3, 1e3]), r"got \[2000.0, 1000.0\]"),
         (lambda case: tyrecal.evaluate_footprint(case, [float("nan")]), "above 0 and rise"),
         (lambda case: tyrecal.diagnose_case(case, DATA, effects=["rim_with"]), "'rim_width'"),
+        (lambda case: tyrecal.run("fti", case), "did you mean 'fit'"),
+        (lambda case: tyrecal.run("effects", case), "by its command only"),
+        (lambda case: tyrecal.run("fit", case, start=2), "no option 'start': it has measured"),
+        (lambda case: tyrecal.run("footprint", case, loads_N=[2, 1]), "above 0 and rise"),
+        (lambda case: tyrecal.run("sweep-pressure", case, pressures_kPa=2.4), "usual is 50"),
+        (lambda case: tyrecal.run("fit", case, method="bfgs"), "none of slsqp, gauss-newton"),
     ],
 )
 def test_wrong_input_is_a_value_error_in_a_sentence(
@@ -178,6 +184,13 @@ NATURAL: dict[str, list[dict[str, Any]]] = {  # arguments beside the case, that 
     ],
     "emulate": [{}, {"pressures_kPa": [200, 280]}, {"reach": 1}],
     "list_effects": [{}],
+    "run": [
+        {"study": "modes"},
+        {"study": "sweep-pressure", "pressures_kPa": [200.0], "jobs": 1},
+        {"study": "footprint", "loads_N": 3000},
+        {"study": "fit", "fixed": "C10", "measured": DATA, "values": VALUES},
+        {"study": "diagnose", "effects": "rim_width", "measured": str(DATA)},
+    ],
     "read_results": [{"folder": CASES / "ci"}, {"folder": str(CASES / "ci")}],
 }
 WRONG = [2.5, "neither", object(), [None], {"C10": "soft"}, None, -1, b"x"]

@@ -15,7 +15,7 @@ are free: a search may try what it likes.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from inspect import signature
 from itertools import pairwise
 from math import inf, log
@@ -45,6 +45,7 @@ from .tyre.case import CaseError, LoadedCase, as_written, start_values, with_lev
 from .tyre.case.mistakes import suggestion
 from .tyre.case.parts import Setting
 from .tyre.effects import Effect, catalogue
+from .tyre.state import pressure_name
 from .tyre.values import overridden, unusual_value
 from .tyre.values import with_values as _with_values
 
@@ -159,9 +160,7 @@ def fit_case(
     >>> fit.result["converged"], f"{fit.initial.objective:.0f} to {fit.fitted.objective:.0f} Hz"
     (True, '33 to 6 Hz')
     """
-    if _text("method", method) not in METHODS:
-        raise ValueError(f"method '{method}' is none of {', '.join(METHODS)}")
-    case = _case(case)
+    case, method = _case(case), _method("method", method)
     held = _held(case, fixed)
     file = None if measured is None else _file("measured", measured)
     counts = _count("starts", starts, 1), _count("seed", seed, 0), _count("jobs", jobs, 1)
@@ -188,17 +187,10 @@ def sweep_pressure(
     240 kPa: 37.0 Hz
     """
     from .studies.pressure import Failure, sweep
-    from .tyre.state import pressure_name
 
     case = _case(case)
-    design, pressures = _design(case, values), _numbers("pressures_kPa", pressures_kPa)
-    jobs = _count("jobs", jobs, 1)
-    for pressure in pressures:
-        try:
-            _with_values(case, {**design, pressure_name(case): pressure})
-        except ValueError as error:
-            raise ValueError(f"pressures_kPa: {error}") from None
-        _refuse_unusual(case, "pressures_kPa", pressure_name(case), pressure, allow_unusual)
+    design, jobs = _design(case, values), _count("jobs", jobs, 1)
+    pressures = _pressures(case, "pressures_kPa", pressures_kPa, allow_unusual)
     evaluator = _evaluator(case, solver, record)
     states = []
     for outcome in sweep(case, evaluator, {"": design}, pressures, jobs):
@@ -229,12 +221,7 @@ def evaluate_footprint(
     from .studies.footprint import footprint_row
 
     case = _case(case)
-    design, loads = _design(case, values), _numbers("loads_N", loads_N)
-    rise = [after - before for before, after in pairwise([0.0, *loads])]
-    if not rise or not all(0 < each < inf for each in rise):
-        raise ValueError(f"loads_N must be above 0 and rise, got {loads}")
-    for load in loads:
-        _refuse_unusual(case, "loads_N", "road.loads_N.0", load, allow_unusual)
+    design, loads = _design(case, values), _loads(case, "loads_N", loads_N, allow_unusual)
     pressed: Pressed = _evaluator(case, solver, record).press(design, loads)
     if pressed.failed:
         raise pressed.failed
@@ -271,8 +258,7 @@ def diagnose_case(
     file = case.measured if measured is None else _file("measured", measured)
     if file is None:
         raise ValueError("measured must be given: the case's targets are not in a file")
-    again = [repeats] if isinstance(repeats, str | PathLike) else repeats
-    others = [_file("repeats", path) for path in _listed("repeats", again, "a file")]
+    others = _files("repeats", repeats)
     ids = None if effects is None else _names("effects", effects)
     jobs, evaluator = _count("jobs", jobs, 1), _evaluator(case, solver, record)
     return study(case, evaluator, file, others, jobs=jobs, effects=ids).diagnosis
@@ -355,12 +341,13 @@ def run(
     >>> [f"{row.pressure_kPa:g} kPa: {row.modes[0].frequency_Hz:.1f} Hz" for row in result.rows]
     ['160 kPa: 31.1 Hz', '240 kPa: 37.0 Hz']
     """
-    kind = study_class(_text("study", study))
+    kind, case = study_class(_text("study", study)), _case(case)
     known = list(signature(kind.run).parameters)[1:]
-    for name in options:
+    for name, value in options.items():
         if name not in known:
             raise ValueError(f"{study} has no option '{name}': it has {', '.join(known) or 'none'}")
-    case = _case(case)
+        if name in OPTION_READERS:
+            options[name] = OPTION_READERS[name](case, name, value)
     given = StudyInput(case, _evaluator(case, solver, record), {"initial": _design(case, values)})
     given.jobs = _count("jobs", jobs, 1)
     return kind.run(given, **options)
@@ -463,6 +450,42 @@ def _file(name: str, value: Path | str) -> Path:
     return path
 
 
+def _files(name: str, values: Path | str | Iterable[Path | str]) -> list[Path]:
+    several = [values] if isinstance(values, str | PathLike) else values
+    return [_file(name, path) for path in _listed(name, several, "a file")]
+
+
+def _method(name: str, value: str) -> str:
+    if _text(name, value) not in METHODS:
+        raise ValueError(f"{name} '{value}' is none of {', '.join(METHODS)}")
+    return value
+
+
+def _pressures(
+    case: LoadedCase, name: str, values: float | Iterable[float], allowed: bool = False
+) -> list[float]:
+    pressures, path = _numbers(name, values), pressure_name(case)
+    for pressure in pressures:
+        try:
+            _with_values(case, {**start_values(case), path: pressure})
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
+        _refuse_unusual(case, name, path, pressure, allowed)
+    return pressures
+
+
+def _loads(
+    case: LoadedCase, name: str, values: float | Iterable[float], allowed: bool = False
+) -> list[float]:
+    loads = _numbers(name, values)
+    rise = [after - before for before, after in pairwise([0.0, *loads])]
+    if not rise or not all(0 < each < inf for each in rise):
+        raise ValueError(f"{name} must be above 0 and rise, got {loads}")
+    for load in loads:
+        _refuse_unusual(case, name, "road.loads_N.0", load, allowed)
+    return loads
+
+
 def _text(name: str, value: str) -> str:
     if isinstance(value, str):
         return value
@@ -513,3 +536,19 @@ def _wrong(name: str, wanted: str, value: object) -> ValueError:
     text = printable(repr(value))
     shown = text if len(text) <= MAX_SHOWN_CHARACTERS else f"{text[:MAX_SHOWN_CHARACTERS]}..."
     return ValueError(f"{name} must be {wanted}, got {shown}")
+
+
+# how `run` reads an option, by its name: case, name and value; others are passed on as they are
+OPTION_READERS: dict[str, Callable[[LoadedCase, str, Any], Any]] = {
+    "pressures_kPa": _pressures,
+    "at_kPa": _pressures,
+    "loads_N": _loads,
+    "fixed": lambda case, name, value: _held(case, value),
+    "measured": lambda case, name, value: _file(name, value),
+    "repeats": lambda case, name, value: _files(name, value),
+    "effects": lambda case, name, value: _names(name, value),
+    "method": lambda case, name, value: _method(name, value),
+    "starts": lambda case, name, value: _count(name, value, 1),
+    "draws": lambda case, name, value: _count(name, value, 1000),
+    "seed": lambda case, name, value: _count(name, value, 0),
+}

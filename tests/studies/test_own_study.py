@@ -39,6 +39,16 @@ class Weights(Result):
 
     rows: list[Weight]
 
+    @classmethod
+    def run(cls, given):
+        """Every design on the scales."""
+        ask = lambda values: given.evaluator.evaluate(Question(values)).mass_kg
+        rows = [Weight(design=name, mass_kg=ask(each)) for name, each in given.designs.items()]
+        return given.stamped(cls(format=1, rows=rows))
+
+    def quantities(self):
+        return {f"mass_kg {row.design}": row.mass_kg for row in self.rows}
+
     def csv(self):
         return csv_text(list(Weight.model_fields), (row.model_dump() for row in self.rows))
 
@@ -47,12 +57,6 @@ class Weights(Result):
 
     def sentences(self):
         return [f"the {row.design} tyre weighs {row.mass_kg:.1f} kg" for row in self.rows]
-
-
-def run(evaluator, designs):
-    """Every design (name to values of the variables)."""
-    masses = {name: evaluator.evaluate(Question(each)).mass_kg for name, each in designs.items()}
-    return Weights(format=1, rows=[Weight(design=n, mass_kg=kg) for n, kg in masses.items()])
 ''',
     "own_figures.py": """\
 from tyrecal.report.figure import in_house_style, new_figure
@@ -69,8 +73,9 @@ def figures(found):
 import click
 
 from own_figures import figures
-from own_study import run
+from own_study import Weights
 from tyrecal.cli import options
+from tyrecal.studies.result import StudyInput
 
 
 @click.command()
@@ -81,8 +86,8 @@ def command(case, study):
     loaded, values = study.load(case)
     evaluator = study.evaluator(loaded)
     output = study.run(loaded, "weigh", evaluator)
-    found = run(evaluator, {"initial": values})
-    return study.present(output, found, figures(found))
+    result = Weights.run(StudyInput(loaded, evaluator, {"initial": values}))
+    return study.present(output, result, figures(result))
 ''',
 }
 
@@ -107,3 +112,11 @@ def test_it_has_files_tables_figures_and_a_chapter(tmp_path: Path) -> None:
     page = (out / "report.html").read_text()
     assert "<h2>Masses</h2>" in page and ">mass, kg</text>" in page and ">12.80</td>" in page
     assert "The initial tyre weighs 12.8 kg." in page
+    batch = tyrecal(
+        site, "batch", case, "--studies", "modes,weigh", "--output", str(tmp_path / "b")
+    )
+    assert batch.returncode == 0, batch.stderr
+    (entry,) = json.loads((tmp_path / "b/batch.json").read_text())["cases"]
+    assert entry["studies"]["weigh"]["quantities"] == {
+        "mass_kg initial": result["rows"][0]["mass_kg"]
+    }
