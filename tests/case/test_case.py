@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tyrecal.errors import InputError
 from tyrecal.tyre.case import CaseError, number_at, parse_assignment, parse_setting, start_values
 from tyrecal.tyre.case.checks import find
 from tyrecal.tyre.load import load_case, validate
@@ -220,3 +221,9 @@ def test_parse_assignment() -> None:
     for text in ("C10", "=3", "C10=", "C10=high", "C10=null", "C10=1e", "C10=nan", "C10=inf"):
         with pytest.raises(ValueError, match="must be"):
             parse_assignment(text)
+
+
+def test_a_wrong_path_is_a_users_mistake() -> None:
+    """A study from outside may ask for any path: its command ends with a sentence."""
+    with pytest.raises(InputError, match="nothing"):
+        number_at(load_case(CASES / "p235_75r17.yaml"), "nothing")

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from pathlib import Path
 
+from ..errors import InputError
 from ..files import printable
 from ..simulate.evaluate.executor import executor
 from ..simulate.evaluate.failure import EvaluationFailed
@@ -17,11 +18,11 @@ def names_of(paths: Sequence[Path]) -> list[str]:
     """A name for each case file: its stem, or its path below the folder that all have in common,
     without the suffix, where two stems are the same.
 
-    Raises ValueError where a case is given twice, or a path cannot be printed.
+    Raises InputError where a case is given twice, or a path cannot be printed.
     """
     for path in paths:
         if not str(path).isprintable():
-            raise ValueError(f"case '{printable(str(path))}': its path has control characters")
+            raise InputError(f"case '{printable(str(path))}': its path has control characters")
     stems = [path.stem for path in paths]
     if len(set(stems)) == len(stems):
         return stems
@@ -30,7 +31,7 @@ def names_of(paths: Sequence[Path]) -> list[str]:
     names = [path.relative_to(top).with_suffix("").as_posix() for path in whole]
     for path, name in zip(paths, names, strict=True):
         if names.count(name) > 1:
-            raise ValueError(f"case '{path}' is given twice, or twice by this name")
+            raise InputError(f"case '{path}' is given twice, or twice by this name")
     return names
 
 

@@ -26,36 +26,31 @@ def load(
     """The case with its start values, mesh level, assignments and pressure applied.
 
     Says which numbers of the file do not count. Returns (case, values of the variables). Raises
-    CaseError, click.UsageError; both for numbers that no tyre has, too, unless they are allowed.
+    InputError, click.UsageError; both for numbers that no tyre has, too, unless they are allowed.
     """
     from ..measured.load import load_case
-    from ..tyre.case import CaseError, as_written, overruled, start_values, with_level
+    from ..tyre.case import as_written, overruled, start_values, with_level
     from ..tyre.values import overridden, with_values
 
     case = load_case(path, allow_unusual)
-    try:
-        if mesh_level:
-            case = with_level(case, mesh_level)
-        given = _given(case, assigned, pressure_kPa)
-        for sentence in overruled(case, given):
-            terminal.note(sentence)
-        changed = overridden(case, given)
-        replaced = _replaced(case, assigned)
-        case = changed
-        values = start_values(case)
-        case = with_values(case, values)
-        for name, value in given.items():
-            option = f"--set {name}={as_written(value)}"
-            if name == "pressure_kPa" and value == pressure_kPa:
-                option = f"--pressure-kPa {value:g}"
-            refuse_unusual(case, option, name, value, allow_unusual)
-        for sentence in replaced:
-            terminal.note(sentence)
-        return case, values
-    except CaseError:
-        raise
-    except ValueError as error:
-        raise click.UsageError(str(error)) from None
+    if mesh_level:
+        case = with_level(case, mesh_level)
+    given = _given(case, assigned, pressure_kPa)
+    for sentence in overruled(case, given):
+        terminal.note(sentence)
+    changed = overridden(case, given)
+    replaced = _replaced(case, assigned)
+    case = changed
+    values = start_values(case)
+    case = with_values(case, values)
+    for name, value in given.items():
+        option = f"--set {name}={as_written(value)}"
+        if name == "pressure_kPa" and value == pressure_kPa:
+            option = f"--pressure-kPa {value:g}"
+        refuse_unusual(case, option, name, value, allow_unusual)
+    for sentence in replaced:
+        terminal.note(sentence)
+    return case, values
 
 
 def refuse_unusual(loaded: Any, option: str, name: str, value: Setting, allowed: bool) -> None:

@@ -115,7 +115,7 @@ def command(
     from ..batch.case import CaseTask
     from ..batch.drift import baseline_of, compare, read_baseline
     from ..batch.junit import junit as junit_xml
-    from ..batch.run import run_batch
+    from ..batch.run import names_of, run_batch
     from ..batch.studies import Asked
     from ..batch.summary import summary
     from ..simulate.evaluate.cluster import reached
@@ -123,7 +123,7 @@ def command(
     from .output import Run
     from .progress import BatchProgress
 
-    names = _names(cases)
+    names = names_of(cases)
     wanted = _studies(studies)
     pressures = arguments.parse_pressures(from_kPa, to_kPa, steps, allow_unusual)
     study_options = Asked(
@@ -180,15 +180,6 @@ def command(
         terminal.say(f"baseline written to {baseline}")
     terminal.say(f"results in {run.folder}")
     return 0 if result["counts"]["good"] == len(reports) else EXIT_BATCH
-
-
-def _names(cases: Sequence[Path]) -> list[str]:
-    from ..batch.run import names_of
-
-    try:
-        return names_of(cases)
-    except ValueError as error:
-        raise click.UsageError(str(error)) from None
 
 
 def _studies(text: str) -> tuple[str, ...]:

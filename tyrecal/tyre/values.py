@@ -10,6 +10,7 @@ from typing import Any, Literal, get_origin
 
 from pydantic import BaseModel, ValidationError
 
+from ..errors import InputError
 from .case.checks import at, find, folds, problems
 from .case.loaded import LoadedCase
 from .case.mistakes import Keys, dotted, suggestion
@@ -46,7 +47,7 @@ def with_values(loaded: LoadedCase, values: Mapping[str, Setting]) -> LoadedCase
 
     A value can also be one of the words that the schema lists for a key, or None if the schema
     allows it. Values are in the unit of the numbers they set; a variable's bounds are not
-    enforced. Raises ValueError, in one sentence, for an unknown name or a value that the case
+    enforced. Raises InputError, in one sentence, for an unknown name or a value that the case
     cannot have.
     """
     changed = set_values(loaded, values)
@@ -62,10 +63,10 @@ def set_values(loaded: LoadedCase, values: Mapping[str, Setting]) -> LoadedCase:
         is_word = value is None or isinstance(value, str)
         if not isinstance(value, Real) and (not is_word or name in loaded.case.variables):
             shown = as_written(value) if is_word else repr(value)
-            raise ValueError(f"{name} is {shown}, must be a number")
+            raise InputError(f"{name} is {shown}, must be a number")
         for keys in _keys(loaded, name):
             if keys in targets:
-                raise ValueError(f"{name}: {dotted(keys)} is set twice")
+                raise InputError(f"{name}: {dotted(keys)} is set twice")
             targets[keys] = _setting(loaded.case, keys, value)
     for keys, setting in targets.items():
         branch: Any = tree
@@ -83,10 +84,10 @@ def set_values(loaded: LoadedCase, values: Mapping[str, Setting]) -> LoadedCase:
     if parts_to_check:
         data = case.plain()
         for wrong, reason in problems(data, section):
-            raise ValueError(f"{dotted(wrong)} {reason}")
+            raise InputError(f"{dotted(wrong)} {reason}")
         meshed = "mesh" in parts_to_check or redrawn or has_words
         if section and meshed and (message := folds(data, section)):
-            raise ValueError(message)
+            raise InputError(message)
     return replace(loaded, case=case, drawn=section, as_read=loaded.as_read or loaded)
 
 
@@ -102,7 +103,7 @@ def overridden(loaded: LoadedCase, values: Mapping[str, Setting]) -> LoadedCase:
     for path in values.keys() - variables.keys():
         for name, variable in variables.items():
             if path in variable.sets:
-                raise ValueError(f"{path} is set by the variable '{name}': set {name} instead")
+                raise InputError(f"{path} is set by the variable '{name}': set {name} instead")
     changed = with_states_kept(loaded, with_values(loaded, values))
     as_it_is = (bool, str, type(None))
     given = {n: x if isinstance(x, as_it_is) else float(x) for n, x in values.items()}
@@ -112,7 +113,7 @@ def overridden(loaded: LoadedCase, values: Mapping[str, Setting]) -> LoadedCase:
 def unusual_value(loaded: LoadedCase, name: str, value: Setting) -> str | None:
     """Why ``value`` is unusual for a variable, or the number at a dotted path; None if it is not.
 
-    The sentence has the usual range and what was probably meant. Raises ValueError for an unknown
+    The sentence has the usual range and what was probably meant. Raises InputError for an unknown
     name.
     """
     paths = paths_of(loaded, name)
@@ -129,7 +130,7 @@ def unusual_value(loaded: LoadedCase, name: str, value: Setting) -> str | None:
 
 
 def paths_of(loaded: LoadedCase, name: str) -> list[str]:
-    """Dotted paths of the numbers that the variable or the path ``name`` sets. Raises ValueError
+    """Dotted paths of the numbers that the variable or the path ``name`` sets. Raises InputError
     with a suggestion for an unknown name."""
     return [dotted(keys) for keys in _keys(loaded, name)]
 
@@ -148,13 +149,13 @@ def _keys(loaded: LoadedCase, name: str) -> list[Keys]:
     except KeyError as error:
         idle = loaded.kind.idle
         if (path := canonical(name, idle)) is not None:
-            raise ValueError(f"{name} {idle[path]}") from None
+            raise InputError(f"{name} {idle[path]}") from None
         if meant := " or ".join(f"'{path}'" for path in _meant(loaded, name)):
-            raise ValueError(f"there is no '{name}'; did you mean {meant}?") from None
+            raise InputError(f"there is no '{name}'; did you mean {meant}?") from None
         if "." in name:
-            raise ValueError(f"{name}: {error.args[0]}") from None
+            raise InputError(f"{name}: {error.args[0]}") from None
         known = suggestion(name, [*variables, "pressure_kPa"])
-        raise ValueError(f"there is no variable '{name}'{known}") from None
+        raise InputError(f"there is no variable '{name}'{known}") from None
 
 
 def _meant(loaded: LoadedCase, name: str) -> list[str]:
@@ -186,23 +187,23 @@ def is_choice(keys: Keys) -> bool:
 
 def _setting(case: Case, keys: Keys, value: Setting) -> Setting:
     """``value`` in the type of the value at ``keys`` of the case: a number, true or false, a word.
-    Raises ValueError if it has another type."""
+    Raises InputError if it has another type."""
     old = at(case, keys)
     if is_choice(keys) and (value is None or isinstance(value, str)):
         return value
     if isinstance(old, str):
-        raise ValueError(f"{dotted(keys)} is text, '{old}': edit the case file")
+        raise InputError(f"{dotted(keys)} is text, '{old}': edit the case file")
     if value is None and isinstance(old, int | float | None):
         return None  # the schema accepts or refuses it
     if isinstance(old, bool) or isinstance(value, bool):
         if isinstance(old, bool) and isinstance(value, bool):
             return value
         kind = "true or false" if isinstance(old, bool) else "a number"
-        raise ValueError(f"{dotted(keys)} must be {kind}, got {as_written(value)}")
+        raise InputError(f"{dotted(keys)} must be {kind}, got {as_written(value)}")
     if not isinstance(old, int | float | None):
-        raise ValueError(f"{dotted(keys)} is not a number, it cannot be {as_written(value)}")
+        raise InputError(f"{dotted(keys)} is not a number, it cannot be {as_written(value)}")
     if value is None or isinstance(value, str):
-        raise ValueError(f"{dotted(keys)} must be a number, got {as_written(value)}")
+        raise InputError(f"{dotted(keys)} must be a number, got {as_written(value)}")
     number = float(value)
     return int(number) if isinstance(old, int) and number.is_integer() else number
 
@@ -228,4 +229,4 @@ def _set(node: Any, tree: Any, keys: Keys) -> Any:
         for key in wrong[len(keys) :]:
             value = value.get(key, {}) if isinstance(value, dict) else {}
         got = "" if isinstance(value, dict) else f", got {as_written(value)}"
-        raise ValueError(f"{dotted(wrong)} {message}{got}") from None
+        raise InputError(f"{dotted(wrong)} {message}{got}") from None

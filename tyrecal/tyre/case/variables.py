@@ -7,6 +7,7 @@ from collections.abc import Collection
 from dataclasses import replace
 from math import isfinite
 
+from ...errors import InputError
 from .checks import at, find
 from .loaded import LoadedCase
 from .parts import Setting, as_written
@@ -43,19 +44,19 @@ def overruled(loaded: LoadedCase, given: Collection[str] = ()) -> list[str]:
 
 
 def parse_assignment(text: str) -> tuple[str, float]:
-    """``NAME=VALUE`` as name and number. Raises ValueError."""
+    """``NAME=VALUE`` as name and number. Raises InputError."""
     name, value = parse_setting(text)
     if value is None or isinstance(value, str):
-        raise ValueError(f"{name} is '{as_written(value)}', must be a number")
+        raise InputError(f"{name} is '{as_written(value)}', must be a number")
     return name, value
 
 
 def parse_setting(text: str) -> tuple[str, Setting]:
-    """``NAME=VALUE`` as name and number, true, false, null or a word. Raises ValueError."""
+    """``NAME=VALUE`` as name and number, true, false, null or a word. Raises InputError."""
     name, equals, value = text.partition("=")
     name = name.strip()
     if not equals or not name:
-        raise ValueError(f"'{text}' must be NAME=VALUE, as in C10=1.2e6")
+        raise InputError(f"'{text}' must be NAME=VALUE, as in C10=1.2e6")
     if value.strip() in CONSTANTS:
         return name, CONSTANTS[value.strip()]
     try:
@@ -63,29 +64,29 @@ def parse_setting(text: str) -> tuple[str, Setting]:
     except ValueError:
         if WORD.fullmatch(value.strip()):
             return name, value.strip()
-        raise ValueError(f"{name} is '{value.strip()}', must be a number") from None
+        raise InputError(f"{name} is '{value.strip()}', must be a number") from None
     if not isfinite(number):
-        raise ValueError(f"{name} is '{value.strip()}', must be a finite number")
+        raise InputError(f"{name} is '{value.strip()}', must be a finite number")
     return name, number
 
 
 def with_level(loaded: LoadedCase, level: str) -> LoadedCase:
-    """The case at another of its mesh levels. Raises ValueError where it has none of this name."""
+    """The case at another of its mesh levels. Raises InputError where it has none of this name."""
     mesh = loaded.case.mesh
     if level not in mesh.levels:
-        raise ValueError(f"mesh level '{level}' is not one of the case's: {', '.join(mesh.levels)}")
+        raise InputError(f"mesh level '{level}' is not one of the case's: {', '.join(mesh.levels)}")
     case = loaded.case.model_copy(update={"mesh": mesh.model_copy(update={"level": level})})
     read = loaded.as_read and with_level(loaded.as_read, level)
     return replace(loaded, case=case, as_read=read)
 
 
 def number_at(loaded: LoadedCase, path: str) -> float:
-    """The number at a dotted path of the case. Raises ValueError."""
+    """The number at a dotted path of the case. Raises InputError."""
     try:
         keys = find(loaded.case, path)
     except KeyError as error:
-        raise ValueError(f"{path}: {error.args[0]}") from None
+        raise InputError(f"{path}: {error.args[0]}") from None
     value = at(loaded.case, keys)
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{path} is not a number")
+        raise InputError(f"{path} is not a number")
     return value
