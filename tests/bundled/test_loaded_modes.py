@@ -16,6 +16,7 @@ from tyrecal_solvers.bundled.road.loaded_modes import (
     loaded_modes,
     standing_waves,
 )
+from tyrecal_solvers.bundled.road.multifrontal import Elimination
 from tyrecal_solvers.bundled.section.mechanics import mass
 from tyrecal_solvers.bundled.section.symmetry import HALF_TURN
 from tyrecal_solvers.bundled.solid3d.circumference import half_circle
@@ -164,6 +165,37 @@ def test_a_second_hold_is_as_if_it_were_the_first(tyre: Round, pressed: State) -
     both = loaded_modes(work, symmetry, pressed.U, holds, start(tyre), 10, lambda: None)
     np.testing.assert_allclose(both[1].eigenvalues, alone.eigenvalues, rtol=1e-8)
     assert (both[1].eigenvalues < both[0].eigenvalues).all()
+
+
+@pytest.mark.slow
+def test_the_footprints_factor_gives_the_same_modes(
+    tyre: Round, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Modes of parity 1 take the factor that pressed the ring, also one of half the moduli that
+    they vibrate with, and form none: the eigenvalues are those with an own factor."""
+    work = tyre.press(LENGTHS, 1e9, 0.5)
+    state = work.to(10.0)
+    U, hold = work.symmetry.spread(state.parts), stick.held(state.contact)
+    (rubber,) = tyre.model.parts
+    twice = np.full(rubber.rows.weights.size, 2.0)
+    stiff = tyre.model.with_laws(lambda law: replace(law, shear_ratio=twice, bulk_ratio=twice))
+    formed: list[int] = []
+    real = loaded_modes_module.Factor
+
+    def factor(order: Elimination, *given: Any) -> Any:
+        formed.append(order.symmetry.parity)
+        return real(order, *given)
+
+    monkeypatch.setattr(loaded_modes_module, "Factor", factor)
+    shared = work.release_factor()
+    for model in (tyre.model, stiff):
+        results = []
+        for release in (lambda: shared, lambda: None):
+            revolved = Revolved(model, [], work.tyre.around)
+            given = revolved, work.symmetry, U, [hold], start(tyre), 8, lambda: None, None, release
+            results.append(loaded_modes(*given)[0].eigenvalues)
+        np.testing.assert_allclose(*results, rtol=1e-8)
+    assert formed == [-1, 1, -1] * 2
 
 
 def test_a_road_before_waves(tyre: Round) -> None:

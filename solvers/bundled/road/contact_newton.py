@@ -185,9 +185,11 @@ class ContactNewton:
         z = np.where(X[:, 0] > rim, np.abs(X[:, 1]), np.inf)
         return rim + float(np.ptp(X[z <= z.min() + 1e-9, 0]))
 
-    def drop_factor(self) -> None:
-        """Let go of the memory that is only of use while the load stays."""
-        self._factor = None
+    def release_factor(self) -> ContactUpdate | None:
+        """The preconditioner near the last state, which is now the caller's: the next load forms
+        its own, as two at a time would double the memory."""
+        factor, self._factor = self._factor, None
+        return factor
 
     def _state(
         self, parts: Array, height: float, load: float, bound: Bound | None

@@ -195,9 +195,16 @@ def _modes(
     holds = holds if road.friction else holds[:1]
     vibration = Vibration(wanted.model, inflated, tyre.loads, equations, 0.0)
     start = lowest_of_all(vibration, 2 * (wanted.count + 2 * SPARE), work.check)
-    work.drop_factor()
     modes = loaded_modes(
-        tyre, work.symmetry, U, holds, start, wanted.count, work.check, wanted.wheel_kg
+        tyre,
+        work.symmetry,
+        U,
+        holds,
+        start,
+        wanted.count,
+        work.check,
+        wanted.wheel_kg,
+        work.release_factor,
     )
     arrays = {"mode_node": wanted.nodes}
     for name, each in zip(("mode", "sliding"), modes, strict=False):

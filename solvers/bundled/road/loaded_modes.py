@@ -55,20 +55,25 @@ def loaded_modes(
     count: int,
     check: Callable[[], None],
     wheel_kg: float | None = None,
+    release_factor: Callable[[], ContactUpdate | None] = lambda: None,
 ) -> list[LoadedModes]:
     """The ``count`` lowest modes about the field U (k, n, 3), m, for each stiffness of ``holds`` (k
     n 3, k n 3), N/m, which holds the patch.
 
     pressed: the symmetry of U; unloaded: modes of the inflated tyre, to start from; wheel_kg: mass
-    of a wheel that is free along the load, None: it is held. Raises RunFailed, and what ``check``
-    raises to stop.
+    of a wheel that is free along the load, None: it is held; release_factor: gives away a factor of
+    the stiffness near U on fields of parity 1, None: one is formed. Raises RunFailed, and what
+    ``check`` raises to stop.
     """
     tyre.residual(U)
 
     def lowest(parity: int, wanted: int) -> list[tuple[Array, Array]]:
         symmetry = HalfTurn(tyre.model.mesh, pressed.free, pressed.around, parity)
         own_kg = wheel_kg if parity == 1 else None
-        return _Vibrations(tyre, symmetry, holds[0], unloaded, own_kg, check).lowest(holds, wanted)
+        # the factor goes with the search, so that one at a time is in memory
+        factor = release_factor() if parity == 1 else None
+        search = _Vibrations(tyre, symmetry, holds[0], unloaded, own_kg, check, factor)
+        return search.lowest(holds, wanted)
 
     wanted = {1: count // 2 + SPARE, -1: count // 2 + SPARE}
     by_parity = {parity: lowest(parity, number) for parity, number in wanted.items()}
@@ -107,20 +112,25 @@ class _Vibrations:
         unloaded: list[HarmonicModes],
         wheel_kg: float | None,
         check: Callable[[], None],
+        factor: ContactUpdate | None,
     ):
         self.tyre, self.symmetry, self.check = tyre, symmetry, check
         self.wheel_kg = wheel_kg
-        tangents = tyre.tangents(np.float32)
-        order = Elimination(tangents, symmetry)
-        check()
-        try:
-            self.factor = ContactUpdate(Factor(order, tangents, self.symmetry.fold(hold)))
-        except Indefinite:
-            raise RunFailed("unstable", davidson.NOT_STABLE) from None
+        self.factor = factor or self._form(hold)
         self.start = [symmetry.parts(V) * symmetry.mask for V in standing_waves(unloaded, symmetry)]
         turn = symmetry.around.turn(1)[:, None]
         down = np.stack([turn.real, -turn.imag, 0 * turn.real], -1)
         self.down = down * ~symmetry.free  # the rim's nodes (k, n, 3), by 1 m
+
+    def _form(self, hold: csr_matrix) -> ContactUpdate:
+        """The factor of the stiffness with a hold."""
+        tangents = self.tyre.tangents(np.float32)
+        order = Elimination(tangents, self.symmetry)
+        self.check()
+        try:
+            return ContactUpdate(Factor(order, tangents, self.symmetry.fold(hold)))
+        except Indefinite:
+            raise RunFailed("unstable", davidson.NOT_STABLE) from None
 
     def lowest(self, holds: Sequence[csr_matrix], count: int) -> list[tuple[Array, Array]]:
         """For each hold omega^2 (count,) and shapes (count, k, n, 3). Each search starts from the
