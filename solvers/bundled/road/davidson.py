@@ -8,7 +8,6 @@ keeps three blocks where this keeps all, and goes on where K is not positive.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,85 +22,110 @@ NOT_STABLE = "the pressed tyre is not stable: its stiffness is not positive"
 MIN_LENGTH2 = 1e-10  # of a direction's squared length, below which it is in the basis already
 
 
-@dataclass(frozen=True)
 class Basis:
-    """M-orthonormal vectors (b, size), and their images K x (b, size)."""
+    """M-orthonormal vectors x (b, size) with their images K x and M x; it grows in place."""
 
-    vectors: Array
-    images: Array
+    def __init__(self, size: int):
+        self._rows = np.empty((3, 0, size))
+        self._count = 0
 
-    def turned(self, turn: Array) -> Basis:
-        """Basis of the combinations ``turn`` (b', b) of these vectors."""
-        return Basis(turn @ self.vectors, turn @ self.images)
+    @property
+    def vectors(self) -> Array:
+        """x (b, size)."""
+        return self._rows[0, : self._count]
 
-    def joined(self, other: Basis) -> Basis:
-        """Basis of the vectors of both."""
-        vectors = np.concatenate([self.vectors, other.vectors])
-        return Basis(vectors, np.concatenate([self.images, other.images]))
+    @property
+    def images(self) -> Array:
+        """K x (b, size), which the caller changes in place where K changes."""
+        return self._rows[1, : self._count]
+
+    @property
+    def inertias(self) -> Array:
+        """M x (b, size)."""
+        return self._rows[2, : self._count]
+
+    def add(self, fields: Array, product: Operator, mass: Operator) -> int:
+        """Add the directions of ``fields`` (c, size) beyond the basis; how many they are."""
+        block, inertia = self._beyond(fields, mass(fields))
+        start, self._count = self._count, self._count + len(block)
+        if self._count > self._rows.shape[1]:
+            larger = np.empty((3, 2 * self._count, self._rows.shape[2]))
+            larger[:, :start] = self._rows[:, :start]
+            self._rows = larger
+        if len(block):
+            for rows, new in zip(self._rows, (block, product(block), inertia), strict=True):
+                rows[start : self._count] = new
+        return len(block)
+
+    def _beyond(self, block: Array, inertia: Array) -> tuple[Array, Array]:
+        """The directions of a block, and M times them, orthonormal to the basis and each other."""
+        for _ in range(2):
+            scale = 1 / np.sqrt(np.einsum("bs,bs->b", block, inertia))[:, None]
+            block, inertia = block * scale, inertia * scale
+            overlap = inertia @ self.vectors.T
+            block -= overlap @ self.vectors
+            inertia -= overlap @ self.inertias
+            gram = inertia @ block.T
+            values, turn = np.linalg.eigh((gram + gram.T) / 2)
+            keep = values > MIN_LENGTH2
+            turn = (turn[:, keep] / np.sqrt(values[keep])).T
+            block, inertia = turn @ block, turn @ inertia
+        return block, inertia
+
+    def cut(self, turn: Array) -> None:
+        """Replace the vectors by their combinations ``turn`` (b', b), b' < b."""
+        for rows in self._rows:
+            rows[: len(turn)] = turn @ rows[: self._count]
+        self._count = len(turn)
 
 
 def basis_of(fields: Array, product: Operator, mass: Operator) -> Basis:
-    """Orthonormal basis of the space that fields (b, size) span."""
-    vectors = _orthonormal(fields, np.empty((0, fields.shape[1])), mass)
-    return Basis(vectors, product(vectors))
+    """Basis of the space that fields (b, size) span."""
+    basis = Basis(fields.shape[1])
+    basis.add(fields, product, mass)
+    return basis
 
 
 def lowest(
-    product: Operator, mass: Operator, inverse: Operator, start: Basis, count: int
-) -> tuple[Array, Array, Basis]:
-    """The ``count`` lowest eigenvalues, ascending, vectors (count, size), x^T M x = 1, and the
-    basis that has them, from which a matrix near K may start.
+    product: Operator, mass: Operator, inverse: Operator, basis: Basis, count: int
+) -> tuple[Array, Array]:
+    """The ``count`` lowest eigenvalues, ascending, and vectors (count, size), x^T M x = 1; the
+    ``basis`` grows until it has them, and a matrix near K may start from it.
 
     Operators take blocks (b, size); ``inverse``: about K^-1, symmetric.
     Raises RunFailed, unstable where K is not positive.
     """
-    if len(start.vectors) < count:
-        have = f"{len(start.vectors)} directions to start from"
+    if len(basis.vectors) < count:
+        have = f"{len(basis.vectors)} directions to start from"
         raise RunFailed("crashed", f"{have} for {count} modes")
-    basis, H = start, start.vectors @ start.images.T
+    H = basis.vectors @ basis.images.T
     error, before = np.full(count, np.inf), np.zeros(count)
     for _ in range(MAX_BLOCKS):
         values, turn = np.linalg.eigh((H + H.T) / 2)
         if values[0] <= 0:
             raise RunFailed("unstable", NOT_STABLE)
         lowest = values[:count]
-        # asked again of what has not converged, and where the basis has found a lower one
+        # of what has not converged yet, and where the basis has found a lower one
         left = (error > EIGENVALUE_RTOL) | (before - lowest > EIGENVALUE_RTOL * lowest)
-        ritz = basis.turned(turn[:, :count].T)
-        residual = ritz.images[left] - lowest[left, None] * mass(ritz.vectors[left])
+        ritz = turn[:, :count].T
+        residual = ritz[left] @ basis.images - lowest[left, None] * (ritz[left] @ basis.inertias)
         step = inverse(residual)
         # the residual in the norm of K^-1, squared: the eigenvalue's error, relative
         error[left] = np.einsum("cs,cs->c", residual, step) / lowest[left]
         if (error <= EIGENVALUE_RTOL).all():
-            return lowest, ritz.vectors, basis
+            return lowest, ritz @ basis.vectors
         before = lowest
         if len(basis.vectors) + count > MAX_BASIS_PER_MODE * count:
             kept = MAX_BASIS_PER_MODE * count // 2
-            basis, H = basis.turned(turn[:, :kept].T), np.diag(values[:kept])
-        block = _orthonormal(step[error[left] > EIGENVALUE_RTOL], basis.vectors, mass)
-        if not len(block):
+            basis.cut(turn[:, :kept].T)
+            H = np.diag(values[:kept])
+        added = basis.add(step[error[left] > EIGENVALUE_RTOL], product, mass)
+        if not added:
             break
-        new = Basis(block, product(block))
-        basis = basis.joined(new)
-        column = basis.vectors @ new.images.T
-        H = np.block([[H, column[: len(H)]], [column[: len(H)].T, column[len(H) :]]])
+        column = basis.vectors @ basis.images[-added:].T
+        H = np.block([[H, column[:-added]], [column[:-added].T, column[-added:]]])
     raise RunFailed(
         "crashed",
         f"{count} modes of the pressed tyre did not converge: {(error > EIGENVALUE_RTOL).sum()} are"
         f" left, the worst off by {error.max():.1e}",
     )
-
-
-def _orthonormal(block: Array, V: Array, mass: Operator) -> Array:
-    """The directions of a block beyond those of V, M-orthonormal to them and to each other."""
-    for _ in range(2):
-        image = mass(block)
-        scale = 1 / np.sqrt(np.einsum("bs,bs->b", block, image))
-        block, image = block * scale[:, None], image * scale[:, None]
-        overlap = image @ V.T
-        gram = image @ block.T - overlap @ overlap.T
-        block = block - overlap @ V
-        values, turn = np.linalg.eigh((gram + gram.T) / 2)
-        keep = values > MIN_LENGTH2
-        block = (turn[:, keep] / np.sqrt(values[keep])).T @ block
-    return block

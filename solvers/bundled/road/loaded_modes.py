@@ -147,9 +147,9 @@ class _Vibrations:
             if basis is None:
                 basis = davidson.basis_of(start, stiffness, inertia)
             else:  # the images K x of the basis change by the change of the hold
-                images = self._operator(partial(_times, hold - before), 0.0)(basis.vectors)
-                basis = davidson.Basis(basis.vectors, basis.images + images)
-            values, x, basis = davidson.lowest(stiffness, inertia, inverse, basis, count)
+                change = self._operator(partial(_times, hold - before), 0.0)
+                basis.images[:] += change(basis.vectors)
+            values, x = davidson.lowest(stiffness, inertia, inverse, basis, count)
             # the half tyre has half of the modal mass
             result.append((values, np.array([self._field(row) for row in x]) / np.sqrt(2)))
         return result
