@@ -57,6 +57,9 @@ class Dissection:
     def __init__(self, connectivities: list[Array], symmetry: HalfTurn):
         self.symmetry = symmetry
         self.columns, self.along, self._nodes = _columns(connectivities, symmetry)
+        mask = symmetry.mask
+        self._mask = mask[:, :, self.along]  # of free components, in the order of the columns
+        self._flat = np.arange(mask.size).reshape(mask.shape)[:, :, self.along]
         pieces = [np.arange(p.functions.start, p.functions.stop) for p in symmetry.around.pieces]
         self._functions = _ranges(pieces, symmetry.mask.shape[1])
 
@@ -76,7 +79,7 @@ class Dissection:
         if len(parts) == 2 and columns[1] <= first:
             return [i for part in parts for i in self._cut(fronts, (part,), columns, pieces, first)]
         inside = self._inside(columns, pieces)
-        unknown = self.symmetry.mask[list(parts)][:, :, self.along]
+        unknown = self._mask[list(parts)]
         halves: list[tuple[Range, Range]] = []
         if len(parts) == 2 and columns[0] < first:
             halves = [((columns[0], first), pieces), ((first, columns[1]), pieces)]
@@ -115,10 +118,9 @@ class Dissection:
 
     def _unknowns(self, parts: tuple[int, ...], chosen: Array) -> Array:
         """Flat indices of the free components of some (function, node)."""
-        mask = self.symmetry.mask
-        flat = np.arange(mask.size).reshape(mask.shape)[:, :, self.along]
-        wanted = mask[:, :, self.along] & chosen[None, ..., None]
-        return np.concatenate([flat[part][wanted[part]] for part in parts])
+        return np.concatenate(
+            [self._flat[part][self._mask[part] & chosen[..., None]] for part in parts]
+        )
 
 
 def _meet(ends: Array, box: Range) -> Array:
