@@ -41,6 +41,13 @@ def test_davidson_against_dense_algebra(random: np.random.Generator) -> None:
     np.testing.assert_allclose(basis.inertias, basis.vectors @ M, atol=1e-9 * np.linalg.norm(M))
 
 
+def test_davidson_from_fewer_fields_than_modes(random: np.random.Generator) -> None:
+    K, M = matrices(random)
+    values, _, _ = lowest(K, M, np.linalg.inv(K), random.normal(size=(2, 120)), 5)
+    exact = eigh(K, M, eigvals_only=True)[:5]
+    np.testing.assert_allclose(values, exact, rtol=3 * davidson.EIGENVALUE_RTOL)
+
+
 def test_davidson_goes_on_from_the_basis_of_a_matrix_near_by(random: np.random.Generator) -> None:
     """Springs at four places, another lowest mode by it: the same as from dense algebra, with fewer
     products than from the start."""
@@ -75,8 +82,9 @@ def test_davidson_fails_by_name(
     fields = random.normal(size=(4, 120))
     with pytest.raises(RunFailed, match="not positive"):
         lowest(K - 50 * np.eye(120), M, np.eye(120), fields, 3)
+    invariant = np.repeat(np.eye(120)[:1], 4, 0)
     with pytest.raises(RunFailed, match="1 directions to start from for 3 modes"):
-        lowest(K, M, np.eye(120), np.repeat(fields[:1], 4, 0), 3)
+        lowest(np.eye(120), np.eye(120), np.eye(120), invariant, 3)
     monkeypatch.setattr(davidson, "MAX_BLOCKS", 2)
     with pytest.raises(RunFailed, match="did not converge"):
         lowest(K, M, np.eye(120), fields, 3)

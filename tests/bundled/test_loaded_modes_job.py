@@ -95,8 +95,8 @@ def tyre() -> Round:
 def test_what_the_job_asks_for_and_how_it_writes_it(
     tyre: Round, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Modes about the pressed state with its hold, from twice so many and spare ones of the
-    inflated tyre, with the footprint's factor, given away once; their shapes on the whole tyre,
+    """Modes about the pressed state with its hold, from so many and spare ones of the inflated
+    tyre, with the footprint's factor, given away once; their shapes on the whole tyre,
     kept or reversed by the half turn."""
     work = tyre.press(LENGTHS, 1e9, 0.5)
     state = work.to(10.0)
@@ -127,7 +127,7 @@ def test_what_the_job_asks_for_and_how_it_writes_it(
     (shift, started, solved), (product, (hold, smooth), rest) = calls
     plain = Vibration(tyre.model, tyre.U, work.tyre.loads, equations, 0.0)
     np.testing.assert_array_equal(solved, plain.factor(0).solve(np.ones(free)))
-    assert (shift, started) == (0.0, 2 * (2 + 6)) and rest[:2] == ([], 2)
+    assert (shift, started) == (0.0, 2 + 6) and rest[:2] == ([], 2)
     here = press(tyre, 10.0)
     assert abs(hold - here.hold).max() < 1e-9 * abs(here.hold).max()
     V = shifted(tyre, here.around, 0)

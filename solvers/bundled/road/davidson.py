@@ -95,7 +95,9 @@ def lowest(
     Operators take blocks (b, size); ``inverse``: about K^-1, symmetric.
     Raises RunFailed, unstable where K is not positive.
     """
-    if len(basis.vectors) < count:
+    while len(basis.vectors) < count:  # a small start grows by inverse iteration
+        if basis.add(inverse(basis.inertias), product, mass):
+            continue
         have = f"{len(basis.vectors)} directions to start from"
         raise RunFailed("crashed", f"{have} for {count} modes")
     H = basis.vectors @ basis.images.T

@@ -194,7 +194,7 @@ def _modes(
     holds = [held(each) for each in (state.contact, smooth)]
     holds = holds if road.friction else holds[:1]
     vibration = Vibration(wanted.model, inflated, tyre.loads, equations, 0.0)
-    start = lowest_of_all(vibration, 2 * (wanted.count + 2 * SPARE), work.check)
+    start = lowest_of_all(vibration, wanted.count + 2 * SPARE, work.check)
     modes = loaded_modes(
         tyre,
         work.symmetry,
