@@ -416,7 +416,12 @@ def test_a_broken_command_or_study_of_a_package_costs_no_other(
     assert "study 'weigh'" in caplog.text
 
 
-@pytest.mark.parametrize("failure", [MemoryError(), OSError(12, "Cannot allocate memory")])
+NOT_MAPPED = ImportError("_flapack.so: failed to map segment from shared object")
+
+
+@pytest.mark.parametrize(
+    "failure", [MemoryError(), OSError(12, "Cannot allocate memory"), NOT_MAPPED]
+)
 def test_too_little_memory_is_one_sentence(
     failure: Exception, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -39,6 +39,7 @@ COMMANDS = {  # name: one line of help, so that the overview imports no command
     "doctor": "Check the installation: packages, solvers, machine, a known tyre.",
     "completion": "Print a script for shell completion of commands, cases and names.",
 }
+NOT_LOADED = "failed to map segment|cannot allocate memory|Cannot allocate memory"  # of the loader
 NO_MEMORY = "there is not enough memory: use fewer --jobs, a coarser --mesh or another machine"
 EXIT_INPUT, EXIT_SOLVER, EXIT_FIT, EXIT_BATCH = 2, 3, 4, 5
 EXIT_CODES = {
@@ -215,7 +216,7 @@ def main(arguments: list[str] | None = None) -> None:
         if code is None:
             raise
         words = os_words(failure) if isinstance(failure, OSError) else str(failure)
-        if isinstance(failure, MemoryError):
+        if _lacks_memory(failure):
             words = NO_MEMORY
         for sentence in re.split(r"\n(?=[^*\n]*: )", words):  # lines to add to a deck have no ': '
             error(sentence)
@@ -238,4 +239,10 @@ def _exit_code(failure: Exception) -> int | None:
     """Exit code of a failure with a known cause, None for a bug of ours."""
     if isinstance(failure, TyrecalError):
         return failure.exit_code
-    return EXIT_INPUT if isinstance(failure, OSError | MemoryError) else None
+    return EXIT_INPUT if isinstance(failure, OSError) or _lacks_memory(failure) else None
+
+
+def _lacks_memory(failure: Exception) -> bool:
+    """Whether memory ran out, also while Python loaded a library."""
+    unloaded = isinstance(failure, ImportError) and re.search(NOT_LOADED, str(failure))
+    return isinstance(failure, MemoryError) or bool(unloaded)
