@@ -58,6 +58,24 @@ SLIPS = {  # name: text of the good case, text in its place, key, what was meant
         "rebar_layers.belt_2.angle_deg",
         "usual are belts on both sides of the circumference, all 2 are on one; did you mean 110",
     ),
+    "a Poisson's ratio by a thousand": (
+        "poissons_ratio: 0.3",
+        "poissons_ratio: 0.0003",
+        "materials.belt_cord.poissons_ratio",
+        "usual is 0, or 0.05 to 0.5",
+    ),
+    "a Prony share by a thousand": (
+        "g: 0.3",
+        "g: 0.0003",
+        "materials.rubber.prony.0.g",
+        "usual is 0, or 0.005 to 0.95 of the largest term",
+    ),
+    "a relaxation time by a thousand": (
+        "tau_s: 0.1",
+        "tau_s: 0.0001",
+        "materials.rubber.prony.0.tau_s",
+        "usual is 0.001 to 100000 s of the slowest term",
+    ),
     "1/MPa": ("5.085e-8", "5.085e-2", "materials.rubber.D1_per_Pa", "0.05085 1/MPa, 5.085e-08"),
     "bulk modulus": ("5.085e-8", "3.9e7", "materials.rubber.D1_per_Pa", "bulk modulus K, D1 = 2/K"),
     "g/cm3": ("1100.0", "1.1", "materials.rubber.density_kg_per_m3", "1.1 g/cm3, 1100 kg/m3"),
@@ -203,6 +221,15 @@ def test_a_slip_of_unit_is_refused_unless_it_is_allowed(name: str, tmp_path: Pat
     assert validate(path, allow_unusual=True) == []
     refused = CliRunner().invoke(cli, ["modes", str(path)], standalone_mode=False)
     assert words in str(refused.exception)
+
+
+def test_one_small_or_fast_term_of_a_prony_series_is_usual(tmp_path: Path) -> None:
+    """Two terms that are small, or fast, are not."""
+    old = "{g: 0.3, k: 0.0, tau_s: 0.1}"
+    assert validate(case(tmp_path, old, f"{old}, {{g: 0.001, k: 0.0, tau_s: 1.0e-5}}")) == []
+    both = "{g: 0.002, k: 0.0, tau_s: 1.0e-4}, {g: 0.001, k: 0.0, tau_s: 1.0e-5}"
+    keys = [mistake.key for mistake in validate(case(tmp_path, old, both))]
+    assert keys == ["materials.rubber.prony.0.g", "materials.rubber.prony.0.tau_s"]
 
 
 SETTINGS = [  # arguments after the case, and what was meant

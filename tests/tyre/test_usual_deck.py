@@ -14,6 +14,7 @@ from tyrecal.tyre.values import unusual_value
 from ..cli.test_cli import run
 from .own_decks import STYLES as OTHER_STYLES
 from .own_decks import plain
+from .test_membranes import maker
 
 STYLES = {"plain": plain, **OTHER_STYLES}
 
@@ -80,6 +81,21 @@ def test_a_slip_is_refused_with_what_was_meant(
             "of steel, by its density; did you mean 1.9e+08 kPa, 1.9e+11 Pa",
         ),
         ([("10000000000.0", "2e8")], "material CORD / ELASTIC / E", "of a belt's cords"),
+        (
+            [("00.0, 0.3\n", "00.0, 0.0003\n")],
+            "material CORD / ELASTIC / nu",
+            "usual is 0, or 0.05 to 0.5",
+        ),
+        (
+            [("0.3, 0.0, 0.1\n", "0.0003, 0.0, 0.1\n")],
+            "material RUBBER / VISCOELASTIC / g",
+            "usual is 0, or 0.005 to 0.95 of the largest term",
+        ),
+        (
+            [("0.3, 0.0, 0.1\n", "0.3, 0.0, 0.0001\n0.002, 0.0, 0.00001\n")],
+            "material RUBBER / VISCOELASTIC / row 1 / tau",
+            "usual is 0.001 to 100000 s of the slowest term",
+        ),
         ([("BELT_1, 2.1e-7", "BELT_1, 2.1e-6")], "rebar BELT_1 / area", "cords every 1.16 mm"),
         ([(", 110.0", ", 70.0")], "rebar BELT_2 / angle", "did you mean 110 degrees"),
         ([(", 70.0", ", 20.0")], "rebar BELT_1 / angle", "20 degrees from the circumference"),
@@ -99,6 +115,30 @@ def test_numbers_that_do_not_go_together_are_refused(
     slips = {slip.key: slip.message for slip in deck_slips(deck, deck.numbers)}
     assert path in slips and words in slips[path], slips
     assert {key.rpartition(" / ")[0] for key in slips} == {path.rpartition(" / ")[0]}
+
+
+@pytest.mark.parametrize(("thickness", "is_usual"), [(1e-6, True), (1e-3, True), (0.01, False)])
+def test_the_thickness_of_membranes_is_judged(
+    thickness: float, is_usual: bool, tmp_path: Path
+) -> None:
+    """Membranes that only bear cords are as thin as a micrometre."""
+    (tmp_path / "tyre.inp").write_text(maker(thickness=thickness))
+    deck = read_own_deck(tmp_path / "tyre.inp")
+    slips = list(deck_slips(deck, deck.numbers))
+    assert [slip.key for slip in slips] == [
+        f"thickness of the membranes {name}" for name in (() if is_usual else ("CARCASS", "BELT"))
+    ]
+    assert all(slip.line and "usual is 1e-07 to 0.005 m" in slip.message for slip in slips)
+
+
+def test_hyperelastic_cords_are_refused_as_cords_not_as_rubber(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = plain().replace("*ELASTIC\n10000000000.0, 0.3", "*HYPERELASTIC, NEO HOOKE\n1.7e9, 1e-11")
+    (tmp_path / "tyre.inp").write_text(text.replace("1500.0\n", "7850.0\n"))
+    assert run("init", "--deck", str(tmp_path / "tyre.inp"), "--no-pictures") == 2
+    error = capsys.readouterr().err
+    assert "is not *ELASTIC: give a cord its modulus" in error and "shear modulus" not in error
 
 
 def test_every_door_refuses_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,7 +9,7 @@ are free.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import pi, sqrt
 from typing import TYPE_CHECKING, Any
@@ -145,6 +145,7 @@ USUAL: dict[str, Usual] = {
     "materials.*.reference_frequency_Hz": Usual(0.1, 1000, "Hz", FREQUENCY),
     # textile cords 1 to 25 GPa, aramid 60 to 130, steel 150 to 210: see `cord_modulus`
     "materials.*.youngs_modulus_Pa": Usual(5e7, 3e11, "Pa", STRESS),
+    "materials.*.poissons_ratio": Usual(0, 0.5, "", least=0.05),
     "materials.*.density_kg_per_m3": Usual(500, 9000, "kg/m3", DENSITY),
     "rebar_layers.*.area_m2": Usual(
         5e-9, 2e-5, "m2", {**AREA, "m of diameter": lambda d: pi * d**2 / 4}
@@ -198,6 +199,8 @@ CARCASS_ANGLE = Usual(-30, 30, "degrees from the meridian", FROM_CIRCUMFERENCE)
 BELT_ANGLE = Usual(25, 155, "degrees from the meridian", FROM_CIRCUMFERENCE)
 SHEAR_MODULUS_Pa = 3e5, 4e7  # of rubber
 RUBBER_DENSITY = Usual(700, 2500, "kg/m3", DENSITY, reason=" of rubber")
+MIN_RELAXED = 0.005  # of a modulus by the largest Prony term; rubber relaxes more
+SLOWEST_TERM_s = 1e-3  # a series of faster terms alone acts above a tyre's modes, beyond 160 Hz
 STEEL_DENSITY = 5000.0  # kg/m3 from which a cord is steel, filled with rubber or not
 # diameter of a belt's cord over their spacing, for what a measured area may hold
 THICKEST_CORD = 1.2
@@ -258,6 +261,16 @@ def constant_beside(usual: Usual, factor: float, others_Pa: float) -> Usual:
     return replace(usual, low=low, high=high, reason=", for a shear modulus of 0.3 to 40 MPa")
 
 
+def in_series(usual: Usual, key: str, value: float, others: Sequence[float]) -> Usual:
+    """Narrow the range of the largest number of a Prony series beside the same number, g, k or
+    tau, of its other terms; of a smaller one it stays."""
+    if any(other > value for other in others):
+        return usual
+    if key in ("g", "k"):
+        return replace(usual, least=MIN_RELAXED, reason=" of the largest term")
+    return replace(usual, low=SLOWEST_TERM_s, reason=" of the slowest term")
+
+
 def cord_modulus(density: float | None, is_belt: bool) -> Usual:
     """Range of a cord's modulus, Pa, by its density, kg/m3, and by where it is."""
     usual = USUAL["materials.*.youngs_modulus_Pa"]
@@ -316,7 +329,7 @@ def refusal(
     data: Mapping[str, Any], section: Section | None, keys: Keys, value: float
 ) -> str | None:
     """Why ``value`` is not usual at ``keys`` of the case that ``data`` and ``section`` are of."""
-    for usual, of in () if isinstance(value, bool) else _ranges(data, section, keys):
+    for usual, of in () if isinstance(value, bool) else _ranges(data, section, keys, value):
         if keys[-1] == "C01_Pa" and value == 0:  # C10 is judged
             continue
         if not holds_angle(usual, value) and (message := usual.refusal(value)):
@@ -325,20 +338,21 @@ def refusal(
 
 
 def _ranges(
-    data: Mapping[str, Any], section: Section | None, keys: Keys
+    data: Mapping[str, Any], section: Section | None, keys: Keys, value: float
 ) -> Iterator[tuple[Usual, str]]:
-    """Usual ranges at ``keys``, each with words that go before."""
+    """Usual ranges of ``value`` at ``keys``, each with words that go before."""
     here, last = keys[0], str(keys[-1])
     if here == "variables":
         for path in entries(at(data, keys[:-1]), "sets") if last == "start" else ():
             if isinstance(path, str) and (path_keys := _keys(data, path)):
-                yield from ((usual, f"{path}: ") for usual, _ in _ranges(data, section, path_keys))
+                ranges = _ranges(data, section, path_keys, value)
+                yield from ((usual, f"{path}: ") for usual, _ in ranges)
     elif here == "uncertainties" and last == "absolute":
         for path in entries(at(data, keys[:-1]), "sets"):
             if isinstance(path, str) and (path_keys := _keys(data, path)):
-                for usual, _ in _ranges(data, section, path_keys):
-                    value = number({"": _value(data, path_keys)}, "")
-                    most = abs(value) if value and usual.holds(value) else usual.high
+                own = number({"": _value(data, path_keys)}, "")
+                for usual, _ in _ranges(data, section, path_keys, own or 0.0):
+                    most = abs(own) if own and usual.holds(own) else usual.high
                     yield Usual(0, most, usual.unit, usual.slips), f"{path}: "
     elif here == "effects" and len(keys) == 2 and last in IDS:
         effect = catalogue()[last]
@@ -349,10 +363,10 @@ def _ranges(
             yield angle, ""
     elif here == "targets" and last in _SIGMAS.values():
         for quantity in (name for name, sigma in _SIGMAS.items() if sigma == last):
-            value = number(at(data, keys[:-1]), quantity)
-            if value and value > 0:
+            mean = number(at(data, keys[:-1]), quantity)
+            if mean and mean > 0:
                 whole = USUAL_MEASUREMENTS[quantity]
-                yield replace(whole, low=MIN_SIGMA * value, high=MAX_SIGMA * value), ""
+                yield replace(whole, low=MIN_SIGMA * mean, high=MAX_SIGMA * mean), ""
     else:
         words = tuple(map(str, keys))
         load = last == "load_N" or words[:2] == ("road", "loads_N")
@@ -362,7 +376,19 @@ def _ranges(
             ):
                 usual = _up_to_the_rim(usual, data, section) if load and section else usual
                 usual = _of_belt(usual, data, section, keys)
+                usual = _of_series(usual, data, keys, value)
                 yield _of_material(usual, data, section, keys), ""
+
+
+def _of_series(usual: Usual, data: Mapping[str, Any], keys: Keys, value: float) -> Usual:
+    """The range of a Prony term's number beside the other terms; of any other number, ``usual``."""
+    if keys[0] != "materials" or len(keys) != 5:
+        return usual
+    series = _value(data, keys[:3])
+    terms = [term for term in series if isinstance(term, dict)] if isinstance(series, list) else []
+    here = _value(data, keys[:4])
+    others = (number(term, str(keys[4])) for term in terms if term is not here)
+    return in_series(usual, str(keys[4]), value, [x for x in others if x is not None])
 
 
 def _of_belt(usual: Usual, data: Mapping[str, Any], section: Section | None, keys: Keys) -> Usual:

@@ -11,7 +11,9 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
+from ..units import LENGTH
 from .case.mistakes import Mistake
+from .own_deck.numbers import plain_number
 from .own_deck.own_deck import UNIT_LENGTH, UNIT_MASS, OwnDeck
 from .own_deck.solver_deck import Ply, SolverDeck
 from .usual import (
@@ -26,6 +28,7 @@ from .usual import (
     constant_beside,
     cord_modulus,
     holds_angle,
+    in_series,
     one_side,
 )
 
@@ -34,6 +37,7 @@ RADIUS_m = Usual(0.1, 1.2, "m")  # of the outermost node
 ELASTIC = Usual(5e5, 3e11, "Pa", STRESS)
 OF_FIELD = {  # the end of a number's path: its range
     "ELASTIC / E": ELASTIC,
+    "ELASTIC / nu": USUAL["materials.*.poissons_ratio"],
     "HYPERELASTIC / C10": USUAL["materials.*.C10_Pa"],
     "HYPERELASTIC / C01": USUAL["materials.*.C01_Pa"],
     "HYPERELASTIC / D1": USUAL["materials.*.D1_per_Pa"],
@@ -49,6 +53,7 @@ SHEAR_TERMS = {"C10": 2.0, "C01": 2.0, "mu": 1.0} | {f"mu{i}": 1.0 for i in rang
 OVER_THE_CROWN = 0.35  # of a section's height: how far down from the crown a belt may reach
 MIN_BELT_ANGLE = 10.0  # degrees from the meridian; cords at less may be a piece of a carcass
 ANY_CONSTANT = Usual(-1e9, 1e9, "Pa", STRESS)
+MEMBRANE = Usual(1e-7, 5e-3, "m", LENGTH)  # thin ones only bear cords
 ANGULAR_SPACING = USUAL["rebar_layers.*.spacing_deg"]
 UNITS_mm = {  # in a deck in mm, t, s: the unit's name, and SI in one of it
     "Pa": ("MPa", 1e6),
@@ -79,7 +84,11 @@ def usual_numbers(
         usual = OF_FIELD.get(field if first.startswith("material ") else last)
         if field == "ELASTIC / E" and material in cords:
             usual = cord_modulus(_density(deck, numbers, first), material in in_belts)
-        if field == "DENSITY / density" and _shear_terms(deck, first):
+        if field.startswith("HYPERELASTIC") and material in cords:
+            continue  # the solver refuses such cords
+        if field.startswith("VISCOELASTIC"):
+            usual = _in_series(usual, deck, numbers, path)
+        if field == "DENSITY / density" and material not in cords and _shear_terms(deck, first):
             usual = RUBBER_DENSITY
         if field == f"HYPERELASTIC / {last}" and last in SHEAR_TERMS:
             usual = _beside_others(usual or ANY_CONSTANT, deck, numbers, first, last)
@@ -108,6 +117,7 @@ def deck_slips(deck: OwnDeck, numbers: Mapping[str, float]) -> Iterator[Mistake]
     if message := RADIUS_m.refusal(radius):
         words = f"radius of the outermost node is {radius:.3g} m in these units: {message}"
         yield Mistake(str(deck.path), 0, "", "", words + ALL_THE_SAME)
+    yield from _membranes(deck)
     for path, message in _unusual(deck, numbers, flat):
         if not path:  # a mark or a parameter gives the number
             yield Mistake(str(deck.path), 0, "", "", message)
@@ -184,6 +194,32 @@ def _beside_others(
         if not path.endswith(f" / {name}"):
             others += factor * numbers[path] * stress
     return constant_beside(usual, SHEAR_TERMS[name], others)
+
+
+def _in_series(
+    usual: Usual | None, deck: OwnDeck, numbers: Mapping[str, float], path: str
+) -> Usual | None:
+    """Range of a number of a Prony series beside those of its other terms."""
+    start, _, last = path.rpartition(" / ")
+    series = start.partition(" / VISCOELASTIC")[0] + " / VISCOELASTIC / "
+    others = [
+        numbers[each]
+        for each in deck.numbers
+        if each != path and each.startswith(series) and each.endswith(f" / {last}")
+    ]
+    return usual and in_series(usual, last, numbers[path], others)
+
+
+def _membranes(deck: OwnDeck) -> Iterator[Mistake]:
+    """Membranes that are thicker or thinner than a tyre's."""
+    usual = _in_units(MEMBRANE) if deck.units == "mm" else MEMBRANE
+    for block in deck.blocks:
+        for row in block.rows if block.name == "MEMBRANE SECTION" else ():
+            if plain_number(row.text(0)) and (message := usual.refusal(row.number(0))):
+                file = str(deck.path.parent / row.place.file)
+                key = f"thickness of the membranes {block.get('ELSET')}"
+                value = f"{row.number(0):g}"
+                yield Mistake(file, row.place.line, key, value, message + ALL_THE_SAME)
 
 
 def _density(deck: OwnDeck, numbers: Mapping[str, float], material: str) -> float | None:
