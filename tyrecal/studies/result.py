@@ -366,7 +366,7 @@ def _flat(row: CsvRow) -> dict[str, Any]:
     flat: dict[str, Any] = {}
     for key, value in row.items():
         if isinstance(value, Mapping):
-            flat |= {f"{key}.{name}": each for name, each in value.items()}
+            flat |= {f"{key}.{name}": each for name, each in _flat(value).items()}
         elif isinstance(value, list | tuple):
             flat[key] = "; ".join(map(str, value))
         else:
