@@ -169,6 +169,39 @@ def test_what_the_model_cannot_follow_has_no_reason() -> None:
     assert likeliest_reason(left) is None
 
 
+@pytest.mark.parametrize(("rest", "is_slip"), [(0.0, True), (0.02, False)])
+def test_a_slip_is_named_only_if_the_rest_fits(rest: float, is_slip: bool) -> None:
+    """[1,0] is off by 10 %; at 2 % of every other value the model lacks more than this row."""
+    values = noisy()
+    values[2] *= 1.1
+    signs = np.resize([1, -1, 1, -1, -1, 1], 20)
+    left = two_pressures(values * np.exp(rest * signs))
+    reason = likeliest_reason(left)
+    assert (reason is not None and reason.kind == "value") == is_slip
+    assert left.chi2_per_dof is not None and left.chi2_per_dof > 5
+
+
+@pytest.mark.parametrize(("factor", "kind"), [(1.05, "mode"), (10.0, "value")])
+def test_a_mode_measured_once_may_show_an_effect(factor: float, kind: str) -> None:
+    """Unless its number is a likely slip: at a second pressure the mode would tell."""
+    values = noisy()[:10]
+    values[4] *= factor
+    reason = likeliest_reason(remainder(values, HERTZ, J, PRESSURES[:1]))
+    assert reason and reason.kind == kind
+    assert reason.excludes_effects == (kind == "value")
+    assert ("lack an effect" in reason.words) == (kind == "mode")
+
+
+@pytest.mark.parametrize(("at_both", "kind"), [(False, "value"), (True, "mode")])
+def test_a_mode_that_is_off_at_both_pressures_may_show_an_effect(at_both: bool, kind: str) -> None:
+    """[2,0] is 3 % off at one pressure, and right or 1.5 % off at the other."""
+    values = noisy()
+    values[14] *= 1.03
+    values[4] *= 1.015 if at_both else 1.0
+    reason = likeliest_reason(two_pressures(values))
+    assert reason and reason.kind == kind and "line 16:" in reason.words
+
+
 def test_a_reason_that_is_nearly_as_likely_is_named_too() -> None:
     """A mode whose sensitivities no other shares is off at one of two pressures: which, nothing
     tells; the reason names one line, and the other."""

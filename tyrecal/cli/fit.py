@@ -103,6 +103,7 @@ def command(
     from ..simulate.program import join_command
     from ..studies.fit.study import FitStudy
     from ..studies.fit.targets import objective_unit, read_targets
+    from ..studies.fit.verdict import FITS
     from ..studies.fitted import NOT_CONVERGED, has_good
 
     terminal = study.terminal
@@ -171,7 +172,9 @@ def command(
     if measured or not loaded.measured:
         words += ["--measured", str(measured or "FILE")]
     next_ = join_command(words)
-    if good and not fit.found.reason and loaded.kind.names_its_parts and read_targets(loaded):
+    reason, fits = fit.found.reason, fit.found.verdict == FITS
+    may_lack_effects = fits or reason is None or not reason.excludes_effects
+    if good and may_lack_effects and loaded.kind.names_its_parts and read_targets(loaded):
         terminal.say(f"next: {next_} finds what the model lacks")
     return 0 if good else EXIT_FIT
 

@@ -10,7 +10,8 @@ variables are fitted again. A known shift s of ln q leaves (d - s)^T P (d - s). 
 a normal with standard deviation t, lower chi2 by g^T (E^T P E + t^-2)^-1 g with g = E^T P d. A
 value that is left out has E = e_i and no t (Cook and Weisberg, Residuals and Influence, sec. 2.2).
 A reason counts if what it takes away is large against the chi2 per degree of freedom that it
-leaves.
+leaves. A slip of a value, or an exchange, counts only if the rest then fits: what is left of a
+missing effect, which moves many values, still does not.
 
 Nothing here runs a solver: `alternatives` evaluates the other states, `judge` calls both.
 """
@@ -46,6 +47,7 @@ MARKED = 16.0  # chi2 that a reason takes away, over the chi2 per degree of free
 MARKED_UNSTATED = 49.0  # the same where the scatter is known from the residuals alone
 MIN_DEGREES_LEFT = 3  # degrees of freedom that tell such a scatter
 MIN_CHECKED = 1e-6  # of a value's own weight: below, nothing else checks the value
+KINDS_OF_SLIP = ("value", "mode", "exchanged")  # kinds of reason after which the rest has to fit
 NEXT_REASON = 6.0  # chi2 between a reason and the next, 20 times less likely: below, both are named
 SAME_VALUE = 0.015  # relative, between a corrected value and the model, besides 3 sd
 
@@ -53,10 +55,16 @@ SAME_VALUE = 0.015  # relative, between a corrected value and the model, besides
 class FitReason(ResultPart):
     """The likeliest reason why a model is off its targets."""
 
-    kind: Literal["value", "exchanged", "pressure", "rim", "wheel", "pattern"]
+    # mode: one value is off, and an effect on its mode explains it nearly as well
+    kind: Literal["value", "mode", "exchanged", "pressure", "rim", "wheel", "pattern"]
     words: str  # a sentence that ends with the question to the user
     chi2_per_dof: float | None = None  # with the reason removed, by the linear model
     also: str = ""  # words of a reason that is nearly as likely
+
+    @property
+    def excludes_effects(self) -> bool:
+        """Whether no effect that the model lacks looks the same."""
+        return self.kind != "mode"
 
     @property
     def sentence(self) -> str:
@@ -160,6 +168,8 @@ def likeliest_reason(left: Remainder, shifts: Sequence[Shift] = ()) -> FitReason
         if freedom < (1 if left.is_stated else MIN_DEGREES_LEFT) or taken <= 0:
             continue
         per_dof = max(each.chi2, 1e-12 * left.chi2) / freedom
+        if left.is_stated and each.reason.kind in KINDS_OF_SLIP and per_dof > MAX_CHI2_PER_DOF:
+            continue
         scale, marked = (
             (max(1.0, per_dof), MARKED) if left.is_stated else (per_dof, MARKED_UNSTATED)
         )
@@ -181,26 +191,44 @@ def _values(left: Remainder) -> Iterator[_Suspicion]:
         if own[i] < MIN_CHECKED / left.covariance[i, i]:
             continue
         model = row.value * float(np.exp(-weighted[i] / own[i]))
-        reason = FitReason(kind="value", words=_slip(row, model, float(own[i] ** -0.5)))
-        yield _Suspicion(reason, left.chi2 - float(weighted[i] ** 2 / own[i]), 1)
+        left_chi2 = left.chi2 - float(weighted[i] ** 2 / own[i])
+        per_dof = left_chi2 / max(left.freedom - 1, 1)
+        scale = max(1.0, per_dof) if left.is_stated else per_dof
+        is_alone = _moved_together(left, row) > left_chi2 + NEXT_REASON * scale
+        reason = _slip(row, model, float(own[i] ** -0.5), is_alone)
+        yield _Suspicion(reason, left_chi2, 1)
 
 
-def _slip(row: Measurement, model: float, sd: float) -> str:
+def _moved_together(left: Remainder, row: Measurement) -> float:
+    """chi2 if an effect moves all values of the row's mode, or quantity, by the same factor."""
+    alike = [(r.quantity, r.label) == (row.quantity, row.label) for r in left.rows]
+    E = np.array(alike, dtype=float)
+    weighted = left.weight @ E
+    size = float(E @ weighted)
+    taken = float(left.deviation @ weighted) ** 2 / size if size > 0 else 0.0
+    return left.chi2 - taken
+
+
+def _slip(row: Measurement, model: float, sd: float, is_alone: bool) -> FitReason:
     """A value that is off; model: what the model calibrated to the others has, sd its relative
-    standard deviation."""
+    standard deviation; is_alone: an effect on its mode explains less."""
     unit = "Hz" if row.quantity == "frequency_Hz" else ""
     at = f" at {row.pressure_kPa:g} kPa" * bool(row.pressure_kPa)
     at += f" under {row.load_N:g} N" * bool(row.load_N)
     place = f"{row.place}: " if row.place else ""
     meant = likely_value(row.value, model, max(3 * sd, SAME_VALUE))
+    kind: Literal["value", "mode"] = "value" if is_alone or meant is not None else "mode"
     question = "is it a slip, or another mode?" if unit else "is it a slip?"
+    if kind == "mode":
+        question = "is it a slip, or does the model lack an effect on this mode?"
     if meant is not None:
         question = f"did you mean {meant:.6g}{f' {unit}' if unit else ''}?"
     value, other = (f"{each} {unit}".rstrip() for each in (f"{row.value:.6g}", f"{model:.4g}"))
-    return (
+    words = (
         f"{place}{row.name} is {value}{at}, where the model calibrated to the other values has"
         f" {other}: {question}"
     )
+    return FitReason(kind=kind, words=words)
 
 
 def likely_value(value: float, model: float, tolerance: float) -> float | None:
