@@ -281,6 +281,17 @@ def test_moduli_scale_shear_and_volume_apart(name: str, F: Array) -> None:
 
 
 @pytest.mark.parametrize(
+    "data", ["5E5, 2., 0., 1., 0., 1., 1E-8", "5E5, 2., 0., 1., 0., 1., 1E-8, 0.\n0."]
+)
+def test_constants_that_are_left_out_are_0(data: str) -> None:
+    """Nine constants are on two lines, of which the second may be missing."""
+    law = read(f"*MATERIAL, NAME=GUM\n*HYPERELASTIC, OGDEN, N=3\n{data}\n")
+    plain = read("*MATERIAL, NAME=GUM\n*HYPERELASTIC, OGDEN\n5E5, 2., 1E-8\n")
+    np.testing.assert_allclose(law.shear_modulus, plain.shear_modulus)
+    assert law.inverse_D1[..., 0] == pytest.approx(plain.inverse_D1[..., 0])
+
+
+@pytest.mark.parametrize(
     ("line", "data", "words"),
     [
         ("YEOH", "6E5, 0., 0., -1E-8", "D must not be negative"),

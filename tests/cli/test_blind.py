@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.studies.blind.seal import SEAL, TRUTH
+from tyrecal.studies.blind.seal import ANSWERS, SEAL, TRUTH
 from tyrecal.studies.inference.spans import spans_of
 
 from .test_cli import run
@@ -82,7 +82,11 @@ def test_a_study_from_end_to_end(
     ]
     assert run("blind", *make) == 0
     assert (out / SEAL).exists() and not list(out.rglob(TRUTH))
-    assert run("blind", "answer", str(out), "--effect", "spindle_lateral", "--quiet") == 0
+    capsys.readouterr()
+    assert run("blind", "answer", str(out), "--effect", "spindle_lateral", "--json") == 0
+    answered = json.loads(capsys.readouterr().out)
+    sealed = json.loads((out / ANSWERS).read_text())["sha256"]
+    assert answered == {"folder": str(out), "sha256": sealed}
     assert run("blind", "score", str(out), "--json") == 0
     printed = json.loads(capsys.readouterr().out)
     assert printed == json.loads((out / "score.json").read_text())

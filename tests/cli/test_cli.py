@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from importlib.metadata import EntryPoint
@@ -432,3 +433,17 @@ def test_too_little_memory_is_one_sentence(
     assert run("validate", CASE) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("error: ") and "memory" in line
+
+
+@pytest.mark.parametrize(("given", "threads"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")])
+def test_blas_has_one_thread_unless_its_variable_is_set(
+    given: dict[str, str], threads: str
+) -> None:
+    """Set before NumPy is imported, which reads it once."""
+    code = "import os, sys, tyrecal.cli.main; print(os.environ['OPENBLAS_NUM_THREADS'])"
+    code += "; assert 'numpy' not in sys.modules"
+    env = {k: v for k, v in os.environ.items() if not k.endswith("_NUM_THREADS")} | given
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == threads

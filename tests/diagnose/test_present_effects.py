@@ -31,6 +31,17 @@ HELD = 0.9
 WITH_FILLER = with_values(CASE, {"effects.bead_filler": HELD})
 
 
+def test_ranges_count_from_what_the_case_has() -> None:
+    """From none of the effect to the end of its range, which the case is part of the way to."""
+    plain, own = (
+        spans_of(case, Evaluator(TyreDesign(case)), ["bead_filler"])[0]["bead_filler"]
+        for case in (CASE, WITH_FILLER)
+    )
+    assert (plain.base, own.base) == (0.0, HELD)
+    assert own.low == pytest.approx(plain.low - HELD) and own.low < 0
+    assert own.high == pytest.approx(plain.high - HELD) and own.high > 0
+
+
 @pytest.mark.slow
 def test_parameters_count_from_what_the_case_has() -> None:
     evaluator = Evaluator(TyreDesign(WITH_FILLER))
