@@ -18,7 +18,10 @@ from .known_truth import CASE, POWERS, START, START_X, TARGETS, TRUTH, evaluator
 def test_says_that_it_did_not_move() -> None:
     """Frequencies that nothing changes: converged at once, and not moved."""
     fit = calibrate(CASE, evaluator(powers={n: 0 * p for n, p in POWERS.items()}))  # type: ignore[arg-type]
-    assert not fit.result["moved"]
+    assert fit.result["converged"] and not fit.result["moved"]
+    assert not fit.found.is_good
+    assert not fit.found.model_copy(update={"converged": False, "moved": True}).is_good
+    assert fit.found.model_copy(update={"moved": True}).is_good
     assert fit.result["singular_values"] == [0.0, 0.0, 0.0]
     assert all(v["standard_error"] is None for v in fit.result["variables"].values())
 
