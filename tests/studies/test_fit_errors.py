@@ -1,0 +1,44 @@
+"""The record of stated errors is counted as its page states."""
+
+from __future__ import annotations
+
+import json
+
+from ..conftest import ROOT
+from .fit_errors import table
+
+BENCHMARKS = ROOT / "tests" / "benchmarks"
+
+
+def test_what_a_90_percent_interval_holds_is_counted() -> None:
+    one = {
+        "size": "a",
+        "chi2_per_dof": 1.0,
+        "variables": {"C10": [3.0, 1.0]},
+        "modes": {"[1,0]": 2},
+    }
+    other = {
+        "size": "a",
+        "chi2_per_dof": 2.0,
+        "variables": {"C10": [-4.0, -1.7]},
+        "modes": {"[1,0]": -1},
+    }
+    rows = list(table([one, other]))
+    assert "| a | C10 | 1 of 2 | 3.54 | 1.39 |" in rows
+    assert (
+        "| a | [1,0] | 1 of 2 |  | 1.58 |" in rows
+        and "| a | all modes | 1 of 2 |  | 1.58 |" in rows
+    )
+    assert rows[-1] == "a: 2 tyres, chi2/dof 1.50 on average"
+
+
+def test_the_page_states_the_counts_of_the_record() -> None:
+    page = (BENCHMARKS / "VERDICTS.md").read_text()
+    lines = [json.loads(x) for x in (BENCHMARKS / "fit_errors.jsonl").read_text().splitlines()]
+    held = {
+        row.split("|")[2].strip(): row.split("|")[3].strip()
+        for row in table(lines)
+        if row[0] == "|"
+    }
+    for name in ("all modes", "A_belt", "A_carcass", "C10", "[0,0] axial"):
+        assert held[name] in page
