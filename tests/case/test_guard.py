@@ -58,6 +58,12 @@ SLIPS = {  # name: text of the good case, text in its place, key, what was meant
         "rebar_layers.belt_2.angle_deg",
         "usual are belts on both sides of the circumference, all 2 are on one; did you mean 110",
     ),
+    "a carcass of a hundredth": (
+        "9.87e+9",
+        "9.87e+7",
+        "materials.carcass_cord.youngs_modulus_Pa",
+        "usual is 5e+08 to 3e+11 Pa",
+    ),
     "a Poisson's ratio by a thousand": (
         "poissons_ratio: 0.3",
         "poissons_ratio: 0.0003",

@@ -144,7 +144,7 @@ USUAL: dict[str, Usual] = {
     "materials.*.prony.*.tau_s": Usual(1e-7, 1e5, "s", {"ms": 1e-3}),
     "materials.*.reference_frequency_Hz": Usual(0.1, 1000, "Hz", FREQUENCY),
     # textile cords 1 to 25 GPa, aramid 60 to 130, steel 150 to 210: see `cord_modulus`
-    "materials.*.youngs_modulus_Pa": Usual(5e7, 3e11, "Pa", STRESS),
+    "materials.*.youngs_modulus_Pa": Usual(5e8, 3e11, "Pa", STRESS),
     "materials.*.poissons_ratio": Usual(0, 0.5, "", least=0.05),
     "materials.*.density_kg_per_m3": Usual(500, 9000, "kg/m3", DENSITY),
     "rebar_layers.*.area_m2": Usual(
