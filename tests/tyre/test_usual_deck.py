@@ -99,6 +99,7 @@ def test_a_slip_is_refused_with_what_was_meant(
         ([("BELT_1, 2.1e-7", "BELT_1, 2.1e-6")], "rebar BELT_1 / area", "cords every 1.16 mm"),
         ([(", 110.0", ", 70.0")], "rebar BELT_2 / angle", "did you mean 110 degrees"),
         ([(", 70.0", ", 20.0")], "rebar BELT_1 / angle", "20 degrees from the circumference"),
+        ([(", 70.0", ", 0.07")], "rebar BELT_1 / angle", "usual is 25 to 155"),
         ([("CORD, 0.0", "CORD, 90.0")], "rebar CARCASS / angle", "usual is -30 to 30"),
     ],
 )

@@ -51,7 +51,8 @@ OF_FIELD = {  # the end of a number's path: its range
 SHEAR_TERMS = {"C10": 2.0, "C01": 2.0, "mu": 1.0} | {f"mu{i}": 1.0 for i in range(1, 7)}
 """Constants of *HYPERELASTIC, and the factor with which each adds to the shear modulus."""
 OVER_THE_CROWN = 0.35  # of a section's height: how far down from the crown a belt may reach
-MIN_BELT_ANGLE = 10.0  # degrees from the meridian; cords at less may be a piece of a carcass
+# degrees from the meridian; cords at less may be a piece of a carcass that is given in pieces
+MIN_BELT_ANGLE = 10.0
 ANY_CONSTANT = Usual(-1e9, 1e9, "Pa", STRESS)
 MEMBRANE = Usual(1e-7, 5e-3, "m", LENGTH)  # thin ones only bear cords
 ANGULAR_SPACING = USUAL["rebar_layers.*.spacing_deg"]
@@ -166,14 +167,22 @@ def _angles(flat: SolverDeck) -> dict[tuple[str, float], Usual]:
         radii.setdefault(_key(ply), []).extend(mesh.nodes[n][0] for n in nodes)
     section = [mesh.nodes[n][0] for n in mesh.around]
     lowest, height = min(section), max(section) - min(section)
-    ranges = {}
-    for key, those in radii.items():
-        low, high = ((r - lowest) / height for r in (min(those), max(those)))
-        if low > 1 - OVER_THE_CROWN and abs((key[1] + 90) % 180 - 90) >= MIN_BELT_ANGLE:
-            ranges[key] = BELT_ANGLE
-        elif low < OVER_THE_CROWN and high > 1 - OVER_THE_CROWN:
-            ranges[key] = CARCASS_ANGLE
-    return ranges
+    spans = {
+        key: [(r - lowest) / height for r in (min(those), max(those))]
+        for key, those in radii.items()
+    }
+    carcasses = {
+        key: CARCASS_ANGLE
+        for key, (low, high) in spans.items()
+        if low < OVER_THE_CROWN and high > 1 - OVER_THE_CROWN
+    }
+    belts = {
+        key: BELT_ANGLE
+        for key, (low, _) in spans.items()
+        if low > 1 - OVER_THE_CROWN
+        and (carcasses or abs((key[1] + 90) % 180 - 90) >= MIN_BELT_ANGLE)
+    }
+    return belts | carcasses
 
 
 def _shear_terms(deck: OwnDeck, material: str) -> dict[str, float]:
