@@ -98,6 +98,10 @@ def test_chi2_above_its_freedom_scales_the_total() -> None:
     ]
     assert errors[:2] == [errors[0]] * 2
     assert errors[2] == pytest.approx(2 * errors[0])
+    # what predictions are made of states the scatter of each target, relative
+    assert [each.scatter for each in total.responses] == pytest.approx(
+        [SIGMA] * len(problem.targets)
+    )
 
 
 def test_why_it_is_not_known() -> None:

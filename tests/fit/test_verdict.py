@@ -181,6 +181,17 @@ def test_a_slip_is_named_only_if_the_rest_fits(rest: float, is_slip: bool) -> No
     assert left.chi2_per_dof is not None and left.chi2_per_dof > 5
 
 
+def test_a_slip_is_named_with_one_value_more_than_it_takes() -> None:
+    """Four values, two variables, one slip: one degree of freedom is left."""
+    values = HERTZ.copy()
+    values[1] *= 10
+    whole = remainder(values, HERTZ, J, PRESSURES[:1])
+    left = Remainder(whole.rows[:4], whole.deviation[:4], whole.covariance[:4, :4], J[:4])
+    assert left.freedom == 2
+    reason = likeliest_reason(left)
+    assert reason and reason.kind == "value" and "did you mean 35 Hz" in reason.words
+
+
 @pytest.mark.parametrize(("factor", "kind"), [(1.05, "mode"), (10.0, "value")])
 def test_a_mode_measured_once_may_show_an_effect(factor: float, kind: str) -> None:
     """Unless its number is a likely slip: at a second pressure the mode would tell."""
