@@ -26,6 +26,21 @@ if __name__ == "__main__":
     with process_pool(1) as pool:
         pool.submit(work, sys.argv[1]).result()
 """
+TOLD_TO_END = """
+import os, signal
+from tyrecal.simulate.evaluate.pool import _work
+
+def task():
+    try:
+        os.kill(os.getpid(), signal.SIGTERM)
+    finally:
+        print("cleared", flush=True)
+
+try:
+    _work(task)
+finally:
+    print("answered", flush=True)
+"""
 STOPPED = """
 import os, random, signal, sys, threading
 from tests.evaluate.test_pool import large
@@ -194,3 +209,12 @@ def test_an_interruption_ends_the_workers(
     with pytest.raises(KeyboardInterrupt), Pool(1):
         pass
     assert ended == ["now", "now"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows ends processes without a signal")
+def test_a_worker_that_is_told_to_end_finishes_its_task_and_ends() -> None:
+    """The task may clear what it had begun; no answer follows."""
+    done = subprocess.run(
+        [sys.executable, "-c", TOLD_TO_END], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (128 + signal.SIGTERM, "cleared\n"), done.stderr
