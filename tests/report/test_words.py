@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from tyrecal.report.diagnosis import _robust
 from tyrecal.report.table import fit_doubts, fit_verdict
 
 
@@ -88,3 +90,15 @@ def test_variables_that_the_data_do_not_determine(error: float | None, words: st
     result["variables"]["A"]["standard_error"] = error
     doubts = fit_doubts(result)
     assert len(doubts) == (words is not None) and all(words in doubt for doubt in doubts if words)
+
+
+@pytest.mark.parametrize("readings", [1, 2])
+def test_a_robust_verdict_mentions_labelings_if_there_are_several(readings: int) -> None:
+    robustness = SimpleNamespace(robust=True, low=0.7, high=0.9)
+    verdict = SimpleNamespace(key="rim_width", best="rim_width", kind="named")
+    d: Any = SimpleNamespace(
+        robustness=robustness, verdict=verdict, exchanged=[], readings=[None] * readings
+    )
+    words = _robust(d)
+    assert ("under every likely labeling" in words) == (readings == 2)
+    assert "the probability of `rim_width` is between 0.70 and 0.90" in words
