@@ -13,7 +13,7 @@ import numpy, scipy.linalg
 size = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
 hard = resource.getrlimit(resource.RLIMIT_AS)[1]
 resource.setrlimit(resource.RLIMIT_AS, (size + 20_000_000, hard))  # a buffer has 32 MB
-from tyrecal_solvers.bundled.section import compiled
+from tyrecal_solvers.bundled.section import lapack_memory
 """
 
 
