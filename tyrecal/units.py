@@ -3,6 +3,7 @@ engineers say; files and formulas have SI."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from math import pi
 
@@ -77,6 +78,11 @@ def factor(table: Mapping[str, float], unit: str) -> float | None:
 def display_unit(unit: str) -> tuple[str, float]:
     """The unit that engineers use for one of the catalogue or the case, and the factor to it."""
     return SAID.get(unit, (unit, 1.0))
+
+
+def printed_unit(unit: str) -> str:
+    """A unit as people read it: 'kg/m3' becomes 'kg/m³'; keys of files keep their digits."""
+    return re.sub(r"(?<=[a-z])[23]\b", lambda digit: {"2": "²", "3": "³"}[digit[0]], unit)
 
 
 def in_engineers_units(value: float, unit: str, digits: int = 6) -> str:

@@ -71,7 +71,7 @@ def _words(result: dict[str, Any]) -> list[str]:
     for each in result.get("footprints", ()):
         words += [
             f"{each['load_N']:g} N: deflection {1e3 * each['deflection_m']:.2f} mm,"
-            f" contact area {1e4 * each['contact_area_m2']:.1f} cm2"
+            f" contact area {1e4 * each['contact_area_m2']:.1f} cm²"
         ]
     return words + ([result["failure"]] if result.get("failure") else [])
 

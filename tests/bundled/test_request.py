@@ -196,7 +196,7 @@ def test_words_of_steps_and_footprints() -> None:
         "  harmonic 2: 73.12, 88.20 Hz",
     ]
     assert _words({"footprints": [pressed], "failure": "no more"}) == [
-        "4000 N: deflection 20.34 mm, contact area 182.2 cm2",
+        "4000 N: deflection 20.34 mm, contact area 182.2 cm²",
         "no more",
     ]
     assert _words({"footprints": [], "failure": ""}) == []

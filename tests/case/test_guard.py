@@ -38,7 +38,7 @@ SLIPS = {  # name: text of the good case, text in its place, key, what was meant
         "density_kg_per_m3: 1100.0",
         "density_kg_per_m3: 7850.0",
         "materials.rubber.density_kg_per_m3",
-        "usual is 700 to 2500 kg/m3 of rubber",
+        "usual is 700 to 2500 kg/m³ of rubber",
     ),
     "kPa of steel": (
         "172.2e+9",
@@ -50,7 +50,7 @@ SLIPS = {  # name: text of the good case, text in its place, key, what was meant
         "belt_1: {line: belt1, material: belt_cord, area_m2: 2.118683e-7",
         "belt_1: {line: belt1, material: belt_cord, area_m2: 2.118683e-6",
         "rebar_layers.belt_1.area_m2",
-        "usual is 5e-09 to 1.52184e-06 m2, for belt cords every 1.16 mm",
+        "usual is 5e-09 to 1.52184e-06 m², for belt cords every 1.16 mm",
     ),
     "belts on one side": (
         "angle_deg: 110.0",
@@ -84,8 +84,8 @@ SLIPS = {  # name: text of the good case, text in its place, key, what was meant
     ),
     "1/MPa": ("5.085e-8", "5.085e-2", "materials.rubber.D1_per_Pa", "0.05085 1/MPa, 5.085e-08"),
     "bulk modulus": ("5.085e-8", "3.9e7", "materials.rubber.D1_per_Pa", "bulk modulus K, D1 = 2/K"),
-    "g/cm3": ("1100.0", "1.1", "materials.rubber.density_kg_per_m3", "1.1 g/cm3, 1100 kg/m3"),
-    "t/mm3": ("5900.0", "5.9e-9", "materials.belt_cord.density_kg_per_m3", "t/mm3, 5900 kg/m3"),
+    "g/cm3": ("1100.0", "1.1", "materials.rubber.density_kg_per_m3", "1.1 g/cm³, 1100 kg/m³"),
+    "t/mm3": ("5900.0", "5.9e-9", "materials.belt_cord.density_kg_per_m3", "t/mm³, 5900 kg/m³"),
     "GPa": ("172.2e+9", "172.2", "materials.belt_cord.youngs_modulus_Pa", "172.2 GPa, 1.722e+11"),
     "MPa of cords": (
         "9.87e+9",
@@ -97,7 +97,7 @@ SLIPS = {  # name: text of the good case, text in its place, key, what was meant
         "area_m2: 2.118683e-7",
         "area_m2: 0.2118683",
         "rebar_layers.belt_1.area_m2",
-        "0.211868 mm2, 2.119e-07 m2",
+        "0.211868 mm², 2.119e-07 m²",
     ),
     "mm of spacing": (
         "spacing_m: 1.16e-3",
@@ -161,7 +161,7 @@ SLIPS = {  # name: text of the good case, text in its place, key, what was meant
         "  modes:\n",
         "  footprint: [{load_N: 4000, contact_area_m2: 160, sigma_m2: 3}]\n  modes:\n",
         "targets.footprint.0.contact_area_m2",
-        "160 cm2, 0.016 m2",
+        "160 cm², 0.016 m²",
     ),
     "mm of a patch": (
         "  modes:\n",
@@ -241,7 +241,7 @@ def test_one_small_or_fast_term_of_a_prony_series_is_usual(tmp_path: Path) -> No
 SETTINGS = [  # arguments after the case, and what was meant
     (["modes", "--pressure-kPa", "2.4"], "--pressure-kPa 2.4: usual is 50 to 1200 kPa"),
     (["modes", "--set", "C10=1.0"], "--set C10=1: usual is"),
-    (["modes", "--set", "materials.rubber.density_kg_per_m3=1.1"], "1.1 g/cm3, 1100 kg/m3"),
+    (["modes", "--set", "materials.rubber.density_kg_per_m3=1.1"], "1.1 g/cm³, 1100 kg/m³"),
     (["modes", "--set", "rebar_layers.belt_1.angle_deg=110"], "did you mean 70 degrees"),
     (["modes", "--set", "materials.rubber.C01_Pa=-9e5"], "usual is -850000 to 1.9e+07 Pa"),
     (["modes", "--set", "C10=1e3"], "1000 kPa, 1e+06 Pa"),

@@ -33,11 +33,11 @@ def test_no_number_of_a_deck_as_it_is_is_unusual(style: str, tmp_path: Path) -> 
         ("plain", "material CORD / ELASTIC / E", 1e4, "10000 MPa, 1e+10 Pa"),
         ("plain", "material RUBBER / HYPERELASTIC / C10", 0.8, "0.8 MPa, 8e+05 Pa"),
         ("plain", "material RUBBER / HYPERELASTIC / D1", 0.05, "0.05 1/MPa, 5e-08 1/Pa"),
-        ("plain", "material RUBBER / DENSITY / density", 1.1, "1.1 g/cm3, 1100 kg/m3"),
+        ("plain", "material RUBBER / DENSITY / density", 1.1, "1.1 g/cm³, 1100 kg/m³"),
         ("plain", "rebar BELT_1 / spacing", 1.16, "1.16 mm, 0.00116 m"),
-        ("plain", "rebar BELT_1 / area", 0.21, "0.21 mm2, 2.1e-07 m2"),
+        ("plain", "rebar BELT_1 / area", 0.21, "0.21 mm², 2.1e-07 m²"),
         ("millimetres", "material CORD / ELASTIC / E", 1e10, "1e+10 Pa, 1e+04 MPa"),
-        ("millimetres", "material CORD / DENSITY / density", 1500.0, "1500 kg/m3, 1.5e-09 t/mm3"),
+        ("millimetres", "material CORD / DENSITY / density", 1500.0, "1500 kg/m³, 1.5e-09 t/mm³"),
         ("millimetres", "rebar BELT_1 / spacing", 0.00116, "0.00116 m, 1.16 mm"),
     ],
 )
@@ -73,7 +73,7 @@ def test_a_slip_is_refused_with_what_was_meant(
         (
             [("1100.0", "7850.0")],
             "material RUBBER / DENSITY / density",
-            "usual is 700 to 2500 kg/m3 of rubber",
+            "usual is 700 to 2500 kg/m³ of rubber",
         ),
         (
             [("1500.0\n", "7850.0\n"), ("10000000000.0", "190e6")],

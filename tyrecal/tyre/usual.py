@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from math import pi, sqrt
 from typing import TYPE_CHECKING, Any
 
-from ..units import INCH, LENGTH, LOAD, PRESSURE, QUANTITIES
+from ..units import INCH, LENGTH, LOAD, PRESSURE, QUANTITIES, printed_unit
 from .case.checks import Problems, at, find
 from .case.mistakes import Keys
 from .case.parts import number
@@ -57,7 +57,7 @@ class Usual:
         if self.holds(value):
             return None
         low = f"0, or {self.least:g}" if self.least and self.low == 0 else f"{self.low:g}"
-        unit = f" {self.unit}" if self.unit else ""
+        unit = f" {printed_unit(self.unit)}" if self.unit else ""
         least = f", of a size of at least {self.least:g} or 0" if self.low < 0 < self.least else ""
         meant = self._meant(value, unit)
         question = f"; did you mean {' or '.join(meant)}?" if meant else ""
@@ -71,7 +71,7 @@ class Usual:
             right = slip(value) if callable(slip) else slip * value
             alike = any(abs(right - other) <= READING_RTOL * abs(other) for other in readings)
             if value and self.holds(right) and not alike:
-                readings[right] = f"{value:g} {name}, {right:.4g}{unit}"
+                readings[right] = f"{value:g} {printed_unit(name)}, {right:.4g}{unit}"
         return list(readings.values())[:2]
 
 

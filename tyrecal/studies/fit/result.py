@@ -17,6 +17,7 @@ from ...tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ...tyre.number_units import unit_of
 from ...tyre.state import AS_THE_CASE
 from ...tyre.values import with_values
+from ...units import printed_unit
 from .. import named
 from ..fitted import NOT_CONVERGED
 from ..labels import Labels
@@ -418,7 +419,7 @@ class FitResult(Result):
         rows: list[list[Any]] = [
             [
                 name,
-                ", ".join(filter(None, (each.unit, "at bound" * each.at_bound))),
+                ", ".join(filter(None, (printed_unit(each.unit), "at bound" * each.at_bound))),
                 *map(RESULT_DIGITS.cell, (each.initial, each.value)),
                 f"{each.lower:g}..{each.upper:g}",
                 each.percent(each.standard_error_total),

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from ...units import printed_unit
 from ..result import (
     NAME_COLUMNS,
     Column,
@@ -198,7 +199,7 @@ class SampleResult(Result):
             half = (v.high - v.low) / (2 * 1.645)  # as a standard error, were it normal
             percent = [f"{100 * each / v.median:.2g}" for each in (half, v.standard_error)]
             figures = [*map(DIGITS.cell, (v.median, v.low, v.high)), *percent]
-            rows.append([name, *figures, DIGITS.cell(v.best), v.unit])
+            rows.append([name, *figures, DIGITS.cell(v.best), printed_unit(v.unit)])
         return [Table([*map(Column, heads)], rows), *self._predicted()]
 
     def _predicted(self) -> list[Table]:
@@ -248,7 +249,7 @@ class SampleResult(Result):
 
     def summary(self) -> list[str]:
         ranges = (
-            f"{name} {v.low:.4g} to {v.high:.4g} {v.unit}".rstrip()
+            f"{name} {v.low:.4g} to {v.high:.4g} {printed_unit(v.unit)}".rstrip()
             for name, v in self.variables.items()
         )
         return [f"90 % of the draws: {', '.join(ranges)}"]
