@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 READING_RTOL = 0.05  # readings that differ by less are one: bar and atm
 Slips = Mapping[str, float | Callable[[float], float]]
-"""What may have been written instead, and the factor, or the function, to the right unit."""
+"""Units that may have been meant, each with the factor, or the function, to the right unit."""
 ALL_THE_SAME = " (--allow-unusual accepts it)"
 _SIGMAS = {"frequency_Hz": "sigma_Hz", "mass_kg": "sigma_kg"} | {
     name: each.sigma for name, each in FOOTPRINT_QUANTITIES.items()

@@ -47,7 +47,7 @@ class Design(Protocol):
     """
 
     values: Mapping[str, float]
-    """Of the design variables, and other numbers that were set, by name or path."""
+    """Values of the design variables, and of other numbers that were set, by name or path."""
 
     @property
     def header(self) -> str:
@@ -72,7 +72,7 @@ class Design(Protocol):
 
     @property
     def solver(self) -> SolverChoice:
-        """Which solver it is meant for, its options and time limit."""
+        """The solver that the case names, its options and time limit."""
 
     @property
     def nominal(self) -> Design | None:

@@ -43,7 +43,7 @@ Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_\-]*$", ma
 NOT_IN_TEXT = r"\x00-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069"
 Text = Annotated[str, StringConstraints(pattern=rf"^[^{NOT_IN_TEXT}]*$", max_length=300)]
 Setting = float | bool | str | None
-"""What a user sets: a number, true or false, a word among those that the schema lists, null."""
+"""A value that a user sets: a number, true or false, a word that the schema lists, null."""
 Disagreement = tuple[str, str]
 """A key of a part, and what would be right there."""
 WRONG = object()

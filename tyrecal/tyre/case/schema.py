@@ -95,7 +95,7 @@ def _numbers(values: Mapping[str, Any], key: str) -> list[float]:
 
 
 class SolverChoice(Part):
-    """Which solver runs, how long one run (of footprints: a load) may take, its own options.
+    """The solver to run, how long one run (of footprints: a load) may take, its own options.
 
     The bundled solver's limit is processor time; a program's, time by the clock.
     """
@@ -275,11 +275,11 @@ def _every_effect(given: dict[str, float]) -> dict[str, float]:
 
 
 OF_A_SECTION = ("section", "mesh", "materials", "solids")
-"""What a case must have that is no deck's."""
+"""Keys that a case must have, if it has no deck."""
 IN_A_DECK = ("section", "mesh", "materials", "solids", "rebar_layers", "templates")
-"""What stands in the deck, where the case names one."""
+"""Keys that a case with a deck must not have: the deck has these numbers."""
 IN_DECKS = ("cavity", "spin_rad_per_s", "point_mass", "road_spring", "splice")
-"""What stands in decks in three dimensions, too."""
+"""Keys that a case with decks in three dimensions must not have either."""
 HIGHEST = "highest_harmonic"
 DECK_LEVEL = "deck"
 """The mesh level of a deck: it has its own mesh."""
