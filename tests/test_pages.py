@@ -1,32 +1,18 @@
-"""Figures of the pages on the paper and on real data are those that the tool computes; links of all
-documents lead somewhere, and a page on recorded studies stays short."""
+"""Figures of the documents are those that the commands give; links of all documents lead somewhere,
+and a page on recorded studies stays short."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from tyrecal.measured.tables import read_measurements
-from tyrecal.simulate.deck.tyre_design import TyreDesign
-from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
-from tyrecal.simulate.modes.label import Label, paired_labels
-from tyrecal.studies.fit.calibrate import calibrate
-from tyrecal.studies.fit.problem import objective
-from tyrecal.studies.fit.targets import read_targets
-from tyrecal.studies.labelling.label import fitted_prior, label
-from tyrecal.studies.labelling.result import labels_posterior
-from tyrecal.tyre.case import start_values
-from tyrecal.tyre.load import load_case
-
 from .conftest import CASES
-from .studies.both_columns import COLUMNS, PAPER_HZ
-from .studies.pages import differences, recorded
+from .studies.page_steps import STEPS
+from .studies.pages import DOCUMENTS as FIGURE_PAGES
+from .studies.pages import differences, is_rounded, marked_tables, numbers, plain, recorded, run
 
-NUMBER = re.compile(r"[+\-]?\d+(?:\.\d+)?")
 ROOT = CASES.parent
 BENCHMARKS = ROOT / "tests" / "benchmarks"
 DOCUMENTS = sorted(
@@ -37,54 +23,6 @@ DOCUMENTS = sorted(
 MAX_PAGE_WORDS = 1500
 
 
-def rows(page: str, start: str) -> list[list[str]]:
-    """Cells of the lines of a page's table that begin so, plain."""
-    text = (CASES / page).read_text(encoding="utf-8")
-    plain = text.replace("\N{MINUS SIGN}", "-").replace("*", "")
-    lines = re.findall(rf"^\| ({start}.*?) \|$", plain, re.M)
-    return [re.split(r" ?\| ", line) for line in lines]
-
-
-def figure(cell: str) -> float:
-    """The first number."""
-    match = NUMBER.search(cell)
-    assert match, cell
-    return float(match[0])
-
-
-def frequencies(values: Mapping[str, float]) -> dict[Label, float]:
-    """Frequencies of the paper's tyre."""
-    case = load_case(CASES / "p235_75r17.yaml")
-    answer = Evaluator(TyreDesign(case)).evaluate(Question(values))
-    return {mode.label: mode.frequency_Hz for mode in paired_labels(answer.modes)}
-
-
-def test_table_2_of_the_page_on_the_paper() -> None:
-    """Both columns, deviations and changes; equation (1) of both."""
-    targets = read_targets(load_case(CASES / "p235_75r17.yaml"))
-    start = start_values(load_case(CASES / "p235_75r17.yaml"))
-    hertz = [frequencies({**start, **column}) for column in COLUMNS]
-    printed = rows("paper.md", r"\[\d,\d\]")
-    for target, cells, paper in zip(targets, printed, np.transpose(PAPER_HZ), strict=True):
-        ours = [each[target.label] for each in hertz]
-        assert cells[0].split()[0] == f"[{target.label.c},{target.label.m}]"
-        expected = [
-            *(
-                x
-                for pair in zip(paper, ours, strict=True)
-                for x in (*pair, 100 * pair[1] / pair[0] - 100)
-            ),
-            100 * paper[1] / paper[0] - 100,
-            100 * ours[1] / ours[0] - 100,
-        ]
-        for cell, value in zip(cells[1:], expected, strict=True):
-            assert figure(cell) == pytest.approx(value, abs=0.06 if "%" in cell else 0.006), cells
-    (last,) = rows("paper.md", r"equation \(1\), Hz")
-    assert [figure(last[i]) for i in (2, 5)] == [
-        pytest.approx(objective(each, targets), abs=0.006) for each in hertz
-    ]
-
-
 def test_every_figure_is_the_recorded_one_rounded() -> None:
     """The record is that of the last run of `python -m tests.studies.pages FOLDER`."""
     assert not list(differences(recorded()))
@@ -92,21 +30,40 @@ def test_every_figure_is_the_recorded_one_rounded() -> None:
 
 @pytest.mark.slow
 @pytest.mark.numbers
-def test_labels_of_the_page_on_real_data() -> None:
-    """Labels that the fitted 205/60R15 gives to six frequencies without labels."""
-    case = load_case(CASES / "205_60r15.yaml")
-    evaluator = Evaluator(TyreDesign(case))
-    fixed = {"A_belt": case.case.variables["A_belt"].start}
-    fit = calibrate(case, evaluator, fixed=fixed).found
-    readings = read_measurements(CASES / "205_60r15_vervoort.csv", labelled=False)
-    labelled = label(case, evaluator, readings, fitted_prior(case, fit), fixed=fixed)
-    table = rows("real_data.md", r"\d{3}")
-    for cells, frequency in zip(table, labels_posterior(case, labelled).frequencies, strict=True):
-        assert figure(cells[0]) == frequency.frequency_Hz and cells[1] == frequency.display
-        assert figure(cells[2]) == pytest.approx(frequency.expected_Hz, abs=0.06)
-        off = 100 * (frequency.expected_Hz or 0.0) / frequency.frequency_Hz - 100
-        assert figure(cells[3]) == pytest.approx(off, abs=0.06)
-        assert figure(cells[4]) == pytest.approx(100 * frequency.probability, abs=1.0)
+@pytest.mark.parametrize("step", [name for name, step in STEPS.items() if step.is_quick])
+def test_a_command_gives_what_is_recorded(step: str, tmp_path: Path) -> None:
+    figures, kept = run(step, tmp_path), recorded()[step]
+    assert figures.keys() == kept.keys()
+    assert figures == pytest.approx(kept, rel=1e-4)
+
+
+@pytest.mark.parametrize("document", [name for name in FIGURE_PAGES if "tests/" not in name])
+def test_tables_of_figures_name_their_source(document: str) -> None:
+    """A table of which a third of the cells are numbers is checked, or says who gives them."""
+    for table in marked_tables(document):
+        cells = [cell for row in table.rows for cell in plain(row).strip("| ").split(" | ")[1:]]
+        figures = [cell for cell in cells if re.match(r"[+-]?\d", cell)]
+        assert table.kind or 3 * len(figures) < len(cells) or len(figures) < 2, table.rows
+
+
+@pytest.mark.parametrize(
+    ("printed", "value", "expected"),
+    [
+        ("2.6", 2.55, True),
+        ("2.6", 2.549, False),
+        ("2.60e-7", 2.604e-7, True),
+        ("10,000", 9e3, False),
+    ],
+)
+def test_a_printed_number_is_compared_to_its_last_digit(
+    printed: str, value: float, expected: bool
+) -> None:
+    assert is_rounded(printed, value) == expected
+
+
+def test_numbers_of_a_row_are_those_behind_its_name() -> None:
+    row = "| [3,0] at 2 kN | **\N{MINUS SIGN}11.5 %** | [4,0] 13 | 1.34e-7 ± 188 % | 10,000 |"
+    assert numbers(row) == ["-11.5", "13", "1.34e-7", "188", "10,000"]
 
 
 def text_without_code(document: Path) -> str:

@@ -6,7 +6,7 @@ their cases, in a fifth of the time. Lines of a ```text block right below are li
 
 from __future__ import annotations
 
-import csv
+import json
 import os
 import re
 import shutil
@@ -16,6 +16,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
+from .cli.test_cli import run
+from .studies.page_steps import of_fit
+from .studies.pages import differences, recorded
 
 ROOT = Path(__file__).parents[1]
 GUIDES = [
@@ -161,14 +165,22 @@ def test_the_quick_blocks_are_in_the_readme() -> None:
 
 @pytest.mark.guide
 def test_the_results_table_is_what_the_fit_gives(clone: Clone) -> None:
-    with (clone("README.md", 1) / "p235_75r17/fit.csv").open(encoding="utf-8") as file:
-        fitted = list(csv.DictReader(file))
-    table = re.findall(r"^\| \[\d,\d\] .*?\| (.*) \|$", (ROOT / "README.md").read_text(), re.M)
-    for cells, row in zip(table, fitted, strict=True):
-        shown = [float(cell.replace("\N{MINUS SIGN}", "-")) for cell in cells.split(" | ")]
-        hertz = [row["initial_Hz"], row["fitted_Hz"], row["target_Hz"]]
-        assert shown[:3] == pytest.approx(list(map(float, hertz)), abs=0.006)
-        assert shown[3] == pytest.approx(float(row["deviation_percent"]), abs=0.06)
+    """And every other figure of a document that this fit gives."""
+    content = json.loads((clone("README.md", 1) / "p235_75r17/fit.json").read_text("utf-8"))
+    assert not list(differences({**recorded(), "fit": of_fit(content)}))
+
+
+def test_the_error_in_the_reference_is_the_commands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for path in (ROOT / "cases").glob("p235_75r17.*"):
+        shutil.copy(path, tmp_path / path.name)
+    case = (tmp_path / "p235_75r17.yaml").read_text(encoding="utf-8")
+    (tmp_path / "my.yaml").write_text(case.replace("kPa: 240.0", "kPa: 2.4"), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    assert run("validate", "my.yaml") == 2
+    (shown,) = re.findall(r"^error: my.yaml.*", (ROOT / "cases/README.md").read_text(), re.M)
+    assert shown in " ".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.guide

@@ -1,0 +1,177 @@
+"""Sentences of the documents with figures in them, each with what the record has for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from .page_figures import AXIAL, LABELS, VARIABLES, change, of, rises
+from .page_steps import Record
+
+PAPER, REAL_DATA, OWN_TYRE = "cases/paper.md", "cases/real_data.md", "cases/own_tyre.md"
+SAMPLING, GUIDE = "cases/sampling.md", "cases/README.md"
+# page, its words with {} for each figure, what the record has for them
+SENTENCES: list[tuple[str, str, Callable[[Record], list[float]]]] = [
+    (PAPER, "SLSQP, exact sensitivities, {} evaluations", of("fit", "evaluations")),
+    (
+        PAPER,
+        "Gauss-Newton method, exact sensitivities, {} evaluations",
+        of("fit gauss-newton", "evaluations"),
+    ),
+    (
+        PAPER,
+        "with C10 held {}e-7 ± {} % and {}e-8 m² ± {} %, {} Hz",
+        of("fit C10 held", *VARIABLES, "objective_Hz"),
+    ),
+    (
+        PAPER,
+        "C10 falls to {} MPa ± {} %, A_belt {}e-7, A_carcass {}e-8 m², {} Hz",
+        of("fit", ("C10", 1e-6), "C10 %", VARIABLES[0], VARIABLES[2], "objective_Hz"),
+    ),
+    (
+        PAPER,
+        "{} % ([3,1]) with C10 held; {} % ([0,0] lateral) with all three",
+        lambda r: [abs(r["fit C10 held"]["off [3,1]"]), abs(r["fit"][f"off {AXIAL}"])],
+    ),
+    (
+        PAPER,
+        "| {}, with exact sensitivities; {} with C10 held; {} to within 0.05 Hz |",
+        lambda r: [
+            r["fit"]["evaluations"],
+            r["fit C10 held"]["evaluations"],
+            r["fit"]["evaluations_to_0.05_Hz"],
+        ],
+    ),
+    (
+        PAPER,
+        "it moves [0,0] lateral by {} % and [1,0] by {} %, A_belt alone by {} and {} %. On [3,0]"
+        " and [4,0] A_belt has more effect ({} and {} % for {} and {} %)",
+        lambda r: [
+            change(r, step, label)
+            for labels in ((AXIAL, "[1,0]"), ("[3,0]", "[4,0]"))
+            for step in (("A_carcass", "A_belt") if AXIAL in labels else ("A_belt", "A_carcass"))
+            for label in labels
+        ],
+    ),
+    (
+        PAPER,
+        "standard errors of {} (A_belt), {} (A_carcass) and {} % (C10)",
+        of("fit", "A_belt %", "A_carcass %", "C10 %"),
+    ),
+    (
+        PAPER,
+        "the belt's added mass ({} to {} kg)",
+        lambda r: [r["initial"]["mass_kg"], r["optimum"]["mass_kg"]],
+    ),
+    (
+        PAPER,
+        "the vertical stiffness falls by {} to {} %",
+        lambda r: [-max(rises(r, "N/mm")), -min(rises(r, "N/mm"))],
+    ),
+    (
+        PAPER,
+        "each frequency within {} %",
+        lambda r: [max(abs(r["inferred"][f"2: {x} {k}"]) for x in LABELS for k in (0, 1))],
+    ),
+    (
+        PAPER,
+        "sidewalls {} % thinner. Its belt cords have steel's density ({} g/cm³ for the example's"
+        " 5.9) and modulus ({} GPa, the bound). Its carcass cords are softer ({} GPa for 9.87), and"
+        " its rubber is denser ({},",
+        of(
+            "inferred",
+            *(("line 25 0", -100.0), ("line 33 0", 1e-3), ("line 31 0", 1e-9)),
+            *(("line 32 0", 1e-9), ("line 35 0", 1e-3)),
+        ),
+    ),
+    (
+        PAPER,
+        "The narrow rim's section ends at {} and {} Hz",
+        of("narrow rim", "line 13 1", "line 13 2"),
+    ),
+    (REAL_DATA, "All six together are {} % probable", of("labels", "labeling 0")),
+    (REAL_DATA, "next, with {} %, is [9,0]", of("labels", "labeling 1")),
+    (
+        REAL_DATA,
+        "114 Hz is [2,0] with {} %, [3,0] with {} %, [1,0] with {} %",
+        of("labels without a fit", "114 [2,0]", "114 [3,0]", "114 [1,0]"),
+    ),
+    (
+        REAL_DATA,
+        'calibration leaves {} % (rms), p = {}. "Nothing" has {} %, "not explained" {} %, the'
+        " likeliest effect {} %",
+        of("diagnosed", "rms %", "p", "none %", "outside %", "effect %"),
+    ),
+    (
+        REAL_DATA,
+        "*not explained by the catalogue*: {} % left, p = {}e-12",
+        of("diagnosed, section exact", "rms %", ("p", 1e12)),
+    ),
+    (
+        REAL_DATA,
+        "the tread, stiffness {} % ± {} %",
+        of("diagnosed, section exact", "part %", "part sigma %"),
+    ),
+    (
+        REAL_DATA,
+        "The labels [3,0] to [8,0] have a probability of {} %, and the fit fails: {} standard"
+        " deviations are left (χ² per degree of freedom {}). A_belt is {}e-7 m² ± {} %, A_carcass"
+        " {}e-7 m² ± {} %, C10 {} MPa ± {} %",
+        of(
+            "both",
+            *("labels %", "objective_Hz", "chi2", ("A_belt", 1e7), "A_belt %"),
+            *(("A_carcass", 1e7), "A_carcass %", ("C10", 1e-6), "C10 %"),
+        ),
+    ),
+    (
+        REAL_DATA,
+        "carcass cords ({} and {} kg, for",
+        of("one effect", "1: tread_modulus 10 2", "1: tread_modulus 20 2"),
+    ),
+    (
+        REAL_DATA,
+        "C10_sidewall {} MPa ± {} % and A_carcass {}e-7 m² ± {} %, after {} designs",
+        of(
+            "stiffnesses",
+            *(("C10_sidewall", 1e-6), "C10_sidewall %", ("A_carcass", 1e7), "A_carcass %"),
+            "evaluations",
+        ),
+    ),
+    (
+        OWN_TYRE,
+        "F falls from {} to {} standard deviations. The model weighs {} kg",
+        of("real", "initial_objective_Hz", "objective_Hz", "mass_kg"),
+    ),
+    (OWN_TYRE, "A_carcass, {}e-7 m²", of("real", ("A_carcass", 1e7))),
+    (OWN_TYRE, "have the correlation {}.", of("real, free", "A_belt and C10 correlated")),
+    (
+        SAMPLING,
+        "C10 is {} MPa ± {} % by `fit` and {} MPa ± {} % by `sample`",
+        lambda r: [
+            *of("fit", ("C10", 1e-6), "C10 total %")(r),
+            *of("sample", ("C10 median", 1e-6), "C10 %")(r),
+        ],
+    ),
+    (
+        "cases/measured_data.md",
+        "The total standard errors are {}, {} and {} %",
+        of("three states", *(f"{name} total %" for name in ("A_belt", "A_carcass", "C10"))),
+    ),
+    ("cases/diagnosis.md", "the p-value of the fit is {}.", of("paper diagnosed", "p")),
+    (
+        "cases/diagnosis.md",
+        '"none" has {}, and no effect exceeds',
+        of("paper diagnosed", ("none %", 0.01)),
+    ),
+    (
+        GUIDE,
+        "The sensitivities d ln f / d ln p are between {} and {};",
+        lambda r: [
+            choose(
+                r[step][f"{design} {name} rate"]
+                for step in ("sweep", "narrow rim, sweep")
+                for design in ("initial", "fitted")
+            )
+            for choose, name in ((min, "least"), (max, "largest"))
+        ],
+    ),
+]
