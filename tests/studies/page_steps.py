@@ -153,7 +153,7 @@ def of_measurements(text: str) -> Figures:
 
 
 def of_shapes(text: str) -> Figures:
-    """What `measured import` prints of each shape: the probability of its label."""
+    """Probability of the label of each shape, from what `measured import` prints."""
     lines = re.findall(r"(\[\d,\d\](?: lateral| torsional)?)((?: +[\d.]+)+)\s*$", text, re.M)
     return {f"{label} sure": float(numbers.split()[-1]) for label, numbers in lines}
 

@@ -53,17 +53,20 @@ DRAWN = [
     Drawn(
         [
             f"fit {CASE}",
-            f"sweep-pressure {CASE} {FITTED}",
             f"effects bead_filler --case {CASE} {FITTED} --output bead_filler",
             f"effects spindle_tilt --case {CASE} {FITTED} --output spindle_tilt",
         ],
         {
             "modes.png": "p235_75r17/fit_modes.png",
             "section.png": "p235_75r17/fit_section.png",
-            "pressure_sweep.png": "p235_75r17/pressure_sweep.png",
             "effect_bead_filler.png": "bead_filler/effect_bead_filler.png",
             "effect_spindle_tilt.png": "spindle_tilt/effect_spindle_tilt.png",
         },
+        is_quick=True,
+    ),
+    Drawn(
+        [f"fit {CASE} --no-pictures", f"sweep-pressure {CASE} {FITTED}"],
+        {"pressure_sweep.png": "p235_75r17/pressure_sweep.png"},
     ),
     Drawn(
         [f"diagnose {CASE} --measured cases/p235_75r17_wheeler.csv --output diagnosis"],
