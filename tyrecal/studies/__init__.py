@@ -1,6 +1,13 @@
 """Studies of a tyre. A study is one class, a `Result`, with `run`, its figures in `report` and its
 command in `cli`. One from outside names its `Result` as an entry point ``tyrecal.studies`` and its
-command as one of ``tyrecal.commands``. Command line, batch, API and page know no study by name."""
+command as one of ``tyrecal.commands``. Command line, batch, API and page know no study by name.
+
+>>> from tyrecal.simulate.deck.tyre_design import TyreDesign
+>>> from tyrecal.simulate.evaluate.evaluator import Evaluator
+>>> import tyrecal
+>>> case = tyrecal.load_case("cases/p235_75r17.yaml", mesh="coarse")
+>>> evaluator = Evaluator(TyreDesign(case))
+"""
 
 from __future__ import annotations
 
@@ -84,7 +91,11 @@ def study_class(name: str) -> type[Result]:
 
 def result_types() -> dict[str, type[Result]]:
     """Types of results by the name of the study, those from outside last; one that cannot be loaded
-    is named and left out."""
+    is named and left out.
+
+    >>> list(result_types())[:3]
+    ['fit', 'modes', 'sweep-pressure']
+    """
     from ..tyre.plugins import load_plugin
 
     types = {name: named(entry.place) for name, entry in STUDIES.items()}

@@ -69,6 +69,11 @@ class Emulator:
     degrees (k, v) of the products; coefficients (k, n + 1), the last of d; designs: what it is made
     of; errors, relative: the median of all; of each label (n,) what 99 % of designs keep; what they
     keep in all labels; covariance (n, n) of the labels' errors in a design.
+
+    >>> import tyrecal
+    >>> surrogate = tyrecal.emulate(case, reach=0.1, evaluations=10)
+    >>> min(surrogate.frequencies({"C10": 1.05e6}).values()) > 36
+    True
     """
 
     variables: tuple[DesignVariable, ...]

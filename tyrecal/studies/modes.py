@@ -93,7 +93,13 @@ class ModesResult(Result):
 def run(
     case: LoadedCase, evaluator: Evaluator, values: Mapping[str, float]
 ) -> tuple[ModesResult, Evaluation, list[Mode]]:
-    """One design: the result, and what it was made of. Raises what `Evaluator.evaluate` does."""
+    """One design: the result, and what it was made of. Raises what `Evaluator.evaluate` does.
+
+    >>> from tyrecal.tyre.case import start_values
+    >>> result, evaluation, modes = run(case, evaluator, start_values(case))
+    >>> print(modes[0].label, f"{modes[0].frequency_Hz:.1f} Hz of {result.mass_kg:.2f} kg")
+    [0,0] axial 37.0 Hz of 12.81 kg
+    """
     from ..simulate.evaluate.evaluator import Question  # late: not for those who read results
 
     evaluation = evaluator.evaluate(Question(values))

@@ -34,7 +34,12 @@ class PressedState:
 
 @dataclass(frozen=True)
 class PressingPlan:
-    """Size of the problem, number of runs, likely time and memory."""
+    """Size of the problem, number of runs, likely time and memory.
+
+    >>> plan = PressingPlan(nodes=100, places_round=17, designs=1, states=())
+    >>> plan.section_unknowns
+    300
+    """
 
     nodes: int  # of the section
     # nodes round half the tyre, from the patch to the top, which has a half turn's symmetry

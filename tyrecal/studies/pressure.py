@@ -70,6 +70,11 @@ def sweep(
     Where a target's mode is not among the modes that the case asks for, more are asked for.
     Raises DeckRefused and what else ``Evaluator.evaluate`` raises for wrong input; an
     evaluation that fails is an outcome.
+
+    >>> from tyrecal.tyre.case import start_values
+    >>> outcomes = sweep(case, evaluator, {"initial": start_values(case)}, [200.0, 240.0])
+    >>> [round(state.modes[0].frequency_Hz, 1) for state in outcomes]
+    [34.2, 37.0]
     """
     name = pressure_name(case)
     wanted = target_labels(case)

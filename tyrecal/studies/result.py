@@ -31,7 +31,11 @@ Wave = Annotated[int, Field(ge=0, le=200)]
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table."""
+    """A column of a table.
+
+    >>> Column("area, cm²", ".1f", 1e4).cell(0.0158)
+    '158.0'
+    """
 
     name: str  # with the unit
     form: str = ".2f"  # of a number; "": the column holds words
@@ -59,7 +63,12 @@ NAME_COLUMNS = (Column("mode", ""), Column("motion", ""))  # see `Named.named`
 
 @dataclass(frozen=True)
 class Table:
-    """A table, for a terminal and for a page alike."""
+    """A table, for a terminal and for a page alike.
+
+    >>> table = Table([Column("mode", ""), Column("Hz", ".1f")], [["[2,0]", "79.5"]])
+    >>> [column.name for column in table.columns]
+    ['mode', 'Hz']
+    """
 
     columns: Sequence[Column]
     rows: Sequence[Sequence[Cell]]

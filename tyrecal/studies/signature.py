@@ -42,6 +42,12 @@ class Plain:
     """The tyre without the effect at each pressure, with slopes by the case's variables.
 
     values: of the variables, in their own units. Raises what ``Evaluator.evaluate`` does.
+
+    >>> from tyrecal.tyre.case import start_values
+    >>> plain = Plain(case, evaluator, start_values(case), [240.0])
+    >>> filler = plain.signature("bead_filler", 3.0)
+    >>> f"{filler.before.max():.1f} % before, {filler.after.max():.1f} % after a new fit"
+    '21.0 % before, 5.0 % after a new fit'
     """
 
     def __init__(

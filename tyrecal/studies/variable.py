@@ -15,7 +15,12 @@ START_SPREAD = 0.5  # of ln of a variable that the case says no more of: 2.7 tim
 @dataclass(frozen=True)
 class DesignVariable:
     """A design variable: bounds in its own unit; ``log`` scaled inside the optimiser or not;
-    percent: standard deviation of its start, None where it is not stated."""
+    percent: standard deviation of its start, None where it is not stated.
+
+    >>> stiffness = DesignVariable("C10", start=1e6, lower=1e5, upper=1e7)
+    >>> stiffness.value(stiffness.scaled(1e6)), round(stiffness.slope(2e6))
+    (1000000.0, 2000000)
+    """
 
     name: str
     start: float
@@ -54,7 +59,11 @@ class DesignVariable:
 
 
 def read_variables(case: LoadedCase) -> list[DesignVariable]:
-    """All variables of the case, as `read_variable` has each. Raises InputError."""
+    """All variables of the case, as `read_variable` has each. Raises InputError.
+
+    >>> [v.name for v in read_variables(case)]
+    ['A_belt', 'A_carcass', 'C10']
+    """
     return [read_variable(case, name) for name in case.case.variables]
 
 

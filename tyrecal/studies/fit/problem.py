@@ -68,7 +68,13 @@ class Point:
 
 
 def objective(frequencies: Mapping[Label, float], targets: list[Target]) -> float:
-    """F for frequencies by label: equation (1) in Hz where no target has a sigma."""
+    """F for frequencies by label: equation (1) in Hz where no target has a sigma.
+
+    >>> from tyrecal.simulate.modes.label import Label
+    >>> from .targets import Target
+    >>> round(objective({Label(2, 0): 80.5}, [Target(Label(2, 0), 79.5)]), 4)
+    1.4142
+    """
     return math.sqrt(
         sum(
             t.weight
@@ -86,6 +92,10 @@ class Problem:
     many states of a point are evaluated at a time, and how many neighbours, where the solver gives
     no slopes. measured: all targets, as their residuals stand: ``targets``, the unloaded
     tyre's modes, then ``others``, on the ``road`` and the ``mass``; labels: of modes by state.
+
+    >>> problem = Problem(case, evaluator, fixed={"A_belt": 2e-7})
+    >>> [v.name for v in problem.variables]
+    ['A_carcass', 'C10']
     """
 
     def __init__(

@@ -31,6 +31,10 @@ class FitStudy:
 
     case: with the targets that it is fitted to; left_out: what was measured and is not one of them;
     evaluator: of ``case``. Raises InputError, DeckRefused, OSError before anything is evaluated.
+
+    >>> study = FitStudy(case, evaluator, fixed={"A_belt": 2e-7})
+    >>> len(study.case.case.targets.modes)
+    9
     """
 
     def __init__(

@@ -19,7 +19,13 @@ RIM_WORDS = {"springs": "spindle"}  # of provenance
 @dataclass(frozen=True)
 class Target:
     """A measured mode of the unloaded tyre: frequency and standard deviation in Hz, weight in the
-    objective."""
+    objective.
+
+    >>> from tyrecal.simulate.modes.label import Label
+    >>> target = Target(Label(2, 0), frequency_Hz=79.5, sigma_Hz=0.5)
+    >>> target.multiplicity
+    2
+    """
 
     label: Label
     frequency_Hz: float
@@ -57,7 +63,12 @@ class ValueTarget:
 
 
 def read_targets(case: LoadedCase) -> list[Target]:
-    """Target modes of the unloaded tyre, those as the case is before those in other states."""
+    """Target modes of the unloaded tyre, those as the case is before those in other states.
+
+    >>> first = read_targets(case)[0]
+    >>> print(first.label, first.frequency_Hz)
+    [0,0] axial 31.7
+    """
     targets = [
         Target(
             Label(t.c, t.m, t.kind),

@@ -97,7 +97,18 @@ class Labelings:
 
 
 def labelings(measured: Frequencies, modes: Modes) -> Labelings:
-    """All labelings that are not cut."""
+    """All labelings that are not cut.
+
+    >>> import numpy as np
+    >>> from tyrecal.simulate.modes.label import Label
+    >>> labels, hertz = (Label(2, 0), Label(3, 0)), np.array([80.0, 100.0])
+    >>> tyre = Modes(labels, np.zeros(2, int), np.log(hertz), np.full((2, 1), 0.02))
+    >>> every, sure, state = np.ones((1, 2), bool), np.ones(1, bool), np.zeros(1, int)
+    >>> measured = Frequencies(np.log([80.5]), np.array([0.005]), state, every, sure)
+    >>> best = labelings(measured, tyre)
+    >>> print(labels[best.modes[0, 0]], round(best.probabilities[0], 3))
+    [2,0] 0.998
+    """
     total: dict[tuple[int, ...], float] = {}
     evidence: dict[tuple[int, ...], float] = {}
     means: dict[tuple[int, ...], tuple[float, Array]] = {}
