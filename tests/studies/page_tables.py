@@ -285,7 +285,11 @@ def effects_table(record: Record) -> list[list[float]]:
 
 
 CLUSTER = {  # figures of the printed lines of `tests/benchmarks/cluster.py`
-    "idle to": "line 0 0"
+    **{"idle to": "line 0 0", "idle from": "line 0 1", "worker MB": "line 2 0"},
+    **{"evaluations": "line 3 0", "evaluation kB": "line 3 1", "files": "line 3 2"},
+    **{"files kB": "line 3 3", "batch kB": "line 3 4", "tasks": "line 4 0", "task ms": "line 4 3"},
+    **{"start MB": "line 4 4", "most MB": "line 4 5"},
+    **{"task to": "line 4 6", "task from": "line 4 7"},
 }
 
 
