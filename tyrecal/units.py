@@ -86,6 +86,12 @@ def printed_unit(unit: str) -> str:
 
 
 def in_engineers_units(value: float, unit: str, digits: int = 6) -> str:
-    """``in_engineers_units(-0.00934, "m", 3)`` is '-9.34 mm'."""
+    """``in_engineers_units(-0.00934, "m", 3)`` is '-9.34 mm'; 110 with two digits is '110'."""
     name, factor = display_unit(unit)
-    return f"{value * factor:.{digits}g} {name}".rstrip()
+    rounded = float(f"{value * factor:.{digits}g}")
+    return f"{rounded:.12g} {name}".rstrip()
+
+
+def signed(value: float, digits: int) -> str:
+    """A number with its sign and so many decimals, in which what rounds to 0 is '+0'."""
+    return f"{round(value, digits) + 0.0:+.{digits}f}"

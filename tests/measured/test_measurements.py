@@ -50,7 +50,7 @@ def read(tmp_path: Path, *lines: str, header: str = HEADER) -> list:
         ("frequency_Hz,2,0,,,240,0,79.5,-1", "greater than 0"),
         ("frequency_Hz,2,0,,,240,0,79.5,", "greater than 0"),
         ("frequency_Hz,2,0,,,240,0,nan,0.2", "must be a number"),
-        ("frequency_Hz,2,0,,,240,0,79.5,40", "more than 20%"),
+        ("frequency_Hz,2,0,,,240,0,79.5,40", "more than 20 %"),
         ("frequency_Hz,2.5,0,,,240,0,79.5,0.2", "whole number"),
         ("frequency_Hz,0,0,,,240,0,31.7,0.2", "lateral (axial) or torsional"),
         ("frequency_Hz,2,0,axial,,240,0,79.5,0.2", "must be empty"),

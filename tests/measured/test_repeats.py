@@ -97,7 +97,7 @@ def test_a_lone_member_stays_one() -> None:
     "runs", [[value(66.0, "1", sigma=40.0)], [value(30.0, "1"), value(90.0, "2")]]
 )
 def test_a_sigma_that_no_fit_would_read_is_refused(runs: list[Measurement]) -> None:
-    with pytest.raises(InputError, match=r"sigma of \[1,0\] is .* more than 20%"):
+    with pytest.raises(InputError, match=r"sigma of \[1,0\] is .* more than 20 %"):
         combined(runs)
 
 

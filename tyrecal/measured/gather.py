@@ -79,7 +79,8 @@ def gather(
             if channel := run.least_explained:
                 advice = f"most of the rest is channel {channel}: try --leave-out {channel}"
             notes.append(
-                f"{test.path}: the modes make {run.explained:.0%} of the functions; {advice}"
+                f"{test.path}: the modes make {100 * run.explained:.0f} % of the functions;"
+                f" {advice}"
             )
         measured_here = measurements_of(run, pressure_kPa)
         for each in measured_here:

@@ -60,7 +60,8 @@ def combined(
         if sigma > MAX_SIGMA * mean:
             raise InputError(
                 f"{runs[0].place}: sigma of {runs[0].name} is {sigma:.3g}, more than"
-                f" {MAX_SIGMA:.0%} of the value {mean:.4g}: is it a mistake, or another mode?"
+                f" {100 * MAX_SIGMA:.0f} % of the value {mean:.4g}: is it a mistake, or another"
+                " mode?"
             )
         rows.append(replace(runs[0], value=mean, sigma=sigma))
     return sorted(rows, key=_order)

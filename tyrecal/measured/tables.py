@@ -193,7 +193,8 @@ def _sigma_mistake(each: Measurement) -> str | None:
     if isnan(each.sigma):
         return "sigma is '', must be the standard deviation, greater than 0"
     if each.sigma > MAX_SIGMA * each.value:
-        return f"sigma is {each.sigma:g}, more than {MAX_SIGMA:.0%} of the value {each.value:g}"
+        most = f"{100 * MAX_SIGMA:.0f} %"
+        return f"sigma is {each.sigma:g}, more than {most} of the value {each.value:g}"
     return None
 
 

@@ -18,7 +18,7 @@ from ..studies.diagnose.under_load import LoadedRow
 from ..studies.diagnose.verdict import NAMED, NO_GAP, UNDECIDED, no_gap_words
 from ..studies.fit.result import OTHER_RESIDUALS
 from ..tyre.footprint_quantities import FOOTPRINT_QUANTITIES
-from ..units import display_unit, in_engineers_units
+from ..units import display_unit, in_engineers_units, signed
 from .shape_data import parts_data
 from .table import map_resolution
 
@@ -293,7 +293,8 @@ def _where(d: Diagnosis) -> Iterator[str]:
 def _fields(study: DiagnosedCase) -> Iterator[str]:
     """The section as the data describe it."""
     rows = [
-        f"| {v.field} | {v.place} | {v.value:+.2g} {v.unit} | {v.sigma:.2g} | {v.before:.2g} |"
+        f"| {v.field} | {v.place.replace('_', ' ')} | {signed(v.value, 2)} {v.unit} |"
+        f" {v.sigma:.2g} | {v.before:.2g} |"
         for v in study.section
     ]
     if rows:

@@ -16,6 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ..studies.diagnose.where import PartChange
+from ..units import signed
 from .figure import COLOURS, GREY, RUBBER, headline, in_house_style, new_figure
 from .shape_data import DiagnosisSection, Flat, SectionData
 from .table import MINUS, map_resolution
@@ -196,8 +197,7 @@ def _colour(place: PartChange | None) -> tuple[float, ...]:
 
 def _signed(value: float, digits: int) -> str:
     """A number with a sign, a true minus, and no -0."""
-    text = f"{round(value, digits) + 0.0:+.{digits}f}"
-    return text.replace("-", MINUS)
+    return signed(value, digits).replace("-", MINUS)
 
 
 def _points(flat: Sequence[float]) -> Array:

@@ -112,7 +112,7 @@ class Labels(ResultPart):
         doubts = []
         if self.doubtful:
             where = ", ".join(f"{each.frequency_Hz:g} Hz" for each in self.doubtful)
-            doubts.append(f"labels less than {SURE_LABEL:.0%} probable: {where}")
+            doubts.append(f"labels less than {100 * SURE_LABEL:.0f} % probable: {where}")
         if not self.settled:
             doubts.append("no labeling is consistent with its own fit: give labels that you know")
         return doubts

@@ -9,6 +9,7 @@ from typing import TypeVar
 
 from ...studies.diagnose.result import DiagnosisResult
 from ...studies.fit.result import ROAD_QUANTITIES, FitResult, FittedMode
+from ...units import signed
 from ..table import CLOSE, FAR, MINUS
 from .results import Results
 from .summary import verdict_words
@@ -135,7 +136,7 @@ def _graded(fit: FitResult, aim: tuple[str, str]) -> str:
     if off is None:
         return NOTHING
     grade = "○" if abs(off) <= CLOSE else "◐" if abs(off) <= FAR else "●"
-    return f"{grade}{NB}{off:+.2f}".replace("-", MINUS)
+    return f"{grade}{NB}{signed(off, 2)}".replace("-", MINUS)
 
 
 def _likeliest(diagnosis: DiagnosisResult) -> str:

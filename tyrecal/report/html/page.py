@@ -26,6 +26,7 @@ from ...studies.modes import ModesResult
 from ...studies.pressure_result import PressureSweep
 from ...studies.result import Deviation, Named, Result
 from ...tyre.case import as_written
+from ...units import signed
 from ..convergence import draw_convergence, draw_deviations, draw_states
 from ..diagnosis_pictures import MAX_SHOWN, MIN_SHOWN_PROBABILITY, draw_residuals
 from ..figure import svg
@@ -321,7 +322,7 @@ def environment() -> ImmutableSandboxedEnvironment:
         lstrip_blocks=True,
     )
     made.filters["fixed"] = lambda value, digits: f"{value:.{digits}f}".replace("-", MINUS)
-    made.filters["signed"] = lambda value, digits: f"{value:+.{digits}f}".replace("-", MINUS)
+    made.filters["signed"] = lambda value, digits: signed(value, digits).replace("-", MINUS)
     made.filters["digits"] = lambda value, count: f"{value:.{count}g}"
     made.filters["range"] = _range
     made.tests["deviation"] = lambda cell: isinstance(cell, Deviation)

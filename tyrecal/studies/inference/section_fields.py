@@ -141,8 +141,8 @@ def words(case: LoadedCase) -> str:
     unsaid = "" if case.case.section.known_from else ", not stated in the case"
     return (
         f"section known from {known.replace('_', ' ')}{unsaid}: meridian {1e3 * meridian:.2g} mm,"
-        f"{tip} rim's hold {hold:.2g} mm, gauges {gauge:.0%}, compounds' stiffness {stiffness:.0%}"
-        f" and density {density:.0%}, smooth"
+        f"{tip} rim's hold {hold:.2g} mm, gauges {100 * gauge:.0f} %, compounds' stiffness"
+        f" {100 * stiffness:.0f} % and density {100 * density:.0f} %, smooth"
     )
 
 
