@@ -37,7 +37,7 @@ def free_port() -> int:
 
 
 def answers(port: int) -> bool:
-    """Whether somebody listens."""
+    """Return whether somebody listens at the port."""
     with socket.socket() as there:
         return there.connect_ex(("127.0.0.1", port)) == 0
 

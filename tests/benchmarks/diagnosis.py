@@ -40,7 +40,7 @@ class Watched(Evaluator):
     seconds: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
 
     def evaluate(self, question: Question) -> Evaluation:
-        """As `Evaluator.evaluate`."""
+        """Evaluate as `Evaluator.evaluate` does, and count."""
         start = time.process_time()
         try:
             return super().evaluate(question)

@@ -50,7 +50,8 @@ def test_the_adapter_writes_the_decks_and_what_they_cannot_say(tmp_path: Path) -
 
 
 def test_the_two_that_a_doublet_has_split_into_are_read_as_one(tmp_path: Path) -> None:
-    """With both frequencies, the mean of them and of their slopes, and the first one's shape."""
+    """The adapter reads both frequencies, the mean of them and of their slopes, and the first
+    shape."""
     density = texts(MASS)["inflate"].splitlines().index("*DENSITY") + 2
     sensitivities = {"p": [("inflate", density, 0, 1.0)]}
     job = Job(Deck(texts(MASS), "modes", "inflate"), Request([0, 1], 2, sensitivities))
@@ -83,7 +84,7 @@ def test_the_two_that_a_doublet_has_split_into_are_read_as_one(tmp_path: Path) -
 
 
 def test_modes_are_written_by_rising_frequency(tmp_path: Path) -> None:
-    """With their shapes and slopes, whatever their harmonics."""
+    """Shapes and slopes keep this order, whatever their harmonics."""
     lines = texts(PLAIN)["inflate"].splitlines()
     density = lines.index("*DENSITY") + 2
     deck = Deck(texts(PLAIN), "modes", "inflate")

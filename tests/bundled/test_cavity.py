@@ -77,7 +77,7 @@ def test_volume_and_slow_compression() -> None:
 
 @pytest.mark.parametrize("motion", ["axial", "radial"])
 def test_a_moving_wheel_carries_its_air(motion: str) -> None:
-    """On a soft spring: omega^2 = k / (wheel + tyre + rho V)."""
+    """The wheel on a soft spring has omega^2 = k / (wheel + tyre + rho V)."""
     tyre = inflated()
     n = {"axial": 0, "radial": 1}[motion]
     K = coupling(tyre.air(1.0, 1.0), tyre.model.mesh.X, tyre.U, 0)
@@ -111,7 +111,8 @@ def test_torsion_feels_no_air_and_vertical_motion_a_percent() -> None:
 
 
 def test_cavity_modes_are_not_the_tyres() -> None:
-    """At n = 1 the torus resonates near 186 Hz, below the tyre's third mode: it is left out."""
+    """The torus resonates near 186 Hz at n = 1, below the tyre's third mode; this mode is left
+    out."""
     tyre = inflated()
     plain = support.hertz(tyre.vibration().modes(1, 4).eigenvalues)
     filled = support.hertz(tyre.vibration(None, tyre.air()).modes(1, 4).eigenvalues)

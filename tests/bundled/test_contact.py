@@ -172,7 +172,8 @@ def test_an_open_road_pushes_nobody(work: Round, random: np.random.Generator) ->
 def test_tangent_is_the_forces_derivative(
     work: Round, random: np.random.Generator, friction: float, state: str
 ) -> None:
-    """Without friction to rounding; with it but for the points' own way, as the edge moves."""
+    """The tangent is exact to rounding without friction; with friction, except for the points'
+    own way as the edge moves."""
     road, U = settled(work, friction)
     V = states(U, random)[state]
     contact = road.forces(V, HEIGHT)
@@ -190,8 +191,8 @@ def test_tangent_is_the_forces_derivative(
 def test_bounded_friction_has_a_potential(
     work: Round, random: np.random.Generator, state: str
 ) -> None:
-    """With the normal forces that limit it given (Tresca), forces are the energy's gradient and
-    the tangent is symmetric."""
+    """Forces are the energy's gradient and the tangent is symmetric, if the normal forces that
+    limit friction are given (Tresca)."""
     road, U = settled(work, 0.7)
     V = states(U, random)[state]
     points = road.forces(V, HEIGHT).points
@@ -212,7 +213,8 @@ def test_bounded_friction_has_a_potential(
 
 
 def test_the_potential_has_no_jump_where_a_point_begins_to_slide(work: Round) -> None:
-    """From e / 2 of the elastic slip's path on; at thrice e, 2.5 e of the bound."""
+    """The potential is smooth beyond half the elastic slip e; at three times e it is 2.5 e of
+    the bound."""
     road, U = settled(work, 0.7)
     bound = road.forces(U, HEIGHT).bound(1.0)
 
@@ -250,8 +252,8 @@ def test_positive_part_of_the_stiffness(work: Round, random: np.random.Generator
 
 
 def test_settled_keeps_what_sticks(work: Round, random: np.random.Generator) -> None:
-    """Once a load is reached the forces at the same state are the same, sticking or sliding; points
-    that newly touch have no traction until they move; those that left have forgotten theirs."""
+    """Forces of a reached load stay the same at the same state, sticking or sliding. Points that
+    newly touch have no traction until they move; points that left have lost theirs."""
     road, U = settled(work, 0.7)
     down = lowered(AROUND, len(work.U), np.array([2e-4, 0.0, 0.0]))
     for x in (0.3 * SLIP, 4 * SLIP):
@@ -270,7 +272,8 @@ def test_settled_keeps_what_sticks(work: Round, random: np.random.Generator) -> 
 
 
 def test_traction_of_a_reached_load_is_path_dependent(work: Round) -> None:
-    """There and back by ten elastic slips: the traction has turned to the full one against it."""
+    """A motion there and back by ten elastic slips turns the traction to the full one against
+    it."""
     road, U = settled(work, 0.7)
     along = lambda s: U + lowered(AROUND, len(work.U), np.array([0.0, s * SLIP, 0.0]))
     there = road.forces(along(10), HEIGHT)

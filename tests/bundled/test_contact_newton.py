@@ -71,7 +71,8 @@ def test_nodes_that_bear_less_than_a_newton_belong_to_the_patch(solid: Round) ->
 def test_each_load_that_is_reached_is_told(
     solid: Round, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """And how far on the way to one that takes several steps; each iteration is for --verbose."""
+    """The solver reports each load, the share of a load that takes several steps, and each
+    iteration for --verbose."""
     newton = ContactNewton._newton
 
     def in_two_steps(press: ContactNewton, load: float) -> Any:
@@ -225,7 +226,7 @@ def test_time_is_looked_at_before_every_iteration(solid: Round) -> None:
 def test_friction_that_does_not_converge_is_left_soon(
     solid: Round, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """After one step more than may fail to halve the residual."""
+    """The iteration ends one step after the last that may fail to halve the residual."""
     press = solid.press(LENGTHS, 1e10, 0.5)
     press.to(50.0)
     monkeypatch.setattr(press, "_step", lambda *given: (0 * press.parts, 0.0))
@@ -333,7 +334,8 @@ def test_a_much_larger_load_after_a_small_one(solid: Round) -> None:
 )
 @pytest.mark.parametrize("friction", [0.5, pytest.param(3.0, marks=pytest.mark.slow)])
 def test_friction_of_any_size_converges(solid: Round, friction: float, slip: float) -> None:
-    """From a soft to a hard stick, and more friction than rubber has."""
+    """The iteration converges from a soft to a hard stick, and with more friction than rubber
+    has."""
     press = solid.press(LENGTHS, 1e10, friction, slip)
     press.to(50.0)
     state = press.to(100.0)
@@ -343,7 +345,8 @@ def test_friction_of_any_size_converges(solid: Round, friction: float, slip: flo
 
 
 def test_a_ring_is_pressed_in_the_middle(solid: Round) -> None:
-    """No cords: mirror images in both planes, so the second part of the fold stays nil."""
+    """A ring without cords is mirrored in both planes, so the second part of the fold stays
+    zero."""
     press = solid.press(LENGTHS, 1e10, 0.5)
     press.to(50.0)
     state = press.to(100.0)

@@ -16,7 +16,8 @@ Array = np.ndarray
 
 @pytest.mark.slow
 def test_follows_the_contact(inflated: Inflated) -> None:
-    """On, stiffer, and off again: as few iterations as with a factor formed there."""
+    """The update follows contact that begins, stiffens and ends, with as few iterations as a
+    factor formed there."""
     touching = ContactUpdate(Problem(inflated).factor)
     for blocks in (
         road_blocks(inflated, 1e6, 0.1),
@@ -33,7 +34,7 @@ def test_follows_the_contact(inflated: Inflated) -> None:
 
 @pytest.mark.slow
 def test_one_node_in_the_middle_of_the_patch(inflated: Inflated) -> None:
-    """Both symmetries hold it but for its way down: a single column."""
+    """The node adds a single column: both symmetries hold it, except for its way down."""
     blocks, X = np.zeros_like(road_blocks(inflated, 1e6, 0.0)), inflated.model.mesh.X
     blocks[0, np.lexsort((abs(X[:, 1]), -X[:, 0].round(9)))[0]] = np.diag([1e6, 0.0, 0.0])
     touching, problem = ContactUpdate(Problem(inflated).factor), Problem(inflated, contact=blocks)
@@ -99,8 +100,9 @@ def test_places_are_formed_once(inflated: Inflated) -> None:
 
 
 def test_takes_what_the_factor_left_out_of_the_contact() -> None:
-    """Without cords the factor takes what keeps the mirror and what reverses it by themselves; a
-    road under one side couples them, which is added: the inverse to single precision."""
+    """The update adds what couples the two parts of the factor. Without cords the factor
+    separates fields that keep the mirror from those that reverse it; a road under one side
+    couples them. The inverse is right to single precision."""
     work = ring((0.2, 0.21, 0.23), 0.02, 2, support.Rubber(), 2e3)
     plain = Inflated(None, work.model, ~work.free, work.loads, work.U)  # type: ignore[arg-type]
     X = work.model.mesh.X

@@ -67,7 +67,7 @@ def test_a_cord_goes_slack_smoothly(q: Array, share: float) -> None:
 
 
 def test_an_artificial_tension_holds_every_direction_alike(q: Array) -> None:
-    """It has no energy and no force, but a tangent, with its weight."""
+    """The artificial tension has no energy and no force, but a tangent, with its weight."""
     taut, weights = CORD.tautened(7.0), np.array([1.0, 2.0, 3.0, 4.0])
     np.testing.assert_array_equal(taut.energy(q), CORD.energy(q))
     np.testing.assert_array_equal(taut.force(q), CORD.force(q))

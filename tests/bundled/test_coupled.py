@@ -83,7 +83,8 @@ def test_what_is_attached_leaves_shapes_of_unit_mass(
 def test_time_is_looked_at_for_every_harmonic_of_what_is_attached(
     vibration: Vibration, inflated: Inflated
 ) -> None:
-    """Those of the sectors, and those asked for beyond; the fields of n = 0 are real."""
+    """The time limit is checked for harmonics of the sectors and for those requested beyond;
+    fields of n = 0 are real."""
     looks: list[int] = []
     attached = on_crown(inflated, 0.05)
     coupled.attached_modes(vibration, attached, [0, 7], 1, lambda: looks.append(1))

@@ -139,8 +139,8 @@ def test_hourglass_vectors(patch: tuple[Array, Array], random: np.random.Generat
 
 
 def test_hourglass_scale() -> None:
-    """On a rectangle a x b at mean radius R: gamma . h = sqrt(R a b (1/a^2 + 1/b^2)) for
-    h = (1, -1, 1, -1), since sum |grad N|^2 = 1/a^2 + 1/b^2 at the centre."""
+    """The scale on a rectangle a x b at mean radius R is gamma . h = sqrt(R a b (1/a^2 + 1/b^2))
+    for h = (1, -1, 1, -1), since sum |grad N|^2 = 1/a^2 + 1/b^2 at the centre."""
     a, b, R = 0.02, 0.05, 0.3
     X = np.array([R, 0.0]) + np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [a / 2, b / 2]
     (gamma,) = elements.solids(X, np.arange(4)[None], element(4, 1)).hourglass

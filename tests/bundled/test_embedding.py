@@ -55,7 +55,7 @@ def mesh_of(*args: object) -> DeckMesh:
 
 @pytest.mark.parametrize("name", [kind for kind in solids() if kind in TYPES])
 def test_the_map_is_inverted(name: str) -> None:
-    """In a distorted element with bent sides, and a little outside."""
+    """The inverse holds in a distorted element with bent sides, and a little outside."""
     kind, random = TYPES[name], np.random.default_rng(3)
     square, corner = [(-1, -1), (1, -1), (1, 1), (-1, 1)], [(0, 0), (1, 0), (0, 1)]
     X = np.array(square if len(kind.faces) == 4 else corner, float)
@@ -92,7 +92,7 @@ def test_a_linear_field_stretches_cords_as_it_does_the_rubber(kind: str) -> None
 
 
 def test_a_guest_on_a_side_moves_with_that_side_alone() -> None:
-    """By halves with its ends where it is its midpoint; at a node it is the node."""
+    """A guest at a midpoint moves with the ends by halves; a guest at a node is the node."""
     text = deck("CGAX4", (0.0, 1.0))
     sides = np.array(NODES)
     for n, (r, z) in ((11, (sides[2] + sides[3]) / 2), (12, sides[5])):

@@ -47,7 +47,7 @@ def run(
 
 @pytest.fixture(scope="module")
 def pressed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """Two loads with friction."""
+    """Footprints of two loads with friction."""
     return run(tmp_path_factory.mktemp("pressed"))
 
 
@@ -280,7 +280,7 @@ def test_nothing_pickled_is_read(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_incompressible_rubber_is_pressed(tmp_path: Path) -> None:
-    """In hybrid elements: the vertical stiffness is that of two loads' difference."""
+    """The vertical stiffness with hybrid elements is that of the difference of two loads."""
     loads = (1000.0, 1010.0)
     for name, text in texts(loads, 0.0).items():
         hybrid = text.replace("TYPE=CGAX8R", "TYPE=CGAX8RH").replace("5.085e-08", "0")

@@ -1,4 +1,4 @@
-"""Which half of a mesh stands for all of it, and meshes that have none."""
+"""Choice of the half of a mesh that represents the whole, and meshes that have none."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def strip(*sets: tuple[str, list[int]]) -> DeckMesh:
 
 
 def test_sets_and_surfaces_that_are_their_own_images() -> None:
-    """Those of which half stands for all; what lies across the middle counts by half."""
+    """Half of a set represents the whole, and parts across the middle count by half."""
     sets = [("BOTH", [1, 2]), ("ONE", [1]), ("ACROSS", [3]), ("ALL", [3, 2, 1]), ("TWO", [1, 1])]
     half = half_mesh(strip(*sets))
     assert half is not None and half.connectivity["SFMGAX1"].tolist() == [[1, 2], [3, 4]]

@@ -149,7 +149,8 @@ def test_on_three_meshes(numbers: tuple[int, ...], element: str, both: Any) -> N
 
 @pytest.mark.slow
 def test_a_mass_beside_the_middle_plane(both: Any) -> None:
-    """It breaks the symmetry, but only at its place: the forces there are apart."""
+    """A mass off the middle plane breaks the symmetry only at its place: the forces there are
+    separate."""
     own = edited((("point_mass", 0.1),))
     at = re.search(r"ELSET=POINT_MASS\n999100001, (\d+)", own["modes"])
     assert at

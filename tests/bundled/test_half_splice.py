@@ -89,7 +89,8 @@ def test_fields_round_a_spliced_tyre_on_half_the_section(
 def test_modes_of_a_spliced_tyre_on_half_the_section(
     circles: tuple[Circles, Circles], halves: Halves
 ) -> None:
-    """One of each doublet is kept by half a turn, one reversed; both kinds are told together."""
+    """Half a turn keeps one mode of each doublet and reverses the other; results list both kinds
+    together."""
     half, whole = (
         sector_modes(c.vibration, halves.U, c.loads, c.model, c.sector, [0, 1, 2], 2, beyond=2)
         for c in circles

@@ -62,8 +62,8 @@ def test_a_folded_stiffness_is_that_of_the_spread_parts(
 
 
 def test_a_turned_tyre_is_the_same(symmetry: HalfTurn, random: np.random.Generator) -> None:
-    """In the planes theta = 0 and pi a field is its own image under (theta, z) -> (-theta, -z),
-    u_r kept, u_theta and u_z reversed, times the parity; held components are nil."""
+    """A field in the planes theta = 0 and pi is its own image under (theta, z) -> (-theta, -z):
+    u_r kept, u_theta and u_z reversed, times the parity. Held components are zero."""
     U = symmetry.spread(masked(symmetry, random))
     image = np.empty_like(U)
     image[:, symmetry.beyond] = U[:, symmetry.nodes] * [1, -1, -1]
@@ -75,8 +75,9 @@ def test_a_turned_tyre_is_the_same(symmetry: HalfTurn, random: np.random.Generat
 
 
 def test_dimension(symmetry: HalfTurn, inflated: Inflated) -> None:
-    """As many unknowns as the turned half has: all free components between the planes, and in each
-    plane half of them, of the nodes at z = 0 those that the turn keeps (u_r) or reverses."""
+    """The fields have as many unknowns as the turned half: all free components between the
+    planes, and half of those in each plane. Of nodes at z = 0 these are the ones that the turn
+    keeps (u_r) or reverses."""
     X, free = inflated.model.mesh.X, ~inflated.held
     middle = free[abs(X[:, 1]) < 1e-9].all(1).sum()
     pairs = (free.all(1).sum() - middle) // 2
@@ -109,7 +110,7 @@ def test_the_half_turn_maps_forces_to_forces(
 
 
 def test_axisymmetric_inflation_is_of_the_symmetry(inflated: Inflated) -> None:
-    """With the twist of the belts: u_theta is odd across."""
+    """The twist of the belts, u_theta, is odd across the section."""
     for around in (AROUND, WAVES):
         symmetry = HalfTurn(inflated.model.mesh, ~inflated.held, around)
         U = np.multiply.outer(around.turn(0).real, inflated.U)

@@ -106,7 +106,7 @@ def lengths(a: float, degrees: float, total: float, growth: float = 1.6) -> Arra
 
 
 def radii(first: float, core: float, growth: float) -> Array:
-    """From the core to R, the outermost element ``first`` thick."""
+    """Radii from the core to R, the outermost element ``first`` thick."""
     return R - np.concatenate([[0], np.cumsum(contact.graded(first, growth, R - core))])[::-1]
 
 
@@ -119,7 +119,7 @@ def cylinder(
     first: float = 5e-3,
     growth: float = 2.0,
 ) -> Found:
-    """In plane strain, a = ``share`` R."""
+    """A cylinder in plane strain with a patch of half width a = ``share`` R."""
     a, E = share * R, RUBBER.plane_strain
     F = np.pi * a**2 * E / (4 * R)
     work = contact.ring(radii(first, 0.2 * R, growth), WIDTH / 2, 2, RUBBER, plane=True)
@@ -225,7 +225,7 @@ def test_cylinder_converges() -> None:
 
 
 def test_small_cylinder_patches_come_nearer() -> None:
-    """At half the width, an eighth of the load's strain energy, half the deviation."""
+    """The deviation halves at half the width, with an eighth of the load's strain energy."""
     large, small = cylinder_without_friction(1.0), cylinder(0.05, 0.5)
     assert abs(small.peak - 1) < 0.6 * abs(large.peak - 1)
     assert small.radius == pytest.approx(1.0, abs=0.01)

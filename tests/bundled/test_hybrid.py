@@ -215,7 +215,7 @@ def test_order_on_a_nearly_incompressible_tube(kind: str, order: int) -> None:
 
 @pytest.mark.parametrize("kind", ["CGAX8RH", "CGAX8R", "CGAX4RH", "CGAX4R"])
 def test_reduced_elements_are_exact_on_a_tube(kind: str) -> None:
-    """At the nodes, to round-off that the bulk modulus multiplies."""
+    """Displacements of nodes are exact to round-off, which the bulk modulus multiplies."""
     assert abs(lame(kind, 2)) < 1e-8
 
 
@@ -382,7 +382,8 @@ def test_triangles_among_quadrilaterals_on_half_the_section(
 
 
 def test_the_way_to_incompressible_rubber_is_one_of_two(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By softer bulk first, or at once: the same state, in fewer factorisations."""
+    """Softer bulk first, and full bulk at once, lead to the same state; the first needs fewer
+    factorisations."""
     steps = []
     for ratio in (inflation.EASED, float("inf")):
         monkeypatch.setattr(inflation, "EASED", ratio)
@@ -397,7 +398,7 @@ def test_incompressible_rubber_needs_hybrid_elements() -> None:
 
 
 def test_incompressible_rubber_starts_near_a_shape_at_full_bulk() -> None:
-    """From its own shape there is nothing to do; from that of softer rubber a few steps."""
+    """A start from its own shape needs no step, a start from the shape of softer rubber a few."""
     pair = tyre("CGAX8RH", "0")
     shapes = []
     for C in ("1000000", "900000"):

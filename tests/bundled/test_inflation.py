@@ -26,8 +26,9 @@ def small() -> Model:
 
 @dataclass
 class Newton:
-    """In place of Newton's method: the state is its share and stiffness, found where ``bears`` says
-    so of the last share and stiffness, and these; remembers what was asked, two factors each."""
+    """Stand-in for Newton's method. The state is its share and stiffness; it is found if
+    ``bears`` accepts the last share and stiffness and these. It remembers its calls, each of two
+    factors."""
 
     bears: Callable[[float, float, float, float], bool]
     asked: list[tuple[float, float, int]] = field(default_factory=list)
@@ -77,8 +78,9 @@ def test_the_whole_load_is_tried_first(small: Model, monkeypatch: pytest.MonkeyP
 def test_stiff_rubber_is_let_down(
     small: Model, monkeypatch: pytest.MonkeyPatch, most: float, stiffness: list[float]
 ) -> None:
-    """By factors up to ``most``: a factor that is too large becomes its root; long iterations are
-    for the first alone, and time is looked at before each further one."""
+    """Stiffness falls by factors up to ``most``. A factor that is too large is replaced by its
+    root; only the first iteration may be long, and the time limit is checked before each further
+    one."""
     newton = Newton(lambda _, before, share, now: now == 8 or 1 < before <= most * now)
     U, used, looks = inflate(small, monkeypatch, newton)
     assert [s for _, s, _ in newton.asked] == pytest.approx([1, *stiffness])
@@ -92,8 +94,8 @@ def test_stiff_rubber_is_let_down(
 def test_the_load_comes_in_steps(
     small: Model, monkeypatch: pytest.MonkeyPatch, most: float
 ) -> None:
-    """Where stiff rubber is not let down by a tenth: a quarter first, then twice the last step, or
-    half of it where that was too much, down to a 256th."""
+    """The load rises by a quarter, then by twice the last step, or by half of it if that was too
+    much, down to a 256th, if stiff rubber does not yield by a tenth."""
     newton = Newton(
         lambda reached, before, share, now: (
             now == 8 or (now == 1 and before == 1 and share - reached <= most)
@@ -127,8 +129,8 @@ def test_where_no_load_step_helps_it_says_how_far_it_came(
 
 
 def test_how_newtons_method_ends(small: Model) -> None:
-    """In equilibrium already: at once. After too few iterations, and where no inertia holds back
-    what gives way: with why."""
+    """Newton's method ends at once in equilibrium. After too few iterations, and if no inertia
+    holds back what yields, it ends with the reason."""
     number = support.numbering(small, support.held(small, [2, 3]))  # the outside
 
     def run(U: Array, pressure: float, longest: int, mass: float) -> tuple[Array | None, int, str]:

@@ -15,7 +15,8 @@ from .job_pairs import FREQUENCY, PLAIN, TURNING, WHEEL, run, texts
 
 
 def test_slopes_take_the_static_tangent_whatever_the_vibration_has() -> None:
-    """Neither its shift nor its moduli: the factor of Newton's method at the inflated state."""
+    """Sensitivities use the factor of Newton's method at the inflated state, without the
+    vibration's shift and moduli."""
     work = {}
     for name, data in (("plain", "20\n"), ("shifted", "20, , , -1000.\n")):
         pair = dict(texts(PLAIN))

@@ -56,7 +56,7 @@ def test_increments_are_counted_whole() -> None:
 
 
 def test_a_section_alone_has_the_modes_without_waves() -> None:
-    """Its *FREQUENCY step, whatever harmonics a request would have."""
+    """The *FREQUENCY step of a section computes n = 0 only, whatever harmonics a request has."""
     text = texts(PLAIN)["inflate"] + f"*STEP\n{FREQUENCY.replace('20', '4')}*END STEP\n"
     for request in (Request(), Request(harmonics=[0, 1, 2])):
         (result,) = Job(Deck({"inflate": text}, "inflate", None), request).run()

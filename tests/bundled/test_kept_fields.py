@@ -78,7 +78,8 @@ def test_matrices_on_half_are_the_wholes(
 
 @pytest.mark.parametrize(("band", "D", "words"), [(-2.0, 2.0, "pivot 1 of 2"), (2.0, 1.0, "plane")])
 def test_what_is_not_positive_definite(band: float, D: float, words: str) -> None:
-    """Two unknowns, of which the last is coupled to two on the middle plane: K = 2, E = 2."""
+    """K = 2 and E = 2 with two unknowns, of which the last is coupled to two on the middle
+    plane."""
     corner = np.array([[2.0, 0.0], [2.0, 0.0], [0.0, 2.0]])
     phase = np.array([1.0, 1j])
     K = np.array([[band, 2.0], [0.0, 0.0]])
@@ -91,7 +92,8 @@ def test_what_is_not_positive_definite(band: float, D: float, words: str) -> Non
 
 
 def test_whole_fields_and_forces(halves: Halves, random: np.random.Generator) -> None:
-    """With half the elements the state is completed, and forces and sums are those of all."""
+    """The state of half the elements is completed, and forces and sums are those of all
+    elements."""
     symmetry = halves.symmetry
     even = halves.U * symmetry.here[:, None]
     np.testing.assert_allclose(symmetry.field(even), halves.U, atol=1e-15)

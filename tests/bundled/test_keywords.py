@@ -66,7 +66,7 @@ def test_blocks_lines_and_numbers() -> None:
 
 
 def test_a_refusal_names_the_file_and_the_line() -> None:
-    """Where they are known."""
+    """A refusal names file and line if they are known."""
     (node,) = read_keywords("*NODE\n1, x\n", "inflate")
     with pytest.raises(DeckError, match=r"^inflate\.inp, line 2: 'x' is not a number$"):
         node.rows[0].number(1)

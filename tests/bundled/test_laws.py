@@ -236,7 +236,8 @@ def test_slopes_by_the_rows(name: str, F: Array, random: np.random.Generator) ->
 
 @LAW
 def test_slopes_by_every_number_of_the_deck(name: str, F: Array) -> None:
-    """One of them at a time carries a tangent: energy, force and tangent against differences."""
+    """Energy, force and tangent agree with differences if one number at a time carries a
+    tangent."""
     text = deck(name)
     start = 3
     numbers = NUMBERS.get(name, [E, NU])

@@ -70,8 +70,8 @@ def test_without_a_road_the_modes_are_the_harmonic_ones(tyre: Round) -> None:
 
 
 def test_waves_beyond_the_patch_are_the_modes_own(tyre: Round) -> None:
-    """With elements of 1 degree near the patch and waves to 5 beyond, the remaining error of the
-    harmonic modes is the elements' own, fourth order in their length, up to n = 4."""
+    """The remaining error of harmonic modes is that of the elements, fourth order in their
+    length, up to n = 4: elements are 1 degree near the patch, and waves to 5 are beyond."""
     errors = []
     for elements in (6, 12):
         around = half_circle(np.full(elements, np.radians(36.0) / elements), 5)
@@ -86,8 +86,9 @@ def test_waves_beyond_the_patch_are_the_modes_own(tyre: Round) -> None:
 
 
 def test_standing_waves_of_the_unloaded_tyre_are_nearly_its_modes(tyre: Round) -> None:
-    """Each has the frequency of its harmonic, as exactly as the elements hold it, and keeps or
-    reverses the half turn; of every mode there is one, of a doublet one of either parity."""
+    """Each standing wave has the frequency of its harmonic, as exactly as the elements permit,
+    and keeps or reverses the half turn. Each mode occurs once, each doublet once for either
+    parity."""
     around = half_circle(np.full(24, np.pi / 24))
     work, weigh = tyre.tyre(around), Inertia(tyre.model, around)
     work.residual(tyre.everywhere(around))

@@ -26,7 +26,8 @@ CYLINDER = f"""*NODE
 
 
 def test_force_and_tangent_are_derivatives() -> None:
-    """By central differences and by the complex step, which slopes are formed with."""
+    """Force and tangent agree with central differences and with the complex step that forms
+    sensitivities."""
     rng = np.random.default_rng(1)
     flat = np.array([1.0, 0, 0, 0, 1.0, 0])
     z = flat + 0.1 * rng.standard_normal((4, 6))

@@ -48,7 +48,7 @@ class Problem:
         self.factor = Factor(order, tangents, self.folded(self.contact))
 
     def folded(self, contact: Array) -> csr_matrix:
-        """On the parts, stiffness at single nodes (k, n, 3, 3)."""
+        """Stiffness at single nodes (k, n, 3, 3), on the parts of the fold."""
         nodes = np.arange(contact.shape[0] * contact.shape[1] + 1)
         return self.symmetry.fold(bsr_matrix((contact.reshape(-1, 3, 3), nodes[:-1], nodes)))
 
@@ -65,7 +65,7 @@ class Problem:
 def conjugate_gradients(
     product: Callable[[Array], Array], inverse: Callable[[Array], Array], b: Array
 ) -> tuple[Array, int]:
-    """Until the residual is 1e-6 of the right side."""
+    """Iterations until the residual is 1e-6 of the right side."""
     precondition = lambda r: inverse(r).astype(float)  # parts are added up in double precision
     x, r = np.zeros_like(b), b.copy()
     z = precondition(r)
@@ -128,7 +128,7 @@ def test_contact_is_part_of_it(inflated: Inflated, stiffness: float, sideways: f
 
 @pytest.mark.slow
 def test_approximate_inverse_is_symmetric(inflated: Inflated) -> None:
-    """To single precision, and positive; what is held stays at rest."""
+    """The inverse is symmetric to single precision, and positive; held components stay at rest."""
     for contact in (None, road_blocks(inflated, 1e6, 0.1)):
         problem = Problem(inflated, contact=contact)
         x, y = problem.random()

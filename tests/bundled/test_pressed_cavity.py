@@ -90,7 +90,8 @@ FILLED = TyreDesign(with_values(CASE, {"cavity.share": 1.0}))
 
 
 def test_only_loaded_modes_ask_for_the_cavity(tmp_path: Path) -> None:
-    """And only with a gas: a footprint's record stays that of its decks."""
+    """Loaded modes request the cavity only with a gas; the stored answer of a footprint depends
+    on its decks alone."""
     filled, empty = FILLED, TyreDesign(CASE)
     Bundled().write(Decks(filled, loads_N=LOADS), tmp_path)
     Bundled().write(Decks(empty, loads_N=LOADS, loaded_modes=4), tmp_path)

@@ -157,8 +157,8 @@ def tube(*held: str, surface: str = "", cap: float = 0.0) -> Job:
 
 
 def test_an_end_that_is_free_along_the_axle_is_refused() -> None:
-    """By its node, at the procedure's line; held along the axle the tube widens as Lame's does in
-    plane strain."""
+    """The refusal names the node, at the procedure's line. Held along the axle, the tube widens
+    as Lame's does in plane strain."""
     inner = np.flatnonzero(TUBE.where(0, 0.30) & TUBE.where(1, 0.1))[0]
     with pytest.raises(DeckError, match=rf"line \d+.*node {inner + 1}, which is free along the"):
         tube("LOW, 2").run()
@@ -172,7 +172,8 @@ def test_an_end_that_is_free_along_the_axle_is_refused() -> None:
 
 
 def test_an_end_is_closed_by_a_surface_under_the_same_pressure() -> None:
-    """From end to end, as a wheel's well does; and not by one under another pressure."""
+    """A surface from end to end closes it, as a wheel's well does; one under another pressure
+    does not."""
     low, high = (np.flatnonzero(TUBE.where(0, 0.30) & TUBE.where(1, z))[0] + 1 for z in (0.0, 0.1))
     lid = f"*ELEMENT, TYPE=SFMGAX1, ELSET=LID\n99, {high}, {low}\n*SURFACE, NAME=LID\nLID, SPOS\n"
     for text, cap in ((lid, 100.0), (lid.replace(f"{high}, {low}", f"{low}, {high}"), -100.0)):

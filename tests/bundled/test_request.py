@@ -137,7 +137,8 @@ def test_requests_at_their_limits(tmp_path: Path, request_: dict[str, Any], fine
 
 
 def test_what_a_request_does_not_ask_for_is_not_done(tmp_path: Path) -> None:
-    """Two modes of each harmonic, at the moduli of the deck, no slopes and nothing beside."""
+    """The default is two modes of each harmonic, at the moduli of the deck, without
+    sensitivities."""
     path = tmp_path / "modes.request.json"
     for result in (read_request(path, ["modes"]), path.write_text("{}") and read_request(path, [])):
         assert result == Request(None, 2, {}, False, None, None)  # type: ignore[comparison-overlap]

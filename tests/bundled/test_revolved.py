@@ -72,9 +72,9 @@ JOIN = 0.6
 
 @pytest.mark.parametrize("highest", [2, 6])
 def test_waves_beyond_the_elements(highest: int) -> None:
-    """Even functions are all of cos j x, odd ones of sin j x from the join to the top; both go on
-    where the last element ends, are orthonormal but for the one that is not zero there, and what
-    the stations sum up are integrals."""
+    """Even functions are all cos j x, odd ones sin j x, from the join to the top. Both continue
+    where the last element ends and are orthonormal, except for the one that is not zero there;
+    sums over the stations are integrals."""
     around = half_circle(np.array([0.1, 0.2, 0.3]), highest)
     fine, w = np.polynomial.legendre.leggauss(200)
     beyond, w = JOIN + (np.pi - JOIN) * (1 + fine) / 2, (np.pi - JOIN) * w / 2
@@ -173,7 +173,8 @@ def test_residual_is_the_potentials_gradient(
 def test_product_is_the_residuals_derivative(
     small: tuple[Revolved, Array], random: np.random.Generator
 ) -> None:
-    """By a fourth-order difference, follower pressure and hourglass patterns included."""
+    """The product agrees with a fourth-order difference, follower pressure and hourglass
+    patterns included."""
     tyre, U = small
     phi = fields(tyre, random, 1.0)
     e = 2e-7

@@ -104,7 +104,7 @@ def test_waves_are_the_lowest(inflated: Inflated, n: int) -> None:
 
 
 def test_slow_spin_by_first_order_perturbation(inflated: Inflated) -> None:
-    """At 1e-3 rad/s the members lie at omega0 -+ (n - g) Omega, g = U^H i M S U of the mode at
+    """The members are at omega0 -+ (n - g) Omega at 1e-3 rad/s, g = U^H i M S U of the mode at
     rest: g = 2 n / (n^2 + 1) for an inextensible ring in its plane, 0 for axial motion."""
     spin = 1e-3
     m = support.turning(inflated.model, spin)

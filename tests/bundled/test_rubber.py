@@ -125,7 +125,7 @@ def test_vibration_modulus(law: MooneyRivlin, F: Array) -> None:
 
 @LAW
 def test_vibration_shear_and_bulk_modulus_are_separate(law: MooneyRivlin) -> None:
-    """At the reference the ratios scale G = 2 (C10 + C01) and K = 2 / D1, each its own."""
+    """The ratios scale G = 2 (C10 + C01) and K = 2 / D1 separately at the reference."""
     one = np.broadcast_to(np.eye(3), (5, 3, 3))
     vibrating = replace(law, shear_ratio=np.full(5, 1.4), bulk_ratio=np.full(5, 1.1))
     scaled = MooneyRivlin(1.4 * law.C10, 1.4 * law.C01, 1.1 * law.inverse_D1)
@@ -134,7 +134,7 @@ def test_vibration_shear_and_bulk_modulus_are_separate(law: MooneyRivlin) -> Non
 
 
 def test_stiffer_rubber_has_all_its_moduli_so_many_times() -> None:
-    """On another path to the same equilibrium."""
+    """Stiffer rubber takes another path to the same equilibrium."""
     plain = support.model_of(support.tyre((3, 2, 2, 1)).deck)
     stiff = plain.with_laws(methodcaller("stiffened", 3.0))
     pairs = [(a.law, b.law) for a, b in zip(plain.parts, stiff.parts, strict=True)]
@@ -149,7 +149,7 @@ def test_stiffer_rubber_has_all_its_moduli_so_many_times() -> None:
 def test_between_the_paths_to_an_equilibrium_time_is_looked_at(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """After the whole load at once, and before every step of the load."""
+    """The time limit is checked after the whole load at once, and before every step of the load."""
     tried: list[str] = []
     monkeypatch.setattr(inflation, "_newton", lambda *given: tried.append("try") or (None, 1, "no"))
     m = support.model_of(support.tyre((3, 2, 2, 1)).deck)

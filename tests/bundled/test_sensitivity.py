@@ -155,8 +155,8 @@ def test_pressure_against_central_differences(base: Modes) -> None:
 
 
 def test_remembered_strains_change_nothing(base: Modes) -> None:
-    """One memory of the modes' gradients serves all variables, a node's among them, whose
-    operators differ: the same rates to the last digit as each on its own."""
+    """The memory of the modes' gradients gives the same rates to the last digit for all
+    variables, also for a node, whose operators differ."""
     fields = fields_of(base)
     for name in ("C10", "R of a node", "belt area"):
         tangents = VARIABLES[name].tangents
@@ -166,8 +166,8 @@ def test_remembered_strains_change_nothing(base: Modes) -> None:
 
 
 def test_preload_matters(base: Modes) -> None:
-    """With the state frozen the derivative by the carcass' area comes out wrong by more than its
-    own size: the change of the preload is part of the answer."""
+    """The derivative by the carcass' area is wrong by more than its own size if the state is
+    frozen: the change of the preload is part of it."""
     tangents = VARIABLES["carcass area"].tangents
     whole = rates(base, tangents, PRESSURE)
     seeded = model.build(language.seed(language.read_keywords(TYRE.deck), tangents), None, True)

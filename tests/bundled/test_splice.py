@@ -44,7 +44,8 @@ def test_a_heavier_sector_weighs_where_it_is(vibration: Vibration, inflated: Inf
 def test_an_equilibrium_with_a_splice_looks_at_the_time(
     vibration: Vibration, inflated: Inflated
 ) -> None:
-    """Once where the state is one already; more often with a stiffer sector, or it does not end."""
+    """The time limit is checked once if the state is an equilibrium already, and more often with
+    a stiffer sector."""
     around = splice.full_circle(2)
     looks: list[int] = []
     for share, more in ((0.0, 1), (0.05, 2)):

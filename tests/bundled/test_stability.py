@@ -1,4 +1,4 @@
-"""One verdict on stability: modes, sensitivities, inflation and a press on the road agree."""
+"""Agreement of modes, sensitivities, inflation and a press on the road about stability."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def passenger(bears_compression: bool) -> LoadedCase:
 
 
 def failure(case: LoadedCase, pressed: bool, **numbers: float) -> str:
-    """Why the bundled solver fails; "" if it does not."""
+    """Reason why the bundled solver fails; "" if it does not."""
     design = TyreDesign(case).at({**FLAT_BELTS, **numbers})
     texts = Decks(design, loads_N=(500.0,) if pressed else ()).texts("abaqus")
     name = "press" if pressed else "modes"

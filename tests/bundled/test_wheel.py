@@ -26,9 +26,10 @@ Array = np.ndarray
 
 @pytest.mark.parametrize(("z", "quadratic"), [(0.0, True), (0.03, True), (0.0, False)])
 def test_a_free_tyre_on_its_wheel_moves_rigidly(z: float, quadratic: bool) -> None:
-    """Two zeros at n = 0 (axial, spin) and two at n = 1 (radial, tilt: six motions with their
-    quarter turns), with the follower pressure on the closed cavity, the reference point anywhere
-    on the axle: lambda to 3e-11 of the first that bends, f to 5e-6, all of it round-off."""
+    """A free tyre has two zeros at n = 0 (axial, spin) and two at n = 1 (radial, tilt): six
+    motions with their quarter turns. The follower pressure acts on the closed cavity, and the
+    reference point is anywhere on the axle. Each lambda is within 3e-11 of the first that bends
+    the tyre."""
     tyre = inflated(z=z, quadratic=quadratic)
     for n in (0, 1):
         values = tyre.vibration(tyre.wheel(), shift=SHIFT).modes(n, 3).eigenvalues
