@@ -324,7 +324,7 @@ def test_usual_loads_follow_size_and_pressure() -> None:
 
 
 def test_every_range_is_of_a_number_that_a_case_can_have() -> None:
-    """And holds what the shipped cases and the schema's defaults say."""
+    """The ranges contain the numbers of the shipped cases and the schema's defaults."""
     reached = set()
     for path in CASES.glob("*.yaml"):
         loaded = load_case(path)

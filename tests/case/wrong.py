@@ -1,4 +1,4 @@
-"""How a wrong case is made from one that is right, and what must be said of it."""
+"""Wrong cases made from a right one, and the words that their refusal must contain."""
 
 from __future__ import annotations
 

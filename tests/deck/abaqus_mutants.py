@@ -124,7 +124,7 @@ def keywords(lines: list[str], names: tuple[str, ...] = ("",)) -> list[int]:
 
 
 def end(lines: list[str], k: int) -> int:
-    """Where the block of a keyword ends."""
+    """Line at which the block of a keyword ends."""
     return next((j for j in range(k + 1, len(lines)) if lines[j].startswith("*")), len(lines))
 
 
@@ -157,7 +157,7 @@ def misspelt_option(lines: list[str], random: Random) -> list[str]:
 
 
 def misspelt_word(lines: list[str], random: Random) -> list[str]:
-    """One of the words that an option may have."""
+    """Mutants in which a word that an option may have is misspelt."""
     words = r"(?<==)(YES|LONG TERM|PRONY|TABULAR|STIFFNESS|ELEMENT|LANCZOS|MASS|NEW|LINEAR)$"
     words = words.replace("$", r"(?=,|$)")
     k = random.choice([k for k in keywords(lines) if re.search(words, lines[k])])
@@ -167,7 +167,7 @@ def misspelt_word(lines: list[str], random: Random) -> list[str]:
 
 
 def dropped_option(lines: list[str], random: Random) -> list[str]:
-    """One that must be given."""
+    """Mutants without an option that must be given."""
     pattern = rf", ({'|'.join(REQUIRED)})[^,]*"
     must = (
         r"\*(SOLID SEC|SURFACE|MATERIAL|SECTION|RIGID|ELSET|NSET|CONTACT PAIR|MASS|SPRING|ROTARY)"
@@ -213,7 +213,7 @@ def deleted(lines: list[str], random: Random) -> list[str]:
 
 
 def data_missing(lines: list[str], random: Random) -> list[str]:
-    """All data lines of a keyword that has some; with OP=NEW it may have none."""
+    """Mutants without all data lines of a keyword that has some; with OP=NEW it may have none."""
     may = [k for k in keywords(lines, WITH_DATA) if not re.search("NODE FILE|OP=NEW", lines[k])]
     k = random.choice(may)
     return lines[: k + 1] + lines[end(lines, k) :]
@@ -309,8 +309,8 @@ def decks() -> dict[str, list[str]]:
 
 
 def caught(job: str, lines: list[str]) -> bool:
-    """Whether the grammar finds anything in it, or in what goes on from it; a text that is no deck
-    is caught by its reader."""
+    """Return whether the grammar finds a mistake in the deck, or in one that continues it. A
+    text that is no deck is caught by its reader."""
     try:
         blocks = read_keywords("\n".join(lines))
     except DeckError:

@@ -20,7 +20,8 @@ def said(keywords: list[Block], before: list[Block]) -> list[str]:
 
 @pytest.mark.slow
 def test_every_deck_of_every_combination_of_options() -> None:
-    """Its section, then the jobs that go on from one that has all that they name."""
+    """The grammar accepts each section deck, and the jobs that continue one with all the names
+    they use."""
     count = 0
     for text in abaqus_decks.inflations():
         assert not said(read_keywords(text), []), text
@@ -33,7 +34,7 @@ def test_every_deck_of_every_combination_of_options() -> None:
 
 
 def test_the_grammar_has_every_keyword_and_option_of_the_templates() -> None:
-    """As their texts have them, whatever their conditions."""
+    """Keywords and options are taken from the templates' texts, whatever their conditions."""
     for path in (ROOT / "templates" / "abaqus").glob("*.j2"):
         text = re.sub(r"\{%.*?%\}", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
         for name, rest in re.findall(r"^\*([A-Z][A-Z ]+)(.*)$", text, re.MULTILINE):
@@ -43,7 +44,8 @@ def test_the_grammar_has_every_keyword_and_option_of_the_templates() -> None:
 
 
 def test_what_the_grammar_does_not_know_is_a_doubt() -> None:
-    """Neither it nor the options after it are refused for it; ABAQUS has more keywords."""
+    """An unknown keyword and the options after it are not refused, because ABAQUS has more
+    keywords."""
     text = next(abaqus_decks.inflations())
     for old, new in (("*DENSITY", "*PLASTIC\n1.0E6, 0.0\n*DENSITY"), ("*STATIC", "*DYNAMITE")):
         faults = findings(read_keywords(text.replace(old, new, 1)))
@@ -51,6 +53,6 @@ def test_what_the_grammar_does_not_know_is_a_doubt() -> None:
 
 
 def test_mutants_of_our_decks_are_caught(request: pytest.FixtureRequest) -> None:
-    """All of them."""
+    """The grammar catches all of them."""
     mutants = abaqus_mutants.draw(60, request.config.getoption("--seed"))
     assert not [(kind, lines) for kind, caught, lines in mutants if not caught]

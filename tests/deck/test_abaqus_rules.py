@@ -77,8 +77,8 @@ def test_keywords_stand_where_the_manual_wants_them(values: str, loads: str) -> 
 
 @pytest.mark.slow
 def test_a_turning_tyre_is_as_stiff_as_the_frequency_says() -> None:
-    """At next to no speed the frequencies are those of the tyre that does not turn, its rubber
-    evaluated at the same frequency, not those of its static modulus."""
+    """A tyre at almost no speed has the frequencies of the tyre at rest, with rubber at the same
+    frequency and not at its static modulus."""
     stiff = with_values(COARSE, {"analysis.vibration_frequency_Hz": 60.0})
     rest, slow = frequencies(stiff), frequencies(stiff, rotation=1e-3)
     assert rest.keys() == slow.keys()

@@ -117,8 +117,8 @@ def test_other_gases() -> None:
 
 
 def test_prony_level_and_exponent_make_one_table() -> None:
-    """With a vibration frequency the table's level is the Prony series' there; the inflated state
-    is that of the series' relaxed modulus, whatever the constants are given as."""
+    """The table's level is that of the Prony series at the vibration frequency. The inflated
+    state has the series' relaxed modulus, however the constants are given."""
     values = {"analysis.vibration_frequency_Hz": 100.0}
     both = with_values(CASE, {**values, "materials.rubber.frequency_exponent": 1e-9})
     assert frequencies(both) == pytest.approx(frequencies(with_values(CASE, values)), rel=1e-7)

@@ -126,7 +126,7 @@ def test_without_the_side_file_the_deck_alone_is_solved(tmp_path: Path) -> None:
 
 
 def test_tangents_find_every_place_of_a_variable() -> None:
-    """Both belts' areas move with A_belt, one for one; C10 stands in one place."""
+    """The areas of both belts move with A_belt, one for one; C10 has one place."""
     case = load_case(CASES / "p235_75r17.yaml")
     values = start_values(case)
     decks = Decks(TyreDesign(case, values), tuple(values))
@@ -331,7 +331,7 @@ def test_numbers_have_thirteen_digits_and_fit_abaqus_fields() -> None:
 def test_a_deck_that_would_mean_another_tyre_is_refused(
     case_folder: Path, template: str, old: str, new: str, words: str
 ) -> None:
-    """Each with the deck's name, and its line where a line is to blame."""
+    """Each refusal has the deck's name, and the line at fault if there is one."""
     case = case_with_template(case_folder, template, old, new)
     with pytest.raises(DeckRefused, match=r"(inflate|modes)\.inp") as failure:
         Evaluator(TyreDesign(case)).evaluate(Question({}))

@@ -236,7 +236,8 @@ def test_other_shipped_case_has_a_deck_of_it(effect: Effect) -> None:
 
 @pytest.mark.slow
 def test_a_new_file_is_all_that_a_new_effect_touches(tmp_path: Path) -> None:
-    """In a copy: it is found, comes where it says, and writes itself into the case."""
+    """A copy of the package finds a new effect, lists it in its place and writes it into the
+    case."""
     package = shutil.copytree(ROOT / "tyrecal", tmp_path / "tyrecal")
     text = (package / "tyre/effects/belt_angle.py").read_text()
     text = text.replace('id="belt_angle"', 'id="steeper_belts"').replace("place=70", "place=71")

@@ -1,4 +1,4 @@
-"""How a tyre is mounted: a rim whose beads are really pushed apart, a hub that goes along."""
+"""Effects of mounting: a rim whose beads are really pushed apart, and a hub that moves along."""
 
 from __future__ import annotations
 
@@ -62,7 +62,8 @@ def test_bent_section_is_the_mounted_one_but_for_small_stresses(value: float) ->
 
 @pytest.mark.parametrize("way", RIGID)
 def test_more_of_the_hub_goes_along_where_its_clamp_gives_way(way: str) -> None:
-    """That direction's mode falls, by more where the pressure has raised it; no other does."""
+    """The mode of that direction falls, by more if the pressure has raised it; no other mode
+    does."""
     effect = catalogue()[f"spindle_{way}"]
     assert effect.beside
     rows = [(label, kPa) for kPa in (160.0, 320.0) for label in RIGID.values()]

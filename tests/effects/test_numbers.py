@@ -182,8 +182,8 @@ def test_wider_rim_bends_the_carcass_and_does_not_stretch_it() -> None:
 
 
 def test_a_bead_that_does_not_sit_is_one_whose_table_says_so() -> None:
-    """Its first stations free: elements, materials and cords are the bead's. Stations are so near
-    that chords are as long as the arc."""
+    """A bead whose first stations are free has the same elements, materials and cords. Stations
+    are so near that chords are as long as the arc."""
     table, bead = CASE.section, len(CASE.section.rigid) - 1 - RIM
     free = bead // 2
     rigid = table.rigid.copy()
@@ -205,8 +205,8 @@ def test_a_bead_that_does_not_sit_is_one_whose_table_says_so() -> None:
 
 @pytest.mark.slow
 def test_a_bead_that_nearly_sits_is_one_that_does_and_weighs_the_same() -> None:
-    """But for a fiftieth of the bead, whose elements make the mesh of its edge finer; the fewest
-    that the deck's digits show is as good as twice that."""
+    """The mesh differs at a fiftieth of the bead only, whose edge is finer. The smallest value
+    that the deck's digits show acts like twice that value."""
     plain, least, twice = (frequencies(bead_seat=e) for e in (0.0, 1e-9, 2e-9))
     assert list(twice.values()) == pytest.approx(list(least.values()), rel=1e-8)
     assert list(least.values()) == pytest.approx(list(plain.values()), rel=0.01)
@@ -352,7 +352,7 @@ def test_what_else_there_is_to_an_effect_is_no_more_of_it(id: str, value: float)
 
 
 def test_a_higher_filler_stiffens_the_region_above_by_its_share() -> None:
-    """By 10 mm over its length; a section with none above says so."""
+    """The filler is 10 mm higher than its region; a section with no region above reports that."""
     higher = catalogue()["bead_filler"].beside
     assert higher
     made = higher(CASE, 2.0)
@@ -367,7 +367,8 @@ def test_a_higher_filler_stiffens_the_region_above_by_its_share() -> None:
 
 
 def test_a_cap_ply_may_reach_the_edge_of_the_widest_belt() -> None:
-    """As much heavier as that belt's area is larger; where belts end together there is none."""
+    """The ply is as much heavier as the area of the widest belt is larger; belts that end
+    together give no change."""
     effect = catalogue()["cap_ply"]
     assert effect.beside
     with pytest.raises(ValueError, match="no belt is wider than the outer one"):

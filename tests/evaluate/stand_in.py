@@ -38,7 +38,7 @@ class StandIn:
         self.cause, self.runs = cause, 0
 
     def write(self, decks: Any, folder: Path) -> list[Path]:
-        """One file."""
+        """Write one file of the run."""
         path = folder / "deck.inp"
         path.write_text(repr(sorted(decks.values.items())))
         return [path]

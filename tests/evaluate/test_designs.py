@@ -77,7 +77,8 @@ def test_somebodys_decks_are_evaluated_without_a_case() -> None:
 def test_effects_are_written_in_once_a_design(
     gradients: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One design asked for, and one to either side of each variable whose slope is wanted."""
+    """Effects are written once for the design, and once on either side of each variable with a
+    sensitivity."""
     effect, made = catalogue()["bead_filler"], []
 
     def add(case: Any, value: float) -> Any:

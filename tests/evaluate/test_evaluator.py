@@ -36,7 +36,7 @@ Edit = Callable[[dict[str, Any]], Any]
 
 
 def test_a_run_that_went_well_is_kept_where_that_is_asked(tmp_path: Path) -> None:
-    """With a word on what came of it, as those of failures always are."""
+    """The folder has a word on the outcome, as folders of failures always have."""
     subject = evaluator(tmp_path)
     ask(subject)
     assert not list((tmp_path / "runs").iterdir())
@@ -62,7 +62,7 @@ def test_a_failure_without_a_folder_of_runs_leaves_none() -> None:
 
 @pytest.mark.parametrize("place", ["here", "gone", "elsewhere", "below", "none", "a NUL"])
 def test_a_record_names_a_folder_of_ours_or_none(tmp_path: Path, place: str) -> None:
-    """Where the failure's run is kept: a folder beside the others, in which an outcome stands."""
+    """The folder of a failed run is next to the others and contains an outcome."""
     runs = tmp_path / "runs"
     at = {"elsewhere": tmp_path / "run-1", "below": runs / "a" / "run-1"}.get(place, runs / "run-1")
     at.mkdir(parents=True)
@@ -91,7 +91,7 @@ def test_time_limits_grow_with_loads_and_modes(tmp_path: Path) -> None:
 
 
 def test_a_record_of_another_pressure_is_not_this_ones(tmp_path: Path) -> None:
-    """To a millionth."""
+    """Pressures are compared to a millionth."""
     for off, runs in ((0.9e-6, 0), (1.1e-6, 1)):
         ask(evaluator(tmp_path))
         again = evaluator(tmp_path)
@@ -200,7 +200,7 @@ def road(*footprints: dict[str, Any], **changes: Any) -> dict[str, Any]:
 
 
 def test_loads_are_those_that_were_asked_for() -> None:
-    """To 1e-9 of themselves, borne to 1 %."""
+    """Loads agree to 1e-9 of themselves, and are borne to 1 %."""
     for off, whole in ((0.9e-9, True), (1e-7, False)):
         if whole:
             assert pressed(road(footprint(500 * (1 + off))), [500.0], None).failed is None
@@ -317,7 +317,7 @@ MOVED = {"displacement": np.ones((3, 3))}
 
 @pytest.mark.parametrize("kind", LIES)
 def test_a_solvers_lie_is_a_failure_with_its_reason(kind: str, tmp_path: Path) -> None:
-    """And nothing of it is recorded."""
+    """A wrong answer is stored nowhere."""
     edit, words = LIES[kind]
 
     class Liar(StandIn):
@@ -420,7 +420,7 @@ def test_leftovers_of_killed_writers_go_after_an_hour(tmp_path: Path) -> None:
 def test_as_many_jobs_as_the_workers_need(
     workers: int, cores: int, jobs: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """And they are ended, whatever happens."""
+    """The jobs end, whatever happens."""
     path = tmp_path / "here.yaml"
     path.write_text(f"queueing_system: local\nworkers: {workers}\ncores: {cores}\n")
     done: list[Any] = []

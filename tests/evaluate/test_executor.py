@@ -43,7 +43,7 @@ def test_all_tasks_in_order(jobs: int) -> None:
 
 
 def knows(module: str) -> bool:
-    """Whether this process had imported it before anybody asked for it here."""
+    """Return whether this process had imported the module before it was needed here."""
     return module in sys.modules
 
 
@@ -97,7 +97,7 @@ def work(task: str | int) -> None:
 
 
 def test_workers_that_were_ended_are_not_ended_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Those at work, and those that wait for the next tasks."""
+    """Workers are at work, or wait for the next tasks."""
     ended: list[str] = []
 
     class Workers:

@@ -442,7 +442,7 @@ def test_store_verify_names_what_it_sets_aside(
 
 
 def test_arrays_that_are_packed_are_not_unpacked() -> None:
-    """Whether that makes them smaller or not; plain ones come back."""
+    """Packed arrays are refused, whether packing makes them smaller or not; plain ones are read."""
     noise = np.random.default_rng(0).bytes(4000)
     for array in (np.zeros(1000), np.frombuffer(noise, np.uint8)):
         plain, packed = io.BytesIO(), io.BytesIO()

@@ -35,7 +35,7 @@ def test_a_command_and_who_set_it(
 def test_a_broken_solver_is_named_where_it_is_used_and_listed_with_its_problem(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """One whose module lacks it, and one that cannot be made."""
+    """The solver's module lacks it, or it cannot be made."""
     bundled = EntryPoint("bundled", "tyrecal_solvers.bundled.adapter:Bundled", solver.GROUP)
     entries = [
         bundled,

@@ -66,7 +66,7 @@ def test_vibration_modulus_between_relaxed_and_instantaneous(case_folder: Path) 
 
 
 def test_second_invariant_counts() -> None:
-    """At small strain C10 and C01 act alike; in the inflated sidewall they differ a little."""
+    """C10 and C01 act alike at small strain; in the inflated sidewall they differ a little."""
     half = {"materials.rubber.C10_Pa": 5e5, "materials.rubber.C01_Pa": 5e5}
     mixed, plain = frequencies(CASE, **half), frequencies(CASE, C10=1e6)
     ratios = np.array([mixed[k] / plain[k] for k in plain])
@@ -118,7 +118,7 @@ def test_the_papers_elements(case_folder: Path) -> None:
 
 
 def test_no_pressure_no_strain() -> None:
-    """At rest nothing moves, and the cold tyre still has modes."""
+    """A tyre at rest does not move, and still has modes."""
     case = replace(CASE, case=CASE.case.model_copy(update={"pressure_kPa": 0.0}))
     answer = Evaluator(TyreDesign(case)).evaluate(Question({}))
     assert abs(answer.displacement).max() < 1e-12

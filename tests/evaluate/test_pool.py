@@ -77,7 +77,7 @@ if __name__ == "__main__":
 
 
 def answers_term() -> bool:
-    """Whether this process would clear up before it ends."""
+    """Return whether this process would clear up before it ends."""
     return getattr(signal.getsignal(signal.SIGTERM), "__name__", "") == "_remember"
 
 
@@ -102,7 +102,7 @@ def test_an_orderly_end_waits_for_all_that_was_asked() -> None:
 
 
 def test_workers_that_are_told_to_end_have_so_long_all_together() -> None:
-    """Then they are killed."""
+    """Workers that need longer are killed."""
     heard: list[tuple[str, Any]] = []
 
     class Deaf:
@@ -194,7 +194,7 @@ def test_workers_of_the_command_answer_when_they_are_told_to_end(tmp_path: Path)
 def test_an_interruption_ends_the_workers(
     monkeypatch: pytest.MonkeyPatch, kind: type[BaseException]
 ) -> None:
-    """In the block, and while its end is waited for."""
+    """The interruption comes in the block, or while its end is waited for."""
     ended: list[str] = []
     monkeypatch.setattr(Pool, "end", lambda self: ended.append("now"))
     with pytest.raises(kind), Pool(1):

@@ -136,7 +136,7 @@ def test_unless_asked_otherwise_all_is_done_in_this_process(
 
 
 def test_a_tyre_that_finds_no_equilibrium_ends_with_the_line_that_helps(tmp_path: Path) -> None:
-    """Only then: a tyre that is flat on its rim has another cause."""
+    """A tyre that is flat on its rim has another cause, and the line is not printed."""
     pressing = evaluator(tmp_path, reach=1e3)
     read = pressing.solver.read
     buckled = {"failure": "no equilibrium between 1000 and 4000 N: the cords of layer BELT buckle"}

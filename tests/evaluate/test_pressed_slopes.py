@@ -46,8 +46,8 @@ def small_case(folder: Path) -> Path:
 def test_along_all_variables_at_once_they_are_differences(
     loads: list[float], tmp_path: Path
 ) -> None:
-    """To 1e-3 of the largest of them, at the second load too, whose slip counts from the first
-    one's patch."""
+    """Sensitivities agree with differences to 1e-3 of the largest, also at the second load,
+    whose slip counts from the first one's patch."""
     case = load_case(small_case(tmp_path))
     start = {name: case.case.variables[name].start for name in ALONG}
     evaluator = Evaluator(TyreDesign(case), store=Store(tmp_path / "record"))

@@ -42,7 +42,7 @@ def moved(case: LoadedCase) -> dict[str, float]:
 
 
 def numbers(pressed: Pressed) -> bytes:
-    """All that depends on the state."""
+    """Numbers of an answer that depend on the state."""
     first = pressed.footprints[0]
     parts = (first.displacement, first.pressure_Pa, first.stiffness_N_per_m, first.deflection_m)
     return b"".join(np.asarray(part).tobytes() for part in parts)

@@ -73,7 +73,7 @@ def test_a_job_of_pbs(tmp_path: Path) -> None:
 
 
 def common(lines: list[str]) -> None:
-    """One thread a worker, before the workers start; as many workers as cores."""
+    """Settings: one thread a worker, before the workers start; as many workers as cores."""
     start = next(i for i, line in enumerate(lines) if line.startswith("/opt/tyrecal/bin/python"))
     for name in ("OPENBLAS", "MKL", "OMP"):
         assert lines.index(f"export {name}_NUM_THREADS=1") < start

@@ -25,7 +25,7 @@ FAR = {name: 0.8 * value for name, value in START.items()}
 
 
 def ask(evaluator: Evaluator, values: dict[str, float], *gradients: str) -> bytes:
-    """All numbers of an answer."""
+    """Return the numbers of an answer."""
     return numbers(evaluator.evaluate(Question(values, gradients)))
 
 
@@ -68,7 +68,7 @@ def test_what_was_set_before_does_not_count() -> None:
 
 
 def starts(evaluator: Evaluator, monkeypatch: pytest.MonkeyPatch) -> list[bool]:
-    """Whether each deck from now on names a shape to start from."""
+    """Return whether each further deck names a shape to start from."""
     named: list[bool] = []
     write = type(evaluator.solver).write
 
@@ -99,7 +99,7 @@ def test_the_case_as_it_stands_starts_at_rest_and_is_asked_once(
 def test_where_the_nominal_tyre_fails_all_start_at_rest(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """And nothing is left of that failure, which nobody asked for."""
+    """Nothing remains of that failure, which no study requested."""
     soft = {"variables.C10.lower": 1e4, "variables.C10.start": 2e4, "pressure_kPa": 1500.0}
     unstable = replace(with_values(CASE, soft), as_read=None)
     case = with_values(unstable, {"pressure_kPa": 240.0})

@@ -49,7 +49,7 @@ class Elastic(Hertz):
         return paths
 
     def footprint(self, load: float) -> dict[str, Any]:
-        """One load."""
+        """Footprint of one load."""
         footprint = super().footprint(load)
         footprint["stiffness_N_per_m"] *= self.factor
         scale = (load / 4e3) ** (1 / 3)

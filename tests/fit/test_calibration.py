@@ -31,7 +31,7 @@ from .known_truth import CASE, POWERS, START, TARGETS, TRUTH, evaluator, with_ta
 
 
 def test_objective_by_hand_from_the_papers_table_2() -> None:
-    """Its columns give 33.13 and 8.603 Hz by equation (1), doublets counted twice."""
+    """The columns of Table 2 give 33.13 and 8.603 Hz by equation (1), doublets counted twice."""
     initial = [36.85, 37.17, 43.85, 65.07, 76.33, 86.65, 104.36, 117.07, 122.65]
     optimised = [30.86, 35.85, 36.92, 58.75, 68.41, 78.67, 96.42, 107.9, 114.9]
     targets = [Target(label, TARGETS[label]) for label in LABELS]
@@ -54,7 +54,7 @@ def test_finds_the_truth(method: str, has_gradients: bool) -> None:
 
 @pytest.mark.parametrize("method", ["slsqp", "gauss-newton"])
 def test_converges_on_eigenvalues_of_seven_digits(method: str) -> None:
-    """As CalculiX prints them; differences then leave noise in the gradient."""
+    """CalculiX prints seven digits; differences then leave noise in the gradient."""
     base = evaluator(has_gradients=False)
     base.solver = SimpleNamespace(difference_step=1e-3)  # type: ignore[assignment]
     base.round = lambda f: np.sqrt([float(f"{x:.6e}") for x in f**2])
@@ -90,7 +90,7 @@ def test_bounds_that_hold_too_few_tyres_end_the_drawing_of_starts() -> None:
 
 
 class Counting(FakeEvaluator):
-    """With counts of its own, wherever it is copied to."""
+    """Evaluator with counts of its own, also after it is copied."""
 
     counts = Counts()
 
@@ -107,7 +107,7 @@ class Counting(FakeEvaluator):
 def test_starts_of_other_processes_tell_how_often_the_solver_ran(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Each has counts of its own, which are added."""
+    """The counts of the processes are added."""
 
     class Elsewhere(Here):
         def each(self, function: Any, tasks: Any) -> Any:

@@ -69,7 +69,8 @@ def test_the_difference_without_coupling_is_found_on_either_side(torsional: floa
 
 @pytest.mark.parametrize("factors", [(1.07, 0.955), (1.08, 0.966)])
 def test_a_fit_that_ends_at_the_crossing_says_so_soon(factors: tuple[float, float]) -> None:
-    """Without a bound there it would step over the jump and back until its restarts are used up."""
+    """Without a bound there, the fit would step over the jump and back until its restarts are
+    used up."""
     tyre = coupled(*factors)
     fit = calibrate(CASE, tyre)  # type: ignore[arg-type]
     result = fit.result

@@ -18,7 +18,7 @@ from .tyre_in_states import CASE
 
 
 def read(variable: Variable) -> DesignVariable:
-    """As the variable "x" of a case."""
+    """Read a variable as "x" of a case."""
     case = CASE.case.model_copy(update={"variables": {"x": variable}})
     return read_variable(replace(CASE, case=case), "x")
 
@@ -57,8 +57,8 @@ def test_a_variables_coordinate_and_back(log: bool) -> None:
 
 
 def test_how_well_a_start_is_known() -> None:
-    """As stated, else by 0.5 of a logarithm; never worse than uniformly within the bounds, as of a
-    linear variable that says nothing."""
+    """A start is known as stated, else by 0.5 of a logarithm, and never worse than uniformly
+    within the bounds. A linear variable that states nothing is uniform."""
     spread = lambda log, lower, upper, percent=None: (
         DesignVariable("x", 2.0, lower, upper, log, percent).spread
     )

@@ -49,7 +49,8 @@ def test_a_step_is_a_third_of_the_room_at_most() -> None:
 
 
 def test_a_neighbour_without_a_solution_gives_way_to_the_other() -> None:
-    """Without either neighbour there is no slope, and without a licence no question."""
+    """Without both neighbours there is no sensitivity; without a licence the solver does not
+    run."""
 
     def failing(cause: str, both: bool) -> Any:
         failure = EvaluationFailed(cause, "not there")
@@ -84,7 +85,7 @@ def test_a_point_without_neighbours_fails() -> None:
 
 @pytest.mark.parametrize("bound", ["lower", "upper"])
 def test_differences_stay_within_the_bounds(bound: str) -> None:
-    """At a bound there is one neighbour only, and where it fails no other takes its place."""
+    """A variable at a bound has one neighbour only; if that fails, no other replaces it."""
     at = getattr(CASE.case.variables["C10"], bound)
     within = lambda values: not 1e5 <= values["C10"] <= 1e7
     x = np.log([START["A_belt"], START["A_carcass"], at])

@@ -30,7 +30,7 @@ def test_steps_back_from_designs_that_fail(method: str, margin: float) -> None:
 
 @pytest.mark.parametrize("method", ["slsqp", "gauss-newton"])
 def test_goes_round_designs_that_fail(method: str) -> None:
-    """Where it would go first, and within 2 % of it, there is no equilibrium."""
+    """The design that the search tries first, and those within 2 % of it, have no equilibrium."""
     first = calibrate(CASE, evaluator(), method).history[1]["values"]  # type: ignore[arg-type]
     fails = lambda values: all(abs(np.log(values[n] / first[n])) < 0.02 for n in first)
     assert not fails(TRUTH)

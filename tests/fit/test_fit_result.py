@@ -35,7 +35,7 @@ def test_a_bound_that_holds_is_reported() -> None:
 
 @pytest.mark.parametrize("held", [False, True])
 def test_a_pressure_that_varies_is_told_as_it_was_fitted(held: bool) -> None:
-    """With the frequencies and the mass that belong to it, not as the case has it."""
+    """The result has the fitted pressure with its frequencies and mass, not that of the case."""
     pressure = CASE.case.variables["C10"].model_copy(
         update={"sets": ["pressure_kPa"], "start": 200.0, "lower": 100.0, "upper": 400.0}
     )

@@ -25,7 +25,7 @@ AREA = TargetFootprint(load_N=4000, contact_area_m2=0.016, sigma_m2=1e-4)
 
 
 class Tyre(TyreInStates):
-    """With an evaluator's way to other designs of the same tyre."""
+    """Toy tyre with an evaluator's way to other designs of the same tyre."""
 
     def of(self, design: Any) -> Tyre:
         return self
@@ -65,7 +65,7 @@ def with_pressure_variable(modes: list[TargetMode], start: float = 240.0) -> Loa
 def test_a_fit_in_a_state_without_targets_is_refused(
     values: Mapping[str, float], words: str
 ) -> None:
-    """One sentence: which states have targets, and what to do. Nothing is evaluated."""
+    """The refusal states which states have targets, and what to do. No design is evaluated."""
     case = overridden(case_with(measured([OWN])), values)
     with pytest.raises(InputError) as refused:
         study(case)
@@ -95,7 +95,7 @@ def test_a_state_that_is_set_chooses_the_targets_measured_there(
 
 
 def test_the_fit_that_remains_finds_the_tyre() -> None:
-    """From a start that its user has set; the result says what it is of."""
+    """The fit starts from a start that its user set, and the result records it."""
     case = overridden(case_with(measured([OWN, SOFT])), {"pressure_kPa": 240, "C10": 2e6})
     fit = study(case).run()
     assert fit.initial.values["C10"] == 2e6 and fit.result["pressure_kPa"] == 240
@@ -125,7 +125,7 @@ def test_areas_stay_at_their_pressure_and_on_a_held_rim() -> None:
 
 
 def test_targets_whose_pressure_is_a_variable_follow_it_unless_it_is_held() -> None:
-    """Its start is where the search for the pressure begins; held elsewhere it moves targets."""
+    """The pressure's start is where its search begins; held elsewhere, it moves the targets."""
     case = with_pressure_variable(measured([OWN]))
     assert states(study(overridden(case, {"P": 200})).case) == {OWN}
     assert states(study(case, fixed={"P": 240.0}).case) == {OWN}

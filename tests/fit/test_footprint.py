@@ -147,8 +147,8 @@ def test_footprints_alone_determine_as_many_variables_as_there_are() -> None:
 
 @pytest.mark.slow
 def test_standard_errors_with_footprints_by_the_normal_equations() -> None:
-    """All sigmas stated, singlets and doublets alike: (J'^T J')^-1 where the weights are those of
-    the noise; with footprints no error is larger than without."""
+    """The errors are (J'^T J')^-1 if weights are those of the noise: all sigmas are stated,
+    singlets and doublets alike. With footprints no error is larger than without."""
     modes = [t for t in exact_modes(0.5) if t.c == 0]
     case = case_with(modes, FOOTPRINT)
     problem = Problem(case, evaluator(case))

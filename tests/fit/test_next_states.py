@@ -55,7 +55,8 @@ def test_each_state_adds_what_a_fit_without_it_lacks() -> None:
 
 @pytest.mark.numbers
 def test_the_next_state_is_the_one_whose_fit_would_be_best() -> None:
-    """Its standard errors are those of a fit that has it; the most telling is named first."""
+    """The stated standard errors are those of a fit that has the state; the most informative is
+    first."""
     have = STATES[:2]
     fit = fitted(case_with(measured(have)))
     proposals = fit.found.next_states
@@ -78,7 +79,8 @@ def test_the_next_state_is_the_one_whose_fit_would_be_best() -> None:
 
 
 def test_modes_under_a_load_are_like_those_of_a_next_state() -> None:
-    """Each once, where no unloaded state was measured; the tyre's own is then one to propose."""
+    """Loaded modes count once each if no unloaded state was measured; the unloaded state is then
+    proposed."""
     at_load = TyreState(None, 4000.0)
     targets = [
         ValueTarget("frequency_Hz", 80.0, 0.4, state=at_load, member=Member(Label(2, 0), side))

@@ -50,7 +50,7 @@ class Sloped(Elastic):
         return super().write(decks, folder)
 
     def footprint(self, load: float) -> dict[str, Any]:
-        """One load, with sensitivities."""
+        """Footprint of one load, with sensitivities."""
         at_load = super().footprint(load)
         at_load["contact_area_m2"] = float(at_load["area_m2"].sum())
         slopes = {
@@ -80,7 +80,7 @@ def test_length_and_width_find_two_variables() -> None:
 
 @pytest.mark.parametrize("solver", [Elastic, Sloped])
 def test_sensitivities_are_those_of_the_formula(solver: type[Elastic]) -> None:
-    """By differences, and of a solver that gives them."""
+    """Sensitivities are by differences, or from a solver that gives them."""
     case = case_with([], [target(name) for name in POWERS])
     problem = Problem(case, Evaluator(TyreDesign(case), _solver=solver()))
     point = problem.evaluate(np.log(list(TRUTH.values())) + 0.05)

@@ -36,7 +36,8 @@ def test_no_step_is_taken_where_no_point_is_inside() -> None:
 @pytest.mark.parametrize("key", range(5))
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e6])
 def test_a_step_is_the_first_of_slsqp(size: float, key: int) -> None:
-    """In the metric of its own matrix, whatever the size of the residuals; bounds on both sides."""
+    """The step is in the metric of its own matrix, for residuals of any size and bounds on both
+    sides."""
     random = generator("first of slsqp", key)
     J, r = random.normal(size=(7, 3)), random.normal(size=7)
     H = J.T @ J + 0.2 * np.trace(J.T @ J) / 3 * np.eye(3)

@@ -29,7 +29,7 @@ def minimise(method: str, problem: Any, start: Array, tolerance: float) -> searc
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("box", [10.0, 0.3])
 def test_a_linear_problem_in_a_box_is_solved_in_a_few_steps(method: str, box: float) -> None:
-    """At the least sum of squares in the box, whether its sides hold or not."""
+    """The solution is the least sum of squares in the box, with active sides or none."""
     counts = []
     for key in range(5):
         problem = linear(key, box)
@@ -77,7 +77,7 @@ def test_what_is_as_high_as_before_is_not_lower(method: str) -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_step_beyond_what_has_a_solution_is_taken_back(method: str) -> None:
-    """To its sixteenth at least: the wall stands at a tenth of the way."""
+    """The step is reduced to a sixteenth at least: the wall is at a tenth of the way."""
     problem: Any = Linear(np.eye(3), np.array([0.8, 0.4, 0.2]))
     problem.wall = lambda x: x[0] > 0.08
     end = minimise(method, problem, np.zeros(3), 1e-6)
@@ -132,7 +132,7 @@ def test_steps_learn_the_curvature() -> None:
 
 
 def test_what_pushes_against_a_bound_does_not_count() -> None:
-    """At a bound, to 1e-9 of a coordinate, the gradient counts where it leads inside alone."""
+    """The gradient within 1e-9 of a bound counts only if it leads inside."""
     problem: Any = SimpleNamespace(lower=np.full(2, -1.0), upper=np.full(2, 1.0))
     norm = lambda x, g: search.projected_gradient(problem, point(x, [1.0], [g]))
     assert norm([0.0, 0.0], [3.0, 4.0]) == pytest.approx(5.0)

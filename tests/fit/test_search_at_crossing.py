@@ -30,7 +30,7 @@ def pair(difference: float, clarity: float) -> dict:
 
 
 def test_a_crossing_bounds_where_the_gradient_is_normal_to_it() -> None:
-    """To a tenth, and where the labels are mixed."""
+    """The gradient is normal to a tenth, and labels are mixed."""
     edge = Crossing(np.zeros(2), 0.0, np.array([3.0, 4.0]))
     watch = CrossingWatch(Paired(np.eye(2), np.zeros(2)), None, edge)  # type: ignore[arg-type]
     normal, along = np.array([0.6, 0.8]), np.array([-0.8, 0.6])
@@ -44,7 +44,7 @@ def test_a_crossing_bounds_where_the_gradient_is_normal_to_it() -> None:
 
 
 class Paired(Linear):
-    """With both [0, 0] modes among the targets."""
+    """Problem with both [0, 0] modes among its targets."""
 
     targets = (Target(AXIAL, 40.0), Target(TORSIONAL, 40.0))
 
@@ -98,7 +98,7 @@ def test_designs_beyond_a_crossing_are_reached_by_the_least_change_of_the_residu
 
 
 def test_slopes_are_taken_from_where_labels_are_clear() -> None:
-    """From 0.3 on: the nearest such point, or none."""
+    """Clarity from 0.3 on suffices: the nearest such point is taken, or none."""
     problem: Any = Paired(np.eye(2), np.zeros(2))
     problem.scale = np.ones(2)
     near, far, farther = (

@@ -56,7 +56,8 @@ def test_one_design_is_found_from_all_states(method: str) -> None:
 
 
 def test_states_of_a_design_are_asked_for_at_once_and_each_once() -> None:
-    """So that --jobs does them side by side; the nominal state is asked as it always was."""
+    """So --jobs computes states side by side; the question for the nominal state is the usual
+    one."""
     tyre = TyreInStates()
     problem = Problem(case_with(measured()), tyre, jobs=4)  # type: ignore[arg-type]
     problem.evaluate(problem.start())
@@ -198,7 +199,7 @@ def test_a_variable_that_a_state_sets_moves_nothing_there() -> None:
 
 
 def test_areas_at_two_pressures_are_pressed_in_their_states() -> None:
-    """By the formula of `pressed`; the loads of one state are not another's."""
+    """Areas follow the formula of `pressed`; loads of one state do not enter another."""
     plain = pressed.area_target(0.0125, 1e-4)
     there = pressed.area_target(0.0125, 1e-4, 6000.0).model_copy(update={"pressure_kPa": 160.0})
     case = pressed.case_with([], [plain, there])

@@ -65,7 +65,7 @@ def test_noise_is_what_is_left_over_the_freedom_that_is_left() -> None:
 
 
 def test_a_direction_that_the_data_do_not_see() -> None:
-    """Two variables with one pattern: their sum is seen, their difference is not."""
+    """The data determine the sum of two variables with one pattern, and not their difference."""
     powers = {**POWERS, "A_carcass": POWERS["A_belt"]}
     fit = calibrate(CASE, evaluator(powers=powers))  # type: ignore[arg-type]
     values = fit.result["singular_values"]

@@ -47,8 +47,8 @@ OWN = (Label(1, 0), Label(1, 1), Label(2, 0), Label(2, 1))
 def every_labeling(
     given: Frequencies, modes: Modes, tau: float
 ) -> Iterator[tuple[Any, float, float]]:
-    """Each admissible labeling with ln of prior times evidence, and ln of the evidence of what is
-    labelled, from the joint normal density."""
+    """List each admissible labeling with ln of prior times evidence, and ln of the evidence of
+    its labelled frequencies, from the joint normal density."""
     count, n = given.allowed.shape
     C = modes.H @ modes.H.T + discrepancy(modes.labels, tau)
     width = np.ptp(given.y) + 2 * FOREIGN_MARGIN
@@ -142,7 +142,7 @@ FOREIGN_Hz = 90.0
 
 
 class Tyre(TyreInStates):
-    """With an evaluator's way to other designs of the same tyre."""
+    """Toy tyre with an evaluator's way to other designs of the same tyre."""
 
     def of(self, design: Any) -> Tyre:
         return self
@@ -181,7 +181,8 @@ def labelled() -> Labelled:
 
 @pytest.mark.numbers
 def test_readings_get_the_labels_of_the_tyre(labelled: Labelled) -> None:
-    """In two states together; the one that is no mode is left out and reported."""
+    """Readings of two states are labelled together; the one that is no mode is left out and
+    reported."""
     assert labelled.readings == with_labels()
     left = [own for own, x in zip(labelled.frequencies, labelled.labels, strict=True) if x is None]
     assert [each.value for (each,) in left] == [FOREIGN_Hz]
@@ -217,7 +218,7 @@ def test_a_fit_takes_the_likeliest_labels_and_tells_them(tmp_path: Path) -> None
 
 
 def test_what_a_fit_leaves_open_is_the_prior_of_the_next() -> None:
-    """Its standard errors and correlations; no more than before it."""
+    """The prior has the fit's standard errors and correlations, and is no wider than before."""
     tyre: Any = Tyre()
     case = case_with(measured(STATES))
     fit = calibrate(case, tyre).found

@@ -43,7 +43,7 @@ PRESSURES = (200.0, 250.0)
 
 
 def remainder(values: Array, model: Array, J: Array, pressures: Sequence[float]) -> Remainder:
-    """All modes at each pressure in turn, a line of a file each."""
+    """Residuals of all modes at each pressure in turn, one line of a file each."""
     rows = [
         Measurement("frequency_Hz", label, "", p, 0.0, float(f), SIGMA * f, "", f"t.csv, line {k}")
         for k, (label, p, f) in enumerate(
@@ -162,7 +162,7 @@ def test_another_state_is_named_where_it_takes_half_of_chi2_away() -> None:
 
 
 def test_what_the_model_cannot_follow_has_no_reason() -> None:
-    """All modes off by more than their scatter, none by more than the others."""
+    """Residuals exceed their scatter in all modes, in none more than in the others."""
     signs = np.resize([1, -1, 1, -1, -1, 1], 20)
     left = two_pressures(model_Hz() * np.exp(0.012 * signs))
     assert left.chi2_per_dof is not None and left.chi2_per_dof > 5

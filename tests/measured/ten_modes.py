@@ -126,7 +126,7 @@ def systems_2420() -> dict[str, Any]:
 
 
 def hammer() -> Sets:
-    """One accelerometer, impacts at all points."""
+    """Test with one accelerometer and impacts at all points."""
     sets = functions(along_xyz())
     swapped = {"rsp_node": "ref_node", "rsp_dir": "ref_dir", "ref_node": "rsp_node"}
     swapped["ref_dir"] = "rsp_dir"
@@ -202,7 +202,7 @@ def no_motion(sets: Sets) -> Sets:
 
 
 def partly(sets: Sets) -> Sets:
-    """Two shakers; the second measured only with the first 12 points."""
+    """Test with two shakers, the second measured with the first 12 points only."""
     second = functions(along_xyz(1), 1)
     return [*sets, *[each for each in second if each["rsp_node"] <= 12]]
 

@@ -42,8 +42,8 @@ def on_rings(shares: Sequence[float], directions: str) -> tuple[Sensors, np.ndar
 def test_a_case_labels_what_sensors_alone_do_not(
     shares: tuple[float, ...], directions: str
 ) -> None:
-    """All frequencies 8 % above the case's, 3 % noise: no label is wrong, and at least five more of
-    the fourteen are given."""
+    """No label is wrong, and at least five more of the fourteen are given, with frequencies 8 %
+    above the case's and 3 % noise."""
     sensors, nodes = on_rings(shares, directions)
     rng = generator("case")
     ordered = sorted(modes(), key=lambda mode: mode.frequency_Hz)

@@ -128,7 +128,7 @@ def test_a_mode_that_was_missed_is_noticed(tmp_path: Path) -> None:
 
 
 def test_a_mode_is_told_with_digits_that_mean_something() -> None:
-    """And None where a number is not known."""
+    """A number that is not known is None."""
     mode = MeasuredMode(66.1234567, np.ones(3))
     judged = Judged(None, {Label(1, 0): 0.87654321}, "mixed")
     labelled: Any = SimpleNamespace(mode=mode, judged=judged, collinearity=0.12345678, member="1")

@@ -1,4 +1,4 @@
-"""Where sensors stand: the axle, the centre, directions, and places that are no tyre's."""
+"""Geometry of sensors: axle, centre, directions, and places that are not on the tyre."""
 
 from __future__ import annotations
 
@@ -69,7 +69,8 @@ def test_radii_are_a_tyres(radius: float, tyre: int) -> None:
 
 @pytest.mark.parametrize(("off", "fine"), [(0.03, True), (0.04, False)])
 def test_a_circle_stands_about_the_axle(off: float, fine: bool) -> None:
-    """To a tenth of its radius; where the centre is given it may stand anywhere."""
+    """The circle is about the axle to a tenth of its radius; with a given centre it may be
+    anywhere."""
     if fine:
         assert sensors_of(SIGNALS, ring(off=off))
     else:

@@ -38,8 +38,8 @@ def functions(
 
 @pytest.mark.slow
 def test_frequencies_are_off_by_what_they_state(chance: Chance) -> None:
-    """All modes, within two sigma in 19 of 20; the mean square of error over sigma is above a
-    twentieth: a bound that says nothing would cover, too.
+    """Errors are within two sigma in 19 of 20 modes. Their mean square over sigma is above a
+    twentieth, because a useless bound would cover, too.
 
     False failures: 1e-7.
     """
@@ -98,7 +98,8 @@ def test_noise_alone_is_no_mode(chance: Chance) -> None:
 
 @pytest.mark.slow
 def test_nothing_hangs_on_rounding() -> None:
-    """Any file, its band wide or narrow, every value off by half a million times rounding."""
+    """The result is the same for any file and band if every value is off by half a million times
+    rounding."""
     for key in range(8):
         measured, low, high = drawn(generator("rounding", key))
         shaken = generator("shaken", key).standard_normal(measured.values.shape)
@@ -158,7 +159,7 @@ def hertz_of(poles: list[np.ndarray], low: float = 20.0, high: float = 130.0) ->
 
 
 def test_a_mode_is_seen_in_two_fifths_of_the_orders() -> None:
-    """Each time beside its like one order below: the first sight of it is none."""
+    """A pole counts if its like is in the order below; its first occurrence does not."""
     assert hertz_of(orders((80.0, 0.02, range(9)))) == pytest.approx([80.0])
     assert hertz_of(orders((80.0, 0.02, range(8)))) == []
     assert hertz_of(orders((80.0, 0.02, ALWAYS), (50.0, 0.02, ALWAYS))) == pytest.approx([50, 80])
@@ -174,7 +175,7 @@ def test_a_tyres_mode_has_damping_in_the_band_and_decays() -> None:
 
 
 def test_a_pole_comes_again_within_a_hundredth_and_a_fifth_of_its_damping() -> None:
-    """From one order to the next; those that wander farther are none."""
+    """Poles that move farther from one order to the next do not count."""
     for ratio, change, seen in ((1.009, 1.0, 1), (1.011, 1.0, 0), (1.0, 1.19, 1), (1.0, 1.27, 0)):
         even, odd = range(0, 20, 2), range(1, 20, 2)
         poles = orders((80.0, 0.02, even), (80.0 * ratio, 0.02 * change, odd))

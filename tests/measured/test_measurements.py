@@ -116,7 +116,7 @@ def test_pairs_and_single_values_of_another_load_or_pressure_do_not_meet(tmp_pat
 
 
 def test_what_is_left_empty_is_none(tmp_path: Path) -> None:
-    """No load and, of the mass, no pressure: 0; and no label."""
+    """An empty load is 0, and so is the mass' pressure; an empty label is none."""
     mode, mass = read(tmp_path, "frequency_Hz,2,0,,,240,,79.5,0.2", "mass_kg,,,,,,,12.5,0.05")
     assert (mode.pressure_kPa, mode.load_N, mode.value, mode.sigma) == (240.0, 0.0, 79.5, 0.2)
     assert (mass.pressure_kPa, mass.load_N, mass.label) == (0.0, 0.0, None)
@@ -204,7 +204,7 @@ def test_columns_of_another_table_are_all_known(tmp_path: Path) -> None:
 
 
 def test_a_rim_is_told_where_it_is_not_the_cases(tmp_path: Path) -> None:
-    """And refused, line by line, where the case cannot have it."""
+    """A rim that the case cannot have is refused, line by line."""
     case = load_case(CASES / "p235_75r17.yaml")
     lines = [f"frequency_Hz,{c},0,,,240,0,79.5,0.2,{rim}" for c, rim in ((2, "fixed"), (3, "free"))]
     rows = [*read(tmp_path, *lines, header=RIMS), *read(tmp_path, GOOD)]

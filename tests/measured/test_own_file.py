@@ -42,7 +42,8 @@ def case_of(folder: Path, rows: list[str], more: str = "") -> Path:
 
 
 def test_what_a_file_holds_are_targets_each_in_its_state(tmp_path: Path) -> None:
-    """As by --measured, and for all that asks for the targets' labels or states."""
+    """The targets are those of --measured, also for commands that need the targets' labels or
+    states."""
     rows = [*ROWS, '"[2,0]",70,0.4,160,free\n', '"[7,0]",190,1,240,\n']
     case = load_case(case_of(tmp_path, rows, "  source: our bench\n"))
     given, left_out = with_measured(load_case(CASES / "p235_75r17.yaml"), tmp_path / "measured.csv")
@@ -85,7 +86,8 @@ def test_mistakes_in_the_file_have_its_name_and_line(
 
 
 def test_targets_that_no_fit_can_use_are_mistakes_of_the_case(tmp_path: Path) -> None:
-    """Too few, or at one other pressure; other studies do without."""
+    """Too few targets, or targets at one other pressure, are refused by a fit and ignored by
+    other studies."""
     path = case_of(tmp_path, ROWS[:2])
     _, (mistake,) = judged(path)
     assert mistake.key == "targets" and "2 targets cannot determine 3" in mistake.message

@@ -13,8 +13,8 @@ pytestmark = pytest.mark.numbers
 
 @pytest.mark.slow
 def test_labels_from_rings_are_right_or_not_given(chance: Chance) -> None:
-    """Some 130 modes of the main tyre, coarse mesh: wrong in one of 200 at most, and given in 19 of
-    20 that `measured sensors` calls distinguishable.
+    """Of some 130 modes of the main tyre (coarse mesh) at most one in 200 is wrong, and 19 in 20
+    of those that `measured sensors` calls distinguishable have a label.
 
     False failures: 2e-7.
     """

@@ -116,7 +116,7 @@ def test_a_label_with_many_waves_below_one_with_few_is_reported() -> None:
 
 
 def test_what_is_nearly_as_likely_is_named_too() -> None:
-    """One mode at two pressures contradicts itself, and so do two labels there: the
+    """A mode that contradicts itself at two pressures is as likely as two exchanged labels: the
     doubt names one, and then the other."""
     rows = measured(200, 250)
     rows[1] = replace(rows[1], value=0.88 * rows[1].value)

@@ -108,7 +108,7 @@ def test_a_stated_uncertainty_allows_more_than_a_few_per_cent() -> None:
 
 
 def test_a_slip_is_found_among_many_repeats_and_changes_no_other_sigma() -> None:
-    """In every place of a table in turn, of 1 % where repeats scatter by 0.1 %."""
+    """The slip of 1 % is in every place of a table in turn; repeats scatter by 0.1 %."""
     scatter = np.resize([-1.2, 0.3, 0.9, 1.1, -0.4, -0.7, 0.2, 1.4, -1.6], (6, 4)) * 1e-3
     clean = np.linspace(40, 140, 6)[:, None] * (1 + scatter)
     assert lines(repeated(*map(tuple, clean))) == []
@@ -119,7 +119,8 @@ def test_a_slip_is_found_among_many_repeats_and_changes_no_other_sigma() -> None
 
 
 def test_runs_that_all_differ_by_the_same_share_are_reported() -> None:
-    """Two runs 3.4 % apart in every label, as at two pressures; not where one alone differs."""
+    """A message appears for two runs 3.4 % apart in every label, as at two pressures, and not if
+    one label alone differs."""
     pairs = [(f * 1.034 * (1 + e), f) for f, e in ((84.8, 1e-3), (101.7, -1e-3), (41.3, 5e-4))]
     (words,) = common_shifts(repeated(*pairs))
     assert "all 3 frequencies are 3.4% above those of" in words and "pressure" in words

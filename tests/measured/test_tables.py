@@ -88,7 +88,7 @@ def test_other_quantities_and_loads(tmp_path: Path) -> None:
 def test_lengths_and_widths_of_a_patch(
     tmp_path: Path, length: str, width: str, values: str
 ) -> None:
-    """One sigma with a unit of length is that of both."""
+    """A single sigma with a unit of length belongs to both."""
     head = f"load [N];pressure [kPa];{length};{width};sigma [mm]\n"
     read_back = {each.quantity: each for each in read(tmp_path, f"{head}4000;220;{values};2\n")}
     assert read_back["contact_length_m"].value == pytest.approx(0.132, rel=1e-5)

@@ -1,5 +1,5 @@
-"""One modal test, with ten known modes, in every way that measuring systems write it: all ten are
-right, or one sentence says what is missing."""
+"""A modal test with ten known modes, in every way that measuring systems write it: all ten are
+right, or one sentence states what is missing."""
 
 from __future__ import annotations
 
@@ -165,7 +165,7 @@ def test_directions_that_the_shapes_contradict_are_doubted(tmp_path: Path) -> No
 
 
 def test_one_geometry_in_two_kinds_of_nodes(tmp_path: Path) -> None:
-    """With the six digits of the older one, and its places in a cylindrical system."""
+    """The older kind has six digits and its places in a cylindrical system."""
     places = np.column_stack([np.full(16, 0.33), np.degrees(THETA), Z])
     turned = nodes(15, 11, places=places) | {"def_cs": np.full(16, 11)}
     file = read_universal(write(tmp_path / "f.uff", systems_18(1), nodes(), turned))
@@ -174,7 +174,7 @@ def test_one_geometry_in_two_kinds_of_nodes(tmp_path: Path) -> None:
 
 
 def test_channels_can_be_taken_away(tmp_path: Path) -> None:
-    """By node, direction and component; a name that fits none is refused."""
+    """Channels are left out by node, direction and component; a name that fits none is refused."""
     sets = [nodes(), *with_component(functions(along_xyz()), "Ring"), *functions(along_xyz())]
     path = write(tmp_path / "f.uff", *sets)
     file = read_universal(path)
@@ -237,7 +237,7 @@ def test_a_channel_that_spoils_the_rest_is_named(tmp_path: Path, size: float) ->
 
 
 def test_functions_come_in_one_unit_or_are_refused() -> None:
-    """Those that state g beside those in m/s^2; a unit that is not known is refused."""
+    """Files with g next to files with m/s^2 are refused, and so is an unknown unit."""
     units_of = lambda *words: [
         Function(F, np.ones(len(F), complex), None, (k, 1), (9, 1), f"p{k}", unit=word)
         for k, word in enumerate(words)
@@ -253,8 +253,8 @@ def test_functions_come_in_one_unit_or_are_refused() -> None:
 
 
 def test_repeats_of_a_test_in_parts_stay_repeats(tmp_path: Path) -> None:
-    """Two runs of four parts, given one after the other, are two tests; a channel that each part
-    has, such as the driving point, does not make them repeats."""
+    """A pair of runs of four parts each, given one after the other, is two tests. A channel that
+    each part has, such as the driving point, does not make them repeats."""
     sets = functions(along_xyz())
     driving = function(along_xyz()[0, 0], F, 99, ref_node=99, ref_dir=1, ord_data_type=5, binary=1)
     parts = [[driving, *sets[k : k + 12]] for k in range(0, 48, 12)]

@@ -64,7 +64,7 @@ def labels(modes):
 
 
 def rings(made, rng, noise=0.0, nodes=RINGS, angles=ANGLES):
-    """Both halves of a pair, turned at random, their points shuffled."""
+    """Rings with both halves of a pair, turned at random, their points shuffled."""
     turn = rng.uniform(0, 2 * np.pi)
     halves = []
     order = rng.permutation(len(nodes) * len(angles))
@@ -318,7 +318,8 @@ def test_clarity_is_the_lead_over_the_next_order():
 
 
 def test_the_next_free_overtone_of_its_parity_is_taken():
-    """Without waves odd ones from 1, even ones from 2; with waves from 2 and 3."""
+    """Modes without waves have odd overtones from 1 and even ones from 2, modes with waves from
+    2 and 3."""
     many = [mode(50.0 + i, 0, [{"r": [0, 1.0]}]) for i in range(3)]
     assert labels(many) == [Label(0, 1), Label(0, 3), Label(0, 5)]
     many = [mode(50.0 + i, 0, [{"t": [1.0]}]) for i in range(3)]

@@ -60,7 +60,8 @@ def test_a_ring_has_half_of_the_way_to_either_neighbour() -> None:
 
 
 def test_members_of_a_doublet_stand_by_the_patch() -> None:
-    """One even, one odd, about angle 0, wherever the doublet was turned to; orthogonal."""
+    """The members are one even and one odd about angle 0, wherever the doublet was turned to,
+    and orthogonal."""
     both = members(OVAL, WHERE)
     assert list(both) == [Member(OVAL.label, symmetry) for symmetry in SYMMETRIES]
     shapes = np.array(list(both.values()))
@@ -203,8 +204,8 @@ def test_what_is_not_known_lies_above() -> None:
 
 
 def test_the_nearest_orthonormal_columns_do_not_depend_on_sizes() -> None:
-    """They are orthonormal, and as near to the directions as an independent formula has them:
-    v (v^T v)^-1/2 of columns of length 1."""
+    """The columns are orthonormal, and as near to the directions as an independent formula
+    gives: v (v^T v)^-1/2 of columns of length 1."""
     v = np.linalg.qr(np.random.default_rng(2).standard_normal((9, 3)))[0]
     v = v + 0.2 * np.roll(v, 1, axis=1)
     columns = _nearest_orthonormal(v * [1.0, 30.0, 0.01])

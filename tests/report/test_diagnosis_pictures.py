@@ -43,7 +43,7 @@ def drawn(d: Diagnosis, folder: Path) -> list[Figure]:
 
 
 def words(figure: Figure) -> str:
-    """All that is written; fails where a piece of it stands beyond the picture's edge."""
+    """Return the texts of a picture; fails if a text is beyond the picture's edge."""
     box, written = figure.bbox, []
     for text in figure.findobj(Text):
         assert isinstance(text, Text)
@@ -170,7 +170,7 @@ def test_section_map_of_many_parts_is_readable_and_as_wide_as_its_picture(tmp_pa
 def test_the_limit_of_a_named_effect_is_no_text_on_a_bar(
     named: Diagnosis, count: int, tmp_path: Path
 ) -> None:
-    """With one bar its words stood on the bar: they are in the legend."""
+    """The words are in the legend, because with one bar they would be on the bar."""
     few = tuple(h for h in named.hypotheses if h.key in ("none", "outside", "e0")[-1 - count :])
     d = replace(named, hypotheses=few)
     figure = pictures.draw_probabilities(d)

@@ -53,7 +53,8 @@ def over_decades() -> Figure:
 
 @pytest.mark.parametrize("kind", PICTURE_FORMATS)
 def test_formats(kind: str, tmp_path: Path) -> None:
-    """Each is of its kind and the same again; numbers of decades are no mathematical markup."""
+    """Files have their format and the same bytes each time; numbers of decades are no
+    mathematical markup."""
     contents = []
     for name in ("a", "b"):
         figure, path = over_decades(), tmp_path / f"{name}.{kind}"

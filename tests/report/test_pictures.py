@@ -112,7 +112,8 @@ def test_title(tyre):
 
 
 def test_section(tyre, tmp_path, written):
-    """As high as its content: nothing between the drawing, its title and its legend but a line."""
+    """The picture is as high as its content: one line between the drawing, its title and its
+    legend."""
     inflation = dict(zip(tyre.evaluation.nodes, tyre.evaluation.displacement, strict=True))
     inflated = section_data(tyre.case, tyre.mesh, inflation)
     plain = section_data(tyre.case, tyre.mesh, {})

@@ -81,7 +81,7 @@ def test_a_crest_stands_at_the_top(tyre) -> None:
 
 
 def test_a_solver_with_nodes_of_its_own(tyre) -> None:
-    """Other numbers and another order change nothing; places too far away are not guessed."""
+    """Other node numbers and another order change nothing; places too far away are not guessed."""
     case, evaluation, modes = tyre
     mesh = resolved(case).mesh
     order = generator(1).permutation(len(evaluation.nodes))

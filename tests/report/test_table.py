@@ -186,7 +186,7 @@ def test_a_tyre_that_is_none_is_doubted() -> None:
 
 
 def test_both_members_of_a_split_doublet_are_shown() -> None:
-    """With the number that the file has, where something splits it."""
+    """Each member has the number of the file if something splits the doublet."""
     mode = {"c": 2, "m": 1, "kind": None, "multiplicity": 1, "clarity": 0.9}
     result = ModesResult.model_validate(
         {

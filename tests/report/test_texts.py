@@ -87,7 +87,7 @@ def test_signatures(id: str, pressures: tuple[float, ...], tmp_path: Path) -> No
     "designs", [("initial",), pytest.param(("initial", "fitted"), marks=pytest.mark.slow)]
 )
 def test_crowded_lines_over_the_load(designs: tuple[str, ...], tmp_path: Path) -> None:
-    """All modes within 12 Hz, both members of each."""
+    """The modes are within 12 Hz, with both members of each."""
     rows = [
         {
             "design": design,

@@ -47,7 +47,7 @@ def rows(values: Iterable[object], length: int = 8) -> str:
 
 
 def material(c10: str) -> str:
-    """And the section."""
+    """Text of the material and the section."""
     return (
         "*SOLID SECTION, ELSET=RUBBER, MATERIAL=RUBBER\n*MATERIAL, NAME=RUBBER\n"
         f"*HYPERELASTIC, NEO HOOKE\n{c10}, {D1}\n*DENSITY\n{DENSITY}\n"

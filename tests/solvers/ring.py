@@ -12,7 +12,7 @@ PLACES = "000 200 220 020 002 202 222 022 100 210 120 010 102 212 122 012 001 20
 
 
 def sector(C10: float = 1e8, inner: float = 0.30, outer: float = 0.315, width: float = 0.02) -> str:
-    """One element through the thickness; m, Pa."""
+    """Sector with one element through the thickness; m, Pa."""
     lines = ["*NODE, NSET=EVERY"]
     for number, place in enumerate(PLACES.split(), start=1):
         a, b, c = (int(digit) / 2 for digit in place)

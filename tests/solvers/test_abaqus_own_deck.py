@@ -42,7 +42,7 @@ def case_of(folder: Path, text: str) -> Path:
 def test_modes_are_those_of_the_bundled_solver(
     style: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """In the units of the deck, m or mm, with a number set by a path and another pressure."""
+    """The deck is in m or mm, with a number set by a path and another pressure."""
     case = case_of(tmp_path, style())  # type: ignore[operator]
     name = next(iter(load_case(case).case.variables))
     value = 1.2 * load_case(case).case.variables[name].start

@@ -16,7 +16,7 @@ from .standin_calculix import evaluate, folder_for, with_two_diameters
 
 
 def test_decks_run_at_the_same_time_and_tell_the_same(tmp_path: Path) -> None:
-    """Each of two waits until the other has begun; with one at a time neither would end."""
+    """The two decks wait for each other to begin; with one at a time neither would end."""
     together = evaluate(with_two_diameters(tmp_path / "two", "together", 2))
     alone = evaluate(with_two_diameters(tmp_path / "one", "none", 1))
     assert [mode["n"] for mode in together["modes"]] == [1, 2]
@@ -36,7 +36,7 @@ def test_one_deck_of_several_that_fails_fails_all(tmp_path: Path, parallel: int)
 def test_an_interruption_ends_the_decks_at_work(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, parallel: int, ended: int
 ) -> None:
-    """In this thread it reaches them by itself."""
+    """The interruption reaches decks in this thread by itself."""
     folder, calls = with_two_diameters(tmp_path, "none", parallel), []
 
     def run_job(place: Path, job: str, *given: object) -> None:

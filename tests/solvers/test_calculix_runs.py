@@ -30,7 +30,7 @@ def evaluate(folder: Path) -> dict:
 
 @pytest.mark.parametrize("place", ["plain", "with blanks and ümlauts", "long" * 40])
 def test_an_inflated_ring(tmp_path: Path, place: str) -> None:
-    """In places too of which ccx cannot cope with the path."""
+    """The ring also runs in folders whose path ccx cannot use."""
     folder = write_ring(tmp_path / place)
     for _ in range(2):  # twice the same job in the same folder
         answer = evaluate(folder)
@@ -92,8 +92,8 @@ def test_a_deck_that_is_not_there_or_is_named_with_its_ending(tmp_path: Path, jo
 
 
 def test_two_runs_in_one_file(tmp_path: Path) -> None:
-    """Two runs of the same job in the same folder at the same time; the runner cannot keep others
-    out."""
+    """The runner cannot keep others out: two runs of the same job share a folder at the same
+    time."""
     write_ring(tmp_path)
     run_job(tmp_path, "inflate", ["sector.inp"], ["ccx"], 20.0)
     written = (tmp_path / "inflate.frd").read_text()

@@ -65,8 +65,8 @@ def test_a_compressed_cord_is_refused_by_layer_and_region(tmp_path: Path) -> Non
 
 
 def test_the_deck_says_which_cords_must_be_taut() -> None:
-    """All strips of the layer whose material bears no compression, each between ends that are as
-    far apart as a carcass' elements are long; no other. ABAQUS has its keyword."""
+    """The deck lists all strips of the layer whose material bears no compression, each between
+    ends as far apart as a carcass' elements are long, and no others. ABAQUS has its keyword."""
     case = main_case()
     assert not STRIP_COMMENT.findall(Decks(TyreDesign(case)).texts("calculix")["sector.inp"])
     cord = with_part(case.case.materials["carcass_cord"], bears_compression=False)

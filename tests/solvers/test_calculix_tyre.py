@@ -47,7 +47,7 @@ def coarse_case(folder: Path) -> Path:
 
 @pytest.mark.ccx
 def test_masses_agree_where_cord_lines_have_kinks(case_folder: Path) -> None:
-    """And where one rubber borders on another at a ply: 1e-6 of the tyre's."""
+    """Masses also agree if one rubber borders on another at a ply, to 1e-6 of the tyre's."""
     case = load_case(coarse_case(case_folder))
     case = tread_density(thick_cushion(case, 1.5), -0.2)
     with common():
@@ -61,7 +61,7 @@ def test_masses_agree_where_cord_lines_have_kinks(case_folder: Path) -> None:
 
 @pytest.mark.ccx
 def test_calculix_agrees_with_the_bundled_solver(case_folder: Path) -> None:
-    """In a folder with a blank, of which ccx itself cannot write to the absolute path."""
+    """The folder has a blank in its absolute path, to which ccx itself cannot write."""
     case = load_case(coarse_case(case_folder))
     values = start_values(case)
     ours = Evaluator(TyreDesign(case)).evaluate(Question(values))

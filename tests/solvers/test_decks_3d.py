@@ -99,8 +99,7 @@ def test_a_ring_is_labelled_wherever_its_axle_is(lines: int) -> None:
 
 
 def test_waves_that_few_nodes_cannot_tell_apart_are_the_fewer_ones() -> None:
-    """With 12 nodes round the tyre, 2 and 10 waves are the same, also as printed with six
-    digits."""
+    """Waves 2 and 10 are the same with 12 nodes round the tyre, also as printed with six digits."""
     theta = 2 * np.pi * np.arange(12) / 12 + 0.1
     points = 0.3 * np.stack([np.cos(theta), np.sin(theta), 0 * theta], -1)
     shapes = np.array([np.cos(2 * theta + phase)[:, None] * points for phase in (0.4, 1.2)])
@@ -119,7 +118,8 @@ def test_nodes_that_are_no_ring() -> None:
 
 @pytest.mark.parametrize("solver", ["abaqus", "calculix"])
 def test_the_text_is_the_users_but_for_the_marks(solver: str, tmp_path: Path) -> None:
-    """And for a pressure that is another, wherever it stands, and what is said to be added."""
+    """The text changes at marks, at another pressure, and by the lines that are reported as
+    added."""
     case = load_case(case_of(tmp_path))
 
     def written(values: dict[str, float]) -> dict[str, str]:
@@ -161,7 +161,7 @@ def test_the_text_is_the_users_but_for_the_marks(solver: str, tmp_path: Path) ->
 
 
 def test_a_pressure_by_mark(tmp_path: Path) -> None:
-    """In the decks' unit, here MPa; what else is a pressure stays."""
+    """The pressure is in the decks' unit, here MPa; other pressures stay."""
     text = TEXTS["modes.inp"].replace("25000.0", "{{ pressure }}")
     case = load_case(case_of(tmp_path, decks_3d.CASE.replace("units: m", "units: mm"), modes=text))
     texts = Decks(DecksDesign(case, {"pressure_kPa": 60.0})).texts("calculix")
@@ -229,7 +229,7 @@ def test_what_is_wrong_is_said_by_file_line_and_key(
 
 
 def test_a_case_is_made_of_decks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """With plain numbers, which are its variables; their crown and order are the user's to say."""
+    """The decks' plain numbers are variables of the case; the user states their crown and order."""
     text = TEXTS["inflate.inp"].replace(decks_3d.MARKED, "4500000.0")
     case_of(tmp_path, inflate=text, modes=decks_3d.modes(calculix=False))
     pair = [
@@ -250,7 +250,7 @@ def test_a_case_is_made_of_decks(tmp_path: Path, capsys: pytest.CaptureFixture[s
 def test_what_abaqus_refuses_of_decks_is_said_by_file_and_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """And refused where it runs them. In space, layers that fan out need an orientation."""
+    """The adapter refuses the same decks. In space, layers that fan out need an orientation."""
     fanned = "*ELEMENT, TYPE=SFM3D4R, ELSET=PLY\n9001, 1, 2, 5, 4\n*SURFACE SECTION, ELSET=PLY\n"
     fanned += "*REBAR LAYER, GEOMETRY=ANGULAR\nPLY, 1e-7, 0.2, 0.0, RUBBER, 0.0\n*MATERIAL, "
     text = TEXTS["inflate.inp"].replace("*MATERIAL, ", fanned, 1)
@@ -274,7 +274,8 @@ def test_no_pressure_is_found(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_modes_on_abaqus_are_the_twins(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """To what a .fil holds; pressure and mark are those of the case, the axle is x."""
+    """Modes agree to the digits of a .fil; pressure and mark are those of the case, the axle is
+    x."""
     case = case_of(tmp_path, modes=decks_3d.modes(calculix=False))
     command = ("--solver", "abaqus", "--solver-command", f"{sys.executable} {STANDIN}")
     given = ("--set", "C10=4e6", "--pressure-kPa", "60", "--json", "--no-store")
@@ -312,7 +313,7 @@ def test_what_needs_a_section_is_refused(
 def test_a_check_says_what_is_known_and_added(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """And the decks are written with folders of what they include."""
+    """The decks are written with the folders of their includes."""
     (tmp_path / "parts").mkdir()
     (tmp_path / "parts" / "mesh.inp").write_text(TEXTS["mesh.inp"])
     inflate = TEXTS["inflate.inp"].replace("mesh.inp", "parts/mesh.inp")

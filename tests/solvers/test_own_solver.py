@@ -73,7 +73,7 @@ def test_its_failure_is_typed_and_kept(site: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_its_fit_needs_no_gradients(site: Path, tmp_path: Path) -> None:
-    """Two free variables by finite differences, one of them already at its optimum."""
+    """The fit has two free variables by finite differences, one of them already at its optimum."""
     out = tmp_path / "out"
     done = tyrecal(
         site,

@@ -138,7 +138,8 @@ def test_the_half_turned_about_x_is_the_other_half(element: str) -> None:
 
 @pytest.mark.parametrize("element", ["C3D8", "C3D20R", "C3D20"])
 def test_the_road_meets_the_tread(element: str) -> None:
-    """Its face lies at the outer radius, its travel ends at inflated radius less deflection."""
+    """The road's face is at the outer radius; its travel ends at inflated radius less
+    deflection."""
     case = coarse_case(element)
     texts = press_texts(case, [0.006, 0.01], HALF, 0.3925, Road(friction=0.0))
     tyre = around(calculix_context(resolved(case)), HALF)

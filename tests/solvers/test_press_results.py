@@ -172,7 +172,7 @@ def test_the_radius_is_the_last_states(tmp_path: Path) -> None:
 
 @pytest.mark.ccx
 def test_road_and_rim_balance(tmp_path: Path) -> None:
-    """Without pressure, which CalculiX would count in part as the rim's reaction."""
+    """The tyre has no pressure, which CalculiX would count in part as the rim's reaction."""
     case = coarse_case("C3D8")
     angles = Angles(8.0, 16.0, 32.0, 2.0)
     texts = press_texts(case, [0.004], angles, 0.39215)

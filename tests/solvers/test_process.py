@@ -23,7 +23,7 @@ def test_exit_code_and_output(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_hanging_command_is_ended_with_its_children(tmp_path: Path) -> None:
-    """Its child is a fork, so that a busy machine has it at once."""
+    """The child is a fork, so that a busy machine has it at once."""
     parent = """import os, time
 pid = os.fork()
 if pid:
@@ -97,7 +97,7 @@ from tyrecal_solvers.process import run_command
 
 
 def _ends(pid: int) -> bool:
-    """Whether a process is gone within ten seconds."""
+    """Return whether a process ends within ten seconds."""
     for _ in range(100):
         if not _alive(pid):
             return True

@@ -10,7 +10,7 @@ from .ring import provenance
 
 
 def sample() -> dict[str, Any]:
-    """Two variables; counts of a bell, turned."""
+    """Sample of two variables with bell-shaped, turned counts."""
     at = np.linspace(-3, 3, 30)
     bell = np.exp(-0.5 * (at[:, None] ** 2 + at**2 - 0.8 * at * at[:, None]))
     share = np.exp(-0.5 * np.linspace(-3, 3, 40) ** 2)
@@ -69,7 +69,7 @@ def sample() -> dict[str, Any]:
 
 
 def effects(name: str) -> list[dict[str, Any]]:
-    """One with a re-fit, one whose mode is lost at the middle pressure."""
+    """Effects: one with a new fit, one whose mode is lost at the middle pressure."""
     both = []
     for title, after, lost in (("Filler of " + name, 1.5, False), ("Heat", None, True)):
         rows = [

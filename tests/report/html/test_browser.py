@@ -91,7 +91,7 @@ def show(browser: Any, address: str, width: int, **media: str) -> Any:
 
 
 def changes(picture: Callable[[], object], seconds: float) -> bool:
-    """Whether a picture becomes another one in this time."""
+    """Return whether a picture changes in this time."""
     first, end = picture(), time.monotonic() + seconds
     while time.monotonic() < end:
         time.sleep(0.05)
@@ -192,7 +192,8 @@ def test_an_oval_is_one(shown: Any) -> None:
 
 
 def test_zoom_and_the_second_of_a_pair(shown: Any) -> None:
-    """By slider and keys; the second [2,0] is the first turned by an eighth: as high as wide."""
+    """Slider and keys zoom; the second [2,0] is the first turned by an eighth, so it is as high
+    as wide."""
     from selenium.webdriver import Keys
 
     paused(shown)
@@ -227,7 +228,7 @@ def test_who_prefers_less_motion_gets_none(browser: Any, address: str) -> None:
 
 
 def test_it_prints_on_a4_every_mode(browser: Any, address: str) -> None:
-    """Also from a dark screen: the canvases hold each mode's shape."""
+    """The canvases hold each mode's shape, also from a dark screen."""
     show(browser, address, 768, prefers_color_scheme="dark")
     answer = browser.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})
     pdf = base64.b64decode(answer["data"])

@@ -100,7 +100,7 @@ def links_lead_to_ids(tags: Nesting) -> None:
 
 
 def test_table_2_is_there(folder: Path) -> None:
-    """Each row of the paper's table, its figures in their order."""
+    """The page has each row of the paper's table, its figures in their order."""
     words = kept_words_of(folder)
     for c, m, kind, initial, fitted, target in TABLE_2:
         off = 100 * (fitted / target - 1)
@@ -352,7 +352,7 @@ def test_lists_of_unequal_length(copy: Path, file: str, path: tuple[str | int, .
 
 @pytest.mark.slow
 def test_whatever_is_spoilt_the_page_is_whole_or_refused(copy: Path, tmp_path: Path) -> None:
-    """Any leaf of any file becomes something else, or goes: no traceback, no broken page."""
+    """Any leaf of any file is replaced or removed: no traceback, no broken page."""
     random = Random(1)
     odd = [None, 0, -1, 1e300, -1e-300, "", "<b>", "\ud800", [], {}, [[1.0]], True, 5, "fit"]
     outcomes = {True: 0, False: 0}
