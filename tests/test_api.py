@@ -105,7 +105,7 @@ def test_the_example_of(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_wrong_input_is_a_value_error_in_a_sentence(
     call: Any, words: str, coarse: tyrecal.LoadedCase
 ) -> None:
-    """Not a failure of the solver, and never silently another question."""
+    """Wrong input is not a failure of the solver, and never silently another question."""
     with pytest.raises(ValueError, match=words) as error:
         call(coarse)
     assert "\n" not in str(error.value)
@@ -153,7 +153,7 @@ def test_values_of_variables_are_those_of_the_design_everywhere(coarse: tyrecal.
 
 @pytest.fixture
 def unrun(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """No solver runs: what comes so far was accepted."""
+    """Lets no solver run: a call that comes so far was accepted."""
 
     def refuse(*given: Any) -> Any:
         raise EvaluationFailed("crashed", "the solver would have run")
@@ -198,7 +198,8 @@ NEVER_WRONG = {"allow_unusual"}  # true or false, as anything is
 
 
 def accepted(name: str, given: dict[str, Any], case: Any) -> bool:
-    """Whether a call comes as far as the solver, or returns; else it is refused in a sentence."""
+    """Return whether a call comes as far as the solver, or returns; else it is refused in a
+    sentence."""
     function = getattr(tyrecal, name)
     takes_case = "case" in inspect.signature(function).parameters
     try:
@@ -226,7 +227,7 @@ def test_natural_calls_are_accepted(name: str, coarse: tyrecal.LoadedCase, unrun
 
 @pytest.mark.parametrize("name", NATURAL)
 def test_wrong_arguments_are_named(name: str, coarse: tyrecal.LoadedCase, unrun: None) -> None:
-    """Each argument of each function as what it cannot be: no error from within."""
+    """Each argument of each function gets wrong values: no error comes from within."""
     parameters = inspect.signature(getattr(tyrecal, name)).parameters
     for parameter in sorted(parameters.keys() - NEVER_WRONG):
         refused = sum(

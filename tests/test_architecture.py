@@ -73,7 +73,7 @@ def test_the_rooms_are_those_of_the_map() -> None:
 
 
 def test_imports_run_downwards() -> None:
-    """From the command to the leaves; the face hands on what `api` offers."""
+    """Imports run from the command to the leaves; the package hands on the names of `api`."""
     order = ["__main__", *ROOMS[: ROOMS.index("api")], "__init__", *ROOMS[ROOMS.index("api") :]]
     for name in modules():
         here = room_of(name)
@@ -88,7 +88,7 @@ def test_imports_run_downwards() -> None:
 
 
 def test_no_circle() -> None:
-    """Not even of imports that are late or for types only."""
+    """Late imports and imports for types count, too."""
     below = {name: {x for x in imported(name) if x in modules()} - {name} for name in modules()}
     done: set[str] = set()
 

@@ -55,7 +55,7 @@ def exceptions() -> dict[str, tuple[str, str]]:
 
 
 def test_all_exceptions_are_drawn() -> None:
-    """In the tree of the package that defines them, below the parent that they are drawn below."""
+    """The tree of the package that defines an exception shows it below its parent."""
     for top, text in (("tyrecal", errors.__doc__), ("tyrecal_solvers", solvers_text())):
         tree = drawn(text or "")
         own = {n: base for n, (m, base) in exceptions().items() if m.split(".")[0] == top}

@@ -74,7 +74,8 @@ def core() -> list[metadata.Distribution]:
 
 
 def licence(distribution: metadata.Distribution) -> str:
-    """As the package states it: an expression, else classifiers, else the first line of a text."""
+    """Licence as the package states it: an expression, else classifiers, else the first line of
+    a text."""
     fields = distribution.metadata
     classifiers = [c for c in fields.get_all("Classifier") or [] if c.startswith("License ::")]
     text = (fields["License"] or "").strip().partition("\n")[0]
@@ -113,7 +114,8 @@ def test_developers_have_every_extra() -> None:
 
 
 def test_the_core_takes_at_most_350_megabytes() -> None:
-    """All files of the core, compiled ones too; pip and setuptools belong to the environment."""
+    """The sum has all files of the core, compiled ones too; pip and setuptools belong to the
+    environment."""
     size = sum(
         path.stat().st_size
         for distribution in core()

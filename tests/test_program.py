@@ -49,7 +49,7 @@ FOLDER = '"C:\\Program Files\\ccx\\" -x'
 
 @pytest.mark.parametrize("line", ON_WINDOWS)
 def test_windows_command_lines(line: str) -> None:
-    """As CommandLineToArgvW and C programs split them; Python's own joining is the inverse."""
+    """CommandLineToArgvW and C programs split them so; Python's own joining is the inverse."""
     assert split_command(line, windows=True) == ON_WINDOWS[line]
     again = join_command(ON_WINDOWS[line], windows=True)
     assert again == subprocess.list2cmdline(ON_WINDOWS[line])
@@ -97,7 +97,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_the_named_program_gives_version_and_answers(here: Path) -> None:
-    """And stands in run.json by its whole path."""
+    """Its whole path is in run.json."""
     options = ["--solver", "calculix", "--solver-command", "./ccx", "--output", "out"]
     assert run("modes", CASE, "--mesh", "coarse", *options) == 3
     assert (here / "mine").read_text() == "ran\nran\n" and not (here / "other").exists()
@@ -125,7 +125,8 @@ def test_a_program_is_found_once_for_all_who_run_it(
     design: TyreDesign,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """By the option and the variable, here and in worker processes, wherever these are."""
+    """The option and the variable set the program here and in worker processes, wherever these
+    are."""
     if path is not None:
         monkeypatch.setenv("PATH", f"{path}{os.pathsep}{os.environ['PATH']}")
     whole = [str(here / program), "-x"]
@@ -162,7 +163,8 @@ def test_a_settings_file_names_no_relative_path(here: Path) -> None:
 def test_a_program_that_is_not_there(
     command: str, why: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """One sentence: what was looked for, where, and what to do; no run's folder is left."""
+    """The sentence states which program was sought, where, and what to do; no run folder is
+    left."""
     (here / "plain").touch()
     options = ["--solver", "calculix", "--solver-command", command, "--output", "out"]
     assert run("modes", CASE, "--mesh", "coarse", *options) == 3
@@ -174,7 +176,7 @@ def test_a_program_that_is_not_there(
 
 
 def test_answers_of_another_program_are_not_taken_from_the_record(here: Path) -> None:
-    """Two builds may say the same version: the file tells them apart, not where it lies."""
+    """The file distinguishes two builds of the same version, its place does not."""
     (here / "run").mkdir()
     (here / "run" / "a.inp").write_text("a deck")
 

@@ -85,7 +85,7 @@ def stated() -> dict[str, Version]:
 
 
 def passes(name: str, python: Path, folder: Path) -> bool:
-    """Whether tests, fit and report end with code 0."""
+    """Return whether tests, fit and report end with code 0."""
     start = time.monotonic()
     folder.mkdir()
     tyrecal = [python, "-m", "tyrecal"]

@@ -13,7 +13,7 @@ pytestmark = pytest.mark.numbers
 
 @pytest.mark.slow
 def test_labels_from_rings_are_right_or_not_given(chance: Chance) -> None:
-    """Of some 130 modes of the main tyre (coarse mesh) at most one in 200 is wrong, and 19 in 20
+    """At most one in 200 of some 130 modes of the main tyre (coarse mesh) is wrong, and 19 in 20
     of those that `measured sensors` calls distinguishable have a label.
 
     False failures: 2e-7.

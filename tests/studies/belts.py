@@ -1,4 +1,4 @@
-"""Whether modes, fit and footprint agree that tyres with drawn belts are stable.
+"""Agreement of modes, fit and footprint that tyres with drawn belts are stable.
 
     python -m tests.studies.belts [COUNT] [SEED] [--bears-compression] [--pressed N] [--calculix N]
 
@@ -81,7 +81,7 @@ def inflated(case: LoadedCase, load_N: float) -> None:
 
 
 def failures(case: LoadedCase, load_N: float, pressed: bool) -> dict[str, str]:
-    """Why each command would fail, "" if it does not."""
+    """Reason why each command would fail, "" if it does not."""
     start = start_values(case)
     problem = Problem(case, Evaluator(TyreDesign(case)))
     ways: dict[str, Callable[[], Any]] = {
@@ -129,7 +129,7 @@ def off_calculix(case: LoadedCase) -> float | str:
 
 
 def counts(lines: Sequence[Mapping[str, Any]]) -> str:
-    """How many tyres are computed, and about how many the commands agree."""
+    """Number of tyres that are computed, and about how many the commands agree."""
     causes = [{line[name].split(":")[0] for name in COMMANDS} for line in lines]
     agree = sum(len(each) == 1 for each in causes)
     computed = sum(each == {""} for each in causes)

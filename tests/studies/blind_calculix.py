@@ -149,7 +149,7 @@ def calculix(case: LoadedCase) -> dict[str, float]:
 
 
 def run(case: LoadedCase, about: Mapping[str, Any]) -> None:
-    """One run of both solvers on record."""
+    """Record one run of both solvers."""
     try:
         entry = {**about, "calculix": calculix(case), "common": bundled(case, targets(case))[0]}
     except EvaluationFailed as failure:

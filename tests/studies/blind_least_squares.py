@@ -34,8 +34,8 @@ STEPS, LONGEST = 20, 0.5
 
 
 def errors(folder: Path, trials: Sequence[Scored]) -> dict[str, Array]:
-    """By kind of trial, "effect" (detectable and named) and "none": rms errors held out, in ln f,
-    (trials, 2), of calibrations without and with the effect. ``trials``: as they were scored."""
+    """Rms errors held out, in ln f, (trials, 2), of calibrations without and with the effect, by
+    kind of trial: "effect" (detectable and named) and "none". ``trials``: as they were scored."""
     protocol, labels = read_protocol(folder), labels_of(case_of(folder))
     ruler = read_ruler(folder, labels)
     scored = {each.id: each for each in trials}

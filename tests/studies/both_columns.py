@@ -157,7 +157,7 @@ def tell(title: str, labels: Sequence[object], ln_f: Array) -> None:
 
 
 def main(name: str, inferred: bool) -> None:
-    """As it is, and as near as it comes."""
+    """Print the case as it is, and as near as it comes."""
     case = with_variables(load_case(CASES / f"{name}.yaml"), inferred)
     fine, coarse = BothColumns(case), BothColumns(with_level(case, "coarse"))
     own = fine.at(fine.start)[0]

@@ -151,7 +151,7 @@ def common(law: bool = True, sides: bool = True) -> Iterator[None]:
 
 @contextmanager
 def rewritten(deck: Callable[[str], str]) -> Iterator[None]:
-    """All decks as ``deck`` has their text."""
+    """Write all decks with the text that ``deck`` gives them."""
     plain = TyreDesign.texts
 
     def texts(design: TyreDesign, dialect: str, request: Mapping[str, Any]) -> dict[str, str]:
@@ -162,7 +162,7 @@ def rewritten(deck: Callable[[str], str]) -> Iterator[None]:
 
 
 def on_common_nodes(a: HarmonicShape, b: HarmonicShape) -> tuple[HarmonicShape, HarmonicShape]:
-    """Both shapes on the nodes that the two meshes share, to 10 micrometres."""
+    """Shapes on the nodes that the two meshes share, to 10 micrometres."""
     places = [{tuple(np.round(p, 5)): i for i, p in enumerate(s.points)} for s in (a, b)]
     both = sorted(places[0].keys() & places[1].keys())
     result = []

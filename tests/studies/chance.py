@@ -1,4 +1,4 @@
-"""How often the statistical tests fail, and how far their claims are from failing.
+"""Rates at which the statistical tests fail, and how far their claims are from failing.
 
     python tests/studies/chance.py [seeds] [first] [folder or file ...]
 

@@ -145,7 +145,7 @@ def targets(case: LoadedCase) -> list[Label]:
 
 
 def on_common(case: LoadedCase, folder: Path) -> Common:
-    """Both solvers on the bundled one's discrete problem."""
+    """Compare both solvers on the bundled one's discrete problem."""
     answer = Evaluator(TyreDesign(case), "bundled").evaluate(Question({}))
     ours = match(label_modes(answer.modes), targets(case))
     same = ask(folder, common_problem(case))

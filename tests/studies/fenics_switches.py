@@ -94,7 +94,7 @@ def between(after: dict[str, Mode], before: dict[str, Mode]) -> str:
 
 
 def worst_row(folder: Path, record: Store) -> None:
-    """From the bundled solver to CalculiX, each step by itself."""
+    """Steps from the bundled solver to CalculiX, each by itself."""
     case = at(CASES[0], *DRAWN[3])
     with common():
         halves = split(case, PLY_THICKNESS_M)
@@ -127,7 +127,7 @@ def refused() -> LoadedCase:
 
 
 def refused_state(folder: Path, record: Store) -> None:
-    """That tyre's state by FEniCSx, and by CalculiX with one thing switched."""
+    """State of that tyre by FEniCSx, and by CalculiX with one thing switched."""
     case = refused()
     filled = {**deck_problem(case), "filler": FILLER}
     waves = {**filled, "harmonics": [*range(5), *range(20, 201, 20)], "target": BELOW}

@@ -45,7 +45,7 @@ def files_passed(arguments: list[str]) -> list[str]:
 
 
 def importing(frame: FrameType | None) -> bool:
-    """Whether a call is part of an import."""
+    """Return whether a call is part of an import."""
     while frame := frame and frame.f_back:
         if frame.f_code.co_name == "<module>" and frame.f_globals["__name__"] != "__main__":
             return True

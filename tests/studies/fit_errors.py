@@ -1,4 +1,4 @@
-"""Whether a fit's stated standard errors hold over drawn tyres.
+"""Standard errors that a fit states, tested over drawn tyres.
 
     python -m tests.studies.fit_errors [COUNT] [SEED] [SIZE ...] >> fit_errors.jsonl
     python -m tests.studies.fit_errors fit_errors.jsonl

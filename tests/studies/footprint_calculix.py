@@ -274,7 +274,7 @@ def extrapolated(sizes: Sequence[float], values: Sequence[float]) -> tuple[float
 
 
 def table(done: dict[str, dict[str, Any]]) -> None:
-    """All runs, then the families' extrapolations."""
+    """Print all runs, then the families' extrapolations."""
     print("| run | mm | force, N | area, cm2 | cpu, s | wall, s | memory, MB |")
     print("|---|---|---|---|---|---|---|")
     for name in [name for name in RUNS if name in done]:

@@ -42,7 +42,7 @@ def coarse_case(folder: Path) -> Path:
 
 
 class NotReached(RuntimeError):
-    """Not even the first load."""
+    """Error: not even the first load is reached."""
 
     cause = "no_equilibrium"
 
@@ -93,7 +93,7 @@ class Hertz(Bundled):
         }
 
     def footprint(self, load: float) -> dict[str, Any]:
-        """One load."""
+        """Footprint of one load."""
         scale = (load / 4e3) ** (1 / 3)
         a, b, deflection = 0.08 * scale * self.size, 0.05 * scale * self.size, 0.02 * scale**2
         nodes = np.array(list(self.mesh.nodes))

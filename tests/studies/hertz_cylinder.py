@@ -1,4 +1,4 @@
-"""How near the bundled solver's contact comes to Hertz: meshes, loads, road, friction.
+"""Distance of the bundled solver's contact from Hertz: meshes, loads, road, friction.
 
 python -m tests.studies.hertz_cylinder (some minutes)
 """

@@ -152,8 +152,8 @@ class Tyre:
         md.add_Dirichlet_condition_with_simplification("u", self.regions["rim"])
 
     def newton(self, most: int = 25) -> int:
-        """To 1e-8 of the first residual of its kind; halves steps that make the residual grow
-        much."""
+        """Newton's method to 1e-8 of the first residual of its kind; halves steps that make the
+        residual grow much."""
         md, reached = self.md, 0
         md.assembly("build_all")
         residual = md.rhs()

@@ -60,7 +60,7 @@ def left(session: int) -> list[str]:
 
 
 def rubbish(out: Path) -> bool:
-    """Whether run folders or half-written files are there."""
+    """Return whether run folders or half-written files are there."""
     left = (".new-*", "runs", "*.partial")
     return any(path for each in left for path in out.rglob(each))
 

@@ -112,7 +112,7 @@ def _evenness(shape: HarmonicShape) -> float:
 
 @cache
 def _images(points: bytes) -> Array:
-    """Each node's image under z -> -z."""
+    """Image of each node under z -> -z."""
     X = np.frombuffer(points).reshape(-1, 2)
     return np.asarray(KDTree(X).query(X * [1, -1])[1])
 

@@ -65,7 +65,7 @@ class Sensor:
 
 
 def evaluated(pressure_kPa: float, effects: Mapping[str, float] | None = None) -> list[Mode]:
-    """All modes of the true tyre, with effects by path."""
+    """Return all modes of the true tyre, with effects by path."""
     case = load_case(CASES / "p235_75r17.yaml")
     case = with_values(case, {"analysis.highest_harmonic": HIGHEST, **(effects or {})})
     question = Question({**TRUTH, "pressure_kPa": pressure_kPa}, (), PER_HARMONIC)
@@ -113,7 +113,8 @@ def damping(modes: list[Mode], rng: np.random.Generator) -> Array:
 def accelerances(
     modes: list[Mode], ratios: Array, places: list[Sensor], rng: np.random.Generator
 ) -> dict[tuple[int, int], Array]:
-    """By sensor and direction: sum of phi_i phi_j (-w^2) / (w_k^2 - w^2 + 2 i zeta w w_k)."""
+    """Functions by sensor and direction: sum of phi_i phi_j (-w^2) / (w_k^2 - w^2 + 2 i zeta w
+    w_k)."""
     (z, angle), direction = DRIVEN
     first = modes[0].raw.shape
     assert isinstance(first, HarmonicShape)
@@ -202,7 +203,8 @@ def write_functions(folder: Path, rng: np.random.Generator) -> None:
 
 
 def write_shapes(folder: Path, rng: np.random.Generator) -> None:
-    """Both members of each doublet, turned by some angle round the tyre, each with a phase."""
+    """Write both members of each doublet, turned by some angle round the tyre, each with a
+    phase."""
     modes = evaluated(200.0)
     places = sensors(modes[0].raw.shape, rng)  # type: ignore[arg-type]
     sets = geometry(places)

@@ -113,7 +113,7 @@ def drawn(tree: Path, seed: int, count: int, areas: Sequence[str] = ()) -> list[
 
 
 class Cover:
-    """Which tests execute which line of a copy, from the files that `mutants_cover` wrote."""
+    """Tests that execute each line of a copy, from the files that `mutants_cover` wrote."""
 
     def __init__(self, tree: Path):
         self.tree = tree
@@ -311,7 +311,8 @@ class Runner:
         return slot
 
     def _meet(self, slot: Path, mutant: Mutant, names: list[str], files: list[str]) -> Watch:
-        """In this process, with the function exchanged; or with everything imported again."""
+        """Run the tests in this process with the function exchanged, or with everything imported
+        again."""
         path = slot / mutant.file
         source = path.read_bytes()
         module = mutant.file.removesuffix(".py").replace("/", ".")

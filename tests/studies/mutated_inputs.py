@@ -120,7 +120,7 @@ WITH_MORE = (  # numbers that count, and no others
 
 
 class Slow(BaseException):
-    """Too much processor time."""
+    """Error: too much processor time."""
 
 
 def mutated(data: bytes, chance: Random) -> bytes:
@@ -154,7 +154,7 @@ def mutated(data: bytes, chance: Random) -> bytes:
 
 
 def mutated_json(content: Any, chance: Random) -> Any:
-    """One value, somewhere in it, replaced or removed."""
+    """Replace or remove one value somewhere in the file."""
     here, path = content, []
     while isinstance(here, dict | list) and here and chance.random() < 0.85:
         key = chance.choice([*here] if isinstance(here, dict) else range(len(here)))
@@ -398,7 +398,7 @@ class Kinds:
         return run(solve, str(folder / "modes"), "--oldjob", "inflate", *limit)
 
     def state(self) -> dict[str, Any]:
-        """All that must stay as it is."""
+        """Return what must stay as it is."""
         return {
             str(path): path.read_bytes() if path.is_file() else None
             for top in (self.outside, self.base)
@@ -412,7 +412,7 @@ LONG = ("fits", "footprints")
 
 
 def trial(kinds: Kinds, kind: str, number: int, seed: int) -> dict[str, Any]:
-    """One input; ``fault`` says what was wrong, "" where nothing was."""
+    """Try one input; ``fault`` states what was wrong, "" if nothing was."""
     chance, fault, code = Random(f"{seed}/{kind}/{number}"), "", 0
     out, err = io.StringIO(), io.StringIO()
     before, used = kinds.state(), time.process_time()

@@ -56,7 +56,7 @@ class Mutant:
         return source[: self.start] + self.new.encode() + source[self.end :]
 
     def compiles(self, source: bytes) -> bool:
-        """Whether it is Python still; templates are not judged."""
+        """Return whether the text is still Python; templates are not judged."""
         if not self.file.endswith(".py"):
             return True
         with warnings.catch_warnings(action="ignore"):
@@ -68,7 +68,7 @@ class Mutant:
 
 
 def mutants_of(file: str, source: bytes) -> Iterator[Mutant]:
-    """All changes of one file; none in annotations, messages, assertions and imports."""
+    """List the changes of one file; none in annotations, messages, assertions and imports."""
     tree = ast.parse(source)
     begins = [0]
     for row in source.splitlines(keepends=True):
@@ -162,7 +162,7 @@ def functions_of(code: CodeType) -> dict[str, list[CodeType]]:
 
 
 def functions(modules: set[str]) -> dict[str, list[FunctionType]]:
-    """All functions that there are of modules whose top package is one of ``modules``."""
+    """List the functions of modules whose top package is one of ``modules``."""
     by_module: dict[str, list[FunctionType]] = defaultdict(list)
     for one in gc.get_objects():
         if isinstance(one, FunctionType) and (one.__module__ or "").partition(".")[0] in modules:

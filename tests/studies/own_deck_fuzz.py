@@ -72,7 +72,7 @@ HUGE = (
 
 
 def numbers(text: str, random: Random) -> str:
-    """One field of a data line exchanged."""
+    """Exchange one field of a data line."""
     lines = text.split("\n")
     k = random.choice([k for k, line in enumerate(lines) if line and line[0] != "*"])
     fields = lines[k].split(",")
@@ -137,7 +137,7 @@ KINDS: tuple[Callable[[str, Random], str], ...] = (numbers, option, lines_moved,
 
 
 def judged(path: Path) -> str:
-    """How a deck ends: refused, read, or what went wrong."""
+    """Return how a deck ends: refused, read, or the fault."""
     try:
         deck = read_own_deck(path, "m")
         blocks = deck.with_numbers({})
@@ -193,7 +193,7 @@ def draw(count: int, seed: int) -> list[tuple[str, str, float, str]]:
 
 
 def sizes() -> list[str]:
-    """How the plain deck ends with each of `HUGE`."""
+    """Return how the plain deck ends with each of `HUGE`."""
     text = own_decks.plain()
     at = text.index("*RIGID BODY")
     with TemporaryDirectory() as folder:

@@ -20,12 +20,12 @@ def of(step: str, *keys: str | tuple[str, float]) -> Callable[[Record], list[flo
 
 
 def pressed(step: str, what: str) -> Callable[[Record], list[float]]:
-    """At every load."""
+    """Figures at every load."""
     return of(step, *(f"{what} at {load}" for load in LOADS_N))
 
 
 def rises(record: Record, what: str) -> list[float]:
-    """From the initial design to the paper's optimum, %, at every load."""
+    """Changes from the initial design to the paper's optimum, %, at every load."""
     after, before = (pressed(step, what)(record) for step in ("pressed optimum", "pressed"))
     return [100 * a / b - 100 for a, b in zip(after, before, strict=True)]
 

@@ -32,7 +32,7 @@ def of_fit(content: Mapping[str, Any]) -> Figures:
     figures["least singular value"] = content["singular_values"][-1]
     for name, v in content["variables"].items():
         figures |= {name: v["value"], f"{name} %": 100 * v["standard_error"] / v["value"]}
-        if (total := v["standard_error_total"]) is not None:
+        if (total := v.get("standard_error_total")) is not None:
             figures[f"{name} total %"] = 100 * total / v["value"]
     for pair in itertools.combinations(content["variables"], 2):
         figures[f"{' and '.join(pair)} correlated"] = content["correlations"][pair[0]][pair[1]]

@@ -76,7 +76,7 @@ def as_the_case(record: Record) -> list[float]:
 
 
 def paper_itself(record: Record) -> list[float]:
-    """Its row for the paper's own columns."""
+    """Row of the table of sections for the paper's own columns."""
     del record
     first, second = (dict(zip(LABELS, column, strict=True)) for column in PAPER_HZ)
     return [

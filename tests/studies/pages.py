@@ -83,7 +83,7 @@ def numbers(row: str) -> list[str]:
 
 
 def is_rounded(printed: str, value: float) -> bool:
-    """Whether a printed number is ``value``, rounded to the last digit of the former."""
+    """Return whether a printed number is ``value``, rounded to the last digit of the former."""
     mantissa, _, power = printed.replace(",", "").partition("e")
     unit = 10.0 ** (int(power or 0) - len(mantissa.partition(".")[2]))
     return abs(float(f"{mantissa}e{power or 0}") - value) <= 0.5 * unit * (1 + 1e-3)

@@ -66,7 +66,7 @@ class RingTest:
 
 @cache
 def tyre_modes(name: str, design: int = 0) -> tuple[Mode, ...]:
-    """By rising frequency, up to c = 10; design: 0, as the case has it, or another."""
+    """Modes by rising frequency, up to c = 10; design: 0, as the case has it, or another."""
     with TemporaryDirectory() as folder:
         path = CASES / name if name.endswith(".yaml") else Path(folder) / "tyre.yaml"
         if not path.exists() and run(
@@ -117,7 +117,7 @@ def draw_test(
 def labels_given(
     test: RingTest, case: CaseModes | None = None
 ) -> Iterator[tuple[Label, Label | None, bool]]:
-    """Each mode's label, the label given, and whether the sensors can tell it."""
+    """True label of each mode, the label given, and whether the sensors can distinguish it."""
     labeller = Labeller(test.sensors, test.highest, case)
     alike = labeller.looks_like()
     measured = [

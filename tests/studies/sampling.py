@@ -144,7 +144,7 @@ def coverage(count: int, seed: int) -> None:
 
 
 def cost(times: int) -> None:
-    """In evaluations with slopes."""
+    """Print the cost in evaluations with sensitivities."""
     import_began = time.process_time()
     import emcee  # noqa: F401
 

@@ -86,7 +86,7 @@ RESAMPLES = 4000
 
 @dataclass(frozen=True)
 class Laboratory:
-    """All that it may measure of a tyre: what each row belongs to."""
+    """Measurements that may be taken of a tyre: what each row belongs to."""
 
     problem: InverseProblem  # of all rows
     item: Array  # (n,)
@@ -161,7 +161,7 @@ def by_next(tyre: Laboratory) -> Course:
 
 
 def by_plan(tyre: Laboratory, plan: Sequence[str]) -> Course:
-    """One after the other."""
+    """Take the measurements one after the other."""
     done: list[str] = []
     for name in plan:
         done.append(name)
@@ -248,7 +248,7 @@ def laboratory() -> Laboratory:
 def _with_readings(
     expanded: Expansion, shows: Array, ids: Sequence[str], far: Mapping[str, float]
 ) -> Expansion:
-    """With rows more: readings of effects' sizes, over their ranges, and of sources."""
+    """Add rows: readings of effects' sizes, over their ranges, and of sources."""
     m, v = len(shows), len(expanded.x0)
 
     def of(id: str, nodes: EffectResponse) -> EffectResponse:

@@ -44,7 +44,7 @@ EFFECTS_IN_TURN = (2, 0, 2, 1, 3)  # of tyres
 
 
 def named_before(d: Diagnosis) -> str | None:
-    """By the likeliest explanation alone, with the priors of before."""
+    """Name the likeliest explanation alone, with the earlier priors."""
     pairs, singles = 0.03, 0.62
     ids = len(d.problem.expansion.nodes)
     prior = {0: 1.0, 1: singles / ids, 2: pairs / (ids * (ids - 1) / 2), 3: 0.0}
@@ -61,7 +61,7 @@ def named_before(d: Diagnosis) -> str | None:
 
 
 def judged(key: str | None, truth: set[str], kind: str) -> str:
-    """All named, a part of them, with others, or what else was said."""
+    """Return the verdict on a trial: all named, a part of them, with others, or another answer."""
     if key is None:
         return kind
     ids = set(key.split("+"))

@@ -1,4 +1,5 @@
-"""Whether `fit --measured FILE` names a slip in a table of drawn tyres, and accuses no clean one.
+"""Rate at which `fit --measured FILE` names a slip in a table of drawn tyres, and accuses no
+clean one.
 
     python -m tests.studies.slips [COUNT] [SEED] [SIZE ...] >> slips.jsonl
     python -m tests.studies.slips slips.jsonl
@@ -149,7 +150,7 @@ def judged(case: LoadedCase, rows: Sequence[Measurement], folder: Path) -> Judge
 
 
 def is_named(kind: str, wrong: Sequence[int], words: str) -> bool:
-    """Whether a sentence names the slip before anything else."""
+    """Return whether a sentence names the slip before anything else."""
     first = words.split("Nearly as likely")[0]
     lines = {int(each) - FIRST_LINE for each in re.findall(r"csv, line (\d+)", first)}
     if kind == PRESSURES:

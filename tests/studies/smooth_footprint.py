@@ -1,4 +1,4 @@
-"""How smooth footprints are over the load: stiffness, area, length and width at close loads.
+"""Smoothness of footprints over the load: stiffness, area, length and width at close loads.
 
     python -m tests.studies.smooth_footprint [--mesh LEVEL] [--from N] [--to N] [--step N]
         [--set NAME=VALUE ...] [--angles A1,A2,...]

@@ -59,7 +59,7 @@ class BothErrors:
 
     @property
     def departure(self) -> float:
-        """From the closed form, relative."""
+        """Relative departure from the closed form."""
         own = np.sqrt(np.outer(np.diag(self.total), np.diag(self.total)))
         return float(abs((self.total - self.by_sigma - self.added) / own).max())
 

@@ -1,4 +1,4 @@
-"""Both methods of the fit from drawn starts: where each ends, and with how many designs.
+"""Ends and numbers of designs of both methods of the fit, from drawn starts.
 
     python -m tests.studies.starts [--count 50] [--seed 0] [--record DIR]
 

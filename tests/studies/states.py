@@ -103,7 +103,7 @@ def case_with(case: LoadedCase, hertz: Hertz, area_m2: float | None = None) -> L
 
 
 def frequencies(evaluator: Evaluator, state: TyreState, values: Mapping[str, float]) -> list[float]:
-    """By the model, Hz, of `LABELS`."""
+    """Frequencies of `LABELS` by the model, Hz."""
     question = Question(state.design(CASE, values))
     ((_, labelled),) = find_modes(evaluator, [question], LABELS)
     assert isinstance(labelled, LabelledModes)
@@ -111,7 +111,7 @@ def frequencies(evaluator: Evaluator, state: TyreState, values: Mapping[str, flo
 
 
 def pressed_area(evaluator: Evaluator, values: Mapping[str, float]) -> float:
-    """By the model, m2, at 4 kN and 240 kPa."""
+    """Area by the model, m2, at 4 kN and 240 kPa."""
     pressed = evaluator.press(values, [LOAD_N])
     mesh = TyreDesign(COARSE, values).tyre.mesh
     return float(footprint_row(pressed, pressed.footprints[0], mesh)["area_m2"])
@@ -185,10 +185,10 @@ class EmulatedEvaluator:
             yield Evaluation(self._key(question.values)[0], 12.8, modes, gradients)
 
     def needs_road(self, modes: bool = False) -> None:
-        """It has one."""
+        """The stand-in has a road."""
 
     def refuse_lacking(self, design: Any) -> None:
-        """It has all."""
+        """Refuse nothing: the stand-in can do everything."""
 
 
 def coverage(count: int, seed: int) -> None:

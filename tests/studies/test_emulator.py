@@ -96,7 +96,8 @@ def test_products_are_legendres_and_their_slopes_those_of_differences() -> None:
 
 @pytest.mark.parametrize("v", [1, 3, 6])
 def test_designs_are_spread_evenly_and_more_of_them_are_further_ones(v: int) -> None:
-    """By 2 or 3 ranks of 40; drawn ones are off by 5 and more, as a rule."""
+    """Designs are off even spacing by 2 or 3 ranks of 40; drawn ones are off by 5 and more, as a
+    rule."""
     t = spread(40, v)
     assert np.array_equal(t, spread(90, v)[:40])
     expected = (2 * np.arange(40) + 1) / 40 - 1
@@ -120,8 +121,8 @@ def test_a_design_left_out_is_as_if_it_had_not_been_evaluated() -> None:
 
 
 def test_the_bound_is_a_tolerance_limit(chance: Chance) -> None:
-    """For log-normal errors it holds for 99 % of designs with a confidence of 95 %, which the
-    closed form comes close to. False failures: 1e-7."""
+    """The bound holds for 99 % of designs of log-normal errors with a confidence of 95 %, which
+    the closed form approaches. False failures: 1e-7."""
     drawn = np.exp(chance.random.normal(-9.0, 1.5, (2000, 30)))
     quantile = np.exp(-9.0 + 2.3263 * 1.5)
     chance.often([bound(each) > quantile for each in drawn], 0.93, 0.97)
@@ -131,7 +132,7 @@ def test_the_bound_is_a_tolerance_limit(chance: Chance) -> None:
 
 
 def test_fresh_designs_keep_the_stated_error(chance: Chance) -> None:
-    """Where the two modes cross, too. False failures: 1e-7."""
+    """Designs also keep the error if the two modes cross. False failures: 1e-7."""
     tyre, kept = meeting(), []
     emulated = made(tyre)
     assert 1e-9 < emulated.median_error < emulated.stated_error < 1e-3

@@ -160,8 +160,8 @@ def test_a_solver_without_a_road_says_so() -> None:
 
 @pytest.mark.slow
 def test_the_bundled_solvers_own_footprints(tmp_path: Path) -> None:
-    """Its loads are borne, by rim and road; it says where it touches; it is the same after half a
-    turn; forces over deflections are the tangents' mean."""
+    """Loads agree with the forces of rim and road, the patch is listed, half a turn changes
+    nothing, and forces over deflections are the tangents' mean."""
     case = load_case(coarse_case(tmp_path))
     mesh = resolved(case).mesh
     loads = [2000.0, 2500.0]

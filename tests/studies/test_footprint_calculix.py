@@ -33,7 +33,7 @@ def test_extrapolation_finds_the_limit_of_its_own_law() -> None:
 
 
 def test_functions_of_a_face() -> None:
-    """They are one at their own node; they and their derivatives carry a linear field."""
+    """The functions are one at their own node; they and their derivatives carry a linear field."""
     a = np.array([-1.0, 1, 1, -1, 0, 1, 0, -1])
     b = np.array([-1.0, -1, 1, 1, -1, 0, 1, 0])
     N, _, _ = serendipity(a, b)

@@ -45,7 +45,8 @@ def hertz(each: Loaded) -> dict[Member, float]:
 
 @pytest.mark.slow
 def test_every_family_at_every_load(tyre: LoadedTyre) -> None:
-    """Both [0,0] once, every doublet's two members, by rising frequency, no load out of place."""
+    """The list has both [0,0] once and both members of every doublet, by rising frequency, and
+    no load out of place."""
     assert [each.load_N for each in tyre.loads] == LOADS and tyre.failed is None
     doublets = [Label(1, 1), Label(1, 0), Label(2, 1), Label(2, 0)]
     wanted = {Member(label, symmetry) for label in doublets for symmetry in SYMMETRIES}
@@ -186,7 +187,8 @@ def test_an_unloaded_tyre_that_fails_is_the_outcome(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("waves", [1, 2, 4, 8])
 def test_elements_are_short_enough_for_the_waves(waves: int) -> None:
-    """Those near the patch stay; the rest are as equal as they are short, and end at the top."""
+    """Elements near the patch stay; the rest are equally long, as short as needed, and end at
+    the top."""
     angles = [4.0, 4.0, 4.0, 5.0, 7.0, 12.0, 21.0, 40.0, 83.0]
     half = fine_enough(angles, waves)
     longest = 360 / (7.5 * waves)
@@ -213,7 +215,7 @@ def test_the_deck_asks_for_modes_after_each_load() -> None:
 
 
 def test_the_cavitys_first_mode_stands_with_the_tyres() -> None:
-    """In the files, the tables and in words; without a gas in none of them."""
+    """Files, tables and sentences have the mode, and none of them without a gas."""
     plain = [loaded(0.0, 80.0, 80.0, 1.0), loaded(500.0, 82.0, 84.0)]
     waves = (186.0, 186.0), (185.1, 187.0)
     filled = [replace(each, cavity_Hz=hertz) for each, hertz in zip(plain, waves, strict=True)]
@@ -246,7 +248,8 @@ def test_the_cavitys_first_mode_stands_with_the_tyres() -> None:
 
 
 def test_a_mode_with_little_of_its_unloaded_shape_has_no_name() -> None:
-    """Its row says which curve it is on; a sweep, whose rows are curves, brackets its frequency."""
+    """The row of such a mode names its curve; a sweep, whose rows are curves, brackets its
+    frequency."""
     loads = (
         loaded(0.0, 80.0, 80.0, 1.0),
         loaded(500.0, 81.0, 82.0, 0.15),

@@ -13,5 +13,5 @@ def test_no_damaged_deck_ends_in_a_traceback(request: pytest.FixtureRequest) -> 
 
 
 def test_sizes_beyond_a_machine_are_refused() -> None:
-    """Each within the limits of time and memory."""
+    """Each refusal is within the limits of time and memory."""
     assert not [how for how in own_deck_fuzz.sizes() if how not in ("refused", "read")]

@@ -61,7 +61,7 @@ def test_a_linear_tyre_has_the_normal_posterior_of_the_closed_form(chance: Chanc
 
 
 def test_what_each_rim_tells_adds_up() -> None:
-    """Two rims, an emulator each: information and ln p are the sums of both."""
+    """Information and ln p of two rims, with an emulator each, are the sums of both."""
     other = J @ np.array([[0.2, 0.0], [0.0, 1.5]])
     one, two = posterior(WIDE), posterior(WIDE, lambda x: 4.5 + x @ other.T)
     both = Posterior(
@@ -102,7 +102,7 @@ def test_draws_are_worth_as_many_as_their_autocorrelation_says() -> None:
 
 
 def test_more_draws_have_more_walkers_until_their_steps_tell_tau() -> None:
-    """As many as are asked for are enough of a tau that is a fifth longer than a chain said."""
+    """The number of draws suffices for a tau a fifth longer than a chain stated."""
     counts = 3000, 40_000, 60_000, 160_000, 10**6
     assert [walkers(count, 2) for count in counts] == [100, 100, 150, 400, 400]
     assert walkers(3000, 40) == 160
@@ -113,8 +113,8 @@ def test_more_draws_have_more_walkers_until_their_steps_tell_tau() -> None:
 
 
 def test_tau_is_known_as_well_as_said(chance: Chance) -> None:
-    """With 400 and 100 walkers over 20 tau of x(t + 1) = a x(t) + noise, tau = 9, it is known to 5
-    and 10 %, by which `ENOUGH` was chosen. False failures: 2e-7."""
+    """Tau = 9 of x(t + 1) = a x(t) + noise is known to 5 and 10 % with 400 and 100 walkers over
+    20 tau, by which `ENOUGH` was chosen. False failures: 2e-7."""
     a, tau = 0.8, 9.0
     for number, share in ((400, 0.05), (100, 0.10)):
         noise = chance.random.normal(size=(int(ENOUGH * tau), number, 40))

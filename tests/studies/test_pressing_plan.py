@@ -55,7 +55,8 @@ def test_more_that_is_wanted_takes_longer() -> None:
 
 
 def test_no_more_run_side_by_side_than_the_memory_holds(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two designs fit in memory of 2.5 times what one needs; in less than one's, one is tried."""
+    """Memory of 2.5 times the need of one design holds two; in less than one's need, one is
+    tried."""
     case = load_case(CASE)
     evaluator = Evaluator(TyreDesign(case))
     states = [PressedState(1), PressedState(1)]
@@ -104,7 +105,8 @@ def test_a_dry_run_prints_it_and_runs_nothing(
 def test_a_dry_run_of_a_fit_over_two_pressures(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Two stiffnesses at one pressure and a length at another; ten designs of Gauss-Newton."""
+    """The fit has two stiffnesses at one pressure, a length at another, and ten designs of
+    Gauss-Newton."""
     table = tmp_path / "measured.csv"
     table.write_text(
         "load [N],pressure [kPa],vertical stiffness [N/mm],contact length [mm],sigma [%]\n"

@@ -33,8 +33,8 @@ pytestmark = pytest.mark.numbers
 
 @pytest.mark.slow
 def test_a_tyre_on_two_rims_is_sampled_and_predicted_on_both() -> None:
-    """One variable, one mode a rim, without scatter: the draws hold the start; [0,0] torsional is
-    higher where the wheel hangs, and a wave that moves no rim is the same on both."""
+    """The draws hold the start with one variable, one mode a rim and no scatter. [0,0] torsional
+    is higher if the wheel hangs, and a wave that moves no rim is the same on both."""
     case = coarse()
     alone = {"C10": case.case.variables["C10"]}
     case = replace(case, case=case.case.model_copy(update={"variables": alone}))
@@ -124,7 +124,7 @@ def test_targets_are_read_with_their_sigma_or_what_the_fit_leaves() -> None:
 
 
 def sampled(draws: int = 20_000) -> Sample:
-    """As `study.run` gives it, of the linear tyre."""
+    """Sample of the linear tyre, as `study.run` gives it."""
     density = posterior(WIDE)
     drawing = sample_box(density, BOUNDS, draws, 5)
     observations = Observations(rows((240.0,)), density.y, SIGMA, 0.0, SIGMA * np.nan, SIGMA)

@@ -14,7 +14,7 @@ from .standard_errors import compared
 @pytest.mark.numbers
 @pytest.mark.parametrize("correlated", [True, False])
 def test_the_total_of_a_fit_exceeds_the_error_by_the_whole_covariance(correlated: bool) -> None:
-    """By (R - R') Sigma (R - R')^T, which is 0 where scatter alone is uncertain."""
+    """The excess is (R - R') Sigma (R - R')^T, which is 0 if scatter alone is uncertain."""
     random = generator("standard errors", int(correlated))
     J, scatter = random.normal(size=(9, 3)), random.uniform(0.5, 2.0, 9)
     root = random.normal(size=(9, 9)) * correlated

@@ -12,8 +12,8 @@ from .stuck_patch import CASE, Compliance, table
 
 
 def test_compliance_of_a_single_mode() -> None:
-    """All of 1 / (lambda - omega^2), whatever the frequency, where the mode is known; without it
-    to third order in omega^2 / lambda."""
+    """The compliance of a known mode is 1 / (lambda - omega^2) at any frequency; without the
+    mode it is right to third order in omega^2 / lambda."""
     static, inertia = np.array([[1 / 4.0]]), np.array([[1 / 16.0]])
     known = Compliance(static, inertia, np.array([4.0]), np.ones((1, 1)))
     unknown = Compliance(static, inertia, np.zeros(0), np.zeros((1, 0)))

@@ -12,8 +12,8 @@ from .wrinkles import by_size, finer, frequencies, with_compression
 @pytest.mark.slow
 @pytest.mark.parametrize("holds", ["whole_bead", "bead_surface"])
 def test_its_modes_do_not_hang_on_the_mesh_at_the_bead(holds: str) -> None:
-    """With twice the elements and rows within 1 %; where cords bear compression [0,0] axial of a
-    bead whose surface is held falls by more than 5 %."""
+    """Frequencies stay within 1 % with twice the elements and rows. If cords bear compression,
+    [0,0] axial of a bead whose surface is held falls by more than 5 %."""
     case = by_size("11R22.5")
     case = changed(case, rim=with_part(case.case.rim, holds=holds))
     moved = {}

@@ -73,8 +73,8 @@ def area_of_gap(along: Array, across: Array, over: Array) -> float:
 
 
 def _edge(place: Array, over: Array) -> float:
-    """Where a line's contact ends, between its last node that touches and the next; half-way
-    where a coarse mesh has no two nodes beyond."""
+    """Place where a line's contact ends, between its last node that touches and the next;
+    half-way if a coarse mesh has no two nodes beyond."""
     last = int(np.flatnonzero(over > 0)[-1])
     if last + 2 >= len(place):
         return float(place[last : last + 2].mean())
@@ -122,7 +122,7 @@ def areas_of_gap(folder: Path) -> list[float]:
 
 
 def road_heights(folder: Path) -> list[float]:
-    """Where the road stands (m) at each deflection of a CalculiX run."""
+    """Height of the road (m) at each deflection of a CalculiX run."""
     text = (folder / "press.inp").read_text()
     road = float(re.findall(r"^\*NODE, NSET=ROAD\n\d+, (\S+),", text, re.M)[0])
     return [road + float(d) for d in re.findall(r"^\*\* deflection .*\n\S+, (\S+)$", text, re.M)]

@@ -44,7 +44,7 @@ SIGMA, APART, MOST_MISSED, REACH = 0.005, 0.02, 3, 0.9
 
 
 def emulated() -> Emulator:
-    """All modes by the variables."""
+    """Modes by the variables, from the emulator."""
     analysis = CASE.case.analysis.model_copy(update={"highest_harmonic": 5})
     wider = replace(CASE, case=CASE.case.model_copy(update={"analysis": analysis}))
     variables = read_variables(CASE)
@@ -99,7 +99,7 @@ def main(count: int, seed: int, discrepant: bool) -> None:
 
 
 def without_labels(y: Array, at: Expansion) -> Frequencies:
-    """All of them."""
+    """Measured frequencies without their labels."""
     count = len(y)
     place, none = np.zeros(count, int), np.zeros(count, bool)
     allowed = admissible([None] * count, place, at)

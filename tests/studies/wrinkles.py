@@ -1,4 +1,5 @@
-"""Where cords are compressed a finer mesh is no better: a layer without bending stiffness wrinkles.
+"""Wrinkles of a layer without bending stiffness: if cords are compressed, a finer mesh is no
+better.
 
     python -m tests.studies.wrinkles 11R22.5 275/40R20
     python -m tests.studies.wrinkles 11R22.5 --tension_only
@@ -49,7 +50,7 @@ def finer(case: LoadedCase, along: int, rows: int) -> LoadedCase:
 
 
 def with_compression(case: LoadedCase, bears: bool) -> LoadedCase:
-    """With cords of which all bear compression, or none."""
+    """Case in which all cords bear compression, or none."""
     materials = {
         name: with_part(m, bears_compression=bears) if isinstance(m, Cord) else m
         for name, m in case.case.materials.items()
