@@ -42,7 +42,9 @@ def of_fit(content: Mapping[str, Any]) -> Figures:
         for name in ("initial", "fitted", "target"):
             figures[f"{name} {label}"] = mode[f"{name}_Hz"]
     for each in content.get("footprint", []):
-        figures[f"off {each['quantity']} {each['pressure_kPa']:g}"] = each["deviation_percent"]
+        figures[f"off {each['quantity']} {each.get('pressure_kPa', 'own')}"] = each[
+            "deviation_percent"
+        ]
     if "labels" in content:
         figures["labels %"] = 100 * content["labels"]["labelings"][0]["probability"]
         rows = sum(mode["multiplicity"] for mode in content["modes"]) - len(content["variables"])
