@@ -37,7 +37,9 @@ def of_fit(content: Mapping[str, Any]) -> Figures:
     for pair in itertools.combinations(content["variables"], 2):
         figures[f"{' and '.join(pair)} correlated"] = content["correlations"][pair[0]][pair[1]]
     for mode in content["modes"]:
-        label = label_of(mode) + (f" {mode['pressure_kPa']:g}" if "pressure_kPa" in mode else "")
+        label = label_of(mode)
+        if f"off {label}" in figures:  # measured in several states
+            label += f" {mode['pressure_kPa']:g}"
         figures[f"off {label}"] = mode["deviation_percent"]
         for name in ("initial", "fitted", "target"):
             figures[f"{name} {label}"] = mode[f"{name}_Hz"]
