@@ -103,7 +103,7 @@ SENTENCES: list[tuple[str, str, Callable[[Record], list[float]]]] = [
     ),
     (
         REAL_DATA,
-        "*not explained by the catalogue*: {} % left, p = {}e-12",
+        "the verdict would be the same: {} % left, p = {}e-12",
         of("diagnosed, section exact", "rms %", ("p", 1e12)),
     ),
     (
