@@ -28,7 +28,7 @@ log = logging.getLogger("tyrecal_solvers")
 CONTACT_FORCE_RTOL = 1e-8  # out-of-balance force over the load
 MAX_NEWTON = 40  # Newton iterations a load
 # GMRES iterations of a step, after which the preconditioner is formed anew
-MAX_GMRES_BEFORE_NEW_FACTOR = 25
+MAX_GMRES_BEFORE_NEW_FACTOR = 8
 MAX_GMRES = 60
 NEAR_LOAD = 2.0  # of a load, up to which Coulomb's friction is tried at once
 SAME_SHARE = 0.02  # of a load, up to which a first guess counts as one at this load
