@@ -75,7 +75,7 @@ def full_disc(patch: pytest.MonkeyPatch) -> None:
     def fails(*arguments: object) -> None:
         raise OSError(28, "No space left on device", "fit_history.csv")
 
-    patch.setattr("tyrecal.studies.fit.calibrate.history_csv", fails)
+    patch.setattr("tyrecal.studies.fit.study.history_csv", fails)
 
 
 def no_picture(patch: pytest.MonkeyPatch) -> None:

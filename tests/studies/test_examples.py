@@ -25,7 +25,7 @@ ENTRIES = {  # what other rooms, studies from outside and Python users begin wit
     "fit.problem": ["Problem", "objective"],
     "fit.study": ["FitStudy"],
     "fit.targets": ["Target", "read_targets"],
-    "fit.variable": ["DesignVariable", "read_variables"],
+    "variable": ["DesignVariable", "read_variables"],
     "labelling.tree": ["labelings"],
     "modes": ["run"],
     "pressing_plan": ["PressingPlan"],
