@@ -12,7 +12,7 @@ OWN_DECKS_FILE = "own_decks.json"
 
 
 @dataclass(frozen=True)
-class OwnDecks:
+class DecksOfRun:
     """Own decks of a run."""
 
     jobs: list[tuple[str, str]]  # each with the one that it continues, or ""
@@ -33,12 +33,12 @@ def save(request: Mapping[str, Any], folder: Path) -> list[Path]:
     if "own_decks" not in request:
         return []
     path = folder / OWN_DECKS_FILE
-    text = json.dumps(asdict(OwnDecks(**request["own_decks"])), indent=1) + "\n"
+    text = json.dumps(asdict(DecksOfRun(**request["own_decks"])), indent=1) + "\n"
     path.write_text(text, encoding="utf-8", newline="")
     return [path]
 
 
-def load(folder: Path) -> OwnDecks | None:
+def load(folder: Path) -> DecksOfRun | None:
     """Load the own decks that were saved in a run folder; None if it has none. Raises OSError."""
     path = folder / OWN_DECKS_FILE
-    return OwnDecks(**json.loads(path.read_text(encoding="utf-8"))) if path.exists() else None
+    return DecksOfRun(**json.loads(path.read_text(encoding="utf-8"))) if path.exists() else None

@@ -157,6 +157,15 @@ def test_a_constants_name_means_one_thing() -> None:
     assert not list(filter(re.compile(OTHER_LIMITS).match, files)), "name limits MAX_ or MIN_"
 
 
+def test_a_class_name_means_one_thing() -> None:
+    places: dict[str, list[str]] = {}
+    for module, path in modules().items():
+        for node in tree(path).body:
+            if isinstance(node, ast.ClassDef):
+                places.setdefault(node.name, []).append(module)
+    assert not {name: where for name, where in places.items() if len(where) > 1}
+
+
 KINDS = {"Stations", "SectionDeck", "DecksIn3D", "UserDecks", "OwnDeck", "OwnDecks", "OwnDeckMesh"}
 BRANCHES_BY_KIND_LEFT = 5  # may only fall: a tyre's kind answers (`tyre/case/kinds`)
 

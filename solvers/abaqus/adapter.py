@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 import subprocess
-from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from .. import own_decks
+from ..decks import WrittenDecks
 from ..errors import Refused, RunFailed
 from ..rings import about_axle, ring_modes
 from .dat import DatTable, read_dat
@@ -21,18 +21,6 @@ from .options import load, read_options
 from .question import read_question
 
 JOB, OLDJOB = "modes", "inflate"
-
-
-class Decks(Protocol):
-    """Decks and requests that the tool hands to the adapter. ``options``: this solver's options
-    from the case; ``request``: for a user's deck its units under ``own_deck``, for decks in three
-    dimensions ``own_decks``."""
-
-    options: Mapping[str, Any]
-    request: Mapping[str, Any]
-
-    def texts(self, dialect: str) -> dict[str, str]:
-        """File name to text."""
 
 
 class Abaqus:
@@ -66,7 +54,7 @@ class Abaqus:
         release = re.search(r"abaqus\D*(\d[\w.\-]*)", output, re.IGNORECASE)
         return release[1] if release else "unknown"
 
-    def write(self, decks: Decks, folder: Path) -> list[Path]:
+    def write(self, decks: WrittenDecks, folder: Path) -> list[Path]:
         """Write the decks and, next to them, the case's options. Raises ``refusals``."""
         units = decks.request.get("own_deck", {})
         paths = [read_options(decks.options, **units).save(folder)]

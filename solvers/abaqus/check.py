@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from ..language.element_types import NODES_AND_SECTION
-from ..language.rule import Rule
+from ..language.rule import KeywordRule
 from ..language.spelling import named
 from ..language.step_rules import STEP_PROCEDURES
 from ..language.table import RULES
@@ -55,8 +55,8 @@ def findings(blocks: Sequence[Block], before: Sequence[Block] = ()) -> list[Find
     """Faults in the keywords of a job, which may continue from the model of another, ``before``."""
     names = _Names()
     for block in before:
-        list(_parameters(block, RULES.get(block.name, Rule("")), names))
-        list(_data(block, RULES.get(block.name, Rule("")), names))
+        list(_parameters(block, RULES.get(block.name, KeywordRule("")), names))
+        list(_data(block, RULES.get(block.name, KeywordRule("")), names))
     names.used.clear()
     names.bare.clear()
     faults = [*_order(blocks, before)]
@@ -127,7 +127,7 @@ def _order(blocks: Sequence[Block], before: Sequence[Block]) -> Iterator[Finding
         yield Finding(block, None, f"has no *END {block.name}")
 
 
-def _parameters(block: Block, rule: Rule, names: _Names) -> Iterator[Finding]:
+def _parameters(block: Block, rule: KeywordRule, names: _Names) -> Iterator[Finding]:
     for name, value in block.parameters.items():
         if name not in rule.parameters:
             yield Finding(
@@ -148,7 +148,7 @@ def _parameters(block: Block, rule: Rule, names: _Names) -> Iterator[Finding]:
         yield Finding(block, None, f"{both[0]} and {both[1]} exclude each other")
 
 
-def _data(block: Block, rule: Rule, names: _Names) -> Iterator[Finding]:
+def _data(block: Block, rule: KeywordRule, names: _Names) -> Iterator[Finding]:
     """Data lines: their number, then each field."""
     forms = rule.forms(block.parameters)
     if not forms and rule.fields:  # a variant whose data the table does not know

@@ -8,13 +8,13 @@ import numpy as np
 
 from ..errors import RunFailed
 from .dat import DatTable
-from .fil import SIM, Modes, read_fil
+from .fil import SIM, ResultModes, read_fil
 
 # largest relative difference of a frequency between .fil and .dat: five digits
 PRINTED_RTOL = 1e-3
 
 
-def checked_modes(path: Path, expected: int | None, table: DatTable) -> Modes:
+def checked_modes(path: Path, expected: int | None, table: DatTable) -> ResultModes:
     """Modes of the results file at ``path``; ``expected`` of them, those of the .dat's table.
 
     Raises RunFailed: ``no_results``, or ``unstable`` for a negative eigenvalue.

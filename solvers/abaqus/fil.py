@@ -23,7 +23,7 @@ SIM = (
 
 
 @dataclass(frozen=True)
-class Modes:
+class ResultModes:
     """Modes of a results file, in global x, y, z."""
 
     eigenvalues: Array  # (m,): omega^2 in 1/s2
@@ -33,7 +33,7 @@ class Modes:
     displacement: Array  # (m, k, 3)
 
 
-def read_fil(path: Path) -> Modes:
+def read_fil(path: Path) -> ResultModes:
     """Modes with shapes. Raises RunFailed (``no_results``) for a file that is not whole."""
     try:
         return _modes(path.read_text(encoding="latin-1"))
@@ -41,7 +41,7 @@ def read_fil(path: Path) -> Modes:
         raise RunFailed("no_results", f"{path.name}: {error}") from None
 
 
-def _modes(text: str) -> Modes:
+def _modes(text: str) -> ResultModes:
     places: dict[int, list[float]] = {}
     mode_data: dict[int, tuple[float, float]] = {}
     shapes: dict[int, dict[int, list[float]]] = {}
@@ -74,7 +74,7 @@ def _arrays(
     places: dict[int, list[float]],
     mode_data: dict[int, tuple[float, float]],
     shapes: dict[int, dict[int, list[float]]],
-) -> Modes:
+) -> ResultModes:
     if not mode_data:
         raise ValueError("it has no mode")
     order = sorted(mode_data)
@@ -87,7 +87,7 @@ def _arrays(
     bare = [node for node in nodes if node not in places]
     if bare:
         raise ValueError(f"node {bare[0]} has no coordinates")
-    return Modes(
+    return ResultModes(
         np.array([mode_data[n][0] for n in order]),
         np.array([mode_data[n][1] for n in order]),
         np.array(nodes),

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
+from ..decks import WrittenDecks
 from ..errors import Refused, RunFailed
 from . import VERSION
 from .deck.start import PressedShape, write_pressed_start, write_start
@@ -18,16 +18,12 @@ JOB, PRESS, OLDJOB = "modes", "press", "inflate"
 REQUEST_KEYS = ("own_frequency", "cavity", "sector")
 
 
-class Decks(Protocol):
-    """Decks of a dialect, and the places of the variables in them, as the tool hands them over."""
+class RoadDecks(WrittenDecks, Protocol):
+    """Decks with loads on the road, with places of the variables in them, and with a start."""
 
-    request: Mapping[str, Any]
     loads_N: tuple[float, ...]
     start: np.ndarray | None
     pressed_start: PressedShape | None
-
-    def texts(self, dialect: str) -> dict[str, str]:
-        """File name to text."""
 
     def tangents(self, dialect: str) -> dict[str, list[tuple[str, int, int, float]]]:
         """Variable to [job, 1-based line, 0-based field, d number / d variable] rows."""
@@ -60,7 +56,7 @@ class Bundled:
     refusals = (Refused,)
     failures = (RunFailed,)
 
-    def write(self, decks: Decks, folder: Path) -> list[Path]:
+    def write(self, decks: RoadDecks, folder: Path) -> list[Path]:
         """Write the decks and, next to them, the requests that only this solver reads."""
         paths = []
         for name, text in decks.texts(self.dialect).items():

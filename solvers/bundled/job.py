@@ -24,7 +24,7 @@ from .modes.harmonics import HarmonicModes
 from .modes.sensitivity import state_rate
 from .modes.wheel import free_along_load
 from .results import StepResult, write
-from .road.road_data import ROAD_NUMBERS, InflatedTangent, ModesAtLoad, RoadData, read_road
+from .road.road_data import ROAD_NUMBERS, InflatedTangent, ModeRequest, RoadData, read_road
 from .section import mechanics
 from .section.band import Numbering
 from .section.boundary import keeps_half_turn, numbering, vibrating
@@ -127,7 +127,7 @@ class Job:
         there; ``start``: another tyre on the road, whose state begins the first load."""
         assert self.road is not None
         wanted: list[float] = []
-        vibrations: dict[float, ModesAtLoad] = {}
+        vibrations: dict[float, ModeRequest] = {}
         for step in self.steps:
             if step.centrifugal:
                 raise DeckError(step.procedure.place, "a turning tyre on a road is not honoured")
@@ -233,7 +233,7 @@ class Job:
         free, _ = hertz(np.stack([U, U]), np.array([0.0, np.pi]))
         return {"cavity_Hz": free, "footprints": footprints}
 
-    def _vibrating(self, step: DeckStep) -> ModesAtLoad:
+    def _vibrating(self, step: DeckStep) -> ModeRequest:
         """Settings of a *FREQUENCY step of a tyre on the road. Raises DeckError."""
         assert self.road is not None
         place, row = step.procedure.place, step.procedure.only_row()
@@ -252,7 +252,7 @@ class Job:
         dynamic_Hz = step.procedure.number("PROPERTY EVALUATION")
         model = self.tyre.models(dynamic_Hz, step.long_term, False)
         wheel_kg = free_along_load(self.tyre.revolve, self.model.mesh, step)
-        return ModesAtLoad(model, row.integer(0), nodes, wheel_kg)
+        return ModeRequest(model, row.integer(0), nodes, wheel_kg)
 
     def _static(self, step: DeckStep) -> None:
         self._check_time()

@@ -11,11 +11,12 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from .. import own_decks
+from ..decks import WrittenDecks
 from ..errors import Refused, RunFailed
 from ..process import end_commands
 from ..rings import about_axle, ring_modes
@@ -27,17 +28,6 @@ Array = np.ndarray
 SECTOR, SETTINGS, INFLATE = "sector.inp", "calculix.json", "inflate"
 REVOLVED = 1e-3  # of the largest displacement; 2e-4 moves no frequency by 0.001 %, 9e-3 one by 5 %
 OPTIONS: dict[str, Any] = {"parallel": 1, "element": "C3D20R", "ply_thickness_m": 2e-4}
-
-
-class Decks(Protocol):
-    """Decks and requests that the tool hands to the adapter. ``options``: this solver's options
-    from the case; ``request``: for a user's decks in three dimensions ``own_decks``."""
-
-    options: Mapping[str, Any]
-    request: Mapping[str, Any]
-
-    def texts(self, dialect: str) -> dict[str, str]:
-        """File name to text."""
 
 
 class CalculiX:
@@ -63,7 +53,7 @@ class CalculiX:
         """Version as ``ccx -v`` prints it; "unknown" where there is no ccx."""
         return _version(tuple(self.command))
 
-    def write(self, decks: Decks, folder: Path) -> list[Path]:
+    def write(self, decks: WrittenDecks, folder: Path) -> list[Path]:
         """Write the decks and, next to them, how to run them. Raises Refused."""
         settings = _settings(decks.options)
         paths = own_decks.save(decks.request, folder)
@@ -159,7 +149,7 @@ class CalculiX:
         }
 
 
-def _of_own_decks(folder: Path, own: own_decks.OwnDecks) -> dict[str, Any]:
+def _of_own_decks(folder: Path, own: own_decks.DecksOfRun) -> dict[str, Any]:
     """Results of a user's decks, shapes at the crown's nodes. Raises RunFailed."""
     table = folder / f"{own.last}.dat"
     eigenvalues = read_eigenvalues(table, None, own.modes)

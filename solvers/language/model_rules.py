@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .laws import INSTEAD_OF_TESTS, LAW_CONSTANTS, LAWS_NOT_READ
-from .rule import ANY_ROWS, MANY, NO_ROWS, ONE_ROW, Rule
+from .rule import ANY_ROWS, MANY, NO_ROWS, ONE_ROW, KeywordRule
 
 OF_MATERIAL = ("MATERIAL",)
 OF_SECTION = ("SOLID SECTION", "MEMBRANE SECTION", "SHELL SECTION")
@@ -14,8 +14,8 @@ NO_REBAR = "it has no rebar: cords are solids of a stiff direction there"
 NO_HOURGLASS = "its hourglass control has no stiffness to set"
 HYPERELASTIC_LAWS = (*LAW_CONSTANTS, *LAWS_NOT_READ)
 
-MODEL_RULES: dict[str, Rule] = {
-    "HEADING": Rule(
+MODEL_RULES: dict[str, KeywordRule] = {
+    "HEADING": KeywordRule(
         "model",
         fields="text...",
         rows=ANY_ROWS,
@@ -23,13 +23,13 @@ MODEL_RULES: dict[str, Rule] = {
         honoured={"section|revolve": ""},
         is_output=True,
     ),
-    "PREPRINT": Rule(
+    "PREPRINT": KeywordRule(
         "model",
         "ECHO=YES|NO|; MODEL=YES|NO|; HISTORY=YES|NO|; CONTACT=YES|NO|",
         rows=NO_ROWS,
         is_output=True,
     ),
-    "PART": Rule(
+    "PART": KeywordRule(
         "model",
         "NAME=+part",
         rows=NO_ROWS,
@@ -37,8 +37,8 @@ MODEL_RULES: dict[str, Rule] = {
         honoured={"deck": "NAME"},
         calculix=NO_PARTS,
     ),
-    "END PART": Rule("part", rows=NO_ROWS, honoured={"deck": ""}),
-    "ASSEMBLY": Rule(
+    "END PART": KeywordRule("part", rows=NO_ROWS, honoured={"deck": ""}),
+    "ASSEMBLY": KeywordRule(
         "model",
         "NAME=name",
         rows=NO_ROWS,
@@ -47,8 +47,8 @@ MODEL_RULES: dict[str, Rule] = {
         honoured={"deck": "~NAME"},
         calculix=NO_PARTS,
     ),
-    "END ASSEMBLY": Rule("part", rows=NO_ROWS, honoured={"deck": ""}),
-    "INSTANCE": Rule(
+    "END ASSEMBLY": KeywordRule("part", rows=NO_ROWS, honoured={"deck": ""}),
+    "INSTANCE": KeywordRule(
         "part",
         "NAME=name; PART=part; NSET=+nset; ELSET=+elset; INSTANCE=name; LIBRARY=name",
         "number...",
@@ -57,31 +57,31 @@ MODEL_RULES: dict[str, Rule] = {
         honoured={"deck": "NAME; PART; NSET; ELSET"},
         calculix=NO_PARTS,
     ),
-    "END INSTANCE": Rule("part", rows=NO_ROWS, honoured={"deck": ""}),
-    "NODE": Rule(
+    "END INSTANCE": KeywordRule("part", rows=NO_ROWS, honoured={"deck": ""}),
+    "NODE": KeywordRule(
         "part",
         "NSET=+nset; SYSTEM=R|C|S",
         "label 6*number?",
         honoured={"deck": "NSET; SYSTEM=R", "section": "NSET", "revolve": "~NSET"},
     ),
-    "SYSTEM": Rule(
+    "SYSTEM": KeywordRule(
         "part", fields="6*number?", rows=(0, 2), honoured={"deck": ""}, calculix=NO_GENERATION
     ),
-    "NGEN": Rule(
+    "NGEN": KeywordRule(
         "part",
         "NSET=+nset; LINE=C|P",
         "2*integer integer? integer? 6*number?",
         honoured={"deck": "NSET; LINE=C"},
         calculix=NO_GENERATION,
     ),
-    "NFILL": Rule(
+    "NFILL": KeywordRule(
         "part",
         "NSET=+nset; BIAS=number",
         "2*nset integer integer?",
         honoured={"deck": "NSET; BIAS"},
         calculix=NO_GENERATION,
     ),
-    "NCOPY": Rule(
+    "NCOPY": KeywordRule(
         "part",
         (
             "CHANGE NUMBER=integer; OLD SET=nset; NEW SET=+nset; SHIFT; "
@@ -94,7 +94,7 @@ MODEL_RULES: dict[str, Rule] = {
         honoured={"deck": "CHANGE NUMBER; OLD SET; NEW SET; SHIFT; REFLECT=LINE; MULTIPLE"},
         calculix=NO_GENERATION,
     ),
-    "NSET": Rule(
+    "NSET": KeywordRule(
         "part model",
         "NSET=+nset; ELSET=elset; GENERATE; UNSORTED; INTERNAL; INSTANCE=name",
         "node 15*node?",
@@ -106,21 +106,21 @@ MODEL_RULES: dict[str, Rule] = {
             "section": "NSET; GENERATE",
         },
     ),
-    "ELEMENT": Rule(
+    "ELEMENT": KeywordRule(
         "part",
         "TYPE=name; ELSET=+elset",
         "label node...",
         needs=("TYPE",),
         honoured={"deck|section": "TYPE; ELSET", "revolve": "TYPE=SPRING1|MASS|ROTARYI; ELSET"},
     ),
-    "ELGEN": Rule(
+    "ELGEN": KeywordRule(
         "part",
         "ELSET=+elset",
         "2*integer 7*integer?",
         honoured={"deck": "ELSET"},
         calculix=NO_GENERATION,
     ),
-    "ELCOPY": Rule(
+    "ELCOPY": KeywordRule(
         "part",
         "ELEMENT SHIFT=integer; OLD SET=elset; NEW SET=+elset; SHIFT NODES=integer; REFLECT",
         rows=NO_ROWS,
@@ -128,7 +128,7 @@ MODEL_RULES: dict[str, Rule] = {
         honoured={"deck": "ELEMENT SHIFT; OLD SET; NEW SET; SHIFT NODES; REFLECT"},
         calculix=NO_GENERATION,
     ),
-    "ELSET": Rule(
+    "ELSET": KeywordRule(
         "part model",
         "ELSET=+elset; GENERATE; UNSORTED; INTERNAL; INSTANCE=name",
         "element 15*element?",
@@ -140,7 +140,7 @@ MODEL_RULES: dict[str, Rule] = {
             "section": "ELSET; GENERATE",
         },
     ),
-    "SURFACE": Rule(
+    "SURFACE": KeywordRule(
         "part",
         "NAME=+surface; INTERNAL; TYPE=ELEMENT|NODE|CYLINDER|REVOLUTION|SEGMENTS; "
         "FILLET RADIUS=number",
@@ -160,14 +160,14 @@ MODEL_RULES: dict[str, Rule] = {
             "revolve": "NAME; TYPE=CYLINDER",
         },
     ),
-    "ORIENTATION": Rule(
+    "ORIENTATION": KeywordRule(
         "part",
         "NAME=+orientation; DEFINITION=name; SYSTEM=name",
         "number...",
         needs=("NAME",),
         honoured={"deck": "~NAME; ~SYSTEM; ~DEFINITION"},
     ),
-    "TRANSFORM": Rule(
+    "TRANSFORM": KeywordRule(
         "part",
         "NSET=nset; TYPE=R|C|S",
         "6*number?",
@@ -175,7 +175,7 @@ MODEL_RULES: dict[str, Rule] = {
         needs=("NSET",),
         instead="give degrees of freedom in r, z and twist",
     ),
-    "SOLID SECTION": Rule(
+    "SOLID SECTION": KeywordRule(
         "part",
         "ELSET=elset; MATERIAL=material; CONTROLS=controls; ORIENTATION=orientation; COMPOSITE",
         "number?",
@@ -186,7 +186,7 @@ MODEL_RULES: dict[str, Rule] = {
             "section": "ELSET; MATERIAL; CONTROLS",
         },
     ),
-    "HOURGLASS STIFFNESS": Rule(
+    "HOURGLASS STIFFNESS": KeywordRule(
         "part",
         fields="4*number?",
         rows=ONE_ROW,
@@ -195,7 +195,7 @@ MODEL_RULES: dict[str, Rule] = {
         data="stiffness:stress",
         calculix=NO_HOURGLASS,
     ),
-    "SECTION CONTROLS": Rule(
+    "SECTION CONTROLS": KeywordRule(
         "part model",
         (
             "NAME=+controls; SECOND ORDER ACCURACY=YES|NO|; "
@@ -207,7 +207,7 @@ MODEL_RULES: dict[str, Rule] = {
         honoured={"deck|section": "NAME; HOURGLASS=STIFFNESS"},
         calculix=NO_HOURGLASS,
     ),
-    "SURFACE SECTION": Rule(
+    "SURFACE SECTION": KeywordRule(
         "part",
         "ELSET=elset; DENSITY=number",
         rows=NO_ROWS,
@@ -215,7 +215,7 @@ MODEL_RULES: dict[str, Rule] = {
         honoured={"deck|section": "ELSET"},
         calculix=NO_REBAR,
     ),
-    "MEMBRANE SECTION": Rule(
+    "MEMBRANE SECTION": KeywordRule(
         "part",
         (
             "ELSET=elset; MATERIAL=material; CONTROLS=controls; DENSITY=number; NODAL THICKNESS; "
@@ -229,7 +229,7 @@ MODEL_RULES: dict[str, Rule] = {
         data="thickness:length",
         calculix=NO_REBAR,
     ),
-    "SHELL SECTION": Rule(
+    "SHELL SECTION": KeywordRule(
         "part",
         (
             "ELSET=elset; MATERIAL=material; COMPOSITE; CONTROLS=controls; DENSITY=number; "
@@ -242,7 +242,7 @@ MODEL_RULES: dict[str, Rule] = {
         variants={"COMPOSITE": "number? integer? name any..."},
         instead="use SFMGAX elements with a *SURFACE SECTION and *REBAR LAYER",
     ),
-    "REBAR LAYER": Rule(
+    "REBAR LAYER": KeywordRule(
         "part",
         "GEOMETRY=CONSTANT|ANGULAR|LIFT EQUATION; ORIENTATION=orientation",
         "name 3*number? material number? integer? 2*number?",
@@ -251,7 +251,7 @@ MODEL_RULES: dict[str, Rule] = {
         data="_name, area:area, spacing:length, _position=0, _material, angle=0",
         calculix=NO_REBAR,
     ),
-    "REBAR": Rule(
+    "REBAR": KeywordRule(
         "part",
         (
             "ELEMENT=BEAM|SHELL|AXISHELL|MEMBRANE|AXIMEMBRANE|CONTINUUM; MATERIAL=material; "
@@ -266,7 +266,7 @@ MODEL_RULES: dict[str, Rule] = {
         instead="lay cords in MGAX elements, or in SFMGAX with *REBAR LAYER",
         calculix=NO_REBAR,
     ),
-    "RIGID BODY": Rule(
+    "RIGID BODY": KeywordRule(
         "part",
         (
             "REF NODE=node; TIE NSET=nset; PIN NSET=nset; ELSET=elset; "
@@ -281,7 +281,7 @@ MODEL_RULES: dict[str, Rule] = {
             "revolve": "REF NODE; TIE NSET; ANALYTICAL SURFACE",
         },
     ),
-    "EMBEDDED ELEMENT": Rule(
+    "EMBEDDED ELEMENT": KeywordRule(
         "part",
         (
             "HOST ELSET=elset; ROUNDOFF TOLERANCE=number; EXTERIOR TOLERANCE=number; "
@@ -294,7 +294,7 @@ MODEL_RULES: dict[str, Rule] = {
         },
         calculix="it embeds no elements",
     ),
-    "TIE": Rule(
+    "TIE": KeywordRule(
         "part",
         (
             "NAME=name; ADJUST=YES|NO|; POSITION TOLERANCE=number; "
@@ -304,7 +304,7 @@ MODEL_RULES: dict[str, Rule] = {
         needs=("NAME",),
         honoured={"deck": "~NAME; ADJUST=YES|NO; ~TYPE; POSITION TOLERANCE"},
     ),
-    "MASS": Rule(
+    "MASS": KeywordRule(
         "part",
         "ELSET=elset",
         "number",
@@ -313,7 +313,7 @@ MODEL_RULES: dict[str, Rule] = {
         honoured={"revolve": "ELSET"},
         data="mass",
     ),
-    "ROTARY INERTIA": Rule(
+    "ROTARY INERTIA": KeywordRule(
         "part",
         "ELSET=elset",
         "6*number?",
@@ -322,7 +322,7 @@ MODEL_RULES: dict[str, Rule] = {
         honoured={"revolve": "ELSET"},
         data="I11, I22, I33",
     ),
-    "SPRING": Rule(
+    "SPRING": KeywordRule(
         "part",
         "ELSET=elset; ORIENTATION=orientation",
         ("integer? integer?", "number number?"),
@@ -331,10 +331,10 @@ MODEL_RULES: dict[str, Rule] = {
         honoured={"revolve": "ELSET"},
         data="stiffness",
     ),
-    "MATERIAL": Rule(
+    "MATERIAL": KeywordRule(
         "model", "NAME=+material", rows=NO_ROWS, needs=("NAME",), honoured={"deck|section": "NAME"}
     ),
-    "DENSITY": Rule(
+    "DENSITY": KeywordRule(
         "model",
         fields="number number?",
         under=OF_MATERIAL,
@@ -342,7 +342,7 @@ MODEL_RULES: dict[str, Rule] = {
         honoured={"deck|section": ""},
         data="density:density",
     ),
-    "ELASTIC": Rule(
+    "ELASTIC": KeywordRule(
         "model",
         (
             "TYPE=ISOTROPIC|ORTHOTROPIC|ANISOTROPIC|ENGINEERING CONSTANTS|LAMINA|TRACTION|"
@@ -356,7 +356,7 @@ MODEL_RULES: dict[str, Rule] = {
         honoured={"deck|section": "TYPE=ISOTROPIC; MODULI=LONG TERM"},
         data={"TYPE=ISOTROPIC": "E:stress, nu=0", "TYPE": "", "": "E:stress, nu=0"},
     ),
-    "NO COMPRESSION": Rule(
+    "NO COMPRESSION": KeywordRule(
         "model",
         rows=NO_ROWS,
         under=OF_MATERIAL,
@@ -364,7 +364,7 @@ MODEL_RULES: dict[str, Rule] = {
         honoured={"deck|section": ""},
         calculix="its elastic law bears compression, and it passes over the keyword",
     ),
-    "HYPERELASTIC": Rule(
+    "HYPERELASTIC": KeywordRule(
         "model",
         (
             f"{'; '.join(HYPERELASTIC_LAWS)}; N=1|2|3|4|5|6; MODULI=LONG TERM|INSTANTANEOUS; "
@@ -379,7 +379,7 @@ MODEL_RULES: dict[str, Rule] = {
         honoured={"deck|section": f"{'; '.join(LAW_CONSTANTS)}; N; MODULI"},
         instead=INSTEAD_OF_TESTS,
     ),
-    "VISCOELASTIC": Rule(
+    "VISCOELASTIC": KeywordRule(
         "model",
         (
             "TIME=PRONY|RELAXATION TEST DATA|CREEP TEST DATA|FREQUENCY DATA|USER; "
@@ -403,7 +403,7 @@ MODEL_RULES: dict[str, Rule] = {
         },
         calculix="its hyperelastic rubber does not relax",
     ),
-    "ACOUSTIC MEDIUM": Rule(
+    "ACOUSTIC MEDIUM": KeywordRule(
         "model",
         "BULK MODULUS",
         "number 2*number?",
@@ -411,8 +411,8 @@ MODEL_RULES: dict[str, Rule] = {
         honoured={"section": "~BULK MODULUS"},  # its only form
         data="bulk modulus:stress",
     ),
-    "FLUID BEHAVIOR": Rule("model", "NAME=+fluid; USER", rows=NO_ROWS, needs=("NAME",)),
-    "FLUID CAVITY": Rule(
+    "FLUID BEHAVIOR": KeywordRule("model", "NAME=+fluid; USER", rows=NO_ROWS, needs=("NAME",)),
+    "FLUID CAVITY": KeywordRule(
         "part model",
         (
             "NAME=name; REF NODE=node; BEHAVIOR=fluid; MIXTURE=name; ADDED VOLUME=number; "
@@ -425,7 +425,7 @@ MODEL_RULES: dict[str, Rule] = {
         alone=("BEHAVIOR", "MIXTURE"),
         instead="load the surface by *DSLOAD, and set cavity.share in the case",
     ),
-    "AMPLITUDE": Rule(
+    "AMPLITUDE": KeywordRule(
         "model",
         (
             "NAME=+amplitude; DEFINITION=TABULAR|EQUALLY SPACED|PERIODIC|MODULATED|DECAY|"
@@ -436,7 +436,7 @@ MODEL_RULES: dict[str, Rule] = {
         needs=("NAME",),
         honoured={"deck": "NAME; DEFINITION=TABULAR; TIME=STEP TIME"},
     ),
-    "SURFACE INTERACTION": Rule(
+    "SURFACE INTERACTION": KeywordRule(
         "part model",
         "NAME=+interaction",
         "number?",
@@ -445,7 +445,7 @@ MODEL_RULES: dict[str, Rule] = {
         honoured={"revolve": "NAME"},
         is_contact=True,
     ),
-    "SURFACE BEHAVIOR": Rule(
+    "SURFACE BEHAVIOR": KeywordRule(
         "part model",
         (
             "PRESSURE-OVERCLOSURE=HARD|LINEAR|EXPONENTIAL|TABULAR; NO SEPARATION; "
@@ -461,7 +461,7 @@ MODEL_RULES: dict[str, Rule] = {
         data="slope",
         is_contact=True,
     ),
-    "FRICTION": Rule(
+    "FRICTION": KeywordRule(
         "part model",
         "ELASTIC SLIP=number; SLIP TOLERANCE=number; ROUGH; LAGRANGE",
         "number 3*number?",
@@ -473,7 +473,7 @@ MODEL_RULES: dict[str, Rule] = {
         data="coefficient",
         is_contact=True,
     ),
-    "CONTACT PAIR": Rule(
+    "CONTACT PAIR": KeywordRule(
         "model",
         (
             "INTERACTION=interaction; ADJUST=name; EXTENSION ZONE=number; "
@@ -489,7 +489,7 @@ MODEL_RULES: dict[str, Rule] = {
         data="slave, master",
         is_contact=True,
     ),
-    "SYMMETRIC MODEL GENERATION": Rule(
+    "SYMMETRIC MODEL GENERATION": KeywordRule(
         "model",
         (
             "REVOLVE; REFLECT=LINE|PLANE; PERIODIC=name; NODE OFFSET=integer; "
@@ -507,7 +507,7 @@ MODEL_RULES: dict[str, Rule] = {
         honoured={"deck": "REFLECT=LINE", "revolve": "REVOLVE"},
         calculix="it reflects and revolves nothing",
     ),
-    "SYMMETRIC RESULTS TRANSFER": Rule(
+    "SYMMETRIC RESULTS TRANSFER": KeywordRule(
         "model",
         "STEP=integer; INC=integer; ITERATION=integer; UNBALANCED STRESS=name",
         rows=NO_ROWS,

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from .laws import INSTEAD_OF_TESTS
-from .rule import Rule
+from .rule import KeywordRule
 
 SHARE_NODES = "share nodes, or *TIE surfaces of the same nodes"
 
 
-def _unjudged(level: str, names: str, **more: str | bool) -> dict[str, Rule]:
-    return {name: Rule(level, is_judged=False, **more) for name in names.split(", ")}  # type: ignore[arg-type]
+def _unjudged(level: str, names: str, **more: str | bool) -> dict[str, KeywordRule]:
+    return {name: KeywordRule(level, is_judged=False, **more) for name in names.split(", ")}  # type: ignore[arg-type]
 
 
-OTHER_KEYWORDS: dict[str, Rule] = {
+OTHER_KEYWORDS: dict[str, KeywordRule] = {
     **_unjudged(
         "model step",
         "OUTPUT, NODE OUTPUT, ELEMENT OUTPUT, CONTACT OUTPUT, ENERGY OUTPUT, MODAL OUTPUT, "
@@ -24,7 +24,7 @@ OTHER_KEYWORDS: dict[str, Rule] = {
     **_unjudged("model part", "INTEGRATED OUTPUT SECTION", is_output=True),
     **_unjudged("model part step", "DAMPING", is_output=True),
     **_unjudged("model", "CONDUCTIVITY, SPECIFIC HEAT", is_output=True),
-    "PARAMETER": Rule(
+    "PARAMETER": KeywordRule(
         "model part", is_judged=False, honoured={"deck": ""}, calculix="it has no parameters"
     ),
     **_unjudged("model", "CAPACITY, MOLECULAR WEIGHT, PHYSICAL CONSTANTS"),

@@ -32,7 +32,7 @@ class Field(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Rule:
+class KeywordRule:
     """The record of one keyword: the manual's rule, and which jobs honour what of it."""
 
     level: str

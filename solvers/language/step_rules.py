@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .rule import ANY_ROWS, NO_ROWS, ONE_ROW, Rule
+from .rule import ANY_ROWS, NO_ROWS, ONE_ROW, KeywordRule
 
 EXTRACTION = ("FREQUENCY", "BUCKLE", "COMPLEX FREQUENCY")
 STEP_PROCEDURES = (
@@ -10,8 +10,8 @@ STEP_PROCEDURES = (
     *("STEADY STATE DYNAMICS", "MODAL DYNAMIC"),
 )
 
-STEP_RULES: dict[str, Rule] = {
-    "RESTART": Rule(
+STEP_RULES: dict[str, KeywordRule] = {
+    "RESTART": KeywordRule(
         "model step",
         (
             "WRITE; READ; FREQUENCY=integer; NUMBER INTERVAL=integer; OVERLAY; "
@@ -23,14 +23,14 @@ STEP_RULES: dict[str, Rule] = {
         honoured={"section": "WRITE; FREQUENCY"},
         is_output=True,
     ),
-    "BOUNDARY": Rule(
+    "BOUNDARY": KeywordRule(
         "model step",
         "OP=MOD|NEW; AMPLITUDE=amplitude; TYPE=DISPLACEMENT|VELOCITY|ACCELERATION; FIXED",
         "node freedom integer? number?",
         honoured={"step": "OP", "deck step": "OP; AMPLITUDE", "deck|section|revolve": ""},
         data="node, first, last, value=0",
     ),
-    "STEP": Rule(
+    "STEP": KeywordRule(
         "model",
         (
             "NAME=name; NLGEOM=YES|NO|; INC=integer; PERTURBATION; "
@@ -44,7 +44,7 @@ STEP_RULES: dict[str, Rule] = {
             "step": "~NAME; NLGEOM=YES|; ~INC; ~PERTURBATION",
         },
     ),
-    "STATIC": Rule(
+    "STATIC": KeywordRule(
         "step",
         (
             "LONG TERM; DIRECT=|NO STOP; STABILIZE=any; RIKS; FACTOR=number; ALLSDTOL=number; "
@@ -56,7 +56,7 @@ STEP_RULES: dict[str, Rule] = {
         honoured={"deck step|step": "LONG TERM; ~DIRECT="},
         data="first, period=1, least, most",
     ),
-    "FREQUENCY": Rule(
+    "FREQUENCY": KeywordRule(
         "step",
         (
             "EIGENSOLVER=LANCZOS|SUBSPACE|AMS; PROPERTY EVALUATION=number; "
@@ -68,7 +68,7 @@ STEP_RULES: dict[str, Rule] = {
         honoured={"step": "EIGENSOLVER=LANCZOS; NORMALIZATION=MASS; PROPERTY EVALUATION; SIM=NO"},
         data="modes, lowest, highest, shift",
     ),
-    "COMPLEX FREQUENCY": Rule(
+    "COMPLEX FREQUENCY": KeywordRule(
         "step",
         (
             "PROPERTY EVALUATION=number; FRICTION DAMPING=YES|NO; "
@@ -82,21 +82,21 @@ STEP_RULES: dict[str, Rule] = {
         honoured={"step": "PROPERTY EVALUATION"},
         data="modes",
     ),
-    "DSLOAD": Rule(
+    "DSLOAD": KeywordRule(
         "step",
         "OP=MOD|NEW; AMPLITUDE=amplitude; FOLLOWER=YES|NO|; CONSTANT RESULTANT=YES|NO|",
         "surface name 7*number?",
         honoured={"deck step": "~OP; AMPLITUDE", "step": "OP=MOD"},
         data="surface, load, pressure",
     ),
-    "DLOAD": Rule(
+    "DLOAD": KeywordRule(
         "step",
         "OP=MOD|NEW; AMPLITUDE=amplitude",
         "element name 7*number?",
         honoured={"deck step": "~OP; AMPLITUDE", "step": "OP=MOD"},
         data="elements, load, size, x=0, y=0, z=0, along x=0, along y=0, along z=0",
     ),
-    "CLOAD": Rule(
+    "CLOAD": KeywordRule(
         "step",
         "OP=MOD|NEW; AMPLITUDE=amplitude; FOLLOWER",
         "node integer number",
@@ -104,7 +104,7 @@ STEP_RULES: dict[str, Rule] = {
         data="node, freedom, force",
         instead="delete it: only the inflation pressure acts",
     ),
-    "CONTACT CONTROLS": Rule(
+    "CONTACT CONTROLS": KeywordRule(
         "step",
         (
             "SLAVE=surface; MASTER=surface; STABILIZE=any; RESET; TANGENT FRACTION=number; "
@@ -115,7 +115,7 @@ STEP_RULES: dict[str, Rule] = {
         honoured={"step": "~SLAVE; ~MASTER; ~STABILIZE="},
         is_contact=True,
     ),
-    "FILE FORMAT": Rule(
+    "FILE FORMAT": KeywordRule(
         "model step",
         "ASCII; ZERO INCREMENT",
         rows=NO_ROWS,
@@ -123,7 +123,7 @@ STEP_RULES: dict[str, Rule] = {
         honoured={"step": "ASCII"},
         is_output=True,
     ),
-    "NODE FILE": Rule(
+    "NODE FILE": KeywordRule(
         "step",
         "FREQUENCY=integer; NSET=nset; GLOBAL=YES|NO|; MODE=integer; LAST MODE=integer",
         "name...",
@@ -131,7 +131,7 @@ STEP_RULES: dict[str, Rule] = {
         honoured={"step": "NSET; FREQUENCY"},
         is_output=True,
     ),
-    "MODAL FILE": Rule(
+    "MODAL FILE": KeywordRule(
         "step",
         "FREQUENCY=integer",
         rows=NO_ROWS,
@@ -139,7 +139,7 @@ STEP_RULES: dict[str, Rule] = {
         honoured={"step": ""},
         is_output=True,
     ),
-    "CONTACT FILE": Rule(
+    "CONTACT FILE": KeywordRule(
         "step",
         "FREQUENCY=integer; SLAVE=surface; MASTER=surface; NSET=nset",
         "name...",
@@ -147,5 +147,5 @@ STEP_RULES: dict[str, Rule] = {
         honoured={"step": "SLAVE"},
         is_output=True,
     ),
-    "END STEP": Rule("step", rows=NO_ROWS, honoured={"deck step|step": ""}),
+    "END STEP": KeywordRule("step", rows=NO_ROWS, honoured={"deck step|step": ""}),
 }

@@ -19,7 +19,7 @@ from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.problem import Problem
 from tyrecal.studies.fit.study import FitStudy
-from tyrecal.studies.labelling.expansion import Expansion, Prior, find_labels
+from tyrecal.studies.labelling.expansion import ModesNearDesign, Prior, find_labels
 from tyrecal.studies.labelling.label import Labelled, fitted_prior, label, start_prior
 from tyrecal.studies.labelling.result import labels_posterior
 from tyrecal.studies.labelling.tree import (
@@ -122,12 +122,12 @@ def test_expansions_go_on_until_the_design_is_found() -> None:
     def ln_f(x: Array) -> Array:
         return np.asarray(base + slope * (x + 0.3 * x**2))
 
-    def expand(x: Array) -> Expansion:
-        return Expansion(labels, np.zeros(5, int), ln_f(x), (slope * (1 + 0.6 * x))[:, None])
+    def expand(x: Array) -> ModesNearDesign:
+        return ModesNearDesign(labels, np.zeros(5, int), ln_f(x), (slope * (1 + 0.6 * x))[:, None])
 
     y = ln_f(np.array([0.9]))
 
-    def given(at: Expansion) -> Frequencies:
+    def given(at: ModesNearDesign) -> Frequencies:
         every = np.ones((5, 5), bool)
         return Frequencies(y, np.full(5, 0.005), np.zeros(5, int), every, np.zeros(5, bool))
 

@@ -14,7 +14,7 @@ from tyrecal.studies import pressing_plan
 from tyrecal.studies.pressing_plan import (
     FIRST_LOAD_S,
     FURTHER_DESIGN_S,
-    PressedState,
+    PlannedState,
     PressingPlan,
     plan_pressing,
 )
@@ -22,14 +22,14 @@ from tyrecal.tyre.load import load_case
 
 from ..cli.test_cli import CASE, run
 
-PLAN = PressingPlan(nodes=1000, places_round=17, designs=2, states=(PressedState(8),))
+PLAN = PressingPlan(nodes=1000, places_round=17, designs=2, states=(PlannedState(8),))
 
 
 def test_its_numbers_by_hand() -> None:
     """3000 displacements in the section, 51000 round half the tyre; 2 designs x (8 + 2) loads."""
-    plan = replace(PLAN, states=(PressedState(8), PressedState(2)))
+    plan = replace(PLAN, states=(PlannedState(8), PlannedState(2)))
     assert (plan.section_unknowns, plan.unknowns, plan.runs) == (3000, 51000, 20)
-    one = replace(PLAN, designs=1, states=(PressedState(1),))
+    one = replace(PLAN, designs=1, states=(PlannedState(1),))
     assert one.seconds == pytest.approx(FIRST_LOAD_S * 51000 * 3000 / 1e9)
     of_six = (1 + 5 * FURTHER_DESIGN_S / FIRST_LOAD_S) * (one.seconds or 0)
     assert replace(one, designs=6).seconds == pytest.approx(of_six)
@@ -43,15 +43,15 @@ def test_more_that_is_wanted_takes_longer() -> None:
     first, *more = (
         replace(PLAN, states=(state,)).seconds or 0.0
         for state in (
-            PressedState(1),
-            PressedState(2),
-            PressedState(1, modes=True),
-            PressedState(1, sensitivities=3),
-            PressedState(1, neighbours=3),
+            PlannedState(1),
+            PlannedState(2),
+            PlannedState(1, modes=True),
+            PlannedState(1, sensitivities=3),
+            PlannedState(1, neighbours=3),
         )
     )
     assert min(more) > first
-    assert replace(PLAN, states=(PressedState(1, neighbours=3),)).runs == 8
+    assert replace(PLAN, states=(PlannedState(1, neighbours=3),)).runs == 8
 
 
 def test_no_more_run_side_by_side_than_the_memory_holds(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -59,7 +59,7 @@ def test_no_more_run_side_by_side_than_the_memory_holds(monkeypatch: pytest.Monk
     tried."""
     case = load_case(CASE)
     evaluator = Evaluator(TyreDesign(case))
-    states = [PressedState(1), PressedState(1)]
+    states = [PlannedState(1), PlannedState(1)]
     one = plan_pressing(case, evaluator, states, designs=3).memory_bytes or 0.0
     for available, at_once in ((2.5 * one, 2), (0.5 * one, 1), (None, 6)):
         monkeypatch.setattr(pressing_plan, "available_memory_bytes", lambda a=available: a)
@@ -72,7 +72,7 @@ def test_its_words() -> None:
         " tyre); 1 design x 1 state x 8 loads: 8 runs; about "
     )
     plan = replace(
-        PLAN, states=(PressedState(1), PressedState(2)), is_estimate=True, is_timed=False
+        PLAN, states=(PlannedState(1), PlannedState(2)), is_estimate=True, is_timed=False
     )
     assert str(plan).endswith("; about 2 designs x 2 states x 1 or 2 loads: about 6 runs")
     assert plan.content()["seconds"] is None

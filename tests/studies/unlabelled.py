@@ -31,7 +31,7 @@ from tyrecal.studies.blind.statistics import (
 )
 from tyrecal.studies.emulator import Emulator, emulator
 from tyrecal.studies.fit.targets import target_labels
-from tyrecal.studies.labelling.expansion import Expansion, Prior, admissible, find_labels
+from tyrecal.studies.labelling.expansion import ModesNearDesign, Prior, admissible, find_labels
 from tyrecal.studies.labelling.tree import DISCREPANCIES, FOREIGN_MARGIN, Frequencies, discrepancy
 from tyrecal.studies.variable import START_SPREAD, read_variables
 from tyrecal.tyre.load import load_case
@@ -63,8 +63,8 @@ def main(count: int, seed: int, discrepant: bool) -> None:
     nominal = np.array([labels.index(label) for label in MEASURED])
     zero = np.zeros(len(labels), int)
 
-    def expand(x: Array) -> Expansion:
-        return Expansion(labels, zero, made.ln_f(x[None])[0], made.slopes(x[None])[0])
+    def expand(x: Array) -> ModesNearDesign:
+        return ModesNearDesign(labels, zero, made.ln_f(x[None])[0], made.slopes(x[None])[0])
 
     right, stated, apart, each_right, each_stated = [], [], [], [], []
     for i in range(count):
@@ -98,7 +98,7 @@ def main(count: int, seed: int, discrepant: bool) -> None:
     tell("each frequency", np.array(each_right), np.array(each_stated))
 
 
-def without_labels(y: Array, at: Expansion) -> Frequencies:
+def without_labels(y: Array, at: ModesNearDesign) -> Frequencies:
     """Measured frequencies without their labels."""
     count = len(y)
     place, none = np.zeros(count, int), np.zeros(count, bool)

@@ -53,7 +53,7 @@ from tyrecal.studies.inference.separability import separate
 from tyrecal.studies.inference.spans import spans_of
 from tyrecal.studies.inference.tyre_model import TyreModel
 from tyrecal.studies.inference.uncertainties import sources
-from tyrecal.studies.labelling.expansion import Expansion, Prior, admissible, find_labels
+from tyrecal.studies.labelling.expansion import ModesNearDesign, Prior, admissible, find_labels
 from tyrecal.studies.labelling.tree import FOREIGN_MARGIN, Frequencies
 from tyrecal.studies.variable import START_SPREAD
 from tyrecal.tyre.effects.edit import changed, with_part
@@ -140,13 +140,13 @@ def labelled(
     labels = tuple(row.label for row in rows if row.label)
     states = np.array([PRESSURES_kPa.index(row.pressure_kPa) for row in rows])
 
-    def at(x: Array) -> Expansion:
-        return Expansion(labels, states, *whole.expansion.plain(x))
+    def at(x: Array) -> ModesNearDesign:
+        return ModesNearDesign(labels, states, *whole.expansion.plain(x))
 
     given = [labels[i] if i >= 0 and labels[i].c <= known else None for i in tyre.truth]
     sure = np.array([label is not None for label in given])
 
-    def measured(there: Expansion) -> Frequencies:
+    def measured(there: ModesNearDesign) -> Frequencies:
         allowed = admissible(given, tyre.states, there)
         return Frequencies(tyre.y, np.full(len(tyre.y), NOISE), tyre.states, allowed, sure)
 

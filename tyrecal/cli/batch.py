@@ -12,15 +12,15 @@ from ..files import json_text, make_folder, refuse_link, write_text
 from ..studies import STUDIES, runnable
 from . import arguments, options
 from .main import EXIT_BATCH
-from .parameters import Place, Whole, option
+from .parameters import FileOrFolder, WholeNumber, option
 from .terminal import Terminal
 
 STUDY_NAMES = [name for name, entry in STUDIES.items() if entry.runs_by_name]
-FILE_PATH = Place(folder=False)
+FILE_PATH = FileOrFolder(folder=False)
 
 
 @click.command()
-@click.argument("cases", nargs=-1, required=True, type=Place(exists=True, folder=False))
+@click.argument("cases", nargs=-1, required=True, type=FileOrFolder(exists=True, folder=False))
 @option(
     "--studies",
     default="fit",
@@ -50,7 +50,7 @@ FILE_PATH = Place(folder=False)
 @options.pressures
 @option(
     "--jobs",
-    type=Whole(1, 256),
+    type=WholeNumber(1, 256),
     default=1,
     metavar="N",
     show_default=True,
@@ -63,7 +63,7 @@ FILE_PATH = Place(folder=False)
     options.solver_command,
     option(
         "--output",
-        type=Place(),
+        type=FileOrFolder(),
         metavar="DIR",
         help="Folder for the results, with one folder for each case (default: batch).",
     ),

@@ -9,13 +9,13 @@ from typing import Any
 import click
 
 from . import arguments, complete, options
-from .parameters import NumberWithin, Place, Whole, option
+from .parameters import FileOrFolder, NumberWithin, WholeNumber, option
 from .terminal import Progress, Terminal, resume
 
-folder = click.argument("folder", type=Place(file=False), metavar="DIR")
+folder = click.argument("folder", type=FileOrFolder(file=False), metavar="DIR")
 truth = option(
     "--truth",
-    type=Place(file=False),
+    type=FileOrFolder(file=False),
     metavar="DIR",
     help="Folder of the sealed truth (default: DIR-truth, next to DIR).",
 )
@@ -23,7 +23,7 @@ truth = option(
 
 def trials(flag: str, name: str, default: int, what: str) -> Any:
     """How many trials of a kind are made."""
-    number = Whole(0)
+    number = WholeNumber(0)
     help = f"Trials {what}."
     return option(
         flag, name, type=number, default=default, show_default=True, metavar="N", help=help
@@ -113,7 +113,7 @@ def power(
 @option(
     "--case",
     "case_path",
-    type=Place(),
+    type=FileOrFolder(),
     required=True,
     metavar="CASE",
     shell_complete=complete.cases,
@@ -131,7 +131,10 @@ def power(
     help="Effect to draw; repeatable (default: all that the case allows).",
 )
 @option(
-    "--seed", type=Whole(0), metavar="N", help="Seed of the random numbers (default: a secret one)."
+    "--seed",
+    type=WholeNumber(0),
+    metavar="N",
+    help="Seed of the random numbers (default: a secret one).",
 )
 @truth
 @options.every(options.jobs, options.allow_unusual)

@@ -7,9 +7,9 @@ from pathlib import Path
 import click
 
 from . import arguments, complete, options
-from .parameters import NumberWithin, Place, option
+from .parameters import FileOrFolder, NumberWithin, option
 
-file = Place(exists=True, folder=False)
+file = FileOrFolder(exists=True, folder=False)
 
 
 @click.command()

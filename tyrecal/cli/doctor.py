@@ -9,7 +9,7 @@ import click
 
 from . import complete, options
 from .main import EXIT_SOLVER
-from .parameters import Place, option
+from .parameters import FileOrFolder, option
 from .solvers import command_words, settings_file, settings_words
 from .terminal import Terminal
 
@@ -30,7 +30,7 @@ HINTS = {
 )
 @option(
     "--store",
-    type=Place(file=False),
+    type=FileOrFolder(file=False),
     envvar="TYRECAL_STORE",
     metavar="DIR",
     help="Evaluation store to list (default: those of the results folders here, or TYRECAL_STORE).",

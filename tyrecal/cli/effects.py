@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from . import arguments, complete, options
-from .parameters import Number, Place, option
+from .parameters import FileOrFolder, Number, option
 
 
 @click.command()
@@ -17,7 +17,7 @@ from .parameters import Number, Place, option
 @option(
     "--case",
     "case",
-    type=Place(),
+    type=FileOrFolder(),
     metavar="CASE",
     shell_complete=complete.cases,
     help="Case: compute the change of this tyre's frequencies.",

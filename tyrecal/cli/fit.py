@@ -11,7 +11,7 @@ import click
 
 from . import arguments, complete, options
 from .main import EXIT_FIT
-from .parameters import OneOf, Place, Whole, option
+from .parameters import FileOrFolder, OneOf, WholeNumber, option
 from .terminal import Progress, Terminal
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 )
 @option(
     "--measured",
-    type=Place(exists=True, folder=False),
+    type=FileOrFolder(exists=True, folder=False),
     metavar="FILE",
     help="Measurements (CSV) in place of the case's targets, in their states (pressure, load,"
     " rim); with --pressure-kPa, only those at that pressure. Frequencies without c and m get"
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 )
 @option(
     "--starts",
-    type=Whole(1, 100000),
+    type=WholeNumber(1, 100000),
     default=1,
     metavar="N",
     show_default=True,
@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 )
 @option(
     "--seed",
-    type=Whole(0),
+    type=WholeNumber(0),
     default=0,
     metavar="S",
     show_default=True,

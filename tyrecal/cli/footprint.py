@@ -55,7 +55,7 @@ def command(
     """
     from ..report.shape_data import patches_data
     from ..studies.footprint import run
-    from ..studies.pressing_plan import PressedState, plan_pressing
+    from ..studies.pressing_plan import PlannedState, plan_pressing
 
     terminal = study.terminal
     case, fitted, study = default_case(case, fitted, study)
@@ -72,7 +72,7 @@ def command(
     designs = _designs(compare, values, fitted, loaded, terminal)
     if len(designs) == 1:
         options.say_idle(terminal, study.jobs, "one design is pressed alone; --fitted adds another")
-    pressed_to = [PressedState(len(loads_N))]
+    pressed_to = [PlannedState(len(loads_N))]
     plan = plan_pressing(loaded, evaluator, pressed_to, len(designs), study.jobs)
     if study.print_plan(plan, dry_run):
         return 0

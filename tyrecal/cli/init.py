@@ -10,7 +10,7 @@ import click
 
 from ..errors import InputError
 from . import options
-from .parameters import Number, NumberWithin, OneOf, Place, option
+from .parameters import FileOrFolder, Number, NumberWithin, OneOf, option
 from .terminal import Terminal
 
 if TYPE_CHECKING:
@@ -36,14 +36,14 @@ def _length(flag: str, text: str, unit: str = "mm") -> Any:
 @option(
     "--section",
     "file",
-    type=Place(exists=True, folder=False),
+    type=FileOrFolder(exists=True, folder=False),
     metavar="FILE",
     help="CSV of your own section: stations, or an outer and an inner curve.",
 )
 @option(
     "--deck",
     "deck_files",
-    type=Place(exists=True, folder=False),
+    type=FileOrFolder(exists=True, folder=False),
     multiple=True,
     metavar="FILE.inp",
     help="ABAQUS deck of your axisymmetric section, or those of your tyre in three dimensions in"
@@ -81,7 +81,7 @@ def _length(flag: str, text: str, unit: str = "mm") -> Any:
 )
 @option(
     "--output",
-    type=Place(),
+    type=FileOrFolder(),
     metavar="CASE.yaml",
     help="Case file to write (default: named by the size, in this folder).",
 )

@@ -9,7 +9,7 @@ import click
 from click.core import ParameterSource
 
 from . import arguments, options
-from .parameters import Number, NumberWithin, OneOf, Place, Whole, option
+from .parameters import FileOrFolder, Number, NumberWithin, OneOf, WholeNumber, option
 from .terminal import Terminal
 
 if TYPE_CHECKING:
@@ -18,7 +18,11 @@ if TYPE_CHECKING:
     from .output import Run
 
 files = click.argument(
-    "files", nargs=-1, required=True, metavar="FILE...", type=Place(exists=True, folder=False)
+    "files",
+    nargs=-1,
+    required=True,
+    metavar="FILE...",
+    type=FileOrFolder(exists=True, folder=False),
 )
 axle = option(
     "--axle",
@@ -50,7 +54,7 @@ leave_out = option(
 highest = option(
     "--highest-harmonic",
     "highest",
-    type=Whole(0, 20),
+    type=WholeNumber(0, 20),
     metavar="C",
     help="Largest number of waves round the circumference of a mode in the band (default: 12).",
 )
@@ -90,7 +94,7 @@ def command() -> None:
 @files
 @option(
     "--output",
-    type=Place(folder=False),
+    type=FileOrFolder(folder=False),
     metavar="FILE",
     default="measured.csv",
     show_default=True,
@@ -185,7 +189,7 @@ def import_files(
 
 
 @command.command()
-@click.argument("file", type=Place(exists=True, folder=False))
+@click.argument("file", type=FileOrFolder(exists=True, folder=False))
 @options.every(axle, centre, directions, highest, leave_out)
 @options.with_terminal
 def sensors(
@@ -228,7 +232,7 @@ def sensors(
 
 @command.command("label")
 @options.case_argument
-@click.argument("file", type=Place(exists=True, folder=False))
+@click.argument("file", type=FileOrFolder(exists=True, folder=False))
 @options.every(
     options.assignments,
     options.fitted(

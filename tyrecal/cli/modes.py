@@ -65,7 +65,7 @@ def command(
     """
     from ..report.shape_data import tyre_data
     from ..studies import modes as studies
-    from ..studies.pressing_plan import PressedState, plan_pressing
+    from ..studies.pressing_plan import PlannedState, plan_pressing
     from ..tyre.effects.edit import changed, with_part
 
     loads = wanted_loads(load_N, sweep)
@@ -94,7 +94,7 @@ def command(
     if fitted:
         designs["fitted"] = arguments.fitted_values(fitted, loaded, terminal)
     if loads:
-        pressed_to = [PressedState(sum(load > 0 for load in loads), modes=True)]
+        pressed_to = [PlannedState(sum(load > 0 for load in loads), modes=True)]
         plan = plan_pressing(loaded, evaluator, pressed_to, len(designs), study.jobs)
         if study.print_plan(plan, dry_run):
             return 0

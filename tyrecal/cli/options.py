@@ -29,7 +29,7 @@ from click.core import ParameterSource
 
 from ..files import PICTURE_FORMATS
 from . import arguments, complete
-from .parameters import Number, OneOf, Place, Whole, option
+from .parameters import FileOrFolder, Number, OneOf, WholeNumber, option
 from .terminal import SOLVERS, Terminal
 
 if TYPE_CHECKING:
@@ -42,8 +42,10 @@ if TYPE_CHECKING:
     from ..tyre.case import LoadedCase
     from .output import Run
 
-case_argument = click.argument("case", type=Place(), shell_complete=complete.cases)
-case_or_last = click.argument("case", type=Place(), required=False, shell_complete=complete.cases)
+case_argument = click.argument("case", type=FileOrFolder(), shell_complete=complete.cases)
+case_or_last = click.argument(
+    "case", type=FileOrFolder(), required=False, shell_complete=complete.cases
+)
 solver = option(
     "--solver",
     default="",
@@ -60,7 +62,7 @@ solver_command = option(
 )
 output = option(
     "--output",
-    type=Place(),
+    type=FileOrFolder(),
     metavar="DIR",
     help="Folder for the results (default: named after the case, here or in the output of your"
     " settings).",
@@ -82,7 +84,7 @@ quiet = option("--quiet", is_flag=True, help="Print errors only.")
 verbose = option("--verbose", is_flag=True, help="Print more, and keep run folders.")
 jobs = option(
     "--jobs",
-    type=Whole(1, 256),
+    type=WholeNumber(1, 256),
     default=1,
     metavar="N",
     show_default=True,
@@ -90,7 +92,7 @@ jobs = option(
 )
 store = option(
     "--store",
-    type=Place(file=False),
+    type=FileOrFolder(file=False),
     envvar="TYRECAL_STORE",
     metavar="DIR",
     help="Evaluation store: finished evaluations are read from it (default: the folder 'record' of"
@@ -164,7 +166,7 @@ _to = option(
 )
 _steps = option(
     "--steps",
-    type=Whole(2, 10000),
+    type=WholeNumber(2, 10000),
     default=12,
     metavar="N",
     show_default=True,
@@ -395,7 +397,7 @@ def _terminal_of(values: dict[str, Any]) -> Terminal:
 
 def fitted(text: str) -> Callable[[Any], Any]:
     """A finished fit whose design is studied too; ``text``: the option's help."""
-    path = Place(exists=True)
+    path = FileOrFolder(exists=True)
     return option("--fitted", type=path, metavar="fit.json|DIR", help=text)
 
 

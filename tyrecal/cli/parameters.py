@@ -110,7 +110,7 @@ class NumberWithin(_Number, click.FloatRange):
     """A number within a range."""
 
 
-class Whole(_Number, click.IntRange):
+class WholeNumber(_Number, click.IntRange):
     """A whole number within a range, as 200000 or 2e5."""
 
     what = "a whole number"
@@ -134,7 +134,7 @@ class OneOf(_Answering, click.Choice):
         return f"must be {words}{suggestion(str(value), names, '')}"
 
 
-class Place(_Answering, click.Path):
+class FileOrFolder(_Answering, click.Path):
     """A file or a folder; ``exists``: one that is there."""
 
     def __init__(self, exists: bool = False, file: bool = True, folder: bool = True):

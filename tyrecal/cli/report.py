@@ -7,15 +7,15 @@ from pathlib import Path
 import click
 
 from . import options
-from .parameters import Place, option
+from .parameters import FileOrFolder, option
 from .terminal import Terminal
 
 
 @click.command()
-@click.argument("folders", metavar="DIR...", nargs=-1, required=True, type=Place())
+@click.argument("folders", metavar="DIR...", nargs=-1, required=True, type=FileOrFolder())
 @option(
     "--output",
-    type=Place(),
+    type=FileOrFolder(),
     metavar="FILE",
     help="HTML file to write (default: report.html in DIR; for several DIRs, in the current"
     " folder).",

@@ -7,20 +7,20 @@ from pathlib import Path
 import click
 
 from . import arguments, options
-from .parameters import Number, Place, Whole, option
+from .parameters import FileOrFolder, Number, WholeNumber, option
 
 
 @click.command()
 @options.every(options.case_argument, options.assignments, options.pressure)
 @option(
     "--measured",
-    type=Place(exists=True, folder=False),
+    type=FileOrFolder(exists=True, folder=False),
     metavar="FILE",
     help="Measurements (CSV) in place of the case's targets, at any pressures and on any rims.",
 )
 @option(
     "--draws",
-    type=Whole(1000, 10_000_000),
+    type=WholeNumber(1000, 10_000_000),
     default=100_000,
     metavar="N",
     show_default=True,
@@ -29,7 +29,7 @@ from .parameters import Number, Place, Whole, option
 )
 @option(
     "--seed",
-    type=Whole(0, 2**32 - 1),
+    type=WholeNumber(0, 2**32 - 1),
     default=0,
     metavar="S",
     show_default=True,

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from . import options
-from .parameters import OneOf, Place, option
+from .parameters import FileOrFolder, OneOf, option
 from .terminal import Terminal
 
 
@@ -19,7 +19,7 @@ from .terminal import Terminal
     help="Solver for which decks with expected frequencies are written, to be run where the"
     " program is installed.",
 )
-@option("--output", type=Place(file=False), help="Folder of the selftest.")
+@option("--output", type=FileOrFolder(file=False), help="Folder of the selftest.")
 @options.with_terminal
 def command(selftest: str | None, output: Path | None, terminal: Terminal) -> int:
     """List the installed solvers: version, abilities, problems, program that each starts, and the

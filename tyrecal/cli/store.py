@@ -7,13 +7,13 @@ from pathlib import Path
 import click
 
 from . import options
-from .parameters import NumberWithin, Place, option
+from .parameters import FileOrFolder, NumberWithin, option
 from .terminal import Terminal, resume
 
 
 @click.command()
 @click.argument(
-    "folder", metavar="DIR", type=Place(exists=True, file=False), envvar="TYRECAL_STORE"
+    "folder", metavar="DIR", type=FileOrFolder(exists=True, file=False), envvar="TYRECAL_STORE"
 )
 @option("--verify", is_flag=True, help="Check every checksum; set damaged evaluations aside.")
 @option(

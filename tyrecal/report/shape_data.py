@@ -47,7 +47,7 @@ class Patches(Result):
     patches: list[PatchData]
 
 
-class Cords(ResultPart):
+class CordLines(ResultPart):
     """The cords of a layer as lines along the section."""
 
     angle_deg: float
@@ -58,7 +58,7 @@ class SectionData(ResultPart):
     """The section of a tyre as polygons and lines."""
 
     areas: dict[str, list[Flat]]  # elements by region or compound
-    cords: dict[str, Cords]  # by layer
+    cords: dict[str, CordLines]  # by layer
     rim: list[Flat]  # elements that the rim holds, and held lines of the outline of other elements
     outline: Flat  # before the inflation
     inflated: Flat | None  # the outline after the inflation; None: not known
@@ -164,7 +164,7 @@ def section_data(
     layers = {name: turns(case, mesh, name) for name in angles}
     angles, layers = {**angles, **mesh.angles}, {**layers, **mesh.layers}
     cords = {
-        name: Cords(angle_deg=angles[name], lines=[_line(place, nodes) for nodes in lines])
+        name: CordLines(angle_deg=angles[name], lines=[_line(place, nodes) for nodes in lines])
         for name, lines in layers.items()
     }
     return SectionData(

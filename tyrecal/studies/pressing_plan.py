@@ -23,7 +23,7 @@ DESIGNS_OF_FIT = {"slsqp": 15, "gauss-newton": 10}  # most that a start takes, a
 
 
 @dataclass(frozen=True)
-class PressedState:
+class PlannedState:
     """One state of a design, and the loads to which it is pressed there."""
 
     loads: int  # how many
@@ -45,7 +45,7 @@ class PressingPlan:
     # nodes round half the tyre, from the patch to the top, which has a half turn's symmetry
     places_round: int
     designs: int  # how many, or about how many where ``is_estimate``
-    states: tuple[PressedState, ...]
+    states: tuple[PlannedState, ...]
     at_once: int = 1  # how many of them run side by side
     is_timed: bool = True  # the estimates hold for the solver
     is_estimate: bool = False
@@ -79,7 +79,7 @@ class PressingPlan:
             total += self.designs * press * share
         return 1e-9 * self._entries * total / self.at_once
 
-    def _modes_s(self, state: PressedState) -> float:
+    def _modes_s(self, state: PlannedState) -> float:
         return MODES_AT_LOAD_S * state.loads if state.modes else 0.0
 
     @property
@@ -143,7 +143,7 @@ def _time(seconds: float) -> str:
 def plan_pressing(
     case: LoadedCase,
     evaluator: Evaluator,
-    states: Sequence[PressedState],
+    states: Sequence[PlannedState],
     designs: int = 1,
     at_once: int = 1,
     is_estimate: bool = False,

@@ -15,7 +15,7 @@ from ..units import LENGTH
 from .case.mistakes import Mistake
 from .own_deck.numbers import plain_number
 from .own_deck.own_deck import UNIT_LENGTH, UNIT_MASS, OwnDeck
-from .own_deck.solver_deck import Ply, SolverDeck
+from .own_deck.solver_deck import RebarPly, SolverDeck
 from .usual import (
     ALL_THE_SAME,
     BELT_ANGLE,
@@ -152,7 +152,7 @@ def _is_belt(name: str, angles: Mapping[tuple[str, float], Usual]) -> bool:
     return bool(kinds) and all(usual is BELT_ANGLE for usual in kinds)
 
 
-def _key(ply: Ply) -> tuple[str, float]:
+def _key(ply: RebarPly) -> tuple[str, float]:
     """Name and angle: a layer may be given element by element, and a name serve two layers."""
     return ply.name, ply.angle_deg
 

@@ -19,7 +19,7 @@ from ...errors import Indefinite
 from ..section.kept_fields import Coordinates, Factor
 from ..section.mechanics import OfElements
 from ..section.symmetry import Whole
-from .cavity import Coupling
+from .cavity import GasCoupling
 
 Array = np.ndarray
 
@@ -33,7 +33,7 @@ class Border:
     mass: tuple[Array, Array]  # likewise
     wall: Array  # C on the band (s, size)
     wall_rim: Array  # C on q (s, q)
-    air: Coupling | None
+    air: GasCoupling | None
 
     @property
     def widths(self) -> tuple[int, int, int]:
@@ -116,7 +116,7 @@ def assemble(
     own: tuple[Array, Array],
     stiffness: Array,
     mass: Array,
-    air: Coupling | None,
+    air: GasCoupling | None,
 ) -> Border:
     """Assemble the border from the rim's ``fields`` T (nodes, 3, q), K T and M T (nodes, 3, q), and
     the wheel's own stiffness and mass (q,)."""

@@ -66,7 +66,7 @@ def read_cavity(keywords: list[Block], mesh: DeckMesh, cavity: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Coupling:
+class GasCoupling:
     """Matrices of a harmonic, per radian."""
 
     C: Array  # (k, nodes, 3), m2
@@ -88,7 +88,7 @@ class Coupling:
         return amplitudes
 
 
-def coupling(air: GasCavity, X: Array, U: Array, n: int) -> Coupling:
+def coupling(air: GasCavity, X: Array, U: Array, n: int) -> GasCoupling:
     """Matrices of the inflated cavity. X (nodes, 2), U (nodes, 3); complex steps allowed."""
     kind = np.result_type(X, U)
     walls = [elements.lines(X, surface.connectivity, POINTS_ALONG) for surface in air.surfaces]
@@ -113,7 +113,7 @@ def coupling(air: GasCavity, X: Array, U: Array, n: int) -> Coupling:
         Q += _integral(weights, psi)
         H += _integral(weights, slopes[..., 0]) + _integral(weights, slopes[..., 1])
         H += _integral(n * n * weights / rho**2, psi)
-    return Coupling(C, H / air.density, Q / air.bulk, slice(0 if n else 1, None))
+    return GasCoupling(C, H / air.density, Q / air.bulk, slice(0 if n else 1, None))
 
 
 def _integral(weights: Array, f: Array) -> Array:

@@ -22,7 +22,7 @@ from ..section.point_elements import PointElements
 from ..section.stability import unstable
 from . import bordered, lanczos
 from .bordered import Border, Bordered
-from .cavity import Coupling, GasCavity, coupling
+from .cavity import GasCavity, GasCoupling, coupling
 from .wheel import Wheel
 
 Array = np.ndarray
@@ -130,7 +130,7 @@ class Vibration:
         if wheel:
             self._forces = self._symmetry.force(mechanics.gradient(model, U, loads))
         self._borders: dict[int, Border | None] = {}
-        self._couplings: dict[int, Coupling] = {}
+        self._couplings: dict[int, GasCoupling] = {}
         self._shifted_mass = None
         if shift:
             masses = mechanics.mass_matrices(model)

@@ -29,7 +29,7 @@ STATIC_MOMENTS = 3
 
 
 @dataclass
-class Family:
+class HarmonicFamily:
     """Fields of harmonic n that diagonalise K(n) and M, the lowest first; u^H M u = 1."""
 
     n: int
@@ -42,10 +42,10 @@ class Family:
         return 1 / np.pi if self.n else 1 / (2 * np.pi)
 
 
-class Basis:
+class HarmonicBasis:
     """Real fields: for each family c = 1, and for n >= 1 then c = i."""
 
-    def __init__(self, families: list[Family]):
+    def __init__(self, families: list[HarmonicFamily]):
         self.families = families
         own = [np.tile(each.eigenvalues, 2 if each.n else 1) for each in families]
         ends = np.cumsum([len(each) for each in own])
@@ -94,7 +94,7 @@ def attached_modes(
         check()
         own = count + 1 if n <= max(harmonics) + SPARE_HARMONICS else 0
         families.append(_with_response(vibration, n, own, force))
-    basis = Basis(families)
+    basis = HarmonicBasis(families)
     p = basis.at_zero(attached)
     looked = CANDIDATES_PER_MODE * len(_seats(harmonics, count)) + 10
     low, high, rest = _reduced(basis.eigenvalues, p, looked)
@@ -140,7 +140,7 @@ def _unit_forces(numbering: Coordinates, attached: PointElements) -> Array:
     return forces
 
 
-def _with_response(vibration: Vibration, n: int, count: int, force: Array) -> Family:
+def _with_response(vibration: Vibration, n: int, count: int, force: Array) -> HarmonicFamily:
     """Modes of harmonic n and the static response to forces (size, k) on the attached
     components."""
     factor, numbering = vibration.factor(n), vibration.numbering
@@ -160,7 +160,7 @@ def _with_response(vibration: Vibration, n: int, count: int, force: Array) -> Fa
     return family
 
 
-def ritz(vibration: Vibration, n: int, vectors: Array, images: Array) -> Family:
+def ritz(vibration: Vibration, n: int, vectors: Array, images: Array) -> HarmonicFamily:
     """Fields spanned by ``vectors`` (size, k), K(n) times which is ``images``, made diagonal."""
     masses = vibration.times_mass(vectors)
     size = np.sqrt(np.einsum("ik,ik->k", vectors.conj(), masses).real)
@@ -170,7 +170,7 @@ def ritz(vibration: Vibration, n: int, vectors: Array, images: Array) -> Family:
     K = turn.conj().T @ (vectors.conj().T @ images) @ turn
     values, inner = np.linalg.eigh((K + K.conj().T) / 2)
     shapes = vibration.numbering.spread(vectors @ (turn @ inner))
-    return Family(n, values, np.moveaxis(shapes, -1, 0))
+    return HarmonicFamily(n, values, np.moveaxis(shapes, -1, 0))
 
 
 @dataclass
@@ -210,7 +210,7 @@ class CoupledShapes:
 
 
 def named(
-    basis: Basis, values: Array, vectors: Array, harmonics: list[int], count: int, p: Array
+    basis: HarmonicBasis, values: Array, vectors: Array, harmonics: list[int], count: int, p: Array
 ) -> list[HarmonicModes]:
     """Coupled modes, eigenvalues (m,) rising and vectors (fields, m), by the plain modes of
     which they hold most; of a doublet's two the lower comes first. p (d, fields)."""

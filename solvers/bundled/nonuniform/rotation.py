@@ -22,7 +22,7 @@ from ...language.text import COMPLEX_STEP
 from ..modes.harmonics import HarmonicModes, SeededTyre, Vibration
 from ..section.mechanics import mass_matrices
 from ..section.parts.part import SPIN_AXIS
-from .coupled import Family, assigned, ritz, split
+from .coupled import HarmonicFamily, assigned, ritz, split
 
 Array = np.ndarray
 SPARE_MODES = 4  # modes in the basis beyond those wanted
@@ -94,7 +94,7 @@ class Whirl:
         return Whirl(self.n, self.spin, self.omega[keep], self.shapes[keep], self.coriolis[keep])
 
 
-def _basis(vibration: Vibration, spin: float, n: int, count: int) -> Family:
+def _basis(vibration: Vibration, spin: float, n: int, count: int) -> HarmonicFamily:
     """Modes at rest in the turning frame, and responses to the Coriolis forces of each other."""
     factor, numbering = vibration.factor(n), vibration.numbering
     modes = vibration.modes(n, count, factor)
@@ -120,7 +120,7 @@ def _turned(vibration: Vibration, x: Array) -> Array:
     return vibration.numbering.gather(np.einsum("ij,njb->nib", i * SPIN_AXIS, full))
 
 
-def _coriolis(vibration: Vibration, spin: float, family: Family) -> Array:
+def _coriolis(vibration: Vibration, spin: float, family: HarmonicFamily) -> Array:
     """C = 2 i Omega M S on the basis."""
     x = vibration.numbering.gather(np.moveaxis(family.shapes, 0, -1))
     i = 1.0 if np.iscomplexobj(vibration.numbering.spread(x)) else 1j

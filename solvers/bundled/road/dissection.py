@@ -32,7 +32,7 @@ class Kind:
 
 
 @dataclass(frozen=True)
-class Column:
+class ElementColumn:
     """Elements between two levels of nodes."""
 
     nodes: slice  # in `Dissection.along`
@@ -136,7 +136,9 @@ def _ranges(groups: list[Array], count: int) -> Array:
     return np.array([first, last])
 
 
-def _columns(connectivities: list[Array], symmetry: HalfTurn) -> tuple[list[Column], Array, Array]:
+def _columns(
+    connectivities: list[Array], symmetry: HalfTurn
+) -> tuple[list[ElementColumn], Array, Array]:
     """Columns from the bead on; the nodes (q,) in that order, and of each the first and last
     column."""
     place = np.full(symmetry.shape[1], -1)
@@ -167,7 +169,7 @@ def _columns(connectivities: list[Array], symmetry: HalfTurn) -> tuple[list[Colu
         first = rank[nodes].min()
         place = np.where(level < 0, -1, rank - first)
         its = [Kind(here, there, turned, place[c]) for here, there, turned, c in kinds]
-        columns.append(Column(slice(first, first + len(nodes)), its))
+        columns.append(ElementColumn(slice(first, first + len(nodes)), its))
     return columns, along, ends[:, along]
 
 

@@ -39,7 +39,7 @@ from .contact_newton import ContactNewton, PressedState
 from .half_turn_symmetry import HalfTurn
 from .loaded_modes import SPARE, loaded_modes
 from .patch import patch
-from .road_data import InflatedTangent, ModesAtLoad, RoadData
+from .road_data import InflatedTangent, ModeRequest, RoadData
 from .slopes import Slopes
 from .stick import held
 from .tread import tread_of
@@ -61,7 +61,7 @@ def press(
     data: RoadData,
     wanted: list[float],
     check: Callable[[], None],
-    vibrations: Mapping[float, ModesAtLoad] = MappingProxyType({}),
+    vibrations: Mapping[float, ModeRequest] = MappingProxyType({}),
     tangents: Mapping[str, InflatedTangent] = MappingProxyType({}),
     begin: Callable[[ContactNewton, Array], None] | None = None,
 ) -> dict[str, Any]:
@@ -180,7 +180,7 @@ def _footprint(
 def _modes(
     work: ContactNewton,
     state: PressedState,
-    wanted: ModesAtLoad,
+    wanted: ModeRequest,
     equations: Numbering,
     inflated: Array,
     angles: Array,

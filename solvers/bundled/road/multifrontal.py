@@ -15,7 +15,7 @@ from scipy.sparse import csr_matrix
 
 from ..section.symmetry import MIRROR_SIGNS
 from .dense_cholesky import cholesky, divide, divide_transposed, less_square
-from .dissection import Column, Dissection, Front, Kind, Range
+from .dissection import Dissection, ElementColumn, Front, Kind, Range
 from .half_turn_symmetry import ODD, HalfTurn
 
 Array = np.ndarray
@@ -204,7 +204,7 @@ def _add(whole: Array, here: Array, some: Array, block: Array) -> None:
             whole[target, beyond] += block[source, across]
 
 
-def _fold(column: Column, kind: Kind, g: int, h: int) -> csr_matrix:
+def _fold(column: ElementColumn, kind: Kind, g: int, h: int) -> csr_matrix:
     """Map from the elements' stiffness, flat between even and odd fields (2, 2, 2 e, 3a, 3a), to
     the stiffness between the components of parts g and h at the column's nodes. Each element
     contributes here and as its mirror image."""

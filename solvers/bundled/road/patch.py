@@ -20,7 +20,7 @@ WIDTH_SAMPLES = 5  # angles of a span at which the width is looked at
 
 
 @dataclass(frozen=True)
-class Patch:
+class HalfPatch:
     """Contact patch of half the tyre, on rings k and nodes n; length and width are those of the
     whole patch."""
 
@@ -30,7 +30,7 @@ class Patch:
     width: float  # m
 
 
-def patch(contact: Contact, X: Array, rings: Array) -> Patch:
+def patch(contact: Contact, X: Array, rings: Array) -> HalfPatch:
     """The patch of a contact, on nodes at the angles ``rings`` (k,) from 0 on. X (n, 2): R, Z of
     the section, m."""
     tread, points = contact.road.tread, contact.points
@@ -45,7 +45,7 @@ def patch(contact: Contact, X: Array, rings: Array) -> Patch:
         hat = share[..., None] * across  # (i, j, p, a)
         np.add.at(area, (ring[..., None], nodes), hat * size[..., None])
         np.add.at(force, (ring[..., None], nodes), hat[..., None] * local[..., None, :])
-    return Patch(area, force, *_extent(contact, X))
+    return HalfPatch(area, force, *_extent(contact, X))
 
 
 def _hats(xi: Array, count: int) -> Array:

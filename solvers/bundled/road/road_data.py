@@ -30,7 +30,7 @@ class RoadData:
 
 
 @dataclass(frozen=True)
-class ModesAtLoad:
+class ModeRequest:
     """Modes wanted at a load."""
 
     model: Model

@@ -20,7 +20,7 @@ UNITS = {"Hz": "Hz", "sigma": "sigmas"}
 
 
 @dataclass(frozen=True)
-class Row:
+class ComparisonRow:
     """A row: its name, more of it in small letters, and a cell per folder."""
 
     name: str
@@ -33,7 +33,7 @@ class Group:
     """Rows under a heading."""
 
     heading: str
-    rows: list[Row]
+    rows: list[ComparisonRow]
 
 
 def comparison(results: Sequence[Results]) -> list[Group]:
@@ -50,11 +50,11 @@ def comparison(results: Sequence[Results]) -> list[Group]:
             Group("Fit", list(_whole(fits))),
             Group(
                 "Variables ± standard error",
-                [Row(n, "", _cells(fits, partial(_variable, name=n))) for n in names],
+                [ComparisonRow(n, "", _cells(fits, partial(_variable, name=n))) for n in names],
             ),
             Group(
                 "Fitted over target, %",
-                [Row(*aim, _cells(fits, partial(_graded, aim=aim))) for aim in aims],
+                [ComparisonRow(*aim, _cells(fits, partial(_graded, aim=aim))) for aim in aims],
             ),
         ]
     if any(diagnoses):
@@ -62,19 +62,23 @@ def comparison(results: Sequence[Results]) -> list[Group]:
     return groups
 
 
-def _whole(fits: Sequence[FitResult | None]) -> Iterator[Row]:
-    yield Row("objective", "initial", _cells(fits, lambda fit: _objective(fit, "initial_")))
-    yield Row("objective", "fitted", _cells(fits, _objective))
-    yield Row("worst mode", "", _cells(fits, _worst))
-    yield Row("verdict", "chi2 per degree of freedom", _cells(fits, _fit_verdict))
-    yield Row("converged", "design points", _cells(fits, _end))
-    yield Row("pressure", "", _cells(fits, _pressures))
-    yield Row("mass", "tyre without rim", _cells(fits, lambda fit: f"{fit.mass_kg:.2f} kg"))
+def _whole(fits: Sequence[FitResult | None]) -> Iterator[ComparisonRow]:
+    yield ComparisonRow(
+        "objective", "initial", _cells(fits, lambda fit: _objective(fit, "initial_"))
+    )
+    yield ComparisonRow("objective", "fitted", _cells(fits, _objective))
+    yield ComparisonRow("worst mode", "", _cells(fits, _worst))
+    yield ComparisonRow("verdict", "chi2 per degree of freedom", _cells(fits, _fit_verdict))
+    yield ComparisonRow("converged", "design points", _cells(fits, _end))
+    yield ComparisonRow("pressure", "", _cells(fits, _pressures))
+    yield ComparisonRow(
+        "mass", "tyre without rim", _cells(fits, lambda fit: f"{fit.mass_kg:.2f} kg")
+    )
 
 
-def _verdicts(diagnoses: Sequence[DiagnosisResult | None]) -> Iterator[Row]:
-    yield Row("verdict", "", _cells(diagnoses, verdict_words))
-    yield Row("likeliest", "probability", _cells(diagnoses, _likeliest))
+def _verdicts(diagnoses: Sequence[DiagnosisResult | None]) -> Iterator[ComparisonRow]:
+    yield ComparisonRow("verdict", "", _cells(diagnoses, verdict_words))
+    yield ComparisonRow("likeliest", "probability", _cells(diagnoses, _likeliest))
 
 
 def _cells(contents: Sequence[Content | None], tell: Callable[[Content], str]) -> list[str]:

@@ -13,7 +13,7 @@ from ...tyre.resolve import Tyre
 from ...tyre.section.section import SectionError
 from ...tyre.templates import TemplateFailed
 from .abaqus import claimed, deck_name, solid_claims
-from .sector import INNER_FACE, Sector, Strip, build_sector
+from .sector import INNER_FACE, PlyStrip, Sector, build_sector
 
 ELEMENT_TYPES = ("C3D20R", "C3D20", "C3D8")
 PLY_THICKNESS_M = 2e-4
@@ -154,7 +154,7 @@ def _plies(case: Case, sector: Sector) -> list[dict[str, Any]]:
     return plies
 
 
-def _taut(sector: Sector, strip: Strip, name: str, layer: RebarLayer) -> str:
+def _taut(sector: Sector, strip: PlyStrip, name: str, layer: RebarLayer) -> str:
     """JSON of a ply whose cords bear no compression, as the solver's adapter reads it to refuse a
     state that compresses them."""
     a, b, c, d = sector.bricks[strip.element][:4]

@@ -25,7 +25,7 @@ INNER_FACE = "P6"  # a brick's face over side 4 of the section's element
 
 
 @dataclass(frozen=True)
-class Strip:
+class PlyStrip:
     """An element of a ply."""
 
     element: int  # in the section
@@ -44,7 +44,7 @@ class Sector:
     # section element to its row in the mesh without plies, a ply's being that inside it
     rows: dict[int, int]
     regions: dict[int, str]
-    strips: dict[str, list[Strip]]  # per line, from -z to +z
+    strips: dict[str, list[PlyStrip]]  # per line, from -z to +z
     section: list[int]  # nodes on the front face
     behind: list[int]  # nodes on the other face
     # (node halfway between the faces, node in front of it), the held ones left out
@@ -115,12 +115,12 @@ def _normals(line: Array) -> Array:
     return normals
 
 
-def _strip(mesh: SectionMesh, number: int) -> Strip:
+def _strip(mesh: SectionMesh, number: int) -> PlyStrip:
     corner = np.array([mesh.nodes[n] for n in mesh.solids[number][:4]])
     start, end = (corner[0] + corner[1]) / 2, (corner[3] + corner[2]) / 2
     length = np.linalg.norm(end - start)
     along, radius = (end - start) / length, (start[0] + end[0]) / 2
-    return Strip(
+    return PlyStrip(
         number,
         (float(along[0]), float(along[1])),
         float(radius),

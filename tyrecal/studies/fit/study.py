@@ -18,7 +18,7 @@ from ...tyre.case import LoadedCase, start_values
 from ...tyre.values import with_values
 from ..labelling.label import label
 from ..labelling.result import labels_posterior
-from ..pressing_plan import DESIGNS_OF_FIT, PressedState, PressingPlan, plan_pressing
+from ..pressing_plan import DESIGNS_OF_FIT, PlannedState, PressingPlan, plan_pressing
 from .calibrate import Fit, FitNotify, calibrate, check, history_csv
 from .problem import Problem
 from .targets import states_of
@@ -98,7 +98,7 @@ class FitStudy:
             exact = problem.exact_on_road > 0
         loads = Counter((state.unloaded, modal) for state, modal in places)
         states = [
-            PressedState(count, modal, *((len(free), 0) if exact and not modal else (0, len(free))))
+            PlannedState(count, modal, *((len(free), 0) if exact and not modal else (0, len(free))))
             for (_, modal), count in loads.items()
         ]
         designs = DESIGNS_OF_FIT[method] * starts

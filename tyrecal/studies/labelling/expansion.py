@@ -34,7 +34,7 @@ class Prior:
 
 
 @dataclass(frozen=True)
-class Expansion:
+class ModesNearDesign:
     """The model at a design: label and state (a number) of each mode of a family (those across the
     belt, and overtones, are told by no list), ln f (n,), slopes (n, v)."""
 
@@ -50,7 +50,7 @@ class LabelSearch:
     would find the same; else it is the surest of those that take turns."""
 
     labelings: Labelings
-    expansion: Expansion
+    expansion: ModesNearDesign
     x: Array
     rounds: int
     settled: bool
@@ -62,12 +62,12 @@ class LabelSearch:
 
 
 Measured = Callable[
-    [Expansion], Frequencies
+    [ModesNearDesign], Frequencies
 ]  # what is admissible hangs on the modes that there are
 
 
 def find_labels(
-    expand: Callable[[Array], Expansion],
+    expand: Callable[[Array], ModesNearDesign],
     measured: Measured,
     prior: Prior,
     first: Array | None = None,
@@ -94,7 +94,7 @@ def find_labels(
     return replace(max(last, key=lambda each: each.labelings.probabilities[0]), settled=False)
 
 
-def admissible(labels: Sequence[Label | None], states: Array, at: Expansion) -> Array:
+def admissible(labels: Sequence[Label | None], states: Array, at: ModesNearDesign) -> Array:
     """(m, n): the modes that each measured frequency can be, a label or None for unlabelled
     ones."""
     same = np.array([[own in (None, label) for label in at.labels] for own in labels])

@@ -20,7 +20,7 @@ from ...tyre.state import TyreState
 from ..fit.problem import Problem
 from ..fit.result import FitResult
 from ..variable import DesignVariable, read_variable
-from .expansion import Expansion, LabelSearch, Prior, admissible, find_labels
+from .expansion import LabelSearch, ModesNearDesign, Prior, admissible, find_labels
 from .tree import Frequencies
 
 Array = np.ndarray
@@ -39,7 +39,7 @@ class Labelled:
     # or the two of a doublet
     frequencies: list[list[Measurement]]
     found: LabelSearch
-    start: Expansion  # the model where the variables are expected
+    start: ModesNearDesign  # the model where the variables are expected
 
     @property
     def labels(self) -> list[Label | None]:
@@ -123,7 +123,7 @@ def label(
     frequencies = _of_unloaded(case, readings)
     states = list(dict.fromkeys(each[0].state.of(case) for each in frequencies))
     place = np.array([states.index(each[0].state.of(case)) for each in frequencies])
-    model = Model(problem, states, max(each[0].value for each in frequencies), jobs)
+    model = LabelledModel(problem, states, max(each[0].value for each in frequencies), jobs)
     values = [float(np.mean([r.value for r in each])) for each in frequencies]
     relative = [
         float(np.hypot.reduce([r.sigma for r in each])) / len(each) / value
@@ -131,7 +131,7 @@ def label(
     ]
     known = [each[0].label for each in frequencies]
 
-    def measured(at: Expansion) -> Frequencies:
+    def measured(at: ModesNearDesign) -> Frequencies:
         allowed = admissible(known, place, at)
         is_labelled = np.array([own is not None for own in known])
         return Frequencies(
@@ -157,7 +157,7 @@ def _of_unloaded(case: LoadedCase, readings: Sequence[Measurement]) -> list[list
     return sorted(groups.values(), key=lambda group: group[0].value)
 
 
-class Model:
+class LabelledModel:
     """The modes of a case in ``states``, by its variables, up to above ``highest_Hz``."""
 
     def __init__(
@@ -167,7 +167,7 @@ class Model:
         self.top_Hz = BAND_ABOVE * highest_Hz
         self.harmonics = problem.case.case.analysis.highest_harmonic
 
-    def expand(self, x: Array) -> Expansion:
+    def expand(self, x: Array) -> ModesNearDesign:
         """The model at coordinates x (v,). Raises EvaluationFailed, DeckRefused."""
         while True:
             by_state = self._evaluated(x)
@@ -188,7 +188,7 @@ class Model:
         hertz = np.array([mode.frequency_Hz for _, mode, _ in every])
         slopes = np.array([row for *_, row in every]) / hertz[:, None]
         labels = tuple(mode.label for _, mode, _ in every)
-        return Expansion(labels, np.array([i for i, *_ in every]), np.log(hertz), slopes)
+        return ModesNearDesign(labels, np.array([i for i, *_ in every]), np.log(hertz), slopes)
 
     def _evaluated(self, x: Array) -> list[tuple[list[Mode], Array]]:
         """Modes of each state, and d f / d x (modes, variables)."""

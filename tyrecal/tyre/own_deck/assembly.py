@@ -28,7 +28,7 @@ class Assembly:
 
 
 @dataclass
-class Part:
+class DeckPart:
     """A *PART."""
 
     block: Block
@@ -39,15 +39,15 @@ class Part:
 
 def collect(blocks: Sequence[Block]) -> Assembly:
     """The deck's. Raises OwnDeckError."""
-    made, parts = Assembly(taken=_taken(blocks)), dict[str, Part]()
-    part: Part | None = None
+    made, parts = Assembly(taken=_taken(blocks)), dict[str, DeckPart]()
+    part: DeckPart | None = None
     instance: Block | None = None
     for block in blocks:
         if block.name == "PART":
             name = block.need("NAME")
             if name in parts:
                 raise block.refused(f"the part {name} is defined twice")
-            part = parts[name] = Part(block, Scope(name))
+            part = parts[name] = DeckPart(block, Scope(name))
         elif block.name == "END PART":
             part = None
         elif block.name == "INSTANCE":
@@ -85,7 +85,7 @@ def _taken(blocks: Sequence[Block]) -> dict[str, set[int]]:
     return taken
 
 
-def _instance(made: Assembly, parts: dict[str, Part], block: Block) -> None:
+def _instance(made: Assembly, parts: dict[str, DeckPart], block: Block) -> None:
     """Put a part's nodes, elements, sets and options in the model under INSTANCE.NAME."""
     name, part = block.need("NAME"), parts[block.need("PART")]
     if any(name in each.instances for each in parts.values()):
@@ -133,7 +133,7 @@ def _mapped(
     return lambda: [numbers[n] for n in members(name, block)]
 
 
-def _other(made: Assembly, block: Block, prefix: str, parts: dict[str, Part]) -> None:
+def _other(made: Assembly, block: Block, prefix: str, parts: dict[str, DeckPart]) -> None:
     name = block.name
     if name in ("NSET", "ELSET"):  # of an instance, from outside it
         for part in parts.values():

@@ -19,7 +19,7 @@ HELD_BY_SYMMETRY = {2, 4, 5, 6}
 
 
 @dataclass(frozen=True, eq=False)
-class Embedded:
+class EmbeddedElements:
     """An *EMBEDDED ELEMENT some of whose nodes are no rubber's: elements of each data line."""
 
     block: Block
@@ -50,7 +50,7 @@ class Constraints:
         self.rim: dict[int, None] = {}
         self.reference: tuple[int, Point] | None = None
         self.same: dict[int, int] = {}
-        self.embedded: list[Embedded] = []
+        self.embedded: list[EmbeddedElements] = []
         self.guests: set[int] = set()
         self.bodies: list[RigidBody] = []
         self.seats: set[str] = set()  # rigid surfaces that nodes are tied to
@@ -171,7 +171,7 @@ class Constraints:
                 self.guests |= self._merge(list(own), rubber).keys()
                 lines.append((row, tuple(members)))
         if len(self.guests) > before:
-            self.embedded.append(Embedded(block, tuple(hosts), tuple(lines)))
+            self.embedded.append(EmbeddedElements(block, tuple(hosts), tuple(lines)))
 
     def _merge(self, some: Sequence[int], others: Sequence[int]) -> dict[int, float]:
         """Each of ``some`` nodes is one with that of ``others`` which lies there; distance to the

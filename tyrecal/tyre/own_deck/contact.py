@@ -37,7 +37,7 @@ class Pair:
     reference: int  # node of the rigid surface
 
 
-class Contact:
+class DeckContact:
     """The contact of a deck. Raises OwnDeckError."""
 
     def __init__(self, made: Assembly, blocks: ClassifiedDeck, tied: Constraints):

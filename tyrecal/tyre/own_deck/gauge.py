@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from .model import Model
+from .model import DeckModel
 from .scope import Point, corner_areas, faces_of, nearest
 from .surfaces import Face
 
@@ -24,7 +24,7 @@ Gauges = tuple[tuple[Sets, float], ...]  # factors on the thickness of parts
 
 
 @lru_cache(maxsize=8)
-def thickened(model: Model, factors: Gauges) -> Model:
+def thickened(model: DeckModel, factors: Gauges) -> DeckModel:
     """The section with the thickness of parts times their factors. Raises OwnDeckError where one
     has no free outer surface, or an element folds over."""
     nodes = dict(model.nodes)
@@ -38,7 +38,7 @@ def thickened(model: Model, factors: Gauges) -> Model:
 
 
 @lru_cache(maxsize=8)
-def _growth(model: Model, sets: Sets) -> Mapping[int, Point]:
+def _growth(model: DeckModel, sets: Sets) -> Mapping[int, Point]:
     """Displacement of the part's nodes as it becomes twice as thick."""
     sections = [s for s in model.solids if s.name.upper() in sets]
     own = {n for section in sections for n in section.elements}
@@ -71,7 +71,7 @@ def _growth(model: Model, sets: Sets) -> Mapping[int, Point]:
     return {n: (float(r), float(z)) for n, (r, z) in zip(members, grown, strict=True)}
 
 
-def _segments(model: Model, faces: Sequence[Face]) -> Array:
+def _segments(model: DeckModel, faces: Sequence[Face]) -> Array:
     """Straight pieces (s, 2, 2) of faces, the solid on their left."""
     pairs = [pair for _, _, nodes in faces for pair in pairwise(nodes)]
     return np.array([[model.nodes[n] for n in pair] for pair in pairs])

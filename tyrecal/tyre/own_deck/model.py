@@ -9,8 +9,8 @@ import numpy as np
 
 from .assembly import Assembly, collect
 from .classify import LOADS, ClassifiedDeck
-from .constraints import Constraints, Embedded, lines_of_the_other_half
-from .contact import Contact
+from .constraints import Constraints, EmbeddedElements, lines_of_the_other_half
+from .contact import DeckContact
 from .scope import Element, Point, corner_areas, faces_of, mirror_of, reflected
 from .surfaces import Face, boundary_of, surface_faces
 from .text import Block, Row, element_types
@@ -29,14 +29,14 @@ class Assigned:
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class DeckModel:
     """Numbers are the deck's own where it has no instances."""
 
     nodes: dict[int, Point]
     elements: dict[int, Element]
     solids: tuple[Assigned, ...]
     plies: tuple[Assigned, ...]
-    embedded: tuple[Embedded, ...]
+    embedded: tuple[EmbeddedElements, ...]
     cavity: tuple[Face, ...]  # under the inflation pressure
     cavity_name: str
     pressure: tuple[tuple[Block, Row, int], ...]  # where it stands: data field of each load
@@ -48,7 +48,7 @@ class Model:
     left_out: tuple[str, ...] = ()  # contact that the held bead makes superfluous, in words
 
 
-def build(deck: ClassifiedDeck) -> Model:
+def build(deck: ClassifiedDeck) -> DeckModel:
     """The section. Raises OwnDeckError."""
     made = collect(deck.model)
     return _Builder(made, deck).model()
@@ -60,7 +60,7 @@ class _Builder:
     def __init__(self, made: Assembly, deck: ClassifiedDeck):
         self.made, self.blocks, self.root = made, deck, made.root
 
-    def model(self) -> Model:
+    def model(self) -> DeckModel:
         """Raises OwnDeckError."""
         if not any(e.is_solid for e in self.root.elements.values()):
             raise self.blocks.model[-1].refused("is the last, but the deck has no CGAX element")
@@ -69,7 +69,7 @@ class _Builder:
         pressed, name, places = self._pressure()
         self.tied = Constraints(self.made, self.blocks)
         left_out = (
-            Contact(self.made, self.blocks, self.tied).left_out() if self.blocks.contact else ()
+            DeckContact(self.made, self.blocks, self.tied).left_out() if self.blocks.contact else ()
         )
         if not self.tied.rim:
             raise self.blocks.model[-1].refused(
@@ -102,7 +102,7 @@ class _Builder:
                 " a ply shares its nodes with the rubber, or is an *EMBEDDED ELEMENT",
                 element.row,
             )
-        return Model(
+        return DeckModel(
             {n: p for n, p in self.root.nodes.items() if n in used},
             {k: e for k, e in self.root.elements.items() if not e.kind.startswith("RAX")},
             solids,
@@ -296,7 +296,9 @@ class _Builder:
         self.tied.guests |= {image[n] for n in self.tied.guests}
         doubled = lambda numbers: (*numbers, *(n + further for n in numbers))
         self.tied.embedded = [
-            Embedded(e.block, doubled(e.hosts), tuple((row, doubled(own)) for row, own in e.lines))
+            EmbeddedElements(
+                e.block, doubled(e.hosts), tuple((row, doubled(own)) for row, own in e.lines)
+            )
             for e in self.tied.embedded
         ]
         return tuple(map(both, solids)), tuple(map(both, plies)), both_faces

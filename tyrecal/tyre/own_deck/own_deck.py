@@ -13,7 +13,7 @@ from typing import Any, Literal
 from . import numbers as numbers_of
 from .classify import ClassifiedDeck, classify
 from .gauge import Gauges, thickened
-from .model import Model, build
+from .model import DeckModel, build
 from .solver_deck import SECTION_OPTIONS, SolverDeck, translate
 from .text import Block, OwnDeckError, Place, number_from, read_blocks, table
 
@@ -36,7 +36,7 @@ class OwnDeck:
     units: Units
     blocks: tuple[Block, ...]
     texts: Mapping[str, str]  # of its files, by name relative to its folder
-    _models: dict[tuple[Block, ...], Model] = field(default_factory=dict, repr=False)
+    _models: dict[tuple[Block, ...], DeckModel] = field(default_factory=dict, repr=False)
     _filled: dict[int, Block] = field(default_factory=dict, repr=False)
 
     @cached_property
@@ -124,7 +124,7 @@ class OwnDeck:
         self._filled[place] = last
         return last
 
-    def model(self, deck: ClassifiedDeck) -> Model:
+    def model(self, deck: ClassifiedDeck) -> DeckModel:
         """The section of classified blocks, remembered while the mesh's own stay the same."""
         mesh = (b for b in (*deck.model, *deck.inflation) if b.name in TOPOLOGY)
         key = (*mesh, *deck.contact)

@@ -10,7 +10,7 @@ from ..section.curve import length_along
 from ..section.mesh import SectionMesh
 from ..section.section import Section
 from .scope import CORNERS_OF
-from .solver_deck import Ply, SolverDeck
+from .solver_deck import RebarPly, SolverDeck
 
 Array = np.ndarray
 DRAWN_STATIONS = 40  # of the drawn half
@@ -23,7 +23,7 @@ class OwnDeckMesh(SectionMesh):
     path_outer: list[int] = field(default_factory=list)
     path_inner: list[int] = field(default_factory=list)
     around: list[int] = field(default_factory=list)
-    plies: tuple[Ply, ...] = ()
+    plies: tuple[RebarPly, ...] = ()
 
     @property
     def inner_ends(self) -> tuple[int, int]:
@@ -78,7 +78,7 @@ class OwnDeckMesh(SectionMesh):
             by_material.setdefault(ply.material, []).extend(self.cords[ply.set_name].values())
         return by_material
 
-    def _named(self) -> dict[str, Ply]:
+    def _named(self) -> dict[str, RebarPly]:
         names = [ply.name for ply in self.plies]
         return {
             ply.name if names.count(ply.name) == 1 else f"{ply.set_name} {ply.name}": ply

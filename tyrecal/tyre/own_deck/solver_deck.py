@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .classify import ClassifiedDeck
-from .model import Assigned, Model
+from .model import Assigned, DeckModel
 from .numbers import written
 from .solver_mesh import DeckLines, SolverMesh, solver_mesh
 from .text import Block, Place, Row, fields, table
@@ -20,7 +20,7 @@ SECTION_OPTIONS = ("HOURGLASS STIFFNESS", "REBAR LAYER")
 
 
 @dataclass(frozen=True, eq=False)
-class Ply:
+class RebarPly:
     """A rebar layer as it is found."""
 
     name: str
@@ -42,11 +42,11 @@ class SolverDeck:
     origins: tuple[Place, ...]
     materials: tuple[str, ...]  # of the solid sections, by their place
     sections: tuple[str, ...]  # their sets, likewise
-    plies: tuple[Ply, ...]
+    plies: tuple[RebarPly, ...]
     pressure_Pa: float
     long_term: bool
     blocks: ClassifiedDeck
-    model: Model
+    model: DeckModel
 
     @property
     def set_names(self) -> list[str]:
@@ -66,7 +66,7 @@ class SolverDeck:
         return "\n".join(self.lines)
 
 
-def translate(deck: ClassifiedDeck, model: Model, length: float, mass: float) -> SolverDeck:
+def translate(deck: ClassifiedDeck, model: DeckModel, length: float, mass: float) -> SolverDeck:
     """The flat deck of a model whose units of length and mass are so many m and kg. Raises
     OwnDeckError."""
     mesh = solver_mesh(model, length)
@@ -74,7 +74,7 @@ def translate(deck: ClassifiedDeck, model: Model, length: float, mass: float) ->
     blocks = _materials(deck.model)
     options = _options(deck.model)
     used: dict[str, str] = {}
-    rubbers, plies = [], list[Ply]()
+    rubbers, plies = [], list[RebarPly]()
     for k, section in enumerate(model.solids, start=1):
         name = _used(section.block, section.block.need("MATERIAL"), blocks, used)
         rubbers.append(section.block.get("MATERIAL"))
@@ -215,7 +215,7 @@ def _layers(
     used: dict[str, str],
     mesh: SolverMesh,
     length: float,
-) -> list[Ply]:
+) -> list[RebarPly]:
     if option.name != "REBAR LAYER":
         raise option.refused("does not belong under a *SURFACE SECTION")
     if not option.rows:
@@ -237,7 +237,7 @@ def _layers(
         name = re.sub(r"\W", "_", row.name(0)) or "LAYER"
         rows.append(Row(row.place, ",".join((name, *row.fields[1:4], flat_name, *row.fields[5:]))))
         layers.append(
-            Ply(
+            RebarPly(
                 row.name(0),
                 section.name,
                 material,

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from .model import Model
+from .model import DeckModel
 from .numbers import written
 from .scope import Point
 from .surfaces import Face
@@ -77,7 +77,7 @@ def _tolerances(block: Block, length: float) -> str:
     return tolerances
 
 
-def solver_mesh(model: Model, length: float) -> SolverMesh:
+def solver_mesh(model: DeckModel, length: float) -> SolverMesh:
     """The mesh of a model whose unit of length is so many m, remembered with it. Raises
     OwnDeckError."""
     known = getattr(model, "_flat", {})

@@ -14,14 +14,14 @@ from .arruda_boyce import ArrudaBoyce
 from .hyperelastic import Hyperelastic
 from .mooney_rivlin import MooneyRivlin
 from .ogden import Ogden
-from .polynomial import Polynomial
+from .polynomial import PolynomialLaw
 from .reduced_polynomial import ReducedPolynomial
 
 Scalar = complex | float
 LAW_CLASSES: tuple[type[Hyperelastic], ...] = (  # the first that has all constants of a law
     MooneyRivlin,
     ReducedPolynomial,
-    Polynomial,
+    PolynomialLaw,
     ArrudaBoyce,
     Ogden,
 )

@@ -18,7 +18,7 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True)
-class Polynomial(InvariantLaw):
+class PolynomialLaw(InvariantLaw):
     """C_ij and 1 / D_i, Pa."""
 
     shear_moduli: ClassVar[tuple[str, ...]] = ("C10", "C01", "C20", "C11", "C02")
