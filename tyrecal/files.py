@@ -28,7 +28,7 @@ PICTURE_FORMATS = ("png", "svg", "pdf")
 
 def _tyre(study: str, overview: str) -> tuple[str, ...]:
     """Pictures of a tyre and its modes, which carry the study's name."""
-    return (overview, f"{study}_section.png", f"{study}_mode_*.png", f"{study}_mode_*.vtu")
+    return (overview, f"{study}_section.png", f"{study}_mode_*.vtu")
 
 
 RESULTS = {  # of a study, by pattern: what a new run of it takes the place of
