@@ -121,6 +121,27 @@ def test_what_further_rows_gain_from_an_effect_whose_slope_at_0_is_known() -> No
     assert queries[0].slopes == ("e0",) and queries[0].constants
 
 
+@pytest.mark.parametrize("off", [0.0, 1e-15, 0.1])
+def test_what_a_further_row_gains_from_an_effect_of_either_sign(off: float) -> None:
+    """As if each size were evaluated, also if their mean is 0 or off by rounding, where the effect
+    shows nothing that could be scaled to the other sizes."""
+    toy = Toy(effects=1, pressures=(240.0,))
+    sizes, likely = np.array([-0.8, 0.8 + off]), {"none": 0.6, "e0": 0.4}
+
+    def further(rows: list) -> Any:
+        zero, J = np.zeros(len(rows)), np.zeros((len(rows), 3))
+        answer = lambda q: Answer(7.1 + 0.01 * q.effects.get("e0", zero), J, zero, J[:, :2])
+        return SimpleNamespace(answers=lambda queries: [*map(answer, queries)], sloped_at_0=())
+
+    further_rows = OtherStates(further, 240.0)
+    ranked = rank(problem(toy), np.zeros(3), likely, {"e0": {"e0": sizes}}, (), further_rows)
+    gain = next(c.gain * c.hours for c in ranked if c.what == "weigh the tyre")
+    shifts = {"none": np.zeros((1, 1)), "e0": 0.01 * sizes[:, None]}  # of ln mass, to 0.005
+    alone = CandidateRows(np.array([[0.005**2]]), np.zeros((1, 1)), shifts)
+    assert gain == pytest.approx(alone.information(0, likely, np.ones(1)), rel=1e-3)
+    assert gain > 0.03
+
+
 def informed(p: Sequence[float], squared: Array) -> float:
     """The bound of information on explanations of one size each, squares of distances apart."""
     share = np.array(p) / sum(p)

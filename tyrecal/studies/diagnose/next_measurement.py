@@ -281,10 +281,17 @@ def _along(nodes: EffectResponse, e: float, slope: Array) -> Array:
     return np.nan_to_num(slope) * e * share
 
 
-def _grown(shifts: Array, mean: Array) -> Array:
-    """How much of the shift (n,) at the mean size there is at the others (q,)."""
-    whole = mean @ mean
-    return np.asarray(shifts @ mean / whole) if whole > 0 else np.ones(len(shifts))
+def _farthest(shifts: Array) -> int:
+    """Place of the size that moves the measured rows most, from their shifts (q, n). Not the mean
+    size: that of an effect which may have either sign is next to 0, and shows nothing."""
+    return int(np.argmax((shifts**2).sum(1)))
+
+
+def _grown(shifts: Array) -> Array:
+    """How much of the largest shift (n,) of the measured rows there is at each size (q,)."""
+    largest = shifts[_farthest(shifts)]
+    whole = largest @ largest
+    return np.asarray(shifts @ largest / whole) if whole > 0 else np.ones(len(shifts))
 
 
 def _more_rows(
@@ -294,8 +301,8 @@ def _more_rows(
     sizes: Mapping[str, Sizes],
     further: OtherStates,
 ) -> list[tuple[str, float, CandidateRows]]:
-    """Other pressures, higher harmonics and the mass, as far as the model has an answer at the
-    explanations' mean sizes."""
+    """Other pressures, higher harmonics and the mass, as far as the model has an answer where the
+    explanations move the measured rows most; at other sizes, in proportion to these rows."""
     o = problem.observations
     labels = sorted({row.label for row in o.rows if row.label}, key=str)
     pressures = sorted({row.pressure_kPa for row in o.rows if row.label})
@@ -313,12 +320,16 @@ def _more_rows(
     rows = list(dict.fromkeys(row for _, _, more in offered for row in more))
     model = further.model(rows)
     x = problem.expansion.x0 + d
-    means = [{id: float(e.mean()) for id, e in each.items()} for each in sizes.values()]
+    known = {key: _shifts(problem, each, d) for key, each in sizes.items()}
+    farthest = [
+        {id: float(e[_farthest(known[key])]) for id, e in each.items()}
+        for key, each in sizes.items()
+    ]
     bent = {id for id, each in problem.expansion.nodes.items() if each.sloped[each.values == 0]}
     lines = tuple(
-        {id: 0.0 for each in means for id in each if id in model.sloped_at_0 and id in bent}
+        {id: 0.0 for each in farthest for id in each if id in model.sloped_at_0 and id in bent}
     )
-    rest = [{id: e for id, e in each.items() if id not in lines} for each in means]
+    rest = [{id: e for id, e in each.items() if id not in lines} for each in farthest]
     evaluated = [each for each in rest if each][:MAX_EVALUATED]
     points = [
         Query(x, constants=True, slopes=lines),
@@ -330,20 +341,19 @@ def _more_rows(
     plain, *others = [answer for answer in answers if isinstance(answer, Answer)]
     assert plain.constants is not None
     added = {}
-    for (key, each), mean, own in zip(sizes.items(), means, rest, strict=True):
+    for key, far, own in zip(sizes, farthest, rest, strict=True):
         if own and own not in evaluated:
             continue
         other = others[evaluated.index(own)] if own else plain
         here = sum(
             (
-                _along(problem.expansion.nodes[id], mean[id], plain.slopes[id])
+                _along(problem.expansion.nodes[id], far[id], plain.slopes[id])
                 for id in lines
-                if id in mean
+                if id in far
             ),
             other.eta - plain.eta,
         )
-        at_mean = _shifts(problem, {id: np.array([e]) for id, e in mean.items()}, d)[0]
-        added[key] = _grown(_shifts(problem, each, d), at_mean)[:, None] * here
+        added[key] = _grown(known[key])[:, None] * here
     scatter = float(np.median(o.scatter))
     result = []
     for words, hours, more in offered:
