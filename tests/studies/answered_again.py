@@ -4,12 +4,15 @@
     python -m tests.studies.answered_again DIR blind_study_2 drawing --jobs 2
     python -m tests.studies.answered_again DIR blind_study_2 exact --every 5    # of five trials one
     python -m tests.studies.answered_again DIR blind_study_2           # the table
+    python -m tests.studies.answered_again DIR blind_study_2 exact --every 24 --solver
+    python -m tests.studies.answered_again DIR blind_study_2 exact --beside OTHER_DIR
 
 Those tyres' sections are the case's own (`exact`); the second line answers as if they had been
 taken from a drawing, the default, so that what this costs is seen. Effects are the ones that the
 study's answers weighed; that tyres have one at most is told, as the rules tell it. DIR keeps what
 was answered; the same command goes on from there. Each column is of the trials that both origins
-answered, the recorded one, too.
+answered, the recorded one, too. `--solver` answers with the solver, without an emulated model: some
+12 s a trial. `--beside` compares two folders, which two commits answered, trial by trial.
 """
 
 from __future__ import annotations
@@ -57,7 +60,9 @@ def weighed(answers: Path) -> list[str]:
     return sorted(keys - {NONE, OUTSIDE})
 
 
-def answered(study: str, folder: Path, origin: str, jobs: int, every: int) -> str:
+def answered(
+    study: str, folder: Path, origin: str, jobs: int, every: int, solver: bool = False
+) -> str:
     """Answer what has no answer yet, of ``every`` so many trials by name one; the hash of all."""
     trials = folder / study / origin / "trials"
     marked = trials / "weighed.json"
@@ -79,7 +84,27 @@ def answered(study: str, folder: Path, origin: str, jobs: int, every: int) -> st
     model = tyre_model(case, evaluator, protocol, jobs, json.loads(marked.read_text()))
     on_progress = lambda done, all: print(f"{done} of {all}", file=sys.stderr, flush=True)
     more = further(protocol.counts)
-    return answer(trials, emulate(model), rows_of(case, protocol), jobs, on_progress, more)
+    used = model if solver else emulate(model)
+    return answer(trials, used, rows_of(case, protocol), jobs, on_progress, more)
+
+
+def changes(first: Path, other: Path) -> str:
+    """How the answers in two folders differ, of the trials that both have."""
+    names = sorted({p.name for p in first.glob("*.json")} & {p.name for p in other.glob("*.json")})
+    verdicts, effects, largest = [], [], (0.0, "", "")
+    for name in names:
+        one, two = (json.loads((each / name).read_text())["diagnosis"] for each in (first, other))
+        trial = name.removesuffix(".json")
+        if one["verdict"] != two["verdict"]:
+            verdicts.append(f"{trial}: {one['verdict']}, {two['verdict']}")
+        if one["effect"] != two["effect"]:
+            effects.append(f"{trial}: {one['effect']}, {two['effect']}")
+        p, q = one["probabilities"], two["probabilities"]
+        for key in sorted({*p, *q}):
+            largest = max(largest, (abs(p.get(key, 0.0) - q.get(key, 0.0)), key, trial))
+    counts = f"{len(names)} trials, {len(verdicts)} other verdicts, {len(effects)} other effects"
+    most = f"largest change of a probability {largest[0]:.3f} ({largest[1]}, {largest[2]})"
+    return "\n".join([f"{counts}, {most}", *verdicts, *effects])
 
 
 def compared(study: str, folder: Path) -> dict[str, list[Scored]]:
@@ -123,10 +148,24 @@ def _share(rate: dict[str, Any]) -> str:
 @click.argument("origin", type=click.Choice(ORIGINS), required=False)
 @click.option("--jobs", default=1)
 @click.option("--every", default=1)
-def main(folder: Path, study: str, origin: str | None, jobs: int, every: int) -> None:
+@click.option("--solver", is_flag=True)
+@click.option("--beside", type=click.Path(path_type=Path, exists=True))
+def main(
+    folder: Path,
+    study: str,
+    origin: str | None,
+    jobs: int,
+    every: int,
+    solver: bool,
+    beside: Path | None,
+) -> None:
     """Answer, or tell the figures of what is answered beside those on record."""
+    if origin and beside:
+        place = Path(study, origin, "trials", "answers")
+        print(changes(folder / place, beside / place))
+        return
     if origin:
-        print(answered(study, folder, origin, jobs, every))
+        print(answered(study, folder, origin, jobs, every, solver))
         return
     by_origin = compared(study, folder / study)
     columns = {name: dict(figures(summary(trials))) for name, trials in by_origin.items()}
