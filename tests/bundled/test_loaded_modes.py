@@ -285,7 +285,7 @@ def test_results_hold_the_half_turn(tyre: Round, pressed: State, lowest: LoadedM
     """Shapes on the whole tyre, as the job writes them: each kept or reversed by the half turn."""
     work = tyre.press(LENGTHS, 1e9, 0.5)
     rows = np.arange(len(tyre.U))
-    wanted = footprint_job.ModesAtLoad(tyre.model, 6, rows)
+    wanted = footprint_job.ModeRequest(tyre.model, 6, rows)
     state = work.to(10.0)
     equations = support.numbering(tyre.model, ~tyre.free)
     written = footprint_job._modes(work, state, wanted, equations, tyre.U, work.tyre.around.angles)

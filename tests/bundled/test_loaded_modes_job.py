@@ -120,7 +120,7 @@ def test_what_the_job_asks_for_and_how_it_writes_it(
     monkeypatch.setattr(footprint_job, "loaded_modes", modes_)
     equations = support.numbering(tyre.model, ~tyre.free)
     free = equations.size
-    wanted = footprint_job.ModesAtLoad(tyre.model, 2, nodes, 9.0)
+    wanted = footprint_job.ModeRequest(tyre.model, 2, nodes, 9.0)
     work.tyre.residual(0 * shapes[0])  # a state that is not the wanted one
     factor = work._factor
     written = footprint_job._modes(work, state, wanted, equations, tyre.U, work.tyre.around.angles)

@@ -191,7 +191,7 @@ def test_a_picture_in_another_format(tmp_path: Path) -> None:
 def test_pictures_of_an_earlier_format_are_set_aside(tmp_path: Path) -> None:
     from tyrecal.files import results
 
-    for name in ("convergence.svg", "fit_section.pdf", "fit_mode_1_0.svg", "footprint.svg"):
+    for name in ("convergence.svg", "fit_section.pdf", "fit_modes.svg", "footprint.svg"):
         (tmp_path / name).touch()
     stale = {path.name for path in results(tmp_path, "fit")}
-    assert stale == {"convergence.svg", "fit_section.pdf", "fit_mode_1_0.svg"}
+    assert stale == {"convergence.svg", "fit_section.pdf", "fit_modes.svg"}
