@@ -1,6 +1,6 @@
 """Studies of a tyre. A study is one class, a `Result`, with `run`, its figures in `report` and its
 command in `cli`. One from outside names its `Result` as an entry point ``tyrecal.studies`` and its
-command as one of ``tyrecal.commands``. Command line, batch, API and page know no study by name.
+command as one of ``tyrecal.commands``. Batch and `api.run` know no study by name.
 
 >>> from tyrecal.simulate.deck.tyre_design import TyreDesign
 >>> from tyrecal.simulate.evaluate.evaluator import Evaluator

@@ -7,7 +7,7 @@ from scipy.linalg import lapack
 from scipy.sparse import csr_array
 
 from ...errors import Indefinite
-from . import lapack_memory  # noqa: F401
+from . import lapack_memory  # noqa: F401  (takes LAPACK's buffers, or raises MemoryError)
 from .sparse import narrow_order
 
 Array = np.ndarray
