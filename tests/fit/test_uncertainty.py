@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,12 +10,20 @@ import numpy as np
 import pytest
 
 from tyrecal.studies.fit.calibrate import calibrate
-from tyrecal.studies.fit.problem import Point
+from tyrecal.studies.fit.problem import Point, Problem
 from tyrecal.studies.fit.uncertainty import uncertainty
 from tyrecal.studies.variable import DesignVariable
 
 from ..chance import Chance, generator
 from .known_truth import CASE, POWERS, evaluator, with_targets
+
+
+def problem_of(scale: Any, targets: list, variables: list, others: Sequence = ()) -> Problem:
+    """A problem of these targets that no solver answers."""
+    problem: Any = Problem.__new__(Problem)
+    problem.scale, problem.targets, problem.variables = scale, targets, variables
+    problem.measured, problem.noise_Hz = [*targets, *others], None
+    return problem
 
 
 def test_uncertainty_by_its_formula() -> None:
@@ -23,11 +32,9 @@ def test_uncertainty_by_its_formula() -> None:
     random = generator("uncertainty")
     slopes, scale = random.normal(size=(5, 2)), np.array([1.0, 4.0, 0.5, 0.0, 2.0])
     sigmas = np.array([0.1, 0.4, 0.2, 0.3])
-    targets = [SimpleNamespace(sigma_Hz=s) for s in sigmas]
+    targets = [SimpleNamespace(sigma=s) for s in sigmas]
     variables = [DesignVariable("a", 3.0, 1.0, 9.0), DesignVariable("b", 0.0, -1.0, 3.0, log=False)]
-    problem: Any = SimpleNamespace(
-        scale=scale, targets=targets, variables=variables, others=[SimpleNamespace(sigma=0.05)]
-    )
+    problem = problem_of(scale, targets, variables, [SimpleNamespace(sigma=0.05)])
     J, y = scale[:, None] * slopes, random.normal(size=5)
     at = Point({"a": 3.0, "b": 0.5}, np.zeros(2), scale * y, J, {}, 1.0, 1.0, np.empty(0))
     result = uncertainty(problem, at)
@@ -51,13 +58,11 @@ def test_noise_is_what_is_left_over_the_freedom_that_is_left() -> None:
     point_of = lambda n: Point(
         {"a": 3.0, "b": 3.0}, np.zeros(2), (scale * y)[:n], J[:n], {}, 1.0, 1.0, np.empty(0)
     )
-    none = [SimpleNamespace(sigma_Hz=None)] * 4
-    common: dict[str, Any] = {"variables": variables, "others": []}
-    problem: Any = SimpleNamespace(scale=scale[:4], targets=none, **common)
+    none = [SimpleNamespace(sigma=None)] * 4
+    problem = problem_of(scale[:4], none, variables)
     result = uncertainty(problem, point_of(4))
     assert result.noise_Hz == pytest.approx(np.linalg.norm(y[:4]) / np.sqrt(2))
-    known = [*none, SimpleNamespace(sigma_Hz=0.3)]
-    problem = SimpleNamespace(scale=scale, targets=known, **common)
+    problem = problem_of(scale, [*none, SimpleNamespace(sigma=0.3)], variables)
     leverage = J[4] @ np.linalg.inv(J.T @ J) @ J[4]
     noise = np.linalg.norm(y[:4]) / np.sqrt(4 - (2 - leverage))
     sigma = np.sqrt((4 * noise**2 + 0.3**2) / 5)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tyrecal.studies.fit.uncertainty import fit_response
+from tyrecal.studies.fit.least_squares import fit_response
 
 from ..chance import generator
 from .standard_errors import compared

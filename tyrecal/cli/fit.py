@@ -47,6 +47,12 @@ if TYPE_CHECKING:
     help="Variable to hold at its start value; repeatable.",
 )
 @option(
+    "--prior",
+    is_flag=True,
+    help="Weigh in what is known before: each variable's percent, and the errors of section,"
+    " material laws and constants. Fewer values than variables are enough.",
+)
+@option(
     "--starts",
     type=WholeNumber(1, 100000),
     default=1,
@@ -74,6 +80,7 @@ def command(
     method: str,
     measured: Path | None,
     fix: tuple[str, ...],
+    prior: bool,
     starts: int,
     seed: int,
     pictures: bool,
@@ -92,7 +99,7 @@ def command(
     \b
     tyrecal fit cases/p235_75r17.yaml
     tyrecal fit cases/p235_75r17.yaml --fix C10 --method gauss-newton
-    tyrecal fit cases/p235_75r17.yaml --report
+    tyrecal fit cases/p235_75r17.yaml --prior --report
     tyrecal fit cases/p235_75r17.yaml --measured measured.csv --pressure-kPa 200
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --jobs 2
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --scheduler tcp://10.0.0.1:8786
@@ -112,7 +119,7 @@ def command(
     for name in fix:
         arguments.refuse_unknown("--fix", name, values, "variable")
     fixed = {name: values[name] for name in fix}
-    calibration = FitStudy(loaded, study.evaluator(loaded), measured, fixed)
+    calibration = FitStudy(loaded, study.evaluator(loaded), measured, fixed, prior)
     file = measured or loaded.measured
     questions = doubts_of_file(file) if file else []
     for doubt in questions:

@@ -20,9 +20,11 @@ from ..far_off import far_off
 from ..result import csv_text
 from . import gauss_newton, slsqp
 from .judge import measured_rows
-from .problem import Point, Problem
+from .prior import PriorProblem
+from .problem import FitNotify, Point, Problem
 from .result import FitResult, StartReport, fit_result
 from .search import AT_CROSSING, CONVERGED, Descend, is_converged, minimise
+from .targets import read_targets
 from .verdict import FIT_VERDICT_WORDS
 
 Array = np.ndarray
@@ -30,9 +32,8 @@ METHODS: dict[str, Descend] = {"slsqp": slsqp.descend, "gauss-newton": gauss_new
 TOLERANCE = 1e-3  # projected gradient, Hz per unit of a logarithm: 1e-5 Hz for a change of 1 %
 SLOPE_NOISE_HZ = 50.0  # differences of a step that suits the digits: this times the step
 SLOPE_ERROR = 1e-4  # of d ln q / d x of patches and stiffnesses, by the curvature within a step
+MAX_WEIGHINGS = 4  # times that a fit takes the weights anew, of the design where it ended
 MAX_REPLACED = 20  # replaced starts per start asked for
-
-FitNotify = Callable[[int, Mapping[str, float], Point | EvaluationFailed], None]
 
 
 @dataclass
@@ -69,6 +70,7 @@ def calibrate(
     notify: FitNotify | None = None,
     finished: Callable[[int, int], None] = lambda done, starts: None,
     readings: Sequence[Measurement] = (),
+    prior: bool = False,
 ) -> Fit:
     """Fit the case's free variables to its targets.
 
@@ -76,15 +78,20 @@ def calibrate(
     starts that cannot be evaluated are counted and replaced. jobs: processes for the drawn starts,
     and for the neighbours of a point of the first one, where the solver gives no slopes. notify is
     told of every design here, finished of every start; readings: lines of the file that the targets
-    are from. Raises what `check` does; EvaluationFailed
-    when the case's own start cannot be evaluated; InputError where a target is far off it.
+    are from; prior: what is known of the variables and of the model's errors enters the fit
+    (`PriorProblem`). Raises what `check` does; EvaluationFailed when the case's own start cannot be
+    evaluated; InputError where a target is far off it.
 
     >>> fixed = {"A_belt": 2.6e-7, "A_carcass": 6.9e-8}
     >>> fit = calibrate(case, evaluator, method="gauss-newton", fixed=fixed)
     >>> f"{fit.initial.objective:.1f} to {fit.fitted.objective:.1f} Hz"
     '17.4 to 3.7 Hz'
     """
-    problem = Problem(case, evaluator, fixed, notify, jobs)
+    if prior:
+        noise = noise_Hz(case, evaluator, fixed, jobs)
+        problem: Problem = PriorProblem(case, evaluator, fixed, notify, jobs, noise)
+    else:
+        problem = Problem(case, evaluator, fixed, notify, jobs)
     check(problem)
     initial = problem.evaluate(problem.start())
     if not np.isfinite(initial.objective):
@@ -105,6 +112,24 @@ def calibrate(
     )
 
 
+def noise_Hz(
+    case: LoadedCase, evaluator: Evaluator, fixed: Mapping[str, float] | None = None, jobs: int = 1
+) -> float | None:
+    """Standard deviation, Hz, that a fit leaves to targets without one; None where all have one.
+
+    Raises InputError where too few targets are left over to tell.
+    """
+    if all(target.sigma for target in read_targets(case) if target.weight):
+        return None
+    noise = calibrate(case, evaluator, fixed=fixed, jobs=jobs).found.noise_Hz
+    if noise is None:
+        raise InputError(
+            "the targets have no sigma_Hz, and are too few to estimate it from the residuals:"
+            " state sigma_Hz, or give measurements with --measured"
+        )
+    return noise
+
+
 def check(problem: Problem) -> None:
     """Raises InputError; DeckRefused where there are targets on the road and the solver has none,
     or it cannot express a state of theirs."""
@@ -115,7 +140,8 @@ def check(problem: Problem) -> None:
         )
     if not problem.variables:
         raise InputError("no variable is free: there is nothing to fit")
-    if reason := cannot_fit([t.weight for t in problem.measured], len(problem.variables)):
+    needed = len(problem.variables) if problem.spread is None else 1
+    if reason := cannot_fit([t.weight for t in problem.measured], needed):
         raise InputError(reason)
     if problem.road:
         problem.evaluator.needs_road(modes=any(t.member for t in problem.road))
@@ -144,6 +170,11 @@ def _run(problem: Problem, start: Array, method: str) -> StartReport:
     first = problem.evaluate(start)
     tolerance = _tolerance(problem)
     outcome = minimise(problem, start, tolerance, METHODS[method])
+    for _ in range(MAX_WEIGHINGS):
+        if problem.is_settled(outcome.point):
+            break
+        problem.weigh(outcome.point)
+        outcome = minimise(problem, outcome.point.x, tolerance, METHODS[method])
     converged = is_converged(problem, outcome.point, max(10 * TOLERANCE, tolerance))
     converged = converged or outcome.message in (CONVERGED, AT_CROSSING)
     values, history = dict(first.values), _history(problem)
@@ -196,7 +227,7 @@ def _run_all(
         yield from (_start_here(problem, x, method) for x in starts)
         return
     evaluator = problem.evaluator.worker()
-    tasks = [(Problem(problem.case, evaluator, problem.fixed), x, method) for x in starts]
+    tasks = [(problem.again(evaluator), x, method) for x in starts]
     with executor(jobs, problem.evaluator.scheduler) as workers:
         for answer in in_order(workers.each(_start_alone, tasks)):
             if isinstance(answer, EvaluationFailed):  # its process died
@@ -207,7 +238,7 @@ def _run_all(
 
 
 def _start_here(problem: Problem, start: Array, method: str) -> StartReport | EvaluationFailed:
-    alone = Problem(problem.case, problem.evaluator, problem.fixed, problem.notify)
+    alone = problem.again(problem.evaluator, problem.notify)
     try:
         return _run(alone, start, method)
     except EvaluationFailed as failure:

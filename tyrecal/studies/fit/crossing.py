@@ -82,6 +82,7 @@ def crossing(problem: Problem, points: Iterable[Point], near: Point) -> Crossing
     point = min(telling, key=lambda p: float(np.linalg.norm(p.x - near.x)))
     targets = [(t.state, t.label) for t in problem.targets]
     i, j = (targets.index((state, label)) for label in PAIR)
-    slopes = point.jacobian[i] / problem.scale[i] - point.jacobian[j] / problem.scale[j]
+    J = point.plain.jacobian
+    slopes = J[i] / problem.scale[i] - J[j] / problem.scale[j]
     clarity = pair_clarity(point, state)
     return Crossing(point.x, gap(point, state) * clarity, slopes / clarity, state)

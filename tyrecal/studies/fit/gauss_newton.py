@@ -25,6 +25,7 @@ from .search import (
     USED_UP,
     CrossingWatch,
     Descent,
+    has_nothing_to_gain,
     is_converged,
     room_to_move,
 )
@@ -49,7 +50,8 @@ def descend(
             promised(point, curvature, step)
             <= MIN_OBJECTIVE_GAIN * max(point.objective, EXACT) ** 2
         ):
-            return Descent(point, NO_LOWER, watch.edge)
+            end = CONVERGED if has_nothing_to_gain(problem, point) else NO_LOWER
+            return Descent(point, end, watch.edge)
         there = _first_solvable(problem, point, step)
         if there is None:
             damping *= 4

@@ -43,7 +43,7 @@ def judge(
     evaluated if the model does not fit.
     """
     rows, keep, is_stated = measured_rows(problem, readings), problem.scale > 0, False
-    stated = np.array([bool(_sigma(t)) for t in problem.measured])
+    stated = np.array([bool(t.sigma) for t in problem.measured])
     counted = keep
     if (keep & stated).any():
         keep, is_stated = keep & stated, covariance is not None
@@ -60,9 +60,15 @@ def judge(
         of_values = np.diag((known.sigma[keep] / values) ** 2)
     else:
         of_values = covariance[np.ix_(keep[counted], keep[counted])]
+    deviation = np.log(values / model)
+    if problem.spread is not None:  # what was known before is a measurement of each variable
+        J = point.plain.jacobian[keep] / problem.scale[keep][:, None] / model[:, None]
+        deviation = deviation + J @ (point.x - problem.start())
+        of_values = of_values + (J * problem.spread**2) @ J.T
+        slopes = slopes[:, :0]
     left = Remainder(
         [row for row, kept in zip(rows, keep, strict=True) if kept],
-        np.log(values / model),
+        deviation,
         of_values,
         slopes,
         is_stated,
@@ -98,17 +104,13 @@ def measured_rows(problem: Problem, readings: Sequence[Measurement] = ()) -> lis
                 member,
                 0.0 if is_mass else state.pressure_kPa or 0.0,
                 state.load_N,
-                target.frequency_Hz if isinstance(target, Target) else target.value,
-                _sigma(target) or np.nan,
+                target.value,
+                target.sigma or np.nan,
                 place=places.get(key, str(case.path)),
                 rim=None if is_mass else state.rim,
             )
         )
     return rows
-
-
-def _sigma(target: Target | ValueTarget) -> float | None:
-    return target.sigma_Hz if isinstance(target, Target) else target.sigma
 
 
 def _label(target: Target | ValueTarget) -> tuple[Label | None, str]:

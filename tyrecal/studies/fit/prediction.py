@@ -6,6 +6,7 @@ c. So the computed ln f' = eta'(x) is off by
 
     J' R (scatter + form + G c) - (form' + G' c),    variance A Sigma A^T,  A = (J' R, -1)
 
+With what was known before of the variables, (I - R J) (x_0 - x_t) adds to x - x_t (`prior`).
 Sigma is the covariance of measured and other rows together, without scatter of the others. It is
 multiplied by chi2 per degree of freedom where the standard errors of the variables are. The tyre's
 own frequency is meant: another measurement adds its scatter.
@@ -28,10 +29,17 @@ from ..inference.covariance import model_form
 from ..inference.observations import Observable
 from ..inference.uncertainties import sources
 from ..result import ResultPart
+from ..variable import read_variable
 from .responses import FitResponse, linear_answer
 
 Array = np.ndarray
 MAX_PRESSURES = 4  # at which a fitted design is evaluated with all sensitivities
+
+
+class AtBound(ResultPart):
+    """Part of a variable in a fit.json."""
+
+    at_bound: bool = False
 
 
 class FitResponses(ResultPart):
@@ -39,6 +47,8 @@ class FitResponses(ResultPart):
 
     responses: list[FitResponse] = Field(default=[])
     chi2_per_dof: float | None = None
+    prior: bool = False
+    variables: dict[str, AtBound] = Field(default={})
 
 
 def read_responses(path: Path) -> FitResponses:
@@ -58,7 +68,10 @@ def predicted_errors(
     """Standard deviations (m,) of ln f of modes (label, kPa) on the case's rim, as the design
     ``values`` of the fit has them. It is evaluated with its sensitivities to all sources of error
     in the measured states and at ``MAX_PRESSURES`` pressures, between which these are interpolated
-    in ln p. Raises DeckRefused, EvaluationFailed."""
+    in ln p. Raises DeckRefused, EvaluationFailed; ValueError where a variable is at its bound: no
+    linear error holds there."""
+    if held := [name for name, each in fit.variables.items() if each.at_bound]:
+        raise ValueError(f"the fit ended with {held[0]} at its bound, where no linear error holds")
     names = list(case.case.variables)
     measured = tuple(_observable(case, each) for each in fit.responses)
     others = tuple(Observable("frequency_Hz", label, p) for label, p in wanted)
@@ -76,8 +89,11 @@ def predicted_errors(
     J, G = np.split(np.vstack([both[:n], *there]), [J.shape[1]], axis=1)
     model = model_form((*measured, *others), laws) + G @ G.T
     scatter = np.array([each.scatter for each in fit.responses])
+    unseen = np.eye(len(names)) - R @ J[:n]
+    unseen *= [read_variable(case, name).spread * fit.prior for name in names]
     variance = prediction_variance(J[n:], R, scatter, model)
-    return np.asarray(np.sqrt(variance * max(1.0, fit.chi2_per_dof or 0.0)))
+    variance += ((J[n:] @ unseen) ** 2).sum(1)
+    return np.asarray(np.sqrt(variance * (1.0 if fit.prior else max(1.0, fit.chi2_per_dof or 0.0))))
 
 
 def prediction_variance(J: Array, R: Array, scatter: Array, model: Array) -> Array:

@@ -29,6 +29,7 @@ from ...tyre.case import LoadedCase
 from ...tyre.state import AS_THE_CASE, TyreState, without
 from ..variable import read_variable
 from .differences import STEP, differences
+from .least_squares import fit_covariance, fit_response
 from .road import PRESS_STEP, press, press_with_slopes
 from .targets import Target, ValueTarget, read_mass_targets, read_road_targets, read_targets
 
@@ -52,6 +53,11 @@ class Point:
     others: Array
 
     @property
+    def plain(self) -> Point:
+        """The design with the residuals above, whatever a fit minimises."""
+        return self
+
+    @property
     def modes(self) -> dict[Label, Mode]:
         """Modes of the case's own state, or of the first one that was measured."""
         return next(iter(self.states.values()), {})
@@ -65,6 +71,10 @@ class Point:
     def gradient(self) -> Array:
         """dF/dx, Hz."""
         return self.jacobian.T @ self.residuals / max(self.objective, 1e-300)
+
+
+# called with (number of a design, its values, Point or failure)
+FitNotify = Callable[[int, Mapping[str, float], Point | EvaluationFailed], None]
 
 
 def objective(frequencies: Mapping[Label, float], targets: list[Target]) -> float:
@@ -103,7 +113,7 @@ class Problem:
         case: LoadedCase,
         evaluator: Evaluator,
         fixed: Mapping[str, float] | None = None,
-        notify: Callable[[int, Mapping[str, float], Point | EvaluationFailed], None] | None = None,
+        notify: FitNotify | None = None,
         jobs: int = 1,
     ):
         self.case, self.evaluator, self.notify, self.jobs = case, evaluator, notify, jobs
@@ -131,11 +141,46 @@ class Problem:
         exact = exact and "footprint_gradients" in evaluator.solver.capabilities
         self.exact_on_road = sum(not t.member for t in self.road) if exact else 0
         self.points: dict[tuple[float, ...], Point | EvaluationFailed] = {}
+        # (v,) standard deviation of each coordinate about the start's, if it enters the fit
+        self.spread: Array | None = None
+        self.noise_Hz: float | None = None  # of frequencies without sigma, if it is known
         self.best: Point | None = None  # from whose state on the road the next design begins
 
     def start(self) -> Array:
         """Coordinates of the case's start values."""
         return np.array([v.scaled(v.start) for v in self.variables])
+
+    @property
+    def counted(self) -> list[Target | ValueTarget]:
+        """Targets that have a weight."""
+        return [each for each in self.measured if each.scale > 0]
+
+    def again(self, evaluator: Evaluator, notify: FitNotify | None = None) -> Problem:
+        """The same problem without any design, evaluated by another evaluator."""
+        return Problem(self.case, evaluator, self.fixed, notify)
+
+    def is_settled(self, point: Point) -> bool:
+        """Whether the weights hold at ``point``: here they are the same everywhere."""
+        return True
+
+    def weigh(self, point: Point) -> None:
+        """Take the weights that hold at ``point``."""
+
+    def response(self, point: Point) -> tuple[Array, Array]:
+        """d x / d q (v, n) of the fitted coordinates by the n targets that count; which variables
+        the data determine (v,)."""
+        counts = self.scale > 0
+        return fit_response(point.jacobian[counts], self.scale[counts])
+
+    def errors(self, point: Point, sigma: Array, used: Array) -> tuple[Array, Array]:
+        """Covariance (v, v) of the coordinates by the scatter ``sigma`` of the targets of a mask
+        ``used`` (targets,), as if only these were fitted; which variables they determine (v,)."""
+        return fit_covariance(point.jacobian[used], self.scale[used], sigma[used])
+
+    def left_of_prior(self, point: Point) -> Array:
+        """Covariance (v, v) of the coordinates that the data leave of what was known of them
+        before: 0, as nothing of it enters the fit."""
+        return np.zeros((len(self.variables), len(self.variables)))
 
     def is_free(self, x: Array) -> Array:
         """Whether each variable (v,) is at no bound at coordinates x."""
@@ -187,7 +232,7 @@ class Problem:
         pressed, rises = self._pressed(values)
         slopes = np.vstack([slopes[:modal], rises, slopes[modal:]])
         others = np.concatenate([pressed, measured[modal:]])
-        wanted = [t.frequency_Hz for t in self.targets] + [t.value for t in self.others]
+        wanted = [t.value for t in self.measured]
         x = np.array([v.scaled(values[v.name]) for v in self.variables])
         return Point(
             values,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -37,7 +37,7 @@ from ..result import (
     state_words,
 )
 from .judge import judge
-from .prediction import FitResponses
+from .prediction import AtBound, FitResponses
 from .problem import Point, Problem
 from .responses import FitResponse
 from .search import projected_gradient
@@ -61,6 +61,10 @@ OTHER_RESIDUALS = (
     "A fit and a diagnosis leave different residuals: the fit weighs them by the measurement's"
     " scatter alone, the diagnosis also by the model's own error and the uncalibrated constants,"
     " and leaves what these explain."
+)
+BY_DATA = (
+    "'by data' is the share of the variance known before that the data took away: at 0 % the value"
+    " is the one that was known. Deviations are left where section, laws or constants explain them."
 )
 MAX_PROPOSED = 4  # states in a table
 HERTZ, RESULT_DIGITS = Column("Hz"), Column("", ".4g")
@@ -86,6 +90,9 @@ class FittedVariable(ResultPart):
     upper: float
     standard_error: float | None  # by the scatter of the measurement; None: not determined
     standard_error_total: float | None = None  # by all that is uncertain; None: not known
+    total_holds: bool = True  # the total is small enough for a linear estimate, no bound is near
+    # share of the variance known before that the data took away, if that enters the fit
+    explained_by_data: float | None = None
     variance_by_cause: dict[str, float] = Field(default={})  # shares of the total's, 1 together
     at_bound: bool
     unit: str = ""  # of the number that it sets
@@ -180,6 +187,7 @@ class FitResult(Result):
     study, stem, heading = "fit", "fit", "Fit"
 
     method: str
+    prior: bool = False  # whether what is known of variables and model entered the fit
     pressure_kPa: float
     mass_kg: float
     objective_Hz: float
@@ -224,9 +232,11 @@ class FitResult(Result):
         method: str = "slsqp",
         starts: int = 1,
         seed: int = 0,
+        prior: bool = False,
     ) -> FitResult:
-        """Calibrate the variables to the case's targets, or to a file of measurements."""
-        study = named(FIT_STUDY)(given.case, given.evaluator, measured, fixed)
+        """Calibrate the variables to the case's targets, or to a file of measurements; prior: with
+        what is known of them and of the model."""
+        study = named(FIT_STUDY)(given.case, given.evaluator, measured, fixed, prior)
         result: FitResult = study.run(method, starts, seed, given.jobs).found
         return result
 
@@ -256,7 +266,12 @@ class FitResult(Result):
     def pass_on(self, given: StudyInput) -> None:
         values = self.fixed | {name: each.value for name, each in self.variables.items()}
         given.designs["fitted"] = {name: values[name] for name in given.designs["initial"]}
-        given.responses = FitResponses(responses=self.responses, chi2_per_dof=self.chi2_per_dof)
+        given.responses = FitResponses(
+            responses=self.responses,
+            chi2_per_dof=self.chi2_per_dof,
+            prior=self.prior,
+            variables={n: AtBound(at_bound=v.at_bound) for n, v in self.variables.items()},
+        )
 
     def csv(self) -> str:
         keys = ["c", "m", "kind", "multiplicity", "initial_Hz", "fitted_Hz", "target_Hz"]
@@ -334,8 +349,18 @@ class FitResult(Result):
             " alone: how far a repeated test would move it.",
             f"The largest part of the total is: {cause}, {100 * share:.0f} % of the variance on"
             " average.",
-            OTHER_RESIDUALS,
+            *self._which_totals_hold(),
+            BY_DATA if self.prior else OTHER_RESIDUALS,
         ]
+
+    def _which_totals_hold(self) -> Iterator[str]:
+        unsure = [name for name, each in self.variables.items() if not each.total_holds]
+        if unsure:
+            yield (
+                f"The totals of {', '.join(unsure)} may be several times too small: they are"
+                " linear, and large or next to a variable at its bound. Errors that hold:"
+                f" {'tyrecal sample' if self.prior else 'tyrecal fit --prior, tyrecal sample'}."
+            )
 
     def numbers(self) -> list[Table]:
         """All targets of a fit over every target with its initial and measured value."""
@@ -387,7 +412,10 @@ class FitResult(Result):
         """Tables of what each state adds and, below, of the states that would add most next."""
         if not self.states:
             return []
-        own = {name: each.standard_error for name, each in self.variables.items()}
+        own = {
+            name: each.standard_error_total if self.prior else each.standard_error
+            for name, each in self.variables.items()
+        }
         heads = [Column("left out", ""), Column("values", "d"), Column("rms, sigmas")]
         heads += [Column(in_lines(f"{name}, std. err. %")) for name in own]
         rows: list[list[Any]] = [
@@ -416,6 +444,7 @@ class FitResult(Result):
     def _variables(self) -> Table:
         heads = [Column("variable", ""), Column("unit", "")]
         heads += map(Column, ("initial", "fitted", "bounds", "std. err. %", "scatter %"))
+        heads += [Column("by data %")] * self.prior
         rows: list[list[Any]] = [
             [
                 name,
@@ -424,11 +453,12 @@ class FitResult(Result):
                 f"{each.lower:g}..{each.upper:g}",
                 each.percent(each.standard_error_total),
                 each.percent(each.standard_error),
+                *[_percent_of(each.explained_by_data)] * self.prior,
             ]
             for name, each in self.variables.items()
         ]
         rows += [
-            [name, "held", *map(RESULT_DIGITS.cell, (value, value)), None, None, None]
+            [name, "held", *map(RESULT_DIGITS.cell, (value, value)), *[None] * (len(heads) - 4)]
             for name, value in self.fixed.items()
         ]
         return Table(heads, rows)
@@ -446,7 +476,7 @@ def fit_result(
 ) -> FitResult:
     """The result of a fit whose ``best`` start is one of ``reports``; ``replaced``: drawn starts
     that could not be evaluated; ``readings``: lines of the file that the targets are from."""
-    point = best.point
+    point = best.point.plain
     objectives = [row["objective_Hz"] for row in history]
     known = uncertainty(problem, point)
     names = [v.name for v in problem.variables]
@@ -463,11 +493,12 @@ def fit_result(
     content = {
         "format": 1,
         "method": method,
+        **({} if problem.spread is None else {"prior": True}),
         "pressure_kPa": with_values(problem.case, point.values).case.pressure_kPa,
         "mass_kg": point.mass_kg,
         "objective_Hz": point.objective,
         "objective_unit": objective_unit(problem.case),
-        "initial_objective_Hz": initial.objective,
+        "initial_objective_Hz": initial.plain.objective,
         "evaluations": len(history),
         "evaluations_to_0.05_Hz": next(
             i
@@ -482,7 +513,7 @@ def fit_result(
         "chi2_per_dof": judged.chi2_per_dof,
         "reason": judged.reason,
         "message": best.message,
-        "projected_gradient_norm": projected_gradient(problem, point),
+        "projected_gradient_norm": projected_gradient(problem, best.point),
         "label_margin": point.clarity,
         "variables": _variables(problem, initial, point, known, total, judged.chi2_per_dof),
         "fixed": dict(problem.fixed),
@@ -504,7 +535,7 @@ def fit_result(
         "starts": [
             {
                 "initial": r.initial,
-                "objective_Hz": r.point.objective,
+                "objective_Hz": r.point.plain.objective,
                 "converged": r.converged,
                 "evaluations": len(r.history),
                 "message": r.message,
@@ -636,3 +667,7 @@ def _states(problem: Problem, point: Point, known: FitUncertainty) -> dict[str, 
 
 def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
+
+
+def _percent_of(share: float | None) -> str | None:
+    return None if share is None else f"{100 * share:.0f}"

@@ -17,9 +17,10 @@ from ...simulate.modes.find import LabelledModes
 from ...simulate.modes.label import Label
 from ...tyre.state import RIMS, TyreState
 from ...tyre.usual import USUAL
+from .least_squares import fit_covariance
 from .problem import Point, Problem
 from .targets import Target, ValueTarget
-from .uncertainty import FitUncertainty, fit_covariance, standard_errors
+from .uncertainty import FitUncertainty, standard_errors
 
 Array = np.ndarray
 STEP_OUT = 1.25  # of pressure, below and above those measured
@@ -58,8 +59,8 @@ def state_reports(problem: Problem, point: Point, known: FitUncertainty) -> list
     for state in dict.fromkeys(each for each in own if each):
         here = np.array([each == state for each in own])
         rest = counts & ~here
-        errors = _errors(
-            problem, point, point.jacobian[rest], problem.scale[rest], known.sigma[rest]
+        errors = _named(
+            problem, standard_errors(problem, point, *problem.errors(point, known.sigma, rest))
         )
         mean = float(np.mean(off[counts & here] ** 2)) if (counts & here).any() else np.nan
         rms = float(np.sqrt(mean)) if np.isfinite(mean) else None
@@ -69,9 +70,11 @@ def state_reports(problem: Problem, point: Point, known: FitUncertainty) -> list
 
 def next_states(problem: Problem, point: Point, known: FitUncertainty) -> list[NextState]:
     """States of the unloaded tyre that were not measured, the most telling first; none where the
-    solver gives no exact slopes, or the data do not determine the variables as they are."""
+    solver gives no exact slopes, what was known before enters the fit, or the data do not determine
+    the variables as they are."""
     before = _named(problem, known.standard_errors)
-    if problem.difference_step is not None or not all(before.values()):
+    unknown = problem.difference_step is not None or problem.spread is not None
+    if unknown or not all(before.values()):
         return []
     like = _best_measured(problem, known)
     states = _others(problem) if like else []

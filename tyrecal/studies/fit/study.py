@@ -20,6 +20,7 @@ from ..labelling.label import label
 from ..labelling.result import labels_posterior
 from ..pressing_plan import DESIGNS_OF_FIT, PlannedState, PressingPlan, plan_pressing
 from .calibrate import Fit, FitNotify, calibrate, check, history_csv
+from .prior import PriorProblem
 from .problem import Problem
 from .targets import states_of
 
@@ -43,9 +44,11 @@ class FitStudy:
         evaluator: Evaluator,
         measured: Path | None = None,
         fixed: Mapping[str, float] | None = None,
+        prior: bool = False,
     ):
         """measured: takes the place of the case's targets; fixed: values of variables that are
-        held."""
+        held; prior: see `calibrate`."""
+        self.prior = prior
         self.measured, self.fixed = measured or case.measured, dict(fixed or {})
         self._plain = with_values(case, {**start_values(case), **self.fixed})
         self.evaluator = evaluator.of(design_of(self._plain))
@@ -70,7 +73,8 @@ class FitStudy:
 
     @property
     def _problem(self) -> Problem:
-        return Problem(self.case, self.evaluator, self.fixed)
+        kind = PriorProblem if self.prior else Problem
+        return kind(self.case, self.evaluator, self.fixed)
 
     @property
     def evaluates_one_by_one(self) -> bool:
@@ -134,6 +138,7 @@ class FitStudy:
                 notify,
                 finished,
                 self.used,
+                self.prior,
             )
 
         fit = self._fit_with_labels(calibrated, jobs) if self.needs_labels else calibrated()

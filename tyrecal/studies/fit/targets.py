@@ -34,6 +34,16 @@ class Target:
     state: TyreState = AS_THE_CASE
 
     @property
+    def value(self) -> float:
+        """The frequency, Hz."""
+        return self.frequency_Hz
+
+    @property
+    def sigma(self) -> float | None:
+        """Its standard deviation, Hz."""
+        return self.sigma_Hz
+
+    @property
     def multiplicity(self) -> int:
         """How many modes it stands for: doublets count twice."""
         return 2 if self.label.c else 1

@@ -1,31 +1,30 @@
 """Standard errors of a fit that hold for the tyre, not for its measurement alone.
 
-    cov x = B Q Sigma Q B^T,  B = (J^T J)^-1 J^T W^(1/2),  Q = diag(q)        (`uncertainty`)
-    Sigma = Sigma_rep + Sigma_form + sum_k s_k^2 g_k g_k^T                    (diagnose/covariance)
+    cov x = B Q Sigma Q B^T + left of what was known before,  Q = diag(q)   (`Problem.response`)
+    Sigma = Sigma_rep + Sigma_form + sum_k s_k^2 g_k g_k^T                   (inference/covariance)
 
 q: fitted values; Sigma: covariance of ln q, as `diagnose` and `sample` have it. If chi^2 by Sigma
-exceeds its degrees of freedom (`verdict`), cov x is multiplied by their ratio.
+exceeds its degrees of freedom (`verdict`), cov x is multiplied by their ratio; not with a prior,
+where cov x is the posterior, as in `sample`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from ...tyre.case import LoadedCase
-from ..inference.covariance import covariance, model_form
-from ..inference.observations import Observable, Observations
-from ..inference.uncertainties import Source, sources
+from .model_errors import ModelErrors, model_errors
 from .problem import Point, Problem
-from .responses import FitResponse, linear_answer
+from .responses import FitResponse
 from .targets import Target, ValueTarget
-from .uncertainty import FitUncertainty, fit_response, standard_errors
+from .uncertainty import FitUncertainty, standard_errors
 
 Array = np.ndarray
 BY_MEASUREMENT, BY_MODEL, BY_SECTION = "measurement", "material laws and mesh", "section"
+BY_START = "what was known of the variables before"
+MAX_LINEAR_ERROR = 0.2  # of a coordinate: beyond, or next to a bound, no linear error holds
 MIN_VARIANCE_SHARE = 0.01  # of the variance, below which a cause is not listed
 
 
@@ -43,11 +42,18 @@ class TotalError:
         self, problem: Problem, point: Point, chi2_per_dof: float | None
     ) -> dict[str, dict[str, Any]]:
         """Entries of fit.json about the total by variable; standard errors in each one's unit."""
-        spread = self.of_coordinates * max(1.0, chi2_per_dof or 0.0)
+        has_prior = problem.spread is not None
+        spread = self.of_coordinates * (1.0 if has_prior else max(1.0, chi2_per_dof or 0.0))
         errors = standard_errors(problem, point, spread, self.is_determined)
+        explained, at_bound = None, ~problem.is_free(point.x)
+        holds = (np.diag(spread) <= MAX_LINEAR_ERROR**2) & ~at_bound.any()
+        if problem.spread is not None:
+            explained, holds = 1 - np.diag(spread) / problem.spread**2, ~at_bound
         return {
             v.name: {
                 "standard_error_total": errors[i],
+                "total_holds": bool(holds[i]),
+                **({"explained_by_data": float(explained[i])} if explained is not None else {}),
                 "variance_by_cause": {
                     cause: float(share[i])
                     for cause, share in self.shares.items()
@@ -65,30 +71,25 @@ def total_error(problem: Problem, point: Point, scatter: FitUncertainty) -> Tota
     DeckRefused if the solver has no exact sensitivities; EvaluationFailed; ValueError with the
     reason if targets are on the road or their standard deviation is unknown.
     """
-    if problem.road:
-        raise ValueError("it is not computed for targets on the road")
     counts = problem.scale > 0
-    sigma, J = scatter.sigma[counts], point.jacobian[counts]
+    sigma = scatter.sigma[counts]
     if not np.isfinite(sigma).all():
         raise ValueError("the standard deviation of the measured values is not known")
-    measured = [each for each, used in zip(problem.measured, counts, strict=True) if used]
-    wanted = np.array([t.frequency_Hz if isinstance(t, Target) else t.value for t in measured])
-    fitted = wanted + (point.residuals / problem.scale)[counts]
-    rows = tuple(_row(problem.case, each) for each in measured)
-    known, _ = sources(problem.case)
-    _, by_constants, laws = linear_answer(
-        problem.case, problem.evaluator, point.values, rows, known, problem.jobs
-    )
-    none = np.full(len(rows), np.nan)
-    observed = Observations(rows, np.log(wanted), sigma / wanted, 0.0, none, none)
-    whole = covariance(observed, by_constants, laws)
-    response, is_determined = fit_response(J, problem.scale[counts])
+    errors = model_errors(problem, point)
+    point = point.plain
+    measured = problem.counted
+    wanted = np.array([t.value for t in measured])
+    fitted = wanted + point.residuals[counts] / problem.scale[counts]
+    relative = sigma / wanted
+    whole = errors.covariance(relative)
+    response, is_determined = problem.response(point)
     response = response * fitted  # d x / d ln q
-    parts = _parts(response, sigma / wanted, model_form(rows, laws), by_constants, known)
-    spread = response @ whole @ response.T
+    unseen = problem.left_of_prior(point)
+    parts = _parts(response, relative, errors, np.diag(unseen))
+    spread = response @ whole @ response.T + unseen
     responses = [
-        _response(problem, each, float(relative), column)
-        for each, relative, column in zip(measured, sigma / wanted, response.T, strict=True)
+        _response(problem, each, float(own), column)
+        for each, own, column in zip(measured, relative, response.T, strict=True)
     ]
     return TotalError(whole, spread, parts, is_determined, responses)
 
@@ -111,23 +112,16 @@ def _response(
     )
 
 
-def _row(case: LoadedCase, target: object) -> Observable:
-    if not isinstance(target, Target):
-        return Observable("mass_kg", None, 0.0)
-    pressure = target.state.with_defaults(case).pressure_kPa or 0.0
-    return Observable("frequency_Hz", target.label, pressure, rim=target.state.rim)
-
-
-def _parts(
-    response: Array, scatter: Array, form: Array, by_constants: Array, known: Sequence[Source]
-) -> dict[str, Array]:
-    """Shares (v,) of the variance by cause: the section is one, each constant its own."""
-    moved = (response @ by_constants) ** 2
+def _parts(response: Array, scatter: Array, errors: ModelErrors, unseen: Array) -> dict[str, Array]:
+    """Shares (v,) of the variance by cause: the section is one, each constant its own; unseen
+    (v,): the variance that the data leave of what was known before."""
+    moved = (response @ errors.by_constants) ** 2
     parts = {
         BY_MEASUREMENT: response**2 @ scatter**2,
-        BY_MODEL: np.einsum("vi,ij,vj->v", response, form, response),
+        BY_MODEL: np.einsum("vi,ij,vj->v", response, errors.form, response),
+        BY_START: unseen,
     }
-    for k, source in enumerate(known):
+    for k, source in enumerate(errors.known):
         cause = BY_SECTION if source.field else source.name.replace("_", " ")
         parts[cause] = parts.get(cause, 0.0) + moved[:, k]
     whole = np.sum([*parts.values()], 0)

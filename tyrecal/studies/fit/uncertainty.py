@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .least_squares import pseudo_inverse
 from .problem import Point, Problem
 
 Array = np.ndarray
@@ -33,17 +34,18 @@ class FitUncertainty:
 def uncertainty(problem: Problem, point: Point) -> FitUncertainty:
     """Linearised uncertainty at ``point`` of the fit that was made, whatever its weights.
 
-    The fit answers noise dq in the measured values with dx = (J^T J)^-1 J^T W^(1/2) dq, J and
-    W^(1/2) with the weights, multiplicities and sigmas of the objective, so its covariance is
-    B diag(sigma^2) B^T with B = (J^T J)^-1 J^T W^(1/2) (Seber and Wild, Nonlinear Regression,
-    sec. 2.1). A doublet is one measured value. sigma is the targets' own; frequencies that have
-    none share one that is estimated from their residuals.
+    The fit answers noise dq in the measured values with dx = B dq (`Problem.response`), B with the
+    weights, multiplicities and sigmas of the objective, so its covariance is B diag(sigma^2) B^T
+    (Seber and Wild, Nonlinear Regression, sec. 2.1). A doublet is one measured value. sigma is the
+    targets' own; frequencies that have none share one that is estimated from their residuals.
     """
     counts = problem.scale > 0
-    J, root = point.jacobian[counts], problem.scale[counts]
-    inverse, _ = _inverse(J.T @ J)
+    point = point.plain
+    J = point.jacobian[counts]
+    inverse, _ = pseudo_inverse(J.T @ J)
     sigma = _noise(problem, point, counts, np.einsum("ij,jk,ik->i", J, inverse, J))
-    covariance, seen = fit_covariance(J, root, sigma)
+    response, seen = problem.response(point)
+    covariance = (response * sigma**2) @ response.T
     errors = standard_errors(problem, point, covariance, seen)
     spread = np.sqrt(np.where(seen & np.isfinite(sigma).all(), np.diag(covariance), np.inf))
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -61,20 +63,6 @@ def uncertainty(problem: Problem, point: Point) -> FitUncertainty:
     )
 
 
-def fit_covariance(J: Array, root: Array, sigma: Array) -> tuple[Array, Array]:
-    """Covariance (v, v) of the coordinates by rows of the weighted Jacobian, W^(1/2) and sigma of
-    targets, see `uncertainty`; which variables the data see (v,)."""
-    response, seen = fit_response(J, root)
-    return (response * sigma**2) @ response.T, seen
-
-
-def fit_response(J: Array, root: Array) -> tuple[Array, Array]:
-    """B = (J^T J)^-1 J^T W^(1/2) (v, n): d x / d q of the fitted coordinates by the targets; which
-    variables the data determine (v,)."""
-    inverse, seen = _inverse(J.T @ J)
-    return inverse @ (J * root[:, None]).T, seen
-
-
 def standard_errors(
     problem: Problem, point: Point, covariance: Array, seen: Array
 ) -> list[float | None]:
@@ -90,20 +78,12 @@ def _noise(problem: Problem, point: Point, counts: Array, leverage: Array) -> Ar
     leverage: diagonal of J (J^T J)^-1 J^T, whose sum is the number of variables that the data see:
     what the targets with a sigma do not determine of them, the others lose as freedom.
     """
-    modal = [t.sigma_Hz or np.nan for t in problem.targets]
-    sigma = np.array(modal + [t.sigma for t in problem.others])[counts]
+    sigma = np.array([t.sigma or np.nan for t in problem.measured])[counts]
     unknown = np.isnan(sigma)
+    if problem.noise_Hz:
+        return np.where(unknown, problem.noise_Hz, sigma)
     freedom = unknown.sum() - (len(problem.variables) - leverage[~unknown].sum())
     if freedom > 1e-9:  # else the fit goes through every point and says nothing about noise
         plain = (point.residuals[counts] / problem.scale[counts])[unknown]
         sigma[unknown] = np.linalg.norm(plain) / np.sqrt(freedom)
     return sigma
-
-
-def _inverse(information: Array) -> tuple[Array, Array]:
-    """Pseudo-inverse, and which variables the data see (v,)."""
-    values, vectors = np.linalg.eigh(information)
-    blind = values <= 1e-14 * max(values[-1], 1e-300)
-    seen = (vectors[:, blind] ** 2).sum(1) <= 1e-8
-    kept = vectors[:, ~blind]
-    return (kept / values[~blind]) @ kept.T, seen

@@ -19,7 +19,7 @@ from ...tyre.case.parts import RimSupport
 from ...tyre.state import AS_THE_CASE, SPRINGS, WHEEL_FREE, TyreState
 from ...tyre.values import set_values
 from ..emulator import Emulator, emulator, needs_slopes
-from ..fit.calibrate import calibrate
+from ..fit.calibrate import noise_Hz
 from ..fit.targets import read_targets, rims_of
 from ..inference.check_units import check_units
 from ..inference.covariance import covariance
@@ -86,7 +86,7 @@ def run(
     """
     check(case, evaluator, readings)
     stage(SAMPLE_STAGES[0])
-    noise = None if readings is not None else noise_of_targets(case, evaluator)
+    noise = None if readings is not None else noise_Hz(case, evaluator)
     if readings is None:
         readings = targets_as_readings(case, noise)
     observations = observe(modal(readings), split=Assumed().split)
@@ -225,22 +225,6 @@ def states_sampled(case: LoadedCase, readings: Sequence[Measurement] | None) -> 
 def modal(readings: Sequence[Measurement]) -> list[Measurement]:
     """The frequencies of the unloaded tyre."""
     return [each for each in readings if each.quantity == "frequency_Hz" and not each.load_N]
-
-
-def noise_of_targets(case: LoadedCase, evaluator: Evaluator) -> float | None:
-    """Standard deviation, Hz, that a fit leaves to targets without one; None where all have one.
-
-    Raises InputError where too few targets are left over to tell.
-    """
-    if all(target.sigma_Hz for target in read_targets(case)):
-        return None
-    noise = calibrate(case, evaluator).found.noise_Hz
-    if noise is None:
-        raise InputError(
-            "the targets have no sigma_Hz, and are too few to estimate it from the residuals:"
-            " state sigma_Hz, or give measurements with --measured"
-        )
-    return noise
 
 
 def targets_as_readings(case: LoadedCase, noise_Hz: float | None) -> list[Measurement]:

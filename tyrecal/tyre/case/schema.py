@@ -113,8 +113,8 @@ def cannot_fit(weights: Sequence[float], free: int) -> str | None:
     if count < free:
         targets = "1 target" if count == 1 else f"{count} targets"
         return (
-            f"{targets} cannot determine {free} free variables: give more, or hold variables with"
-            " --fix"
+            f"{targets} cannot determine {free} free variables: give more, hold variables with"
+            " --fix, or weigh in what is known with --prior"
         )
     return None
 

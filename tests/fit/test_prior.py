@@ -1,0 +1,140 @@
+"""A fit with what is known before: the normal posterior where the model is linear, and `sample`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import tyrecal
+from tyrecal.cli.main import cli
+from tyrecal.errors import InputError
+from tyrecal.files import read_json
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.studies.fit import model_errors
+from tyrecal.studies.fit.calibrate import calibrate
+from tyrecal.studies.fit.prior import PriorProblem
+from tyrecal.studies.fit.uncertainty import uncertainty
+
+from ..chance import generator
+from ..conftest import CASES
+from .test_total_error import coarse
+from .tyre_in_states import START, TRUTH, TyreInStates, case_with, measured
+
+Array = np.ndarray
+
+
+class _Errors:
+    """Model errors with a covariance that is given, plus the scatter."""
+
+    def __init__(self, covariance: Array):
+        self.of_model = covariance
+
+    def covariance(self, scatter: Array) -> Array:
+        return self.of_model + np.diag(scatter**2)
+
+
+def problem_with(count: int, monkeypatch: Any) -> tuple[PriorProblem, Array, Array]:
+    """The first ``count`` frequencies of a tyre whose ln f is linear in x; J and Sigma."""
+    case = case_with(measured()[:count])
+    tyre = TyreInStates()
+    problem = PriorProblem(case, tyre)  # type: ignore[arg-type]
+    random = generator("prior", count)
+    root = 0.01 * random.normal(size=(count, count))
+    errors = _Errors(root @ root.T)
+    monkeypatch.setattr("tyrecal.studies.fit.prior.model_errors", lambda *_: errors)
+    point = problem.evaluate(problem.start()).plain
+    J = point.jacobian / problem.scale[:, None] / (problem.reference * np.exp(0))[:, None]
+    q = problem.reference + point.residuals / problem.scale
+    return problem, J * (problem.reference / q)[:, None], errors.covariance(problem.scatter)
+
+
+@pytest.mark.parametrize("count", [1, 2, 9])
+def test_a_linear_model_has_its_normal_posterior(count: int, monkeypatch: Any) -> None:
+    """Mean and covariance by the textbook, with fewer values than variables too: in gain form,
+    K = S J^T (J S J^T + Sigma)^-1, which shares nothing with the code."""
+    problem, J, sigma = problem_with(count, monkeypatch)
+    S = np.diag(problem.spread**2)
+    K = S @ J.T @ np.linalg.inv(J @ S @ J.T + sigma)
+    start = problem.evaluate(problem.mean)
+    q = problem.reference + start.plain.residuals / problem.scale
+    expected = problem.mean + K @ np.log(problem.reference / q)
+    step = np.linalg.lstsq(start.jacobian, -start.residuals, rcond=None)[0]
+    np.testing.assert_allclose(problem.mean + step, expected, rtol=1e-6)
+    there = problem.evaluate(expected)
+    assert np.linalg.norm(there.gradient) < 1e-3
+    C = S - K @ J @ S
+    scatter, used = problem.scatter * problem.reference, problem.scale > 0
+    np.testing.assert_allclose(problem.errors(there, scatter, used)[0], C, rtol=1e-6, atol=1e-12)
+    # the same by what the fit answers to the data and to what was known before
+    at = problem.reference + there.plain.residuals / problem.scale
+    B = problem.response(there)[0] * at
+    parts = B @ sigma @ B.T + problem.left_of_prior(there)
+    np.testing.assert_allclose(parts, C, rtol=0.02, atol=1e-6)
+    assert len(uncertainty(problem, there.plain).standard_errors) == len(START)
+
+
+def test_a_state_left_out_is_its_rows_left_out(monkeypatch: Any) -> None:
+    """Rows without weight and rows that are left out are the same to the posterior."""
+    problem, J, sigma = problem_with(9, monkeypatch)
+    there = problem.evaluate(problem.mean)
+    keep = np.arange(9) < 4
+    C, _ = problem.errors(there, np.empty(0), keep)
+    S, own = np.diag(problem.spread**2), sigma[:4, :4]
+    J = J[:4]
+    expected = S - S @ J.T @ np.linalg.solve(J @ S @ J.T + own, J @ S)
+    np.testing.assert_allclose(C, expected, rtol=1e-6, atol=1e-12)
+
+
+@pytest.mark.parametrize("method", ["slsqp", "gauss-newton"])
+def test_a_fit_ends_where_its_weights_hold(method: str, monkeypatch: Any) -> None:
+    """Little scatter and a model without errors: the truth; many errors: what was known."""
+    for size in (1e-6, 10.0):
+        errors = _Errors(size**2 * np.eye(9))
+        monkeypatch.setattr("tyrecal.studies.fit.prior.model_errors", lambda *_, e=errors: e)
+        monkeypatch.setattr("tyrecal.studies.fit.total_error.model_errors", model_errors)
+        case = case_with(measured(sigma=1e-3)[:9])
+        fit = calibrate(case, TyreInStates(), method, prior=True)  # type: ignore[arg-type]
+        wanted = TRUTH if size < 1 else START
+        for name, value in fit.fitted.plain.values.items():
+            assert value == pytest.approx(wanted[name], rel=0.02 if size < 1 else 0.2), name
+        assert fit.found.prior and fit.found.converged
+
+
+@pytest.mark.slow
+def test_it_agrees_with_sample() -> None:
+    """Where the data determine the variables and the model is nearly linear, the errors are those
+    of `sample` within 5 %, and the values within a fifth of them."""
+    case = coarse("exact", {})
+    start = case.case.variables["C10"].start
+    changed = {"C10": case.case.variables["C10"].model_copy(update={"start": 1.05 * start})}
+    case = replace(
+        case, case=case.case.model_copy(update={"variables": {**case.case.variables, **changed}})
+    )
+    fit = calibrate(case, Evaluator(TyreDesign(case)), "gauss-newton", prior=True).found
+    assert fit.verdict == "fits"
+    sample = tyrecal.run("sample", case)
+    for name, each in fit.variables.items():
+        own = sample.variables[name]
+        assert each.standard_error_total == pytest.approx(own.standard_error, rel=0.05), name
+        assert abs(each.value - own.best) < 0.2 * own.standard_error, name
+
+
+@pytest.mark.slow
+def test_fewer_values_than_variables(tmp_path: Any, capsys: Any) -> None:
+    """Two frequencies for three variables: refused without --prior; with it each variable says what
+    the data added, and the screen has it."""
+    table = tmp_path / "two.csv"
+    table.write_text("c,m,frequency_Hz,sigma_Hz,pressure_kPa\n2,0,79.5,0.3,240\n1,1,37.8,0.3,240\n")
+    case = str(CASES / "p235_75r17.yaml")
+    words = ["fit", case, "--measured", str(table), "--mesh", "coarse", "--no-pictures"]
+    with pytest.raises(InputError, match=r"cannot determine 3 free variables.*--prior"):
+        cli([*words, "--output", str(tmp_path / "a")], standalone_mode=False)
+    assert cli([*words, "--prior", "--output", str(tmp_path / "b")], standalone_mode=False) == 0
+    assert "by data %" in capsys.readouterr().out
+    result = read_json(tmp_path / "b" / "fit.json")
+    shares = [each["explained_by_data"] for each in result["variables"].values()]
+    assert result["prior"] and all(0 <= share < 1 for share in shares) and max(shares) > 0.5
