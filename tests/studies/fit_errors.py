@@ -44,6 +44,7 @@ from tyrecal.tyre.case.schema import TargetMode, Targets
 from tyrecal.tyre.effects.edit import changed
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.number_units import EFFECT_PATH
+from tyrecal.tyre.values import with_values
 
 from ..conftest import CASES
 from .wrinkles import by_size
@@ -76,17 +77,16 @@ def frequencies(case: LoadedCase, values: dict[str, float], pressures: Sequence[
 
 @dataclass(frozen=True)
 class DrawnTyre:
-    """A tyre as it may be: case with its section, its variables, and all numbers that it has;
+    """A tyre as it may be: case with all its numbers and its section, and its variables;
     pressure_off: of every pressure that is read, kPa."""
 
     case: LoadedCase
     truth: dict[str, float]
-    numbers: dict[str, float]
     pressure_off: float
 
     def frequencies(self, pressures_kPa: Sequence[float]) -> list[float]:
         """Hz of `LABELS` where the gauge reads each pressure. Raises EvaluationFailed."""
-        return frequencies(self.case, self.numbers, [p + self.pressure_off for p in pressures_kPa])
+        return frequencies(self.case, {}, [p + self.pressure_off for p in pressures_kPa])
 
 
 def drawn_tyre(case: LoadedCase, random: np.random.Generator) -> DrawnTyre:
@@ -105,8 +105,9 @@ def drawn_tyre(case: LoadedCase, random: np.random.Generator) -> DrawnTyre:
                 off[path] = amount * step
             else:
                 off[path] = own[path] + amount * step
-    tyre = with_fields(case, {name: float(random.normal()) for name in fields(case)})
-    return DrawnTyre(tyre, truth, {**truth, **off}, pressure_off)
+    own_numbers = with_values(case, {**truth, **off})  # before compounds part by region
+    tyre = with_fields(own_numbers, {name: float(random.normal()) for name in fields(case)})
+    return DrawnTyre(tyre, truth, pressure_off)
 
 
 def measured_and_own(

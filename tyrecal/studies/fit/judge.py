@@ -92,7 +92,7 @@ def measured_rows(problem: Problem, readings: Sequence[Measurement] = ()) -> lis
         places.setdefault(key, each.place)
     rows = []
     for target in problem.measured:
-        quantity = "frequency_Hz" if isinstance(target, Target) else target.quantity
+        quantity = target.quantity
         label, member = _label(target)
         state = target.state.with_defaults(case)
         is_mass = quantity == "mass_kg"

@@ -12,7 +12,8 @@ from ..inference.observations import Observable, Observations
 from ..inference.uncertainties import Source, sources
 from .problem import Point, Problem
 from .responses import linear_answer
-from .targets import Target
+from .road_errors import road_changes, road_form
+from .targets import Target, ValueTarget
 
 Array = np.ndarray
 
@@ -22,45 +23,60 @@ class ModelErrors:
     """Possible errors of the n values that count.
 
     by_constants (n, k): changes of ln q by one standard deviation of each of ``known``; laws:
-    standard deviation of each part of what material laws do.
+    standard deviation of each part of what material laws do; road (n,): that of values on the road
+    by the model itself.
     """
 
     rows: tuple[Observable, ...]
     known: list[Source]
     by_constants: Array
     laws: float
+    road: Array
 
     @property
     def form(self) -> Array:
         """Covariance (n, n) by mesh and material laws."""
-        return model_form(self.rows, self.laws)
+        return model_form(self.rows, self.laws) + np.diag(self.road**2)
 
     def covariance(self, scatter: Array) -> Array:
         """Sigma (n, n) of ln q; scatter (n,): relative standard deviations."""
         none = np.full(len(self.rows), np.nan)
         observed = Observations(self.rows, none, scatter, 0.0, none, none)
-        return covariance(observed, self.by_constants, self.laws)
+        of_frequencies = covariance(observed, self.by_constants, self.laws)
+        return of_frequencies + np.diag(self.road**2)
 
 
 def model_errors(problem: Problem, point: Point) -> ModelErrors:
     """Possible errors at the design ``point``, which is evaluated with all sensitivities in every
     state.
 
-    Raises DeckRefused if the solver has no exact sensitivities; EvaluationFailed; ValueError if
-    targets are on the road.
+    Raises DeckRefused if the solver has no exact sensitivities; EvaluationFailed; ValueError for
+    targets on the road, see `road_changes`, and those of a fit without prior, which does not press
+    the tyre for it.
     """
-    if problem.road:
-        raise ValueError("it is not computed for targets on the road")
-    rows = tuple(_observable(problem.case, each) for each in problem.counted)
-    known, _ = sources(problem.case)
-    _, by_constants, laws = linear_answer(
-        problem.case, problem.evaluator, point.values, rows, known, problem.jobs
+    if problem.road and problem.spread is None:
+        raise ValueError("for targets on the road it is computed with --prior alone")
+    case, counted = problem.case, problem.counted
+    on_road = np.array([bool(each.state.load_N) for each in counted])
+    rows = tuple(_observable(case, each) for each in counted)
+    known, _ = sources(case)
+    by_constants = np.zeros((len(rows), len(known)))
+    unloaded = [row for row, pressed in zip(rows, on_road, strict=True) if not pressed]
+    _, by_constants[~on_road], laws = linear_answer(
+        case, problem.evaluator, point.values, unloaded, known, problem.jobs
     )
-    return ModelErrors(rows, known, by_constants, laws)
+    pressed = [each for each in counted if isinstance(each, ValueTarget) and each.state.load_N]
+    road = np.zeros(len(rows))
+    if pressed:
+        road[on_road] = road_form(pressed)
+        by_constants[on_road] = road_changes(
+            case, problem.evaluator, pressed, point.values, known, problem.jobs
+        )
+    return ModelErrors(rows, known, by_constants, laws, road)
 
 
-def _observable(case: LoadedCase, target: object) -> Observable:
-    if not isinstance(target, Target):
-        return Observable("mass_kg", None, 0.0)
+def _observable(case: LoadedCase, target: Target | ValueTarget) -> Observable:
+    if target.state.load_N or not isinstance(target, Target):
+        return Observable(target.quantity, None, 0.0)
     pressure = target.state.with_defaults(case).pressure_kPa or 0.0
     return Observable("frequency_Hz", target.label, pressure, rim=target.state.rim)

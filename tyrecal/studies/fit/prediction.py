@@ -69,9 +69,11 @@ def predicted_errors(
     ``values`` of the fit has them. It is evaluated with its sensitivities to all sources of error
     in the measured states and at ``MAX_PRESSURES`` pressures, between which these are interpolated
     in ln p. Raises DeckRefused, EvaluationFailed; ValueError where a variable is at its bound: no
-    linear error holds there."""
+    linear error holds there, or values on the road were fitted."""
     if held := [name for name, each in fit.variables.items() if each.at_bound]:
         raise ValueError(f"the fit ended with {held[0]} at its bound, where no linear error holds")
+    if any(each.load_N for each in fit.responses):
+        raise ValueError("it is not computed for a fit to values on the road")
     names = list(case.case.variables)
     measured = tuple(_observable(case, each) for each in fit.responses)
     others = tuple(Observable("frequency_Hz", label, p) for label, p in wanted)

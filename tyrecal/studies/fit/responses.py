@@ -23,12 +23,14 @@ Array = np.ndarray
 
 
 class FitResponse(ResultPart):
-    """A measured value that counts: a mode at a pressure on a rim, or the mass (no c and m)."""
+    """A measured value that counts: a mode at a pressure on a rim, the mass (no c and m), or one
+    on the road (load_N)."""
 
     c: int | None = None
     m: int | None = None
     kind: str | None = None
     pressure_kPa: float = 0.0
+    load_N: float = 0.0
     rim: RimSupport | None = None
     scatter: float  # relative standard deviation
     # d x / d ln value by variable; x: ln of the variable, or its share of the bounds' width

@@ -11,6 +11,7 @@ are differences: areas, lengths and widths are reproducible to 1e-12 of themselv
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import cast
 
 import numpy as np
 
@@ -95,7 +96,7 @@ def press_with_slopes(
         if pressed.failed:
             raise pressed.failed
         at = {each.load_N: each.slopes for each in pressed.footprints}
-        for place, quantity in _of_patches(case, question.values, pressed, here).items():
+        for place, quantity in _of_patches(evaluator, question.values, pressed, here).items():
             own = here[place]
             rates, name = at[own.state.load_N], FOOTPRINT_QUANTITIES[own.quantity].slope
             quantities[place] = quantity
@@ -131,13 +132,13 @@ def _footprints(
         elif outcome.failed:
             yield outcome.failed
         else:
-            yield _of_patches(case, values, outcome, targets)
+            yield _of_patches(evaluator, values, outcome, targets)
 
 
 def _of_patches(
-    case: LoadedCase, values: Mapping[str, float], pressed: Pressed, targets: Placed
+    evaluator: Evaluator, values: Mapping[str, float], pressed: Pressed, targets: Placed
 ) -> Quantities:
-    mesh = TyreDesign(case, values).tyre.mesh
+    mesh = cast(TyreDesign, evaluator.design.at(values)).tyre.mesh
     rows = {each.load_N: footprint_row(pressed, each, mesh) for each in pressed.footprints}
     return {
         place: rows[t.state.load_N][FOOTPRINT_QUANTITIES[t.quantity].row]

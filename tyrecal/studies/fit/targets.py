@@ -33,6 +33,8 @@ class Target:
     sigma_Hz: float | None = None
     state: TyreState = AS_THE_CASE
 
+    quantity = "frequency_Hz"
+
     @property
     def value(self) -> float:
         """The frequency, Hz."""

@@ -101,7 +101,7 @@ def _response(
     names = (v.name for v in problem.variables)
     response = dict(zip(names, column.tolist(), strict=True))
     if not isinstance(target, Target):
-        return FitResponse(scatter=scatter, response=response)
+        return FitResponse(scatter=scatter, response=response, load_N=target.state.load_N)
     state = target.state.with_defaults(problem.case)
     return FitResponse(
         **asdict(target.label),
