@@ -547,6 +547,8 @@ OPTION_READERS: dict[str, Callable[[LoadedCase, str, Any], Any]] = {
     "measured": lambda case, name, value: _file(name, value),
     "repeats": lambda case, name, value: _files(name, value),
     "effects": lambda case, name, value: _names(name, value),
+    "by": lambda case, name, value: _names(name, value),
+    "of": lambda case, name, value: _names(name, value),
     "method": lambda case, name, value: _method(name, value),
     "starts": lambda case, name, value: _count(name, value, 1),
     "draws": lambda case, name, value: _count(name, value, 1000),

@@ -50,6 +50,9 @@ HEADS = {  # columns with their units, as a user's script reads them
     "pressure_sweep.csv": "design,pressure_kPa,c,m,kind,multiplicity,frequency_Hz,d_ln_f_d_ln_p",
     "footprint.csv": "design,load_N,deflection_m,area_m2,length_m,width_m,mean_pressure_Pa,"
     "peak_pressure_Pa,vertical_stiffness_N_per_m",
+    "sensitivities.csv": "quantity,by,value,per",
+    "sensitivities_selection.csv": "name,sets,gain,p_value,shift_in_sd,alike",
+    "sensitivities_uncertain.csv": "name,sets,shift_in_sd",
     "effects.csv": "id,unit,value,mass_kg,before_percent,after_percent,absorbed,"
     "refitted.C10.before,refitted.C10.after",
     "effects_modes.csv": "id,pressure_kPa,c,m,kind,before_percent,after_percent",
@@ -69,6 +72,8 @@ FIRST_ROWS = {  # numbers in their columns
     "fit.csv": "0,0,axial,1,36.85,30.86,31.7,-2.649842271293379,,,,,,",
     "fit_variables.csv": "A_belt,2e-07,3.6e-07,1e-07,1e-05,3.6e-08,,False,",
     "effects.csv": "filler,K,3.0,0.1,4.5,1.5,0.886,1000000.0,1100000.0",
+    "sensitivities.csv": '"frequency_Hz [2,0]",C10,0.5,',
+    "sensitivities_selection.csv": "belt_angle,rebar_layers.belt.angle_deg,31.0,5e-05,2.75,gauge",
     "footprint.csv": "initial,1000.0,0.005,0.003,0.1,0.08,330000.0,500000.0,200000.0",
     "sample.csv": "2,0,,240.0,79.0,78.5,79.5,79.0,0.3,79.5,",
     "diagnosis_effects.csv": "rim_width,12.0,,,,",
@@ -112,6 +117,7 @@ IN_TABLES = {  # key of the JSON content whose every number has to be in some CS
     "sweep-pressure": ("rows",),
     "sweep-load": ("rows",),
     "footprint": ("rows",),
+    "sensitivities": ("rows",),
     "sample": ("variables", "predicted"),
     "diagnose": ("probabilities", "detectability", "section_map"),
 }

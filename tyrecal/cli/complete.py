@@ -71,6 +71,11 @@ def assignments(ctx: click.Context, param: click.Parameter, incomplete: str) -> 
     return _starting((f"{name}=" for name in dict.fromkeys(names)), incomplete)
 
 
+def numbers(ctx: click.Context, param: click.Parameter, incomplete: str) -> Items:
+    """Names of the case's variables, and paths of its other numbers."""
+    return _starting({*_part("variables"), *_numbers(_case())}, incomplete)
+
+
 def _starting(names: Iterable[str], incomplete: str) -> Items:
     if incomplete.endswith("="):  # a number follows
         return []

@@ -23,8 +23,8 @@ from .terminal import Terminal
 @option("--author", default="", metavar="NAME", help="Name under the title (default: none).")
 @options.with_terminal
 def command(folders: tuple[Path, ...], output: Path | None, author: str, terminal: Terminal) -> int:
-    """Show the results in DIR (of fit, modes, sweep-pressure, footprint, effects, sample, diagnose)
-    on one HTML page.
+    """Show the results in DIR (of fit, modes, sweep-pressure, footprint, sensitivities, effects,
+    sample, diagnose) on one HTML page.
 
     The page is one file that needs no network: summary, tables, plots, and mode shapes that turn
     and vibrate. It prints on A4 and works on a phone. Fits and diagnoses of several folders are

@@ -55,6 +55,11 @@ STUDIES = {  # in the order of a page and of a batch
         "Press the tyre on a road: contact area and pressure over load.",
         True,
     ),
+    "sensitivities": Entry(
+        "tyrecal.studies.sensitivities.result:SensitivitiesResult",
+        "State how each number of the case moves frequencies, and which numbers to free.",
+        True,
+    ),
     "effects": Entry(
         "tyrecal.studies.effects:Effects", "List and explain effects that a plain model leaves out."
     ),

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ValidationError
 
 from ..errors import InputError
 from .case.checks import at, find, folds, problems
+from .case.identity import is_of_tyre
 from .case.loaded import LoadedCase
 from .case.mistakes import Keys, dotted, suggestion
 from .case.parts import Setting, as_written
@@ -21,9 +22,10 @@ from .case.stations import read_section_of
 from .own_deck.numbers import as_known, canonical
 from .plugins import IDS
 from .resolve import resolved
-from .state import with_states_kept
+from .state import PRESSURE_PATH, with_states_kept
 from .usual import belts_on_one_side, refusal
 
+IN_DECK = "deck.numbers."  # before the path of a number of a user's deck
 MAX_MEANT = 3  # paths that the error for an unknown name suggests
 # parts of a case whose numbers no other part and no mesh depends on: changes need no check
 INDEPENDENT_PARTS = {
@@ -138,6 +140,23 @@ def paths_of(loaded: LoadedCase, name: str) -> list[str]:
 def value_at(loaded: LoadedCase, path: str) -> Any:
     """The value at a path of `paths_of`; None if the case has no number there."""
     return at(loaded.case, find(loaded.case, path))
+
+
+def tyre_numbers(loaded: LoadedCase) -> dict[str, float]:
+    """Numbers by path that make the tyre, and its pressure, in their own units: those that are not
+    0 and that no variable sets. Whole numbers, which count something, are left out."""
+    taken = {path for variable in loaded.case.variables.values() for path in variable.sets}
+    own = {path: value_at(loaded, path) for path in _numbers(loaded.case.model_dump(), ())}
+    numbers = {
+        path: value
+        for path, value in own.items()
+        if (path == PRESSURE_PATH or is_of_tyre(path)) and not path.startswith(IN_DECK)
+    }
+    return {
+        path: value
+        for path, value in {**numbers, **loaded.deck_numbers}.items()
+        if isinstance(value, float) and value and taken.isdisjoint((path, IN_DECK + path))
+    }
 
 
 def _keys(loaded: LoadedCase, name: str) -> list[Keys]:

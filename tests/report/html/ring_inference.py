@@ -9,6 +9,45 @@ import numpy as np
 from .ring import provenance
 
 
+def sensitivities() -> dict[str, Any]:
+    values = {"C10": (0.5, 0.25), "rebar_layers.belt.angle_deg": (-0.01, 0.02)}
+    quantities = {"frequency_Hz [2,0]": 79.5, "mass_kg": 12.5}
+    return {
+        "format": 1,
+        "design": "fitted",
+        "number_values": {"C10": 8e5, "rebar_layers.belt.angle_deg": 70.0},
+        "quantity_values": quantities,
+        "rows": [
+            {"quantity": q, "by": by, "value": x, "per": "degree" * by.endswith("deg")}
+            for by, row in values.items()
+            for q, x in zip(quantities, row, strict=True)
+        ],
+        "selection": {
+            "chi2": 40.5,
+            "chi2_left": 9.5,
+            "chi2_exact_section": 90.5,
+            "freedom": 11,
+            "known_from": "drawing",
+            "steps": [
+                {
+                    "name": "belt_angle",
+                    "sets": ["rebar_layers.belt.angle_deg"],
+                    "gain": 31.0,
+                    "p_value": 5e-5,
+                    "shift_in_sd": 2.75,
+                    "alike": ["gauge"],
+                }
+            ],
+            "next_name": "gauge",
+            "next_p_value": 0.625,
+            "numbers": [
+                {"name": "belt_angle", "sets": ["rebar_layers.belt.angle_deg"], "shift_in_sd": 2.5},
+                {"name": "gauge", "sets": ["section.gauges.0.factor"], "shift_in_sd": 0.375},
+            ],
+        },
+    }
+
+
 def sample() -> dict[str, Any]:
     """Sample of two variables with bell-shaped, turned counts."""
     at = np.linspace(-3, 3, 30)

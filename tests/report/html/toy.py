@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from .ring import fit, parts, pressure_sweep, provenance, shapes
-from .ring_inference import diagnosis, effects, sample
+from .ring_inference import diagnosis, effects, sample, sensitivities
 from .ring_under_load import footprint, load_sweep, loaded_modes, loaded_shapes, patches
 
 
@@ -34,6 +34,7 @@ def write(folder: Path, name: str = "Toy & sons", effect: str = "rim_width") -> 
         "load_sweep.json": load_sweep(),
         "footprint.json": footprint(),
         "footprint_patches.json": patches(name),
+        "sensitivities.json": sensitivities(),
         "effects.json": effects(name),
         "sample.json": sample(),
         "diagnosis.json": diagnosis(effect),

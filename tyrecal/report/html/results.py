@@ -115,7 +115,7 @@ def read_results(folder: Path) -> Results:
             last = "; it is a folder of a batch: give the folders of the cases in it"
         raise InputError(
             f"'{folder}' holds no results of fit, modes, sweep-pressure, footprint,"
-            f" effects, sample or diagnose{last}"
+            f" sensitivities, effects, sample or diagnose{last}"
         )
     return results
 

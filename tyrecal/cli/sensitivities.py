@@ -1,0 +1,102 @@
+"""tyrecal sensitivities"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from . import arguments, complete, options
+from .parameters import FileOrFolder, option
+
+
+@click.command()
+@options.every(options.case_argument, options.assignments, options.pressure)
+@option(
+    "--by",
+    multiple=True,
+    metavar="NAME|PATH",
+    shell_complete=complete.numbers,
+    help="Variable, or path of a number of the case; repeatable (default: all that are not 0)."
+    " Example: rebar_layers.belt_1.angle_deg.",
+)
+@option(
+    "--of",
+    "kinds",
+    multiple=True,
+    metavar="QUANTITY",
+    help="frequency (default), mass, contact_area, contact_length, contact_width or"
+    " vertical_stiffness; repeatable.",
+)
+@option(
+    "--loads-N",
+    "loads",
+    metavar="F1,F2,...",
+    help="Loads of quantities on the road, N, rising (default: those of the case's targets, or the"
+    " middle one of road.loads_N).",
+)
+@option(
+    "--measured",
+    type=FileOrFolder(exists=True, folder=False),
+    metavar="FILE",
+    help="Measurements (CSV), to select the numbers worth freeing in a fit (default: the file of"
+    " the case's targets).",
+)
+@options.fitted("fit.json of the case: sensitivities of the fitted design.")
+@option("--pictures/--no-pictures", default=True, help="Draw the heat map.")
+@options.figure_format
+@options.study
+def command(
+    case: Path,
+    assignments: tuple[str, ...],
+    pressure_kPa: float | None,
+    by: tuple[str, ...],
+    kinds: tuple[str, ...],
+    loads: str | None,
+    measured: Path | None,
+    fitted: Path | None,
+    pictures: bool,
+    study: options.Study,
+) -> int:
+    """State how each number of CASE moves the frequencies: d ln f / d ln x, exact, from one
+    evaluation. Angles and numbers that are 0: d ln f / d x, per degree or unit.
+
+    Writes sensitivities.json, .csv and .png. With measurements it selects the uncertain numbers
+    that, freed in a fit within what is known of them, reduce the deviations most, and stops where
+    the next gain is no better than chance. Free them with: tyrecal fit --free.
+
+    \b
+    tyrecal sensitivities cases/p235_75r17.yaml
+    tyrecal sensitivities cases/p235_75r17.yaml --by pressure_kPa --by C10 --of vertical_stiffness
+    tyrecal sensitivities cases/205_60r15.yaml --measured cases/205_60r15_mf_swift.csv
+    """
+    from ..studies.result import StudyInput
+    from ..studies.sensitivities.result import SensitivitiesResult, loads_on_road
+    from ..studies.sensitivities.table import kinds_of, numbers_of
+
+    loaded, values = study.load(case, assignments, pressure_kPa)
+    kinds_of(kinds), numbers_of(loaded, by)
+    loads_N = None
+    if loads is not None:
+        loads_N = arguments.parse_loads(loads)
+        arguments.refuse_unusual_loads(loaded, "--loads-N", loads_N, study.allow_unusual)
+        if not loads_on_road(loaded, kinds, loads_N):
+            raise click.UsageError(f"--loads-N {loads}: give --of a quantity on the road too")
+    evaluator = study.evaluator(loaded)
+    designs = {"initial": values}
+    if fitted:
+        designs["fitted"] = arguments.fitted_values(fitted, loaded, study.terminal)
+    file = measured or loaded.measured
+    on_road = loads_on_road(loaded, kinds, loads_N)
+    files = [file] if file else []
+    output = study.run(loaded, "sensitivities", evaluator, measured=files, load_N=on_road or 0.0)
+    given = StudyInput(loaded, evaluator, designs, jobs=study.jobs)
+    with study.terminal.progress("sensitivities") as bar:
+        evaluator.on_progress = bar.at
+        result = SensitivitiesResult.run(given, by=by, of=kinds, loads_N=loads_N, measured=measured)
+    figures = {}
+    if pictures:
+        from ..report.sensitivities import figures as drawn
+
+        figures = drawn(result)
+    return study.present(output, result, figures)

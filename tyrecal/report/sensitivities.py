@@ -1,0 +1,45 @@
+"""Heat map of sensitivities: numbers by quantities."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.figure import Figure
+
+from ..studies.sensitivities.result import MAX_NUMBERS_SHOWN, SensitivitiesResult, heading_of, named
+from .figure import in_house_style, new_figure
+from .table import MINUS
+
+DIVERGING = colormaps["RdBu_r"]
+DARK = 0.6  # of the largest value, above which a cell's text is white
+
+
+def figures(result: SensitivitiesResult) -> dict[str, Figure]:
+    """Figures of the study, by name."""
+    return {"sensitivities": draw_heat_map(result)} if result.rows else {}
+
+
+@in_house_style
+def draw_heat_map(result: SensitivitiesResult) -> Figure:
+    """The most influential numbers, from red (raises a quantity) to blue (lowers it)."""
+    numbers = list(result.by_number().items())[:MAX_NUMBERS_SHOWN]
+    quantities = list(result.quantity_values)
+    values = np.array([[own[each].value for each in quantities] for _, own in numbers])
+    figure = new_figure(3.2 + 0.6 * len(quantities), 1.6 + 0.24 * len(numbers))
+    axes = figure.add_subplot()
+    largest = max(abs(values).max(), 1e-12)
+    edges = [np.arange(count + 1) - 0.5 for count in values.shape]  # cells, as vectors on a page
+    axes.pcolormesh(edges[1], edges[0], values, cmap=DIVERGING, vmin=-largest, vmax=largest)
+    axes.invert_yaxis()
+    for (i, j), value in np.ndenumerate(values):
+        colour = "white" if abs(value) > DARK * largest else "0.2"
+        text = f"{round(value, 2) + 0.0:.2f}".replace("-", MINUS)
+        axes.text(j, i, text, ha="center", va="center", fontsize=7, color=colour)
+    axes.set_xticks(
+        range(len(quantities)), [heading_of(each).replace(" ", "\n") for each in quantities]
+    )
+    axes.set_yticks(range(len(numbers)), [named(own[quantities[0]]) for _, own in numbers])
+    axes.tick_params(length=0, top=True, labeltop=True, bottom=False, labelbottom=False)
+    axes.spines[:].set_visible(False)
+    axes.set_xlabel("d ln q / d ln x")
+    return figure

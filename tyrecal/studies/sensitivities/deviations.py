@@ -1,0 +1,84 @@
+"""Deviations of a case from what was measured, linear in its variables and uncertain numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import InputError
+from ...measured.measurement import Measurement
+from ...measured.targets import in_states, readings_of
+from ...simulate.evaluate.evaluator import Evaluator
+from ...tyre.case import LoadedCase
+from ..inference.check_units import check_units
+from ..inference.covariance import covariance
+from ..inference.inverse_problem import Assumed, places
+from ..inference.model import Answer, Query
+from ..inference.observations import observe
+from ..inference.plain_fit import plain_fit
+from ..inference.tyre_model import TyreModel
+from ..inference.uncertainties import Source, calibrated, sources
+from .selection import chi2
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """n deviations, linear about the tyre that fits them."""
+
+    r: Array  # (n,) of ln q, at the variables' start values
+    covariance: Array  # (n, n) with the variables' spread: S + J Sx J^T
+    numbers: tuple[Source, ...]  # k numbers that may be off
+    G: Array  # (n, k) change of ln q by one standard deviation of each
+    chi2_exact_section: float  # of r, if the section's fields were known
+    freedom: int  # of chi2: values less variables
+    left_out: tuple[str, ...]  # measurements that are not used, and why
+
+
+def deviations(case: LoadedCase, evaluator: Evaluator, measured: Path, jobs: int = 1) -> Deviations:
+    """Deviations from a file of measurements, with the covariance of a diagnosis: scatter, error of
+    the model, and the section's fields, which no number of the case frees.
+
+    Raises InputError, DeckRefused, EvaluationFailed, OSError.
+    """
+    readings = in_states(case, readings_of(case, measured))
+    if not any(_is_modal(each) for each in readings):
+        raise InputError(f"{measured}: it has no frequency of the unloaded tyre")
+    if "pressure_kPa" in calibrated(case):
+        raise InputError(
+            "a variable of the case sets pressure_kPa, which the measurements state: take it out"
+            " of the variables"
+        )
+    observations = observe(readings, split=Assumed().split)
+    rows = list(dict.fromkeys(row.row for row in observations.rows))
+    known, _ = sources(case)
+    model = TyreModel(case, evaluator, rows, known, {}, jobs)
+    check_units(model, observations, [str(measured)])
+    where = places(observations, rows)
+    x = plain_fit(model, observations, where)
+    (answer,) = model.answers([Query(x, constants=True)])
+    if not isinstance(answer, Answer):
+        raise answer
+    assert answer.constants is not None
+    J, constants = answer.jacobian[where], answer.constants[where]
+    of_section = np.array([source.field is not None for source in known], bool)
+    r = observations.y - answer.eta[where] + J @ (x - model.start)
+    by_variables = (J * model.spread) @ (J * model.spread).T
+    laws, by_section = model.material_laws, constants[:, of_section]
+    exact = covariance(observations, np.zeros_like(by_section), laws) + by_variables
+    return Deviations(
+        r,
+        covariance(observations, by_section, laws) + by_variables,
+        tuple(source for source in known if source.field is None),
+        constants[:, ~of_section],
+        chi2(exact, r),
+        len(observations.y) - len(x),
+        observations.left_out,
+    )
+
+
+def _is_modal(reading: Measurement) -> bool:
+    return reading.quantity == "frequency_Hz" and not reading.load_N
