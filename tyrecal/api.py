@@ -141,6 +141,7 @@ def fit_case(
     *,
     method: str = "slsqp",
     fixed: Mapping[str, float] | Iterable[str] | str | None = None,
+    free: Iterable[str] | str = (),
     starts: int = 1,
     seed: int = 0,
     jobs: int = 1,
@@ -150,7 +151,8 @@ def fit_case(
     """Calibrate the case's variables to its targets, or to a file of measurements (CSV) in their
     place, as ``tyrecal fit --measured`` does: frequencies without labels get the likeliest ones.
 
-    ``fixed`` holds variables at values, or at their start where it is a name or several.
+    ``fixed`` holds variables at values, or at their start where it is a name or several. ``free``
+    frees uncertain numbers, one or several, within what is known of them.
     ``method`` is "slsqp" (SciPy's) or "gauss-newton", which needs about a third of the designs.
     ``result`` holds what fit.json does, ``provenance`` too, ``fitted`` the design: ``values``,
     ``objective`` in Hz, ``modes`` by label and, of targets in several states, ``states``: modes of
@@ -164,7 +166,8 @@ def fit_case(
     held = _held(case, fixed)
     file = None if measured is None else _file("measured", measured)
     counts = _count("starts", starts, 1), _count("seed", seed, 0), _count("jobs", jobs, 1)
-    return FitStudy(case, _evaluator(case, solver, record), file, held).run(method, *counts)
+    study = FitStudy(case, _evaluator(case, solver, record), file, held, _names("free", free))
+    return study.run(method, *counts)
 
 
 def sweep_pressure(
@@ -547,6 +550,7 @@ OPTION_READERS: dict[str, Callable[[LoadedCase, str, Any], Any]] = {
     "measured": lambda case, name, value: _file(name, value),
     "repeats": lambda case, name, value: _files(name, value),
     "effects": lambda case, name, value: _names(name, value),
+    "free": lambda case, name, value: _names(name, value),
     "by": lambda case, name, value: _names(name, value),
     "of": lambda case, name, value: _names(name, value),
     "method": lambda case, name, value: _method(name, value),

@@ -47,6 +47,13 @@ if TYPE_CHECKING:
     help="Variable to hold at its start value; repeatable.",
 )
 @option(
+    "--free",
+    metavar="PATH,...",
+    help="Uncertain numbers to fit too, by path or by the name of their uncertainty: each within"
+    " three standard deviations of what is known of it, which counts as a measured value."
+    " Example: belt_1_angle,tread_density.",
+)
+@option(
     "--prior",
     is_flag=True,
     help="Weigh in what is known before: each variable's percent, and the errors of section,"
@@ -80,6 +87,7 @@ def command(
     method: str,
     measured: Path | None,
     fix: tuple[str, ...],
+    free: str | None,
     prior: bool,
     starts: int,
     seed: int,
@@ -100,6 +108,8 @@ def command(
     tyrecal fit cases/p235_75r17.yaml
     tyrecal fit cases/p235_75r17.yaml --fix C10 --method gauss-newton
     tyrecal fit cases/p235_75r17.yaml --prior --report
+    tyrecal fit cases/p235_75r17.yaml --free rubber_density,belt_1_angle
+    tyrecal fit cases/p235_75r17.yaml --report
     tyrecal fit cases/p235_75r17.yaml --measured measured.csv --pressure-kPa 200
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --jobs 2
     tyrecal fit cases/p235_75r17.yaml --starts 20 --seed 1 --scheduler tcp://10.0.0.1:8786
@@ -119,7 +129,8 @@ def command(
     for name in fix:
         arguments.refuse_unknown("--fix", name, values, "variable")
     fixed = {name: values[name] for name in fix}
-    calibration = FitStudy(loaded, study.evaluator(loaded), measured, fixed, prior)
+    freed = [name.strip() for name in free.split(",")] if free else []
+    calibration = FitStudy(loaded, study.evaluator(loaded), measured, fixed, freed, prior)
     file = measured or loaded.measured
     questions = doubts_of_file(file) if file else []
     for doubt in questions:

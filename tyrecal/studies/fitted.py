@@ -19,7 +19,8 @@ NOT_CONVERGED: Final = "not_converged"  # folder of a fit that may not take a be
 
 def read_fitted(path: Path, case: LoadedCase) -> tuple[dict[str, float], list[str]]:
     """Fitted values of the case's variables (in the units of the numbers they set) in fit.json,
-    and in which ways the fit was made otherwise, in sentences: on another mesh.
+    of numbers that the fit freed by path, and in which ways the fit was made otherwise, in
+    sentences: on another mesh.
 
     The fit has to be of the same tyre, whatever its targets, state, mesh or solver. Raises
     InputError in one sentence; OSError.
@@ -27,6 +28,13 @@ def read_fitted(path: Path, case: LoadedCase) -> tuple[dict[str, float], list[st
     try:
         fit = read_json(path)
         fitted_values = {name: v["value"] for name, v in fit["variables"].items()} | fit["fixed"]
+        freed = {
+            path: fitted_values[name]
+            for name, each in fit.get("freed", {}).items()
+            for path in each["sets"]
+        }
+        for name in fit.get("freed", {}):
+            del fitted_values[name]
         pressure = float(fit["pressure_kPa"])
         of = fit.get("provenance", {})
         tyre, theirs = of.get("tyre_sha256"), dict(of.get("overrides", {}))
@@ -46,10 +54,11 @@ def read_fitted(path: Path, case: LoadedCase) -> tuple[dict[str, float], list[st
         )
     if tyre != tyre_sha256(case):
         raise InputError(f"'{path}' is a fit of another tyre: {_difference(theirs, case)}")
-    for name, value in fitted_values.items():
+    for name, value in {**fitted_values, **freed}.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
             raise InputError(f"variable '{name}' is {value!r} in '{path}', must be a finite number")
     values = {name: float(fitted_values[name]) for name in start_values(case)}
+    values |= {path: float(value) for path, value in freed.items()}
     design = dict(values)
     if pressure_name(case) == "pressure_kPa":
         design["pressure_kPa"] = pressure  # else its variable stands among the others

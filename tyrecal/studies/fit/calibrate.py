@@ -149,6 +149,8 @@ def check(problem: Problem) -> None:
         own = state.numbers(problem.case)
         for each in problem.variables:
             if "pressure_kPa" in own and pressure_name(problem.case) == each.name:
+                if each.name in problem.freed:
+                    raise InputError(f"--free {each.name}: the targets state their pressure")
                 raise InputError(
                     f"variable '{each.name}' sets pressure_kPa, which targets state: hold it with"
                     f" --fix {each.name}"

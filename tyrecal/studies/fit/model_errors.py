@@ -13,7 +13,7 @@ from ..inference.uncertainties import Source, sources
 from .problem import Point, Problem
 from .responses import linear_answer
 from .road_errors import road_changes, road_form
-from .targets import Target, ValueTarget
+from .targets import KNOWLEDGE, Target, ValueTarget
 
 Array = np.ndarray
 
@@ -58,12 +58,13 @@ def model_errors(problem: Problem, point: Point) -> ModelErrors:
         raise ValueError("for targets on the road it is computed with --prior alone")
     case, counted = problem.case, problem.counted
     on_road = np.array([bool(each.state.load_N) for each in counted])
+    unloaded = ~on_road & np.array([each.quantity != KNOWLEDGE for each in counted])
     rows = tuple(_observable(case, each) for each in counted)
     known, _ = sources(case)
     by_constants = np.zeros((len(rows), len(known)))
-    unloaded = [row for row, pressed in zip(rows, on_road, strict=True) if not pressed]
-    _, by_constants[~on_road], laws = linear_answer(
-        case, problem.evaluator, point.values, unloaded, known, problem.jobs
+    own = [row for row, modal in zip(rows, unloaded, strict=True) if modal]
+    _, by_constants[unloaded], laws = linear_answer(
+        case, problem.evaluator, point.values, own, known, problem.jobs
     )
     pressed = [each for each in counted if isinstance(each, ValueTarget) and each.state.load_N]
     road = np.zeros(len(rows))

@@ -23,6 +23,7 @@ from ...simulate.evaluate.evaluator import Evaluator
 from ...tyre.case import LoadedCase
 from .model_errors import model_errors
 from .problem import FitNotify, Point, Problem
+from .targets import KNOWLEDGE
 
 Array = np.ndarray
 SAME_WEIGHTS = 0.1  # of x, within which one design's weights hold for another
@@ -57,6 +58,8 @@ class PriorProblem(Problem):
     ):
         super().__init__(case, evaluator, fixed, notify, jobs)
         self.noise_Hz = noise_Hz
+        knowledge = np.array([each.quantity == KNOWLEDGE for each in self.measured])
+        self.scale = np.where(knowledge, 0.0, self.scale)  # it is in the spread
         counted = self.counted
         self.reference = np.array([each.value for each in counted])
         sigma = np.array([each.sigma or noise_Hz or np.nan for each in counted])

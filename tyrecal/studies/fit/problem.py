@@ -9,8 +9,8 @@ F = sqrt( sum over modes, doublets twice, of w ((f_num - f_ref) / sigma)^2
           + sum over other targets of w ((q_num - q_ref) / sigma)^2 )
 
 A frequency without sigma counts as one of 1 Hz, so that without any F is equation (1) in Hz; with
-some, F is a number of standard deviations. Each target has its state: a design is evaluated once in
-each state that has one.
+some, F is a number of standard deviations. What is known of a freed number counts as another target
+(`free`). Each target has its state: a design is evaluated once in each state that has one.
 """
 
 from __future__ import annotations
@@ -29,9 +29,18 @@ from ...tyre.case import LoadedCase
 from ...tyre.state import AS_THE_CASE, TyreState, without
 from ..variable import read_variable
 from .differences import STEP, differences
+from .freed import freed_variables
 from .least_squares import fit_covariance, fit_response
 from .road import PRESS_STEP, press, press_with_slopes
-from .targets import Target, ValueTarget, read_mass_targets, read_road_targets, read_targets
+from .targets import (
+    KNOWLEDGE_SIGMA,
+    Target,
+    ValueTarget,
+    read_known,
+    read_mass_targets,
+    read_road_targets,
+    read_targets,
+)
 
 Array = np.ndarray
 BOUND_MARGIN = 1e-6  # of a scaled variable
@@ -101,7 +110,8 @@ class Problem:
     notify: called with (number of the point, its values, Point or failure) as they come; jobs: how
     many states of a point are evaluated at a time, and how many neighbours, where the solver gives
     no slopes. measured: all targets, as their residuals stand: ``targets``, the unloaded
-    tyre's modes, then ``others``, on the ``road`` and the ``mass``; labels: of modes by state.
+    tyre's modes, then ``others``, on the ``road``, the ``mass`` and what is ``known``; labels: of
+    modes by state.
 
     >>> problem = Problem(case, evaluator, fixed={"A_belt": 2e-7})
     >>> [v.name for v in problem.variables]
@@ -123,7 +133,8 @@ class Problem:
         ]
         self.targets, self.road = read_targets(case), read_road_targets(case)
         self.mass = read_mass_targets(case)
-        self.others = [*self.road, *self.mass]
+        self.freed, self.known = freed_variables(case), read_known(case)
+        self.others = [*self.road, *self.mass, *self.known]
         self.measured: list[Target | ValueTarget] = [*self.targets, *self.others]
         self.scale = np.array([each.scale for each in self.measured])
         self.labels: dict[TyreState, list[Label]] = {}
@@ -153,7 +164,7 @@ class Problem:
     @property
     def counted(self) -> list[Target | ValueTarget]:
         """Targets that have a weight."""
-        return [each for each in self.measured if each.scale > 0]
+        return [each for each, scale in zip(self.measured, self.scale, strict=True) if scale > 0]
 
     def again(self, evaluator: Evaluator, notify: FitNotify | None = None) -> Problem:
         """The same problem without any design, evaluated by another evaluator."""
@@ -230,8 +241,9 @@ class Problem:
             slopes = differences(self.variables, values, step, ask, measured)[1]
         modal = len(self.targets)
         pressed, rises = self._pressed(values)
-        slopes = np.vstack([slopes[:modal], rises, slopes[modal:]])
-        others = np.concatenate([pressed, measured[modal:]])
+        known, shifts = self._known(values)
+        slopes = np.vstack([slopes[:modal], rises, slopes[modal:], shifts])
+        others = np.concatenate([pressed, measured[modal:], known])
         wanted = [t.value for t in self.measured]
         x = np.array([v.scaled(values[v.name]) for v in self.variables])
         return Point(
@@ -260,6 +272,20 @@ class Problem:
             more = differences(self.variables, values, PRESS_STEP, ask)
             quantities, slopes = np.append(quantities, more[0]), np.vstack([slopes, more[1]])
         return quantities, slopes
+
+    def _known(self, values: Mapping[str, float]) -> tuple[Array, Array]:
+        """1 + 0.01 z of each freed number, z its shift in standard deviations, and d / d x (freed,
+        variables)."""
+        quantities = [1 + KNOWLEDGE_SIGMA * v.in_sd(values[n]) for n, v in self.freed.items()]
+        slopes = [
+            [
+                KNOWLEDGE_SIGMA / each.sd * v.slope(values[name]) * (v.name == name)
+                for v in self.variables
+            ]
+            for name, each in self.freed.items()
+        ]
+        shape = len(self.freed), len(self.variables)
+        return np.array(quantities, float), np.array(slopes, float).reshape(shape)
 
     def _measured(self, by_state: Mapping[TyreState, LabelledModes]) -> Array:
         """Frequencies (targets,) of a design, Hz, and behind them its mass where it is a target."""

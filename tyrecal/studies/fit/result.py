@@ -42,7 +42,7 @@ from .problem import Point, Problem
 from .responses import FitResponse
 from .search import projected_gradient
 from .states import next_states, plain, state_reports
-from .targets import objective_unit
+from .targets import KNOWLEDGE, objective_unit
 from .total_error import TotalError, total_error
 from .uncertainty import FitUncertainty, uncertainty
 from .verdict import DOES_NOT_FIT, NOT_JUDGED, FitReason, FitVerdict, does_not_fit_words
@@ -103,6 +103,15 @@ class FittedVariable(ResultPart):
             return None
         percent = abs(100 * error / self.value)
         return f"{percent:.0f}" if percent >= 10 else f"{percent:.2g}"
+
+
+class FreedNumberFit(ResultPart):
+    """A number that the fit freed: the knowledge of it, and how far it moved."""
+
+    sets: list[str]  # paths
+    known: float  # in its own unit
+    standard_deviation: float
+    shift_in_sd: float
 
 
 class FittedState(ResultPart):
@@ -207,6 +216,7 @@ class FitResult(Result):
     label_margin: float  # least clarity of a label
     variables: dict[str, FittedVariable]
     fixed: dict[str, float]
+    freed: dict[str, FreedNumberFit] = Field(default={})  # of ``variables``
     modes: list[FittedMode]
     footprint: list[FittedFootprint] = Field(default=[])
     mass: FittedFootprint | None = None
@@ -229,14 +239,15 @@ class FitResult(Result):
         *,
         measured: Path | None = None,
         fixed: Mapping[str, float] | None = None,
+        free: Sequence[str] = (),
         method: str = "slsqp",
         starts: int = 1,
         seed: int = 0,
         prior: bool = False,
     ) -> FitResult:
-        """Calibrate the variables to the case's targets, or to a file of measurements; prior: with
-        what is known of them and of the model."""
-        study = named(FIT_STUDY)(given.case, given.evaluator, measured, fixed, prior)
+        """Calibrate the variables, and uncertain numbers to ``free``, to the case's targets or to a
+        file of measurements; prior: with what is known of them and of the model."""
+        study = named(FIT_STUDY)(given.case, given.evaluator, measured, fixed, free, prior)
         result: FitResult = study.run(method, starts, seed, given.jobs).found
         return result
 
@@ -265,7 +276,9 @@ class FitResult(Result):
 
     def pass_on(self, given: StudyInput) -> None:
         values = self.fixed | {name: each.value for name, each in self.variables.items()}
-        given.designs["fitted"] = {name: values[name] for name in given.designs["initial"]}
+        by_path = {p: values[name] for name, each in self.freed.items() for p in each.sets}
+        own = {name: values[name] for name in given.designs["initial"]}
+        given.designs["fitted"] = own | by_path
         given.responses = FitResponses(
             responses=self.responses,
             chi2_per_dof=self.chi2_per_dof,
@@ -330,6 +343,13 @@ class FitResult(Result):
         ]
 
     def sentences(self) -> list[str]:
+        """How far freed numbers moved, and how far the standard errors hold."""
+        moved = [f"{name} by {each.shift_in_sd:+.2f}" for name, each in self.freed.items()]
+        words = ", ".join(moved)
+        freed = [f"Freed, in standard deviations of what is known: {words}."] if moved else []
+        return freed + self._error_words()
+
+    def _error_words(self) -> list[str]:
         """How far the standard errors hold."""
         if self.total_error_unknown:
             return [
@@ -517,6 +537,7 @@ def fit_result(
         "label_margin": point.clarity,
         "variables": _variables(problem, initial, point, known, total, judged.chi2_per_dof),
         "fixed": dict(problem.fixed),
+        **({"freed": _freed(problem, point)} if problem.freed else {}),
         "modes": _modes(problem, initial, point, several),
         **({"footprint": pressed} if pressed else {}),
         **({"mass": mass[0]} if mass else {}),
@@ -525,7 +546,7 @@ def fit_result(
         **(
             {"total_error_unknown": total}
             if isinstance(total, str)
-            else {"responses": total.responses}
+            else {"responses": [] if problem.freed else total.responses}
         ),
         "correlations": {
             a: {b: _finite(known.correlations[i, j]) for j, b in enumerate(names)}
@@ -583,6 +604,19 @@ def _variables(
     return variables
 
 
+def _freed(problem: Problem, point: Point) -> dict[str, FreedNumberFit]:
+    """The numbers that were freed."""
+    return {
+        name: FreedNumberFit(
+            sets=each.sets,
+            known=each.start,
+            standard_deviation=each.sd,
+            shift_in_sd=each.in_sd(point.values[name]),
+        )
+        for name, each in problem.freed.items()
+    }
+
+
 def _modes(problem: Problem, initial: Point, point: Point, several: bool) -> list[FittedMode]:
     """Modes of the unloaded tyre, then those on the road."""
     result = []
@@ -619,7 +653,7 @@ def _others(problem: Problem, initial: Point, point: Point, several: bool) -> li
     """All but modes."""
     result = []
     for i, target in enumerate(problem.others):
-        if target.member:
+        if target.member or target.quantity == KNOWLEDGE:
             continue
         fitted = float(point.others[i])
         of = {

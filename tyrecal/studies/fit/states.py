@@ -51,7 +51,7 @@ class NextState:
 
 def state_reports(problem: Problem, point: Point, known: FitUncertainty) -> list[StateReport]:
     """Report on every measured state, in the order of the targets."""
-    own = [None if t in problem.mass else t.state for t in problem.measured]
+    own = [None if t in (*problem.mass, *problem.known) else t.state for t in problem.measured]
     counts = problem.scale > 0
     with np.errstate(divide="ignore", invalid="ignore"):
         off = point.residuals / problem.scale / known.sigma
@@ -129,7 +129,9 @@ def _others(problem: Problem) -> list[TyreState]:
         state.with_defaults(problem.case) for state, labels in problem.labels.items() if labels
     ]
     measured = [
-        t.state.with_defaults(problem.case) for t in problem.measured if t not in problem.mass
+        t.state.with_defaults(problem.case)
+        for t in problem.measured
+        if t not in (*problem.mass, *problem.known)
     ]
     pressures = sorted(p for p in {state.pressure_kPa for state in measured} if p)
     ends = (pressures[0] / STEP_OUT, pressures[-1] * STEP_OUT)

@@ -20,6 +20,7 @@ from ..labelling.label import label
 from ..labelling.result import labels_posterior
 from ..pressing_plan import DESIGNS_OF_FIT, PlannedState, PressingPlan, plan_pressing
 from .calibrate import Fit, FitNotify, calibrate, check, history_csv
+from .free import with_freed, without_freed
 from .prior import PriorProblem
 from .problem import Problem
 from .targets import states_of
@@ -44,12 +45,14 @@ class FitStudy:
         evaluator: Evaluator,
         measured: Path | None = None,
         fixed: Mapping[str, float] | None = None,
+        free: Sequence[str] = (),
         prior: bool = False,
     ):
         """measured: takes the place of the case's targets; fixed: values of variables that are
-        held; prior: see `calibrate`."""
+        held; free: uncertain numbers to free, see `with_freed`; prior: see `calibrate`."""
         self.prior = prior
         self.measured, self.fixed = measured or case.measured, dict(fixed or {})
+        case = with_freed(case, free)
         self._plain = with_values(case, {**start_values(case), **self.fixed})
         self.evaluator = evaluator.of(design_of(self._plain))
         file = self.measured
@@ -150,7 +153,8 @@ class FitStudy:
     def provenance(self) -> dict[str, Any]:
         """The block ``provenance`` of the result."""
         files = [self.measured] if self.measured else []
-        return provenance(self.case, self.evaluator.solver, files, **states_of(self.case))
+        case = without_freed(self.case)
+        return provenance(case, self.evaluator.solver, files, **states_of(self.case))
 
     def _fit_with_labels(self, calibrated: Callable[[], Fit], jobs: int) -> Fit:
         case, evaluator, readings, fixed = self._plain, self.evaluator, self.readings, self.fixed

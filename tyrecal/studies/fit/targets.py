@@ -12,7 +12,10 @@ from ...simulate.modes.loaded import Member
 from ...tyre.case import LoadedCase
 from ...tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ...tyre.state import AS_THE_CASE, TyreState
+from .freed import freed_variables
 
+KNOWLEDGE = "knowledge"  # of a number that the fit frees, see `free`
+KNOWLEDGE_SIGMA = 0.01
 RIM_WORDS = {"springs": "spindle"}  # of provenance
 
 
@@ -59,7 +62,7 @@ class Target:
 @dataclass(frozen=True)
 class ValueTarget:
     """Anything else, with its standard deviation in the same unit: on the road one of
-    `FOOTPRINT_QUANTITIES`, or the frequency of the mode ``member``; the mass."""
+    `FOOTPRINT_QUANTITIES`, or the frequency of the mode ``member``; the mass; ``KNOWLEDGE``."""
 
     quantity: str
     value: float
@@ -136,6 +139,11 @@ def read_mass_targets(case: LoadedCase) -> list[ValueTarget]:
     return [ValueTarget("mass_kg", mass.mass_kg, mass.sigma_kg, mass.weight)] if mass else []
 
 
+def read_known(case: LoadedCase) -> list[ValueTarget]:
+    """Knowledge of each of the numbers that the fit frees, as a target."""
+    return [ValueTarget(KNOWLEDGE, 1.0, KNOWLEDGE_SIGMA) for _ in freed_variables(case)]
+
+
 def states_of(case: LoadedCase) -> dict[str, Any]:
     """The states of all targets, as `provenance` takes them."""
     others = read_road_targets(case) + read_mass_targets(case)
@@ -156,6 +164,6 @@ def rims_of(case: LoadedCase, states: Iterable[TyreState]) -> list[str]:
 
 def objective_unit(case: LoadedCase) -> str:
     """``Hz``, or ``sigma`` where a target has a standard deviation: the objective counts them."""
-    others = read_road_targets(case) + read_mass_targets(case)
+    others = read_road_targets(case) + read_mass_targets(case) + read_known(case)
     modal = any(target.sigma_Hz for target in read_targets(case))
     return "sigma" if modal or others else "Hz"

@@ -30,6 +30,7 @@ from ...measured.measurement import Measurement
 from ...measured.sense import doubts, likeliest_exchange
 from ..fitted import NOT_CONVERGED
 from ..result import ResultPart
+from .targets import KNOWLEDGE
 
 Array = np.ndarray
 FitVerdict = Literal["fits", "does_not_fit", "not_judged", "not_converged"]
@@ -188,6 +189,8 @@ def _values(left: Remainder) -> Iterator[_Suspicion]:
     """Each value left out."""
     weighted, own = left.weight @ left.deviation, np.diag(left.weight)
     for i, row in enumerate(left.rows):
+        if row.quantity == KNOWLEDGE:
+            continue
         if own[i] < MIN_CHECKED / left.covariance[i, i]:
             continue
         model = row.value * float(np.exp(-weighted[i] / own[i]))

@@ -1,0 +1,88 @@
+"""Numbers that a fit frees within what is known of them: variables of that fit alone.
+
+Each is bounded by three of its standard deviations. What is known of it stays a value like those
+that were measured, so that the fit weighs both: q = 1 + 0.01 (x - x0) / s, known to be 1 with a
+standard deviation of 0.01.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from ...errors import InputError
+from ...tyre.case import LoadedCase, number_at
+from ...tyre.case.mistakes import suggestion
+from ...tyre.own_deck.numbers import as_known
+from ..inference.uncertainties import Source, sources
+from .freed import FreedVariable, freed_variables
+
+FREED_WITHIN = 3.0  # standard deviations of what is known
+
+
+def with_freed(case: LoadedCase, names: Sequence[str]) -> LoadedCase:
+    """The case with uncertain numbers, by the name of their uncertainty or by path, as further
+    variables. Raises InputError."""
+    variables: dict[str, Any] = dict(case.case.variables)
+    known = [source for source in sources(case)[0] if not source.field]
+    for name in dict.fromkeys(names):
+        source = _uncertainty(case, name, known)
+        if source.name in case.case.variables:
+            raise InputError(f"{source.name} is an uncertainty and a variable: rename one of them")
+        variables[source.name] = _variable(case, source)
+    return replace(case, case=case.case.model_copy(update={"variables": variables}))
+
+
+def without_freed(case: LoadedCase) -> LoadedCase:
+    """The case as its file has it, with its own variables alone."""
+    freed = freed_variables(case)
+    own = {name: each for name, each in case.case.variables.items() if name not in freed}
+    return replace(case, case=case.case.model_copy(update={"variables": own}))
+
+
+def _uncertainty(case: LoadedCase, name: str, known: Sequence[Source]) -> Source:
+    """The uncertainty that has this name or sets this path. Raises InputError."""
+    path = as_known(name, case.deck_numbers)
+    for source in known:
+        if name == source.name or path in source.steps:
+            return source
+    if name in case.case.variables:
+        raise InputError(f"{name} is a variable of the case, which the fit changes already")
+    names = [source.name for source in known]
+    try:
+        number_at(case, name)
+    except InputError:
+        raise InputError(
+            f"there is no uncertain number '{name}'{suggestion(name, names)}"
+        ) from None
+    for own, variable in case.case.variables.items():
+        if path in variable.sets:
+            raise InputError(
+                f"{name} is set by the variable '{own}', which the fit changes already"
+            )
+    raise InputError(
+        f"nothing is known of {name}: state its standard deviation in the case, as in"
+        f" uncertainties: {{my_number: {{sets: [{name}], percent: 5}}}}"
+    )
+
+
+def _variable(case: LoadedCase, source: Source) -> FreedVariable:
+    """The variable of an uncertainty. Raises InputError where it moves unlike numbers."""
+    values = {float(number_at(case, path)) for path in source.steps}
+    if len(values) > 1 or len(set(source.steps.values())) > 1:
+        raise InputError(
+            f"{source.name} moves numbers of different values together"
+            f" ({', '.join(source.steps)}): give each its own entry in uncertainties to free it"
+        )
+    (start,), sd = values, abs(next(iter(source.steps.values())))
+    lower, upper = start - FREED_WITHIN * sd, start + FREED_WITHIN * sd
+    return FreedVariable(
+        sets=list(source.steps),
+        start=start,
+        lower=lower,
+        upper=upper,
+        percent=100 * sd / abs(start) if start else None,
+        scale="log" if lower > 0 else "linear",
+        sd=sd,
+    )
