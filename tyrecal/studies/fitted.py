@@ -28,12 +28,9 @@ def read_fitted(path: Path, case: LoadedCase) -> tuple[dict[str, float], list[st
     try:
         fit = read_json(path)
         fitted_values = {name: v["value"] for name, v in fit["variables"].items()} | fit["fixed"]
-        freed = {
-            path: fitted_values[name]
-            for name, each in fit.get("freed", {}).items()
-            for path in each["sets"]
-        }
-        for name in fit.get("freed", {}):
+        freed: dict[str, Any] = {}
+        for name, each in fit.get("freed", {}).items():
+            freed |= each["numbers"]
             del fitted_values[name]
         pressure = float(fit["pressure_kPa"])
         of = fit.get("provenance", {})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from numbers import Real
@@ -66,10 +66,14 @@ def set_values(loaded: LoadedCase, values: Mapping[str, Setting]) -> LoadedCase:
         if not isinstance(value, Real) and (not is_word or name in loaded.case.variables):
             shown = as_written(value) if is_word else repr(value)
             raise InputError(f"{name} is {shown}, must be a number")
-        for keys in _keys(loaded, name):
+        variable = loaded.case.variables.get(name)
+        numbers: Sequence[Setting] = [value]
+        if variable and isinstance(value, Real):
+            numbers = variable.numbers(value)
+        for keys, number in zip(_keys(loaded, name), numbers, strict=True):
             if keys in targets:
                 raise InputError(f"{name}: {dotted(keys)} is set twice")
-            targets[keys] = _setting(loaded.case, keys, value)
+            targets[keys] = _setting(loaded.case, keys, number)
     for keys, setting in targets.items():
         branch: Any = tree
         for key in keys[:-1]:

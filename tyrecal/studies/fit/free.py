@@ -68,14 +68,9 @@ def _uncertainty(case: LoadedCase, name: str, known: Sequence[Source]) -> Source
 
 
 def _variable(case: LoadedCase, source: Source) -> FreedVariable:
-    """The variable of an uncertainty. Raises InputError where it moves unlike numbers."""
-    values = {float(number_at(case, path)) for path in source.steps}
-    if len(values) > 1 or len(set(source.steps.values())) > 1:
-        raise InputError(
-            f"{source.name} moves numbers of different values together"
-            f" ({', '.join(source.steps)}): give each its own entry in uncertainties to free it"
-        )
-    (start,), sd = values, abs(next(iter(source.steps.values())))
+    """The variable of an uncertainty."""
+    starts = [float(number_at(case, path)) for path in source.steps]
+    start, sd = starts[0], abs(next(iter(source.steps.values())))
     lower, upper = start - FREED_WITHIN * sd, start + FREED_WITHIN * sd
     return FreedVariable(
         sets=list(source.steps),
@@ -84,5 +79,6 @@ def _variable(case: LoadedCase, source: Source) -> FreedVariable:
         upper=upper,
         percent=100 * sd / abs(start) if start else None,
         scale="log" if lower > 0 else "linear",
-        sd=sd,
+        starts=starts,
+        steps=list(source.steps.values()),
     )

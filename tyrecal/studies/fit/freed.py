@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 from ...tyre.case import LoadedCase
-from ...tyre.case.parts import Positive
 from ...tyre.case.schema import Variable
 
 
 class FreedVariable(Variable):
-    """A number, or several that move together, with the standard deviation of what is known of
-    it, in its own unit."""
+    """A number, and others that move with it as their uncertainty states: the variable's value is
+    the first number's."""
 
-    sd: Positive
+    starts: list[float]  # each number as it is known, in its own unit
+    steps: list[float]  # change of each by one standard deviation
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation of the first number."""
+        return abs(self.steps[0])
 
     def in_sd(self, value: float) -> float:
         """How far a value is from what is known, in standard deviations."""
-        return (value - self.start) / self.sd
+        return (value - self.start) / self.steps[0]
+
+    def numbers(self, value: float) -> list[float]:
+        """Each number: as it is known, and as many of its standard deviations as the first."""
+        z = self.in_sd(value)
+        return [start + step * z for start, step in zip(self.starts, self.steps, strict=True)]
 
 
 def freed_variables(case: LoadedCase) -> dict[str, FreedVariable]:

@@ -279,7 +279,7 @@ class Problem:
         quantities = [1 + KNOWLEDGE_SIGMA * v.in_sd(values[n]) for n, v in self.freed.items()]
         slopes = [
             [
-                KNOWLEDGE_SIGMA / each.sd * v.slope(values[name]) * (v.name == name)
+                KNOWLEDGE_SIGMA / each.steps[0] * v.slope(values[name]) * (v.name == name)
                 for v in self.variables
             ]
             for name, each in self.freed.items()

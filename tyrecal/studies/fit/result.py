@@ -108,10 +108,10 @@ class FittedVariable(ResultPart):
 class FreedNumberFit(ResultPart):
     """A number that the fit freed: the knowledge of it, and how far it moved."""
 
-    sets: list[str]  # paths
-    known: float  # in its own unit
+    known: float  # in its own unit, as its standard deviation
     standard_deviation: float
     shift_in_sd: float
+    numbers: dict[str, float]  # by path: the number, and others that move with it
 
 
 class FittedState(ResultPart):
@@ -276,7 +276,7 @@ class FitResult(Result):
 
     def pass_on(self, given: StudyInput) -> None:
         values = self.fixed | {name: each.value for name, each in self.variables.items()}
-        by_path = {p: values[name] for name, each in self.freed.items() for p in each.sets}
+        by_path = {path: x for each in self.freed.values() for path, x in each.numbers.items()}
         own = {name: values[name] for name in given.designs["initial"]}
         given.designs["fitted"] = own | by_path
         given.responses = FitResponses(
@@ -608,10 +608,10 @@ def _freed(problem: Problem, point: Point) -> dict[str, FreedNumberFit]:
     """The numbers that were freed."""
     return {
         name: FreedNumberFit(
-            sets=each.sets,
             known=each.start,
             standard_deviation=each.sd,
             shift_in_sd=each.in_sd(point.values[name]),
+            numbers=dict(zip(each.sets, each.numbers(point.values[name]), strict=True)),
         )
         for name, each in problem.freed.items()
     }

@@ -62,7 +62,11 @@ def regions(model: Parted, x: Array) -> list[SectionPart]:
     evaluator = model.evaluator.of(TyreDesign(case))
     labels = sorted({label for label, _ in model.rows if label}, key=str)
     own = model.values(x)
-    taken = {path: own[name] for name, v in case.case.variables.items() for path in v.sets}
+    taken = {
+        path: number
+        for name, v in case.case.variables.items()
+        for path, number in zip(v.sets, v.numbers(own[name]), strict=True)
+    }
     design = {**numbers, **taken}
     designs = [model.in_state(state, design, list(numbers)) for state in model.states]
     at: dict[TyreState, LabelledModes] = {}

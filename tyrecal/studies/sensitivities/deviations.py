@@ -20,7 +20,7 @@ from ..inference.observations import observe
 from ..inference.plain_fit import plain_fit
 from ..inference.tyre_model import TyreModel
 from ..inference.uncertainties import Source, calibrated, sources
-from .selection import chi2
+from .selection import Candidates
 
 Array = np.ndarray
 
@@ -74,7 +74,7 @@ def deviations(case: LoadedCase, evaluator: Evaluator, measured: Path, jobs: int
         covariance(observations, by_section, laws) + by_variables,
         tuple(source for source in known if source.field is None),
         constants[:, ~of_section],
-        chi2(exact, r),
+        Candidates.of(r, exact, np.zeros((len(r), 0))).fit([])[0],
         len(observations.y) - len(x),
         observations.left_out,
     )

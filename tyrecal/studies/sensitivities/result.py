@@ -14,7 +14,7 @@ from ...tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ..inference.section_fields import known_from
 from ..result import Cell, Column, CsvRow, Result, ResultPart, StudyInput, Table, csv_text
 from .deviations import deviations
-from .selection import CHANCE, forward_selection
+from .selection import CHANCE, Candidates, likeliest_shifts, select_numbers
 from .table import FREQUENCY_KIND, Sensitivity, kinds_of, loads_of, sensitivities
 
 MIN_SENSITIVITY_SHOWN = (
@@ -28,10 +28,10 @@ class FreedNumber(ResultPart):
 
     name: str  # of the uncertainty
     sets: list[str]  # paths
-    gain: float
-    p_value: float
+    gain: float  # fall of chi2 by freeing it after the others
+    p_value: float  # probability of a gain so large by chance, the choice counted
     shift_in_sd: float  # likeliest, with the others that are freed
-    alike: list[str]  # uncertainties that these data cannot distinguish from it
+    alike: list[str]  # uncertainties that these data do not distinguish from it
 
 
 class UncertainNumber(ResultPart):
@@ -174,7 +174,10 @@ class SensitivitiesResult(Result):
         if selection.next_name:
             last = [f"stop: {selection.next_name}", None, p_value.cell(selection.next_p_value)]
             rows.append([*last, None, None])
-        caption = "chance: probability that the best of all numbers gains as much by chance"
+        caption = (
+            "gain: after the others are freed; chance: probability that the best of all numbers"
+            " gains as much by chance"
+        )
         return Table(columns, rows, "Numbers to free", caption)
 
     def sentences(self) -> list[str]:
@@ -240,7 +243,8 @@ def selection_words(selection: Selection) -> list[str]:
 def select(given: StudyInput, measured: Path) -> Selection:
     """The numbers to free, by a file of measurements. Raises as `deviations`."""
     left = deviations(given.case, given.evaluator, measured, given.jobs)
-    chosen = forward_selection(left.r, left.covariance, left.G)
+    chosen = select_numbers(Candidates.of(left.r, left.covariance, left.G))
+    shifts = likeliest_shifts(left.r, left.covariance, left.G)
     names = [source.name for source in left.numbers]
     sets = [list(source.steps) for source in left.numbers]
     return Selection(
@@ -251,20 +255,20 @@ def select(given: StudyInput, measured: Path) -> Selection:
         known_from=known_from(given.case),
         steps=[
             FreedNumber(
-                name=names[step.place],
-                sets=sets[step.place],
-                gain=step.gain,
-                p_value=step.p_value,
-                shift_in_sd=float(chosen.shifts[step.place]),
-                alike=[names[k] for k in step.alike],
+                name=names[each.place],
+                sets=sets[each.place],
+                gain=each.gain,
+                p_value=each.p_value,
+                shift_in_sd=each.shift,
+                alike=[names[k] for k in each.alike],
             )
-            for step in chosen.steps
+            for each in chosen.numbers
         ],
         next_name=None if chosen.next_place is None else names[chosen.next_place],
         next_p_value=chosen.next_p_value,
         numbers=[
             UncertainNumber(name=name, sets=paths, shift_in_sd=float(shift))
-            for name, paths, shift in zip(names, sets, chosen.shifts_of_all, strict=True)
+            for name, paths, shift in zip(names, sets, shifts, strict=True)
         ],
         left_out=list(left.left_out),
     )

@@ -130,6 +130,10 @@ class Variable(Part):
     percent: Positive | None = None
     scale: Literal["log", "linear"] = "log"
 
+    def numbers(self, value: float) -> list[float]:
+        """The numbers at ``sets`` where the variable has a value."""
+        return [value] * len(self.sets)
+
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
         start, lower, upper = (number(values, key) for key in ("start", "lower", "upper"))
