@@ -1,9 +1,10 @@
 """Constants that nobody calibrates, as the data describe them: reported, and never named as a
 cause.
 
-With z ~ N(0, 1) of each and g its slopes: E z = G^T P r, r the residual of the likeliest fit. An
-effect that the case states as uncertain (``uncertainties``) is such a constant as far as that
-reaches (`evidence.COVERAGE`); only what is beyond is an effect.
+With z ~ N(0, 1) of each and g its slopes: E z = G^T S^-1 r, r the residual of the likeliest fit,
+which has weighed the variables' prior. An effect that the case states as uncertain
+(``uncertainties``) is such a constant as far as that reaches (`evidence.COVERAGE`); only what is
+beyond is an effect.
 """
 
 from __future__ import annotations
@@ -36,11 +37,11 @@ def constants_posterior(diagnosis: Diagnosis) -> list[ConstantShift]:
     d = hypothesis.fitted.d[best]
     effects = {id: e[[best]] for id, e in hypothesis.values.items()}
     r = problem.observations.y - problem.predicted(effects, d[None])[0]
-    P, _, _ = projection(problem, d)
+    _, inverse, _ = projection(problem, d)
     G = problem.mixed @ problem.constants if problem.zeta else problem.constants
     shifts = [
         ConstantShift(name, float(z))
-        for name, z in zip(diagnosis.sources, G.T @ P @ r, strict=True)
+        for name, z in zip(diagnosis.sources, G.T @ inverse @ r, strict=True)
         if not name.startswith(SECTION)
     ]
     return sorted(shifts, key=lambda each: -abs(each.shift_in_sd))

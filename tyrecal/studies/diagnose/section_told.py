@@ -1,7 +1,8 @@
 """The section's fields as the data describe them, where nothing else is wrong.
 
-With z ~ N(0, 1) of each component and g its slopes: E z = G^T P r, cov z = I - G^T P G, r what the
-plain calibration leaves and P what it cannot absorb.
+With z ~ N(0, 1) of each component and g its slopes: E z = G^T S^-1 r, cov z = I - G^T P G, r what
+the plain calibration leaves and P what it cannot absorb. (P r of the deviations at the variables'
+prior is S^-1 r of those at the calibration.)
 """
 
 from __future__ import annotations
@@ -29,11 +30,11 @@ def section_posterior(
     """Meridian and gauges amid each region, the filler's tip, the rim's hold, compounds by part."""
     problem = diagnosis.bare
     columns = [k for k, source in enumerate(sources) if source.field]
-    P, _, _ = projection(problem, diagnosis.hypothesis(NONE).fitted.d[0])
+    P, inverse, _ = projection(problem, diagnosis.hypothesis(NONE).fitted.d[0])
     G = problem.constants[:, columns]
     if problem.zeta:
         G = problem.mixed @ G
-    mean, covariance = G.T @ P @ diagnosis.gap.residuals, np.eye(len(columns)) - G.T @ P @ G
+    mean, covariance = G.T @ inverse @ diagnosis.gap.residuals, np.eye(len(columns)) - G.T @ P @ G
     middles = {name: sum(stations(case.section, name)) // 2 for name, _ in case.section.regions}
     compounds = {name: i for i, name in enumerate(rubber_parts(case).values())}
     known = [source.field for source in sources if source.field]
