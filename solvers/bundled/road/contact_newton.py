@@ -370,7 +370,8 @@ class ContactNewton:
             rise = (v[-1] / scale - float((tangent.of_force * y).sum())) / schur
             return np.append((y - answer * rise).ravel(), rise / scale)
 
-        begin = precondition(right, first) / (float(np.linalg.norm(right)) or 1.0)
+        size = float(np.linalg.norm(right)) or 1.0  # a number that moves nothing has no right side
+        begin = precondition(right, first) / size
         solution, used, left = gmres(product, precondition, right, tolerance, MAX_GMRES, begin)
         return solution[:-1].reshape(shape), float(solution[-1]) * scale, used, left
 
