@@ -81,6 +81,8 @@ def test_a_batch_and_python_give_the_same_numbers(tmp_path: Path) -> None:
         (["--of", "area"], "there is no quantity 'area'"),
         (["--loads-N", "3000"], "give --of a quantity on the road"),
         (["--of", "contact_area", "--loads-N", "3,x"], "must be numbers in N"),
+        (["--solver", "calculix"], "gives no exact sensitivities of this case"),
+        (["--measured", str(CASES / "205_60r15_both.csv")], "the frequency has no label, c and m"),
     ],
 )
 def test_what_cannot_be_is_refused_before_anything_runs(

@@ -71,8 +71,9 @@ def command(
     tyrecal sensitivities cases/205_60r15.yaml --measured cases/205_60r15_mf_swift.csv
     """
     from ..studies.result import StudyInput
+    from ..studies.sensitivities.deviations import measured_values
     from ..studies.sensitivities.result import SensitivitiesResult, loads_on_road
-    from ..studies.sensitivities.table import kinds_of, numbers_of
+    from ..studies.sensitivities.table import kinds_of, needs_gradients, numbers_of
 
     loaded, values = study.load(case, assignments, pressure_kPa)
     kinds_of(kinds), numbers_of(loaded, by)
@@ -83,10 +84,13 @@ def command(
         if not loads_on_road(loaded, kinds, loads_N):
             raise click.UsageError(f"--loads-N {loads}: give --of a quantity on the road too")
     evaluator = study.evaluator(loaded)
+    needs_gradients(evaluator)
     designs = {"initial": values}
     if fitted:
         designs["fitted"] = arguments.fitted_values(fitted, loaded, study.terminal)
     file = measured or loaded.measured
+    if file:
+        measured_values(loaded, file)
     on_road = loads_on_road(loaded, kinds, loads_N)
     files = [file] if file else []
     output = study.run(loaded, "sensitivities", evaluator, measured=files, load_N=on_road or 0.0)

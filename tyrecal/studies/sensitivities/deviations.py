@@ -16,7 +16,7 @@ from ..inference.check_units import check_units
 from ..inference.covariance import covariance
 from ..inference.inverse_problem import Assumed, places
 from ..inference.model import Answer, Query
-from ..inference.observations import observe
+from ..inference.observations import Observations, observe
 from ..inference.plain_fit import plain_fit
 from ..inference.tyre_model import TyreModel
 from ..inference.uncertainties import Source, calibrated, sources
@@ -38,12 +38,8 @@ class Deviations:
     left_out: tuple[str, ...]  # measurements that are not used, and why
 
 
-def deviations(case: LoadedCase, evaluator: Evaluator, measured: Path, jobs: int = 1) -> Deviations:
-    """Deviations from a file of measurements, with the covariance of a diagnosis: scatter, error of
-    the model, and the section's fields, which no number of the case frees.
-
-    Raises InputError, DeckRefused, EvaluationFailed, OSError.
-    """
+def measured_values(case: LoadedCase, measured: Path) -> Observations:
+    """Values of the unloaded tyre in a file. Raises InputError, OSError."""
     readings = in_states(case, readings_of(case, measured))
     if not any(_is_modal(each) for each in readings):
         raise InputError(f"{measured}: it has no frequency of the unloaded tyre")
@@ -52,7 +48,16 @@ def deviations(case: LoadedCase, evaluator: Evaluator, measured: Path, jobs: int
             "a variable of the case sets pressure_kPa, which the measurements state: take it out"
             " of the variables"
         )
-    observations = observe(readings, split=Assumed().split)
+    return observe(readings, split=Assumed().split)
+
+
+def deviations(case: LoadedCase, evaluator: Evaluator, measured: Path, jobs: int = 1) -> Deviations:
+    """Deviations from a file of measurements, with the covariance of a diagnosis: scatter, error of
+    the model, and the section's fields, which no number of the case frees.
+
+    Raises InputError, DeckRefused, EvaluationFailed, OSError.
+    """
+    observations = measured_values(case, measured)
     rows = list(dict.fromkeys(row.row for row in observations.rows))
     known, _ = sources(case)
     model = TyreModel(case, evaluator, rows, known, {}, jobs)

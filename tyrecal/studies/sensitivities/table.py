@@ -97,6 +97,15 @@ def numbers_of(case: LoadedCase, by: Sequence[str]) -> list[str]:
     return names
 
 
+def needs_gradients(evaluator: Evaluator) -> None:
+    """Raises DeckRefused where the solver gives no exact sensitivities of the case."""
+    if not evaluator.has_gradients:
+        raise DeckRefused(
+            f"solver '{evaluator.solver.name}' gives no exact sensitivities of this case: 'tyrecal"
+            " solvers' shows which one does (gradients)"
+        )
+
+
 def sensitivities(
     case: LoadedCase,
     evaluator: Evaluator,
@@ -113,11 +122,7 @@ def sensitivities(
     Raises InputError, DeckRefused, EvaluationFailed.
     """
     kinds, names = kinds_of(of), numbers_of(case, by)
-    if not evaluator.has_gradients:
-        raise DeckRefused(
-            f"solver '{evaluator.solver.name}' gives no exact sensitivities of this case: 'tyrecal"
-            " solvers' shows which one does (gradients)"
-        )
+    needs_gradients(evaluator)
     x = _next_to_0(case, {n: values[n] if n in values else number_at(case, n) for n in names})
     design = {**values, **x}
     refused: dict[str, str] = {}
