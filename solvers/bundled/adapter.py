@@ -113,6 +113,9 @@ class Bundled:
             first, hertz = places[0], [step["modes"][i]["frequency_Hz"] for i in places]
             mode = {key: step["modes"][first][key] for key in ("frequency_Hz", "multiplicity", "n")}
             modes.append({**mode, "amplitude": shapes[first]})
+            ratios = [step["modes"][i].get("damping_ratio") for i in places]
+            if ratios[0] is not None:
+                modes[-1]["damping_ratio"] = sum(ratios) / len(ratios)
             if len(places) > 1:
                 both = {"frequency_Hz": sum(hertz) / 2, "multiplicity": 2, "members": hertz}
                 modes[-1] |= both

@@ -16,6 +16,7 @@ from .deck.request import Request
 from .deck.steps import Deck, DeckStep, Tangent
 from .modes.bordered import Bordered
 from .modes.cavity import GasCavity, read_cavity
+from .modes.damping import loss_forms
 from .modes.frequency_dependent import SelfConsistent
 from .modes.harmonics import HarmonicModes, HasModes, SeededTyre, Vibration, lowest_of_all
 from .modes.sensitivity import ModeShapes, RimAndAir, eigenvalue_rates, state_rate
@@ -128,18 +129,27 @@ class FrequencyStep:
         sensitivities = self.tyre.request.sensitivities
         if not sensitivities:
             return {}, {}
-        # a mode can be a sum of shapes of several harmonics; owner: the mode of each shape
-        forms = [m.forms() for m in modes]
-        n, shapes, owner, eigenvalues = (np.concatenate(x) for x in zip(*forms, strict=True))
-        before = np.cumsum([0, *(len(values) for *_, values in forms[:-1])])
-        owner += np.repeat(before, [len(own) for _, _, own, _ in forms])
-        fields = ModeShapes(n, shapes, owner)
+        fields, eigenvalues = _fields(modes)
         by_variable = {
             v: self._rates(rows, modes, fields, eigenvalues) for v, rows in sensitivities.items()
         }
         return {v: rates for v, (rates, _) in by_variable.items()}, {
             v: mass for v, (_, mass) in by_variable.items()
         }
+
+    def damping(self, modes: list[HarmonicModes]) -> list[Array] | None:
+        """Damping ratios, one array per entry of ``modes``; None if no material has a loss
+        factor."""
+        if not self.model.lossy:
+            return None
+        fields, eigenvalues = _fields(modes)
+        forms = loss_forms(self.model, self.tyre.U, fields, eigenvalues)
+        # a growth of K at the rate of the losses changes lambda at twice the rate of damping
+        constant = SeededTyre(self.model, spin(self.model, self.step), self.tyre.attached())
+        return [
+            rates / (2 * m.eigenvalues)
+            for m, rates in zip(modes, _of_modes(modes, forms, constant), strict=True)
+        ]
 
     def _static_factor(self) -> Factor:
         """Factor of the static tangent at U, for dU / d variable; the vibration's if it is the same
@@ -178,13 +188,27 @@ class FrequencyStep:
         forms = eigenvalue_rates(moving, U, V, acting, fields, eigenvalues, rim_and_air)
         attached = read_point_elements(revolve, moving.mesh)
         tyre = SeededTyre(moving, spin(self.model, step), attached)
-        each = np.split(forms, np.cumsum([len(m.eigenvalues) for m in modes])[:-1])
         mass = (total_mass(moving) + attached.total_kg).imag / COMPLEX_STEP
-        rates = [
-            m.combination.rates(its, tyre) if m.combination else its
-            for m, its in zip(modes, each, strict=True)
-        ]
-        return rates, float(mass)
+        return _of_modes(modes, forms, tyre), float(mass)
+
+
+def _fields(modes: list[HarmonicModes]) -> tuple[ModeShapes, Array]:
+    """All modes as sums of shapes, as one mode can have several harmonics, and their
+    eigenvalues."""
+    forms = [m.forms() for m in modes]
+    n, shapes, owner, eigenvalues = (np.concatenate(x) for x in zip(*forms, strict=True))
+    before = np.cumsum([0, *(len(values) for *_, values in forms[:-1])])
+    owner += np.repeat(before, [len(own) for _, _, own, _ in forms])
+    return ModeShapes(n, shapes, owner), eigenvalues
+
+
+def _of_modes(modes: list[HarmonicModes], forms: Array, tyre: SeededTyre) -> list[Array]:
+    """d lambda, one array per entry of ``modes``, from the forms of all modes."""
+    each = np.split(forms, np.cumsum([len(m.eigenvalues) for m in modes])[:-1])
+    return [
+        m.combination.rates(its, tyre) if m.combination else its
+        for m, its in zip(modes, each, strict=True)
+    ]
 
 
 def _model(tyre: Inflated, step: DeckStep, dynamic_Hz: float | None, own: bool) -> Model:

@@ -116,7 +116,8 @@ class Job:
                 else:
                     work = FrequencyStep(self.tyre, place, step)
                     modes = work.modes()
-                    results.append(self._result(step, modes, *work.rates(modes)))
+                    rates = work.rates(modes)
+                    results.append(self._result(step, modes, *rates, work.damping(modes)))
         if not results:
             with self._slower(self.steps[-1]):
                 self._judge(self.steps[-1])
@@ -286,6 +287,7 @@ class Job:
         modes: list[HarmonicModes],
         rates: dict[str, list[np.ndarray]],
         mass_rates: dict[str, float],
+        damping: list[np.ndarray] | None = None,
     ) -> StepResult:
         return StepResult(
             step.number,
@@ -296,6 +298,7 @@ class Job:
             self.tyre.U,
             self.factorisations,
             mass_rates,
+            damping,
         )
 
     def _check_time(self) -> None:

@@ -2,7 +2,8 @@
 
 JOB.json: ``steps`` [{step, pressure_Pa, mass_kg, factorisations, modes [{n, frequency_Hz,
 eigenvalue, multiplicity; where doublets have split, which doublet of its harmonic from 0 on,
-and which member of it, 1 or 2}], sensitivities {variable: [d f / d variable, Hz per unit]},
+and which member of it, 1 or 2; damping_ratio where a material has a loss factor}],
+sensitivities {variable: [d f / d variable, Hz per unit]},
 mass_sensitivities {variable: kg per unit}}].
 JOB.npz: ``nodes`` (k,), ``points`` (k, 2) R, Z in m, and per step S ``displacement_S`` (k, 3) and
 ``shapes_S`` (modes, k, 3): complex amplitudes of u = Re[U exp(i n Theta)] in r, theta, z, scaled
@@ -36,6 +37,7 @@ class StepResult:
     U: Array
     factorisations: int
     mass_rates: dict[str, float] = field(default_factory=dict)  # variable to d mass, kg
+    damping: list[Array] | None = None  # damping ratios per harmonic; None: no loss factor is known
 
 
 def write(stem: Path, model: Model, results: list[StepResult]) -> None:
@@ -59,6 +61,8 @@ def write(stem: Path, model: Model, results: list[StepResult]) -> None:
                 "eigenvalue": value,
                 "multiplicity": 1 if members is not None else 2 if n else 1,
             }
+            if result.damping is not None:
+                line["damping_ratio"] = float(result.damping[i][j])
             if members is not None:
                 line |= {"doublet": j // 2, "member": int(members[j])}
             lines.append(line)

@@ -403,6 +403,15 @@ MODEL_RULES: dict[str, KeywordRule] = {
         },
         calculix="its hyperelastic rubber does not relax",
     ),
+    # of materials, masses and springs; it changes no frequency
+    "DAMPING": KeywordRule(
+        "model part step",
+        "ALPHA=number; BETA=number; COMPOSITE=number; STRUCTURAL=number",
+        rows=NO_ROWS,
+        needs=("ALPHA|BETA|COMPOSITE|STRUCTURAL",),
+        honoured={"section": "STRUCTURAL"},
+        is_output=True,
+    ),
     "ACOUSTIC MEDIUM": KeywordRule(
         "model",
         "BULK MODULUS",

@@ -22,7 +22,6 @@ OTHER_KEYWORDS: dict[str, KeywordRule] = {
         is_output=True,
     ),
     **_unjudged("model part", "INTEGRATED OUTPUT SECTION", is_output=True),
-    **_unjudged("model part step", "DAMPING", is_output=True),
     **_unjudged("model", "CONDUCTIVITY, SPECIFIC HEAT", is_output=True),
     "PARAMETER": KeywordRule(
         "model part", is_judged=False, honoured={"deck": ""}, calculix="it has no parameters"

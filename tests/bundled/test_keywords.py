@@ -109,7 +109,7 @@ def test_hourglass_stiffness_is_of_the_section_above_it() -> None:
     ("old", "new", "line", "words"),
     [
         ("*DENSITY\n", "*HOURGLASS STIFFNESS\n3E4\n*DENSITY\n", 17, "directly under its *SOLID"),
-        ("*DENSITY", "*DAMPING", 17, "DAMPING"),
+        ("*DENSITY", "*CONDUCTIVITY", 17, "CONDUCTIVITY"),
         ("*NODE, NSET=ALL", "*NODE, NSET=ALL, SYSTEM=C", 4, "SYSTEM"),
         ("TYPE=CGAX4R", "TYPE=CGAX5R", 9, "CGAX5R"),
         ("4, 0.2, 0.1", "3, 0.2, 0.1", 8, "node 3 is defined twice"),

@@ -25,9 +25,14 @@ from .result import (
 if TYPE_CHECKING:
     from ..simulate.evaluate.evaluator import Evaluator
 
-EXTRA = {  # forms
-    **{"sliding_Hz": ".2f", "grip_mm": ".2f", "symmetry": ""},
-    **{"member": ".0f", "clarity": ".2f", "overlap": ".2f"},
+EXTRA = {  # further columns of the table
+    "damping_ratio": Column("damping %", ".2f", 100),
+    "sliding_Hz": Column("sliding_Hz"),
+    "grip_mm": Column("grip_mm"),
+    "symmetry": Column("symmetry", ""),
+    "member": Column("member", ".0f"),
+    "clarity": Column("clarity"),
+    "overlap": Column("overlap"),
 }
 
 
@@ -61,6 +66,8 @@ class ModesResult(Result):
         for mode in self.modes:
             member = f" member {mode.member}" if mode.member else ""
             numbers[f"frequency_Hz {mode.label}{member}"] = mode.frequency_Hz
+            if mode.damping_ratio is not None:
+                numbers[f"damping_ratio {mode.label}{member}"] = mode.damping_ratio
         return numbers
 
     def csv(self) -> str:
@@ -70,9 +77,8 @@ class ModesResult(Result):
         return csv_text(list(dict.fromkeys(["c", "m", "kind", *known])), rows)
 
     def tables(self) -> list[Table]:
-        known = ("sliding_Hz", "grip_mm", "symmetry", "member", "clarity", "overlap")
-        extra = [key for key in known if any(getattr(m, key) is not None for m in self.modes)]
-        columns = [*NAME_COLUMNS, Column("Hz"), *(Column(key, EXTRA[key]) for key in extra)]
+        extra = [key for key in EXTRA if any(getattr(m, key) is not None for m in self.modes)]
+        columns = [*NAME_COLUMNS, Column("Hz"), *(EXTRA[key] for key in extra)]
         rows = [
             [
                 *m.named(),
@@ -145,5 +151,6 @@ def mode_entry(mode: Mode) -> dict[str, Any]:
         "kind": mode.label.kind,
         "frequency_Hz": mode.frequency_Hz,
         "multiplicity": mode.multiplicity,
+        **({} if mode.raw.damping_ratio is None else {"damping_ratio": mode.raw.damping_ratio}),
         "clarity": round(float(mode.clarity), 6),
     }

@@ -305,6 +305,7 @@ class ModeEntry(Named):
     """A mode of modes.json or of a sweep."""
 
     multiplicity: int = 1
+    damping_ratio: float | None = None  # fraction of critical damping
     clarity: float | None = None  # of its label, 0 to 1
     member: int | None = None  # of a split doublet
     symmetry: str | None = None  # about the patch

@@ -142,6 +142,9 @@ USUAL: dict[str, Usual] = {
     "materials.*.prony.*.g": Usual(0, 0.95, "", SHARE),
     "materials.*.prony.*.k": Usual(0, 0.95, "", SHARE),
     "materials.*.prony.*.tau_s": Usual(1e-7, 1e5, "s", {"ms": 1e-3}),
+    "materials.*.loss_factor": Usual(0, 1, "", SHARE, reason=" of rubber"),
+    "materials.*.loss_factor.*.0": Usual(0.01, 1e5, "Hz", FREQUENCY),
+    "materials.*.loss_factor.*.1": Usual(0, 1, "", SHARE, reason=" of rubber"),
     "materials.*.reference_frequency_Hz": Usual(0.1, 1000, "Hz", FREQUENCY),
     # textile cords 1 to 25 GPa, aramid 60 to 130, steel 150 to 210: see `cord_modulus`
     "materials.*.youngs_modulus_Pa": Usual(5e8, 3e11, "Pa", STRESS),
@@ -382,7 +385,7 @@ def _ranges(
 
 def _of_series(usual: Usual, data: Mapping[str, Any], keys: Keys, value: float) -> Usual:
     """The range of a Prony term's number beside the other terms; of any other number, ``usual``."""
-    if keys[0] != "materials" or len(keys) != 5:
+    if keys[0] != "materials" or keys[2] != "prony" or len(keys) != 5:
         return usual
     series = _value(data, keys[:3])
     terms = [term for term in series if isinstance(term, dict)] if isinstance(series, list) else []

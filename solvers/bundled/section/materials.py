@@ -1,8 +1,9 @@
-"""Materials of a deck: rubber with Prony terms or a table of moduli, elastic cords, a gas."""
+"""Materials of a deck: rubber with Prony terms or a table of moduli, elastic cords, a gas; their
+loss factors."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,6 +13,7 @@ from .laws.data_lines import read_law
 from .laws.hyperelastic import Hyperelastic
 from .laws.linear_elastic import LinearElastic
 
+Array = np.ndarray
 Scalar = complex | float  # complex where it carries the tangent of a slope (`sensitivity`)
 
 
@@ -43,6 +45,27 @@ class ModulusTable:
         return i, float(np.clip((f - table[i]) / (table[i + 1] - table[i]), 0.0, 1.0))
 
 
+@dataclass(frozen=True)
+class LossFactor:
+    """Loss over storage modulus of a material: ``structural``, of all its stiffness, and what a
+    table adds to it by frequency."""
+
+    structural: float = 0.0
+    frequency_Hz: tuple[float, ...] = ()  # rising; empty: there is no table
+    shear: tuple[float, ...] = ()
+    bulk: tuple[float, ...] = ()
+
+    def at(self, frequency_Hz: Array) -> tuple[Array, Array]:
+        """Loss factors of shear and bulk at frequencies, linear in ln f between the table's rows,
+        constant beyond its ends."""
+        whole = np.full(np.shape(frequency_Hz), self.structural)
+        if not self.frequency_Hz:
+            return whole, whole
+        place, table = np.log(np.maximum(frequency_Hz, 1e-12)), np.log(self.frequency_Hz)
+        shear, bulk = (np.interp(place, table, own) for own in (self.shear, self.bulk))
+        return whole + shear, whole + bulk
+
+
 @dataclass
 class Material:
     """Constants as the deck gives them."""
@@ -56,6 +79,7 @@ class Material:
     instantaneous: bool = False  # the moduli are those of sudden loading
     prony: list[tuple[Scalar, Scalar, Scalar]] = field(default_factory=list)  # g, k, tau in s
     table: ModulusTable | None = None  # in place of a Prony series
+    loss: LossFactor | None = None  # None: not known
     bulk_modulus: Scalar | None = None  # Pa, of a gas
     tension_only: bool = False  # a cord that bears no compression
 
@@ -140,6 +164,7 @@ def _hyperelastic(m: Material, k: Block) -> None:
 def _viscoelastic(m: Material, k: Block) -> None:
     if "FREQUENCY" in k.parameters:
         m.table = _modulus_table(k)
+        m.loss = _with_losses(m, k)
         return
     for row in k.rows:
         m.prony.append((row.value(0, 0.0), row.value(1, 0.0), row.value(2)))
@@ -150,8 +175,7 @@ def _viscoelastic(m: Material, k: Block) -> None:
 
 
 def _modulus_table(k: Block) -> ModulusTable:
-    """Rows of loss and storage: G''/G0, 1 - G'/G0, K''/K0, 1 - K'/K0, frequency in Hz. A
-    vibration without damping has no use for the losses."""
+    """Rows of loss and storage: G''/G0, 1 - G'/G0, K''/K0, 1 - K'/K0, frequency in Hz."""
     frequency = [row.number(4) for row in k.rows]
     ratios = [1 - row.value(1, 0.0) for row in k.rows]
     if len(frequency) < 2 or any(b <= a for a, b in pairwise([0.0, *frequency])):
@@ -159,6 +183,27 @@ def _modulus_table(k: Block) -> ModulusTable:
     if any(np.real(ratio) <= 0 for ratio in ratios) or any(row.value(3, 0.0) for row in k.rows):
         raise DeckError(k.place, "shear moduli of a table are positive, and the bulk modulus stays")
     return ModulusTable(tuple(frequency), tuple(ratios))
+
+
+def _with_losses(m: Material, k: Block) -> LossFactor | None:
+    """The loss factors of a table of moduli besides those that the material has."""
+    assert m.table is not None
+    losses = [[row.number(i, 0.0) for i in (0, 2)] for row in k.rows]
+    if any(each < 0 for row in losses for each in row):
+        raise DeckError(k.place, "losses of a table must not be negative")
+    if not any(map(any, losses)):
+        return m.loss
+    storage = np.real(m.table.ratios)
+    shear, bulk = np.array(losses).T / np.array([storage, np.ones_like(storage)])
+    structural = m.loss.structural if m.loss else 0.0
+    return LossFactor(structural, m.table.frequency_Hz, tuple(shear), tuple(bulk))
+
+
+def _damping(m: Material, k: Block) -> None:
+    structural = k.number("STRUCTURAL")
+    if structural is None or structural < 0:
+        raise DeckError(k.place, "*DAMPING needs STRUCTURAL=, a loss factor of 0 or more")
+    m.loss = replace(m.loss or LossFactor(), structural=structural)
 
 
 def _positive(k: Block, index: int, what: str) -> Scalar:
@@ -182,6 +227,7 @@ def _acoustic(m: Material, k: Block) -> None:
 
 _READERS = {
     "ACOUSTIC MEDIUM": _acoustic,
+    "DAMPING": _damping,
     "DENSITY": _density,
     "ELASTIC": _elastic,
     "HYPERELASTIC": _hyperelastic,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from ...language.text import Block
 from .half_mesh import half_mesh
 from .laws.energy_law import EnergyLaw
-from .materials import ModulusTable, read_materials
+from .materials import Material, ModulusTable, read_materials
 from .mesh import DeckMesh, read_mesh
 from .parts import cords, membrane, rubber
 from .parts.elastic import Elastic
@@ -24,6 +24,7 @@ class Model:
     mesh: DeckMesh
     parts: list[TyrePart]
     tables: list[ModulusTable] = field(default_factory=list)  # moduli at each mode's own frequency
+    lossy: list[Material] = field(default_factory=list)  # materials with a loss factor
 
     def with_laws(self, change: Callable[[EnergyLaw], EnergyLaw]) -> Model:
         """The model with changed laws."""
@@ -38,6 +39,12 @@ class Model:
             for i in range(len(self.tables))
         ]
         return [replace(self, parts=[p for p in parts if p is not None]) for parts in grown]
+
+    def material_parts(self, compound: int, modulus: int) -> list[TyrePart]:
+        """The parts of the stiffness that are proportional to a modulus (0: shear, 1: bulk) of a
+        lossy material, without its initial stress."""
+        parts = [part.material_part(compound, modulus) for part in self.parts]
+        return [part for part in parts if part is not None]
 
 
 def build(
@@ -63,5 +70,6 @@ def build(
     materials = read_materials(keywords)
     known = [m.table for m in materials.values() if m.table is not None]
     tables = list(dict.fromkeys(known)) if own_frequency else []
-    job = SectionJob(keywords, mesh, materials, tables, dynamic_Hz, long_term)
-    return Model(mesh, [part for read in READERS for part in read(job)], tables)
+    lossy = [m for m in materials.values() if m.loss is not None]
+    job = SectionJob(keywords, mesh, materials, tables, lossy, dynamic_Hz, long_term)
+    return Model(mesh, [part for read in READERS for part in read(job)], tables, lossy)

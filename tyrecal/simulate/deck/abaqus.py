@@ -130,7 +130,7 @@ def _material(material: Any, analysis: Analysis) -> dict[str, Any]:
             "density": material.density_kg_per_m3,
             "bears_compression": material.bears_compression,
         }
-    if material.frequency_exponent:
+    if material.frequency_exponent or isinstance(material.loss_factor, list):
         return frequency_rubber(material, analysis)
     return {
         "kind": "rubber",
@@ -140,6 +140,7 @@ def _material(material: Any, analysis: Analysis) -> dict[str, Any]:
         "moduli": material.moduli.upper().replace("_", " "),
         "storage": [],
         "prony": [{"g": t.g, "k": t.k, "tau": t.tau_s} for t in material.prony],
+        "damping": material.loss_factor,
         "density": material.density_kg_per_m3,
     }
 
@@ -284,7 +285,8 @@ def gas_material(case: Case) -> dict[str, Any] | None:
 
 def frequency_rubber(m: Rubber, analysis: Analysis) -> dict[str, Any]:
     """Constants of the inflated state as long-term ones, and the shear modulus over frequency:
-    G(f)/G0 = (f / f_ref)^beta times the Prony series' at the vibration frequency."""
+    G(f)/G0 = (f / f_ref)^beta times the Prony series' at the vibration frequency; with the losses
+    of a table of loss factors."""
     shear, bulk = 1 - sum(t.g for t in m.prony), 1 - sum(t.k for t in m.prony)
     static = (1.0, 1.0)
     if m.moduli != analysis.static_moduli:
@@ -294,6 +296,13 @@ def frequency_rubber(m: Rubber, analysis: Analysis) -> dict[str, Any]:
         squares = [(2 * np.pi * analysis.vibration_frequency_Hz * t.tau_s) ** 2 for t in m.prony]
         dynamic = shear + sum(t.g * x / (1 + x) for t, x in zip(m.prony, squares, strict=True))
         level = dynamic / (shear if analysis.static_moduli == "long_term" else 1.0)
+    hertz = TABLE_HZ if m.frequency_exponent else np.zeros(0)
+    loss, damping = np.zeros(len(hertz)), m.loss_factor
+    if isinstance(damping, list):
+        known, factors = np.array(damping).T
+        hertz = np.unique([*hertz, *known])
+        loss, damping = np.interp(np.log(hertz), np.log(known), factors), None
+    ratios = [level * (f / m.reference_frequency_Hz) ** m.frequency_exponent for f in hertz]
     return {
         "kind": "rubber",
         "C10": m.C10_Pa * static[0],
@@ -304,10 +313,13 @@ def frequency_rubber(m: Rubber, analysis: Analysis) -> dict[str, Any]:
         "storage": [
             {
                 "frequency": float(f),
-                "shear": 1 - float(level * (f / m.reference_frequency_Hz) ** m.frequency_exponent),
+                "shear": 1 - float(ratio),
+                "shear_loss": float(ratio * factor),
+                "bulk_loss": float(factor),
             }
-            for f in TABLE_HZ
+            for f, ratio, factor in zip(hertz, ratios, loss, strict=True)
         ],
+        "damping": damping,
         "density": m.density_kg_per_m3,
     }
 

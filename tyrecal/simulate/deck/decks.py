@@ -220,6 +220,8 @@ def _slopes(file: str, above: str, below: str, width: float) -> list[tuple[int, 
             keyword = one.split(",")[0].upper()
         if one == other or one.startswith("**") or keyword == "*HEADING":
             continue
+        if keyword == "*DAMPING":  # no frequency depends on it
+            continue
         try:
             if one.startswith("*"):
                 raise ValueError("a keyword line")

@@ -49,6 +49,7 @@ class _Mode(_Part):
     amplitude: Annotated[Any, of.shaped("c" + of.REAL, None, 3)] = None
     displacement: Annotated[Any, of.shaped(of.REAL, None, 3, nan=True)] = None
     members: of.HertzPair | None = None
+    damping_ratio: of.Finite | None = None
 
     @property
     def points(self) -> int:

@@ -45,6 +45,7 @@ class RawMode:
     shape: HarmonicShape | RingShape
     multiplicity: int
     members: tuple[float, float] | None = None
+    damping_ratio: float | None = None  # fraction of critical damping; None: not known
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,8 @@ def evaluation(answer: dict[str, Any]) -> Evaluation:
         else:
             shape = RingShape(points, np.ascontiguousarray(mode["displacement"]))
         members = tuple(mode["members"]) if mode.get("members") else None
-        modes.append(RawMode(mode["frequency_Hz"], shape, mode["multiplicity"], members))
+        hertz, damping = mode["frequency_Hz"], mode.get("damping_ratio")
+        modes.append(RawMode(hertz, shape, mode["multiplicity"], members, damping))
     return Evaluation(
         pressure_kPa=answer["pressure_Pa"] / 1e3,
         mass_kg=answer["mass_kg"],

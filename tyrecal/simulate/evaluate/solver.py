@@ -53,7 +53,8 @@ class Solver(Protocol):
         """pressure_Pa, mass_kg, modes [{frequency_Hz, multiplicity, n, amplitude}], gradients
         {variable: [Hz per unit]}, nodes, points, displacement and,
         for fits to the mass, mass_gradients {variable: kg per unit}. A doublet that is split is one
-        mode of multiplicity 2 at the mean frequency, with ``members`` [Hz, Hz].
+        mode of multiplicity 2 at the mean frequency, with ``members`` [Hz, Hz]. Where a loss factor
+        is known, each mode has its damping_ratio, a fraction of critical damping.
 
         A solver in three dimensions gives each mode {frequency_Hz, multiplicity 1, displacement
         (k, 3)} at ``points`` (k, 3), as in `RingShape`; pairs are joined by the tool.

@@ -253,7 +253,7 @@ def pair_rings(modes: Sequence[RawMode], tolerance: float = 5e-3) -> list[RawMod
         if best < 1.5:  # a pair differs by its split, two orders in all their shares: by 2
             used.add(partner)
             mean = (mode.frequency_Hz + waiting[partner].frequency_Hz) / 2
-            mode = RawMode(mean, mode.shape, 2)
+            mode = RawMode(mean, mode.shape, 2, damping_ratio=mode.damping_ratio)
         joined.append(mode)
     return sorted(joined, key=lambda mode: mode.frequency_Hz)
 

@@ -5,14 +5,17 @@ before them the kinds of number and text, and the model, that all parts of a cas
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     AfterValidator,
     BaseModel,
     ConfigDict,
+    Discriminator,
     Field,
     StringConstraints,
+    Tag,
     model_validator,
 )
 from pydantic_core import PydanticCustomError
@@ -98,12 +101,22 @@ class Prony(Part):
     tau_s: Annotated[Positive, Field(ge=1e-9, le=1e9)]
 
 
+LossRow = Annotated[list[NotNegative], Field(min_length=2, max_length=2)]  # Hz, loss factor
+NUMBER_OR_TABLE = "number", "table"
+Loss = Annotated[
+    Annotated[NotNegative, Tag("number")]
+    | Annotated[list[LossRow], Field(min_length=2), Tag("table")],
+    Discriminator(lambda value: NUMBER_OR_TABLE[isinstance(value, list)]),
+]
+
+
 class Rubber(Part):
     """Mooney-Rivlin: C10 (I1 - 3) + C01 (I2 - 3) + (J - 1)^2 / D1, with a Prony series.
 
     ``moduli`` says whether the constants are those of relaxed or of instantaneous rubber. In a
     mode of frequency f the shear modulus is (f / reference_frequency_Hz)^frequency_exponent times
-    as large.
+    as large. ``loss_factor``: loss over storage modulus in a vibration, or a table of it, rows of
+    frequency (Hz) and loss factor; None: not known. It changes no frequency.
     """
 
     kind: Literal["rubber"]
@@ -114,6 +127,7 @@ class Rubber(Part):
     prony: list[Prony] = Field(default_factory=list)
     frequency_exponent: Annotated[float, Field(ge=0, le=0.5)] = 0.0
     reference_frequency_Hz: Frequency = 60.0
+    loss_factor: Loss | None = None
     density_kg_per_m3: Positive
 
     @classmethod
@@ -121,13 +135,23 @@ class Rubber(Part):
         c10, c01 = number(values, "C10_Pa"), number(values, "C01_Pa")
         if c10 is not None and c01 is not None and not c10 + c01 > 0:
             yield "C10_Pa", f"must be greater than -C01_Pa, C10_Pa + C01_Pa is {c10 + c01:g}"
+        terms = values.get("prony")
+        terms = terms if isinstance(terms, list) else []
         for share in "gk":
-            terms = values.get("prony")
-            terms = terms if isinstance(terms, list) else []
             total = sum(number(dict(term), share) or 0 for term in terms if term is not WRONG)
             if total > MAX_RELAXED:
                 least = f"must have a sum of all {share} of at most {MAX_RELAXED:g}"
                 yield "prony", f"{least}, got {total:.9g}"
+        table = values.get("loss_factor")
+        if isinstance(table, list):
+            hertz = [row[0] for row in table if row is not WRONG and WRONG not in row]
+            if any(b <= a for a, b in pairwise([0.0, *hertz])):
+                yield (
+                    "loss_factor",
+                    "must have rows [Hz, loss factor], their frequencies rising from above 0",
+                )
+            if any(number(dict(term), "k") for term in terms if term is not WRONG):
+                yield "loss_factor", "must be one number where a term of prony has a k above 0"
 
 
 class Cord(Part):

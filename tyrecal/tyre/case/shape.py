@@ -13,7 +13,17 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 
 from .mistakes import Keys, suggestion
-from .parts import WRONG, Cord, DeckSource, Part, RebarLayer, Rim, Rubber, SectionSource
+from .parts import (
+    NUMBER_OR_TABLE,
+    WRONG,
+    Cord,
+    DeckSource,
+    Part,
+    RebarLayer,
+    Rim,
+    Rubber,
+    SectionSource,
+)
 from .schema import Case, Road, TargetFootprint, TargetMode, Targets, Uncertainty, Variable
 
 UNIONS = (Union, UnionType)
@@ -63,6 +73,8 @@ def explain(
         if keys[:1] == ("materials",) and len(keys) > 2 and keys[2] in KINDS:
             # pydantic names the kind between the material and its key
             keys, material = (*keys[:2], *keys[3:]), KINDS[str(keys[2])]
+        if "loss_factor" in keys:  # pydantic names its type, too
+            keys = tuple(key for key in keys if key not in NUMBER_OR_TABLE)
         if keys[-1:] == ("[key]",):
             yield keys[:-1], NAME
         elif kind == "extra_forbidden":

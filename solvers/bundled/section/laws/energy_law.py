@@ -55,6 +55,11 @@ class EnergyLaw(ABC):
         part."""
         return None
 
+    def material_part(self, compound: int, modulus: int) -> Self | None:
+        """The part of the tangent that is proportional to a modulus (0: shear, 1: bulk) of the
+        model's lossy material number ``compound``; None: no part."""
+        return None
+
     def at_stations(self, points: int, stations: int) -> Self:
         """The law with the constants of ``points`` Gauss points repeated for every station."""
 

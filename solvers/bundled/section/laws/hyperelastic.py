@@ -40,6 +40,8 @@ class Hyperelastic(EnergyLaw):
     bulk_ratio: Array | None = None
     # place in the model's modulus tables, -1 = none
     table: Array | None = None
+    # place among the model's materials with a loss factor, -1 = none; None: there are none
+    compound: Array | None = None
     # not so: the tangent is without the initial stress, as that of a ratio has it
     stressed: bool = True
     # dU/dJ as a hybrid element has it, Pa, which does not change with J; None: the law's own
@@ -153,6 +155,17 @@ class Hyperelastic(EnergyLaw):
 
     def frequency_dependent_part(self, table: int) -> Self:
         own = self.scaled(self.table == table, 0.0)
+        return replace(own, shear_ratio=None, bulk_ratio=None, stressed=False)
+
+    def material_part(self, compound: int, modulus: int) -> Self | None:
+        if self.compound is None or compound not in self.compound:
+            return None
+        share = [self.compound == compound, np.zeros(1)]
+        ratios = [1.0 if r is None else r for r in (self.shear_ratio, self.bulk_ratio)]
+        shear, bulk = (
+            r * s for r, s in zip(ratios, share if not modulus else share[::-1], strict=True)
+        )
+        own = self.scaled(shear, bulk)
         return replace(own, shear_ratio=None, bulk_ratio=None, stressed=False)
 
 

@@ -190,6 +190,10 @@ def _layer(job: SectionJob, k: Block, row: Row, lines: Lines) -> _Layer:
     if material.prony or material.table is not None:
         words = f"material {material.name} of a rebar layer is *VISCOELASTIC: cords do not relax"
         raise DeckError(row.place, words)
+    if material in job.lossy:
+        raise DeckError(
+            row.place, f"the damping of material {material.name}, of cords, is not honoured"
+        )
     if not (np.real(area) > 0 and np.real(spacing) > 0):
         raise DeckError(row.place, "area and spacing of a layer must be positive")
     angle = row.value(5, 0.0) * np.pi / 180

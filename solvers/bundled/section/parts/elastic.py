@@ -81,6 +81,10 @@ class Elastic(TyrePart):
         law = self.law.frequency_dependent_part(table)
         return None if law is None else replace(self, law=law)
 
+    def material_part(self, compound: int, modulus: int) -> TyrePart | None:
+        law = self.law.material_part(compound, modulus)
+        return None if law is None else replace(self, law=law)
+
     def at_stations(self, nodes: int) -> AtStations:
         return ElasticAtStations(self, nodes)
 

@@ -47,6 +47,10 @@ def _sections(job: SectionJob) -> Iterator[tuple[str, np.ndarray, Hyperelastic, 
         if material.table in job.tables:
             words = f"material {material.name} of a membrane needs a Prony series, no table"
             raise DeckError(k.place, words)
+        if material in job.lossy:
+            raise DeckError(
+                k.place, f"the damping of material {material.name}, of a membrane, is not honoured"
+            )
         if not np.real(thickness) > 0:
             raise DeckError(k.place, "the thickness of a membrane must be positive")
         law = law.scaled(*material.static_scale(job.long_term))

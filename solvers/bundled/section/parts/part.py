@@ -56,6 +56,11 @@ class TyrePart(ABC):
         no part."""
         return None
 
+    def material_part(self, compound: int, modulus: int) -> TyrePart | None:
+        """The part of its stiffness that is proportional to a modulus (0: shear, 1: bulk) of the
+        model's lossy material number ``compound``; None: no part."""
+        return None
+
     def form(self, U: Array, fields: ModeShapes) -> Array:
         """phi^H K phi (m,) of the modes phi. K0 and K2 are symmetric, K1 antisymmetric, so that
         (a - i b)^T K(n) (a + i b) = a.K0 a + b.K0 b + n^2 (a.K2 a + b.K2 b) + 2 n b.K1 a."""
@@ -247,6 +252,7 @@ class SectionJob:
     mesh: DeckMesh
     materials: dict[str, Material]
     tables: list[ModulusTable]  # whose rubber keeps its static modulus: the table is the model's
+    lossy: list[Material]  # with a loss factor
     dynamic_Hz: float | None  # at which the vibration's modulus is evaluated; None = static
     long_term: bool  # the static state is relaxed, else its moduli are the instantaneous ones
 

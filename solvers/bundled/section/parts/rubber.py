@@ -109,8 +109,9 @@ def _of_one_law(
         hold = section.hourglass
         if hold is None:
             hold = hourglass.SHARE_OF_SHEAR_MODULUS * np.ravel(laws[-1].shear_modulus)[0]
-        table.append([*ratio, material.density, hold, place])
-    shear, bulk, density, hold, place = np.array(table).T[:, owner]
+        compound = job.lossy.index(material) if material in job.lossy else -1
+        table.append([*ratio, material.density, hold, place, compound])
+    shear, bulk, density, hold, place, compound = np.array(table).T[:, owner]
     point = lambda values: np.repeat(values, g)
     still = job.dynamic_Hz is None or not (np.any(shear != 1) or np.any(bulk != 1))
     law = replace(
@@ -118,6 +119,7 @@ def _of_one_law(
         shear_ratio=None if still else point(shear),
         bulk_ratio=None if still else point(bulk),
         table=point(place.real.astype(int)) if job.tables else None,
+        compound=point(compound.real.astype(int)) if job.lossy else None,
     )
     rows = Rows(solids.B0, solids.hoop, slice(1, None, 3), np.eye(3).ravel(), solids.weights)
     mass = consistent_mass(solids.mass_N, density[:, None] * solids.mass_weights)
