@@ -15,7 +15,7 @@ from .deck.start import PressedShape, write_pressed_start, write_start
 
 JOB, PRESS, OLDJOB = "modes", "press", "inflate"
 # of the tool's request, as in `request.Request`
-REQUEST_KEYS = ("own_frequency", "cavity", "sector")
+REQUEST_KEYS = ("own_frequency", "cavity", "sector", "response")
 
 
 class RoadDecks(WrittenDecks, Protocol):
@@ -51,6 +51,7 @@ class Bundled:
             "start",
             "pressed_start",
             "own_deck",
+            "response",
         }
     )
     refusals = (Refused,)
@@ -103,6 +104,11 @@ class Bundled:
             nodes, points = arrays["nodes"], arrays["points"]
             displacement = arrays[f"displacement_{step['step']}"]
             shapes = arrays[f"shapes_{step['step']}"] if step["modes"] else []
+            response = {
+                name: arrays[f"response_{name}_{step['step']}"]
+                for name in ("frequency_Hz", "receptance", "hub")
+                if f"response_{name}_{step['step']}" in arrays
+            }
         # modes of the file by place; the two that a doublet has split into count as one
         members: dict[object, list[int]] = {}
         for i, mode in enumerate(step["modes"]):
@@ -119,7 +125,9 @@ class Bundled:
             if len(places) > 1:
                 both = {"frequency_Hz": sum(hertz) / 2, "multiplicity": 2, "members": hertz}
                 modes[-1] |= both
+        last = step.get("last_harmonic_of_response")
         return {
+            **({"response": {**response, "last_harmonic": last}} if response else {}),
             "pressure_Pa": step["pressure_Pa"],
             "mass_kg": step["mass_kg"],
             "modes": modes,

@@ -12,13 +12,14 @@ from functools import partial
 import numpy as np
 
 from ..language.text import COMPLEX_STEP, Block, DeckError, Row
-from .deck.request import Request
+from .deck.request import TREAD_DIRECTIONS, Request
 from .deck.steps import Deck, DeckStep, Tangent
 from .modes.bordered import Bordered
 from .modes.cavity import GasCavity, read_cavity
 from .modes.damping import loss_forms
 from .modes.frequency_dependent import SelfConsistent
 from .modes.harmonics import HarmonicModes, HasModes, SeededTyre, Vibration, lowest_of_all
+from .modes.response import Response, ResponseResult, tread_patch
 from .modes.sensitivity import ModeShapes, RimAndAir, eigenvalue_rates, state_rate
 from .modes.wheel import Wheel, read_wheel
 from .nonuniform.coupled import attached_modes
@@ -150,6 +151,35 @@ class FrequencyStep:
             rates / (2 * m.eigenvalues)
             for m, rates in zip(modes, _of_modes(modes, forms, constant), strict=True)
         ]
+
+    def response(self) -> ResponseResult | None:
+        """The requested responses; None if there are none. Raises DeckError, RunFailed."""
+        wanted, place, model, U = (
+            self.tyre.request.response,
+            self.step.procedure.place,
+            self.model,
+            self.tyre.U,
+        )
+        if wanted is None:
+            return None
+        if is_nonuniform(self.tyre, self.step) or not self.vibration.plain or self.vibration.shift:
+            words = (
+                "a response is that of a tyre that is the same all round, its rim held, without gas"
+            )
+            raise DeckError(place, words)
+        if self.step.output not in model.mesh.node_sets:
+            raise DeckError(place, "a response needs a *NODE FILE with a set of the tread's nodes")
+        tread = [model.mesh.index[n] for n in model.mesh.node_sets[self.step.output]]
+        patch = tread_patch(model.mesh.X, U, np.array(tread), wanted["patch_m"])
+        lowest, highest = wanted["lowest_Hz"], wanted["highest_Hz"]
+        frequencies = np.linspace(lowest, highest, wanted["lines"])
+        response = Response(self.vibration, model, U, patch, highest, self.tyre.check)
+        points = [
+            [(np.radians(angle), TREAD_DIRECTIONS.index(way)) for angle, way in wanted[which]]
+            for which in ("excite", "respond")
+        ]
+        last = len(response.harmonics) - 1
+        return ResponseResult(frequencies, *response.at(frequencies, *points), last)
 
     def _static_factor(self) -> Factor:
         """Factor of the static tangent at U, for dU / d variable; the vibration's if it is the same

@@ -118,6 +118,7 @@ class Job:
                     modes = work.modes()
                     rates = work.rates(modes)
                     results.append(self._result(step, modes, *rates, work.damping(modes)))
+                    results[-1].response = work.response()
         if not results:
             with self._slower(self.steps[-1]):
                 self._judge(self.steps[-1])

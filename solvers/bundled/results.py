@@ -7,7 +7,8 @@ sensitivities {variable: [d f / d variable, Hz per unit]},
 mass_sensitivities {variable: kg per unit}}].
 JOB.npz: ``nodes`` (k,), ``points`` (k, 2) R, Z in m, and per step S ``displacement_S`` (k, 3) and
 ``shapes_S`` (modes, k, 3): complex amplitudes of u = Re[U exp(i n Theta)] in r, theta, z, scaled
-to unit modal mass of the whole tyre.
+to unit modal mass of the whole tyre; of a response its frequencies, receptances and forces on the
+hub (`modes.response`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 
 from . import VERSION
 from .modes.harmonics import HarmonicModes
+from .modes.response import ResponseResult
 from .section.model import Model
 
 Array = np.ndarray
@@ -38,6 +40,7 @@ class StepResult:
     factorisations: int
     mass_rates: dict[str, float] = field(default_factory=dict)  # variable to d mass, kg
     damping: list[Array] | None = None  # damping ratios per harmonic; None: no loss factor is known
+    response: ResponseResult | None = None
 
 
 def write(stem: Path, model: Model, results: list[StepResult]) -> None:
@@ -82,6 +85,10 @@ def write(stem: Path, model: Model, results: list[StepResult]) -> None:
             }
         )
         arrays[f"displacement_{result.step}"] = result.U
+        if result.response is not None:
+            steps[-1]["last_harmonic_of_response"] = result.response.last_harmonic
+            for name in ("frequency_Hz", "receptance", "hub"):
+                arrays[f"response_{name}_{result.step}"] = getattr(result.response, name)
         if order:
             whole = [  # from unit mass per radian to the whole circle's 2 pi, or pi for a wave
                 result.modes[i].shapes[j] / np.sqrt(np.pi * (1 if result.modes[i].n else 2))

@@ -15,6 +15,8 @@ from . import grammar
 from .steps import Tangent
 
 MAX_HARMONIC, MAX_MODES = 999, 999  # harmonic; modes of one
+MAX_RESPONSE_LINES = 20_000  # of a response
+TREAD_DIRECTIONS = "radial", "tangential", "lateral"  # components of displacements
 
 
 @dataclass
@@ -32,6 +34,9 @@ class Request:
     # {"job", "width_deg"} of a sector about Theta = 0 in which the tyre is that of another section
     # job, of the same mesh
     sector: dict[str, Any] | None = None
+    # {"lowest_Hz", "highest_Hz", "lines", "patch_m", "excite", "respond"} of responses to a force
+    # on a patch of the tread: points are lists [angle in degrees, direction]
+    response: dict[str, Any] | None = None
 
 
 def read_request(path: Path, jobs: Sequence[str]) -> Request:
@@ -53,7 +58,7 @@ def read_request(path: Path, jobs: Sequence[str]) -> Request:
 def _request(content: Any, folder: Path, jobs: Sequence[str]) -> Request:
     _object("the request", content, [each.name for each in fields(Request)])
     for key, value in content.items():
-        if value is not None or key not in ("harmonics", "cavity", "sector"):
+        if value is not None or key not in ("harmonics", "cavity", "sector", "response"):
             _CHECKS[key](key, value)
     request = Request(**content)
     known = [*jobs, *([request.sector["job"]] if request.sector else [])]
@@ -143,6 +148,28 @@ def _sector(key: str, value: Any) -> None:
     _must(0 < width <= 360, f"{key}.width_deg", width, "must be above 0 and at most 360")
 
 
+def _response(key: str, value: Any) -> None:
+    points = "excite", "respond"
+    limits = {"lowest_Hz": (0, 1e4), "highest_Hz": (1, 1e4), "patch_m": (1e-3, 0.5)}
+    _object(key, value, [*limits, "lines", *points], all_of_them=True)
+    for name, (least, most) in limits.items():
+        _finite(f"{key}.{name}", value[name])
+        right = f"must be from {least:g} to {most:g}"
+        _must(least <= value[name] <= most, f"{key}.{name}", value[name], right)
+    lowest, highest = value["lowest_Hz"], value["highest_Hz"]
+    _must(lowest < highest, f"{key}.highest_Hz", highest, "must be above lowest_Hz")
+    _whole(2, MAX_RESPONSE_LINES)(f"{key}.lines", value["lines"])
+    for name in points:
+        rows, right = value[name], 'must be a list of points, as in [[0, "radial"]]'
+        _must(isinstance(rows, list) and rows, f"{key}.{name}", rows, right)
+        for i, row in enumerate(rows):
+            place = f"{key}.{name}[{i}]"
+            _must(isinstance(row, list) and len(row) == 2, place, row, "must be [angle, direction]")
+            _finite(f"{place}[0]", row[0])
+            right = f"must be one of {', '.join(TREAD_DIRECTIONS)}"
+            _must(row[1] in TREAD_DIRECTIONS, f"{place}[1]", row[1], right)
+
+
 def _object(key: str, value: Any, names: Sequence[str] = (), all_of_them: bool = False) -> None:
     """Checks for an object, where there are ``names`` with no others."""
     contents = f" with {' and '.join(names)}" if all_of_them else ""
@@ -170,4 +197,5 @@ _CHECKS: dict[str, Callable[[str, Any], None]] = {
     "own_frequency": _own_frequency,
     "cavity": _cavity,
     "sector": _sector,
+    "response": _response,
 }

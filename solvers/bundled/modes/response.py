@@ -1,0 +1,248 @@
+"""Response of the inflated tyre, its rim held, to a force on a patch of its tread.
+
+A patch of half angle b that is loaded evenly by a force F in all has the harmonics
+
+    f_0 = F / (2 pi),   f_n = F / pi  sin(n b) / (n b)  exp(-i n Theta_0)   (N per radian)
+
+and a point of the tread moves as the mean over the same patch about it. In each harmonic
+
+    (K + i sum_k eta_k(w) K_k - w^2 M) U = f
+
+is projected on a few fields (`reduction`). With T the rigid motions of rim and tyre, the force of
+the tyre on the hub is
+
+    h(w) = T^H f + w^2 T^H M U
+
+because K T = 0 and K_k T = 0 on all that is free. Harmonics from 2 on exert none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...errors import RunFailed
+from ..section import mechanics
+from ..section.kept_fields import Coordinates, KeptFields
+from ..section.materials import Material
+from ..section.model import Model
+from .harmonics import Vibration
+from .reduction import PartOfStiffness, ResponseBasis
+
+Array = np.ndarray
+SETTLES_UP_TO = 1.5  # times the highest frequency
+LAST_HARMONIC = 0.8  # of that at which sin(n b) is zero: shorter waves hold 1 % of the motion there
+MIN_HARMONICS = 20  # whose waves must be stable; shorter ones are those of cords that buckle
+
+
+@dataclass(frozen=True)
+class ResponseResult:
+    """Responses to unit forces, as `Response.at` has them, at frequencies (f,) in Hz."""
+
+    frequency_Hz: Array
+    receptance: Array
+    hub: Array
+    last_harmonic: int
+
+
+@dataclass(frozen=True)
+class TreadPatch:
+    """Tread patch of a size, m, and the nodes (k,) whose weighted mean motion is its motion."""
+
+    size: float
+    radius: float  # of the inflated tread there, m
+    nodes: Array
+    weights: Array
+
+    @property
+    def half_angle(self) -> float:
+        """b, rad."""
+        return self.size / 2 / self.radius
+
+    def share(self, n: int) -> float:
+        """sin(n b) / (n b)"""
+        return float(np.sinc(n * self.half_angle / np.pi))
+
+
+def tread_patch(X: Array, U: Array, tread: Array, size: float) -> TreadPatch:
+    """The patch about the middle of the tread's nodes (rows); between two of them motion is linear
+    in z. X (n, 2): R, Z; U (n, 3): displacements of the inflated tyre; size: both ways, m."""
+    z = X[tread, 1].real + U[tread, 2]
+    tread, z = tread[np.argsort(z)], np.sort(z)
+    inside = np.linspace(-size / 2, size / 2, 201)
+    hats = np.array([np.interp((inside[1:] + inside[:-1]) / 2, z, row) for row in np.eye(len(z))])
+    weights = hats.mean(1)
+    radius = float(weights @ (X[tread, 0].real + U[tread, 0]))
+    return TreadPatch(size, radius, tread[weights > 0], weights[weights > 0])
+
+
+class Response:
+    """Reduced problems of all harmonics that the patch excites, of a model's ``vibration`` about
+    its inflated state U (n, 3); ``highest_Hz``: of the band; ``check`` may raise to stop. Raises
+    RunFailed."""
+
+    def __init__(
+        self,
+        vibration: Vibration,
+        model: Model,
+        U: Array,
+        patch: TreadPatch,
+        highest_Hz: float,
+        check: Callable[[], None],
+    ):
+        self.patch, self._vibration, self._model, self._U = patch, vibration, model, U
+
+        def part(model: Model) -> PartOfStiffness:
+            return PartOfStiffness(mechanics.tangents(model, U, [], harmonics=True), len(U))
+
+        self._lossy: list[tuple[Material, int, PartOfStiffness]] = [
+            (material, modulus, part(replace(model, parts=parts)))
+            for k, material in enumerate(model.lossy)
+            for modulus in (0, 1)
+            if (parts := model.material_parts(k, modulus))
+        ]
+        self._tables = [part(each) for each in model.frequency_dependent_models()]
+        self._middle = np.array([highest_Hz / 2])
+        limit = (2 * np.pi * SETTLES_UP_TO * highest_Hz) ** 2
+        self.harmonics: list[_Reduced] = []
+        for n in range(int(LAST_HARMONIC * np.pi / patch.half_angle) + 1):
+            check()
+            try:
+                self.harmonics.append(self._harmonic(n, limit))
+            except RunFailed:
+                if n < MIN_HARMONICS:
+                    raise
+                break
+
+    def _harmonic(self, n: int, limit: float) -> _Reduced:
+        numbering = self._vibration.numbering
+        patch = np.zeros((*self._U.shape, 3))
+        for i in range(3):
+            patch[self.patch.nodes, i, i] = self.patch.weights
+        forces = _coordinates(numbering, patch, n)
+        rigid, moved = self._rigid(n)
+        basis = ResponseBasis(self._vibration, n, np.hstack([forces.real, forces.imag, moved]))
+        static = basis.V
+        basis.settle(limit)
+        if self._lossy:
+            damped = np.hstack([static, basis.modes(limit)])
+            losses = self._losses(self._middle)
+            basis.add(sum(eta * self._times(K, damped, n) for eta, K in losses))
+        V = basis.V
+        return _Reduced(
+            n,
+            basis.K,
+            [V.conj().T @ self._times(part, V, n) for _, _, part in self._lossy],
+            [V.conj().T @ self._times(part, V, n) for part in self._tables],
+            V.conj().T @ forces,
+            moved.conj().T @ V,
+            rigid,
+        )
+
+    def _times(self, part: PartOfStiffness, V: Array, n: int) -> Array:
+        return part.times(V, n, self._vibration.numbering, self._model.mesh.symmetry)
+
+    def _losses(self, frequencies_Hz: Array) -> Iterator[tuple[Array, PartOfStiffness]]:
+        """Loss over static stiffness of each part with losses, (f,)."""
+        for material, modulus, part in self._lossy:
+            assert material.loss is not None
+            losses = material.loss.at(frequencies_Hz)[modulus]
+            if material.table in self._model.tables and not modulus:
+                losses = losses * [np.real(material.table.ratio(f)) for f in frequencies_Hz]
+            yield losses, part
+
+    def _rigid(self, n: int) -> tuple[Array, Array]:
+        """T^H of the patch's forces (motions, 3), and M T in coordinates (size, motions)."""
+        vibration, symmetry = self._vibration, self._model.mesh.symmetry
+        X, U = self._model.mesh.X.real, self._U
+        if n > 1:
+            return np.zeros((0, 3)), np.zeros((vibration.numbering.size, 0))
+        r, t, z = X[:, 0] + U[:, 0], U[:, 1], X[:, 1] + U[:, 2]
+        o, one = np.zeros(len(X)), np.ones(len(X))
+        motions = [[o, o, one], [-t, r, o]]
+        if n:
+            motions = [[one, 1j * one, o], [1j * z, -z, t - 1j * r]]
+        fields = np.moveaxis(np.array(motions), (0, 1), (2, 1))
+        forces = np.einsum("k,kim->mi", self.patch.weights, fields[self.patch.nodes].conj())
+        fields = symmetry.kept(fields)
+        inertia = (vibration.mass @ fields.reshape(len(X), -1)).reshape(fields.shape)
+        return forces, vibration.numbering.gather(symmetry.force(inertia))
+
+    def at(
+        self, frequencies_Hz: Array, excited: list[tuple[float, int]], seen: list[tuple[float, int]]
+    ) -> tuple[Array, Array]:
+        """Receptances (seen, excited, f), m/N or rad/N, and forces on the hub (6, excited, f) per N
+        of force.
+
+        excited, seen: angle (rad) and component of each point of the tread. Of the hub: force
+        along Theta = 0, along Theta = 90 degrees and along the axle, then moments about them.
+        """
+        omega = 2 * np.pi * np.asarray(frequencies_Hz)
+        losses = [each for each, _ in self._losses(frequencies_Hz)]
+        known = self._model.tables
+        tables = [np.array([np.real(t.ratio(f)) - 1 for f in frequencies_Hz]) for t in known]
+        receptance = np.zeros((len(seen), len(excited), len(omega)), complex)
+        hub = np.zeros((6, len(excited), len(omega)), complex)
+        for reduced in self.harmonics:
+            n, share = reduced.n, self.patch.share(reduced.n)
+            moved, forces = reduced.at(omega, losses, tables)
+            circle = np.pi if n else 2 * np.pi
+            for e, (angle, component) in enumerate(excited):
+                for s, (at, other) in enumerate(seen):
+                    turned = _turned(moved[:, :, other, component], n * (at - angle))
+                    receptance[s, e] += share**2 / circle * turned
+                if n == 0:
+                    hub[2, e], hub[5, e] = (
+                        _turned(forces[:, :, i, component], 0.0) for i in (0, 1)
+                    )
+                for i in (0, 1) if n == 1 else ():
+                    for q, axis in enumerate((0.0, np.pi / 2)):
+                        about = share * _turned(forces[:, :, i, component], axis - angle)
+                        hub[3 * i + q, e] = about
+        return receptance, hub
+
+
+@dataclass(frozen=True)
+class _Reduced:
+    """A harmonic on its basis, in which M is 1."""
+
+    n: int
+    K: Array
+    lossy: list[Array]
+    tables: list[Array]
+    forces: Array  # of the patch in each direction (basis, 3)
+    moved: Array  # T^H M (motions, basis)
+    rigid: Array  # T^H of the patch's forces (motions, 3)
+
+    def at(self, omega: Array, losses: list[Array], tables: list[Array]) -> tuple[Array, Array]:
+        """Two pairs (2, f, 3, 3) and (2, f, motions, 3): motion of the patch, force on the hub."""
+        K = self.K - omega[:, None, None] ** 2 * np.eye(len(self.K))
+        for table, part in zip(tables, self.tables, strict=True):
+            K = K + table[:, None, None] * part
+        loss = np.zeros_like(K)
+        for eta, part in zip(losses, self.lossy, strict=True):
+            loss = loss + eta[:, None, None] * part
+        # The i of the response is not the i of exp(i n Theta): a number a + j b of both is known by
+        # its values for j = i and j = -i.
+        both = np.stack([np.linalg.solve(K + i * loss, self.forces[None] + 0j) for i in (1j, -1j)])
+        a, b = (both[0] + both[1]) / 2, (both[0] - both[1]) / 2j
+        hub = omega[:, None, None] ** 2 * np.stack([self.moved @ a, self.moved @ b])
+        hub[0] += self.rigid
+        return np.stack([self.forces.conj().T @ a, self.forces.conj().T @ b]), hub
+
+
+def _coordinates(numbering: Coordinates, forces: Array, n: int) -> Array:
+    """Coordinates (size, k) of real forces (n, 3, k) on waves cos(n Theta). On half of the section
+    they are those of what half a turn keeps, less i times those of what it reverses."""
+    if n == 0 or not isinstance(numbering, KeptFields):
+        return numbering.gather(forces)
+    kept, reversed_ = np.hsplit(numbering.apart(forces), 2)
+    return np.asarray(kept - 1j * reversed_)
+
+
+def _turned(pair: Array, angle: float) -> Array:
+    """Re_i[exp(i angle) (a + j b)] of a pair (2, f) as a + i b."""
+    real, imag = (np.exp(1j * angle) * pair).real
+    return np.asarray(real + 1j * imag)
