@@ -125,9 +125,8 @@ class Bundled:
             if len(places) > 1:
                 both = {"frequency_Hz": sum(hertz) / 2, "multiplicity": 2, "members": hertz}
                 modes[-1] |= both
-        last = step.get("last_harmonic_of_response")
         return {
-            **({"response": {**response, "last_harmonic": last}} if response else {}),
+            **({"response": {**response, **step["response"]}} if response else {}),
             "pressure_Pa": step["pressure_Pa"],
             "mass_kg": step["mass_kg"],
             "modes": modes,

@@ -163,9 +163,7 @@ class FrequencyStep:
         if wanted is None:
             return None
         if is_nonuniform(self.tyre, self.step) or not self.vibration.plain or self.vibration.shift:
-            words = (
-                "a response is that of a tyre that is the same all round, its rim held, without gas"
-            )
+            words = "a response needs a tyre that is the same all round, its rim held, without gas"
             raise DeckError(place, words)
         if self.step.output not in model.mesh.node_sets:
             raise DeckError(place, "a response needs a *NODE FILE with a set of the tread's nodes")
@@ -178,8 +176,9 @@ class FrequencyStep:
             [(np.radians(angle), TREAD_DIRECTIONS.index(way)) for angle, way in wanted[which]]
             for which in ("excite", "respond")
         ]
-        last = len(response.harmonics) - 1
-        return ResponseResult(frequencies, *response.at(frequencies, *points), last)
+        counts = len(response.harmonics), response.wanted
+        receptance, hub = response.at(frequencies, *points)
+        return ResponseResult(frequencies, receptance, hub, patch.radius, *counts)
 
     def _static_factor(self) -> Factor:
         """Factor of the static tangent at U, for dU / d variable; the vibration's if it is the same

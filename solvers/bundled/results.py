@@ -86,7 +86,8 @@ def write(stem: Path, model: Model, results: list[StepResult]) -> None:
         )
         arrays[f"displacement_{result.step}"] = result.U
         if result.response is not None:
-            steps[-1]["last_harmonic_of_response"] = result.response.last_harmonic
+            known = ("radius_m", "harmonics", "harmonics_wanted")
+            steps[-1]["response"] = {name: getattr(result.response, name) for name in known}
             for name in ("frequency_Hz", "receptance", "hub"):
                 arrays[f"response_{name}_{result.step}"] = getattr(result.response, name)
         if order:

@@ -60,6 +60,11 @@ STUDIES = {  # in the order of a page and of a batch
         "State how each number of the case moves frequencies, and which numbers to free.",
         True,
     ),
+    "frf": Entry(
+        "tyrecal.studies.response:FrfResult",
+        "Compute response functions of the tread and the hub.",
+        True,
+    ),
     "effects": Entry(
         "tyrecal.studies.effects:Effects", "List and explain effects that a plain model leaves out."
     ),

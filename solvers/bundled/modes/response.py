@@ -44,7 +44,9 @@ class ResponseResult:
     frequency_Hz: Array
     receptance: Array
     hub: Array
-    last_harmonic: int
+    radius_m: float  # of the inflated tread
+    harmonics: int  # that were summed
+    harmonics_wanted: int  # more than that where cords buckle in the shorter waves
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,8 @@ class Response:
         self._middle = np.array([highest_Hz / 2])
         limit = (2 * np.pi * SETTLES_UP_TO * highest_Hz) ** 2
         self.harmonics: list[_Reduced] = []
-        for n in range(int(LAST_HARMONIC * np.pi / patch.half_angle) + 1):
+        self.wanted = int(LAST_HARMONIC * np.pi / patch.half_angle) + 1
+        for n in range(self.wanted):
             check()
             try:
                 self.harmonics.append(self._harmonic(n, limit))

@@ -35,12 +35,14 @@ class Question:
     """One design to evaluate: values of variables or of any number of the case, by name or path.
 
     Variables that are not in ``values`` have their start values, so {} is the start design.
-    gradients: names of variables for sensitivities; modes_per_harmonic: None = the case's.
+    gradients: names of variables for sensitivities; modes_per_harmonic: None = the case's;
+    response: responses to a force on the tread, as the solver's contract has them.
     """
 
     values: Mapping[str, float]
     gradients: tuple[str, ...] = ()
     modes_per_harmonic: int | None = None
+    response: Mapping[str, Any] | None = None
 
 
 class PressQuestion(NamedTuple):
@@ -116,7 +118,8 @@ class Evaluator:
         """
         design = self._with(question.values)
         start = self._start_of(design)
-        decks = Decks(design, question.gradients, question.modes_per_harmonic, start=start)
+        wanted = question.gradients, question.modes_per_harmonic
+        decks = Decks(design, *wanted, start=start, response=question.response)
         try:
             result = self._ask(decks, lambda answer, kept: evaluation(answer))
         except EvaluationFailed as failure:
@@ -211,6 +214,14 @@ class Evaluator:
             raise DeckRefused(
                 f"solver '{self.solver.name}' cannot {what} on a road; 'tyrecal solvers'"
                 f" shows which one can ({capability})"
+            )
+
+    def needs_response(self) -> None:
+        """Raises DeckRefused where the solver computes no responses."""
+        if "response" not in self.solver.capabilities:
+            raise DeckRefused(
+                f"solver '{self.solver.name}' computes no response functions; 'tyrecal solvers'"
+                " shows which one can (response)"
             )
 
     def refuse_lacking(self, design: Design) -> None:

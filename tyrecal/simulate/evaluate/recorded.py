@@ -79,11 +79,23 @@ class _Tyre(_Part):
         return self
 
 
+class _Response(_Part):
+    """Responses to a force on the tread."""
+
+    frequency_Hz: of.RealArray
+    receptance: Annotated[Any, of.shaped("c", None, None, None)]
+    hub: Annotated[Any, of.shaped("c", 6, None, None)]
+    radius_m: of.PositiveFinite
+    harmonics: Annotated[Any, of.shaped("iu", least=0)]
+    harmonics_wanted: Annotated[Any, of.shaped("iu", least=0)]
+
+
 class _Modes(_Tyre):
     modes: Annotated[list[_Mode], Field(min_length=1)]
     gradients: dict[str, of.RealArray]
     displacement: of.Points
     mass_gradients: dict[str, of.Finite] = Field(default_factory=dict)
+    response: _Response | None = None
 
     @model_validator(mode="after")
     def _go_together(self) -> Self:
@@ -176,6 +188,10 @@ def contradiction(answer: Mapping[str, Any], decks: Decks, folder: Path) -> str:
                 return f"it has a mode of harmonic {n}, the highest requested is {highest}"
             if count > each:
                 return f"it has {count} modes of harmonic {n}, {each} were requested"
+    if wanted := request.get("response"):
+        shape = len(wanted["respond"]), len(wanted["excite"]), wanted["lines"]
+        if _shape(answer.get("response", {}).get("receptance", 0)) != shape:
+            return "it has not the responses that were requested"
     return _other_nodes(answer, folder)
 
 

@@ -61,6 +61,7 @@ class Evaluation:
     displacement: Array = field(default_factory=lambda: np.empty((0, 3)))  # (k, 3) by the inflation
     # variable name to d mass, kg per unit
     mass_gradients: dict[str, float] = field(default_factory=dict)
+    response: dict[str, Any] = field(default_factory=dict)  # as `Solver.read` has it
 
 
 def evaluation(answer: dict[str, Any]) -> Evaluation:
@@ -87,4 +88,5 @@ def evaluation(answer: dict[str, Any]) -> Evaluation:
         nodes=nodes,
         displacement=displacement,
         mass_gradients=dict(answer.get("mass_gradients", {})),
+        response=dict(answer.get("response", {})),
     )

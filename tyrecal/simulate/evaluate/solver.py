@@ -22,7 +22,7 @@ class Solver(Protocol):
 
     version: of the program that runs, "unknown" where it is not found; part of every record's key.
     dialect: the template folder of its decks; capabilities: of ``modes``, ``gradients``,
-    ``footprint``, ``footprint_gradients``, ``loaded_modes``, and what effects need
+    ``footprint``, ``footprint_gradients``, ``loaded_modes``, ``response``, and what effects need
     (`Effect.needs`): ``vibration_modulus``, a modulus in the frequency step other than in the
     static one, and those of `resolve.CAPABILITIES`; ``own_decks``: it runs a user's in three
     dimensions;
@@ -54,7 +54,11 @@ class Solver(Protocol):
         {variable: [Hz per unit]}, nodes, points, displacement and,
         for fits to the mass, mass_gradients {variable: kg per unit}. A doublet that is split is one
         mode of multiplicity 2 at the mean frequency, with ``members`` [Hz, Hz]. Where a loss factor
-        is known, each mode has its damping_ratio, a fraction of critical damping.
+        is known, each mode has its damping_ratio, a fraction of critical damping. Where
+        ``decks.request`` has a response {lowest_Hz, highest_Hz, lines, patch_m, excite, respond}
+        of points [degrees, direction] of the tread: response {frequency_Hz (f,), receptance
+        (respond, excite, f), hub (6, excite, f), radius_m, harmonics, harmonics_wanted}. Of the
+        hub: force along Theta = 0, along 90 degrees, along the axle, and moments about them.
 
         A solver in three dimensions gives each mode {frequency_Hz, multiplicity 1, displacement
         (k, 3)} at ``points`` (k, 3), as in `RingShape`; pairs are joined by the tool.

@@ -1,0 +1,162 @@
+"""Response functions for the command, Python and a batch: directions, files, refusals."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tyrecal
+from tyrecal.cli.main import main
+from tyrecal.errors import InputError
+from tyrecal.measured.universal import read_universal
+from tyrecal.report.response import draw_responses
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.studies.response import FrfResult, read_points, response_request
+from tyrecal.studies.result import StudyInput
+from tyrecal.tyre.case import LoadedCase, start_values
+
+Array = np.ndarray
+CASE_FILE = Path(__file__).parents[2] / "cases" / "p235_75r17.yaml"
+PATCH_MM, RADIUS_m = 100.0, 0.3927
+BAND = {"from_Hz": 0.0, "to_Hz": 100.0, "step_Hz": 2.0, "patch_mm": PATCH_MM}
+
+
+@pytest.fixture(scope="module")
+def case() -> LoadedCase:
+    """The example, its rubber with a loss factor."""
+    case = tyrecal.load_case(CASE_FILE, mesh="coarse")
+    rubber = case.case.materials["rubber"].model_copy(update={"loss_factor": 0.2})
+    materials = {**case.case.materials, "rubber": rubber}
+    return replace(case, case=case.case.model_copy(update={"materials": materials}))
+
+
+@pytest.fixture(scope="module")
+def responses(case: LoadedCase) -> FrfResult:
+    given = StudyInput(case, Evaluator(TyreDesign(case)), {"initial": start_values(case)})
+    points = "tread:0deg:radial,tread:90deg:radial,tread:0deg:lateral,tread:0deg:tangential"
+    hub = ",".join(f"hub:{name}" for name in ("fx", "fy", "fz", "mx", "my", "mz"))
+    return FrfResult.run(given, excite=points, respond=f"{hub},{points}", **BAND)
+
+
+def function(result: FrfResult, respond: str, excite: str) -> Array:
+    """A function of frequency (f,)."""
+    (each,) = (x for x in result.functions if (x.respond, x.excite) == (respond, excite))
+    return each.values
+
+
+def test_statically_the_hub_bears_the_force(responses: FrfResult) -> None:
+    """Outwards below the hub is down, outwards behind it backwards; along the axle it has a moment
+    about the fore-aft axis, and backwards below one about the axle."""
+    b = PATCH_MM / 2e3 / responses.radius_m
+    share, arm = np.sin(b) / b, responses.radius_m
+    assert responses.radius_m == pytest.approx(RADIUS_m, rel=0.01)
+    expected = {
+        "tread:0deg:radial": [0, 0, -share, 0, 0, 0],
+        "tread:90deg:radial": [-share, 0, 0, 0, 0, 0],
+        "tread:0deg:lateral": [0, 1, 0, arm * share, 0, 0],
+        "tread:0deg:tangential": [-share, 0, 0, 0, arm, 0],
+    }
+    for excite, forces in expected.items():
+        names = ("fx", "fy", "fz", "mx", "my", "mz")
+        static = [function(responses, f"hub:{name}", excite)[0] for name in names]
+        assert static == pytest.approx(forces, abs=1e-4)
+
+
+def test_a_quarter_turn_and_reciprocity(responses: FrfResult) -> None:
+    below = function(responses, "hub:fz", "tread:0deg:radial")
+    behind = function(responses, "hub:fx", "tread:90deg:radial")
+    np.testing.assert_allclose(below, behind, rtol=1e-9)
+    there = function(responses, "tread:90deg:radial", "tread:0deg:radial")
+    back = function(responses, "tread:0deg:radial", "tread:90deg:radial")
+    np.testing.assert_allclose(there, back, rtol=0, atol=1e-9 * abs(there).max())
+    assert not function(responses, "hub:fy", "tread:0deg:radial").any()
+    peaks = responses.quantities()
+    assert peaks["peak_Hz hub:fz tread:0deg:radial"] == pytest.approx(66.5, abs=1.5)
+    assert peaks["peak hub:fz tread:0deg:radial"] == pytest.approx(1 / (2 * 0.0215), rel=0.15)
+
+
+def test_the_universal_file_reads_back(
+    responses: FrfResult, case: LoadedCase, tmp_path: Path
+) -> None:
+    """Functions, nodes and directions; the hub's are forces, in sets with 9 over 13."""
+    path = tmp_path / "frf.uff"
+    path.write_text(responses.texts()["frf.uff"])
+    file = read_universal(path)
+    assert set(file.nodes) == {1, 101, 102}
+    assert file.nodes[101] == pytest.approx((0, 0, -responses.radius_m))
+    assert file.nodes[102] == pytest.approx((-responses.radius_m, 0, 0), abs=1e-12)
+    assert file.axes[101] == pytest.approx(np.array([[0, 0, -1], [-1, 0, 0], [0, 1, 0]]))
+    assert sum(file.skipped.values()) == 24 and len(file.functions) == 16
+    first = file.functions[0]
+    assert (first.response, first.reference, first.form) == ((101, 1), (101, 1), "receptance")
+    assert first.frequency_Hz == pytest.approx(responses.frequency_Hz)
+    written = function(responses, "tread:0deg:radial", "tread:0deg:radial")
+    np.testing.assert_allclose(first.values, written, rtol=1e-11)
+    lines = path.read_text().splitlines()
+    assert lines[0] == "    -1" and max(map(len, lines)) <= 80
+
+
+def test_tables_and_pictures(responses: FrfResult) -> None:
+    (table,) = responses.tables()
+    assert len(table.rows) == len(responses.functions) == 40
+    rows = responses.csv().splitlines()
+    assert rows[0] == "excite,respond,quantity,unit,frequency_Hz,real,imag"
+    assert len(rows) == 1 + 40 * len(responses.frequency_Hz) and len(responses.frequency_Hz) == 51
+    assert len(draw_responses(responses)["frf"].axes) == 6
+    assert not responses.sentences()
+    again = FrfResult.model_validate_json(responses.texts()["frf.json"])
+    assert again.functions[0].values == pytest.approx(responses.functions[0].values)
+
+
+def test_the_command_and_accelerance(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Without a loss factor the peaks are said to mean nothing."""
+    out = tmp_path / "out"
+    words = f"--mesh coarse --to-Hz 60 --step-Hz 20 --patch-mm 200 --no-pictures --output {out}"
+    points = "--excite tread:0deg:radial --respond tread:0deg:radial"
+    functions = {}
+    for form in ("receptance", "accelerance"):
+        with pytest.raises(SystemExit) as ended:
+            main(["frf", str(CASE_FILE), *words.split(), *points.split(), "--form", form])
+        assert ended.value.code == 0
+        (functions[form],) = json.loads((out / "frf.json").read_text())["functions"]
+    assert "no compound has a loss factor" in capsys.readouterr().out
+    assert {path.name for path in out.glob("frf.*")} == {"frf.json", "frf.csv", "frf.uff"}
+    omega = 2 * np.pi * np.array([0.0, 20.0, 40.0, 60.0])
+    scaled = -(omega**2) * functions["receptance"]["real"]
+    assert functions["accelerance"]["real"] == pytest.approx(scaled)
+    assert functions["accelerance"]["unit"] == "m/s²/N"
+
+
+@pytest.mark.parametrize(
+    ("text", "hub", "words"),
+    [
+        ("tread:0:radial", True, "'tread:0:radial' is no point: give tread:ANGLEdeg:DIRECTION"),
+        ("hub:fq", True, "hub:fz with one of fx, fy"),
+        ("hub:fz", False, "'hub:fz' is no point"),
+        ("hub:fz,hub:fz", True, "has a point twice"),
+        ("", True, "'' is no point"),
+    ],
+)
+def test_points_that_are_refused(text: str, hub: bool, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        read_points(text, hub)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"step_Hz": 0.7}, "whole number of steps"),
+        ({"step_Hz": 0.0}, "whole number of steps"),
+        ({"from_Hz": 200.0}, "frequencies from 200 to 100 Hz"),
+        ({"step_Hz": 0.001}, "more than 5000 frequencies"),
+        ({"patch_mm": 0.0}, "patch 0 mm: must be from 1 to 200 mm"),
+    ],
+)
+def test_requests_that_are_refused(change: dict[str, float], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        response_request("tread:0deg:radial", "hub:fz", **{**BAND, **change})

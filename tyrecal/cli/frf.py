@@ -1,0 +1,127 @@
+"""tyrecal frf"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from . import arguments, options
+from .parameters import Number, OneOf, option
+
+
+@click.command()
+@options.every(options.case_argument, options.assignments, options.pressure)
+@option(
+    "--excite",
+    default="tread:0deg:radial",
+    show_default=True,
+    metavar="POINT,...",
+    help="Points of the tread where a force of 1 N acts: tread:ANGLEdeg:DIRECTION, radial,"
+    " tangential or lateral.",
+)
+@option(
+    "--respond",
+    default="hub:fz,tread:0deg:radial",
+    show_default=True,
+    metavar="POINT,...",
+    help="Points of the response: of the tread, or of the hub fx, fy, fz, mx, my, mz.",
+)
+@option(
+    "--from-Hz",
+    "from_Hz",
+    type=Number(),
+    default=0.0,
+    metavar="A",
+    help="Lowest frequency, Hz (default: 0).",
+)
+@option(
+    "--to-Hz",
+    "to_Hz",
+    type=Number(),
+    default=300.0,
+    metavar="B",
+    help="Highest frequency, Hz (default: 300).",
+)
+@option(
+    "--step-Hz",
+    "step_Hz",
+    type=Number(),
+    default=0.5,
+    metavar="D",
+    help="Step of the frequency, Hz (default: 0.5).",
+)
+@option(
+    "--patch-mm",
+    "patch_mm",
+    type=Number(),
+    default=20.0,
+    metavar="L",
+    help="Side of the square patch that the force acts on, and that a motion is the mean of, mm"
+    " (default: 20).",
+)
+@option(
+    "--form",
+    type=OneOf(("receptance", "accelerance")),
+    default="receptance",
+    show_default=True,
+    help="Motion of the tread per force: displacement or acceleration.",
+)
+@options.fitted("fit.json of the case: take the fitted design.")
+@option("--pictures/--no-pictures", default=True, help="Draw magnitude and phase.")
+@options.figure_format
+@options.study
+def command(
+    case: Path,
+    assignments: tuple[str, ...],
+    pressure_kPa: float | None,
+    excite: str,
+    respond: str,
+    from_Hz: float,
+    to_Hz: float,
+    step_Hz: float,
+    patch_mm: float,
+    form: str,
+    fitted: Path | None,
+    pictures: bool,
+    study: options.Study,
+) -> int:
+    """Compute response functions of the unloaded tyre of CASE, its rim held.
+
+    Writes frf.json, .csv, .uff (universal file, data set 58) and .png: forces of the tyre on the
+    hub, and motions of the tread, per newton on its tread. Hub: x forward, y left, z up. The angle
+    0 is below the hub, 90 behind it. Losses are the compounds' loss_factor.
+
+    \b
+    tyrecal frf cases/p235_75r17.yaml --excite tread:0deg:radial --respond hub:fz,hub:fx
+    tyrecal frf cases/p235_75r17.yaml --respond tread:0deg:radial,tread:90deg:radial --to-Hz 200
+    """
+    from ..studies.response import FrfResult, response_request
+    from ..studies.result import StudyInput
+
+    options.say_idle(study.terminal, study.jobs, "only one design is evaluated")
+    response_request(excite, respond, from_Hz, to_Hz, step_Hz, patch_mm)
+    loaded, values = study.load(case, assignments, pressure_kPa)
+    evaluator = study.evaluator(loaded)
+    evaluator.needs_response()
+    designs = {"initial": values}
+    if fitted:
+        designs = {"fitted": arguments.fitted_values(fitted, loaded, study.terminal)}
+    output = study.run(loaded, "frf", evaluator)
+    given = StudyInput(loaded, evaluator, designs)
+    result = FrfResult.run(
+        given,
+        excite=excite,
+        respond=respond,
+        from_Hz=from_Hz,
+        to_Hz=to_Hz,
+        step_Hz=step_Hz,
+        patch_mm=patch_mm,
+        form=form,  # type: ignore[arg-type]
+    )
+    figures = {}
+    if pictures:
+        from ..report.response import draw_responses
+
+        figures = draw_responses(result)
+    return study.present(output, result, figures)

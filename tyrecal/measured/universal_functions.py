@@ -1,0 +1,90 @@
+"""Frequency-response functions as the text of a universal file: data sets 151, 164, 2411, 2420, 58.
+
+ASCII, in SI units. `universal` reads such files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .coordinates import CYLINDRICAL, CoordinateSystem
+
+Array = np.ndarray
+QUANTITIES_58 = {  # code, exponents of length, force and temperature, label, unit
+    "displacement": (8, 1, 0, 0, "Displacement", "m"),
+    "acceleration": (12, 1, 0, 0, "Acceleration", "m/s2"),
+    "force": (9, 0, 1, 0, "Reaction force", "N"),
+    "moment": (9, 1, 1, 0, "Reaction moment", "N m"),
+    "excitation": (13, 0, 1, 0, "Excitation force", "N"),
+    "frequency": (18, 0, 0, 0, "Frequency", "Hz"),
+    "none": (0, 0, 0, 0, "NONE", "NONE"),
+}
+SYSTEM_NUMBER = 2  # of the cylindrical system; 1 is often taken for the global one
+
+
+@dataclass(frozen=True)
+class WrittenFunction:
+    """A function over evenly spaced frequencies; node and direction (1 to 6) of each end."""
+
+    name: str
+    response: tuple[int, int]
+    reference: tuple[int, int]
+    quantity: str  # of the response, a key of `QUANTITIES_58`
+    values: Array  # (f,) complex
+
+
+def universal_text(
+    title: str,
+    nodes: Mapping[int, Sequence[float]],
+    system: CoordinateSystem,
+    in_system: Iterable[int],
+    frequency_Hz: Array,
+    functions: Iterable[WrittenFunction],
+) -> str:
+    """The file's text; nodes: x, y, z in m; in_system: nodes that move along r, theta, z of a
+    cylindrical ``system``."""
+    cylindrical = {*in_system}
+    header = [_text(title), "NONE", "tyrecal", *["NONE"] * 4]
+    units = (
+        f"{1:10d}{'SI: m, N':<20}{2:10d}\n{_double(1)}{_double(1)}{_double(1)}\n{_double(273.15)}"
+    )
+    axes = [*system.axes, system.origin]
+    systems = [f"{1:10d}", _text(title), f"{SYSTEM_NUMBER:10d}{CYLINDRICAL:10d}{8:10d}", "TYRE"]
+    systems += ["".join(map(_double, row)) for row in axes]
+    places = []
+    for number, place in nodes.items():
+        moves_in = SYSTEM_NUMBER if number in cylindrical else 0
+        places += [f"{number:10d}{0:10d}{moves_in:10d}{11:10d}", "".join(map(_double, place))]
+    sets = [_set(151, header), _set(164, [units]), _set(2420, systems), _set(2411, places)]
+    sets += [_function(title, each, frequency_Hz) for each in functions]
+    return "".join(sets)
+
+
+def _function(title: str, each: WrittenFunction, frequency_Hz: Array) -> str:
+    ends = "".join(f" {'NONE':<10}{n:10d}{d:4d}" for n, d in (each.response, each.reference))
+    step = (frequency_Hz[-1] - frequency_Hz[0]) / (len(frequency_Hz) - 1)
+    lines = [_text(each.name), _text(title), "NONE", "NONE", "NONE"]
+    lines += [f"{4:5d}{0:10d}{1:5d}{0:10d}{ends}"]
+    lines += [f"{6:10d}{len(frequency_Hz):10d}{1:10d}{frequency_Hz[0]:13.5E}{step:13.5E}{0:13.5E}"]
+    for quantity in ("frequency", each.quantity, "excitation", "none"):
+        code, length, force, temperature, label, unit = QUANTITIES_58[quantity]
+        lines += [f"{code:10d}{length:5d}{force:5d}{temperature:5d} {label:<20} {unit:<20}"]
+    numbers = [f"{x:20.12E}" for value in each.values for x in (value.real, value.imag)]
+    lines += ["".join(numbers[k : k + 4]) for k in range(0, len(numbers), 4)]
+    return _set(58, lines)
+
+
+def _set(kind: int, lines: Sequence[str]) -> str:
+    return "\n".join([f"{-1:6d}", f"{kind:6d}", *lines, f"{-1:6d}", ""])
+
+
+def _text(words: str) -> str:
+    """An identification line, never blank."""
+    return words.encode("ascii", "replace").decode()[:80] or "NONE"
+
+
+def _double(value: float) -> str:
+    return f"{value:25.16E}".replace("E", "D")
