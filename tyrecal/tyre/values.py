@@ -11,7 +11,7 @@ from typing import Any, Literal, get_origin
 from pydantic import BaseModel, ValidationError
 
 from ..errors import InputError
-from .case.checks import at, find, folds, problems
+from .case.checks import at, find, problems
 from .case.identity import is_of_tyre
 from .case.loaded import LoadedCase
 from .case.mistakes import Keys, dotted, suggestion
@@ -92,7 +92,7 @@ def set_values(loaded: LoadedCase, values: Mapping[str, Setting]) -> LoadedCase:
         for wrong, reason in problems(data, section):
             raise InputError(f"{dotted(wrong)} {reason}")
         meshed = "mesh" in parts_to_check or redrawn or has_words
-        if section and meshed and (message := folds(data, section)):
+        if section and meshed and (message := loaded.kind.folds(data, section)):
             raise InputError(message)
     return replace(loaded, case=case, drawn=section, as_read=loaded.as_read or loaded)
 

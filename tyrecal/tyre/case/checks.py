@@ -42,7 +42,7 @@ def problems(data: Mapping[str, Any], section: Section | None) -> Problems:
     known = table(data, "mesh").get("levels")
     if isinstance(chosen, str) and isinstance(known, dict) and chosen not in known:
         yield ("mesh", "level"), f"is not one of the levels{suggestion(chosen, known)}"
-    if section:
+    if section and not table(data, "deck"):  # which has its own mesh and materials
         yield from places(data, section)
         yield from levels(data, section)
 
