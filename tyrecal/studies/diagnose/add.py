@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from ruamel.yaml import YAML
-from ruamel.yaml.nodes import ScalarNode
-from ruamel.yaml.representer import RoundTripRepresenter
-
 from ...errors import InputError
-from ...files import atomic_write
+from ...files import write_text
+from ...tyre.case.edit_text import set_in_text
+from ...tyre.case.mistakes import Keys
 from ...tyre.load import load_case
 from ...tyre.values import with_values
 
@@ -31,21 +29,7 @@ def add(path: Path, effects: Mapping[str, float], folder: Path | None = None) ->
         )
     if target.exists():
         raise InputError(f"'{target}' exists already; move it away first")
-    yaml = YAML()
-    yaml.preserve_quotes = True
-    yaml.width = 1000
-    yaml.representer.add_representer(type(None), _null)
-    data = yaml.load(path.read_text(encoding="utf-8"))
-    if "effects" in data:
-        data["effects"].update(effects)
-    else:
-        place = list(data).index("variables") if "variables" in data else len(data)
-        data.insert(place, "effects", dict(effects))
-    with atomic_write(target) as partial, partial.open("w", encoding="utf-8") as file:
-        yaml.dump(data, file)
+    values: dict[Keys, float] = {("effects", id): value for id, value in effects.items()}
+    write_text(target, set_in_text(path.read_text(encoding="utf-8-sig"), values))
     load_case(target, allow_unusual=True)
     return target
-
-
-def _null(representer: RoundTripRepresenter, _: None) -> ScalarNode:
-    return representer.represent_scalar("tag:yaml.org,2002:null", "null")

@@ -57,7 +57,7 @@ def read_document(path: Path) -> Document:
     if text is None:
         return document
     try:
-        root = _compose(text)
+        root = compose(text)
         if isinstance(root, MappingNode):
             document.data = _Reader(document, _yaml().constructor).mapping(root, ())
         else:
@@ -81,7 +81,7 @@ def _yaml() -> YAML:
 
 
 @lru_cache(maxsize=32)
-def _compose(text: str) -> Node | None:
+def compose(text: str) -> Node | None:
     """The nodes of a text, which must not be changed. Composing takes two thirds of the time to
     load a case, and one command loads the same text several times. Raises YAMLError."""
     return _yaml().compose(text)
