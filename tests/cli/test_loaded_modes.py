@@ -78,7 +78,7 @@ def test_a_tyre_that_no_load_is_borne_by(
         (["--sweep-load", "500,0"], "above 0"),
         (["--sweep-load", "much"], "--sweep-load much: must be numbers in N"),
         (["--sweep-load", "500", "--load-N", "500"], "not both"),
-        (["--load-N", "500", "--fitted", CASE], "--fitted goes with --sweep-load"),
+        (["--load-N", "500", "--fitted", CASE], "is not the fit.json"),
         (["--load-N", "500", "--pictures"], "--pictures goes with"),
         (["--wheel", "held"], "--wheel goes with --load-N"),
         (["--load-N", "500", "--solver", "calculix"], "cannot find modes of a tyre on a road"),

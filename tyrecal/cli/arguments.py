@@ -141,6 +141,23 @@ def fitted_values(path: Path, loaded: Any, terminal: Terminal) -> dict[str, floa
     return values
 
 
+def one_design(
+    fitted: Path | None, loaded: Any, assigned: Sequence[str], terminal: Terminal
+) -> tuple[Any, dict[str, float]]:
+    """The case and the values of its variables for a command that evaluates one design: the fitted
+    one where ``fitted`` is given. Raises click.UsageError where --set gives a variable too."""
+    from ..tyre.case import parse_setting, start_values
+    from ..tyre.values import overridden
+
+    if fitted is None:
+        return loaded, start_values(loaded)
+    for name, _ in map(parse_setting, assigned):
+        if name in loaded.case.variables:
+            raise click.UsageError(f"--set {name}: the design is that of --fitted")
+    values = fitted_values(fitted, loaded, terminal)
+    return overridden(loaded, values), values
+
+
 def _given(loaded: Any, assigned: Sequence[str], pressure_kPa: float | None) -> dict[str, Setting]:
     """Values that the user sets, by variable or path: each number once.
 

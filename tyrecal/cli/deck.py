@@ -36,6 +36,7 @@ MAX_DECK_DOUBTS = 10  # doubts about a deck
     options.assignments,
     options.pressure,
     options.loads,
+    options.fitted(),
     options.mesh,
     options.solver,
     options.output,
@@ -47,6 +48,7 @@ def command(
     assignments: tuple[str, ...],
     pressure_kPa: float | None,
     loads: str | None,
+    fitted: Path | None,
     mesh: str,
     solver: str,
     output: Path | None,
@@ -60,9 +62,12 @@ def command(
     tyrecal deck cases/p235_75r17.yaml --output decks
     python -m tyrecal_solvers.bundled decks/modes --oldjob inflate
     tyrecal deck cases/p235_75r17.yaml --output pressed --loads-N 3000,5000
+    tyrecal deck cases/p235_75r17.yaml --fitted p235_75r17 --output fitted_decks
     tyrecal deck --check my_tyre.inp
     """
     if check:
+        if fitted:
+            raise click.UsageError("--check takes no --fitted")
         return _check(case, mesh, assignments, terminal)
     from ..files import atomic_write, private_dir
     from ..simulate.deck.decks import Decks
@@ -73,7 +78,8 @@ def command(
 
     if loads is not None:
         arguments.refuse_set(assignments, "road.loads_N", "--loads-N")
-    loaded, values = arguments.load(case, mesh, assignments, pressure_kPa, terminal, allow_unusual)
+    loaded, _ = arguments.load(case, mesh, assignments, pressure_kPa, terminal, allow_unusual)
+    loaded, values = arguments.one_design(fitted, loaded, assignments, terminal)
     design = design_of(loaded, values)
     evaluator = Evaluator(design, solver)
     adapter = evaluator.solver

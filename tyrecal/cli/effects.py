@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,7 @@ from .parameters import FileOrFolder, Number, option
     shell_complete=complete.cases,
     help="Case: compute the change of this tyre's frequencies.",
 )
-@options.fitted("fit.json of the case: compute the effect for the fitted design.")
+@options.fitted()
 @option(
     "--value",
     type=Number(),
@@ -86,9 +85,8 @@ def command(
             terminal.show(shown(effects_table(entries)))
         return 0
 
-    loaded, values = study.load(case, assignments)
-    if fitted and (lost := _variables_in(assignments, values)):
-        raise click.UsageError(f"--set {lost[0]}: the design is that of --fitted")
+    loaded, _ = study.load(case, assignments)
+    loaded, values = arguments.one_design(fitted, loaded, assignments, terminal)
     if name and value is not None:
         path = f"effects.{name}"
         arguments.refuse_unusual(loaded, f"--value {value:g}", path, value, study.allow_unusual)
@@ -99,8 +97,6 @@ def command(
             f"solver '{adapter.name}' gives no sensitivities, which a re-fit needs"
         )
     kPa = _pressures(loaded, pressures, study.allow_unusual)
-    if fitted:
-        values = arguments.fitted_values(fitted, loaded, terminal)
     output = study.run(loaded, "effects", evaluator, pressure_kPa=kPa)
     entries = [CatalogueEntry.of(catalogue()[id], solvers, loaded) for id in chosen]
     if name and not terminal.as_json:
@@ -121,13 +117,6 @@ def command(
 
         figures = {f"effect_{each.id}": draw_signature(each) for each in signatures}
     return study.present(output, result, figures)
-
-
-def _variables_in(assignments: tuple[str, ...], values: Mapping[str, float]) -> list[str]:
-    """Variables among what is set."""
-    from ..tyre.case import parse_setting
-
-    return [name for name, _ in map(parse_setting, assignments) if name in values]
 
 
 def _pressures(loaded: Any, text: str | None, allowed: bool) -> list[float]:

@@ -18,7 +18,7 @@ DESIGNS = ("initial", "fitted")
 
 @click.command()
 @options.every(options.case_or_last, options.assignments, options.pressure, options.loads)
-@options.fitted("fit.json of the case: press the fitted design too.")
+@options.fitted(" and the initial one")
 @option(
     "--compare",
     metavar="initial,fitted",

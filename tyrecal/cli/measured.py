@@ -235,9 +235,7 @@ def sensors(
 @click.argument("file", type=FileOrFolder(exists=True, folder=False))
 @options.every(
     options.assignments,
-    options.fitted(
-        "fit.json of CASE: expect the fitted values of the variables, within their standard errors."
-    ),
+    options.fitted(", within its standard errors"),
     axle,
     centre,
     directions,

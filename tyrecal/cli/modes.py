@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     options.one_load,
     options.sweep_load,
     options.wheel,
-    options.fitted("fit.json of the case: with --sweep-load, evaluate the fitted design too."),
+    options.fitted("; with --sweep-load the initial one too"),
 )
 @option(
     "--pictures/--no-pictures",
@@ -60,7 +60,7 @@ def command(
     \b
     tyrecal modes cases/p235_75r17.yaml --set A_belt=3e-7 --pressure-kPa 200
     tyrecal modes cases/p235_75r17.yaml --set rebar_layers.belt_1.angle_deg=68 --json
-    tyrecal modes cases/p235_75r17.yaml --load-N 4000
+    tyrecal modes cases/p235_75r17.yaml --fitted p235_75r17 --load-N 4000
     tyrecal modes cases/p235_75r17.yaml --sweep-load 0,1000,2000,4000 --fitted p235_75r17/fit.json
     """
     from ..report.shape_data import tyre_data
@@ -69,8 +69,6 @@ def command(
     from ..tyre.effects.edit import changed, with_part
 
     loads = wanted_loads(load_N, sweep)
-    if fitted and sweep is None:
-        raise click.UsageError("--fitted goes with --sweep-load")
     if wheel and not loads:
         raise click.UsageError("--wheel goes with --load-N or --sweep-load")
     if dry_run and not loads:
@@ -78,10 +76,12 @@ def command(
     if pictures and load_N is not None:
         raise click.UsageError("--pictures goes with --sweep-load, or without a load")
     terminal = study.terminal
-    if not fitted:
+    if not (fitted and sweep):
         why = "only one design is evaluated; --sweep-load with --fitted evaluates two"
         options.say_idle(terminal, study.jobs, why)
     loaded, values = study.load(case, assignments, pressure_kPa)
+    if sweep is None:
+        loaded, values = arguments.one_design(fitted, loaded, assignments, terminal)
     if wheel:
         road = with_part(loaded.case.road, wheel=wheel.replace("-", "_"))
         loaded = changed(loaded, road=road)
@@ -91,7 +91,7 @@ def command(
     arguments.refuse_unusual_loads(loaded, option, loads, study.allow_unusual)
     if loads:
         evaluator.needs_road(modes=True)
-    if fitted:
+    if fitted and sweep is not None:
         designs["fitted"] = arguments.fitted_values(fitted, loaded, terminal)
     if loads:
         pressed_to = [PlannedState(sum(load > 0 for load in loads), modes=True)]

@@ -395,9 +395,11 @@ def _terminal_of(values: dict[str, Any]) -> Terminal:
     return terminal
 
 
-def fitted(text: str) -> Callable[[Any], Any]:
-    """A finished fit whose design is studied too; ``text``: the option's help."""
+def fitted(compares: str = "") -> Callable[[Any], Any]:
+    """A finished fit, whose design is studied; ``compares``: the words that the initial one is
+    studied too."""
     path = FileOrFolder(exists=True)
+    text = f"Fit of the case, fit.json or its folder: take the fitted design{compares}."
     return option("--fitted", type=path, metavar="fit.json|DIR", help=text)
 
 

@@ -16,7 +16,7 @@ from .parameters import option
 @click.command()
 @options.every(options.case_or_last, options.assignments)
 @options.pressures
-@options.fitted("fit.json of the case: sweep the fitted design too.")
+@options.fitted(" and the initial one")
 @option("--pictures/--no-pictures", default=True, help="Draw frequencies over pressure.")
 @options.figure_format
 @options.study
