@@ -32,6 +32,7 @@ COMMANDS = {  # name: one line of help, so that the overview imports no command
     **{name: entry.help for name, entry in STUDIES.items() if entry.help},
     "measured": "Turn modal tables, mode shapes and response functions into measurements.",
     "blind": "Test the diagnosis on synthetic data with a hidden effect.",
+    "export": "Write the calibrated tyre as files: its case, or its decks.",
     "report": "Show the results of one or several folders on one HTML page.",
     "batch": "Study many cases at once, compare with a baseline, report to CI.",
     "solvers": "List the installed solvers and what they can do.",

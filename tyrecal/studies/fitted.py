@@ -9,10 +9,10 @@ from typing import Any, Final
 
 from ..errors import InputError
 from ..files import read_json
-from ..tyre.case import LoadedCase, as_written, start_values
+from ..tyre.case import LoadedCase, as_written, start_values, with_level
 from ..tyre.case.identity import is_of_tyre, tyre_sha256
 from ..tyre.state import pressure_name
-from ..tyre.values import with_values
+from ..tyre.values import overridden, with_values
 
 NOT_CONVERGED: Final = "not_converged"  # folder of a fit that may not take a better one's place
 
@@ -64,6 +64,22 @@ def read_fitted(path: Path, case: LoadedCase) -> tuple[dict[str, float], list[st
     except ValueError as error:
         raise InputError(f"'{path}' has a design that this case cannot have: {error}") from None
     return values, _made_otherwise(of, case)
+
+
+def as_fitted(path: Path, case: LoadedCase) -> LoadedCase:
+    """The case as the fit in fit.json left it: on the fit's mesh, with what its command set, and
+    with the fitted values as the starts of its variables. ``case``: as its file has it. Raises as
+    `read_fitted` does."""
+    try:
+        of = dict(read_json(path).get("provenance", {}))
+        settings, mesh = dict(of.get("overrides", {})), of.get("mesh")
+    except (ValueError, TypeError, AttributeError):
+        raise InputError(f"'{path}' is not the fit.json that 'tyrecal fit' writes") from None
+    if mesh is not None:
+        case = with_level(case, mesh)
+    starts = start_values(case)
+    case = overridden(case, {name: x for name, x in settings.items() if name not in starts})
+    return overridden(case, read_fitted(path, case)[0])
 
 
 def _difference(theirs: Mapping[str, Any], case: LoadedCase) -> str:

@@ -8,8 +8,8 @@ from importlib import import_module
 from math import isclose
 from typing import Any
 
-from ...tyre.own_deck.own_deck import UNIT_LENGTH, UNIT_MASS
-from ...tyre.own_deck.own_text import own_texts
+from ...tyre.case.kinds.section_deck import pressure_in_deck
+from ...tyre.own_deck.own_deck import UNIT_LENGTH
 from ...tyre.own_deck.text import Block, named
 from ...tyre.resolve import Tyre
 from ...tyre.templates import TemplateFailed
@@ -22,17 +22,12 @@ def own_jobs(tyre: Tyre) -> tuple[dict[str, str], dict[str, Any]]:
     """Texts of the job that inflates, which is the user's deck, and of what it includes; and what
     the job that revolves it takes over: its step, node, sets, surfaces and pressure, in the deck's
     own units. Raises TemplateFailed."""
-    deck, flat, c = tyre.written.kind.deck, tyre.flat, tyre.case
+    kind, flat, c = tyre.written.kind, tyre.flat, tyre.case
+    deck = kind.deck
     _refuse_unrevolved(tyre)
     (body,) = (block for block in flat.blocks.model if block.name == "RIGID BODY")
     steps = [block.place for block in deck.blocks if block.name == "STEP"]
-    _, row, field = flat.model.pressure[0]
-    pressure = c.pressure_kPa * 1e3 * UNIT_LENGTH[deck.units] / UNIT_MASS[deck.units]
-    if isclose(row.number(field), pressure, rel_tol=1e-12):
-        pressure = row.number(field)
-    others = [(row, i) for _, row, i in flat.model.pressure if row.number(i) != pressure]
-    numbers = tyre.written.deck_numbers
-    files = own_texts(deck, numbers, [(row, i, pressure) for row, i in others])
+    files = kind.own_texts(tyre)
     files["inflate.inp"] = files.pop(deck.path.name)
     loads = [block for block in flat.blocks.inflation if block.name == "DSLOAD"]
     node, (r, z) = flat.model.reference
@@ -43,8 +38,8 @@ def own_jobs(tyre: Tyre) -> tuple[dict[str, str], dict[str, Any]]:
         "z": z,
         "rim": body.need("TIE NSET"),
         "surfaces": [row.name(0) for block in loads for row in block.rows],
-        "pressure": pressure,
-        "crown": named(tyre.written.kind.source(c).crown),
+        "pressure": pressure_in_deck(tyre),
+        "crown": named(kind.source(c).crown),
     }
 
 

@@ -50,6 +50,10 @@ class DecksIn3D(UserDecks):
         pressure_kPa = self.own.pressure_Pa / 1e3 if self.own.pressures else None
         return lines_of_a_deck(source, pressure_kPa, name=self.own.path.stem, solver="abaqus")
 
+    def own_texts(self, tyre: Any) -> dict[str, str]:
+        """The decks and what they include."""
+        return self.own.filled(self.numbers(tyre.case), 1e3 * tyre.case.pressure_kPa)
+
     def require_section(self, refusal: str) -> None:
         """Raises InputError(refusal)."""
         raise InputError(refusal)

@@ -124,6 +124,11 @@ class TyreKind:
         mesh."""
         return {}
 
+    def own_texts(self, tyre: Any) -> dict[str, str]:
+        """The user's decks of a resolved tyre: their texts by file, only numbers changed. {}:
+        tyrecal writes the decks. Raises InputError for what they cannot express."""
+        return {}
+
     def request(self) -> dict[str, Any]:
         """Requests to a solver that no deck holds."""
         return {}

@@ -6,11 +6,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
+from math import isclose
 from pathlib import Path
 from typing import Any
 
 from ...own_deck.numbers import moduli
 from ...own_deck.own_deck import UNIT_LENGTH, UNIT_MASS, OwnDeck
+from ...own_deck.own_text import own_texts
 from ...own_deck.section_mesh import OwnDeckMesh, section, section_mesh
 from ...own_deck.solver_deck import SolverDeck
 from ...own_deck.solver_mesh import REFERENCE_NODE
@@ -101,6 +103,22 @@ class SectionDeck(UserDecks):
             "hourglass": None,
         }
 
+    def own_texts(self, tyre: Any) -> dict[str, str]:
+        """The deck and what it includes. Raises OwnDeckError for gauges and moduli that are not the
+        deck's."""
+        flat, c = tyre.flat, tyre.case
+        why = {
+            "deck.gauges must be 1, because the deck has its own nodes": self.source(c).thickened,
+            "analysis.static_moduli must be those of its *STATIC": (
+                (c.analysis.static_moduli == "long_term") != flat.long_term
+            ),
+        }
+        for reason in (words for words, holds in why.items() if holds):
+            raise flat.blocks.inflation[0].refused(reason)
+        pressure = pressure_in_deck(tyre)
+        rows = [(row, i) for _, row, i in flat.model.pressure if row.number(i) != pressure]
+        return own_texts(self.own, self.numbers(c), [(row, i, pressure) for row, i in rows])
+
     def request(self) -> dict[str, Any]:
         """Units of the deck, m and kg."""
         units = self.own.units
@@ -126,6 +144,16 @@ class SectionDeck(UserDecks):
     def moduli(self, case: Case, material: str) -> dict[str, int]:
         """Paths of the moduli that are plain numbers."""
         return moduli(self.numbers(case), material)
+
+
+def pressure_in_deck(tyre: Any) -> float:
+    """The pressure of a resolved tyre in the unit of its deck; the deck's own number if it is
+    that."""
+    _, row, i = tyre.flat.model.pressure[0]
+    units = tyre.written.kind.deck.units
+    pressure = 1e3 * tyre.case.pressure_kPa * UNIT_LENGTH[units] / UNIT_MASS[units]
+    own = float(row.number(i))
+    return own if isclose(own, pressure, rel_tol=1e-12) else pressure
 
 
 def trial(flat: SolverDeck) -> float:
