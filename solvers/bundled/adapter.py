@@ -42,6 +42,7 @@ class Bundled:
             "footprint",
             "footprint_gradients",
             "loaded_modes",
+            "rim_stiffness",
             "vibration_modulus",
             "spindle",
             "frequency_modulus",

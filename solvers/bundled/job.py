@@ -24,10 +24,17 @@ from .modes.harmonics import HarmonicModes
 from .modes.sensitivity import state_rate
 from .modes.wheel import free_along_load
 from .results import StepResult, write
-from .road.road_data import ROAD_NUMBERS, InflatedTangent, ModeRequest, RoadData, read_road
+from .road.road_data import (
+    ROAD_NUMBERS,
+    InflatedTangent,
+    ModeRequest,
+    RimRequest,
+    RoadData,
+    read_road,
+)
 from .section import mechanics
 from .section.band import Numbering
-from .section.boundary import keeps_half_turn, numbering, vibrating
+from .section.boundary import keeps_half_turn, numbering, rim_motion, vibrating
 from .section.inflation import equilibrium
 from .section.loads import loads, pressures
 from .section.mesh import DeckMesh, read_mesh
@@ -130,6 +137,7 @@ class Job:
         assert self.road is not None
         wanted: list[float] = []
         vibrations: dict[float, ModeRequest] = {}
+        rim_motions: dict[float, list[list[float]]] = {}
         for step in self.steps:
             if step.centrifugal:
                 raise DeckError(step.procedure.place, "a turning tyre on a road is not honoured")
@@ -141,6 +149,12 @@ class Job:
                 continue
             if step.procedure.name != "STATIC":
                 raise DeckError(step.procedure.place, "a turning tyre on a road is not honoured")
+            if step.is_perturbation:
+                if not wanted:
+                    place = step.procedure.place
+                    raise DeckError(place, "motions of the rim on a road come after a force on it")
+                rim_motions.setdefault(wanted[-1], []).append(self._rim_motion(step))
+                continue
             step.held = self._off_road(step).held
             if not step.forces:
                 self._static(step)
@@ -170,6 +184,7 @@ class Job:
             vibrations,
             self._inflated_tangents(model, equations, acting, last),
             partial(pressed_start.begin, start, self._of_start) if start else None,
+            {load: self._rim_request(motions) for load, motions in rim_motions.items()},
         )
         if self.tyre.request.cavity:
             result |= self._cavity(model, result)
@@ -177,7 +192,8 @@ class Job:
 
     def _on_road(self) -> tuple[int, Model, Numbering, list[Pressure]]:
         """The place of the last static step, and the model, equations and pressures in it."""
-        last = max(i for i, each in enumerate(self.steps) if each.procedure.name == "STATIC")
+        static = [each.procedure.name == "STATIC" for each in self.steps]
+        last = max(i for i, each in enumerate(self.steps) if static[i] and not each.is_perturbation)
         step = self.steps[last]
         model = self.tyre.models(None, step.long_term, False)
         return last, model, numbering(model, step), pressures(model, step)
@@ -255,6 +271,29 @@ class Job:
         model = self.tyre.models(dynamic_Hz, step.long_term, False)
         wheel_kg = free_along_load(self.tyre.revolve, self.model.mesh, step)
         return ModeRequest(model, row.integer(0), nodes, wheel_kg)
+
+    def _rim_motion(self, step: DeckStep) -> list[float]:
+        """Motion (6,) of the rim in a linear step of a tyre on a road: m and rad, along and about
+        the deck's axes. Raises DeckError."""
+        assert self.road is not None
+        place, references = step.procedure.place, list(self.model.mesh.reference_nodes)
+        if len(references) != 1:
+            raise DeckError(place, "motions of one rim are honoured")
+        held = [row for row in step.held if row.text(0) == self.road.node]
+        freedoms = {dof for row in held for dof in range(row.integer(1), 1 + row.integer(2, 0))}
+        if freedoms != set(range(1, 7)) or any(row.value(3, 0.0) for row in held):
+            words = f"node {self.road.node} must be held in 1, 6 while the rim is moved"
+            raise DeckError(place, words)
+        motion = rim_motion(self.model.mesh, step, references[0])
+        if motion.keys() != freedoms:
+            raise DeckError(place, f"node {references[0]} needs a displacement in each of 1 to 6")
+        return [motion[dof] for dof in range(1, 7)]
+
+    def _rim_request(self, motions: list[list[float]]) -> RimRequest:
+        """Request for the reactions to motions of the rim."""
+        (reference,) = self.model.mesh.reference_nodes
+        row = self.model.mesh.index[reference]
+        return RimRequest(np.array(motions), float(np.real(self.model.mesh.X[row, 1])))
 
     def _static(self, step: DeckStep) -> None:
         self._check_time()

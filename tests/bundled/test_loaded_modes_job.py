@@ -73,7 +73,7 @@ def test_the_deck_says_how_the_wheel_stands(
     vibrations: list[Any] = []
 
     def press(*given: Any) -> dict[str, Any]:
-        vibrations.extend(given[-3].values())
+        vibrations.extend(given[-4].values())
         raise RunFailed("crashed", "enough")
 
     monkeypatch.setattr(footprint_job, "press", press)

@@ -37,6 +37,7 @@ def names_of(effects: str = "plain", element: str = "CGAX8R") -> Names:
     mesh = mesh.model_copy(update={"levels": {"default": few}})
     case = replace(case, case=case.case.model_copy(update={"mesh": mesh}))
     names = {**context(TyreDesign(case).tyre), "modes": 20, "loads": (), "loaded_modes": 0}
+    names["rim_motions"] = ()
     return {**names, "mesh_block": written("mesh.inp.j2", names).rstrip("\n")}
 
 
@@ -102,6 +103,7 @@ def presses() -> Iterator[str]:
         own = {
             "loads": loads,
             "loaded_modes": count,
+            "rim_motions": range(1, 7) if count else (),
             "road": {**names_of()["road"], "wheel": wheel},
             "vibration_frequency": 60.0 if hertz else None,
             "long_term": long_term,

@@ -44,7 +44,7 @@ LOADS: dict[str, dict[str, Any]] = {
     "modes": {},
     "a load": {"loads_N": (500.0,)},
     "loads": {"loads_N": (500.0, 1000.0, 1500.0)},
-    "loads with modes": {"loads_N": (500.0, 1000.0), "loaded_modes": 12},
+    "loads with modes": {"loads_N": (500.0, 1000.0), "loaded_modes": 12, "rim_stiffness": True},
 }
 
 

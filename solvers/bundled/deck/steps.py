@@ -28,6 +28,7 @@ class DeckStep:
     output: str  # the node set of its *NODE FILE, or ""
     centrifugal: dict[str, complex | float]  # element set to Omega^2 (rad2/s2) of *DLOAD's CENTRIF
     spin: dict[str, complex | float]  # element set to Omega (rad/s) of its ROTDYNF
+    is_perturbation: bool = False  # a *STATIC that is linear about the end of the step before
 
     @property
     def pressure(self) -> float:
@@ -71,9 +72,10 @@ def _steps(model: list[Block], blocks: list[list[Block]], revolved: bool) -> lis
     pressures: dict[str, complex | float] = {}
     forces: Sequence[Row] = []
     turning: dict[str, dict[str, complex | float]] = {"CENTRIF": {}, "ROTDYNF": {}}
-    long_term = True
+    long_term, on_road = True, any(k.name == "CONTACT PAIR" for k in model)
     for number, block in enumerate(blocks, start=1):
-        procedure = _procedure(block)
+        procedure = _procedure(block, on_road)
+        is_perturbation = procedure.name == "STATIC" and "PERTURBATION" in block[0].parameters
         for k in block:
             if k.name == "BOUNDARY":
                 held = k.rows if k.get("OP") == "NEW" else [*held, *k.rows]
@@ -83,7 +85,7 @@ def _steps(model: list[Block], blocks: list[list[Block]], revolved: bool) -> lis
                 pressures = {**pressures, **_pressures(k)}
             elif k.name == "DLOAD":
                 turning = _turning(k, turning, revolved)
-        if procedure.name == "STATIC":
+        if procedure.name == "STATIC" and not is_perturbation:
             long_term = "LONG TERM" in procedure.parameters
         output = next((k.get("NSET") for k in block if k.name == "NODE FILE"), "")
         steps.append(
@@ -98,6 +100,7 @@ def _steps(model: list[Block], blocks: list[list[Block]], revolved: bool) -> lis
                 output,
                 turning["CENTRIF"],
                 turning["ROTDYNF"],
+                is_perturbation,
             )
         )
     return steps
@@ -128,17 +131,25 @@ def _turning(
     return turning
 
 
-def _procedure(block: list[Block]) -> Block:
+def _procedure(block: list[Block], on_road: bool) -> Block:
+    """The procedure of a step; ``on_road``: of a job with a road, where a *STATIC may be linear.
+    Raises DeckError."""
     procedures = [k for k in block if k.name in PROCEDURES]
     if len(procedures) != 1:
         raise DeckError(
             block[0].place, "a step needs one *STATIC, *FREQUENCY or *COMPLEX FREQUENCY"
         )
-    if procedures[0].name == "STATIC" and "NLGEOM" not in block[0].parameters:
+    procedure, given = procedures[0], block[0].parameters
+    if procedure.name != "STATIC":
+        return procedure
+    if "PERTURBATION" in given and ("NLGEOM" in given or not on_road):
+        words = "a *STATIC step is no linear PERTURBATION, except without NLGEOM on a road"
+        raise DeckError(block[0].place, words)
+    if "PERTURBATION" in given and (procedure.rows or procedure.parameters):
+        raise DeckError(procedure.place, "*STATIC takes no data and parameters in a PERTURBATION")
+    if not {"NLGEOM", "PERTURBATION"} & given.keys():
         raise DeckError(block[0].place, "a *STATIC step needs NLGEOM=YES")
-    if procedures[0].name == "STATIC" and "PERTURBATION" in block[0].parameters:
-        raise DeckError(block[0].place, "a *STATIC step is no linear PERTURBATION")
-    return procedures[0]
+    return procedure
 
 
 def _check_transfer(section: list[Block], steps: list[DeckStep], revolve: list[Block]) -> None:

@@ -39,7 +39,8 @@ from .contact_newton import ContactNewton, PressedState
 from .half_turn_symmetry import HalfTurn
 from .loaded_modes import SPARE, loaded_modes
 from .patch import patch
-from .road_data import InflatedTangent, ModeRequest, RoadData
+from .rim_stiffness import reactions, rim_stiffness
+from .road_data import InflatedTangent, ModeRequest, RimRequest, RoadData
 from .slopes import Slopes
 from .stick import held
 from .tread import tread_of
@@ -64,10 +65,12 @@ def press(
     vibrations: Mapping[float, ModeRequest] = MappingProxyType({}),
     tangents: Mapping[str, InflatedTangent] = MappingProxyType({}),
     begin: Callable[[ContactNewton, Array], None] | None = None,
+    rim_requests: Mapping[float, RimRequest] = MappingProxyType({}),
 ) -> dict[str, Any]:
     """Footprints at the ``wanted`` loads (N) of a tyre inflated to ``U`` (n, 3), with modes where
     there are ``vibrations``, and derivatives by the numbers of the deck that ``tangents`` are of;
-    ``begin`` gives the first load its guess, from the deck's node numbers (n,).
+    ``begin`` gives the first load its guess, from the deck's node numbers (n,); rim_requests: by
+    load, motions of the rim whose reactions are wanted.
 
     Raises DeckError; RunFailed where not even the first load is reached.
     """
@@ -102,6 +105,8 @@ def press(
             state = work.to(load)
             footprint = _footprint(work, state, load, rings)
             footprint |= slopes.at(work, state, rings)
+            if load in rim_requests:
+                footprint |= _rim_reactions(work, state, rim_requests[load])
             if load in vibrations:
                 footprint |= _modes(work, state, vibrations[load], equations, U, rings)
         except (RunFailed, np.linalg.LinAlgError) as error:
@@ -177,6 +182,22 @@ def _footprint(
     }
 
 
+def _rim_reactions(
+    work: ContactNewton, state: PressedState, wanted: RimRequest
+) -> dict[str, Array]:
+    """Reactions to motions of the rim about one load, with the patch held."""
+    C = rim_stiffness(
+        work.tyre,
+        work.symmetry,
+        work.symmetry.spread(state.parts),
+        held(state.contact),
+        work.check,
+        wanted.reference_z,
+        work.release_factor(),
+    )
+    return {"rim_reactions": reactions(C, wanted.motions)}
+
+
 def _modes(
     work: ContactNewton,
     state: PressedState,
@@ -246,7 +267,7 @@ def write(stem: Path, model: Model, result: dict[str, Any]) -> None:
         footprint = {**footprint, "node": numbers[footprint["node"]]}
         if "mode_node" in footprint:
             footprint["mode_node"] = numbers[footprint["mode_node"]]
-        for name in (*PATCH_ARRAYS, "displacement", *MODE_ARRAYS):
+        for name in (*PATCH_ARRAYS, "displacement", "rim_reactions", *MODE_ARRAYS):
             if name in footprint:
                 arrays[f"{name}_{i}"] = footprint.pop(name)
         lines.append({**footprint, "rim_N": footprint["rim_N"].tolist()})
@@ -267,7 +288,7 @@ def read(stem: Path) -> dict[str, Any]:
             answer[name] = arrays[name]
         for i, footprint in enumerate(answer["footprints"]):
             footprint["rim_N"] = np.array(footprint["rim_N"])
-            for name in (*PATCH_ARRAYS, "displacement", *MODE_ARRAYS):
+            for name in (*PATCH_ARRAYS, "displacement", "rim_reactions", *MODE_ARRAYS):
                 if f"{name}_{i}" in arrays:
                     footprint[name] = arrays[f"{name}_{i}"]
     del answer["format"]

@@ -116,21 +116,11 @@ class _Vibrations:
     ):
         self.tyre, self.symmetry, self.check = tyre, symmetry, check
         self.wheel_kg = wheel_kg
-        self.factor = factor or self._form(hold)
+        self.factor = factor or factor_with_hold(tyre, symmetry, hold, check)
         self.start = [symmetry.parts(V) * symmetry.mask for V in standing_waves(unloaded, symmetry)]
         turn = symmetry.around.turn(1)[:, None]
         down = np.stack([turn.real, -turn.imag, 0 * turn.real], -1)
         self.down = down * ~symmetry.free  # the rim's nodes (k, n, 3), by 1 m
-
-    def _form(self, hold: csr_matrix) -> ContactUpdate:
-        """The factor of the stiffness with a hold."""
-        tangents = self.tyre.tangents(np.float32)
-        order = Elimination(tangents, self.symmetry)
-        self.check()
-        try:
-            return ContactUpdate(Factor(order, tangents, self.symmetry.fold(hold)))
-        except Indefinite:
-            raise RunFailed("unstable", davidson.NOT_STABLE) from None
 
     def lowest(self, holds: Sequence[csr_matrix], count: int) -> list[tuple[Array, Array]]:
         """For each hold omega^2 (count,) and shapes (count, k, n, 3). Each search starts from the
@@ -142,7 +132,7 @@ class _Vibrations:
         basis = None
         for before, hold in pairwise([holds[0], *holds]):
             self.factor.to(self.symmetry.fold(hold))
-            stiffness = self._operator(partial(self._forces_of, hold), 0.0)
+            stiffness = self._operator(partial(forces_on, self.tyre, hold), 0.0)
             inverse, start = self._inverse(hold)
             if basis is None:
                 basis = davidson.basis_of(start, stiffness, inertia)
@@ -153,10 +143,6 @@ class _Vibrations:
             # the half tyre has half of the modal mass
             result.append((values, np.array([self._field(row) for row in x]) / np.sqrt(2)))
         return result
-
-    def _forces_of(self, hold: csr_matrix, V: Array) -> Array:
-        """Forces (k, n, 3) of the tyre and the hold on the field V, N for V in m."""
-        return self.tyre.product(V) + _times(hold, V)
 
     def _field(self, vector: Array) -> Array:
         """The field (k, n, 3) of a vector."""
@@ -194,7 +180,7 @@ class _Vibrations:
             return inner, start
         # the wheel is eliminated last: the tyre's vector per unit of its shift is -follows, and
         # ``left`` is the Schur complement, the stiffness of the wheel on the tyre
-        border = self._forces(self._forces_of(hold, self.down))
+        border = self._forces(forces_on(self.tyre, hold, self.down))
         follows = inner(border[None, :-1])[0]
         left = border[-1] - border[:-1] @ follows
 
@@ -204,6 +190,25 @@ class _Vibrations:
             return np.column_stack([y - np.outer(shift, follows), shift])
 
         return bordered, np.vstack([np.pad(start, ((0, 0), (0, 1))), np.append(-follows, 1.0)])
+
+
+def factor_with_hold(
+    tyre: Revolved, symmetry: HalfTurn, hold: csr_matrix, check: Callable[[], None]
+) -> ContactUpdate:
+    """The factor of the tyre's tangent with a hold, on the fields of a symmetry. Raises RunFailed
+    where the tyre is not stable, and what ``check`` raises to stop."""
+    tangents = tyre.tangents(np.float32)
+    order = Elimination(tangents, symmetry)
+    check()
+    try:
+        return ContactUpdate(Factor(order, tangents, symmetry.fold(hold)))
+    except Indefinite:
+        raise RunFailed("unstable", davidson.NOT_STABLE) from None
+
+
+def forces_on(tyre: Revolved, hold: csr_matrix, V: Array) -> Array:
+    """Forces (k, n, 3) of the tyre's tangent and the hold on the field V, N for V in m."""
+    return tyre.product(V) + _times(hold, V)
 
 
 def _times(hold: csr_matrix, V: Array) -> Array:

@@ -39,6 +39,14 @@ class ModeRequest:
     wheel_kg: float | None = None  # of a wheel that is free along the load
 
 
+@dataclass(frozen=True)
+class RimRequest:
+    """Reactions wanted at a load while the patch is held."""
+
+    motions: Array  # (m, 6) of the rim along and about the deck's axes, m and rad
+    reference_z: float  # place on the axle of the node that they are of, m
+
+
 def read_road(model: list[Block]) -> RoadData | None:
     """The road of a revolve job's model, or None where it has none. Raises DeckError."""
     pairs = [k for k in model if k.name == "CONTACT PAIR"]

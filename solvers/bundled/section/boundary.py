@@ -125,12 +125,21 @@ def _free(mesh: DeckMesh, step: DeckStep) -> Array:
 
 def rim_freedoms(mesh: DeckMesh, step: DeckStep, reference: int) -> set[int]:
     """Degrees of freedom 1 to 6 of a rim's reference node that are not held."""
-    held: set[int] = set()
+    return set(range(1, 7)) - rim_motion(mesh, step, reference).keys()
+
+
+def rim_motion(mesh: DeckMesh, step: DeckStep, reference: int) -> dict[int, float]:
+    """Displacements (m, rad) that a step prescribes at a rim's reference node, by degree of freedom
+    1 to 6. Raises DeckError where one is not zero and the step is no linear one."""
+    motion: dict[int, float] = {}
     for row in step.held:
         if _names(mesh, row, reference):
             first, last = _range(row)
-            held.update(range(first, last + 1))
-    return set(range(1, 7)) - held
+            value = float(np.real(row.value(3, 0.0)))
+            if value and not step.is_perturbation:
+                raise DeckError(row.place, "only zero displacements are honoured")
+            motion |= dict.fromkeys(range(first, last + 1), value)
+    return motion
 
 
 def _names(mesh: DeckMesh, row: Row, reference: int) -> bool:

@@ -138,19 +138,22 @@ class Decks:
         start: np.ndarray | None = None,
         pressed_start: PressedTyre | None = None,
         response: Mapping[str, Any] | None = None,
+        rim_stiffness: bool = False,
     ):
         """gradients: variables whose places in the deck are wanted; modes_per_harmonic: the
         design's, or a larger number for a second look; loads_N: press the tyre on the road with
         these instead of finding modes; loaded_modes: how many to find there; start (n, 4): node
         numbers and displacements, m, of a shape near the inflated one, for solvers that can use
         it (``start``); pressed_start: a tyre on the road near this one (``pressed_start``);
-        response: responses that are wanted (``response``)."""
+        response: responses that are wanted (``response``); rim_stiffness: that of the rim is wanted
+        at each load."""
         self.design, self.gradients = design, gradients
         self.loads_N, self.loaded_modes, self.start = loads_N, loaded_modes, start
         self.pressed_start = pressed_start
         self.request = {**design.request, "loads_N": loads_N, "loaded_modes": loaded_modes}
         if response:
             self.request["response"] = response
+        self.request["rim_stiffness"] = rim_stiffness
         if modes_per_harmonic:
             self.request["modes_per_harmonic"] = modes_per_harmonic
         self._header = design.header  # of all its texts: slopes come of their data

@@ -188,6 +188,7 @@ def _abaqus(tyre: Tyre, env: Any, request: DeckRequest) -> dict[str, str]:
     names = _with_mesh(tyre, env)
     names["modes"] = 2 * request["modes_per_harmonic"] * (request["highest_harmonic"] + 1)
     names["loads"], names["loaded_modes"] = request["loads_N"], request["loaded_modes"]
+    names["rim_motions"] = range(1, 7) if request["rim_stiffness"] else ()
     if names["loaded_modes"]:
         half = fine_enough(tyre.case.road.element_angles_deg, request["highest_harmonic"])
         names["road"]["angles"] = half + half[::-1]

@@ -53,6 +53,7 @@ class PressQuestion(NamedTuple):
     modes: int = 0
     gradients: tuple[str, ...] = ()
     base: Mapping[str, float] | None = None
+    rim_stiffness: bool = False
 
 
 @dataclass
@@ -154,22 +155,32 @@ class Evaluator:
         modes: int = 0,
         gradients: tuple[str, ...] = (),
         base: Mapping[str, float] | None = None,
+        rim_stiffness: bool = False,
     ) -> Pressed:
         """One design on the road at rising loads, as far as the solver gets, with so many ``modes``
         at each; gradients: names of variables whose slopes are wanted (`Footprint.slopes`); base:
         values of the design whose state on the road begins the first load (None: the inflated
-        tyre).
+        tyre); rim_stiffness: that of the rim is wanted at each load, too.
 
         Raises what `evaluate` does; DeckRefused too where the solver has no road.
         """
-        self.needs_road(bool(modes))
+        self.needs_road(bool(modes), rim_stiffness)
         design, loads = self._with(values), tuple(loads_N)
         start = None
         if base and not modes and _key(self._with(base)) != _key(design):
             start = self._pressed(base, loads, gradients)
-        decks = Decks(design, gradients, loads_N=loads, loaded_modes=modes, pressed_start=start)
+        decks = Decks(
+            design,
+            gradients,
+            loads_N=loads,
+            loaded_modes=modes,
+            pressed_start=start,
+            rim_stiffness=rim_stiffness,
+        )
         try:
-            answer = self._ask(decks, lambda answer, kept: pressed(answer, loads_N, kept, modes))
+            answer = self._ask(
+                decks, lambda answer, kept: pressed(answer, loads_N, kept, modes, rim_stiffness)
+            )
         except EvaluationFailed as failure:
             raise _advised(failure, design) from None
         if answer.failed:
@@ -205,12 +216,17 @@ class Evaluator:
         tyre = PressedTyre(_key(design), texts, answer.nodes, answer.inflated, *place)
         self.pressed_tyres[tyre.of, first.load_N] = tyre
 
-    def needs_road(self, modes: bool = False) -> None:
-        """Raises DeckRefused where the solver cannot press a tyre on a road, or has no modes of it
-        there."""
-        capability = "loaded_modes" if modes else "footprint"
-        if capability not in self.solver.capabilities:
-            what = "find modes of a tyre" if modes else "press a tyre"
+    def needs_road(self, modes: bool = False, rim_stiffness: bool = False) -> None:
+        """Raises DeckRefused where the solver cannot press a tyre on a road, or has no modes or
+        stiffness of its rim there."""
+        wanted = {
+            "footprint": ("press a tyre", not (modes or rim_stiffness)),
+            "loaded_modes": ("find modes of a tyre", modes),
+            "rim_stiffness": ("find the stiffness of a tyre", rim_stiffness),
+        }
+        for capability, (what, is_wanted) in wanted.items():
+            if not is_wanted or capability in self.solver.capabilities:
+                continue
             raise DeckRefused(
                 f"solver '{self.solver.name}' cannot {what} on a road; 'tyrecal solvers'"
                 f" shows which one can ({capability})"

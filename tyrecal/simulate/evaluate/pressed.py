@@ -49,6 +49,9 @@ class Footprint:
     mode_traction_N: of.RealArray | None = None
     sliding_frequency_Hz: of.HertzArray | None = None  # modes of a patch that slides freely
     sliding_shape: of.Shapes3D | None = None
+    # (6, 6) forces and moments at the rim, N and N m, along and about the deck's axes (down, axle,
+    # rolling direction), for a shift (m) or turn (rad) along or about each; the patch is held
+    rim_reactions: Annotated[Array, of.shaped(of.REAL, 6, 6)] | None = None
     # the gas' first wave fore and aft, and up and down, between rigid walls
     cavity_Hz: of.HertzPair | None = None
     # by variable and name, derivatives of the numbers above by the requested variables
@@ -74,9 +77,14 @@ class Pressed:
 
 
 def pressed(
-    answer: dict[str, Any], loads_N: Sequence[float], kept: Path | None, modes: int = 0
+    answer: dict[str, Any],
+    loads_N: Sequence[float],
+    kept: Path | None,
+    modes: int = 0,
+    rim_stiffness: bool = False,
 ) -> Pressed:
-    """A solver's answer to ``loads_N``, of a run ``kept`` there, with so many ``modes`` at each.
+    """A solver's answer to ``loads_N``, of a run ``kept`` there, with so many ``modes`` at each,
+    and the reactions of the rim where ``rim_stiffness`` is wanted.
 
     Raises EvaluationFailed where it does not hold the loads in their order, one at least, each
     borne by the road, or not their modes.
@@ -98,6 +106,8 @@ def pressed(
         hertz = each.mode_frequency_Hz
         if modes and (hertz is None or len(hertz) < modes or not (hertz > 0).all()):
             raise EvaluationFailed("no_results", f"not {modes} modes at {each.load_N:g} N")
+        if rim_stiffness and each.rim_reactions is None:
+            raise EvaluationFailed("no_results", f"no reactions of the rim at {each.load_N:g} N")
     return Pressed(
         pressure_kPa=answer["pressure_Pa"] / 1e3,
         mass_kg=answer["mass_kg"],

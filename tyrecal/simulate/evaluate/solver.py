@@ -22,10 +22,10 @@ class Solver(Protocol):
 
     version: of the program that runs, "unknown" where it is not found; part of every record's key.
     dialect: the template folder of its decks; capabilities: of ``modes``, ``gradients``,
-    ``footprint``, ``footprint_gradients``, ``loaded_modes``, ``response``, and what effects need
-    (`Effect.needs`): ``vibration_modulus``, a modulus in the frequency step other than in the
-    static one, and those of `resolve.CAPABILITIES`; ``own_decks``: it runs a user's in three
-    dimensions;
+    ``footprint``, ``footprint_gradients``, ``loaded_modes``, ``rim_stiffness``, ``response``, and
+    what effects need (`Effect.needs`): ``vibration_modulus``, a modulus in the frequency step other
+    than in the static one, and those of `resolve.CAPABILITIES`; ``own_decks``: it runs a user's in
+    three dimensions;
     A solver that starts a program has ``command`` too, a list of its words, which is the user's to
     set (`tyrecal.simulate.settings`), never the case's; the tool makes its program a whole path;
     refusals, failures: exceptions of `write`, `run` and `read` for a deck it cannot honour and
