@@ -37,6 +37,15 @@ DEFAULTS = {  # of a baseline that is written for the first time; people edit th
     "footprint/peak_pressure_Pa": {"relative": 0.03},
     "footprint/vertical_stiffness_N_per_m": {"relative": 0.01},
     "sensitivities/sensitivity": {"relative": 1e-3, "absolute": 1e-4},
+    **{
+        f"stiffness/{direction}_per_{unit}": {"relative": 0.01}
+        for direction, unit in (
+            ("vertical_N", "m"),
+            ("lateral_N", "m"),
+            ("longitudinal_N", "m"),
+            ("torsional_Nm", "rad"),
+        )
+    },
     "sample/median": {"relative": 0.05},  # chains differ by a share of their spread
     "sample/predicted_Hz": {"relative": 1e-3},
     "diagnose/verdict": {"absolute": 0.0},

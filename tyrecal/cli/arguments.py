@@ -122,6 +122,20 @@ def parse_pressures(
     return PressureRange(low, high, steps)
 
 
+def parse_pressure_list(loaded: Any, text: str, allowed: bool) -> list[float]:
+    """The pressures of --pressures-kPa, kPa; ``allowed``: unusual ones too. Raises
+    click.UsageError."""
+    flag = "--pressures-kPa"
+    pressures = parse_numbers(flag, text, "numbers in kPa, as in 160,240")
+    for pressure in pressures:
+        if not 0 < pressure < 2000 or pressures.count(pressure) > 1:
+            raise click.UsageError(
+                f"{flag} {pressure:g}: must be pressures between 0 and 2000, each once"
+            )
+        refuse_unusual(loaded, f"{flag} {pressure:g}", "pressure_kPa", pressure, allowed)
+    return pressures
+
+
 def fitted_values(path: Path, loaded: Any, terminal: Terminal) -> dict[str, float]:
     """The design of a fit.json, or of the one in a results folder; reports how the fit was made
     otherwise. Raises click.UsageError where it is not this case's."""

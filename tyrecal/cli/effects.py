@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -96,7 +95,9 @@ def command(
         raise click.UsageError(
             f"solver '{adapter.name}' gives no sensitivities, which a re-fit needs"
         )
-    kPa = _pressures(loaded, pressures, study.allow_unusual)
+    kPa = [round(loaded.case.pressure_kPa * share / 3, 6) for share in (2, 3, 4)]
+    if pressures is not None:
+        kPa = arguments.parse_pressure_list(loaded, pressures, study.allow_unusual)
     output = study.run(loaded, "effects", evaluator, pressure_kPa=kPa)
     entries = [CatalogueEntry.of(catalogue()[id], solvers, loaded) for id in chosen]
     if name and not terminal.as_json:
@@ -117,19 +118,3 @@ def command(
 
         figures = {f"effect_{each.id}": draw_signature(each) for each in signatures}
     return study.present(output, result, figures)
-
-
-def _pressures(loaded: Any, text: str | None, allowed: bool) -> list[float]:
-    """Pressures in kPa. Raises click.UsageError."""
-    if text is None:
-        nominal = loaded.case.pressure_kPa
-        return [round(nominal * share / 3, 6) for share in (2, 3, 4)]
-    flag = "--pressures-kPa"
-    pressures = arguments.parse_numbers(flag, text, "numbers in kPa, as in 160,240")
-    for pressure in pressures:
-        if not 0 < pressure < 2000 or pressures.count(pressure) > 1:
-            raise click.UsageError(
-                f"{flag} {pressure:g}: must be pressures between 0 and 2000, each once"
-            )
-        arguments.refuse_unusual(loaded, f"{flag} {pressure:g}", "pressure_kPa", pressure, allowed)
-    return pressures

@@ -65,6 +65,11 @@ STUDIES = {  # in the order of a page and of a batch
         "Compute response functions of the tread and the hub.",
         True,
     ),
+    "stiffness": Entry(
+        "tyrecal.studies.stiffness:StiffnessResult",
+        "Find the static stiffnesses of the pressed tyre, over load and pressure.",
+        True,
+    ),
     "effects": Entry(
         "tyrecal.studies.effects:Effects", "List and explain effects that a plain model leaves out."
     ),

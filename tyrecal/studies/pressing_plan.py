@@ -17,6 +17,7 @@ from ..tyre.case import LoadedCase
 FIRST_LOAD_S, FURTHER_LOAD_S = 150.0, 40.0
 FURTHER_DESIGN_S = 35.0  # of the first load of a design or state that begins at another one's
 MODES_AT_LOAD_S = 30.0  # in addition, for the modes at each load
+RIM_AT_LOAD_S = 30.0  # in addition, for the stiffness of the rim at each load
 MEMORY_BYTES, PROCESS_BYTES = 2.5e9, 1.5e8  # the latter of a process without any
 SENSITIVITY_SHARE = 0.08  # of a press, for the exact sensitivities by one variable
 DESIGNS_OF_FIT = {"slsqp": 15, "gauss-newton": 10}  # most that a start takes, as a rule
@@ -30,6 +31,7 @@ class PlannedState:
     modes: bool = False  # those at each load are wanted
     sensitivities: int = 0  # number of variables with exact ones
     neighbours: int = 0  # further designs, from which sensitivities are differences
+    rim_stiffness: bool = False  # that at each load is wanted
 
 
 @dataclass(frozen=True)
@@ -74,13 +76,15 @@ class PressingPlan:
         total = 0.0 if all(each.modes for each in self.states) else FIRST_LOAD_S - FURTHER_DESIGN_S
         for each in self.states:
             begun = FIRST_LOAD_S if each.modes else FURTHER_DESIGN_S
-            press = begun + FURTHER_LOAD_S * (each.loads - 1) + self._modes_s(each)
+            press = begun + FURTHER_LOAD_S * (each.loads - 1) + self._more_s(each)
             share = 1 + SENSITIVITY_SHARE * each.sensitivities + each.neighbours
             total += self.designs * press * share
         return 1e-9 * self._entries * total / self.at_once
 
-    def _modes_s(self, state: PlannedState) -> float:
-        return MODES_AT_LOAD_S * state.loads if state.modes else 0.0
+    def _more_s(self, state: PlannedState) -> float:
+        """Seconds for results at each load in addition to the footprint."""
+        at_load = MODES_AT_LOAD_S * state.modes + RIM_AT_LOAD_S * state.rim_stiffness
+        return at_load * state.loads
 
     @property
     def memory_bytes(self) -> float | None:
