@@ -232,6 +232,9 @@ def test_the_plain_fit_ends_near_the_minimum_and_takes_no_leaps() -> None:
         x, visited[-2]
     )  # for the covariance again
     assert abs(x - [1.5, -1.2, 0.8]).max() < 0.05 and value(x) < value(visited[-3]) / 2
+    evaluations = len(visited)
+    again = plain_fit(toy, p.measured(there.eta).observations, p.places, 0.001, begin=x)
+    assert abs(again - x).max() < 0.05 and len(visited) - evaluations <= 3
 
 
 @pytest.mark.parametrize("wall", [0.1, 0.59])

@@ -20,6 +20,7 @@ file = FileOrFolder(exists=True, folder=False)
     metavar="FILE",
     help="Measurements (CSV), with or without labels (default: targets.file of the case).",
 )
+@options.fitted(" as the calibration's first guess")
 @option(
     "--repeats",
     multiple=True,
@@ -89,6 +90,7 @@ def command(
     case: Path,
     assignments: tuple[str, ...],
     measured: Path | None,
+    fitted: Path | None,
     repeats: tuple[Path, ...],
     toggled: tuple[tuple[Path, str], ...],
     effects: tuple[str, ...],
@@ -149,6 +151,7 @@ def command(
         if not change.times:
             option, name = f"--toggled {change.id}={change.value:g}", f"effects.{change.id}"
             arguments.refuse_unusual(loaded, option, name, change.value, False)
+    first_guess = arguments.fitted_values(fitted, loaded, terminal) if fitted else None
     evaluator = study.evaluator(loaded)
     others = [*repeats, *(path for path, _ in changes)]
     states = states_measured(loaded, measured, others)
@@ -167,6 +170,7 @@ def command(
             study.jobs,
             considered,
             stage=bar.begin,
+            first_guess=first_guess,
         )
     written = run.write(diagnosed_case.result)
     parts = parts_data(loaded, [part.region for part in written.section_map])

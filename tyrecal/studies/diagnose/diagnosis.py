@@ -119,6 +119,7 @@ def diagnose(
     known: Expansion | None = None,
     seed: int = 0,
     stage: Callable[[str], None] = lambda stage: None,
+    begin: Array | None = None,
 ) -> Diagnosis:
     """Diagnose observations with a model of ``rows`` (label or None, kPa).
 
@@ -127,21 +128,23 @@ def diagnose(
     further: other rows of the tyre, for the next measurement; ranked: whether `choices` are wanted;
     expansion: of an earlier call with the same model, near whose x0 the fit lies; known: of the
     same model anywhere, from where effects are carried to the fit and only the likeliest are asked
-    there; stage: hears of each of ``STAGES``. Raises the model's failure where the plain tyre has
-    no solution.
+    there; stage: hears of each of ``STAGES``; begin (v,): first guess of x. Raises the model's
+    failure where the plain tyre has no solution.
     """
     labelled = isinstance(observations, Observations)
     readings = [Reading(observations)] if isinstance(observations, Observations) else observations
     stage(STAGES[0])
     bares, first, labels = list[InverseProblem](), list[list[Hypothesis]](), None
     for reading in readings:
-        bare = _calibrated(model, rows, reading.observations, changes, assumed, expansion, known)
+        bare = _calibrated(
+            model, rows, reading.observations, changes, assumed, expansion, known, begin
+        )
         hypotheses = weigh(bare)
         enough = labelled and len(bare.places) > len(model.start)
         labels = exchanged(bare, hypotheses, rows) if enough else None
         if labels:
             there = with_exchanged(bare.observations, *labels)
-            bare = _calibrated(model, rows, there, changes, assumed, None, known)
+            bare = _calibrated(model, rows, there, changes, assumed, None, known, begin)
             hypotheses = weigh(bare)
         bares.append(bare)
         first.append(hypotheses)
@@ -207,6 +210,7 @@ def _calibrated(
     assumed: Assumed,
     expansion: Expansion | None,
     known: Expansion | None,
+    begin: Array | None = None,
 ) -> InverseProblem:
     """Observations and the model, expanded about the plain tyre that fits them.
 
@@ -216,7 +220,7 @@ def _calibrated(
     where = places(observations, rows)
     given = expansion
     if given is None:
-        x0 = plain_fit(model, observations, where, assumed.form, known)
+        x0 = plain_fit(model, observations, where, assumed.form, known, begin=begin)
         expansion = carried(known, model, x0) if known else expand(model, x0)
     assert expansion is not None
     problem = InverseProblem(
@@ -226,7 +230,7 @@ def _calibrated(
         return problem
     shifts = (known or expansion).range_shifts(where)
     moved = np.hstack([shifts, exchange_shifts(observations)])
-    x0 = plain_fit(model, observations, where, assumed.form, known, moved)
+    x0 = plain_fit(model, observations, where, assumed.form, known, moved, begin)
     near = known or abs(x0 - expansion.x0).max() < CARRIED_WITHIN
     try:
         there = carried(known or expansion, model, x0) if near else expand(model, x0)

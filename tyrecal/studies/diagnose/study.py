@@ -8,6 +8,8 @@ from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ...errors import InputError
 from ...measured.measurement import Measurement
 from ...measured.targets import in_states, readings_of
@@ -27,6 +29,7 @@ from ..inference.uncertainties import Source, calibrated, sources
 from ..labelling.label import label
 from ..labelling.result import labels_posterior
 from ..labels import Labels
+from ..variable import read_variables
 from .calibrated import calibrated_variables
 from .diagnosis import Diagnosis, diagnose
 from .evidence import NONE
@@ -88,11 +91,13 @@ def study(
     effects: Sequence[str] | None = None,
     section_map: bool = True,
     stage: Callable[[str], None] = lambda stage: None,
+    first_guess: Mapping[str, float] | None = None,
 ) -> DiagnosedCase:
     """Read the files and diagnose the case with them.
 
     effects: ids to consider, None = the whole catalogue; one that a variable of the case sets is
-    none; stage: hears of each of ``diagnosis.STAGES``. Raises InputError,
+    none; stage: hears of each of ``diagnosis.STAGES``; first_guess: values of the
+    variables at which the calibration begins, None: their starts. Raises InputError,
     EvaluationFailed, and what ``Evaluator.evaluate`` raises.
     """
     switched = [path for path, _ in toggled]
@@ -136,6 +141,10 @@ def study(
         spans[change.id] = _reaching(spans[change.id], change)
     own_sources, assumed_sources = sources(case)
     model = TyreModel(case, evaluator, rows, own_sources, spans, jobs)
+    variables = read_variables(case)
+    begin = None
+    if first_guess:
+        begin = np.array([v.scaled(first_guess[v.name]) for v in variables])
     check_units(model, readings[0].observations, [str(measured), *map(str, switched)], changes)
     diagnosis = diagnose(
         model,
@@ -149,6 +158,7 @@ def study(
             case.case.pressure_kPa,
         ),
         stage=stage,
+        begin=begin,
     )
     own = [runs[path] for path in (measured, *repeats)]
     return DiagnosedCase(

@@ -23,6 +23,7 @@ def plain_fit(
     form: float | None = None,
     known: Expansion | None = None,
     moved: Array | None = None,
+    begin: Array | None = None,
 ) -> Array:
     """x (v,) by damped Gauss-Newton steps from the start; a step has at most ``MAX_STEP`` in any x.
 
@@ -30,7 +31,8 @@ def plain_fit(
     about x goes the rest of the way.
     The covariance is that of the constants at the start and, where x has gone far, anew from there.
     known: of the model about its start, on which the fit goes first; moved (n, k): what else may
-    have moved the observations, as more constants. Raises the model's own failure where the start
+    have moved the observations, as more constants; begin (v,): first guess of x, None: the model's
+    start. Raises the model's own failure where the start
     has no solution.
     """
     run0 = np.array([row.run == 0 for row in observations.rows])
@@ -75,7 +77,7 @@ def plain_fit(
         sigma = covariance(observed, sources, model.material_laws, form)
         return np.asarray(np.linalg.inv(sigma))
 
-    x = np.array(model.start, float)
+    x = np.array(model.start if begin is None else begin, float)
     if known is not None:
         inverse = weights(known.constants)
         expanded = lambda x: Answer(*known.plain(x), known.split)
