@@ -214,3 +214,29 @@ deck:
 spin_rad_per_s: 5.0
 """
     )
+
+
+def test_decks_in_three_dimensions_as_fitted(tmp_path: Path) -> None:
+    """The mark has the fitted number, and nothing else changes."""
+    for path in (CASES / "ring_3d").iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    case = tmp_path / "ring.yaml"
+    fit = with_fit(case, 1.1, {}, "deck")
+    assert run("export", str(fit), "--format", "deck", "--case", str(case)) == 0
+    texts = {path.name: path.read_text() for path in (fit.parent / "export").glob("*.inp")}
+    old = {path.name: path.read_text() for path in tmp_path.glob("*.inp")}
+    assert texts == {name: re.sub(MARK, "4950000", text) for name, text in old.items()}
+    assert any(re.search(MARK, text) for text in old.values())
+
+
+def test_an_export_reports_what_the_deck_has_no_place_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Gas in the case stays there; gauges that are not the deck's are refused."""
+    case = deck_of("cae", tmp_path).with_suffix(".yaml")
+    fit = with_fit(case, 1.1, {"cavity.share": 0.5}, "deck")
+    arguments = ["export", str(fit), "--case", str(case), "--format", "deck"]
+    assert run(*arguments) == 0
+    assert "your deck does not contain the gas in the cavity" in capsys.readouterr().err
+    fit.write_text(fit.read_text().replace("cavity.share", "analysis.highest_harmonic"))
+    assert run(*arguments) == 2

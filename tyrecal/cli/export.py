@@ -56,7 +56,7 @@ def command(
     """
     from ..files import atomic_write, private_dir, read_json
     from ..measured.load import load_case
-    from ..studies.export import case_files, deck_files, settings_left_out
+    from ..studies.export import case_files, deck_files, parts_left_out, settings_left_out
     from ..studies.fitted import as_fitted, is_good
     from .output import Run
 
@@ -88,6 +88,8 @@ def command(
         terminal.say("\n".join(paths))
     if form == "case" and (left := settings_left_out(loaded)):
         terminal.note(f"settings of the state are not in the case: {', '.join(left)}")
+    if form == "deck" and (left := parts_left_out(loaded)):
+        terminal.warn(f"your deck does not contain {' and '.join(left)}: the case adds that")
     return 0
 
 

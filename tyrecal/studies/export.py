@@ -49,6 +49,14 @@ def settings_left_out(case: LoadedCase) -> list[str]:
     ]
 
 
+def parts_left_out(case: LoadedCase) -> list[str]:
+    """Parts of a tyre that the user's own decks, as `deck_files` has them, do not contain."""
+    tyre = resolved(case)
+    if not tyre.written.kind.own_texts(tyre):
+        return []
+    return [words for need, words in tyre.needs.items() if need not in tyre.written.kind.needs]
+
+
 def deck_files(case: LoadedCase, solver: str = "") -> Files:
     """The decks of a case `as_fitted`: the user's own with numbers changed, or else those that
     tyrecal writes for a solver, by default the case's. Raises InputError, DeckRefused, OSError."""
