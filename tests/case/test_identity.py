@@ -139,7 +139,7 @@ def test_how_a_case_is_written_is_not_the_tyre(tmp_path: Path, case: LoadedCase)
         data["analysis"] |= {"sectors": 90, "static_increments": 5}
         del data["targets"], data["uncertainties"]
         for variable in data["variables"].values():
-            variable |= {"scale": "linear", "start": variable["lower"] * 2}
+            variable |= {"scale": "linear", "start": variable["lower"] * 4}
         data["mesh"]["level"] = "coarse"
         data["solver"] = {"name": "calculix", "time_limit_s": 5, "options": {"element": "C3D8"}}
 

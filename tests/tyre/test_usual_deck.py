@@ -12,8 +12,10 @@ from tyrecal.tyre.usual_deck import deck_slips, unusual_numbers, usual_numbers
 from tyrecal.tyre.values import unusual_value
 
 from ..cli.test_cli import run
+from . import maker_decks
 from .own_decks import STYLES as OTHER_STYLES
 from .own_decks import plain
+from .test_maker_decks import recorded
 from .test_membranes import maker
 
 STYLES = {"plain": plain, **OTHER_STYLES}
@@ -47,7 +49,7 @@ def test_a_slip_is_refused_with_what_was_meant(
     file = tmp_path / "tyre.inp"
     file.write_text(STYLES[style]())
     deck = read_own_deck(file)
-    assert path in usual_numbers(deck, deck.numbers, deck.flat({})), sorted(deck.numbers)
+    assert path in usual_numbers(deck, deck.flat({})), sorted(deck.numbers)
     ((_, message),) = unusual_numbers(deck, {path: value})
     assert f"did you mean {meant}" in message
 
@@ -58,12 +60,12 @@ def test_a_slip_is_refused_with_what_was_meant(
         (
             [("800000.0, 200000.0", "1e3, 0.0")],
             "material RUBBER / HYPERELASTIC / C10",
-            "usual is 150000 to 2e+07 Pa, for a shear modulus",
+            "usual is 300000 to 4.75e+06 Pa, for a shear modulus of 0.6 to 9.5 MPa",
         ),
         (
             [("800000.0, 200000.0", "-1.5e5, 200000.0")],
-            "material RUBBER / HYPERELASTIC / C01",
-            "for a shear modulus of 0.3 to 40 MPa",
+            "material RUBBER / HYPERELASTIC / C10",
+            "usual is 100000 to 4.55e+06 Pa, for a shear modulus of 0.6 to 9.5 MPa",
         ),
         (
             [("MOONEY-RIVLIN", "OGDEN"), ("800000.0, 200000.0", "2000.0, 2.0")],
@@ -80,7 +82,7 @@ def test_a_slip_is_refused_with_what_was_meant(
             "material CORD / ELASTIC / E",
             "of steel, by its density; did you mean 1.9e+08 kPa, 1.9e+11 Pa",
         ),
-        ([("10000000000.0", "2e8")], "material CORD / ELASTIC / E", "of a belt's cords"),
+        ([("10000000000.0", "2e8")], "material CORD / ELASTIC / E", "2.8e+09 to 7.1e+10 Pa"),
         (
             [("00.0, 0.3\n", "00.0, 0.0003\n")],
             "material CORD / ELASTIC / nu",
@@ -96,6 +98,26 @@ def test_a_slip_is_refused_with_what_was_meant(
             "material RUBBER / VISCOELASTIC / row 1 / tau",
             "usual is 0.001 to 100000 s of the slowest term",
         ),
+        (
+            [("10000000000.0", "1e11")],
+            "material CORD / ELASTIC / E",
+            "for layers of 500 to 30000 N/mm (modulus times area over spacing)",
+        ),
+        (
+            [
+                ("MOONEY-RIVLIN", "POLYNOMIAL, N=2"),
+                ("800000.0, 200000.0, 5e-08", "8e5, 2e5, 2e7, 0., 0., 5e-8, 0."),
+            ],
+            "material RUBBER / HYPERELASTIC / C20",
+            "-1e+07 to 1e+07 Pa, 10 times the first",
+        ),
+        (
+            [("800000.0, 200000.0", "8e6, 200000.0")],
+            "material RUBBER / HYPERELASTIC / C10",
+            "usual is 100000 to 4.55e+06 Pa",
+        ),
+        ([("4.2E-07, 0.001", "4.2E-06, 0.001")], "rebar CARCASS / area", "for cords every 1 mm"),
+        ([("4.2E-07, 0.001", "4.2E-07, 0.01")], "rebar CARCASS / area", "for cords every 10 mm"),
         ([("BELT_1, 2.1e-7", "BELT_1, 2.1e-6")], "rebar BELT_1 / area", "cords every 1.16 mm"),
         ([(", 110.0", ", 70.0")], "rebar BELT_2 / angle", "did you mean 110 degrees"),
         ([(", 70.0", ", 20.0")], "rebar BELT_1 / angle", "20 degrees from the circumference"),
@@ -163,6 +185,34 @@ def test_every_door_refuses_it(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert validate(tmp_path / "good.yaml", allow_unusual=True) == []
 
 
+@pytest.mark.parametrize("name", maker_decks.DECKS)
+def test_no_number_of_a_maker_s_deck_is_unusual(name: str, tmp_path: Path) -> None:
+    """Nor is the radius at which a spacing was measured, unless it is in another unit."""
+    path = tmp_path / f"{name}.inp"
+    path.write_text(recorded(name, tmp_path))
+    deck = read_own_deck(path)
+    assert list(deck_slips(deck, {})) == []
+    if name == "half_section":
+        radius = "rebar C01 / radius"
+        ((path_of_slip, message),) = unusual_numbers(deck, {radius: 0.2})
+        assert path_of_slip == radius and "did you mean 0.2 m, 200 mm?" in message
+
+
+def test_numbers_by_marks_and_parameters_are_judged(tmp_path: Path) -> None:
+    """At the line where the number acts, and by the name that gives it."""
+    defined = "*PARAMETER\nshear = 2.0e3\nc10 = shear*0.4\n"
+    text = defined + plain().replace("800000.0,", "<c10>,").replace("2.1e-7", "{{ A }}", 1)
+    (tmp_path / "tyre.inp").write_text(text)
+    deck = read_own_deck(tmp_path / "tyre.inp")
+    slips = {slip.key: slip for slip in deck_slips(deck, {"A": 2.1e-4})}
+    assert slips.keys() == {"material RUBBER / HYPERELASTIC / C10", "rebar BELT_1 / area"}
+    line = text.splitlines().index("<c10>, 200000.0, 5e-08") + 1
+    assert slips["material RUBBER / HYPERELASTIC / C10"].line == line
+    assert slips["rebar BELT_1 / area"].value == "0.00021"
+    names = {name for name, _ in unusual_numbers(deck, {"A": 2.1e-4})}
+    assert names == slips.keys() | {"A", "parameter / shear"}
+
+
 def test_a_tyre_of_metres_is_refused(tmp_path: Path) -> None:
     """A deck in millimetres that is read in metres has a radius of hundreds of metres."""
     file = tmp_path / "tyre.inp"
@@ -178,5 +228,5 @@ def test_an_angular_spacing_is_in_degrees_whatever_its_path(tmp_path: Path) -> N
     text = plain().replace("BELT_1,", "BELT,").replace("BELT_2,", "BELT,")
     file.write_text(text.replace("*REBAR LAYER", "*REBAR LAYER, GEOMETRY=ANGULAR"))
     deck = read_own_deck(file)
-    ranges = usual_numbers(deck, deck.numbers, deck.flat({}))
+    ranges = usual_numbers(deck, deck.flat({}))
     assert {each.unit for path, each in ranges.items() if path.endswith("spacing")} == {"degrees"}

@@ -201,12 +201,17 @@ USUAL: dict[str, Usual] = {
 CARCASS_ANGLE = Usual(-30, 30, "degrees from the meridian", FROM_CIRCUMFERENCE)
 BELT_ANGLE = Usual(25, 155, "degrees from the meridian", FROM_CIRCUMFERENCE)
 SHEAR_MODULUS_Pa = 3e5, 4e7  # of rubber
+MEAN_SHEAR_MODULUS_Pa = 6e5, 9.5e6  # of all rubber of a tyre; apexes are stiffer, and few
 RUBBER_DENSITY = Usual(700, 2500, "kg/m3", DENSITY, reason=" of rubber")
 MIN_RELAXED = 0.005  # of a modulus by the largest Prony term; rubber relaxes more
 SLOWEST_TERM_s = 1e-3  # a series of faster terms alone acts above a tyre's modes, beyond 160 Hz
 STEEL_DENSITY = 5000.0  # kg/m3 from which a cord is steel, filled with rubber or not
-# diameter of a belt's cord over their spacing, for what a measured area may hold
-THICKEST_CORD = 1.2
+TEXTILE_DENSITY = 800.0, 2000.0  # kg/m3; aramid has the largest modulus of those
+TEXTILE_MODULUS_Pa = 1.5e11
+# N/m, modulus times area over spacing, that a layer of cords has; of a cap ply it may be less
+MIN_STIFFNESS, MAX_STIFFNESS, MAX_STIFFNESS_OF_STEEL = 5e5, 3e7, 3e8
+# diameter of cords over their spacing, by the area: of a belt, and of a layer that may be two plies
+THINNEST_CORD, THICKEST_CORD, THICKEST_OF_TWO_PLIES = 0.2, 1.2, 1.7
 MIN_ANGLE_OF_A_SIDE = 5.0  # degrees from the circumference, of a belt that has a side
 # slips of effects' parameters, whose ranges the catalogue has, by their unit
 OF_EFFECTS: dict[str, Slips] = {
@@ -254,14 +259,19 @@ def holds_angle(usual: Usual, value: float) -> bool:
     return usual.holds(value)
 
 
-def constant_beside(usual: Usual, factor: float, others_Pa: float) -> Usual:
+def constant_beside(usual: Usual, factor: float, others_Pa: float, share: float = 0.0) -> Usual:
     """Narrow the range of a rubber's constant: ``factor`` times it and ``others_Pa`` are the shear
-    modulus."""
-    low, high = ((modulus - others_Pa) / factor for modulus in SHEAR_MODULUS_Pa)
+    modulus. share: of the section's rubber, 0 if it is not known."""
+    least, most = SHEAR_MODULUS_Pa
+    if share:
+        least = max(least, MEAN_SHEAR_MODULUS_Pa[0] * share)
+        most = min(most, MEAN_SHEAR_MODULUS_Pa[1] / share)
+    low, high = (least - others_Pa) / factor, (most - others_Pa) / factor
     low, high = max(low, usual.low), min(high, usual.high)
     if low >= high:  # another constant is wrong
         return usual
-    return replace(usual, low=low, high=high, reason=", for a shear modulus of 0.3 to 40 MPa")
+    reason = f", for a shear modulus of {least / 1e6:.2g} to {most / 1e6:.2g} MPa"
+    return replace(usual, low=low, high=high, reason=reason)
 
 
 def in_series(usual: Usual, key: str, value: float, others: Sequence[float]) -> Usual:
@@ -274,23 +284,60 @@ def in_series(usual: Usual, key: str, value: float, others: Sequence[float]) -> 
     return replace(usual, low=SLOWEST_TERM_s, reason=" of the slowest term")
 
 
-def cord_modulus(density: float | None, is_belt: bool) -> Usual:
-    """Range of a cord's modulus, Pa, by its density, kg/m3, and by where it is."""
+@dataclass(frozen=True)
+class CordLayer:
+    """Cords of one layer: area m2, spacing m, angle in degrees from the meridian, and its usual
+    angle, which tells a belt."""
+
+    area: float
+    spacing: float
+    angle: float
+    usual_angle: Usual | None
+
+    @property
+    def is_belt(self) -> bool:
+        """Whether it is over the crown alone."""
+        return self.usual_angle is BELT_ANGLE
+
+    @property
+    def bears_load(self) -> bool:
+        """Whether it is a carcass, or a belt that is no cap ply."""
+        is_cap = self.is_belt and abs(self.angle % 180 - 90) < MIN_ANGLE_OF_A_SIDE
+        return not is_cap
+
+    @property
+    def usual_area(self) -> Usual:
+        """Range of the area, m2: cords fill a layer, gum and wrapping apart."""
+        usual = USUAL["rebar_layers.*.area_m2"]
+        if self.usual_angle is None or not USUAL["rebar_layers.*.spacing_m"].holds(self.spacing):
+            return usual
+        most = THICKEST_CORD if self.is_belt else THICKEST_OF_TWO_PLIES
+        low, high = (pi / 4 * (ratio * self.spacing) ** 2 for ratio in (THINNEST_CORD, most))
+        reason = f", for {'belt ' * self.is_belt}cords every {1e3 * self.spacing:.4g} mm"
+        return replace(usual, low=max(usual.low, low), high=min(usual.high, high), reason=reason)
+
+
+def cord_modulus(density: float | None, layers: Iterable[CordLayer]) -> Usual:
+    """Range of a cord's modulus, Pa, by its density, kg/m3, and the stiffness of its layers."""
     usual = USUAL["materials.*.youngs_modulus_Pa"]
     most = USUAL["materials.*.density_kg_per_m3"].high
+    stiffest = MAX_STIFFNESS_OF_STEEL
     if density is not None and STEEL_DENSITY <= density <= most:
-        return replace(usual, low=5e10, high=2.5e11, reason=" of steel, by its density")
-    return replace(usual, low=1e9, reason=" of a belt's cords") if is_belt else usual
-
-
-def area_beside(usual: Usual, spacing: float | None) -> Usual:
-    """Narrow the range of an area of a belt's cords, m2: they are not thicker than their spacing,
-    m, which gum and wrapping leave half of."""
-    if spacing is None or not USUAL["rebar_layers.*.spacing_m"].holds(spacing):
-        return usual
-    high = pi / 4 * (THICKEST_CORD * spacing) ** 2
-    reason = f", for belt cords every {1e3 * spacing:.4g} mm"
-    return replace(usual, high=min(usual.high, high), reason=reason)
+        usual = replace(usual, low=5e10, high=2.5e11, reason=" of steel, by its density")
+    elif density is not None and TEXTILE_DENSITY[0] <= density <= TEXTILE_DENSITY[1]:
+        stiffest = MAX_STIFFNESS
+        usual = replace(usual, high=TEXTILE_MODULUS_Pa, reason=" of textile, by its density")
+    lows, highs = [usual.low], [usual.high]
+    for layer in layers:
+        if layer.usual_angle and layer.usual_area.holds(layer.area):
+            lows.append(MIN_STIFFNESS * layer.spacing / layer.area if layer.bears_load else 0.0)
+            highs.append(stiffest * layer.spacing / layer.area)
+    low, high = (float(f"{each:.2g}") for each in (max(lows), min(highs)))
+    if (low, high) != (usual.low, usual.high) and low < high:
+        bounds = f"{MIN_STIFFNESS / 1e3:g} to {stiffest / 1e3:g} N/mm"
+        reason = f", for layers of {bounds} (modulus times area over spacing)"
+        usual = replace(usual, low=low, high=high, reason=reason)
+    return usual
 
 
 def one_side(angles: Iterable[float]) -> str | None:
@@ -378,7 +425,9 @@ def _ranges(
                 p in ("*", w) for p, w in zip(pattern, words, strict=True)
             ):
                 usual = _up_to_the_rim(usual, data, section) if load and section else usual
-                usual = _of_belt(usual, data, section, keys)
+                if here == "rebar_layers" and last == "area_m2":
+                    layer = _layer(table(table(data, here), str(keys[1])), section)
+                    usual = layer.usual_area if layer else usual
                 usual = _of_series(usual, data, keys, value)
                 yield _of_material(usual, data, section, keys), ""
 
@@ -394,14 +443,12 @@ def _of_series(usual: Usual, data: Mapping[str, Any], keys: Keys, value: float) 
     return in_series(usual, str(keys[4]), value, [x for x in others if x is not None])
 
 
-def _of_belt(usual: Usual, data: Mapping[str, Any], section: Section | None, keys: Keys) -> Usual:
-    """The range of the area of a belt's cords beside their spacing; of any other number,
-    ``usual``."""
-    if keys[0] != "rebar_layers" or keys[-1] != "area_m2" or section is None:
-        return usual
-    layer = table(table(data, "rebar_layers"), str(keys[1]))
-    spacing = number(layer, "spacing_m")
-    return area_beside(usual, spacing) if _angle(layer, section) is BELT_ANGLE else usual
+def _layer(layer: Mapping[str, Any], section: Section | None) -> CordLayer | None:
+    """A layer of the case; None where its cords are not stated, or at an angle to each other."""
+    area, spacing = number(layer, "area_m2"), number(layer, "spacing_m")
+    if section is None or not area or not spacing:
+        return None
+    return CordLayer(area, spacing, number(layer, "angle_deg") or 0.0, _angle(layer, section))
 
 
 def _of_material(
@@ -415,12 +462,9 @@ def _of_material(
     if material.get("kind") == "rubber" and key == "density_kg_per_m3":
         return RUBBER_DENSITY
     if key == "youngs_modulus_Pa":
-        layers = [each for each in table(data, "rebar_layers").values() if isinstance(each, dict)]
-        is_belt = section is not None and any(
-            layer.get("material") == name and _angle(layer, section) is BELT_ANGLE
-            for layer in layers
-        )
-        return cord_modulus(number(material, "density_kg_per_m3"), is_belt)
+        own = (each for each in table(data, "rebar_layers").values() if isinstance(each, dict))
+        layers = (_layer(each, section) for each in own if each.get("material") == name)
+        return cord_modulus(number(material, "density_kg_per_m3"), filter(None, layers))
     if key in ("C10_Pa", "C01_Pa"):
         other = "C01_Pa" if key == "C10_Pa" else "C10_Pa"
         rest = number(material, other)
