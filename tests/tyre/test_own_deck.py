@@ -205,6 +205,7 @@ REFUSED = {
     ),
     "*END STEP": ("", "cut off"),
     "TYPE=CGAX8R": ("TYPE=CPS8R", "no element of a revolved tyre"),
+    "*ELEMENT, TYPE=CGAX8R": ("*ELEMENT, TYPE=CGAX8T", "no element of a revolved tyre"),
     "*ELASTIC": ("*ELASTIC, MODULI=INSTANTANEOUS", "only LONG TERM"),
     "*DSLOAD": ("*BOUNDARY, OP=NEW\n1001, ENCASTRE\n*DSLOAD", "must be at every \\*BOUNDARY"),
 }

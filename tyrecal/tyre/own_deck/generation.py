@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .scope import MOST, Point, Scope, along_arc, mirror_of, nodes_of, reflected
-from .text import Block, Row, is_label, named
+from .scope import MOST, PLIES, RIGID, SOLID, Point, Scope, along_arc, mirror_of, reflected
+from .text import Block, Row, element_types, is_label, named
 
 
 def read(scope: Scope, block: Block) -> None:
@@ -205,8 +205,8 @@ def _listed(scope: Scope, block: Block, members: Callable, known: dict) -> list[
 
 def _element(scope: Scope, block: Block) -> None:
     kind = block.need("TYPE")
-    count = nodes_of(kind)
-    if count is None:
+    count, _ = element_types.NODES_AND_SECTION.get(kind, (0, ""))
+    if not count or not kind.startswith((SOLID, *PLIES, RIGID)):
         raise block.refused(
             f"TYPE={kind} is no element of a revolved tyre: CGAX for rubber, SFMGAX or MGAX"
             " for plies, RAX2 for a rim; give decks in three dimensions in deck.decks of a case"

@@ -14,7 +14,7 @@ Sets = dict[str, list[tuple[Block, Callable[[], list[int]]]]]  # pieces of each,
 CORNERS_OF = {3: 3, 4: 4, 6: 3, 8: 4}  # of solids by their number of nodes
 FARTHEST = 1e9  # coordinate, in any unit
 MOST = 200_000  # nodes or elements that a deck generates
-SOLID, PLIES, RIGID = "CGAX", ("SFMGAX", "MGAX"), "RAX"
+SOLID, PLIES, RIGID = "CGAX", ("SFMGAX", "MGAX"), "RAX"  # beginnings of elements' types
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,13 +35,6 @@ class Element:
     def is_ply(self) -> bool:
         """Whether it holds cords."""
         return self.kind.startswith(PLIES)
-
-
-def nodes_of(kind: str) -> int | None:
-    """How many nodes an element type has; None: it is no type of a tyre's section."""
-    if kind.startswith(SOLID) and kind[4:5] in ("3", "4", "6", "8"):
-        return int(kind[4])
-    return {"SFMGAX1": 2, "SFMGAX2": 3, "MGAX1": 2, "MGAX2": 3, "RAX2": 2}.get(kind)
 
 
 @dataclass
