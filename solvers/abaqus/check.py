@@ -140,7 +140,7 @@ def _parameters(block: Block, rule: KeywordRule, names: _Names) -> Iterator[Find
         elif value.upper() not in wanted.split("|"):
             words = " or ".join(word or "no value" for word in wanted.split("|"))
             yield Finding(block, None, f"{name}={value} must be {words}")
-    for group in rule.needs:
+    for group in rule.needed:
         if not set(group.split("|")) & set(block.parameters):
             yield Finding(block, None, f"needs {' or '.join(group.split('|'))}")
     both = [name for name in rule.alone if name in block.parameters]
@@ -154,7 +154,8 @@ def _data(block: Block, rule: KeywordRule, names: _Names) -> Iterator[Finding]:
     if not forms and rule.fields:  # a variant whose data the table does not know
         return
     lines = (forms,) if isinstance(forms, str) else forms
-    least, most = max(rule.rows[0], len(lines) if len(lines) > 1 else 0), rule.rows[1]
+    least, most = rule.rows if rule.fields else (0, 0)
+    least = max(least, len(lines) if len(lines) > 1 else 0)
     least = (
         0 if block.parameters.get("OP") == "NEW" else least
     )  # which takes all that there were away

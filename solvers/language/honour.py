@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from difflib import get_close_matches
 
-from .rule import NO_ROWS
 from .table import OUTPUT_KEYWORDS, RULES
 from .text import Block
 
@@ -39,7 +38,7 @@ def check_honoured(block: Block, place: str) -> None:
         if values is not None and value not in values:
             right = " or ".join(each or "no value" for each in values)
             raise block.refused(f"{name}={value} is not honoured, only {right}")
-    if block.rows and rule.rows == NO_ROWS and rule.is_judged:
+    if block.rows and rule.is_judged and not rule.fields:
         raise block.refused("takes no data lines", block.rows[0])
     most = len(rule.fields_of(block.parameters))
     for row in block.rows if most else ():

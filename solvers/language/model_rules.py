@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .laws import INSTEAD_OF_TESTS, LAW_CONSTANTS, LAWS_NOT_READ
-from .rule import ANY_ROWS, MANY, NO_ROWS, ONE_ROW, KeywordRule
+from .rule import ANY_ROWS, MANY, ONE_ROW, KeywordRule
 
 OF_MATERIAL = ("MATERIAL",)
 OF_SECTION = ("SOLID SECTION", "MEMBRANE SECTION", "SHELL SECTION")
@@ -24,40 +24,23 @@ MODEL_RULES: dict[str, KeywordRule] = {
         is_output=True,
     ),
     "PREPRINT": KeywordRule(
-        "model",
-        "ECHO=YES|NO|; MODEL=YES|NO|; HISTORY=YES|NO|; CONTACT=YES|NO|",
-        rows=NO_ROWS,
-        is_output=True,
+        "model", "ECHO=YES|NO|; MODEL=YES|NO|; HISTORY=YES|NO|; CONTACT=YES|NO|", is_output=True
     ),
-    "PART": KeywordRule(
-        "model",
-        "NAME=+part",
-        rows=NO_ROWS,
-        needs=("NAME",),
-        honoured={"deck": "NAME"},
-        calculix=NO_PARTS,
-    ),
-    "END PART": KeywordRule("part", rows=NO_ROWS, honoured={"deck": ""}),
+    "PART": KeywordRule("model", "NAME!=+part", honoured={"deck": "NAME"}, calculix=NO_PARTS),
+    "END PART": KeywordRule("part", honoured={"deck": ""}),
     "ASSEMBLY": KeywordRule(
-        "model",
-        "NAME=name",
-        rows=NO_ROWS,
-        needs=("NAME",),
-        once="job",
-        honoured={"deck": "~NAME"},
-        calculix=NO_PARTS,
+        "model", "NAME!=name", once="job", honoured={"deck": "~NAME"}, calculix=NO_PARTS
     ),
-    "END ASSEMBLY": KeywordRule("part", rows=NO_ROWS, honoured={"deck": ""}),
+    "END ASSEMBLY": KeywordRule("part", honoured={"deck": ""}),
     "INSTANCE": KeywordRule(
         "part",
-        "NAME=name; PART=part; NSET=+nset; ELSET=+elset; INSTANCE=name; LIBRARY=name",
+        "NAME!=name; PART!=part; NSET=+nset; ELSET=+elset; INSTANCE=name; LIBRARY=name",
         "number...",
         rows=ANY_ROWS,
-        needs=("NAME", "PART"),
         honoured={"deck": "NAME; PART; NSET; ELSET"},
         calculix=NO_PARTS,
     ),
-    "END INSTANCE": KeywordRule("part", rows=NO_ROWS, honoured={"deck": ""}),
+    "END INSTANCE": KeywordRule("part", honoured={"deck": ""}),
     "NODE": KeywordRule(
         "part",
         "NSET=+nset; SYSTEM=R|C|S",
@@ -84,22 +67,20 @@ MODEL_RULES: dict[str, KeywordRule] = {
     "NCOPY": KeywordRule(
         "part",
         (
-            "CHANGE NUMBER=integer; OLD SET=nset; NEW SET=+nset; SHIFT; "
+            "CHANGE NUMBER!=integer; OLD SET!=nset; NEW SET=+nset; SHIFT; "
             "REFLECT=LINE|MIRROR|POINT; POLE; MULTIPLE=integer"
         ),
         "number...",
         rows=ANY_ROWS,
-        needs=("CHANGE NUMBER", "OLD SET"),
         alone=("SHIFT", "REFLECT", "POLE"),
         honoured={"deck": "CHANGE NUMBER; OLD SET; NEW SET; SHIFT; REFLECT=LINE; MULTIPLE"},
         calculix=NO_GENERATION,
     ),
     "NSET": KeywordRule(
         "part model",
-        "NSET=+nset; ELSET=elset; GENERATE; UNSORTED; INTERNAL; INSTANCE=name",
+        "NSET!=+nset; ELSET=elset; GENERATE; UNSORTED; INTERNAL; INSTANCE=name",
         "node 15*node?",
         rows=ANY_ROWS,
-        needs=("NSET",),
         variants={"GENERATE": "2*integer integer?"},
         honoured={
             "deck": "NSET; GENERATE; UNSORTED; ~INTERNAL; INSTANCE; ELSET",
@@ -108,9 +89,8 @@ MODEL_RULES: dict[str, KeywordRule] = {
     ),
     "ELEMENT": KeywordRule(
         "part",
-        "TYPE=name; ELSET=+elset",
+        "TYPE!=name; ELSET=+elset",
         "label node...",
-        needs=("TYPE",),
         honoured={"deck|section": "TYPE; ELSET", "revolve": "TYPE=SPRING1|MASS|ROTARYI; ELSET"},
     ),
     "ELGEN": KeywordRule(
@@ -122,18 +102,15 @@ MODEL_RULES: dict[str, KeywordRule] = {
     ),
     "ELCOPY": KeywordRule(
         "part",
-        "ELEMENT SHIFT=integer; OLD SET=elset; NEW SET=+elset; SHIFT NODES=integer; REFLECT",
-        rows=NO_ROWS,
-        needs=("ELEMENT SHIFT", "OLD SET", "SHIFT NODES"),
+        "ELEMENT SHIFT!=integer; OLD SET!=elset; NEW SET=+elset; SHIFT NODES!=integer; REFLECT",
         honoured={"deck": "ELEMENT SHIFT; OLD SET; NEW SET; SHIFT NODES; REFLECT"},
         calculix=NO_GENERATION,
     ),
     "ELSET": KeywordRule(
         "part model",
-        "ELSET=+elset; GENERATE; UNSORTED; INTERNAL; INSTANCE=name",
+        "ELSET!=+elset; GENERATE; UNSORTED; INTERNAL; INSTANCE=name",
         "element 15*element?",
         rows=ANY_ROWS,
-        needs=("ELSET",),
         variants={"GENERATE": "2*integer integer?"},
         honoured={
             "deck": "ELSET; GENERATE; ~UNSORTED; ~INTERNAL; INSTANCE",
@@ -142,11 +119,10 @@ MODEL_RULES: dict[str, KeywordRule] = {
     ),
     "SURFACE": KeywordRule(
         "part",
-        "NAME=+surface; INTERNAL; TYPE=ELEMENT|NODE|CYLINDER|REVOLUTION|SEGMENTS; "
+        "NAME!=+surface; INTERNAL; TYPE=ELEMENT|NODE|CYLINDER|REVOLUTION|SEGMENTS; "
         "FILLET RADIUS=number",
         "element? name?",
         rows=ANY_ROWS,
-        needs=("NAME",),
         variants={
             "TYPE=ELEMENT": "element? name?",
             "TYPE=NODE": "node number?",
@@ -162,25 +138,23 @@ MODEL_RULES: dict[str, KeywordRule] = {
     ),
     "ORIENTATION": KeywordRule(
         "part",
-        "NAME=+orientation; DEFINITION=name; SYSTEM=name",
+        "NAME!=+orientation; DEFINITION=name; SYSTEM=name",
         "number...",
-        needs=("NAME",),
         honoured={"deck": "~NAME; ~SYSTEM; ~DEFINITION"},
     ),
     "TRANSFORM": KeywordRule(
         "part",
-        "NSET=nset; TYPE=R|C|S",
+        "NSET!=nset; TYPE=R|C|S",
         "6*number?",
         rows=ONE_ROW,
-        needs=("NSET",),
         instead="give degrees of freedom in r, z and twist",
     ),
     "SOLID SECTION": KeywordRule(
         "part",
-        "ELSET=elset; MATERIAL=material; CONTROLS=controls; ORIENTATION=orientation; COMPOSITE",
+        "ELSET!=elset; MATERIAL=material; CONTROLS=controls; ORIENTATION=orientation; COMPOSITE",
         "number?",
         rows=(0, 1),
-        needs=("ELSET", "MATERIAL|COMPOSITE"),
+        needs=("MATERIAL|COMPOSITE",),
         honoured={
             "deck": "ELSET; MATERIAL; CONTROLS; ~ORIENTATION",
             "section": "ELSET; MATERIAL; CONTROLS",
@@ -198,32 +172,28 @@ MODEL_RULES: dict[str, KeywordRule] = {
     "SECTION CONTROLS": KeywordRule(
         "part model",
         (
-            "NAME=+controls; SECOND ORDER ACCURACY=YES|NO|; "
+            "NAME!=+controls; SECOND ORDER ACCURACY=YES|NO|; "
             "HOURGLASS=STIFFNESS|ENHANCED|VISCOUS|RELAX STIFFNESS|COMBINED"
         ),
         "number...",
         rows=(0, 1),
-        needs=("NAME",),
         honoured={"deck|section": "NAME; HOURGLASS=STIFFNESS"},
         calculix=NO_HOURGLASS,
     ),
     "SURFACE SECTION": KeywordRule(
         "part",
-        "ELSET=elset; DENSITY=number",
-        rows=NO_ROWS,
-        needs=("ELSET",),
+        "ELSET!=elset; DENSITY=number",
         honoured={"deck|section": "ELSET"},
         calculix=NO_REBAR,
     ),
     "MEMBRANE SECTION": KeywordRule(
         "part",
         (
-            "ELSET=elset; MATERIAL=material; CONTROLS=controls; DENSITY=number; NODAL THICKNESS; "
+            "ELSET!=elset; MATERIAL!=material; CONTROLS=controls; DENSITY=number; NODAL THICKNESS; "
             "MEMBRANE THICKNESS=name; ORIENTATION=orientation; POISSON=number"
         ),
         "number? integer?",
         rows=(0, 1),
-        needs=("ELSET", "MATERIAL"),
         alone=("NODAL THICKNESS", "MEMBRANE THICKNESS"),
         honoured={"deck": "ELSET; MATERIAL; ~POISSON=0.5", "section": "ELSET; MATERIAL"},
         data="thickness:length",
@@ -232,13 +202,13 @@ MODEL_RULES: dict[str, KeywordRule] = {
     "SHELL SECTION": KeywordRule(
         "part",
         (
-            "ELSET=elset; MATERIAL=material; COMPOSITE; CONTROLS=controls; DENSITY=number; "
+            "ELSET!=elset; MATERIAL=material; COMPOSITE; CONTROLS=controls; DENSITY=number; "
             "NODAL THICKNESS; OFFSET=any; ORIENTATION=orientation; POISSON=any; "
             "SECTION INTEGRATION=SIMPSON|GAUSS; SHELL THICKNESS=name; THICKNESS MODULUS=number"
         ),
         "number...",
         rows=ANY_ROWS,
-        needs=("ELSET", "MATERIAL|COMPOSITE"),
+        needs=("MATERIAL|COMPOSITE",),
         variants={"COMPOSITE": "number? integer? name any..."},
         instead="use SFMGAX elements with a *SURFACE SECTION and *REBAR LAYER",
     ),
@@ -254,12 +224,11 @@ MODEL_RULES: dict[str, KeywordRule] = {
     "REBAR": KeywordRule(
         "part",
         (
-            "ELEMENT=BEAM|SHELL|AXISHELL|MEMBRANE|AXIMEMBRANE|CONTINUUM; MATERIAL=material; "
+            "ELEMENT!=BEAM|SHELL|AXISHELL|MEMBRANE|AXIMEMBRANE|CONTINUUM; MATERIAL!=material; "
             "NAME=name; GEOMETRY=ISOPARAMETRIC|SKEW; ISODIRECTION=integer; "
             "ORIENTATION=orientation; SINGLE"
         ),
         "element any...",
-        needs=("ELEMENT", "MATERIAL"),
         variants={"ELEMENT=AXIMEMBRANE": "element number 3*number?"},
         honoured={"deck": "ELEMENT=AXIMEMBRANE; MATERIAL; NAME; ~GEOMETRY"},
         data="_elements, area:area, spacing:length=1, angle=0, radius:length=0",
@@ -269,12 +238,12 @@ MODEL_RULES: dict[str, KeywordRule] = {
     "RIGID BODY": KeywordRule(
         "part",
         (
-            "REF NODE=node; TIE NSET=nset; PIN NSET=nset; ELSET=elset; "
+            "REF NODE!=node; TIE NSET=nset; PIN NSET=nset; ELSET=elset; "
             "ANALYTICAL SURFACE=surface; POSITION=INPUT|CENTER OF MASS"
         ),
         "number?",
         rows=ANY_ROWS,
-        needs=("REF NODE", "TIE NSET|PIN NSET|ELSET|ANALYTICAL SURFACE"),
+        needs=("TIE NSET|PIN NSET|ELSET|ANALYTICAL SURFACE",),
         honoured={
             "deck": "REF NODE; TIE NSET; ELSET; ANALYTICAL SURFACE",
             "section": "REF NODE; TIE NSET",
@@ -297,43 +266,32 @@ MODEL_RULES: dict[str, KeywordRule] = {
     "TIE": KeywordRule(
         "part",
         (
-            "NAME=name; ADJUST=YES|NO|; POSITION TOLERANCE=number; "
+            "NAME!=name; ADJUST=YES|NO|; POSITION TOLERANCE=number; "
             "TYPE=SURFACE TO SURFACE|NODE TO SURFACE"
         ),
         "2*surface",
-        needs=("NAME",),
         honoured={"deck": "~NAME; ADJUST=YES|NO; ~TYPE; POSITION TOLERANCE"},
     ),
     "MASS": KeywordRule(
-        "part",
-        "ELSET=elset",
-        "number",
-        rows=ONE_ROW,
-        needs=("ELSET",),
-        honoured={"revolve": "ELSET"},
-        data="mass",
+        "part", "ELSET!=elset", "number", rows=ONE_ROW, honoured={"revolve": "ELSET"}, data="mass"
     ),
     "ROTARY INERTIA": KeywordRule(
         "part",
-        "ELSET=elset",
+        "ELSET!=elset",
         "6*number?",
         rows=ONE_ROW,
-        needs=("ELSET",),
         honoured={"revolve": "ELSET"},
         data="I11, I22, I33",
     ),
     "SPRING": KeywordRule(
         "part",
-        "ELSET=elset; ORIENTATION=orientation",
+        "ELSET!=elset; ORIENTATION=orientation",
         ("integer? integer?", "number number?"),
         rows=(2, MANY),
-        needs=("ELSET",),
         honoured={"revolve": "ELSET"},
         data="stiffness",
     ),
-    "MATERIAL": KeywordRule(
-        "model", "NAME=+material", rows=NO_ROWS, needs=("NAME",), honoured={"deck|section": "NAME"}
-    ),
+    "MATERIAL": KeywordRule("model", "NAME!=+material", honoured={"deck|section": "NAME"}),
     "DENSITY": KeywordRule(
         "model",
         fields="number number?",
@@ -358,7 +316,6 @@ MODEL_RULES: dict[str, KeywordRule] = {
     ),
     "NO COMPRESSION": KeywordRule(
         "model",
-        rows=NO_ROWS,
         under=OF_MATERIAL,
         once="parent",
         honoured={"deck|section": ""},
@@ -420,37 +377,35 @@ MODEL_RULES: dict[str, KeywordRule] = {
         honoured={"section": "~BULK MODULUS"},  # its only form
         data="bulk modulus:stress",
     ),
-    "FLUID BEHAVIOR": KeywordRule("model", "NAME=+fluid; USER", rows=NO_ROWS, needs=("NAME",)),
+    "FLUID BEHAVIOR": KeywordRule("model", "NAME!=+fluid; USER"),
     "FLUID CAVITY": KeywordRule(
         "part model",
         (
-            "NAME=name; REF NODE=node; BEHAVIOR=fluid; MIXTURE=name; ADDED VOLUME=number; "
+            "NAME!=name; REF NODE!=node; BEHAVIOR=fluid; MIXTURE=name; ADDED VOLUME=number; "
             "ADIABATIC; AMBIENT PRESSURE=number; AMBIENT TEMPERATURE=number; "
             "CHECK NORMALS=YES|NO; MINIMUM VOLUME=any; SURFACE=surface"
         ),
         "number?",
         rows=ANY_ROWS,
-        needs=("NAME", "REF NODE", "BEHAVIOR|MIXTURE", "SURFACE|ADDED VOLUME"),
+        needs=("BEHAVIOR|MIXTURE", "SURFACE|ADDED VOLUME"),
         alone=("BEHAVIOR", "MIXTURE"),
         instead="load the surface by *DSLOAD, and set cavity.share in the case",
     ),
     "AMPLITUDE": KeywordRule(
         "model",
         (
-            "NAME=+amplitude; DEFINITION=TABULAR|EQUALLY SPACED|PERIODIC|MODULATED|DECAY|"
+            "NAME!=+amplitude; DEFINITION=TABULAR|EQUALLY SPACED|PERIODIC|MODULATED|DECAY|"
             "SMOOTH STEP|SOLUTION DEPENDENT|ACTUATOR|BUBBLE|USER; VALUE=RELATIVE|ABSOLUTE; "
             "TIME=STEP TIME|TOTAL TIME; SMOOTH=number"
         ),
         "number...",
-        needs=("NAME",),
         honoured={"deck": "NAME; DEFINITION=TABULAR; TIME=STEP TIME"},
     ),
     "SURFACE INTERACTION": KeywordRule(
         "part model",
-        "NAME=+interaction",
+        "NAME!=+interaction",
         "number?",
         rows=(0, 1),
-        needs=("NAME",),
         honoured={"revolve": "NAME"},
         is_contact=True,
     ),
@@ -485,7 +440,7 @@ MODEL_RULES: dict[str, KeywordRule] = {
     "CONTACT PAIR": KeywordRule(
         "model",
         (
-            "INTERACTION=interaction; ADJUST=name; EXTENSION ZONE=number; "
+            "INTERACTION!=interaction; ADJUST=name; EXTENSION ZONE=number; "
             "GEOMETRIC CORRECTION=name; HCRIT=number; MIDFACE NODES=YES|NO; "
             "MINIMUM DISTANCE=YES|NO; NO THICKNESS; SMALL SLIDING; SMOOTH=number; "
             "SLIDING TRANSITION=ELEMENT ORDER SMOOTHING|LINEAR SMOOTHING|QUADRATIC SMOOTHING; "
@@ -493,7 +448,6 @@ MODEL_RULES: dict[str, KeywordRule] = {
             "TYPE=SURFACE TO SURFACE|NODE TO SURFACE"
         ),
         "surface surface?",
-        needs=("INTERACTION",),
         honoured={"revolve": "INTERACTION; TYPE=SURFACE TO SURFACE"},
         data="slave, master",
         is_contact=True,
@@ -519,7 +473,6 @@ MODEL_RULES: dict[str, KeywordRule] = {
     "SYMMETRIC RESULTS TRANSFER": KeywordRule(
         "model",
         "STEP=integer; INC=integer; ITERATION=integer; UNBALANCED STRESS=name",
-        rows=NO_ROWS,
         after=("SYMMETRIC MODEL GENERATION",),
         once="job",
         honoured={"revolve": "STEP; INC"},

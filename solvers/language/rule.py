@@ -4,9 +4,9 @@ Of each: the level it belongs to, its parameters, what it must stand under, come
 often it may stand, and its data lines.
 
 Levels: ``part`` is a part, an instance, the assembly, or a model that has no parts. Parameters:
-``NAME`` takes no value, ``NAME=ONE|TWO`` these (an empty one: none), ``NAME=kind`` a kind, and
-``NAME=+kind`` gives a name of it. Fields of a data line: kinds, ``3*number`` three of them,
-``number?`` may be blank, ``node...`` none or more.
+``NAME`` takes no value, ``NAME=ONE|TWO`` these (an empty one: none), ``NAME=kind`` a kind,
+``NAME=+kind`` gives a name of it, and ``NAME!`` must be given. Fields of a data line: kinds,
+``3*number`` three of them, ``number?`` may be blank, ``node...`` none or more.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from typing import NamedTuple, TypeVar
 
 MANY = 10**9
 Choice = TypeVar("Choice")
+NEEDED = "!"  # behind a parameter that must be given
 QUIET = "~"  # before an option that is honoured as it changes no answer, as a step's name
-NO_ROWS, ONE_ROW, ANY_ROWS = (0, 0), (1, 1), (0, MANY)
+ONE_ROW, ANY_ROWS = (1, 1), (0, MANY)
 Fields = str | tuple[str, ...]  # of every line, or of the first lines and then of all others
 
 
@@ -37,9 +38,9 @@ class KeywordRule:
 
     level: str
     options: str = ""  # its parameters
-    fields: Fields = ""  # of its data lines
-    rows: tuple[int, int] = (1, 10**9)  # how few and how many data lines
-    needs: tuple[str, ...] = ()  # of each, split at |, one must be given
+    fields: Fields = ""  # of its data lines; it takes none without them
+    rows: tuple[int, int] = (1, MANY)  # how few and how many data lines
+    needs: tuple[str, ...] = ()  # groups of parameters, split at |: one must be given
     alone: tuple[str, ...] = ()  # parameters that exclude each other
     under: tuple[str, ...] = ()  # keywords of which it is an option
     # of which one must stand before it, or in the job that it goes on from
@@ -64,7 +65,13 @@ class KeywordRule:
     def parameters(self) -> dict[str, str]:
         """Permitted values of each parameter: words in capitals, split at |, or a kind."""
         pairs = (option.partition("=") for option in self.options.split("; ") if option)
-        return {name: value for name, _, value in pairs}
+        return {name.removesuffix(NEEDED): value for name, _, value in pairs}
+
+    @cached_property
+    def needed(self) -> tuple[str, ...]:
+        """Parameters of which one must be given, in groups that are split at |."""
+        names = (option.partition("=")[0] for option in self.options.split("; "))
+        return (*(n.removesuffix(NEEDED) for n in names if n.endswith(NEEDED)), *self.needs)
 
     @cached_property
     def options_at(self) -> dict[str, dict[str, tuple[str, ...] | None]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .rule import ANY_ROWS, NO_ROWS, ONE_ROW, KeywordRule
+from .rule import ANY_ROWS, ONE_ROW, KeywordRule
 
 EXTRACTION = ("FREQUENCY", "BUCKLE", "COMPLEX FREQUENCY")
 STEP_PROCEDURES = (
@@ -17,7 +17,6 @@ STEP_RULES: dict[str, KeywordRule] = {
             "WRITE; READ; FREQUENCY=integer; NUMBER INTERVAL=integer; OVERLAY; "
             "TIME MARKS=YES|NO|; STEP=integer; INC=integer; END STEP"
         ),
-        rows=NO_ROWS,
         needs=("WRITE|READ",),
         alone=("FREQUENCY", "NUMBER INTERVAL"),
         honoured={"section": "WRITE; FREQUENCY"},
@@ -118,7 +117,6 @@ STEP_RULES: dict[str, KeywordRule] = {
     "FILE FORMAT": KeywordRule(
         "model step",
         "ASCII; ZERO INCREMENT",
-        rows=NO_ROWS,
         once="job",
         honoured={"step": "ASCII"},
         is_output=True,
@@ -132,12 +130,7 @@ STEP_RULES: dict[str, KeywordRule] = {
         is_output=True,
     ),
     "MODAL FILE": KeywordRule(
-        "step",
-        "FREQUENCY=integer",
-        rows=NO_ROWS,
-        within=EXTRACTION,
-        honoured={"step": ""},
-        is_output=True,
+        "step", "FREQUENCY=integer", within=EXTRACTION, honoured={"step": ""}, is_output=True
     ),
     "CONTACT FILE": KeywordRule(
         "step",
@@ -147,5 +140,5 @@ STEP_RULES: dict[str, KeywordRule] = {
         honoured={"step": "SLAVE"},
         is_output=True,
     ),
-    "END STEP": KeywordRule("step", rows=NO_ROWS, honoured={"deck step|step": ""}),
+    "END STEP": KeywordRule("step", honoured={"deck step|step": ""}),
 }
