@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
 
-from .generation import MESH_READERS, read
-from .scope import Element, Point, Scope
+from .generation import MESH_READERS, members_of, read
+from .scope import Members, MeshTable, Point, Scope
 from .text import Block
 
 
@@ -16,7 +18,7 @@ class Assembly:
     block comes with the prefix ("" outside instances) that the names in its data need."""
 
     root: Scope = field(default_factory=Scope)
-    taken: dict[str, set[int]] = field(default_factory=dict)  # numbers outside parts, by keyword
+    taken: dict[str, set[int]] = field(default_factory=dict)  # numbers outside parts
     sections: list[tuple[Block, str]] = field(default_factory=list)  # with the prefix
     surfaces: dict[str, tuple[Block, str]] = field(default_factory=dict)
     rebars: list[tuple[Block, str]] = field(default_factory=list)
@@ -47,7 +49,7 @@ def collect(blocks: Sequence[Block]) -> Assembly:
             name = block.need("NAME")
             if name in parts:
                 raise block.refused(f"the part {name} is defined twice")
-            part = parts[name] = DeckPart(block, Scope(name))
+            part = parts[name] = DeckPart(block, Scope())
         elif block.name == "END PART":
             part = None
         elif block.name == "INSTANCE":
@@ -75,13 +77,13 @@ def collect(blocks: Sequence[Block]) -> Assembly:
 
 def _taken(blocks: Sequence[Block]) -> dict[str, set[int]]:
     """Numbers of the nodes and elements that are given outside parts and instances."""
-    taken: dict[str, set[int]] = {"NODE": set(), "ELEMENT": set()}
+    taken: dict[str, set[int]] = {"node": set(), "element": set()}
     inside = False
     for block in blocks:
         if block.name in ("PART", "INSTANCE", "END PART", "END INSTANCE"):
             inside = not block.name.startswith("END")
-        elif block.name in taken and not inside:
-            taken[block.name] |= {row.integer(0) for row in block.rows}
+        elif block.name.lower() in taken and not inside:
+            taken[block.name.lower()] |= {row.integer(0) for row in block.rows}
     return taken
 
 
@@ -96,41 +98,34 @@ def _instance(made: Assembly, parts: dict[str, DeckPart], block: Block) -> None:
         raise block.refused("a rotation of an instance is not honoured")
     made.shifts[f"{name}."] = dr, dz
     root, own = made.root, part.scope
-    numbers_of = (
-        made.taken["NODE"] | root.nodes.keys(),
-        made.taken["ELEMENT"] | root.elements.keys(),
-    )
-    more = max(numbers_of[0]) if numbers_of[0] & own.nodes.keys() else 0
-    further = max(numbers_of[1]) if numbers_of[1] & own.elements.keys() else 0
-    nodes = {n: n + more for n in own.nodes}
-    elements = {n: n + further for n in own.elements}
+    pairs: list[tuple[MeshTable[Any], MeshTable[Any]]]
+    pairs = [(root.nodes, own.nodes), (root.elements, own.elements)]
+    new = []  # numbers of nodes and elements in the model
+    for labels, of_part in pairs:
+        taken = made.taken[labels.what] | labels.keys()
+        more = max(taken) if taken & of_part.keys() else 0
+        new.append({n: n + more for n in of_part})
+    nodes, elements = new
     for n, (r, z) in own.nodes.items():
         root.nodes[nodes[n]] = (r + dr, z + dz)
         made.instance_nodes[nodes[n]] = name, n
     for n, e in own.elements.items():
-        moved = tuple(nodes[each] for each in e.nodes)
-        root.elements[elements[n]] = Element(e.kind, moved, e.block, e.row)
+        root.elements[elements[n]] = replace(e, nodes=tuple(nodes[each] for each in e.nodes))
     part.instances[name] = nodes, elements
-    for sets, own_sets, numbers, members in (
-        (root.node_sets, own.node_sets, nodes, own.nodes_in),
-        (root.element_sets, own.element_sets, elements, own.elements_in),
-    ):
-        for each, defined in own_sets.items():
-            of = _mapped(members, each, defined[0][0], numbers)
-            sets[f"{name}.{each}"] = [(defined[0][0], of)]
+    for (labels, of_part), numbers in zip(pairs, new, strict=True):
+        for each, defined in of_part.sets.items():
+            of = partial(of_part.members, each, defined[0][0])
+            labels.sets[f"{name}.{each}"] = [(defined[0][0], _renumbered(of, numbers))]
         for n, m in numbers.items():
-            sets[f"{name}.{n}"] = [(block, lambda m=m: [m])]  # type: ignore[misc]
-    root.add_nodes(block, list(nodes.values()))
-    root.add_elements(block, list(elements.values()))
+            labels.sets[f"{name}.{n}"] = [(block, partial(list, [m]))]
+        labels.put(block, list(numbers.values()))
     for other in part.other:
         if other.name not in MESH_READERS:
             _other(made, other, f"{name}.", parts)
 
 
-def _mapped(
-    members: Callable[[str, Block], list[int]], name: str, block: Block, numbers: dict[int, int]
-) -> Callable[[], list[int]]:
-    return lambda: [numbers[n] for n in members(name, block)]
+def _renumbered(members: Members, numbers: dict[int, int]) -> Members:
+    return lambda: [numbers[n] for n in members()]
 
 
 def _other(made: Assembly, block: Block, prefix: str, parts: dict[str, DeckPart]) -> None:
@@ -138,18 +133,9 @@ def _other(made: Assembly, block: Block, prefix: str, parts: dict[str, DeckPart]
     if name in ("NSET", "ELSET"):  # of an instance, from outside it
         for part in parts.values():
             if numbers := part.instances.get(block.get("INSTANCE")):
-                what = 0 if name == "NSET" else 1
-                own = block.need(name)
-                inside = replace(
-                    part.scope,
-                    node_sets={k: v for k, v in part.scope.node_sets.items() if k != own},
-                    element_sets={k: v for k, v in part.scope.element_sets.items() if k != own},
-                )
-                read(inside, block)
-                members = (inside.nodes_in, inside.elements_in)[what]
-                sets = (made.root.node_sets, made.root.element_sets)[what]
-                of = _mapped(members, own, block, numbers[what])
-                sets.setdefault(own, []).append((block, of))
+                labels = made.root.nodes if name == "NSET" else made.root.elements
+                of = _renumbered(members_of(part.scope, block), numbers[name == "ELSET"])
+                labels.add_to_set(block.need(name), block, of)
                 return
         raise block.refused(f"the instance {block.get('INSTANCE')} is not defined above")
     if name in ("SOLID SECTION", "SURFACE SECTION", "MEMBRANE SECTION"):

@@ -86,16 +86,16 @@ class Constraints:
 
     def _rigid(self, block: Block, prefix: str) -> None:
         name = block.need("REF NODE")
-        reference = self.root.nodes_in(prefix + name, block)
+        reference = self.root.nodes.members(prefix + name, block)
         if len(reference) != 1:
             raise block.refused(f"REF NODE={name} is {len(reference)} nodes, one is needed")
         if not {"TIE NSET", "ELSET", "ANALYTICAL SURFACE"} & block.parameters.keys():
             raise block.refused("needs TIE NSET=, ELSET= or ANALYTICAL SURFACE=")
         nodes, surfaces = dict[int, None](), list[str]()
         if tied := block.get("TIE NSET"):
-            nodes |= dict.fromkeys(self.root.nodes_in(prefix + tied, block))
+            nodes |= dict.fromkeys(self.root.nodes.members(prefix + tied, block))
         if elements := block.get("ELSET"):
-            members = self.root.elements_in(prefix + elements, block)
+            members = self.root.elements.members(prefix + elements, block)
             nodes |= dict.fromkeys(n for each in members for n in self.root.elements[each].nodes)
             surfaces += [
                 each
@@ -154,7 +154,7 @@ class Constraints:
     def _embed(self, block: Block, prefix: str) -> None:
         """Plies on nodes of their own: those where the rubber has nodes are the rubber's."""
         hosts = (
-            self.root.elements_in(prefix + block.get("HOST ELSET"), block)
+            self.root.elements.members(prefix + block.get("HOST ELSET"), block)
             if block.get("HOST ELSET")
             else [n for n, e in self.root.elements.items() if e.is_solid]
         )
@@ -162,7 +162,7 @@ class Constraints:
         lines, before = [], len(self.guests)
         for row in block.rows:
             for name in filter(None, row.fields):
-                members = self.root.elements_in(prefix + name.strip('"').upper(), block, row)
+                members = self.root.elements.members(prefix + name.strip('"').upper(), block, row)
                 wrong = [n for n in members if not self.root.elements[n].is_ply]
                 if wrong:
                     raise block.refused(f"element {wrong[0]} of {name} is no SFMGAX or MGAX", row)
@@ -199,7 +199,7 @@ class Constraints:
         fixed: dict[int, set[int]] = {}
         for block in blocks:
             for row in block.rows:
-                nodes = self.root.nodes_in(row.name(0), block, row)
+                nodes = self.root.nodes.members(row.name(0), block, row)
                 if nodes and self.motions.keys() >= set(nodes):
                     self._move(nodes, block, row)
                     continue
@@ -248,7 +248,7 @@ class Constraints:
             (block, row)
             for block in blocks
             for row in block.rows
-            if number in self.root.nodes_in(row.name(0), block, row)
+            if number in self.root.nodes.members(row.name(0), block, row)
         )
 
     def on_plane(self, point: Point) -> bool:

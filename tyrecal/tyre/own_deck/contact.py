@@ -154,7 +154,7 @@ class DeckContact:
     def _lines(self, nodes: Sequence[int]) -> str:
         """The lines that hold nodes, and where they belong."""
         names = ("SEATED", *(f"SEATED_{k}" for k in range(2, MAX_NAMES)))
-        name = next(each for each in names if each not in self.root.node_sets)
+        name = next(each for each in names if each not in self.root.nodes.sets)
         of_instances: dict[str, list[int]] = {}
         known = self.made.instance_nodes
         for n in nodes:

@@ -6,7 +6,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .scope import MOST, PLIES, RIGID, SOLID, Point, Scope, along_arc, mirror_of, reflected
+from .scope import (
+    BEGINNINGS,
+    MOST,
+    Members,
+    MeshTable,
+    Point,
+    Scope,
+    along_arc,
+    mirror_of,
+    reflected,
+)
 from .text import Block, Row, element_types, is_label, named
 
 
@@ -31,7 +41,7 @@ def _node(scope: Scope, block: Block) -> None:
         number = row.integer(0)
         scope.place(block, row, number, point)
         numbers.append(number)
-    scope.add_nodes(block, numbers)
+    scope.nodes.put(block, numbers)
 
 
 def _system(scope: Scope, block: Block) -> None:
@@ -73,7 +83,7 @@ def _ngen(scope: Scope, block: Block) -> None:
         numbers += range(first, last + (1 if step > 0 else -1), step)
         if block.get("LINE") != "C" and any(row.fields[3:]):
             raise block.refused("a point of a curve needs LINE=C", row)
-    scope.add_nodes(block, numbers)
+    scope.nodes.put(block, numbers)
 
 
 def _between(a: np.ndarray, b: np.ndarray, share: float) -> Point:
@@ -105,7 +115,7 @@ def _nfill(scope: Scope, block: Block) -> None:
         raise block.refused("BIAS must be positive")
     numbers: list[int] = []
     for row in block.rows:
-        sets = [scope.nodes_in(row.name(i), block, row) for i in (0, 1)]
+        sets = [scope.nodes.members(row.name(i), block, row) for i in (0, 1)]
         pairs = [
             members if _unsorted(scope, row.name(i)) else sorted(members)
             for i, members in enumerate(sets)
@@ -126,17 +136,17 @@ def _nfill(scope: Scope, block: Block) -> None:
             for k in range(1, count):
                 scope.place(block, row, first + k * step, _between(a, b, shares[k - 1]))
             numbers += range(first, last + (1 if step > 0 else -1), step)
-    scope.add_nodes(block, numbers)
+    scope.nodes.put(block, numbers)
 
 
 def _unsorted(scope: Scope, name: str) -> bool:
-    return any("UNSORTED" in block.parameters for block, _ in scope.node_sets.get(name, ()))
+    return any("UNSORTED" in block.parameters for block, _ in scope.nodes.sets.get(name, ()))
 
 
 def _ncopy(scope: Scope, block: Block) -> None:
     """Copies of a set, shifted, or mirrored about a line."""
     shift = Row(block.place, block.need("CHANGE NUMBER")).integer(0)
-    old = scope.nodes_in(block.need("OLD SET"), block)
+    old = scope.nodes.members(block.need("OLD SET"), block)
     times = Row(block.place, block.parameters.get("MULTIPLE", "1")).integer(0)
     if not 1 <= times <= MOST:
         raise block.refused(f"MULTIPLE must be from 1 to {MOST}")
@@ -160,26 +170,28 @@ def _ncopy(scope: Scope, block: Block) -> None:
         for n in old:
             scope.place(block, None, n + k * shift, move(scope.nodes[n], k))
             new.append(n + k * shift)
-    scope.add_nodes(block, new, "NEW SET")
+    scope.nodes.put(block, new, "NEW SET")
 
 
-def _nset(scope: Scope, block: Block) -> None:
-    of = block.get("ELSET")
-    nodes = lambda: [n for e in scope.elements_in(of, block) for n in scope.elements[e].nodes]
-    given = lambda: _listed(scope, block, scope.nodes_in, scope.nodes)
-    scope._add(scope.node_sets, block.need("NSET"), block, nodes if of else given)
+def _set(scope: Scope, block: Block) -> None:
+    labels = scope.nodes if block.name == "NSET" else scope.elements
+    labels.add_to_set(block.need(block.name), block, members_of(scope, block))
 
 
-def _elset(scope: Scope, block: Block) -> None:
-    given = lambda: _listed(scope, block, scope.elements_in, scope.elements)
-    scope._add(scope.element_sets, block.need("ELSET"), block, given)
+def members_of(scope: Scope, block: Block) -> Members:
+    """Members that an *NSET or *ELSET puts into its set."""
+    if block.name == "ELSET":
+        return lambda: _listed(scope.elements, block)
+    if of := block.get("ELSET"):
+        elements = scope.elements
+        return lambda: [n for e in elements.members(of, block) for n in elements[e].nodes]
+    return lambda: _listed(scope.nodes, block)
 
 
-def _listed(scope: Scope, block: Block, members: Callable, known: dict) -> list[int]:
+def _listed(labels: MeshTable, block: Block) -> list[int]:
     """Members of a set's data lines: numbers and names of other sets, or first, last, step."""
     result: list[int] = []
-    what = "node" if block.name == "NSET" else "element"
-    in_order = sorted(known) if "GENERATE" in block.parameters else []
+    in_order = sorted(labels) if "GENERATE" in block.parameters else []
     for row in block.rows:
         if "GENERATE" in block.parameters:
             first, last, step = row.integer(0), row.integer(1), row.integer(2, 1)
@@ -188,17 +200,17 @@ def _listed(scope: Scope, block: Block, members: Callable, known: dict) -> list[
             numbers = range(first, last + 1, step)
             some = [n for n in in_order if n in numbers]  # a range may have gaps
             if not some:
-                raise block.refused(f"no {what} from {first} to {last} is defined", row)
+                raise block.refused(f"no {labels.what} from {first} to {last} is defined", row)
         else:
             some = []
             for text in filter(None, row.fields):
                 if is_label(text):
                     some.append(int(text))
                 else:
-                    some += members(named(text), block, row)
-        missing = [n for n in some if n not in known]
+                    some += labels.members(named(text), block, row)
+        missing = [n for n in some if n not in labels]
         if missing:
-            raise block.refused(f"{what} {missing[0]} of the set is not defined", row)
+            raise block.refused(f"{labels.what} {missing[0]} of the set is not defined", row)
         result += some
     return result
 
@@ -206,7 +218,7 @@ def _listed(scope: Scope, block: Block, members: Callable, known: dict) -> list[
 def _element(scope: Scope, block: Block) -> None:
     kind = block.need("TYPE")
     count, _ = element_types.NODES_AND_SECTION.get(kind, (0, ""))
-    if not count or not kind.startswith((SOLID, *PLIES, RIGID)):
+    if not count or not kind.startswith(BEGINNINGS):
         raise block.refused(
             f"TYPE={kind} is no element of a revolved tyre: CGAX for rubber, SFMGAX or MGAX"
             " for plies, RAX2 for a rim; give decks in three dimensions in deck.decks of a case"
@@ -220,7 +232,7 @@ def _element(scope: Scope, block: Block) -> None:
         nodes = tuple(Row(row.place, text).integer(0) for text in fields[1:])
         scope.make(block, row, number, kind, nodes)
         numbers.append(number)
-    scope.add_elements(block, numbers)
+    scope.elements.put(block, numbers)
 
 
 def _elgen(scope: Scope, block: Block) -> None:
@@ -244,7 +256,7 @@ def _elgen(scope: Scope, block: Block) -> None:
                 if i or j:
                     shifted = (n + i * nodes + j * row_nodes for n in element.nodes)
                     scope.make(block, row, number, element.kind, tuple(shifted))
-    scope.add_elements(block, made)
+    scope.elements.put(block, made)
 
 
 def _elcopy(scope: Scope, block: Block) -> None:
@@ -252,7 +264,7 @@ def _elcopy(scope: Scope, block: Block) -> None:
     one = lambda name: Row(block.place, block.need(name)).integer(0)
     shift, nodes = one("ELEMENT SHIFT"), one("SHIFT NODES")
     made = []
-    for n in scope.elements_in(block.need("OLD SET"), block):
+    for n in scope.elements.members(block.need("OLD SET"), block):
         element = scope.elements[n]
         shifted = tuple(node + nodes for node in element.nodes)
         if "REFLECT" in block.parameters:
@@ -260,7 +272,7 @@ def _elcopy(scope: Scope, block: Block) -> None:
         row = block.rows[0] if block.rows else element.row
         scope.make(block, row, n + shift, element.kind, shifted)
         made.append(n + shift)
-    scope.add_elements(block, made, "NEW SET")
+    scope.elements.put(block, made, "NEW SET")
 
 
 MESH_READERS: dict[str, Callable[[Scope, Block], None]] = {
@@ -269,9 +281,9 @@ MESH_READERS: dict[str, Callable[[Scope, Block], None]] = {
     "NGEN": _ngen,
     "NFILL": _nfill,
     "NCOPY": _ncopy,
-    "NSET": _nset,
+    "NSET": _set,
     "ELEMENT": _element,
     "ELGEN": _elgen,
     "ELCOPY": _elcopy,
-    "ELSET": _elset,
+    "ELSET": _set,
 }

@@ -78,9 +78,7 @@ class _Builder:
         for number, element in self.root.elements.items():
             if any(n in self.tied.same for n in element.nodes):
                 nodes = tuple(self.tied.same.get(n, n) for n in element.nodes)
-                self.root.elements[number] = Element(
-                    element.kind, nodes, element.block, element.row
-                )
+                self.root.elements[number] = replace(element, nodes=nodes)
         if self.made.reflect:
             solids, plies, pressed = self._reflect(solids, plies, pressed)
         used = {
@@ -125,7 +123,7 @@ class _Builder:
         solids, plies = list[Assigned](), list[Assigned]()
         for block, prefix in self.made.sections:
             name = prefix + block.need("ELSET")
-            elements = self.root.elements_in(name, block)
+            elements = self.root.elements.members(name, block)
             if not elements:
                 raise block.refused(f"the element set {name} is empty")
             solid = block.name == "SOLID SECTION"
@@ -151,7 +149,7 @@ class _Builder:
         lines: dict[int, list[tuple[Block, Row]]] = {}
         for block, prefix in self.made.rebars:
             for row in block.rows:
-                for n in self.root.elements_in(prefix + row.name(0), block, row):
+                for n in self.root.elements.members(prefix + row.name(0), block, row):
                     if not self.root.elements[n].kind.startswith("MGAX"):
                         kind = self.root.elements[n].kind
                         raise block.refused(f"element {n} is a {kind}, no membrane", row)
@@ -165,11 +163,11 @@ class _Builder:
 
     def _all_sets(self) -> dict[str, tuple[int, ...]]:
         """Every set is resolved, used or not: one that dangles is a mistake."""
-        for name, defined in self.root.element_sets.items():
-            self.root.elements_in(name, defined[0][0])
+        for name, defined in self.root.elements.sets.items():
+            self.root.elements.members(name, defined[0][0])
         return {
-            name: tuple(self.root.nodes_in(name, defined[0][0]))
-            for name, defined in self.root.node_sets.items()
+            name: tuple(self.root.nodes.members(name, defined[0][0]))
+            for name, defined in self.root.nodes.sets.items()
         }
 
     def _check_areas(self, used: set[int]) -> None:
@@ -218,7 +216,7 @@ class _Builder:
                 hint = ": set spin_rad_per_s in the case" if kind == "CENTRIF" else ""
                 raise block.refused(f"the load {kind} is not honoured, only P1 to P4{hint}", row)
             else:
-                for n in self.root.elements_in(row.name(0), block, row):
+                for n in self.root.elements.members(row.name(0), block, row):
                     own = dict(faces_of(self.root.elements[n]))
                     if f"S{kind[1]}" not in own:
                         raise block.refused(f"element {n} has no face {kind[1]}", row)
@@ -283,9 +281,7 @@ class _Builder:
         both_faces = list(pressed)
         for number, element in list(root.elements.items()):
             nodes = tuple(image[n] for n in element.nodes)
-            root.elements[number + further] = Element(
-                element.kind, reflected(element, nodes), element.block, element.row
-            )
+            root.elements[number + further] = replace(element, nodes=reflected(element, nodes))
         both = lambda each: replace(
             each, elements=each.elements + tuple(n + further for n in each.elements)
         )

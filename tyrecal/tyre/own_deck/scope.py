@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
 from .text import Block, Row, is_label, language
 
 Point = tuple[float, float]
-Sets = dict[str, list[tuple[Block, Callable[[], list[int]]]]]  # pieces of each, by name
+Members = Callable[[], list[int]]
+Content = TypeVar("Content")
 CORNERS_OF = {3: 3, 4: 4, 6: 3, 8: 4}  # of solids by their number of nodes
 FARTHEST = 1e9  # coordinate, in any unit
 MOST = 200_000  # nodes or elements that a deck generates
-SOLID, PLIES, RIGID = "CGAX", ("SFMGAX", "MGAX"), "RAX"  # beginnings of elements' types
+SOLID, PLIES, RIGID = "CGAX", ("SFMGAX", "MGAX"), "RAX"
+BEGINNINGS = (SOLID, *PLIES, RIGID)  # of the types of elements
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,72 +40,71 @@ class Element:
         return self.kind.startswith(PLIES)
 
 
+class MeshTable(dict[int, Content]):
+    """Nodes, or elements, by number, and the sets of them by name, in pieces. what: node or
+    element."""
+
+    def __init__(self, what: str):
+        super().__init__()
+        self.what, self.keyword = what, {"node": "NSET", "element": "ELSET"}[what]
+        self.sets: dict[str, list[tuple[Block, Members]]] = {}
+        self._asked: list[str] = []
+
+    def members(self, name: str, block: Block, row: Row | None = None) -> list[int]:
+        """Numbers in a set, or the number that a name is. Raises OwnDeckError."""
+        if is_label(name) and int(name) in self:
+            return [int(name)]
+        if name not in self.sets:
+            raise block.refused(f"{self.what} set {name} is not defined", row)
+        if name in self._asked:
+            raise block.refused(f"{self.what} set {name} holds itself", row)
+        self._asked.append(name)
+        members = dict.fromkeys(n for _, of in self.sets[name] for n in of())
+        self._asked.pop()
+        return list(members)
+
+    def add_to_set(self, name: str, block: Block, members: Members) -> None:
+        """Add members that a keyword puts into a set."""
+        self.sets.setdefault(name, []).append((block, members))
+
+    def put(self, block: Block, numbers: list[int], parameter: str = "") -> None:
+        """New ones go to the set that their keyword names, if it names one."""
+        if name := block.get(parameter or self.keyword):
+            self.add_to_set(name, block, lambda: numbers)
+
+    def add(self, number: int, content: Content, block: Block, row: Row | None) -> None:
+        """A new one. Raises OwnDeckError for a number that none can have, or too many."""
+        if not 1 <= number <= language.MAX_LABEL:
+            words = f"numbers go from 1 to {language.MAX_LABEL}"
+            raise block.refused(f"{self.what} {number}: {words}", row)
+        if len(self) > MOST:
+            raise block.refused(f"there are more than {MOST} {self.what}s", row)
+        self[number] = content
+
+
 @dataclass
 class Scope:
     """Nodes, elements and sets that the mesh keywords of one *PART, or of the model, make."""
 
-    name: str = ""
-    nodes: dict[int, Point] = field(default_factory=dict)
-    elements: dict[int, Element] = field(default_factory=dict)
-    node_sets: Sets = field(default_factory=dict)
-    element_sets: Sets = field(default_factory=dict)
+    nodes: MeshTable[Point] = field(default_factory=lambda: MeshTable("node"))
+    elements: MeshTable[Element] = field(default_factory=lambda: MeshTable("element"))
     system: tuple[Point, Point] = (0.0, 0.0), (1.0, 0.0)  # origin, direction of its first axis
-    _asked: list[str] = field(default_factory=list)
-
-    def nodes_in(self, name: str, block: Block, row: Row | None = None) -> list[int]:
-        """Nodes of a set, or the node of this number."""
-        return self._members(name, self.node_sets, self.nodes, "node", block, row)
-
-    def elements_in(self, name: str, block: Block, row: Row | None = None) -> list[int]:
-        """Elements of a set, or the element of this number."""
-        return self._members(name, self.element_sets, self.elements, "element", block, row)
 
     def rubber_nodes(self) -> set[int]:
         """Nodes of the solids."""
         return {n for e in self.elements.values() if e.is_solid for n in e.nodes}
 
-    def _members(
-        self, name: str, sets: dict, known: dict, what: str, block: Block, row: Row | None
-    ) -> list[int]:
-        if is_label(name) and int(name) in known:
-            return [int(name)]
-        if name not in sets:
-            raise block.refused(f"{what} set {name} is not defined", row)
-        if name in self._asked:
-            raise block.refused(f"{what} set {name} holds itself", row)
-        self._asked.append(name)
-        members = dict.fromkeys(n for _, of in sets[name] for n in of())
-        self._asked.pop()
-        return list(members)
-
-    def _add(self, sets: dict, name: str, block: Block, of: Callable[[], list[int]]) -> None:
-        sets.setdefault(name, []).append((block, of))
-
-    def add_nodes(self, block: Block, numbers: list[int], parameter: str = "NSET") -> None:
-        """Nodes of a keyword go to the set that it names."""
-        if name := block.get(parameter):
-            self._add(self.node_sets, name, block, lambda: numbers)
-
-    def add_elements(self, block: Block, numbers: list[int], parameter: str = "ELSET") -> None:
-        """Elements of a keyword go to the set that it names."""
-        if name := block.get(parameter):
-            self._add(self.element_sets, name, block, lambda: numbers)
-
     def place(self, block: Block, row: Row | None, number: int, point: Point) -> None:
         """A new node."""
-        _check_label("node", number, block, row)
         old = self.nodes.get(number)
         if old is not None and max(abs(old[0] - point[0]), abs(old[1] - point[1])) > 0:
             raise block.refused(f"node {number} is defined twice, at two places", row)
-        if len(self.nodes) > MOST:
-            raise block.refused(f"there are more than {MOST} nodes", row)
         if not max(map(abs, point)) < FARTHEST:
             raise block.refused(f"node {number} is at {point}: no tyre is so large", row)
-        self.nodes[number] = point
+        self.nodes.add(number, point, block, row)
 
     def make(self, block: Block, row: Row, number: int, kind: str, nodes: tuple[int, ...]) -> None:
         """A new element."""
-        _check_label("element", number, block, row)
         if number in self.elements:
             raise block.refused(f"element {number} is defined twice", row)
         missing = [n for n in nodes if n not in self.nodes]
@@ -110,15 +112,7 @@ class Scope:
             raise block.refused(f"node {missing[0]} of element {number} is not defined", row)
         if len(set(nodes)) < len(nodes):
             raise block.refused(f"element {number} has a node twice", row)
-        if len(self.elements) > MOST:
-            raise block.refused(f"there are more than {MOST} elements", row)
-        self.elements[number] = Element(kind, nodes, block, row)
-
-
-def _check_label(what: str, number: int, block: Block, row: Row | None) -> None:
-    """Raises OwnDeckError for a number that no node or element can have."""
-    if not 1 <= number <= language.MAX_LABEL:
-        raise block.refused(f"{what} {number}: numbers go from 1 to {language.MAX_LABEL}", row)
+        self.elements.add(number, Element(kind, nodes, block, row), block, row)
 
 
 def mirror_of(block: Block) -> Callable[[Point], Point]:

@@ -29,7 +29,7 @@ def surface_faces(made: Assembly, name: str, block: Block, row: Row | None = Non
         face = line.name(1)
         if any(line.fields[2:]):
             raise surface.refused(f"data '{line.fields[2]}' is not honoured", line)
-        members = made.root.elements_in(prefix + line.name(0), surface, line)
+        members = made.root.elements.members(prefix + line.name(0), surface, line)
         free = set(boundary_of(made.root)) if not face else set()
         for n in members:
             element = made.root.elements[n]
@@ -65,7 +65,7 @@ def surface_nodes(made: Assembly, name: str, block: Block, row: Row) -> list[int
         return [
             n
             for line in surface.rows
-            for n in made.root.nodes_in(prefix + line.name(0), surface, line)
+            for n in made.root.nodes.members(prefix + line.name(0), surface, line)
         ]
     return list(
         dict.fromkeys(n for _, _, nodes in surface_faces(made, name, block, row) for n in nodes)
@@ -77,7 +77,7 @@ def elements_of(made: Assembly, surface: Block, prefix: str) -> list[tuple[Eleme
     return [
         (made.root.elements[n], row.name(1))
         for row in surface.rows
-        for n in made.root.elements_in(prefix + row.name(0), surface, row)
+        for n in made.root.elements.members(prefix + row.name(0), surface, row)
     ]
 
 
