@@ -74,7 +74,8 @@ UNITS_mm = {  # in a deck in mm, t, s: the unit's name, and SI in one of it
 def usual_numbers(deck: OwnDeck, flat: SolverDeck) -> dict[str, Usual]:
     """The usual ranges of a deck's plain numbers by path, of those that have one; ``flat`` is the
     deck that they make."""
-    cords, angular, angles = _cords(deck), _angular(deck), _angles(flat)
+    cords = {ply.material for ply in flat.plies}
+    angular, angles = _angular(deck), _angles(flat)
     layers = _layers(flat, angles)
     shares = _shares(flat)
     ranges = {}
@@ -296,14 +297,6 @@ def _density(deck: OwnDeck, material: str) -> float | None:
     value = deck.numbers.get(f"{material} / DENSITY / density")
     per_volume = UNIT_MASS[deck.units] / UNIT_LENGTH[deck.units] ** 3
     return None if value is None else value * per_volume
-
-
-def _cords(deck: OwnDeck) -> set[str]:
-    """Materials of the deck's layers of rebar."""
-    rows = (row for block in deck.blocks if block.name == "REBAR LAYER" for row in block.rows)
-    return {row.name(4) for row in rows} | {
-        block.get("MATERIAL") for block in deck.blocks if block.name == "REBAR"
-    }
 
 
 def _angular(deck: OwnDeck) -> set[str]:

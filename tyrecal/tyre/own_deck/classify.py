@@ -29,6 +29,7 @@ class ClassifiedDeck:
     """The blocks of a deck by what they are."""
 
     model: list[Block] = field(default_factory=list)
+    options: dict[Block, list[Block]] = field(default_factory=dict)  # of materials and sections
     inflation: list[Block] = field(default_factory=list)  # of the step that inflates
     passed: list[Block] = field(default_factory=list)  # over, as they change nothing
     contact: list[Block] = field(default_factory=list)  # superfluous where the bead is held
@@ -76,6 +77,8 @@ def classify(blocks: Sequence[Block]) -> ClassifiedDeck:
             over = block
         elif over is None or over.name not in owners:
             raise block.refused(words)
+        else:
+            deck.options.setdefault(over, []).append(block)
         if name in ("PART", "ASSEMBLY") and opened:
             raise block.refused("is inside another *PART or *ASSEMBLY")
         if name == "INSTANCE" and opened != ["ASSEMBLY"]:

@@ -14,18 +14,21 @@ from . import numbers as numbers_of
 from .classify import ClassifiedDeck, classify
 from .gauge import Gauges, thickened
 from .model import DeckModel, build
-from .solver_deck import SECTION_OPTIONS, SolverDeck, translate
+from .solver_deck import SolverDeck, translate
 from .text import Block, OwnDeckError, Place, number_from, read_blocks, table
 
 Units = Literal["m", "mm"]
 UNIT_LENGTH = {"m": 1.0, "mm": 1e-3}  # of a unit of length, m
 UNIT_MASS = {"m": 1.0, "mm": 1e3}  # of a unit of mass, kg: mm, t, s, MPa
-DENSITIES = {"m": (300.0, 2e4), "mm": (3e-10, 2e-8)}  # of tyres' materials
+DENSITIES: dict[Units, tuple[float, float]] = {
+    "m": (300.0, 2e4),
+    "mm": (3e-10, 2e-8),
+}  # of tyres' materials
 TOPOLOGY = {"PART", "ASSEMBLY", "SYMMETRIC MODEL GENERATION", "BOUNDARY", "DSLOAD", "DLOAD"}
 TOPOLOGY |= {
     name for name, rule in table.RULES.items() if rule.is_judged and "part" in rule.level.split()
 }
-TOPOLOGY -= {*SECTION_OPTIONS}
+TOPOLOGY -= {"HOURGLASS STIFFNESS", "REBAR LAYER"}
 
 
 @dataclass(eq=False)
@@ -155,20 +158,12 @@ def read_own_deck(path: Path, units: Units | None = None) -> OwnDeck:
 def recognised(blocks: Sequence[Block]) -> Units:
     """The units that the densities are in. Raises OwnDeckError where these do not determine
     them."""
-    rows = [(b, row) for b in blocks if b.name == "DENSITY" for row in b.rows[:1]]
-    values = []
-    for block, row in rows:
-        text = row.text(0)
-        if "{{" not in text and "<" not in text:
-            values.append((block, row.number(0)))
-    fits = [
-        units
-        for units, (low, high) in DENSITIES.items()
-        if values and all(low <= value <= high for _, value in values)
-    ]
-    if not fits:
-        block = values[0][0] if values else blocks[0]
-        raise block.refused(
-            "the units cannot be inferred from the densities: give --units m or --units mm"
-        )
-    return "m" if fits[0] == "m" else "mm"
+    rows = [row for b in blocks if b.name == "DENSITY" for row in b.rows[:1]]
+    values = [row.number(0) for row in rows if "{{" not in row.text(0) and "<" not in row.text(0)]
+    for units, (low, high) in DENSITIES.items():
+        if values and all(low <= value <= high for value in values):
+            return units
+    block = next((b for b in blocks if b.name == "DENSITY"), blocks[0])
+    raise block.refused(
+        "the units cannot be inferred from the densities: give --units m or --units mm"
+    )

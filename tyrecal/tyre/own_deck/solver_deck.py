@@ -5,8 +5,7 @@ output, in the words that solvers honour; each of its lines knows where it comes
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,9 +13,7 @@ from .classify import ClassifiedDeck
 from .model import Assigned, DeckModel
 from .numbers import written
 from .solver_mesh import DeckLines, SolverMesh, solver_mesh
-from .text import Block, Place, Row, fields, table
-
-SECTION_OPTIONS = ("HOURGLASS STIFFNESS", "REBAR LAYER")
+from .text import Block, Place, Row, fields
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,54 +67,39 @@ def translate(deck: ClassifiedDeck, model: DeckModel, length: float, mass: float
     """The flat deck of a model whose units of length and mass are so many m and kg. Raises
     OwnDeckError."""
     mesh = solver_mesh(model, length)
-    write = _Writer(length, mass)
-    blocks = _materials(deck.model)
-    options = _options(deck.model)
-    used: dict[str, str] = {}
+    write = _Writer(deck, mesh, length, mass)
     rubbers, plies = [], list[RebarPly]()
     for k, section in enumerate(model.solids, start=1):
-        name = _used(section.block, section.block.need("MATERIAL"), blocks, used)
-        rubbers.append(section.block.get("MATERIAL"))
-        controls = section.block.get("CONTROLS")
+        block = section.block
+        name = write.used(block, block.need("MATERIAL"))
+        rubbers.append(block.get("MATERIAL"))
+        controls = block.get("CONTROLS")
         more = f", CONTROLS={controls}" if controls else ""
-        write.line(f"*SOLID SECTION, ELSET=SOLID_{k}, MATERIAL={name}{more}", section.block.place)
-        for option in options[section.block]:
-            if option.name != "HOURGLASS STIFFNESS":
-                raise option.refused("does not belong under a *SOLID SECTION")
+        write.line(f"*SOLID SECTION, ELSET=SOLID_{k}, MATERIAL={name}{more}", block.place)
+        for option in deck.options.get(block, ()):
             write.block(option, "*HOURGLASS STIFFNESS")
-        if any(row.text(0) for row in section.block.rows[1:]):
-            raise section.block.refused("takes no more than one data line", section.block.rows[1])
+        if any(row.text(0) for row in block.rows[1:]):
+            raise block.refused("takes no more than one data line", block.rows[1])
     for k, section in enumerate(model.plies, start=1):
-        is_membrane = section.block.name == "MEMBRANE SECTION"
-        if is_membrane:
-            name = _used(section.block, section.block.need("MATERIAL"), blocks, used)
-            write.block(section.block, f"*MEMBRANE SECTION, ELSET=PLY_{k}, MATERIAL={name}")
+        block, layers = section.block, deck.options.get(section.block, [])
+        if block.name == "MEMBRANE SECTION":
+            name = write.used(block, block.need("MATERIAL"))
+            write.block(block, f"*MEMBRANE SECTION, ELSET=PLY_{k}, MATERIAL={name}")
         else:
-            write.line(f"*SURFACE SECTION, ELSET=PLY_{k}", section.block.place)
-        if section.block.rows and not is_membrane:
-            raise section.block.refused("takes no data", section.block.rows[0])
-        if not options[section.block] and not is_membrane:
-            raise section.block.refused("has no *REBAR LAYER under it: give its cords")
-        rebars = [_layer_of(block, row) for block, row in section.rebars]
-        for option in [*options[section.block], *rebars]:
-            plies += _layers(write, section, k, option, blocks, used, mesh, length)
+            write.line(f"*SURFACE SECTION, ELSET=PLY_{k}", block.place)
+            if not layers:
+                raise block.refused("has no *REBAR LAYER under it: give its cords")
+        for option in [*layers, *(_layer_of(*rebar) for rebar in section.rebars)]:
+            plies += write.layers(section, option)
     for block in deck.model:
         if block.name == "SECTION CONTROLS":
             head = f"*SECTION CONTROLS, NAME={block.need('NAME')}, HOURGLASS=STIFFNESS"
             if "HOURGLASS" not in block.parameters or block.rows:
                 raise block.refused("only HOURGLASS=STIFFNESS is honoured of it")
             write.line(head, block.place)
-    for name, plain_name in used.items():
-        write.line(f"*MATERIAL, NAME={plain_name}", blocks[name][0].place)
-        for option in blocks[name][1:]:
-            values = "".join(
-                f", {key}" + (f"={value}" if value else "")
-                for key, value in option.parameters.items()
-            )
-            write.block(option, f"*{option.name}{values}")
+    write.materials()
     static = next(block for block in deck.inflation if block.name == "STATIC")
-    block, row, i = model.pressure[0]
-    stress = mass / length
+    _, row, i = model.pressure[0]
     return SolverDeck(
         mesh,
         (*mesh.lines, *write.lines),
@@ -125,7 +107,7 @@ def translate(deck: ClassifiedDeck, model: DeckModel, length: float, mass: float
         tuple(rubbers),
         tuple(section.name for section in model.solids),
         tuple(plies),
-        row.number(i) * stress,
+        row.number(i) * mass / length,
         "LONG TERM" in static.parameters,
         deck,
         model,
@@ -133,11 +115,13 @@ def translate(deck: ClassifiedDeck, model: DeckModel, length: float, mass: float
 
 
 class _Writer(DeckLines):
-    """Lines with numbers in SI units."""
+    """Lines with numbers in SI units, and the materials that they use."""
 
-    def __init__(self, length: float, mass: float):
+    def __init__(self, deck: ClassifiedDeck, mesh: SolverMesh, length: float, mass: float):
         super().__init__()
-        self.length, self.mass = length, mass
+        self.deck, self.mesh, self.length, self.mass = deck, mesh, length, mass
+        self.defined = _materials(deck)
+        self.names: dict[str, str] = {}  # in the flat deck, of those that are used
 
     def scale(self, unit: str) -> float:
         """The factor to SI units on a field of a kind of unit."""
@@ -151,106 +135,84 @@ class _Writer(DeckLines):
         for i, row in enumerate(block.rows):
             texts = list(row.fields)
             for j, text in enumerate(texts):
-                scale = scales.get((i, j), 1.0)
-                if angular and j == 2:
-                    scale = 1.0
+                scale = 1.0 if angular and j == 2 else scales.get((i, j), 1.0)
                 if scale != 1.0 and text:
                     texts[j] = written(row.number(j) * scale)
             self.line(", ".join(texts), row.place)
 
+    def used(self, block: Block, name: str) -> str:
+        """The flat deck's name of a material that a block uses."""
+        if name not in self.defined:
+            raise block.refused(f"the material {name} is not defined")
+        material = self.defined[name]
+        if not any(each.name == "DENSITY" for each in self.deck.options.get(material, ())):
+            raise material.refused(f"the material {name} needs a *DENSITY")
+        if name not in self.names:
+            simple = re.fullmatch(r"[A-Z][A-Z0-9_\-]{0,60}", name)
+            self.names[name] = name if simple else f"MATERIAL_{len(self.names) + 1}"
+        return self.names[name]
 
-def _options(blocks: Sequence[Block]) -> dict[Block, list[Block]]:
-    """Options under each section keyword: *REBAR LAYER, or *HOURGLASS STIFFNESS."""
-    options: dict[Block, list[Block]] = {}
-    section: Block | None = None
-    for block in blocks:
-        if block.name in ("SOLID SECTION", "SURFACE SECTION", "MEMBRANE SECTION"):
-            section = block
-            options[section] = []
-        elif section and block.name in SECTION_OPTIONS:
-            options[section].append(block)
-    return options
+    def materials(self) -> None:
+        """Those that are used, with their options."""
+        for name, plain_name in self.names.items():
+            self.line(f"*MATERIAL, NAME={plain_name}", self.defined[name].place)
+            for option in self.deck.options[self.defined[name]]:
+                given = option.parameters.items()
+                values = (f", {key}" + (f"={value}" if value else "") for key, value in given)
+                self.block(option, f"*{option.name}{''.join(values)}")
+
+    def layers(self, section: Assigned, option: Block) -> list[RebarPly]:
+        """Write a *REBAR LAYER of a section; returns its layers."""
+        if not option.rows:
+            raise option.refused(
+                "needs a data line: name, area, spacing, position, material, angle"
+            )
+        angular = option.get("GEOMETRY") == "ANGULAR"
+        rows, layers = [], []
+        for row in option.rows:
+            flat_name = self.used(option, row.name(4))
+            if row.number(3, 0.0):
+                words = "the position of a layer in its surface element must be 0"
+                raise option.refused(words, row)
+            for j, what in ((1, "area"), (2, "spacing")):
+                if not row.number(j) > 0:
+                    raise option.refused(f"the {what} must be positive", row)
+            name = re.sub(r"\W", "_", row.name(0)) or "LAYER"
+            texts = (name, *row.fields[1:4], flat_name, *row.fields[5:])
+            rows.append(Row(row.place, ",".join(texts)))
+            layers.append(
+                RebarPly(
+                    row.name(0),
+                    section.name,
+                    row.name(4),
+                    row.number(1) * self.length**2,
+                    row.number(2) * (1.0 if angular else self.length),
+                    angular,
+                    row.number(5, 0.0),
+                    tuple(self.mesh.element_at[n] for n in section.elements),
+                )
+            )
+        head = "*REBAR LAYER" + (", GEOMETRY=ANGULAR" if angular else "")
+        self.block(replace(option, rows=rows), head, angular)
+        return layers
 
 
-def _materials(blocks: Sequence[Block]) -> dict[str, list[Block]]:
-    """*MATERIAL with its options, by name."""
-    by_name: dict[str, list[Block]] = {}
-    current: list[Block] = []
-    for block in blocks:
+def _materials(deck: ClassifiedDeck) -> dict[str, Block]:
+    """*MATERIAL by name."""
+    by_name: dict[str, Block] = {}
+    for block in deck.model:
         if block.name == "MATERIAL":
             name = block.need("NAME")
             if name in by_name:
                 raise block.refused(f"the material {name} is defined twice")
-            if block.rows:
-                raise block.refused("takes no data")
-            current = by_name[name] = [block]
-        elif block.name in table.MATERIAL_OPTIONS:
-            if any(each.name == block.name for each in current):
-                raise block.refused(f"is given twice under {current[0].get('NAME')}")
-            fields.fields_of(block)
-            current.append(block)
+            by_name[name] = block
+            given = set[str]()
+            for option in deck.options.get(block, ()):
+                if option.name in given:
+                    raise option.refused(f"is given twice under {name}")
+                fields.fields_of(option)
+                given.add(option.name)
     return by_name
-
-
-def _used(
-    block: Block, name: str, blocks: Mapping[str, Sequence[Block]], used: dict[str, str]
-) -> str:
-    """The flat deck's name of a material that is used."""
-    if name not in blocks:
-        raise block.refused(f"the material {name} is not defined")
-    if not any(each.name == "DENSITY" for each in blocks[name]):
-        raise blocks[name][0].refused(f"the material {name} needs a *DENSITY")
-    if name not in used:
-        simple = re.fullmatch(r"[A-Z][A-Z0-9_\-]{0,60}", name)
-        used[name] = name if simple else f"MATERIAL_{len(used) + 1}"
-    return used[name]
-
-
-def _layers(
-    write: _Writer,
-    section: Assigned,
-    k: int,
-    option: Block,
-    blocks: Mapping[str, Sequence[Block]],
-    used: dict[str, str],
-    mesh: SolverMesh,
-    length: float,
-) -> list[RebarPly]:
-    if option.name != "REBAR LAYER":
-        raise option.refused("does not belong under a *SURFACE SECTION")
-    if not option.rows:
-        raise option.refused("needs a data line: name, area, spacing, position, material, angle")
-    angular = option.get("GEOMETRY") == "ANGULAR"
-    rows, layers = [], []
-    for row in option.rows:
-        material = row.name(4)
-        flat_name = _used(option, material, blocks, used)
-        if any(row.fields[6:]):
-            raise option.refused(
-                f"data '{next(filter(None, row.fields[6:]))}' is not honoured", row
-            )
-        if row.number(3, 0.0):
-            raise option.refused("the position of a layer in its surface element must be 0", row)
-        for j, what in ((1, "area"), (2, "spacing")):
-            if not row.number(j) > 0:
-                raise option.refused(f"the {what} must be positive", row)
-        name = re.sub(r"\W", "_", row.name(0)) or "LAYER"
-        rows.append(Row(row.place, ",".join((name, *row.fields[1:4], flat_name, *row.fields[5:]))))
-        layers.append(
-            RebarPly(
-                row.name(0),
-                section.name,
-                material,
-                row.number(1) * length**2,
-                row.number(2) * (1.0 if angular else length),
-                angular,
-                row.number(5, 0.0),
-                tuple(mesh.element_at[n] for n in section.elements),
-            )
-        )
-    head = "*REBAR LAYER" + (", GEOMETRY=ANGULAR" if angular else "")
-    write.block(Block(option.name, option.place, option.parameters, tuple(rows)), head, angular)
-    return layers
 
 
 def _layer_of(block: Block, row: Row) -> Block:

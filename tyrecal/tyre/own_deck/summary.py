@@ -10,7 +10,7 @@ import numpy as np
 
 from .own_deck import OwnDeck
 from .solver_deck import SolverDeck
-from .text import names_of
+from .text import Block, names_of
 
 
 def contents(deck: OwnDeck, flat: SolverDeck) -> dict[str, Any]:
@@ -56,16 +56,19 @@ def contents(deck: OwnDeck, flat: SolverDeck) -> dict[str, Any]:
     }
 
 
+LAWS = ("ELASTIC", "HYPERELASTIC", "VISCOELASTIC")
+
+
 def laws(flat: SolverDeck, material: str) -> list[str]:
     """The options of a material."""
-    names: list[str] = []
-    inside = False
-    for block in flat.blocks.model:
-        if block.name == "MATERIAL":
-            inside = block.get("NAME") == material
-        elif inside and block.name in ("ELASTIC", "HYPERELASTIC", "VISCOELASTIC"):
-            names.append(", ".join((block.name.lower(), *map(str.lower, block.parameters))))
-    return names
+    options = (flat.blocks.options.get(b, ()) for b in flat.blocks.model if is_of(b, material))
+    laws = (b for own in options for b in own if b.name in LAWS)
+    return [", ".join((b.name.lower(), *map(str.lower, b.parameters))) for b in laws]
+
+
+def is_of(block: Block, material: str) -> bool:
+    """Whether a block defines a material."""
+    return block.name == "MATERIAL" and block.get("NAME") == material
 
 
 def step_name(name: str) -> str:
