@@ -11,7 +11,7 @@ import numpy as np
 from ..decks import WrittenDecks
 from ..errors import Refused, RunFailed
 from . import VERSION
-from .deck.start import PressedShape, write_pressed_start, write_start
+from .deck.start import PressedStart, write_pressed_start, write_start
 
 JOB, PRESS, OLDJOB = "modes", "press", "inflate"
 # of the tool's request, as in `request.Request`
@@ -23,7 +23,7 @@ class RoadDecks(WrittenDecks, Protocol):
 
     loads_N: tuple[float, ...]
     start: np.ndarray | None
-    pressed_start: PressedShape | None
+    pressed_start: PressedStart | None
 
     def tangents(self, dialect: str) -> dict[str, list[tuple[str, int, int, float]]]:
         """Variable to [job, 1-based line, 0-based field, d number / d variable] rows."""

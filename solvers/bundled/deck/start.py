@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
@@ -19,31 +19,15 @@ from ...errors import Refused
 Array = np.ndarray
 FILE = "start.npy"
 PRESSED_FOLDER, PRESSED_FILE = "start", "start/pressed.npz"
+PRESSED_ARRAYS = ("nodes", "inflated", "displacement", "load_N", "deflection_m")
 COMMENT = re.compile(r"^\*\* Newton's method starts from (\S+), SHA-256 ([0-9a-f]{64})$", re.M)
-
-
-class PressedShape(Protocol):
-    """State of another tyre of the same mesh on the road, which is a good start."""
-
-    texts: Mapping[str, str]
-    """Its decks, file name to text."""
-
-    nodes: Array
-    """Deck numbers (n,)."""
-
-    inflated: Array
-    """Displacements (n, 3) before any load, m."""
-
-    displacement: Array
-    """Displacements (ring, n, 3) on the road, of rings all round, m."""
-
-    load_N: float
-    deflection_m: float
 
 
 @dataclass(frozen=True)
 class PressedStart:
-    """`PressedShape` as it was read, and the hash that names it."""
+    """State of another tyre of the same mesh on the road, which is a good start: its decks by file,
+    deck numbers (n,), displacements (n, 3) before any load and (ring, n, 3) on the road, of rings
+    all round, m."""
 
     texts: Mapping[str, str]
     nodes: Array
@@ -51,20 +35,13 @@ class PressedStart:
     displacement: Array
     load_N: float
     deflection_m: float
-    sha256: str
+    sha256: str = ""  # names it once it is written
 
 
-def write_pressed_start(folder: Path, shape: PressedShape) -> str:
+def write_pressed_start(folder: Path, shape: PressedStart) -> str:
     """Put a tyre on the road next to the deck; the deck's last line. Raises OSError."""
     content = io.BytesIO()
-    np.savez(
-        content,
-        nodes=shape.nodes,
-        inflated=shape.inflated,
-        displacement=shape.displacement,
-        load_N=shape.load_N,
-        deflection_m=shape.deflection_m,
-    )
+    np.savez(content, **{name: getattr(shape, name) for name in PRESSED_ARRAYS})
     (folder / PRESSED_FOLDER).mkdir()
     (folder / PRESSED_FILE).write_bytes(content.getvalue())
     for name, text in shape.texts.items():
@@ -81,21 +58,17 @@ def read_pressed_start(folder: Path, text: str) -> PressedStart | None:
     named = COMMENT.search(text)
     if not named:
         return None
-    path = folder / PRESSED_FILE
-    if named[1] != PRESSED_FILE or not path.is_file():
-        raise Refused(f"the deck names a tyre to start from, and {PRESSED_FILE} is not there")
+    content = _content(folder, PRESSED_FILE, named, "a tyre", "there")
     texts = {
         each.name: each.read_text(encoding="utf-8")
         for each in sorted((folder / PRESSED_FOLDER).glob("*.inp"))
     }
-    content = path.read_bytes()
     if _hash_pressed(content, texts) != named[2]:
         raise Refused(f"{PRESSED_FOLDER} is not the tyre that the deck names: its SHA-256 differs")
     with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-        fields = ("nodes", "inflated", "displacement")
-        nodes, inflated, displacement = (arrays[name] for name in fields)
-        load, deflection = float(arrays["load_N"]), float(arrays["deflection_m"])
-    return PressedStart(texts, nodes, inflated, displacement, load, deflection, named[2])
+        fields: dict[str, Any] = {name: arrays[name] for name in PRESSED_ARRAYS}
+    fields |= {name: float(fields[name]) for name in ("load_N", "deflection_m")}
+    return PressedStart(texts, **fields, sha256=named[2])
 
 
 def write_start(folder: Path, shape: Array) -> str:
@@ -115,16 +88,20 @@ def read_start(folder: Path, text: str) -> Array | None:
     comment = COMMENT.search(text)
     if not comment:
         return None
-    path = folder / FILE
-    if comment[1] != FILE or not path.is_file():
-        raise Refused(f"the deck names a shape to start from, and {FILE} is not next to it")
-    content = path.read_bytes()
+    content = _content(folder, FILE, comment, "a shape", "next to it")
     if _hash(content) != comment[2]:
         raise Refused(f"{FILE} is not the shape that the deck names: its SHA-256 differs")
     shape: Array = np.load(io.BytesIO(content), allow_pickle=False)
     if shape.ndim != 2 or shape.shape[1] != 4 or shape.dtype.kind != "f":
         raise Refused(f"{FILE} must have four numbers a node: its own, and its displacement")
     return shape
+
+
+def _content(folder: Path, file: str, named: re.Match[str], what: str, where: str) -> bytes:
+    """The file that a deck names. Raises Refused where it is not there; OSError."""
+    if named[1] != file or not (folder / file).is_file():
+        raise Refused(f"the deck names {what} to start from, and {file} is not {where}")
+    return (folder / file).read_bytes()
 
 
 def _last_line(file: str, digest: str) -> str:
