@@ -6,16 +6,17 @@ and CalculiX. Keywords, parameters and their words come out as the manual spells
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import NamedTuple, Self, TypeVar
 
 from ..errors import Refused
 from .element_types import NODES_AND_SECTION
 from .spelling import full_keyword, full_parameters, named
 
+Number = TypeVar("Number", int, float)
 MAX_DECK_BYTES = 100_000_000  # of a deck and all that it includes
 MAX_KEYWORDS = 20_000  # of a deck and all that it includes; tyres have hundreds
 MAX_CHARACTERS = 4096  # with those that continue it; ABAQUS reads 256 of each
@@ -97,17 +98,22 @@ class Row:
 
     def number(self, index: int, default: float | None = None) -> float:
         """A field as a finite number."""
+        value = self._parsed(index, default, number_from, "is not a number")
+        if value - value != 0.0:
+            raise self.place.error(f"'{self.text(index)}' is not a finite number")
+        return value
+
+    def _parsed(
+        self, index: int, default: Number | None, parse: Callable[[str], Number], words: str
+    ) -> Number:
         text = self.text(index)
         if not text and default is not None:
             return default
         try:
-            value = number_from(text)
+            return parse(text)
         except ValueError:
-            what = f"'{text[:40]}' is not a number" if text else f"number {index + 1} is missing"
+            what = f"'{text[:40]}' {words}" if text else f"number {index + 1} is missing"
             raise self.place.error(what) from None
-        if value - value != 0.0:
-            raise self.place.error(f"'{text}' is not a finite number")
-        return value
 
     def value(self, index: int, default: float | None = None) -> complex | float:
         """A field as a number; its imaginary part is the tangent times COMPLEX_STEP."""
@@ -118,14 +124,7 @@ class Row:
 
     def integer(self, index: int, default: int | None = None) -> int:
         """A field as a whole number."""
-        text = self.text(index)
-        if not text and default is not None:
-            return default
-        try:
-            return int(_plain(text))
-        except ValueError:
-            what = f"'{text[:40]}' is no whole number" if text else f"number {index + 1} is missing"
-            raise self.place.error(what) from None
+        return self._parsed(index, default, lambda text: int(_plain(text)), "is no whole number")
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,6 +156,11 @@ class Block:
         """A parameter as a number, None if it is not given."""
         text = self.parameters.get(parameter, "")
         return Row(self.place, text).number(0) if text else None
+
+    def integer(self, parameter: str, default: str = "") -> int:
+        """A parameter as a whole number."""
+        text = self.parameters.get(parameter, default)
+        return Row(self.place, text or self.need(parameter)).integer(0)
 
     def only_row(self) -> Row:
         """The data line of a keyword that takes one."""

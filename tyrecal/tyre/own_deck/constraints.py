@@ -138,10 +138,8 @@ class Constraints:
         ends = [e.nodes for e, _ in elements_of(self.made, *surface)]
         pieces = np.array([[self.root.nodes[n] for n in pair] for pair in ends])
         away, _ = nearest(np.array([self.root.nodes[n] for n in slaves]), pieces)
-        given = block.parameters.get("POSITION TOLERANCE", "")
-        allowed = Row(block.place, given).number(0) if given else 0.0
-        if block.get("ADJUST") != "NO":
-            allowed = 0.0
+        given = block.number("POSITION TOLERANCE") or 0.0
+        allowed = given if block.get("ADJUST") == "NO" else 0.0
         for n, distance in zip(slaves, away, strict=True):
             if distance > max(allowed, self.near):
                 raise block.refused(

@@ -145,9 +145,9 @@ def _unsorted(scope: Scope, name: str) -> bool:
 
 def _ncopy(scope: Scope, block: Block) -> None:
     """Copies of a set, shifted, or mirrored about a line."""
-    shift = Row(block.place, block.need("CHANGE NUMBER")).integer(0)
+    shift = block.integer("CHANGE NUMBER")
     old = scope.nodes.members(block.need("OLD SET"), block)
-    times = Row(block.place, block.parameters.get("MULTIPLE", "1")).integer(0)
+    times = block.integer("MULTIPLE", "1")
     if not 1 <= times <= MOST:
         raise block.refused(f"MULTIPLE must be from 1 to {MOST}")
     if ("SHIFT" in block.parameters) == ("REFLECT" in block.parameters):
@@ -261,8 +261,7 @@ def _elgen(scope: Scope, block: Block) -> None:
 
 def _elcopy(scope: Scope, block: Block) -> None:
     """Copies of a set, on nodes of shifted numbers; of mirrored nodes in the reverse order."""
-    one = lambda name: Row(block.place, block.need(name)).integer(0)
-    shift, nodes = one("ELEMENT SHIFT"), one("SHIFT NODES")
+    shift, nodes = block.integer("ELEMENT SHIFT"), block.integer("SHIFT NODES")
     made = []
     for n in scope.elements.members(block.need("OLD SET"), block):
         element = scope.elements[n]

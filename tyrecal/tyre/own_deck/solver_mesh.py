@@ -10,7 +10,7 @@ from .model import DeckModel
 from .numbers import written
 from .scope import Point
 from .surfaces import Face
-from .text import Block, OwnDeckError, Place, Row
+from .text import Block, OwnDeckError, Place
 
 REFERENCE_NODE = 900001
 OVER_THE_BELT = 0.94  # of the largest radius: nodes of the outer surface beyond are the crown's
@@ -66,15 +66,10 @@ class DeckLines:
 
 def _tolerances(block: Block, length: float) -> str:
     """Tolerances of an *EMBEDDED ELEMENT that are given, m."""
-    tolerances = ""
-    for name, scale in (
-        ("ROUNDOFF TOLERANCE", 1.0),
-        ("EXTERIOR TOLERANCE", 1.0),
-        ("ABSOLUTE EXTERIOR TOLERANCE", length),
-    ):
-        if text := block.get(name):
-            tolerances += f", {name}={written(Row(block.place, text).number(0) * scale)}"
-    return tolerances
+    units = {"ROUNDOFF": 1.0, "EXTERIOR": 1.0, "ABSOLUTE EXTERIOR": length}
+    given = ((f"{word} TOLERANCE", scale) for word, scale in units.items())
+    numbers = ((name, block.number(name), scale) for name, scale in given)
+    return "".join(f", {name}={written(x * scale)}" for name, x, scale in numbers if x is not None)
 
 
 def solver_mesh(model: DeckModel, length: float) -> SolverMesh:
