@@ -77,3 +77,14 @@ def test_init_takes_marks(deck: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert case.deck.numbers["A_belt"] == case.variables["A_belt"].start == 2.1e-7
     assert case.variables["C10"].sets == ["deck.numbers.C10"]
     assert run(*command, "--set", "C01=8e5", "--force") == 2
+
+
+def test_decks_whose_files_cannot_name_jobs_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("inflate one.inp", "modes.inp"):
+        (tmp_path / name).write_text(own_decks.plain())
+    decks = (word for name in ("inflate one.inp", "modes.inp") for word in ("--deck", name))
+    command = ("--deck" if word == "--deck" else str(tmp_path / word) for word in decks)
+    assert run("init", *command, "--no-pictures") == 2
+    assert "'inflate one.inp' must be FILE.inp" in capsys.readouterr().err

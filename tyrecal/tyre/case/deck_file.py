@@ -7,6 +7,7 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
+from ...errors import InputError
 from ..own_deck.numbers import as_known, marked_numbers
 from ..own_deck.own_deck import Units, read_own_deck
 from ..own_deck.own_decks import read_own_decks
@@ -42,7 +43,7 @@ def read_kind(
         paths = [inside(folder, name) for name in names]
         if missing := [path.name for path in paths if not path.is_file()]:
             named = f"'{missing[0]}' " * (key == "decks")
-            raise ValueError(f"{named}must be a file, there is none of this name")
+            raise InputError(f"{named}must be a file, there is none of this name")
         first = read_own_deck(paths[0], units if units in ("m", "mm") else None)
         source.setdefault("units", first.units)
         kind = SectionDeck(first) if key == "file" else _in_3d(paths, source, first.units)
@@ -72,7 +73,7 @@ def read_kind(
         place = error.place
         file = str(paths[0].parent / place.file)
         document.mistakes.append(Mistake(file, place.line, "", "", error.message))
-    except ValueError as error:
+    except InputError as error:
         document.add(("deck", key), str(error))
     except OSError as error:
         document.add(("deck", key), f"cannot be read: {error.strerror}")

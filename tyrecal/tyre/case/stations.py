@@ -23,16 +23,16 @@ MIN_RADIUS_MM, MAX_RADIUS_MM = 50, 5000  # outer radius of a tyre
 
 
 def inside(folder: Path, name: str) -> Path:
-    """The path of ``name`` in ``folder``. Raises ValueError if it leads outside, also by a link."""
+    """The path of ``name`` in ``folder``. Raises InputError if it leads outside, also by a link."""
     path = Path(name)
     if not name.strip() or path.is_absolute() or ".." in path.parts:
-        raise ValueError("must be a path inside the case's folder")
+        raise InputError("must be a path inside the case's folder")
     try:
         if not (folder / path).resolve().is_relative_to(folder.resolve()):
-            raise ValueError("must not link to a place outside the case's folder")
+            raise InputError("must not link to a place outside the case's folder")
         (folder / path).exists()
     except (OSError, RuntimeError) as error:
-        raise ValueError(f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
+        raise InputError(f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
     return folder / path
 
 
@@ -43,7 +43,7 @@ def check_templates(document: Document, data: dict[str, Any], folder: Path) -> N
         try:
             if not inside(folder, name).is_dir():
                 document.add(("templates",), "must be a folder, there is none of this name")
-        except ValueError as error:
+        except InputError as error:
             document.add(("templates",), str(error))
 
 
@@ -56,10 +56,10 @@ def measured_file(document: Document, data: dict[str, Any], folder: Path) -> Pat
     try:
         path = inside(folder, name)
         if not path.is_file():
-            raise ValueError("must be a file, there is none of this name")
+            raise InputError("must be a file, there is none of this name")
         if path.stat().st_size > MAX_TABLE_BYTES:
-            raise ValueError(f"the file is larger than {MAX_TABLE_BYTES} bytes")
-    except ValueError as error:
+            raise InputError(f"the file is larger than {MAX_TABLE_BYTES} bytes")
+    except InputError as error:
         document.add(("targets", "file"), str(error))
         return None
     return path
@@ -77,7 +77,7 @@ def read_stations(document: Document, data: dict[str, Any], folder: Path) -> Sec
     try:
         path = inside(folder, name)
         if not path.is_file():
-            raise ValueError("must be a file, there is none of this name")
+            raise InputError("must be a file, there is none of this name")
         if outline is WRONG or (outline and WRONG in outline.values()):
             return None  # reported by the schema already
         given = {"outline": outline} if outline else {"stations": name}
@@ -91,8 +91,6 @@ def read_stations(document: Document, data: dict[str, Any], folder: Path) -> Sec
             document.mistakes.append(Mistake(str(path), error.line, dotted(keys), value, message))
         else:
             document.add(keys, message)
-    except ValueError as error:
-        document.add(keys, shortened(str(error), 300))
     except OSError as error:
         document.add(keys, f"cannot be read: {error.strerror}")
     else:
@@ -101,12 +99,12 @@ def read_stations(document: Document, data: dict[str, Any], folder: Path) -> Sec
 
 
 def read_section_of(source: SectionSource, folder: Path) -> Section:
-    """The section of the part ``section`` of a case. Raises SectionError, ValueError, OSError."""
+    """The section of the part ``section`` of a case. Raises InputError, OSError."""
     from ..section.section import fill_lines, read_section
 
     path = inside(folder, source.file)
     if path.stat().st_size > MAX_TABLE_BYTES:
-        raise ValueError(f"the table of the section is larger than {MAX_TABLE_BYTES} bytes")
+        raise InputError(f"the table of the section is larger than {MAX_TABLE_BYTES} bytes")
     given = source.outline
     if not given:
         _check_columns(path)

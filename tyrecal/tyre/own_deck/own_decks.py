@@ -10,6 +10,7 @@ from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 
+from ...errors import InputError
 from .numbers import DECK_MARK, plain_number
 from .own_deck import UNIT_LENGTH, UNIT_MASS, OwnDeck, Units, read_own_deck
 from .own_text import Setting, own_texts
@@ -240,15 +241,14 @@ def _pressures(
 
 
 def read_own_decks(paths: Sequence[Path], units: Units, crown: str) -> OwnDecks:
-    """The decks in the order in which they are run. Raises OwnDeckError, OSError; ValueError where
-    their files cannot name jobs."""
+    """The decks in the order in which they are run. Raises InputError, OwnDeckError, OSError."""
     stems = [path.stem.upper() for path in paths]
     for path in paths:
         if not JOB_FILE.fullmatch(path.name) or path.parent != paths[0].parent:
-            raise ValueError(
+            raise InputError(
                 f"'{path.name}' must be FILE.inp, of letters, digits, - and _, in one folder with"
                 " the others, as it names a job"
             )
         if stems.count(path.stem.upper()) > 1:
-            raise ValueError(f"'{path.name}' is given twice")
+            raise InputError(f"'{path.name}' is given twice")
     return OwnDecks(tuple(read_own_deck(path, units) for path in paths), named(crown))

@@ -59,9 +59,9 @@ class DecksIn3D(UserDecks):
         raise InputError(refusal)
 
     def require_rim(self) -> None:
-        """Raises ValueError."""
-        raise ValueError("must be absent: the decks state how the rim is held")
+        """Raises InputError."""
+        raise InputError("must be absent: the decks state how the rim is held")
 
     def change_of(self, effect: Any, case: Case) -> Change:
-        """Raises ValueError."""
-        raise ValueError("changes a section, and the tyre is given by decks in three dimensions")
+        """Raises InputError."""
+        raise InputError("changes a section, and the tyre is given by decks in three dimensions")

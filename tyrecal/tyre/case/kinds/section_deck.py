@@ -10,6 +10,7 @@ from math import isclose
 from pathlib import Path
 from typing import Any
 
+from ....errors import InputError
 from ...own_deck.numbers import moduli
 from ...own_deck.own_deck import UNIT_LENGTH, UNIT_MASS, OwnDeck
 from ...own_deck.own_text import own_texts
@@ -127,10 +128,10 @@ class SectionDeck(UserDecks):
     def change_of(self, effect: Any, case: Case) -> Change:
         """The effect's change of numbers and named parts."""
         if effect.add_to_deck is None:
-            raise ValueError("changes lines or regions of a section or a law, not a deck's numbers")
+            raise InputError("changes lines or regions of a section or a law, not a deck's numbers")
         if effect.part and not self.source(case).sets(effect.part):
             part = effect.part
-            raise ValueError(f"needs the sets of {part}: name them in deck.parts.{part}")
+            raise InputError(f"needs the sets of {part}: name them in deck.parts.{part}")
         change: Change = effect.add_to_deck
         return change
 
