@@ -251,7 +251,7 @@ class Spindle:
     the wheel is 3 kg heavier than stated."""
 
     id: str
-    beside: str
+    companion: str
     share: float
 
     def __call__(self, case: LoadedCase, e: float) -> LoadedCase:
@@ -264,7 +264,7 @@ class Spindle:
             diametral_inertia_kg_m2=rim.diametral_inertia_kg_m2 * scale,
         )
         known = catalogue()
-        other = known[self.beside]
+        other = known[self.companion]
         case = known[self.id].add(changed(case, rim=heavier), e)
         return other.add(case, self.share * other.high * e / known[self.id].high)
 

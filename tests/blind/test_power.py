@@ -37,7 +37,7 @@ def test_all_designs_are_asked_for_at_once(monkeypatch: pytest.MonkeyPatch) -> N
 
     monkeypatch.setattr(scale, "answers", counted)
     measure(scale, scale.model_rows)
-    assert len(counts) == 1 and counts[0] > 3 * len(scale.spans)
+    assert len(counts) == 1 and counts[0] > 3 * len(scale.ranges)
 
 
 def lam(id: str, e: float) -> float:
@@ -62,10 +62,10 @@ def test_sizes_are_where_lambda_is_ten_and_twenty_five(id: str) -> None:
 
 
 def test_what_is_found_is_said_and_what_is_hidden_too() -> None:
-    text = words(list(FOUND.values()), RULER, RULES, SCALE.spans)
+    text = words(list(FOUND.values()), RULER, RULES, SCALE.ranges)
     assert "at 160, 240, 320 kPa, every value to 0.2% and the mass to 0.5%" in text
     louder = replace(RULES, noise=1.0, mass=1.0)
-    hidden = words(powers(RULER, louder), RULER, louder, SCALE.spans)
+    hidden = words(powers(RULER, louder), RULER, louder, SCALE.ranges)
     last = hidden.splitlines()[-1]
     assert "at any size in their range" in last and all(f"`{id}`" in last for id in SCALE.g)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tyrecal.studies.blind.seal import ANSWERS, SEAL, TRUTH
-from tyrecal.studies.inference.spans import spans_of
+from tyrecal.studies.inference.effect_ranges import effect_ranges
 
 from .test_cli import run
 from .test_diagnose import coarse  # noqa: F401  the main case with a coarse mesh
@@ -62,8 +62,8 @@ def test_a_study_from_end_to_end(
     }
     for name, value in few.items():
         monkeypatch.setattr(f"tyrecal.studies.blind.emulated.{name}", value)
-    only = lambda case, evaluator, ids=None: spans_of(case, evaluator, ["spindle_lateral"])
-    monkeypatch.setattr("tyrecal.studies.blind.answer.spans_of", only)  # the ruler's, too
+    only = lambda case, evaluator, ids=None: effect_ranges(case, evaluator, ["spindle_lateral"])
+    monkeypatch.setattr("tyrecal.studies.blind.answer.effect_ranges", only)  # the ruler's, too
     assert run("blind", "power", str(coarse), "--noise-percent", "0.5") == 0
     output = capsys.readouterr().out
     assert "every value to 0.5%" in output and "| `spindle_lateral` |" in output

@@ -8,8 +8,8 @@ import numpy as np
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.studies.inference.effect_ranges import effect_ranges
 from tyrecal.studies.inference.model import Answer, Query
-from tyrecal.studies.inference.spans import spans_of
 from tyrecal.studies.inference.tyre_model import TyreModel
 from tyrecal.studies.inference.uncertainties import sources
 
@@ -24,8 +24,8 @@ ROWS = [*((label, p) for p in (180.0, 240.0) for label in LABELS), (None, 0.0)]
 
 def model(rows: list = ROWS) -> TyreModel:
     evaluator = Evaluator(TyreDesign(CASE))
-    spans, _ = spans_of(CASE, evaluator, EFFECTS)
-    return TyreModel(CASE, evaluator, rows, sources(CASE)[0], spans)
+    ranges, _ = effect_ranges(CASE, evaluator, EFFECTS)
+    return TyreModel(CASE, evaluator, rows, sources(CASE)[0], ranges)
 
 
 MODEL = model()

@@ -71,7 +71,7 @@ def test_a_diagnosis_with_known_effects_says_the_same() -> None:
     truth = toy.answers([Query(X, {"e1": 0.8})])[0]
     assert isinstance(truth, Answer)
     p = problem(toy, truth.eta)
-    rows, assumed = list(toy.rows), Assumed(form=0.001, law=0.0)
+    rows, assumed = list(toy.rows), Assumed(form=0.001, response_error=0.0)
     whole, quick = (
         diagnose(toy, rows, p.observations, assumed=assumed, known=known)
         for known in (None, expand(toy, np.zeros(3)))

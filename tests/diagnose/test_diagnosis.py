@@ -12,7 +12,7 @@ import pytest
 from tyrecal.studies.diagnose.diagnosis import STAGES, Diagnosis, diagnose
 from tyrecal.studies.diagnose.result import diagnosis_result
 from tyrecal.studies.inference.inverse_problem import Assumed, Toggle
-from tyrecal.studies.inference.model import Answer, Query, Span
+from tyrecal.studies.inference.model import Answer, EffectRange, Query
 from tyrecal.studies.inference.regions import SectionPart
 
 from ..chance import Chance, generator
@@ -89,7 +89,7 @@ class OtherUnits(Toy):
     def __init__(self, **keys: Any):
         super().__init__(**keys)
         self.spread = self.spread * self.x
-        self.spans = {id: Span(0.0, self.effect) for id in self.spans}
+        self.ranges = {id: EffectRange(0.0, self.effect) for id in self.ranges}
 
     def _answer(self, point: Query) -> Answer:
         effects = {id: e / self.effect for id, e in point.effects.items()}

@@ -11,10 +11,10 @@ from numpy.polynomial.hermite import hermgauss
 from scipy.stats import multivariate_normal
 
 from tyrecal.studies.diagnose.evidence import explain, grid, refit
-from tyrecal.studies.diagnose.several import weigh
+from tyrecal.studies.diagnose.several import weigh_hypotheses
 from tyrecal.studies.inference.expansion import expand
 from tyrecal.studies.inference.inverse_problem import Assumed
-from tyrecal.studies.inference.model import Answer, Query, Span
+from tyrecal.studies.inference.model import Answer, EffectRange, Query
 
 from ..chance import Chance, generator
 from .toy import Toy, drawn, flat, problem
@@ -39,11 +39,13 @@ def test_evidence_against_the_marginal_in_closed_form() -> None:
 def test_what_an_effects_law_may_be_off_is_scatter_of_its_own() -> None:
     """As so much more covariance, parameter by parameter; none where there is no effect."""
     toy = flat(pressures=(160.0, 240.0))
-    loose = problem(toy, assumed=Assumed(form=0.001, law=0.1)).measured(toy.base + toy.g["e0"])
-    strict = replace(loose, assumed=Assumed(form=0.001, law=0.0))
+    loose = problem(toy, assumed=Assumed(form=0.001, response_error=0.1)).measured(
+        toy.base + toy.g["e0"]
+    )
+    strict = replace(loose, assumed=Assumed(form=0.001, response_error=0.0))
     e = np.array([0.4, 1.0])
     result = refit(loose, {"e0": e}, 2)
-    for i, more in enumerate(loose.law(loose.added({"e0": e}, 2))):
+    for i, more in enumerate(loose.response_covariance(loose.added({"e0": e}, 2))):
         own = refit(strict, {"e0": e[i : i + 1]}, 1, more)
         assert more.any() and result.ln_evidence[i] == pytest.approx(own.ln_evidence[0])
     assert refit(loose, {}, 1).ln_evidence == pytest.approx(refit(strict, {}, 1).ln_evidence)
@@ -53,14 +55,14 @@ def test_what_else_an_effect_is_is_integrated_over() -> None:
     """z ~ N(0, 1) times a shift that grows as the effect does: as so much more covariance. It is
     asked for at the ends of the range alone; laws of two effects are off by themselves."""
     toy, more = flat(pressures=(160.0, 240.0)), generator(7).normal(0, 0.01, 18)
-    toy.spans["e0"] = Span(-1.0, 0.5, second=True)
+    toy.ranges["e0"] = EffectRange(-1.0, 0.5, has_shape_uncertainty=True)
     sizes, plain = [], toy._answer
 
     def told(point: Query) -> Answer:
-        if not point.beside:
+        if not point.shape_uncertainty:
             return plain(point)
         sizes.append(point.effects["e0"])
-        return replace(plain(point), beside=2 * point.effects["e0"] * more)
+        return replace(plain(point), shape_uncertainty=2 * point.effects["e0"] * more)
 
     toy._answer = told  # type: ignore[method-assign]
     p = problem(toy, assumed=Assumed(form=0.001)).measured(toy.base + 0.4 * toy.g["e0"])
@@ -68,15 +70,16 @@ def test_what_else_an_effect_is_is_integrated_over() -> None:
     e = np.array([-0.5, 0.4])
     result = refit(p, {"e0": e}, 2)
     for i in range(2):
-        shift, beside = 0.04 * e[i] * toy.g["e0"], 2 * e[i] * more
-        extra = np.outer(shift, shift) * p._alike + np.outer(beside, beside)
-        bare = replace(p, assumed=Assumed(form=0.001, law=0.0))
-        nodes = {**p.expansion.nodes, "e0": replace(p.expansion.nodes["e0"], beside={})}
+        shift, shape_uncertainty = 0.04 * e[i] * toy.g["e0"], 2 * e[i] * more
+        extra = np.outer(shift, shift) * p._alike + np.outer(shape_uncertainty, shape_uncertainty)
+        bare = replace(p, assumed=Assumed(form=0.001, response_error=0.0))
+        nodes = {**p.expansion.nodes, "e0": replace(p.expansion.nodes["e0"], shape_uncertainty={})}
         bare = replace(bare, expansion=replace(p.expansion, nodes=nodes))
         own = refit(bare, {"e0": e[i : i + 1]}, 1, extra)
         assert result.ln_evidence[i] == pytest.approx(own.ln_evidence[0])
     both, one, other = (
-        p.law(p.added(effects, 2)) for effects in ({"e0": e, "e1": e**2}, {"e0": e}, {"e1": e**2})
+        p.response_covariance(p.added(effects, 2))
+        for effects in ({"e0": e, "e1": e**2}, {"e0": e}, {"e1": e**2})
     )
     np.testing.assert_allclose(both, one + other, atol=1e-16)
 
@@ -107,7 +110,7 @@ def test_fewer_values_only_widen_the_answer() -> None:
     """Where the model is linear, and the range of the effect is no limit, a posterior's width is
     the data's information alone, whatever was drawn."""
     toy = flat()
-    toy.spans["e1"] = Span(-5.0, 5.0)
+    toy.ranges["e1"] = EffectRange(-5.0, 5.0)
     base = problem(toy)
     keep = np.arange(len(base.places)) % 3 > 0
     width = lambda q: np.diff([explain(q, ["e1"], 1.0).quantile("e1", s) for s in (0.05, 0.95)])[0]
@@ -187,7 +190,7 @@ def test_the_intervals_of_a_pair_cover(chance: Chance) -> None:
     for _ in range(30):
         truth = {id: chance.random.uniform(0, 1) for id in inside}
         there = base.measured(drawn(toy, base, chance.random, truth, 1.0))
-        (pair,) = (h for h in weigh(there) if h.key == "e0+e1")
+        (pair,) = (h for h in weigh_hypotheses(there) if h.key == "e0+e1")
         for id, hits in inside.items():
             low, high = (pair.quantile(id, share) for share in (0.05, 0.95))
             hits.append(low <= truth[id] <= high)

@@ -9,7 +9,7 @@ import pytest
 from numpy.polynomial import Polynomial
 
 from tyrecal.studies.diagnose.diagnosis import _asked_again
-from tyrecal.studies.diagnose.several import weigh
+from tyrecal.studies.diagnose.several import weigh_hypotheses
 from tyrecal.studies.diagnose.study import _reaching
 from tyrecal.studies.inference.expansion import (
     EffectResponse,
@@ -23,7 +23,7 @@ from tyrecal.studies.inference.expansion import (
     refined,
 )
 from tyrecal.studies.inference.inverse_problem import Assumed, Toggle
-from tyrecal.studies.inference.model import Answer, Query, Span
+from tyrecal.studies.inference.model import Answer, EffectRange, Query
 
 from .toy import Sloped, Toy, problem
 
@@ -35,13 +35,16 @@ Array = np.ndarray
 def test_where_an_effect_is_evaluated_first() -> None:
     """At the farther end of its range if a slope is known there or at 0, else half way, too; of a
     two-sided range at both ends, or at the farther one if both slopes are known."""
-    assert node_values(Span(0.0, 2.0)).tolist() == [1.0, 2.0]
-    assert node_values(Span(-3.0, -1.0)).tolist() == [-3.0, -1.5]
-    assert node_values(Span(-3.0, -1.0), 1).tolist() == [-3.0]
-    assert node_values(Span(0.0, 2.0, also=(3.0,)), 2).tolist() == [2.0, 3.0]
+    assert node_values(EffectRange(0.0, 2.0)).tolist() == [1.0, 2.0]
+    assert node_values(EffectRange(-3.0, -1.0)).tolist() == [-3.0, -1.5]
+    assert node_values(EffectRange(-3.0, -1.0), 1).tolist() == [-3.0]
+    assert node_values(EffectRange(0.0, 2.0, extra_nodes=(3.0,)), 2).tolist() == [2.0, 3.0]
     for slopes, wanted in ((0, [-2.0, 4.0]), (1, [-2.0, 4.0]), (2, [4.0])):
-        assert node_values(Span(-2.0, 4.0), slopes).tolist() == wanted
-    assert node_values(Span(-2.0, 4.0, second=True), 2).tolist() == [-2.0, 4.0]
+        assert node_values(EffectRange(-2.0, 4.0), slopes).tolist() == wanted
+    assert node_values(EffectRange(-2.0, 4.0, has_shape_uncertainty=True), 2).tolist() == [
+        -2.0,
+        4.0,
+    ]
 
 
 def test_an_effect_reaches_as_far_as_there_are_solutions() -> None:
@@ -50,7 +53,7 @@ def test_an_effect_reaches_as_far_as_there_are_solutions() -> None:
     answer = lambda e: Answer(np.full(n, e), np.full((n, 2), 3 * e), np.full(n, abs(e)))
     plain = Expansion(np.zeros(2), np.zeros(n), none, np.zeros((n, 2, 2)), np.zeros(n), none, {})
     failed = ValueError("no such tyre")
-    span = Span(-1.0, 1.0)
+    span = EffectRange(-1.0, 1.0)
     answers = {-1.0: answer(-1), -0.5: failed, 0.5: answer(0.5), 1.0: answer(1), 1.5: answer(1.5)}
     made = _nodes("e0", plain, span, answers)
     assert made and made.values.tolist() == [0.0, 0.5, 1.0, 1.5] and made.reach == (0.0, 1.0)
@@ -80,14 +83,14 @@ def test_hermites_polynomials_take_values_and_slopes() -> None:
 @pytest.mark.parametrize(
     ("at_0", "span", "power", "wanted"),
     [
-        (False, Span(0.0, 1.0), 2, [0, 1]),
-        (False, Span(-2.0, 0.0), 2, [-2, 0]),
-        (False, Span(-0.5, 1.0), 4, [-0.5, 0, 1]),
-        (True, Span(0.0, 1.0), 2, [0, 1]),
+        (False, EffectRange(0.0, 1.0), 2, [0, 1]),
+        (False, EffectRange(-2.0, 0.0), 2, [-2, 0]),
+        (False, EffectRange(-0.5, 1.0), 4, [-0.5, 0, 1]),
+        (True, EffectRange(0.0, 1.0), 2, [0, 1]),
     ],
 )
 def test_a_size_and_its_slope_make_a_quadratic(
-    at_0: bool, span: Span, power: int, wanted: list[float]
+    at_0: bool, span: EffectRange, power: int, wanted: list[float]
 ) -> None:
     """So do a size and the slope where the effect is 0; no slope is asked in vain."""
     toy = Sloped(power, at_0, span)
@@ -104,7 +107,7 @@ def test_a_size_and_its_slope_make_a_quadratic(
 
 def test_one_end_of_the_range_stands_for_both_where_both_slopes_are_known() -> None:
     """A cubic, which reaches to the other end."""
-    toy = Sloped(3, span=Span(-0.5, 1.0))
+    toy = Sloped(3, span=EffectRange(-0.5, 1.0))
     toy.sloped_at_0 = ("e0",)
     plain, toy._answer = toy._answer, lambda point: both(point)  # type: ignore[method-assign]
 
@@ -165,9 +168,9 @@ def test_an_effect_is_not_asked_again_where_it_was_asked() -> None:
     ):
         toy = Toy(effects=1, size=0.3, pressures=(160.0, 240.0), bend=0.0)
         toy.tilt["e0"] *= 0
-        base = problem(toy, assumed=Assumed(form=1e-6, law=0.0), noise=1e-5)
+        base = problem(toy, assumed=Assumed(form=1e-6, response_error=0.0), noise=1e-5)
         p = base.measured(toy.base + toy.J @ np.array([move, 0.0, 0.0]) + size * toy.g["e0"])
-        hypotheses = weigh(p)
+        hypotheses = weigh_hypotheses(p)
         best = next(h for h in hypotheses if h.key == "e0")
         assert best.values["e0"][best.best] == pytest.approx(size, abs=0.02)
         assert best.fitted.d[best.best][0] == pytest.approx(move, abs=0.03)
@@ -177,7 +180,7 @@ def test_an_effect_is_not_asked_again_where_it_was_asked() -> None:
         anchor = again.expansion.nodes["e0"].anchor
         assert (anchor is not None) == wanted
         if wanted:  # and not a second time
-            assert not _asked_again(again, toy, weigh(again))[1]
+            assert not _asked_again(again, toy, weigh_hypotheses(again))[1]
 
 
 def test_curvature_is_that_of_two_slopes() -> None:
@@ -188,16 +191,16 @@ def test_curvature_is_that_of_two_slopes() -> None:
 
 def test_a_change_beyond_the_range_is_asked_where_it_was_measured() -> None:
     """Counted from what the case has; within the range, at 0, or as a factor nothing is added."""
-    span = Span(-0.3, 0.7, base=0.3)  # of an effect from 0 to 1
-    reached = lambda value, times=False: _reaching(span, Toggle("a", value, times, 0.3)).also
+    span = EffectRange(-0.3, 0.7, base=0.3)  # of an effect from 0 to 1
+    reached = lambda value, times=False: _reaching(span, Toggle("a", value, times, 0.3)).extra_nodes
     assert reached(1.5) == (pytest.approx(1.2),) and reached(-0.2) == (pytest.approx(-0.5),)
     for value in (1.0, 0.0, 0.3, 0.65):
         assert reached(value) == ()
     assert reached(5.0, True) == ()
     twice = _reaching(_reaching(span, Toggle("a", 1.5, base=0.3)), Toggle("a", 1.5, base=0.3))
-    assert len(twice.also) == 1
-    zero = _reaching(Span(0.5, 1.0), Toggle("a", 0.0))  # 0 is a node anyway
-    assert zero.also == ()
+    assert len(twice.extra_nodes) == 1
+    zero = _reaching(EffectRange(0.5, 1.0), Toggle("a", 0.0))  # 0 is a node anyway
+    assert zero.extra_nodes == ()
 
 
 def test_an_anchor_is_exact_where_it_was_asked_and_absent_without_the_effect() -> None:

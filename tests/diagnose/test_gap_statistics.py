@@ -10,7 +10,7 @@ from scipy.stats import chi2, ncx2
 
 from tyrecal.studies.diagnose.evidence import NONE, refit
 from tyrecal.studies.diagnose.gap import find_gap, projection
-from tyrecal.studies.diagnose.several import probabilities, weigh
+from tyrecal.studies.diagnose.several import probabilities, weigh_hypotheses
 from tyrecal.studies.inference.inverse_problem import Toggle
 from tyrecal.studies.inference.separability import separate
 
@@ -74,7 +74,7 @@ def test_a_known_change_is_in_every_hypothesis(chance: Chance) -> None:
         y[len(toy.base) :] += 0.5 * toy.g["e1"]
         p = switched.measured(y)
         p_values.append(find_gap(p, refit(p, {}, 1).d[0], NAMES).p_value)
-        share = probabilities(weigh(p, pairs=False))
+        share = probabilities(weigh_hypotheses(p, pairs=False))
         none.append(max(share, key=lambda key: share[key]) == NONE)
     chance.distributed(p_values, "uniform")
     chance.often(none, 0.9)
@@ -91,7 +91,7 @@ def test_splits_speak_for_what_splits() -> None:
     )
     apart = replace(base, observations=seen(0.01))
     joined = replace(base, observations=seen(0.001))
-    assert probabilities(weigh(apart, pairs=False))["e0"] > 0.95
-    assert probabilities(weigh(joined, pairs=False))["e0"] < 0.05
+    assert probabilities(weigh_hypotheses(apart, pairs=False))["e0"] > 0.95
+    assert probabilities(weigh_hypotheses(joined, pairs=False))["e0"] < 0.05
     far = replace(base, observations=seen(0.02))
     assert chi2.sf(find_gap(far, np.zeros(3), NAMES).chi2, n - 3 + pair.sum()) < 1e-6

@@ -15,7 +15,7 @@ from tyrecal.studies.diagnose.diagnosis import diagnose
 from tyrecal.studies.diagnose.evidence import OUTSIDE, PRIOR_OUTSIDE, explain, outside
 from tyrecal.studies.diagnose.label_swap import with_exchanged
 from tyrecal.studies.diagnose.labelings import Reading
-from tyrecal.studies.diagnose.several import PRIOR_NONE, priors, weigh, with_sets
+from tyrecal.studies.diagnose.several import PRIOR_NONE, priors, weigh_hypotheses, with_sets
 from tyrecal.studies.inference.inverse_problem import Assumed, InverseProblem
 
 from ..chance import generator
@@ -25,7 +25,7 @@ pytestmark = pytest.mark.numbers
 
 Array = np.ndarray
 A, B = Label(3, 0), Label(3, 1)
-SINGLE = Assumed(form=0.001, law=0.0, further=0.0)
+SINGLE = Assumed(form=0.001, response_error=0.0, further=0.0)
 
 
 def linear(pressures: Sequence[float] = (160.0, 240.0, 320.0)) -> Toy:
@@ -64,7 +64,7 @@ def test_explanations_are_averages_over_labelings(p: float) -> None:
     y = toy.base + 0.7 * toy.g["e0"] + toy.J @ np.array([0.1, -0.2, 0.05])
     readings = both(toy, y, p)
     diagnosis = diagnose(toy, toy.rows, readings, assumed=SINGLE)
-    prior = {"none": PRIOR_NONE, **dict.fromkeys(toy.spans, priors(3, 0.0)[1])}
+    prior = {"none": PRIOR_NONE, **dict.fromkeys(toy.ranges, priors(3, 0.0)[1])}
     ln = []
     for reading in readings:
         there = replace(problem(toy, assumed=SINGLE), observations=reading.observations)
@@ -106,7 +106,7 @@ def test_several_effects_are_weighed_under_every_labeling() -> None:
     toy = Toy(effects=6, pressures=(240.0,))
     first = problem(toy, toy.base + 0.9 * toy.g["e1"])
     second = replace(first, observations=with_exchanged(first.observations, A, B))
-    weighed = [weigh(each) for each in (first, second)]
+    weighed = [weigh_hypotheses(each) for each in (first, second)]
     sets = [{h.key for h in each} for each in weighed]
     assert sets[0] != sets[1]  # else it shows nothing
     for own, there in zip(weighed, (first, second), strict=True):

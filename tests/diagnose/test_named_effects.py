@@ -9,7 +9,7 @@ import pytest
 
 from tyrecal.studies.diagnose.evidence import NONE, Hypothesis, explain, refit
 from tyrecal.studies.diagnose.gap import projection
-from tyrecal.studies.diagnose.several import PRIOR_NONE, probabilities, weigh
+from tyrecal.studies.diagnose.several import PRIOR_NONE, probabilities, weigh_hypotheses
 from tyrecal.studies.diagnose.verdict import decide
 from tyrecal.studies.inference.inverse_problem import Assumed, Toggle
 from tyrecal.studies.inference.separability import separate
@@ -31,7 +31,7 @@ def test_probabilities_are_calibrated_where_the_truth_is_drawn_from_the_prior(
     """
     toy = flat(size=0.004, effects=5, pressures=(240.0,))
     base, random = problem(toy), chance.random
-    ids = list(toy.spans)
+    ids = list(toy.ranges)
     before = {NONE: PRIOR_NONE / 0.9} | {id: 0.65 / 0.9 / len(ids) for id in ids}
     given, true = [], []
     for _ in range(200):
@@ -62,13 +62,15 @@ def test_false_alarms_and_hits(chance: Chance) -> None:
     P, _, _ = projection(base, np.zeros(3))
     alarms, right = [], []
     for _ in range(40):
-        hypotheses = weigh(base.measured(drawn(toy, base, random, {}, 0.3)), pairs=False)
+        hypotheses = weigh_hypotheses(base.measured(drawn(toy, base, random, {}, 0.3)), pairs=False)
         verdict = decide(hypotheses, probabilities(hypotheses), len(base.places), 3)
         alarms.append(verdict.kind == "named")
         id, e = f"e{random.integers(8)}", random.uniform(0.2, 1)
         while separate(base, P, {id: e}).lambdas[id] < 25:
             id, e = f"e{random.integers(8)}", random.uniform(0.2, 1)
-        hypotheses = weigh(base.measured(drawn(toy, base, random, {id: e}, 0.3)), pairs=False)
+        hypotheses = weigh_hypotheses(
+            base.measured(drawn(toy, base, random, {id: e}, 0.3)), pairs=False
+        )
         p = probabilities(hypotheses)
         right.append(max(p, key=lambda key: p[key]) == id)
     chance.often(alarms, 0.0, 0.02)
@@ -89,13 +91,13 @@ def test_nothing_depends_on_units_or_order() -> None:
             p.observations, rows=tuple(p.observations.rows[i] for i in order), y=y[order]
         ),
     )
-    one, other = probabilities(weigh(p)), probabilities(weigh(shuffled))
+    one, other = probabilities(weigh_hypotheses(p)), probabilities(weigh_hypotheses(shuffled))
     assert {k: other[k] for k in one} == pytest.approx(one, abs=1e-9)
     # all frequencies, measured and computed, in another unit
     scaled = Toy()
     scaled.base = scaled.base + np.log(2 * np.pi)
     again = problem(scaled, y + np.log(2 * np.pi))
-    assert probabilities(weigh(again)) == pytest.approx(one, abs=1e-9)
+    assert probabilities(weigh_hypotheses(again)) == pytest.approx(one, abs=1e-9)
 
 
 def test_twins_that_nothing_tells_apart_share_their_probability() -> None:
@@ -106,7 +108,7 @@ def test_twins_that_nothing_tells_apart_share_their_probability() -> None:
     toy.tilt["twin"] = 0.98 * toy.tilt["e0"]
     base = problem(toy)
     p = base.measured(drawn(toy, base, generator(10), {"e0": 0.6}, 0.3))
-    hypotheses = weigh(p, pairs=False)
+    hypotheses = weigh_hypotheses(p, pairs=False)
     share = probabilities(hypotheses)
     assert share["twin"] / share["e0"] == pytest.approx(1 / 0.98, rel=2e-3)
     P, _, _ = projection(p, np.zeros(3))
@@ -128,7 +130,7 @@ def test_near_twins_have_the_probability_together(chance: Chance) -> None:
     together, one = [], []
     for _ in range(20):
         p = base.measured(drawn(toy, base, chance.random, {"e0": 0.6}, 0.3))
-        hypotheses = weigh(p, pairs=False)
+        hypotheses = weigh_hypotheses(p, pairs=False)
         share = probabilities(hypotheses)
         together.append(share["e0"] + share["twin"] > 0.8)
         verdict = decide(hypotheses, share, len(p.places), 3)
@@ -147,7 +149,7 @@ def test_an_effect_is_found_with_values_missing(chance: Chance) -> None:
     for _ in range(20):
         p = base.measured(drawn(toy, base, chance.random, {"e1": 0.7}, 0.3))
         p = p.only(chance.random.random(len(p.places)) > 0.15)
-        share = probabilities(weigh(p, pairs=False))
+        share = probabilities(weigh_hypotheses(p, pairs=False))
         right.append(max(share, key=lambda key: share[key]) == "e1")
     chance.often(right, 0.95)
 
@@ -156,9 +158,9 @@ def test_an_effect_at_the_bound_of_its_range_is_not_named() -> None:
     """A third more than its range holds, on a tyre whose model is right otherwise; of three times
     as much, which something else is likelier for, it is said, too."""
     toy = Toy(size=0.04, effects=3)
-    base = problem(toy, assumed=Assumed(form=0.001, law=0.3))
+    base = problem(toy, assumed=Assumed(form=0.001, response_error=0.3))
     for e, kind in ((1.3, "undecided"), (0.8, "named"), (3.0, "outside")):
-        hypotheses = weigh(base.measured(toy.base + e * toy.g["e1"]), pairs=False)
+        hypotheses = weigh_hypotheses(base.measured(toy.base + e * toy.g["e1"]), pairs=False)
         verdict = decide(hypotheses, probabilities(hypotheses), len(toy.base), 3)
         assert verdict.kind == kind and verdict.best == "e1"
         assert verdict.candidates[0] == ("outside" if kind == "outside" else "e1")
@@ -201,14 +203,14 @@ def test_an_effects_law_that_is_off_is_still_the_effect(chance: Chance) -> None:
     False failures: 2e-7.
     """
     toy = Toy(size=0.15)
-    strict = problem(toy, assumed=Assumed(form=0.001, law=0.0))
+    strict = problem(toy, assumed=Assumed(form=0.001, response_error=0.0))
     outside, named = [], []
     for _ in range(20):
         real = np.tile(1 + 0.1 * chance.random.normal(size=len(LABELS)), 3)
         y = toy.base + real * toy.g["e0"]
         for law, verdicts in ((0.0, outside), (0.1, named)):
-            p = replace(strict, assumed=Assumed(form=0.001, law=law)).measured(y)
-            hypotheses = weigh(p, pairs=False)
+            p = replace(strict, assumed=Assumed(form=0.001, response_error=law)).measured(y)
+            hypotheses = weigh_hypotheses(p, pairs=False)
             verdict = decide(hypotheses, probabilities(hypotheses), len(y), 3)
             verdicts.append((verdict.kind, verdict.key))
     chance.often([kind == "outside" for kind, _ in outside], 0.9)

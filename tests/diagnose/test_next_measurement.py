@@ -21,7 +21,7 @@ from tyrecal.studies.diagnose.next_measurement import (
     rank,
 )
 from tyrecal.studies.inference.inverse_problem import Toggle
-from tyrecal.studies.inference.model import Answer, Query, Span
+from tyrecal.studies.inference.model import Answer, EffectRange, Query
 from tyrecal.studies.inference.observations import Observable
 from tyrecal.studies.inference.separability import separate
 
@@ -38,10 +38,10 @@ def test_the_menu_of_measurements() -> None:
     where it is not known; a likely effect switched off, sources by themselves."""
     toy = Toy(effects=3, pressures=(200.0, 250.0))
     p = problem(toy)
-    sizes = {id: {id: np.array([0.4, 0.6])} for id in toy.spans}
+    sizes = {id: {id: np.array([0.4, 0.6])} for id in toy.ranges}
     likely = {"none": 0.4, "e0": 0.3, "e1": 0.294, "e2": 0.006, "outside": 0.0}
-    toy.spans["e0"] = Span(0, 1, toggle="take e0 out")
-    p = replace(p, spans=toy.spans)
+    toy.ranges["e0"] = EffectRange(0, 1, toggle="take e0 out")
+    p = replace(p, ranges=toy.ranges)
     rows: list = []
 
     def further(wanted: list) -> Any:
@@ -85,9 +85,9 @@ def test_the_menu_of_measurements() -> None:
 def test_what_further_rows_gain_from_an_effect_whose_slope_at_0_is_known() -> None:
     """It is not asked: its slope there, bent as in the rows that it was asked for; those of the
     others as they are asked."""
-    toy = Sloped(2, at_0=True, span=Span(0.0, 1.0))
+    toy = Sloped(2, at_0=True, span=EffectRange(0.0, 1.0))
     toy.curve = 2e-3 * Polynomial([0.0, 1.0, -0.3])
-    toy.spans["e1"], toy.g["e1"] = Span(0.0, 1.0), np.full(len(toy.rows), 0.001)
+    toy.ranges["e1"], toy.g["e1"] = EffectRange(0.0, 1.0), np.full(len(toy.rows), 0.001)
     toy.tilt["e1"], toy.splits["e1"] = np.zeros((len(toy.rows), 3)), np.zeros(len(toy.rows))
     p = problem(toy)
     likely = {"none": 0.4, "e0": 0.3, "e0+e1": 0.3}
@@ -218,11 +218,11 @@ def test_tools_of_a_laboratory_are_offered_for_what_they_show() -> None:
             strict=True,
         )
     )
-    for each in (toy.g, toy.tilt, toy.spans, toy.splits):
+    for each in (toy.g, toy.tilt, toy.ranges, toy.splits):
         for old, new in names.items():
             each[new] = each.pop(old)
     p = problem(toy)
-    sizes = {id: {id: np.array([0.4, 0.5, 0.6])} for id in toy.spans}
+    sizes = {id: {id: np.array([0.4, 0.5, 0.6])} for id in toy.ranges}
     likely = {"none": 0.4, "rim_width": 0.2, "spindle_tilt": 0.15, "wheel_free": 0.15}
     candidates = rank(p, np.zeros(3), likely, sizes, ())
     assert {c.what: c.hours for c in candidates} == {
@@ -343,7 +343,7 @@ def test_what_is_not_asked_twice_or_has_no_answer_is_not_offered() -> None:
     known; nothing where the model fails; ten explanations at most."""
     toy = Toy(effects=12, pressures=(220.0, 260.0))
     p = problem(toy)
-    sizes = {id: {id: np.array([0.5])} for id in toy.spans}
+    sizes = {id: {id: np.array([0.5])} for id in toy.ranges}
     likely = {id: 0.07 + 0.001 * i for i, id in enumerate(sizes)}
     requests: list = []
 

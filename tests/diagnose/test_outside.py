@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tyrecal.studies.diagnose.label_swap import exchanged, with_exchanged
-from tyrecal.studies.diagnose.several import probabilities, weigh
+from tyrecal.studies.diagnose.several import probabilities, weigh_hypotheses
 from tyrecal.studies.diagnose.verdict import decide
 
 from ..chance import Chance
@@ -28,7 +28,7 @@ def test_a_misread_label_is_outside_and_named(chance: Chance) -> None:
     for _ in range(20):
         y = drawn(toy, base, chance.random, {}, 0.03)
         y[6 :: len(LABELS)] += 0.08
-        hypotheses = weigh(base.measured(y), pairs=False)
+        hypotheses = weigh_hypotheses(base.measured(y), pairs=False)
         verdict = decide(hypotheses, probabilities(hypotheses), len(y), 3)
         named.append(verdict.kind == "outside" and f"{LABELS[6]} is misread" in verdict.words)
     chance.often(named, 0.95)
@@ -45,9 +45,10 @@ def test_exchanged_labels_are_found_whatever_else_is_there(chance: Chance) -> No
         plain = base.measured(drawn(toy, base, chance.random, effects, 0.03))
         y = plain.observations.y
         swapped = replace(plain, observations=with_exchanged(plain.observations, *LABELS[6:8]))
-        quiet.append(exchanged(plain, weigh(plain), toy.rows) is None)
+        quiet.append(exchanged(plain, weigh_hypotheses(plain), toy.rows) is None)
         right.append(
-            exchanged(swapped, weigh(swapped), toy.rows) == tuple(sorted(LABELS[6:8], key=str))
+            exchanged(swapped, weigh_hypotheses(swapped), toy.rows)
+            == tuple(sorted(LABELS[6:8], key=str))
         )
         back = with_exchanged(swapped.observations, *LABELS[6:8])
         assert np.array_equal(back.y, y)
@@ -66,7 +67,7 @@ def test_a_shift_of_modes_in_no_catalogue_is_not_named(chance: Chance) -> None:
     for _ in range(40):
         strange = np.tile(chance.random.normal(0, 0.02, len(LABELS)), 3)
         y = drawn(toy, base, chance.random, {}, 0.3) + strange
-        hypotheses = weigh(base.measured(y), pairs=False)
+        hypotheses = weigh_hypotheses(base.measured(y), pairs=False)
         verdict = decide(hypotheses, probabilities(hypotheses), len(y), 3)
         seen.append(verdict.kind != "no_gap")
         outside.append(verdict.kind == "outside")
@@ -88,7 +89,7 @@ def test_a_trend_in_no_catalogue_is_not_named(chance: Chance) -> None:
     for _ in range(30):
         y = drawn(toy, base, chance.random, {}, 0.3)
         y += np.tile(chance.random.choice([-1, 1]) * slope, 3)
-        hypotheses = weigh(base.measured(y), pairs=False)
+        hypotheses = weigh_hypotheses(base.measured(y), pairs=False)
         verdict = decide(hypotheses, probabilities(hypotheses), len(y), 3)
         seen.append(verdict.kind != "no_gap")
         named.append(verdict.kind == "named")

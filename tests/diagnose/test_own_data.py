@@ -15,7 +15,7 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.studies.diagnose.diagnosis import diagnose
 from tyrecal.studies.diagnose.gap import find_gap, projection
 from tyrecal.studies.diagnose.result import diagnosis_result
-from tyrecal.studies.diagnose.several import probabilities, weigh
+from tyrecal.studies.diagnose.several import probabilities, weigh_hypotheses
 from tyrecal.studies.diagnose.study import study
 from tyrecal.studies.diagnose.verdict import decide
 from tyrecal.studies.inference.expansion import expand
@@ -38,7 +38,7 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> InverseProblem:
     return InverseProblem(
         replace(observations, y=expansion.eta[where]),
         expansion,
-        MODEL.spans,
+        MODEL.ranges,
         where,
         MODEL.start,
         MODEL.spread,
@@ -63,7 +63,7 @@ def test_the_expansion_is_the_model_at_its_nodes_and_close_between(plain: Invers
 
 @pytest.mark.slow
 def test_an_effect_in_the_models_own_data_is_named_with_its_size(tmp_path: Path) -> None:
-    truth = 0.8 * MODEL.spans["bead_filler"].high
+    truth = 0.8 * MODEL.ranges["bead_filler"].high
     path = written(tmp_path / "a.csv", asked(Query(X, {"bead_filler": truth})).eta)
     result = study(CASE, Evaluator(TyreDesign(CASE)), path, effects=EFFECTS)
     d = result.diagnosis
@@ -90,7 +90,7 @@ def test_a_plain_tyre_has_no_gap(plain: InverseProblem, chance: Chance) -> None:
     factor, named, quarter = np.linalg.cholesky(plain.sigma), [], []
     for _ in range(25):
         y = plain.observations.y + factor @ chance.random.normal(size=len(ROWS))
-        hypotheses = weigh(plain.measured(y))
+        hypotheses = weigh_hypotheses(plain.measured(y))
         p = probabilities(hypotheses)
         named.append(decide(hypotheses, p, len(ROWS), len(X)).kind not in ("no_gap", "undecided"))
         quarter.append(p["none"] > 0.25)
@@ -125,7 +125,7 @@ def test_the_mass_gives_the_hidden_away(plain: InverseProblem) -> None:
 
 @pytest.mark.slow
 def test_a_toggled_run_shows_the_cause(tmp_path: Path) -> None:
-    truth = 0.5 * MODEL.spans["bead_filler"].high
+    truth = 0.5 * MODEL.ranges["bead_filler"].high
     one = written(tmp_path / "a.csv", asked(Query(X, {"bead_filler": truth})).eta)
     other = written(tmp_path / "b.csv", asked(Query(X)).eta)
     d = study(

@@ -16,11 +16,11 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import DeckRefused
 from tyrecal.studies.diagnose.result import diagnosis_result
 from tyrecal.studies.diagnose.study import study
+from tyrecal.studies.inference.effect_ranges import effect_ranges
 from tyrecal.studies.inference.expansion import expand
 from tyrecal.studies.inference.inverse_problem import InverseProblem, Toggle
 from tyrecal.studies.inference.model import Answer, Query
 from tyrecal.studies.inference.observations import Observable, Observations
-from tyrecal.studies.inference.spans import spans_of
 from tyrecal.studies.inference.tyre_model import TyreModel
 from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.tyre.values import with_values
@@ -34,7 +34,7 @@ WITH_FILLER = with_values(CASE, {"effects.bead_filler": HELD})
 def test_ranges_count_from_what_the_case_has() -> None:
     """From none of the effect to the end of its range, which the case is part of the way to."""
     plain, own = (
-        spans_of(case, Evaluator(TyreDesign(case)), ["bead_filler"])[0]["bead_filler"]
+        effect_ranges(case, Evaluator(TyreDesign(case)), ["bead_filler"])[0]["bead_filler"]
         for case in (CASE, WITH_FILLER)
     )
     assert (plain.base, own.base) == (0.0, HELD)
@@ -45,9 +45,9 @@ def test_ranges_count_from_what_the_case_has() -> None:
 @pytest.mark.slow
 def test_parameters_count_from_what_the_case_has() -> None:
     evaluator = Evaluator(TyreDesign(WITH_FILLER))
-    spans, _ = spans_of(WITH_FILLER, evaluator, EFFECTS)
-    assert spans["bead_filler"].low == pytest.approx(-HELD)
-    own = TyreModel(WITH_FILLER, evaluator, ROWS, sources(WITH_FILLER)[0], spans)
+    ranges, _ = effect_ranges(WITH_FILLER, evaluator, EFFECTS)
+    assert ranges["bead_filler"].low == pytest.approx(-HELD)
+    own = TyreModel(WITH_FILLER, evaluator, ROWS, sources(WITH_FILLER)[0], ranges)
     less, as_it_is = own.answers([Query(X, {"bead_filler": -HELD}), Query(X)])
     assert isinstance(less, Answer) and isinstance(as_it_is, Answer)
     assert less.eta == pytest.approx(asked(Query(X)).eta, abs=1e-9)
@@ -64,12 +64,12 @@ def test_splits_count_from_what_the_case_has() -> None:
     rows = ROWS[:-1]
     case = with_values(CASE, {"effects.point_mass": 0.04})
     evaluator = Evaluator(TyreDesign(case))
-    spans, _ = spans_of(case, evaluator, ("point_mass", "rim_width"))
-    own = TyreModel(case, evaluator, rows, [], spans)
+    ranges, _ = effect_ranges(case, evaluator, ("point_mass", "rim_width"))
+    own = TyreModel(case, evaluator, rows, [], ranges)
     none = np.full(len(rows), np.nan)
     observables = tuple(Observable("frequency_Hz", label, p) for label, p in rows)
     observations = Observations(observables, np.zeros(len(rows)), none, 0.0, none, none)
-    problem = InverseProblem(observations, expand(own, X), spans, np.arange(len(rows)), X, X)
+    problem = InverseProblem(observations, expand(own, X), ranges, np.arange(len(rows)), X, X)
     for id, e in (("point_mass", 0.03), ("point_mass", -0.04), ("rim_width", 5e-3)):
         (there,) = own.answers([Query(X, {id: e})])
         assert isinstance(there, Answer)
@@ -99,7 +99,7 @@ def test_a_source_of_error_steps_from_what_the_case_has() -> None:
 
 @pytest.mark.slow
 def test_a_part_of_an_effect_in_the_case_leaves_the_rest_to_be_found(tmp_path: Path) -> None:
-    truth = 0.8 * MODEL.spans["bead_filler"].high
+    truth = 0.8 * MODEL.ranges["bead_filler"].high
     path = written(tmp_path / "a.csv", asked(Query(X, {"bead_filler": truth})).eta)
     none = study(CASE, Evaluator(TyreDesign(CASE)), path, effects=EFFECTS, section_map=False)
     some = study(
@@ -139,7 +139,7 @@ def test_a_toggled_run_is_set_to_what_it_says_whatever_the_case_has(tmp_path: Pa
 @pytest.mark.slow
 def test_a_run_switched_beyond_the_range_is_asked_there(tmp_path: Path) -> None:
     """The range is where the effect may be, not how far a laboratory can go with it."""
-    far = 1.5 * MODEL.spans["bead_filler"].high
+    far = 1.5 * MODEL.ranges["bead_filler"].high
     one = written(tmp_path / "a.csv", asked(Query(X)).eta)
     other = written(tmp_path / "b.csv", asked(Query(X, {"bead_filler": far})).eta)
     result = study(
@@ -152,7 +152,7 @@ def test_a_run_switched_beyond_the_range_is_asked_there(tmp_path: Path) -> None:
     )
     d = result.diagnosis
     nodes, own = d.bare.expansion.nodes["bead_filler"], d.bare.expansion
-    assert nodes.reach[1] == MODEL.spans["bead_filler"].high
+    assert nodes.reach[1] == MODEL.ranges["bead_filler"].high
     shift, _, _ = nodes.at(np.array([far]))
     (there,) = result.model.answers([Query(own.x0, {"bead_filler": far})])
     assert isinstance(there, Answer)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tyrecal.studies.diagnose.evidence import families, refit
-from tyrecal.studies.diagnose.reweighed import Perturbation, lines, reweighed
+from tyrecal.studies.diagnose.reweighed import Perturbation, lines, perturbed_evidence
 from tyrecal.studies.inference.inverse_problem import Assumed, InverseProblem
 
 from ..chance import generator
@@ -41,9 +41,9 @@ def made_anew(
     other: Perturbation, extra: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """ln Z and chi2 of effects `E`, or of more covariance without any, by re-fits."""
-    p, law = other.problem.only(other.keep), other.problem.assumed.law
-    assert law is not None
-    p = replace(p, assumed=replace(p.assumed, law=other.laws * law))
+    p, error = other.problem.only(other.keep), other.problem.assumed.response_error
+    assert error is not None
+    p = replace(p, assumed=replace(p.assumed, response_error=other.response_factor * error))
     if extra is None:
         fitted = refit(p, E, 3)
     else:
@@ -56,15 +56,15 @@ def test_the_evidence_about_a_fit_is_that_of_a_fit_made_anew(bend: float, tolera
     """The evidence is exact for a model linear in x, except for what an effect does to its slopes;
     for a bent model it holds to second order in how far the fit moves."""
     toy = Toy(effects=2, bend=bend)
-    p = problem(toy, assumed=Assumed(form=0.001, law=0.1))
+    p = problem(toy, assumed=Assumed(form=0.001, response_error=0.1))
     p = p.measured(drawn(toy, p, generator("reweighed"), {"e0": 0.4}, 0.2))
     fits = lines(p, E, refit(p, E, 3).d)
     extra = np.array([each.extra for each in families(p)])
     unknown = lines(p, {}, refit(p, {}, len(extra), extra).d, extra=extra)
     for other in changes(p):
-        for evidence, wanted in zip(reweighed(fits, other), made_anew(other), strict=True):
+        for evidence, wanted in zip(perturbed_evidence(fits, other), made_anew(other), strict=True):
             assert evidence == pytest.approx(wanted, abs=tolerance, rel=tolerance), other.words
-        evidence, _ = reweighed(unknown, other, extra=extra)
+        evidence, _ = perturbed_evidence(unknown, other, extra=extra)
         wanted, _ = made_anew(other, extra)
         assert evidence == pytest.approx(wanted, abs=tolerance, rel=tolerance), other.words
 
@@ -77,11 +77,11 @@ def test_near_modes_are_coupled_about_a_fit_as_by_a_fit_made_anew(
     coupling bends. No label of the two is left out, whose partner would then be the model's."""
     toy = Near(0.01, effects=2)
     y = toy.coupled(1.1) + 0.3 * toy.g["e0"] + 0.2 * toy.g["e1"]
-    p = problem(toy, y, assumed=Assumed(form=0.001, law=0.1))
+    p = problem(toy, y, assumed=Assumed(form=0.001, response_error=0.1))
     fits = lines(p, E, refit(p, E, 3).d, among)
     for other in changes(p):
-        of = replace(other.problem.assumed, law=other.laws * 0.1)
+        of = replace(other.problem.assumed, response_error=other.response_factor * 0.1)
         anew = refit(replace(other.problem, assumed=of).only(other.keep), E, 3, among=among)
-        ln, chi2 = reweighed(fits, other, among)
+        ln, chi2 = perturbed_evidence(fits, other, among)
         assert ln == pytest.approx(anew.ln_evidence, abs=0.1), other.words
         assert chi2 == pytest.approx(anew.chi2, abs=0.2), other.words

@@ -18,9 +18,9 @@ from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.result import Residual, diagnosis_result
 from tyrecal.studies.diagnose.study import study
 from tyrecal.studies.inference.covariance import BETWEEN_SUPPORTS, alike
+from tyrecal.studies.inference.effect_ranges import effect_ranges
 from tyrecal.studies.inference.model import Answer, ModelRow, Query
 from tyrecal.studies.inference.observations import Observable, observe
-from tyrecal.studies.inference.spans import spans_of
 from tyrecal.studies.inference.tyre_model import TyreModel
 from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.tyre.state import TyreState
@@ -41,8 +41,8 @@ FIXED_ROWS, FREE_ROWS = slice(0, 5), slice(5, 10)
 
 def model(rows: list[ModelRow] = ROWS, effects: tuple[str, ...] = EFFECTS) -> TyreModel:
     evaluator = Evaluator(TyreDesign(CASE))
-    spans, _ = spans_of(CASE, evaluator, list(effects))
-    return TyreModel(CASE, evaluator, rows, sources(CASE)[0], spans)
+    ranges, _ = effect_ranges(CASE, evaluator, list(effects))
+    return TyreModel(CASE, evaluator, rows, sources(CASE)[0], ranges)
 
 
 @pytest.mark.slow

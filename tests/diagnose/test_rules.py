@@ -12,10 +12,10 @@ from scipy.stats import chi2
 from tyrecal.studies.diagnose.evidence import INFLATION, UNKNOWN, explain, outside, refit
 from tyrecal.studies.diagnose.gap import ResidualGroup, _chi2, _corrected, find_gap
 from tyrecal.studies.diagnose.label_swap import _near
-from tyrecal.studies.diagnose.several import HIDDEN_PAIRS, priors, weigh
+from tyrecal.studies.diagnose.several import HIDDEN_PAIRS, priors, weigh_hypotheses
 from tyrecal.studies.diagnose.where import section_map
 from tyrecal.studies.inference.inverse_problem import Assumed, Toggle
-from tyrecal.studies.inference.model import Answer, Query, Span
+from tyrecal.studies.inference.model import Answer, EffectRange, Query
 from tyrecal.studies.inference.observations import Observable, Observations
 from tyrecal.studies.inference.plain_fit import plain_fit
 from tyrecal.studies.inference.regions import SectionPart
@@ -49,7 +49,7 @@ def test_a_gap_by_its_formula() -> None:
     """r^T P r with splits, what calibration absorbs of an effect, and what it makes of x."""
     toy = Toy(effects=2, bend=0.0, pressures=(240.0, 320.0))
     toy.tilt = {id: 0 * tilt for id, tilt in toy.tilt.items()}
-    toy.spans["e1"] = Span(-2.0, 1.0)
+    toy.ranges["e1"] = EffectRange(-2.0, 1.0)
     base = problem(toy)
     y = drawn(toy, base, generator("gap"), {"e0": 0.5}, 0.3)
     p = base.measured(y)
@@ -193,9 +193,11 @@ def test_prior_probabilities_are_one_together() -> None:
     twentieth of what one less has, over all sets, tried or not."""
     toy = Toy(effects=9, pressures=(240.0,))
     base = problem(toy)
-    by_key = {h.key: h for h in weigh(base.measured(drawn(toy, base, generator(1), {}, 0.3)))}
+    by_key = {
+        h.key: h for h in weigh_hypotheses(base.measured(drawn(toy, base, generator(1), {}, 0.3)))
+    }
     assert by_key["none"].prior == 0.25 and by_key["outside"].prior == 0.1
-    singles = [h for key, h in by_key.items() if key in toy.spans]
+    singles = [h for key, h in by_key.items() if key in toy.ranges]
     pairs = [h for key, h in by_key.items() if "+" in key]
     assert sum(h.prior for h in singles) == pytest.approx(0.65 / 1.0525)
     pairs = [h for h in pairs if h.key.count("+") == 1]
@@ -208,10 +210,10 @@ def test_prior_probabilities_are_one_together() -> None:
     best = sorted(singles, key=lambda h: -h.ln_evidence)[:4]
     left = {h.key for h in singles} - {h.key for h in best}
     assert sum(set(h.values) <= left for h in pairs) == HIDDEN_PAIRS  # of ten of theirs
-    alone = {h.key: h.prior for h in weigh(base, pairs=False)}
+    alone = {h.key: h.prior for h in weigh_hypotheses(base, pairs=False)}
     assert sum(alone.values()) == pytest.approx(1)
     one = replace(base.expansion, nodes={"e3": base.expansion.nodes["e3"]})
-    known = weigh(replace(base, expansion=one))
+    known = weigh_hypotheses(replace(base, expansion=one))
     assert {h.key: h.prior for h in known}["e3"] == pytest.approx(0.65)
 
 
@@ -277,10 +279,10 @@ def test_the_guide_says_what_is_assumed() -> None:
     on record."""
     guide = (CASES / "diagnosis.md").read_text()
     assumed = Assumed()
-    laws = [100 * effect.law for effect in catalogue().values()]
+    laws = [100 * effect.response_error for effect in catalogue().values()]
     assert f"may be off by {min(laws):g} to {max(laws):g} % of its own shift" in guide
     _, _, integrated = guide.partition("Uncertain details of some effects are marginalised")
     integrated, _, _ = integrated.partition("\n\n")
     for effect in catalogue().values():
-        assert (effect.beside is not None) == (f"`{effect.id}`" in integrated)
-    assert assumed.law is None and assumed.form is None and assumed.split == 0.003
+        assert (effect.shape_uncertainty is not None) == (f"`{effect.id}`" in integrated)
+    assert assumed.response_error is None and assumed.form is None and assumed.split == 0.003

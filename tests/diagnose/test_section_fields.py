@@ -226,7 +226,7 @@ def test_what_is_told_of_the_section_holds_within_its_standard_deviation(chance:
         z = chance.random.normal(size=len(own_sources))
         y = toy.base + toy.constants @ z + chance.random.normal(0, 0.00224, len(toy.base))
         seen = base.measured(y).observations
-        stated = Assumed(form=0.001, law=0.0)
+        stated = Assumed(form=0.001, response_error=0.0)
         d = diagnose(toy, toy.rows, seen, assumed=stated)  # type: ignore[arg-type]
         posterior = section_posterior(STATED, own_sources, d)
         assert {v.field for v in posterior} == {"meridian", "hold", "gauge", "stiffness", "density"}

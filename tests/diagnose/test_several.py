@@ -20,7 +20,7 @@ from tyrecal.studies.diagnose.several import (
     next_candidates,
     present,
     probabilities,
-    weigh,
+    weigh_hypotheses,
 )
 from tyrecal.studies.diagnose.study import DiagnosedCase
 from tyrecal.studies.diagnose.verdict import Further, decide, most_sure, perhaps
@@ -56,7 +56,7 @@ def test_three_effects_are_found() -> None:
     base = problem(toy)
     truth = {"e0": 0.8, "e2": 0.7, "e4": 0.9}
     y = toy.base + sum(e * toy.g[id] for id, e in truth.items())
-    hypotheses = weigh(base.measured(y))
+    hypotheses = weigh_hypotheses(base.measured(y))
     p = probabilities(hypotheses)
     assert decide(hypotheses, p, len(y), 3).key == "e0+e2+e4" and p["e0+e2+e4"] > 0.9
     best = next(h for h in hypotheses if h.key == "e0+e2+e4")
@@ -70,7 +70,7 @@ def test_few_points_are_enough_for_sets_that_do_not_matter(sizes: dict[str, floa
     1e-3 of those where every set has the full rule."""
     toy = Toy(effects=5)
     p = problem(toy).measured(toy.base + sum(e * toy.g[id] for id, e in sizes.items()))
-    hypotheses = weigh(p)
+    hypotheses = weigh_hypotheses(p)
     several = [h for h in hypotheses if len(h.values) > 1]
     assert any(h.few for h in several)
     full = {h.key: explain(p, list(h.values), h.prior) for h in several}
@@ -86,10 +86,10 @@ def test_what_the_model_was_asked_nothing_more_of_stands() -> None:
     toy = Toy(effects=3, bend=0.05)
     base = problem(toy, x0=np.array([0.1, 0.0, -0.1]))
     base = base.measured(toy.base + 0.6 * toy.g["e0"] + 0.5 * toy.g["e2"])
-    first, x = weigh(base), base.expansion.x0 + 0.2
+    first, x = weigh_hypotheses(base), base.expansion.x0 + 0.2
     for sizes in ({"e0": 0.6}, {"e0": 0.6, "e2": 0.5}):
         again = replace(base, expansion=anchored(base.expansion, toy, [Query(x, sizes)]))
-        later, anew = weigh(again, before=(base, first)), weigh(again)
+        later, anew = weigh_hypotheses(again, before=(base, first)), weigh_hypotheses(again)
         assert [h.key for h in later] == [h.key for h in anew]
         for h, other in zip(later, anew, strict=True):
             assert h.ln_evidence == pytest.approx(other.ln_evidence, abs=1e-12)
@@ -119,7 +119,7 @@ def test_two_effects_that_hide_one_another_are_found() -> None:
     v, u = 5 * root @ Q[:, 3], 30 * root @ Q[:, 4]
     toy.g = {id: v + g for id, g in toy.g.items()} | {"e0": v + u, "e1": v - u}
     base = problem(toy)
-    hypotheses = weigh(base.measured(toy.base + 0.9 * (toy.g["e0"] + toy.g["e1"])))
+    hypotheses = weigh_hypotheses(base.measured(toy.base + 0.9 * (toy.g["e0"] + toy.g["e1"])))
     alone = sorted((h for h in hypotheses if len(h.values) == 1), key=lambda h: -h.ln_evidence)
     assert {h.key for h in alone[:PARTNERS]}.isdisjoint({"e0", "e1"})
     assert decide(hypotheses, probabilities(hypotheses), len(base.places), 3).key == "e0+e1"
@@ -131,9 +131,9 @@ def test_a_size_that_the_case_states_as_possible_is_a_constant() -> None:
     toy = Toy(effects=3, size=0.03)
     base = problem(toy)
     p = base.measured(toy.base + 0.3 * toy.g["e0"])
-    spans = {**toy.spans, "e0": replace(toy.spans["e0"], stated=0.2)}
-    stated = replace(p, spans=spans)
-    plain, hypotheses = weigh(p), weigh(stated)
+    ranges = {**toy.ranges, "e0": replace(toy.ranges["e0"], prior_sd=0.2)}
+    stated = replace(p, ranges=ranges)
+    plain, hypotheses = weigh_hypotheses(p), weigh_hypotheses(stated)
     one, other = probabilities(plain), probabilities(hypotheses)
     assert sum(other.values()) == pytest.approx(1) and sum(one.values()) == pytest.approx(1)
     h = next(h for h in plain if h.key == "e0")
@@ -220,7 +220,7 @@ def test_the_range_is_that_of_the_priors_where_nothing_else_is_in_doubt() -> Non
     computed from the evidences."""
     toy = Toy(effects=2, size=0.02, bend=0.0)
     base = problem(toy)
-    hypotheses = weigh(base.measured(toy.base + 0.3 * toy.g["e0"]))
+    hypotheses = weigh_hypotheses(base.measured(toy.base + 0.3 * toy.g["e0"]))
     p = probabilities(hypotheses)
     verdict = decide(hypotheses, p, len(base.places), 3)
     ranges = []
@@ -238,8 +238,8 @@ def test_the_range_is_that_of_the_priors_where_nothing_else_is_in_doubt() -> Non
 def test_the_page_says_what_it_hangs_on_and_what_is_perhaps_there_first() -> None:
     toy = Toy(effects=2, bend=0.0, pressures=(160.0, 240.0))
     toy.constants = np.stack([toy.constants[:, 0], 0.16 * toy.g["e0"]], 1)
-    spans = {**toy.spans, "e0": replace(toy.spans["e0"], stated=0.2)}
-    toy.spans = spans
+    ranges = {**toy.ranges, "e0": replace(toy.ranges["e0"], prior_sd=0.2)}
+    toy.ranges = ranges
     d = exact(toy, {"e0": 0.7})
     also = replace(d.verdict, also=(Further("e1", 0.25),))
     words = page(

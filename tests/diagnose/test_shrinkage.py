@@ -8,10 +8,10 @@ from scipy.optimize import least_squares
 
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.evidence import explain, refit
-from tyrecal.studies.diagnose.several import weigh
+from tyrecal.studies.diagnose.several import weigh_hypotheses
 from tyrecal.studies.diagnose.shrinkage import _placebo, held_out, shrink
 from tyrecal.studies.inference.inverse_problem import Assumed
-from tyrecal.studies.inference.model import Query, Span
+from tyrecal.studies.inference.model import EffectRange, Query
 from tyrecal.studies.inference.observations import Observable
 
 from ..chance import Chance, generator
@@ -94,7 +94,7 @@ def test_a_calibration_as_usual_stands_beside(without: bool) -> None:
     s = shrink(there, "e1")
     assert s is not None
     hold, _ = held_out(there.observations.rows)
-    (h,) = (h for h in weigh(there.only(~hold)) if h.key == "e1")
+    (h,) = (h for h in weigh_hypotheses(there.only(~hold)) if h.key == "e1")
     effects = {} if without else h.mean()
 
     def off(x: np.ndarray) -> np.ndarray:
@@ -113,8 +113,8 @@ def test_the_placebo_is_what_tyres_without_an_effect_would_show() -> None:
     size, lowers the error of those held out by R; 95 % of them show less."""
     toy = Toy(effects=2, size=0.02, pressures=(200.0, 240.0), bend=0.0)
     toy.tilt = {id: 200 * tilt for id, tilt in toy.tilt.items()}
-    toy.spans["e1"] = Span(0.0, 0.7)
-    p = problem(toy, assumed=Assumed(form=0.001, law=0.04))
+    toy.ranges["e1"] = EffectRange(0.0, 0.7)
+    p = problem(toy, assumed=Assumed(form=0.001, response_error=0.04))
     hold, _ = held_out(p.observations.rows)
     noise = np.random.default_rng(7).multivariate_normal(
         np.zeros(len(hold)), p.sigma, 200, method="cholesky"

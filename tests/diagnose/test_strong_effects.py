@@ -14,7 +14,7 @@ from tyrecal.studies.diagnose.evidence import refit
 from tyrecal.studies.diagnose.label_swap import exchange_shifts, rows_if_exchanged, with_exchanged
 from tyrecal.studies.inference.expansion import expand
 from tyrecal.studies.inference.inverse_problem import Assumed
-from tyrecal.studies.inference.model import Answer, Query, Span
+from tyrecal.studies.inference.model import Answer, EffectRange, Query
 from tyrecal.studies.inference.plain_fit import plain_fit
 
 from .toy import LABELS, Toy, problem
@@ -22,7 +22,7 @@ from .toy import LABELS, Toy, problem
 pytestmark = pytest.mark.numbers
 
 X = np.array([0.2, -0.1, 0.15])
-ASSUMED = Assumed(form=0.001, law=0.02)
+ASSUMED = Assumed(form=0.001, response_error=0.02)
 
 
 class Strong(Toy):
@@ -176,7 +176,7 @@ def test_an_effect_s_range_as_a_constant_has_its_mean_square() -> None:
     """A shift in proportion to an effect that is uniform over 0 to 1, or -0.5 to 1."""
     for low in (0.0, -0.5):
         toy = Toy(effects=1, bend=0.0)
-        toy.spans = {"e0": Span(low, 1.0)}
+        toy.ranges = {"e0": EffectRange(low, 1.0)}
         (nodes,) = expand(toy, np.zeros(3)).nodes.values()
         mean = {0.0: 1 / 3, -0.5: (1 + 0.25) / 6}[low]
         assert (nodes.range_shifts() ** 2).sum(0) == pytest.approx(mean * toy.g["e0"] ** 2)

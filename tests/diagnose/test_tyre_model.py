@@ -14,9 +14,9 @@ import pytest
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
+from tyrecal.studies.inference.effect_ranges import effect_ranges
 from tyrecal.studies.inference.model import Answer, Query
 from tyrecal.studies.inference.regions import regions
-from tyrecal.studies.inference.spans import spans_of
 from tyrecal.studies.inference.tyre_model import TyreModel, _key
 from tyrecal.studies.variable import read_variables
 from tyrecal.tyre.case import LoadedCase, start_values
@@ -126,8 +126,8 @@ def test_an_effect_without_slopes_takes_the_plain_tyres() -> None:
     """The solver gives none with a splice: all is asked once, together, and nothing in vain."""
     evaluator = Evaluator(TyreDesign(CASE))
     splice = Query(X, {"stiffness_splice": 1.0})
-    spans, _ = spans_of(CASE, evaluator, ("bead_filler", "stiffness_splice"))
-    own = TyreModel(CASE, evaluator, ROWS[:9], [], spans)
+    ranges, _ = effect_ranges(CASE, evaluator, ("bead_filler", "stiffness_splice"))
+    own = TyreModel(CASE, evaluator, ROWS[:9], [], ranges)
     answers = own.answers([splice, Query(X, {"bead_filler": 1.0})])
     assert evaluator.counts.runs == 4  # the nominal one first, the plain one with these two
     (plain,) = own.answers([Query(X)])
@@ -145,8 +145,8 @@ WIDE = with_values(CASE, {"splice.width_deg": 100.0})
 def with_slopes(case: LoadedCase, ids: Sequence[str]) -> TyreModel:
     """At 180 kPa, and the mass."""
     evaluator = Evaluator(TyreDesign(case))
-    spans, _ = spans_of(case, evaluator, ids)
-    return TyreModel(case, evaluator, [*ROWS[:9], (None, 0.0)], [], spans)
+    ranges, _ = effect_ranges(case, evaluator, ids)
+    return TyreModel(case, evaluator, [*ROWS[:9], (None, 0.0)], [], ranges)
 
 
 def test_slopes_by_effects_against_differences() -> None:

@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import norm
 
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE, Hypothesis, explain, outside, refit
-from tyrecal.studies.diagnose.several import weigh
+from tyrecal.studies.diagnose.several import weigh_hypotheses
 from tyrecal.studies.diagnose.unmeasured import expected, expected_by, likeliest
 from tyrecal.studies.inference.inverse_problem import InverseProblem
 
@@ -81,7 +81,7 @@ def test_explanations_are_pooled_by_their_probabilities_and_outside_says_nothing
     base = problem(toy)
     out, kept = parted(toy)
     p = without(base.measured(toy.base + 0.12 * toy.g["e0"]), kept)
-    known = [h for h in weigh(p, pairs=False) if h.key != OUTSIDE]
+    known = [h for h in weigh_hypotheses(p, pairs=False) if h.key != OUTSIDE]
     ln = np.array([h.ln_evidence + np.log(h.prior) for h in known])
     share = np.exp(ln - np.logaddexp.reduce(ln))
     each = [expected_by(p, h, toy.rows, out) for h in known]

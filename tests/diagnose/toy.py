@@ -11,7 +11,7 @@ from numpy.polynomial import Polynomial
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.inference.expansion import Expansion, expand
 from tyrecal.studies.inference.inverse_problem import Assumed, InverseProblem, Toggle, places
-from tyrecal.studies.inference.model import Answer, Query, Span
+from tyrecal.studies.inference.model import Answer, EffectRange, Query
 from tyrecal.studies.inference.observations import Observable, Observations
 
 Array = np.ndarray
@@ -71,7 +71,7 @@ class Toy:
             self.g["twin"] = 0.98 * self.g["e0"]
         self.tilt = {id: 0.1 * random.normal(0, size, (n, 3)) for id in self.g}
         self.constants = np.stack([by_mode(0.003), by_mode(0.003)], 1)
-        self.spans = {id: Span(0.0, 1.0) for id in self.g}
+        self.ranges = {id: EffectRange(0.0, 1.0) for id in self.g}
         self.splits = {id: np.zeros(n) for id in self.g}
         self.asked = 0
 
@@ -101,10 +101,10 @@ class Toy:
 class Sloped(Toy):
     """eta + 2e-4 e^power, with slopes by the effect, or the one where it is 0."""
 
-    def __init__(self, power: int, at_0: bool = False, span: Span | None = None):
+    def __init__(self, power: int, at_0: bool = False, span: EffectRange | None = None):
         super().__init__(effects=1, size=0.0, pressures=(240.0,))
         self.curve, self.at_0 = 2e-4 * Polynomial([0.0] * power + [1.0]), at_0
-        self.spans = {"e0": span or Span(0.0, 1.0)}
+        self.ranges = {"e0": span or EffectRange(0.0, 1.0)}
         self.sloped, self.sloped_at_0 = ((), ("e0",)) if at_0 else (("e0",), ())
         self.points: list[Query] = []
 
@@ -133,7 +133,7 @@ def problem(
     toy: Toy,
     y: Array | None = None,
     noise: float = 0.002,
-    assumed: Assumed = Assumed(form=0.001, law=0.0),  # noqa: B008
+    assumed: Assumed = Assumed(form=0.001, response_error=0.0),  # noqa: B008
     x0: Array | None = None,
     changes: tuple[Toggle, ...] = (),
 ) -> InverseProblem:
@@ -151,7 +151,7 @@ def problem(
     return InverseProblem(
         observations,
         expansion,
-        toy.spans,
+        toy.ranges,
         places(observations, toy.rows),
         toy.start,
         toy.spread,

@@ -18,7 +18,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.studies.fit.calibrate import calibrate
-from tyrecal.studies.inference.spans import spans_of
+from tyrecal.studies.inference.effect_ranges import effect_ranges
 from tyrecal.tyre import effects
 from tyrecal.tyre.case import CaseError
 from tyrecal.tyre.effects import IDS, Effect, catalogue
@@ -54,8 +54,8 @@ def test_a_range_is_a_passenger_tyre_s_and_of_some_goes_with_the_pressure(effect
     third = effect.id.startswith("spindle") or effect.id == "temperature_drift"
     times = 1 / 3 if third else 3.0 if effect.id == "pressure_offset" else 1.0
     assert effect.range_on(truck) == pytest.approx((times * effect.low, times * effect.high))
-    spans, _ = spans_of(truck, Evaluator(TyreDesign(truck)), [effect.id])
-    span = spans.get(effect.id)  # road contact and the like, where a solver has them
+    ranges, _ = effect_ranges(truck, Evaluator(TyreDesign(truck)), [effect.id])
+    span = ranges.get(effect.id)  # road contact and the like, where a solver has them
     assert span is None or (span.low, span.high) == pytest.approx(effect.range_on(truck))
 
 

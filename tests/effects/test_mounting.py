@@ -65,11 +65,11 @@ def test_more_of_the_hub_goes_along_where_its_clamp_gives_way(way: str) -> None:
     """The mode of that direction falls, by more if the pressure has raised it; no other mode
     does."""
     effect = catalogue()[f"spindle_{way}"]
-    assert effect.beside
+    assert effect.shape_uncertainty
     rows = [(label, kPa) for kPa in (160.0, 320.0) for label in RIGID.values()]
     stated, heavier = (
         TyreModel(made, Evaluator(TyreDesign(made)), rows, [], {})
-        for made in (effect.add(CASE, effect.high), effect.beside(CASE, effect.high))
+        for made in (effect.add(CASE, effect.high), effect.shape_uncertainty(CASE, effect.high))
     )
     fall = stated.values_at(stated.start) - heavier.values_at(heavier.start)
     own = np.array([label == RIGID[way] for label, _ in rows])

@@ -343,17 +343,17 @@ def test_what_else_there_is_to_an_effect_is_no_more_of_it(id: str, value: float)
     """Wear that is uneven, voids that take stiffness: the same mass, of which 0.4 of the tread is
     17 %; wear is even in its mean across, and the tread a little thicker at its edges."""
     effect = catalogue()[id]
-    assert effect.beside
+    assert effect.shape_uncertainty
     plain, other = (
         Evaluator(TyreDesign(made)).evaluate(Question({})).mass_kg
-        for made in (effect.add(CASE, value), effect.beside(CASE, value))
+        for made in (effect.add(CASE, value), effect.shape_uncertainty(CASE, value))
     )
     assert other == pytest.approx(plain, rel=5e-3)
 
 
 def test_a_higher_filler_stiffens_the_region_above_by_its_share() -> None:
     """The filler is 10 mm higher than its region; a section with no region above reports that."""
-    higher = catalogue()["bead_filler"].beside
+    higher = catalogue()["bead_filler"].shape_uncertainty
     assert higher
     made = higher(CASE, 2.0)
     added = [solid for solid in made.case.solids if solid.regions == ["upper_sidewall"]]
@@ -370,13 +370,13 @@ def test_a_cap_ply_may_reach_the_edge_of_the_widest_belt() -> None:
     """The ply is as much heavier as the area of the widest belt is larger; belts that end
     together give no change."""
     effect = catalogue()["cap_ply"]
-    assert effect.beside
+    assert effect.shape_uncertainty
     with pytest.raises(ValueError, match="no belt is wider than the outer one"):
-        effect.beside(CASE, 1e6)
+        effect.shape_uncertainty(CASE, 1e6)
     stepped = load_case(CASES / "205_60r15.yaml")
     plain, own, wider = (
         Evaluator(TyreDesign(made)).evaluate(Question({})).mass_kg
-        for made in (stepped, effect.add(stepped, 1e6), effect.beside(stepped, 1e6))
+        for made in (stepped, effect.add(stepped, 1e6), effect.shape_uncertainty(stepped, 1e6))
     )
     area = {}
     for name in ("belt1", "belt2"):

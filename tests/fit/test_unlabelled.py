@@ -101,7 +101,7 @@ def test_every_labeling_has_the_probability_of_its_joint_density() -> None:
     assert result.each.sum(1) == pytest.approx(1.0)
     for own, ln_prior in zip(map(tuple, result.modes[:3].tolist()), result.ln_prior, strict=False):
         assert ln_prior == pytest.approx(np.log(total[own] / evidence[own]), abs=1e-6)
-    anew = result.weighed_anew(np.array([0.2, 0.8]))
+    anew = result.with_probabilities(np.array([0.2, 0.8]))
     first = result.probabilities[:2].sum()
     expected = [0.2 * first, 0.8 * first, *result.probabilities[2:]]
     assert anew.probabilities == pytest.approx(np.sort(expected)[::-1])

@@ -87,8 +87,8 @@ def test_probabilities_and_held_out(named: Diagnosis, tmp_path: Path) -> None:
 def test_long_names_are_laid_out(named: Diagnosis, tmp_path: Path) -> None:
     """Modes of one family at one pressure, with the catalogue's longest name; see `conftest`."""
     long = "temperature drift over the run of pressures, as the longest of titles"
-    spans = {id: replace(span, title=long) for id, span in named.problem.spans.items()}
-    d = replace(named, problem=replace(named.problem, spans=spans))
+    ranges = {id: replace(span, title=long) for id, span in named.problem.ranges.items()}
+    d = replace(named, problem=replace(named.problem, ranges=ranges))
     few = [row.label is not None and row.label.m == 1 for row in d.problem.observations.rows]
     alone = replace(
         d,

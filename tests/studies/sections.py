@@ -27,9 +27,10 @@ import numpy as np
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.studies.diagnose.gap import projection
-from tyrecal.studies.diagnose.several import probabilities, weigh
+from tyrecal.studies.diagnose.several import probabilities, weigh_hypotheses
 from tyrecal.studies.diagnose.verdict import decide
 from tyrecal.studies.fit.targets import target_labels
+from tyrecal.studies.inference.effect_ranges import effect_ranges
 from tyrecal.studies.inference.expansion import expand
 from tyrecal.studies.inference.inverse_problem import InverseProblem, places
 from tyrecal.studies.inference.model import Answer, ModelRow, Query
@@ -37,7 +38,6 @@ from tyrecal.studies.inference.observations import Observable, Observations
 from tyrecal.studies.inference.regions import regions
 from tyrecal.studies.inference.section_fields import SECTION_SIZES, UNSAID, arc_length
 from tyrecal.studies.inference.separability import separate
-from tyrecal.studies.inference.spans import spans_of
 from tyrecal.studies.inference.tyre_model import TyreModel
 from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.tyre.case import LoadedCase
@@ -81,7 +81,7 @@ def main(tyres: int, seed: int) -> None:
     rows: list[ModelRow] = [(label, p) for p in PRESSURES_kPa for label in target_labels(case)]
     evaluator = Evaluator(TyreDesign(case))
     own_sources = sources(case)[0]
-    model = TyreModel(case, evaluator, rows, own_sources, spans_of(case, evaluator)[0])
+    model = TyreModel(case, evaluator, rows, own_sources, effect_ranges(case, evaluator)[0])
     stated = replace(expand(model, model.start, False), coupling=None)
     fields = np.array([source.field is not None for source in own_sources])
     exact = replace(stated, constants=np.where(fields, 0.0, stated.constants), material_laws=0.0)
@@ -97,7 +97,7 @@ def main(tyres: int, seed: int) -> None:
         seen = Observations(observables, y, scatter, 0.0, unknown, unknown)
         known = stated if name == "default" else exact
         where = places(seen, rows)
-        return InverseProblem(seen, known, model.spans, where, model.start, model.spread)
+        return InverseProblem(seen, known, model.ranges, where, model.start, model.spread)
 
     power = {}
     for name in ("default", "exact"):
@@ -127,10 +127,10 @@ def main(tyres: int, seed: int) -> None:
         for kind, measured in (("sound", y), ("effect", y + shift[0] + tilt[0] @ d)):
             for name in ("default", "exact")[: 1 + (tyre % EXACT_EACH == 0)]:
                 problem = asked(measured, name)
-                hypotheses = weigh(problem, pairs=False)
+                hypotheses = weigh_hypotheses(problem, pairs=False)
                 p = probabilities(hypotheses)
                 if p["none"] < DOUBTED and kind == "sound":
-                    hypotheses = weigh(problem)
+                    hypotheses = weigh_hypotheses(problem)
                     p = probabilities(hypotheses)
                 verdict = decide(hypotheses, p, len(rows), 3)
                 record[f"{kind} {name}"] = [verdict.kind, verdict.key or ""]

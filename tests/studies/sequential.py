@@ -48,14 +48,14 @@ from tyrecal.studies.diagnose.next_measurement import (
     CandidateRows,
     offered_kPa,
 )
-from tyrecal.studies.diagnose.several import probabilities, weigh
+from tyrecal.studies.diagnose.several import probabilities, weigh_hypotheses
 from tyrecal.studies.fit.targets import target_labels
+from tyrecal.studies.inference.effect_ranges import effect_ranges
 from tyrecal.studies.inference.expansion import EffectResponse, Expansion, expand
 from tyrecal.studies.inference.inverse_problem import InverseProblem, Toggle
 from tyrecal.studies.inference.model import ModelRow
 from tyrecal.studies.inference.observations import Observable, Observations
 from tyrecal.studies.inference.section_fields import SECTION
-from tyrecal.studies.inference.spans import spans_of
 from tyrecal.studies.inference.tyre_model import TyreModel
 from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.tyre.effects.edit import changed, with_part
@@ -98,7 +98,7 @@ class Laboratory:
 
     def judged(self, done: Sequence[str]) -> tuple[list[Hypothesis], dict[str, float]]:
         """The diagnosis of what was measured."""
-        hypotheses = weigh(self.problem.only(np.isin(self.item, done)), pairs=False)
+        hypotheses = weigh_hypotheses(self.problem.only(np.isin(self.item, done)), pairs=False)
         return hypotheses, probabilities(hypotheses)
 
     def information(
@@ -200,8 +200,8 @@ def laboratory() -> Laboratory:
     rows: list[ModelRow] = [(label, p) for p in PRESSURE_kPa.values() for label in labels]
     rows += [(label, TyreState(OWN_kPa, 0.0, "fixed")) for label in labels]
     rows.append((None, 0.0))
-    own_sources, spans = sources(case)[0], spans_of(case, evaluator)[0]
-    model = TyreModel(case, evaluator, rows, own_sources, spans)
+    own_sources, ranges = sources(case)[0], effect_ranges(case, evaluator)[0]
+    model = TyreModel(case, evaluator, rows, own_sources, ranges)
     expanded = replace(expand(model, model.start, False), coupling=None)
     items, observables, places = [], [], []
 
@@ -224,7 +224,7 @@ def laboratory() -> Laboratory:
     ]
     fields = [k for k, name in enumerate(model.sources) if name.startswith(SECTION)]
     shows = np.zeros((len(readings) + len(fields), len(own_sources)))
-    far = {id: max(abs(spans[id].low), abs(spans[id].high)) for id in expanded.nodes}
+    far = {id: max(abs(ranges[id].low), abs(ranges[id].high)) for id in expanded.nodes}
     for i, (_, id) in enumerate(readings):
         shows[i] = [source.steps.get(EFFECT_PATH + id, 0.0) / far[id] for source in own_sources]
     shows[range(len(readings), len(shows)), fields] = 1.0
@@ -240,7 +240,7 @@ def laboratory() -> Laboratory:
     )
     changes = (Toggle(CAVITY_GAS, HELIUM, times=True),)
     problem = InverseProblem(
-        seen, expansion, spans, np.array(places), model.start, model.spread, changes
+        seen, expansion, ranges, np.array(places), model.start, model.spread, changes
     )
     return Laboratory(problem, np.array(items))
 
@@ -261,7 +261,9 @@ def _with_readings(
             slope=np.hstack([nodes.slope, np.full_like(size, np.nan)]),
             tilt=np.concatenate([nodes.tilt, np.zeros((len(size), m, v))], axis=1),
             split=np.hstack([nodes.split, np.zeros_like(size)]),
-            beside={e: np.append(each, np.zeros(m)) for e, each in nodes.beside.items()},
+            shape_uncertainty={
+                e: np.append(each, np.zeros(m)) for e, each in nodes.shape_uncertainty.items()
+            },
         )
 
     return replace(
@@ -284,7 +286,7 @@ def drawn(lab: Laboratory, random: np.random.Generator) -> tuple[str, float, Lab
     d = random.uniform(-APART, APART, len(problem.centre))
     added = problem.added({id: np.array([e])}, 1)
     mean = problem.plain(d)[0] + added.shift[0] + added.tilt[0] @ d
-    root = np.linalg.cholesky(problem.sigma + problem.law(added)[0])
+    root = np.linalg.cholesky(problem.sigma + problem.response_covariance(added)[0])
     y = mean + root @ random.normal(size=len(mean))
     return id, e, replace(lab, problem=problem.measured(y))
 

@@ -26,12 +26,12 @@ from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE
 from tyrecal.studies.diagnose.gap import projection
 from tyrecal.studies.fit.targets import target_labels
+from tyrecal.studies.inference.effect_ranges import effect_ranges
 from tyrecal.studies.inference.expansion import expand
 from tyrecal.studies.inference.inverse_problem import InverseProblem, places
 from tyrecal.studies.inference.model import Answer, ModelRow, Query
 from tyrecal.studies.inference.observations import Observable, Observations
 from tyrecal.studies.inference.separability import separate
-from tyrecal.studies.inference.spans import spans_of
 from tyrecal.studies.inference.tyre_model import TyreModel
 from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.tyre.effects.edit import changed, with_part
@@ -80,7 +80,7 @@ def main(tyres: int, seed: int) -> None:
     rows: list[ModelRow] = [(label, p) for p in PRESSURES_kPa for label in target_labels(case)]
     evaluator = Evaluator(TyreDesign(case))
     own_sources = sources(case)[0]
-    model = TyreModel(case, evaluator, rows, own_sources, spans_of(case, evaluator)[0])
+    model = TyreModel(case, evaluator, rows, own_sources, effect_ranges(case, evaluator)[0])
     known = expand(model, model.start, False)
     turned = [any(path.endswith("angle_deg") for path in source.steps) for source in own_sources]
     constants = known.constants[:, ~np.array(turned)]
@@ -89,7 +89,7 @@ def main(tyres: int, seed: int) -> None:
     unknown, scatter = np.full(len(rows), np.nan), np.full(len(rows), NOISE)
     plain = Observations(observables, known.eta, scatter, 0.0, unknown, unknown)
     where = places(plain, rows)
-    problem = InverseProblem(plain, known, model.spans, where, model.start, model.spread)
+    problem = InverseProblem(plain, known, model.ranges, where, model.start, model.spread)
     P = projection(problem, np.zeros(len(model.start)))[0]
     lines = []
     for tyre in range(tyres):

@@ -42,15 +42,15 @@ from tyrecal.studies.diagnose.labelings import (
     averaged,
     shares,
 )
-from tyrecal.studies.diagnose.several import weigh
+from tyrecal.studies.diagnose.several import weigh_hypotheses
 from tyrecal.studies.diagnose.verdict import decide
 from tyrecal.studies.fit.targets import target_labels
+from tyrecal.studies.inference.effect_ranges import effect_ranges
 from tyrecal.studies.inference.expansion import expand
 from tyrecal.studies.inference.inverse_problem import InverseProblem, places
 from tyrecal.studies.inference.model import ModelRow
 from tyrecal.studies.inference.observations import Observable, Observations
 from tyrecal.studies.inference.separability import separate
-from tyrecal.studies.inference.spans import spans_of
 from tyrecal.studies.inference.tyre_model import TyreModel
 from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.studies.labelling.expansion import ModesNearDesign, Prior, admissible, find_labels
@@ -82,7 +82,7 @@ def judged(whole: InverseProblem, readings: Sequence[Reading], effect: str) -> d
     rows = [row.row for row in whole.observations.rows]
     seen = [each.observations for each in readings]
     there = [replace(whole, observations=o, places=places(o, rows)) for o in seen]
-    weighed = [weigh(each, pairs=False) for each in there]
+    weighed = [weigh_hypotheses(each, pairs=False) for each in there]
     share = shares(readings, weighed)
     best, p = int(np.argmax(share)), averaged(share, weighed)
     verdict = decide(weighed[best], p, len(there[best].places), len(whole.centre))
@@ -113,7 +113,7 @@ def drawn(whole: InverseProblem, random: np.random.Generator, sound: bool) -> tu
     d = random.uniform(-APART, APART, len(whole.centre))
     added = whole.added({} if sound else {id: np.array([e])}, 1)
     mean = whole.plain(d)[0] + added.shift[0] + added.tilt[0] @ d
-    root = np.linalg.cholesky(whole.sigma + whole.law(added)[0])
+    root = np.linalg.cholesky(whole.sigma + whole.response_covariance(added)[0])
     ln_f = mean + root @ random.normal(size=len(mean))
     labels = [row.label for row in whole.observations.rows]
     nine = [label for label in dict.fromkeys(labels) if label not in OTHERS]
@@ -169,12 +169,12 @@ def main(tyres: int, seed: int) -> None:
     labels = [*target_labels(case), *OTHERS]
     rows: list[ModelRow] = [(label, p) for p in PRESSURES_kPa for label in labels]
     evaluator = Evaluator(TyreDesign(case))
-    model = TyreModel(case, evaluator, rows, sources(case)[0], spans_of(case, evaluator)[0])
+    model = TyreModel(case, evaluator, rows, sources(case)[0], effect_ranges(case, evaluator)[0])
     known = replace(expand(model, model.start, False), coupling=None)
     observables = tuple(Observable.of(row) for row in rows)
     every = np.arange(len(rows))
     seen = observed(observables, known.eta, every)
-    whole = InverseProblem(seen, known, model.spans, every, model.start, model.spread)
+    whole = InverseProblem(seen, known, model.ranges, every, model.start, model.spread)
     random, lines = np.random.default_rng(seed), list[str]()
     for tyre in range(tyres):
         id, own = drawn(whole, random, tyre % 4 == 3)
@@ -186,7 +186,7 @@ def main(tyres: int, seed: int) -> None:
         certain = [observed(observables, own.y, own.truth), readings[0].observations]
         for way, o in zip((WAYS[0], WAYS[2]), certain, strict=True):
             there = replace(whole, observations=o, places=places(o, rows))
-            swapped = exchanged(there, weigh(there))
+            swapped = exchanged(there, weigh_hypotheses(there))
             o = with_exchanged(o, *swapped) if swapped else o
             record[way] = judged(whole, [Reading(o)], id)
         for key, labelings in (("right", rows_of), ("right, partly", rows_partly)):

@@ -25,14 +25,14 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.modes.find import LabelledModes
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.diagnose.several import probabilities, weigh
+from tyrecal.studies.diagnose.several import probabilities, weigh_hypotheses
 from tyrecal.studies.diagnose.verdict import decide
 from tyrecal.studies.fit.targets import target_labels
+from tyrecal.studies.inference.effect_ranges import effect_ranges
 from tyrecal.studies.inference.expansion import expand
 from tyrecal.studies.inference.inverse_problem import InverseProblem, places
 from tyrecal.studies.inference.model import ModelRow, Query
 from tyrecal.studies.inference.observations import Observable, Observations
-from tyrecal.studies.inference.spans import spans_of
 from tyrecal.studies.inference.tyre_model import TyreModel
 from tyrecal.studies.inference.uncertainties import sources
 
@@ -89,7 +89,7 @@ def main(tyres: int, seed: int) -> None:
     case = coarse()
     rows: list[ModelRow] = [(label, p) for p in PRESSURES_kPa for label in target_labels(case)]
     evaluator = Evaluator(TyreDesign(case))
-    model = TyreModel(case, evaluator, rows, sources(case)[0], spans_of(case, evaluator)[0])
+    model = TyreModel(case, evaluator, rows, sources(case)[0], effect_ranges(case, evaluator)[0])
     random, count = np.random.default_rng(seed), Counter[tuple[str, str]]()
     lines = []
     observables = tuple(Observable("frequency_Hz", *row) for row in rows)
@@ -105,12 +105,12 @@ def main(tyres: int, seed: int) -> None:
         record = {"tyre": tyre, "drawn": drawn, "apart": round(abs(y[0] - y[1]), 4)}
         for name, known in (("now", expansion), ("slopes", replace(expansion, coupling=None))):
             problem = InverseProblem(
-                seen, known, model.spans, places(seen, rows), model.start, model.spread
+                seen, known, model.ranges, places(seen, rows), model.start, model.spread
             )
-            hypotheses = weigh(problem, pairs=False)
+            hypotheses = weigh_hypotheses(problem, pairs=False)
             p = probabilities(hypotheses)
             if p["none"] < DOUBTED:
-                hypotheses = weigh(problem)
+                hypotheses = weigh_hypotheses(problem)
                 p = probabilities(hypotheses)
             verdict = decide(hypotheses, p, len(rows), len(x))
             count[name, verdict.kind] += 1

@@ -104,7 +104,7 @@ def power(
         ruler = ruler_of(measure(model, rows), labels_of(loaded))
     effect_powers = powers(ruler, rules)
     terminal.result({"power": [asdict(each) for each in effect_powers]})
-    terminal.say(words(effect_powers, ruler, rules, model.spans))
+    terminal.say(words(effect_powers, ruler, rules, model.ranges))
     return 0
 
 
@@ -194,7 +194,7 @@ def make(
         model = tyre_model(case, evaluator, protocol, jobs)
         content = measure(model, rows_of(case, protocol))
         known = ruler_of(content, labels_of(case))
-        terminal.say(words(powers(known, protocol), known, protocol, model.spans))
+        terminal.say(words(powers(known, protocol), known, protocol, model.ranges))
         return content
 
     with terminal.progress("make trials") as bar:

@@ -285,7 +285,7 @@ def _from_deck(
     if not allow_unusual and (slips := list(deck_slips(deck, {**deck.numbers, **numbers}))):
         raise InputError("\n".join(map(str, slips)))
     text = own_case(deck, flat, size, pressure_kPa, numbers)
-    target, picture = _beside(deck.path, output, suffix, force)
+    target, picture = _in_deck_folder(deck.path, output, suffix, force)
     mass_kg = trial(flat)
     with atomic_write(target) as partial:
         partial.write_text(text, encoding="utf-8")
@@ -315,7 +315,7 @@ def _from_decks(
     from .deck import known_of_decks
 
     text = own_decks_case(decks, size, pressure_kPa, numbers)
-    target, _ = _beside(decks.path, output, "", force)
+    target, _ = _in_deck_folder(decks.path, output, "", force)
     with atomic_write(target) as partial:
         partial.write_text(text, encoding="utf-8")
     loaded = load_case(target, allow_unusual=True)
@@ -323,7 +323,9 @@ def _from_decks(
     terminal.say(f"next: {_modes(target)} --solver abaqus")
 
 
-def _beside(file: Path, output: Path | None, suffix: str, force: bool) -> tuple[Path, Path | None]:
+def _in_deck_folder(
+    file: Path, output: Path | None, suffix: str, force: bool
+) -> tuple[Path, Path | None]:
     """Where the case of a deck goes, and its picture. Raises InputError, UsageError."""
     target = output or file.with_suffix(".yaml")
     if target.resolve().parent != file.resolve().parent:

@@ -90,11 +90,11 @@ def _counted(d: Diagnosis) -> str:
 
 
 def _title(study: DiagnosedCase, key: str) -> str:
-    spans = study.diagnosis.problem.spans
+    ranges = study.diagnosis.problem.ranges
     words = {NONE: "no effect at all", OUTSIDE: "not explained by the catalogue"}
     if key in words:
         return words[key]
-    return " and ".join(spans[id].title or id for id in key.split("+"))
+    return " and ".join(ranges[id].title or id for id in key.split("+"))
 
 
 def _headline(study: DiagnosedCase) -> str:
@@ -151,7 +151,7 @@ def _answer(study: DiagnosedCase) -> Iterator[str]:
     if v.kind == NAMED:
         yield f"Rung {d.rung} of 4 (strength of the proof): {RUNGS[d.rung]}."
         if d.rung < 4 and v.key:
-            ways = [d.problem.spans[id].toggle or f"measure again without {id}" for id in ids]
+            ways = [d.problem.ranges[id].toggle or f"measure again without {id}" for id in ids]
             yield (
                 "Frequencies of one state of the tyre cannot prove a cause. To prove it:"
                 f" {'; and '.join(ways)}. Give the second run with `--toggled`."
@@ -212,13 +212,13 @@ def _constants(d: Diagnosis) -> Iterator[str]:
 
 def _sized(d: Diagnosis, key: str, id: str) -> str:
     """The size of the effect ``id`` of ``key`` amid a sentence."""
-    q, base = d.parameter(key, id), d.problem.spans[id].base
+    q, base = d.parameter(key, id), d.problem.ranges[id].base
     whose = f"the size of `{id}`" if "+" in key else "its size"
     has = in_engineers_units(base, q["unit"])
     held = f", including the {has} of the case" if base else ""
     unit, factor = display_unit(q["unit"])
     value, low, high = (f"{factor * q[key]:.3g}" for key in ("value", "low", "high"))
-    sd = d.problem.spans[id].stated
+    sd = d.problem.ranges[id].prior_sd
     times = abs(q["value"] - base) / sd if sd else 0.0
     beyond = f", {times:.1f} times the standard deviation of the case" if sd else ""
     return f"{whose} is {f'{value} {unit}'.rstrip()}, 90 % between {low} and {high}{beyond}{held}"
@@ -347,7 +347,7 @@ def _which(study: DiagnosedCase) -> Iterator[str]:
         if key not in (NONE, OUTSIDE):
             both = [d.parameter(key, id) for id in key.split("+")]
             size = " and ".join(map(_ranged, both))
-        if key in d.problem.spans:
+        if key in d.problem.ranges:
             seen = f"{d.separability.lambdas[key]:.0f}"
         rows.append(f"| {_title(study, key)} | {p:.2f} | {size} | {seen} |")
     yield "\n".join(rows)
@@ -362,7 +362,7 @@ def _which(study: DiagnosedCase) -> Iterator[str]:
         yield f"These data cannot separate {names}."
     held = [
         f"`{id}` {in_engineers_units(span.base, span.unit)}"
-        for id, span in d.problem.spans.items()
+        for id, span in d.problem.ranges.items()
         if span.base
     ]
     if held:
@@ -374,7 +374,7 @@ def _which(study: DiagnosedCase) -> Iterator[str]:
     unseen = [id for id, e in d.separability.smallest.items() if e is None]
     blind = [id for id in unseen if id not in likeliest]
     sizes = [
-        f"`{id}` {in_engineers_units(abs(e), d.problem.spans[id].unit, 2)}"
+        f"`{id}` {in_engineers_units(abs(e), d.problem.ranges[id].unit, 2)}"
         for id, e in d.separability.smallest.items()
         if e is not None
     ]
@@ -473,10 +473,12 @@ def _assumptions(study: DiagnosedCase) -> Iterator[str]:
             " in every single mode"
         )
     form += "; smooth over the pressure"
-    spans = d.problem.spans
-    laws = sorted({span.law for span in spans.values()})
-    law = f"{100 * laws[0]:g} to {100 * laws[-1]:g}" if a.law is None and laws else "0"
-    second = ", ".join(f"`{id}`" for id, span in spans.items() if span.second) or "none"
+    ranges = d.problem.ranges
+    laws = sorted({span.response_error for span in ranges.values()})
+    law = f"{100 * laws[0]:g} to {100 * laws[-1]:g}" if a.response_error is None and laws else "0"
+    second = (
+        ", ".join(f"`{id}`" for id, span in ranges.items() if span.has_shape_uncertainty) or "none"
+    )
     yield (
         f"Model error: {form}. Error of an effect's law: {law} % of its shift, effect by effect."
         f" Effects with uncertain details, averaged over: {second}. Split of the pairs of every"
@@ -487,7 +489,7 @@ def _assumptions(study: DiagnosedCase) -> Iterator[str]:
         f" {PRIOR_OUTSIDE:g}. Two effects have {a.further:g} times the probability of one, and"
         f" three {a.further:g} times that of two."
     )
-    stated = [f"`{id}`" for id, span in d.problem.spans.items() if span.stated]
+    stated = [f"`{id}`" for id, span in d.problem.ranges.items() if span.prior_sd]
     if stated:
         yield (
             f"The case states {', '.join(stated)} as uncertain. Within {COVERAGE:g} standard"

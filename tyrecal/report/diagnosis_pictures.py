@@ -183,10 +183,10 @@ def _place(label: Label | None) -> float:
 
 
 def _short(d: Diagnosis, key: str | None) -> str:
-    spans = d.problem.spans
+    ranges = d.problem.ranges
     if key in (NONE, OUTSIDE) or key is None:
         return {NONE: "No effect", OUTSIDE: "Not explained by the catalogue"}.get(key or "", "")
-    return " + ".join((spans[id].title or id) for id in key.split("+"))
+    return " + ".join((ranges[id].title or id) for id in key.split("+"))
 
 
 def _within(d: Diagnosis, key: str | None) -> str:

@@ -34,15 +34,15 @@ class KeptFields:
 
     def __init__(self, connectivities: list[Array], free: Array, symmetry: MirrorHalf):
         self.symmetry, middle = symmetry, symmetry.middle
-        beside = np.zeros_like(middle)  # nodes that share an element with the middle plane
+        adjacent = np.zeros_like(middle)  # nodes that share an element with the middle plane
         for rows in connectivities:
-            beside[rows[middle[rows].any(1)]] = True
-        beside &= ~middle
-        inner = Numbering(connectivities, free & ~middle[:, None], beside)
+            adjacent[rows[middle[rows].any(1)]] = True
+        adjacent &= ~middle
+        inner = Numbering(connectivities, free & ~middle[:, None], adjacent)
         on_plane = np.flatnonzero(free & middle[:, None])
         self._inner, self._order = inner, np.concatenate([inner.order, on_plane])
         self.size, m = 2 * len(self._order), len(on_plane)
-        first = inner.equation[beside].min(initial=inner.size)
+        first = inner.equation[adjacent].min(initial=inner.size)
         # place in the corner of the last equations and the middle plane
         self._corner = np.full(free.size, -1)
         self._corner[self._order[first:]] = np.arange(len(self._order) - first)

@@ -24,11 +24,11 @@ from ..diagnose.diagnosis import Diagnosis, diagnose
 from ..diagnose.evidence import NONE
 from ..diagnose.result import diagnosis_result
 from ..diagnose.unmeasured import expected, likeliest
+from ..inference.effect_ranges import effect_ranges
 from ..inference.expansion import Expansion, expand
 from ..inference.inverse_problem import Assumed
 from ..inference.model import ModelRow, ResponseModel
 from ..inference.observations import observe
-from ..inference.spans import spans_of
 from ..inference.tyre_model import TyreModel
 from ..inference.uncertainties import sources
 from .make import labels_of
@@ -50,8 +50,8 @@ def tyre_model(
     effects: Sequence[str] | None = None,
 ) -> TyreModel:
     """The model of the diagnosis for all trials."""
-    spans, _ = spans_of(case, evaluator, effects)
-    return TyreModel(case, evaluator, rows_of(case, protocol), sources(case)[0], spans, jobs)
+    ranges, _ = effect_ranges(case, evaluator, effects)
+    return TyreModel(case, evaluator, rows_of(case, protocol), sources(case)[0], ranges, jobs)
 
 
 def case_of(folder: Path) -> LoadedCase:

@@ -1,14 +1,17 @@
 """A model evaluated once for many tyres: polynomials in the design variables between its answers.
 
-About the centre x0, with t = (x - x0) / reach, |t| <= 1:
+eta (n,) are the n rows of the model, ln f of each mode and pressure and ln mass (see
+`inference.model`). x (v,) are the logarithms of the v design variables. e is the parameter of an
+effect, 0 if it is absent. About the centre x0, with t = (x - x0) / reach, |t| <= 1:
 
     eta(x, e) = sum_k a_k q_k(t) + sum over effects of sum_j L_j(e) sum_k b_jk q_k(t)
 
-q_k: monomials, fitted by least squares to values and Jacobians at designs of a Halton sequence;
-L_j: Lagrange's polynomials of the effect's nodes, 0 among them. Changes by the sources of error
-likewise; what couples near modes, and what else an effect's nature leaves open, hardly changes with
-x, and is that of the nearest design, or of the centre. Beyond the box the model goes straight on,
-with the slopes at its nearest point.
+q_k: monomials; their coefficients a_k and b_jk (n,) are fitted by least squares to values and
+Jacobians at designs of a Halton sequence. L_j: Lagrange's polynomials of the effect's nodes, 0
+among them. Changes by the sources of error (`ResponseModel.sources`) are emulated in the same way.
+Two quantities hardly change with x: the coupling of near modes (`Coupling`) is that of the nearest
+design, and the shift by an effect's uncertain shape (`Query.shape_uncertainty`) is that of the
+centre. Beyond the box the model goes straight on, with the slopes at its nearest point.
 """
 
 from __future__ import annotations
@@ -21,24 +24,27 @@ from scipy.stats import qmc
 
 from ..emulator import up_to
 from ..inference.expansion import derivatives, lagrange
-from ..inference.model import Answer, Coupling, Query, ResponseModel, Span
+from ..inference.model import Answer, Coupling, EffectRange, Query, ResponseModel
 
 Array = np.ndarray
-REACH = 0.8  # of ln x: 40 % by the draw, the rest what an ignored effect moves a fit
+# half width of the box in ln of a variable: blind trials draw within 0.4, and an effect that a fit
+# ignores moves its variables by the rest
+REACH = 0.8
 PLAIN_DEGREE, EFFECT_DEGREE, SOURCE_DEGREE = 4, 3, 2
 PLAIN_DESIGNS, EFFECT_DESIGNS, SOURCE_DESIGNS = 20, 10, 12
 ONE_SIDED_SHARES, TWO_SIDED_SHARES = (0.1, 0.4, 0.75, 1.0), (0.5, 1.0)
 SEED = 1
-REWEIGHTED = 12  # times
-HUBER, MIN_SCALE = 2.0, 1e-5  # a weight falls beyond so many medians; of ln f, below any model
+REWEIGHTED = 12  # iterations of Huber's estimator
+HUBER = 2.0  # medians of the absolute residual beyond which an equation weighs less
+MIN_SCALE = 1e-5  # of ln f: smallest residual from which weights fall, far below model errors
 
 
 @dataclass(frozen=True)
 class Polynomial:
     """Polynomial in the design variables t."""
 
-    powers: Array  # (k, v)
-    coefficients: Array  # (k, n)
+    powers: Array  # (k, v) of each of k monomials in each variable
+    coefficients: Array  # (k, n) of each monomial in each row
 
     def at(self, t: Array) -> tuple[Array, Array]:
         """Values (n,) and slopes (n, v) at t (v,)."""
@@ -50,10 +56,10 @@ class Polynomial:
 class EmulatedEffect:
     """Shift that an effect adds, by Lagrange interpolation between its nodes."""
 
-    nodes: Array  # (k,) of the parameter, 0 left out
-    added: tuple[Polynomial, ...]  # at each
-    split: tuple[Polynomial, ...]
-    beside: Mapping[float, Array]  # (n,) at the ends of the range, see `Answer.beside`
+    nodes: Array  # (k,) values of the parameter where it was evaluated, 0 left out
+    added: tuple[Polynomial, ...]  # at each node: change of eta
+    split: tuple[Polynomial, ...]  # at each node: distance of a pair's two modes, in ln f
+    shape_uncertainty: Mapping[float, Array]  # (n,) by end of the range, see `Answer`
 
     def slope(self, e: float, t: Array) -> Array:
         """d eta / d e (n,) at parameter e."""
@@ -62,7 +68,7 @@ class EmulatedEffect:
         return np.tensordot(weights, [p.at(t)[0] for p in self.added], 1)
 
     def at(self, e: float, t: Array) -> tuple[Array, Array, Array]:
-        """Added eta (n,), slopes (n, v) by t, split (n,) at parameter e."""
+        """Added eta (n,), its slopes (n, v) by t, and split (n,) of pairs, at parameter e."""
         weights = lagrange(np.append(self.nodes, 0.0), np.array([e]))[0, :-1]
         values, tilts = zip(*(p.at(t) for p in self.added), strict=True)
         splits = [p.at(t)[0] for p in self.split]
@@ -87,7 +93,9 @@ class Emulated:
         self.variables, self.sources = model.variables, model.sources
         self.start, self.spread = model.start, model.spread
         self.material_laws = model.material_laws
-        self.spans: Mapping[str, Span] = {k: s for k, s in model.spans.items() if k in effects}
+        self.ranges: Mapping[str, EffectRange] = {
+            k: s for k, s in model.ranges.items() if k in effects
+        }
         self.sloped: Collection[str] = {id for id in model.sloped if id in effects}
         self.sloped_at_0: Collection[str] = {id for id in model.sloped_at_0 if id in effects}
         self._plain, self._constants, self._effects = plain, constants, effects
@@ -104,11 +112,12 @@ class Emulated:
         there = (point.x - self.start) / self.reach
         t = np.clip(there, -1.0, 1.0)
         eta, slope = self._plain.at(t)
-        split, beside = np.zeros(len(eta)), None
+        split, uncertain = np.zeros(len(eta)), None
         for id, e in point.effects.items():
             added, tilt, apart = self._effects[id].at(e, t)
             eta, slope, split = eta + added, slope + tilt, np.hypot(split, apart)
-            beside = self._effects[id].beside.get(e) if point.beside else None
+            if point.shape_uncertainty:
+                uncertain = self._effects[id].shape_uncertainty.get(e)
         constants = None
         if point.constants:
             constants = self._constants.at(t)[0].reshape(len(eta), -1)
@@ -119,11 +128,13 @@ class Emulated:
         by_effect = {
             id: self._effects[id].slope(point.effects.get(id, 0.0), t) for id in point.slopes
         }
-        return Answer(straight, slope, split, constants, by_effect, coupling, beside)
+        return Answer(straight, slope, split, constants, by_effect, coupling, uncertain)
 
 
 def emulate(model: ResponseModel, reach: float = REACH) -> Emulated:
-    """Ask the model at its designs, the plain tyre and every effect of its spans.
+    """Evaluate the model at the designs, plain and with every effect, and fit the polynomials.
+
+    reach: half width of the box in x.
 
     An effect without an answer at so many designs that its polynomials are not determined is
     left out. Raises what the model says where the plain tyre has too few answers.
@@ -150,7 +161,7 @@ def emulate(model: ResponseModel, reach: float = REACH) -> Emulated:
         [plain[i].constants.ravel() for i in sources],  # type: ignore[union-attr]
     )
     effects = {}
-    for id, span in model.spans.items():
+    for id, span in model.ranges.items():
         emulated = _effect(model, id, span, signs, designs, plain, reach)
         if emulated is not None:
             effects[id] = emulated
@@ -159,12 +170,12 @@ def emulate(model: ResponseModel, reach: float = REACH) -> Emulated:
 
 
 def monomials(powers: Array, t: Array) -> Array:
-    """q_k(t) (k,)."""
+    """Monomials q_k(t) (k,) at t (v,); powers (k, v)."""
     return np.prod(t[None, :] ** powers, axis=1)
 
 
 def slopes(powers: Array, t: Array) -> Array:
-    """d q_k / d t (v, k)."""
+    """Slopes d q_k / d t (v, k) of the monomials at t (v,); powers (k, v)."""
     lower = [np.maximum(powers - unit, 0) for unit in np.eye(len(t), dtype=int)]
     return np.array([p * monomials(low, t) for p, low in zip(powers.T, lower, strict=True)])
 
@@ -172,7 +183,7 @@ def slopes(powers: Array, t: Array) -> Array:
 def _effect(
     model: ResponseModel,
     id: str,
-    span: Span,
+    span: EffectRange,
     signs: Array,
     designs: Sequence[Array],
     plain: Sequence[Answer | Exception],
@@ -196,14 +207,17 @@ def _effect(
         split.append(_values(up_to(len(signs[0]), 1), where, [a.split for _, a in both]))
     if not nodes:
         return None
-    ends = [e for e in nodes if span.second and e in (span.low, span.high)]
-    at_ends = model.answers([Query(designs[0], {id: e}, beside=True) for e in ends])
-    beside = {e: a.beside for e, a in zip(ends, at_ends, strict=True) if isinstance(a, Answer)}
-    known = {e: shift for e, shift in beside.items() if shift is not None}
+    ends = [e for e in nodes if span.has_shape_uncertainty and e in (span.low, span.high)]
+    at_ends = model.answers([Query(designs[0], {id: e}, shape_uncertainty=True) for e in ends])
+    known = {
+        e: answer.shape_uncertainty
+        for e, answer in zip(ends, at_ends, strict=True)
+        if isinstance(answer, Answer) and answer.shape_uncertainty is not None
+    }
     return EmulatedEffect(np.array(nodes), tuple(added), tuple(split), known)
 
 
-def _node_values(span: Span) -> list[float]:
+def _node_values(span: EffectRange) -> list[float]:
     if span.low < 0 < span.high:
         return [f * end for end in (span.low, span.high) for f in TWO_SIDED_SHARES]
     far = max(span.low, span.high, key=abs)

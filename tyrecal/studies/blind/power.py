@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...units import in_engineers_units
-from ..inference.model import Span
+from ..inference.model import EffectRange
 from ..inference.separability import VISIBLE, smallest
 from .protocol import Protocol
 from .ruler import Ruler, difficulty
@@ -56,14 +56,20 @@ def powers(ruler: Ruler, protocol: Protocol) -> list[Power]:
 
 
 def words(
-    effect_powers: Sequence[Power], ruler: Ruler, protocol: Protocol, spans: Mapping[str, Span]
+    effect_powers: Sequence[Power],
+    ruler: Ruler,
+    protocol: Protocol,
+    ranges: Mapping[str, EffectRange],
 ) -> str:
     """For people."""
-    return "\n".join(_lines(effect_powers, ruler, protocol, spans))
+    return "\n".join(_lines(effect_powers, ruler, protocol, ranges))
 
 
 def _lines(
-    effect_powers: Sequence[Power], ruler: Ruler, protocol: Protocol, spans: Mapping[str, Span]
+    effect_powers: Sequence[Power],
+    ruler: Ruler,
+    protocol: Protocol,
+    ranges: Mapping[str, EffectRange],
 ) -> Iterator[str]:
     labels = list(dict.fromkeys(label.display for label, _ in ruler.rows if label))
     at = ", ".join(f"{p:g}" for p in protocol.given_kPa)
@@ -76,7 +82,7 @@ def _lines(
     yield "|---|---|---|---|---|"
     for power in effect_powers:
         if power.seen is not None:
-            span = spans[power.id]
+            span = ranges[power.id]
             sizes = (
                 "-" if e is None else in_engineers_units(span.base + e, span.unit, 2)
                 for e in (power.named, power.seen)

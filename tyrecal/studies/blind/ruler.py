@@ -85,8 +85,8 @@ class Ruler:
         repeatability alone."""
         rows = [self.rows[i] for i in places]
         labels = [label for label, _ in rows]
-        weighed = np.array([label is None for label in labels])
-        scatter = np.diag(np.where(weighed, protocol.mass, protocol.noise) ** 2 / counts)
+        is_mass = np.array([label is None for label in labels])
+        scatter = np.diag(np.where(is_mass, protocol.mass, protocol.noise) ** 2 / counts)
         if not constants:
             return np.asarray(scatter)
         same = np.array([[a == b for b in labels] for a in labels])
@@ -97,7 +97,7 @@ class Ruler:
         families = [label.family if label else None for label in labels]
         kin = np.array([[a is not None and a == b for b in families] for a in families])
         parts = same + (kin + 1.0 if self.laws_shared else 0.0)
-        laws = self.material_laws**2 * parts * near * np.outer(~weighed, ~weighed)
+        laws = self.material_laws**2 * parts * near * np.outer(~is_mass, ~is_mass)
         g = self.constants[places]
         return np.asarray(scatter + alike * np.outer(form, form) + laws + g @ g.T)
 
@@ -172,7 +172,7 @@ def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> dict[str, Any]:
     plain = [Query(x0, constants=True), *(Query(x0 + step) for step in steps)]
     sizes = {
         id: sorted({f * end for end in (span.low, span.high) if end for f in SHARES})
-        for id, span in model.spans.items()
+        for id, span in model.ranges.items()
     }
     with_effects = [Query(x0, {id: e}) for id, each in sizes.items() for e in each]
     answers = model.answers([*plain, *with_effects])  # all at once: one count of the progress

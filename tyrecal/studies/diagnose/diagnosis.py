@@ -25,7 +25,7 @@ from .label_swap import exchange_shifts, exchanged, with_exchanged
 from .labelings import REFUTED, Reading, averaged, over_labels, shares
 from .next_measurement import SIZES, Choice, OtherStates, rank
 from .robustness import Robustness, robustness
-from .several import probabilities, weigh, with_sets
+from .several import probabilities, weigh_hypotheses, with_sets
 from .shrinkage import Shrinkage, shrink
 from .verdict import CHECK, NAMED, NO_GAP, Verdict, decide, holds
 from .where import PartChange, section_map
@@ -91,7 +91,7 @@ class Diagnosis:
         """Mean and 90 % interval of the effect ``id`` of ``key``, the first by default, with its
         unit, alone or with others; what the case has of it is counted in."""
         id = id or key.split("+")[0]
-        span = self.problem.spans[id]
+        span = self.problem.ranges[id]
         with_it = [h for h in self.hypotheses if h.values and holds(h.key, key)]
         e = np.concatenate([h.values[id] for h in with_it])
         ln = np.array([h.ln_evidence + np.log(h.prior) for h in with_it])
@@ -139,13 +139,13 @@ def diagnose(
         bare = _calibrated(
             model, rows, reading.observations, changes, assumed, expansion, known, begin
         )
-        hypotheses = weigh(bare)
+        hypotheses = weigh_hypotheses(bare)
         enough = labelled and len(bare.places) > len(model.start)
         labels = exchanged(bare, hypotheses, rows) if enough else None
         if labels:
             there = with_exchanged(bare.observations, *labels)
             bare = _calibrated(model, rows, there, changes, assumed, None, known, begin)
-            hypotheses = weigh(bare)
+            hypotheses = weigh_hypotheses(bare)
         bares.append(bare)
         first.append(hypotheses)
         known, expansion = known or bare.expansion, None
@@ -224,7 +224,7 @@ def _calibrated(
         expansion = carried(known, model, x0) if known else expand(model, x0)
     assert expansion is not None
     problem = InverseProblem(
-        observations, expansion, model.spans, where, model.start, model.spread, changes, assumed
+        observations, expansion, model.ranges, where, model.start, model.spread, changes, assumed
     )
     if given is not None or _fits(problem):
         return problem
@@ -253,7 +253,7 @@ def _settled(
     for look in (_nearer_sizes, _asked_again) if problem.expansion.nodes else ():
         again, changed = look(problem, model, hypotheses)
         if changed:
-            problem, hypotheses = again, weigh(again, before=(problem, hypotheses))
+            problem, hypotheses = again, weigh_hypotheses(again, before=(problem, hypotheses))
     return problem, hypotheses
 
 

@@ -74,7 +74,7 @@ class Hypothesis:
     words: str = ""
     # first and last parameter of the whole grid by id: ``values`` may be a part of it
     ends: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    stated: Mapping[str, float] = field(default_factory=dict)  # by id, see `Span.stated`
+    prior_sd: Mapping[str, float] = field(default_factory=dict)  # by id, see `EffectRange.prior_sd`
     few: bool = False  # whether its grid has `FEW_POINTS`
 
     @property
@@ -105,11 +105,11 @@ class Hypothesis:
         """Share of ``p`` (q,) over the grid by key: a size within `COVERAGE` standard deviations of
         what the case states is that constant's, and no effect."""
         ids = self.key.split("+")
-        off = [abs(self.values[id]) > COVERAGE * sd for id, sd in self.stated.items()]
+        off = [abs(self.values[id]) > COVERAGE * sd for id, sd in self.prior_sd.items()]
         by_key: dict[str, float] = {}
         for beyond in product((True, False), repeat=len(off)):
             here = [x == y for x, y in zip(off, beyond, strict=True)]
-            within = {id for id, far in zip(self.stated, beyond, strict=True) if not far}
+            within = {id for id, far in zip(self.prior_sd, beyond, strict=True) if not far}
             key = "+".join(id for id in ids if id not in within) or NONE
             by_key[key] = float(p[np.all(here, axis=0)].sum()) if here else float(p.sum())
         return by_key
@@ -215,7 +215,7 @@ def refit_at(
 ) -> Fitted:
     """x re-fitted from x0 + d (q, v) at the zeta of ``at``; other arguments as in `model_of`."""
     y, model = problem.observations.y, model_of(problem, at, added)
-    S = at.sigma + problem.law(at.with_mixed_laws(added))
+    S = at.sigma + problem.response_covariance(at.with_mixed_laws(added))
     if extra is not None:
         S = S + extra
     inverse = np.linalg.inv(S)
@@ -369,7 +369,7 @@ def explain(
         ln_weights,
         joined,
         ends={id: (float(e.min()), float(e.max())) for id, e in by_id.items()},
-        stated={id: problem.spans[id].stated for id in ids if problem.spans[id].stated},
+        prior_sd={id: problem.ranges[id].prior_sd for id in ids if problem.ranges[id].prior_sd},
         few=few,
     )
 

@@ -19,7 +19,7 @@ from ..inference.inverse_problem import InverseProblem, places
 from ..inference.model import ModelRow
 from ..inference.observations import Observations
 from .evidence import NONE, OUTSIDE, Hypothesis, refit
-from .several import weigh
+from .several import weigh_hypotheses
 
 Array = np.ndarray
 SWAP_PROBABILITY = 0.05  # of laboratories' files, two of their labels
@@ -52,7 +52,7 @@ def exchanged(
     # with sets of effects: two strong ones, beside which no single one fits, look like an exchange
     best, most = None, _all(hypotheses) + float(np.log(1 - SWAP_PROBABILITY))
     for pair in pairs:
-        ln = _all(weigh(read(*pair))) + float(np.log(SWAP_PROBABILITY / len(readings)))
+        ln = _all(weigh_hypotheses(read(*pair))) + float(np.log(SWAP_PROBABILITY / len(readings)))
         if ln > most:
             best, most = pair, ln
     return best

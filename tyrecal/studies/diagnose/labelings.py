@@ -59,9 +59,9 @@ def likely(
     ]
 
 
-def weighed_anew(labelled: Labelled, p: Sequence[float]) -> Labelled:
+def with_probabilities(labelled: Labelled, p: Sequence[float]) -> Labelled:
     """The labelings with the probabilities ``p`` of the first ones' readings."""
-    anew = labelled.found.labelings.weighed_anew(np.array(p))
+    anew = labelled.found.labelings.with_probabilities(np.array(p))
     return replace(labelled, found=replace(labelled.found, labelings=anew))
 
 

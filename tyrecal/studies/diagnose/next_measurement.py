@@ -178,7 +178,7 @@ def rank(
     every = HELD_BY.union(*(shown for _, shown in DIRECT_READINGS.values()))
     for id in (id for id in ids if id not in every):
         change, tool = _absent(problem, id), "toggle"
-        toggle = problem.spans[id].toggle if id in problem.spans else ""
+        toggle = problem.ranges[id].toggle if id in problem.ranges else ""
         words = toggle or f"measure again without {id}"
         if id == CAVITY_GAS:
             words, tool = "inflate with helium and measure again", "helium"
@@ -200,7 +200,7 @@ def _among(likely: Mapping[str, float], after: CandidateRows) -> dict[str, float
 
 
 def _absent(problem: InverseProblem, id: str) -> Toggle:
-    return Toggle(id, 0.0, base=problem.spans[id].base if id in problem.spans else 0.0)
+    return Toggle(id, 0.0, base=problem.ranges[id].base if id in problem.ranges else 0.0)
 
 
 def rows_shown(problem: InverseProblem, d: Array, sizes: Mapping[str, Sizes]) -> CandidateRows:
@@ -229,13 +229,13 @@ def with_readings(
     """The rows with readings of effects' sizes, over their ranges, and of sources of error
     themselves."""
     n, m = len(now.sigma), len(ids) + len(sources)
-    spans = [problem.spans[id] for id in ids]
-    far = [max(abs(span.low), abs(span.high)) for span in spans]
+    ranges = [problem.ranges[id] for id in ids]
+    far = [max(abs(span.low), abs(span.high)) for span in ranges]
     sigma = np.zeros((n + m, n + m))
     sigma[:n, :n] = now.sigma
     sigma[:n, n + len(ids) :] = problem.constants[:, list(sources)]
     sigma[n + len(ids) :, :n] = sigma[:n, n + len(ids) :].T
-    own = [READING**2 + (span.stated / end) ** 2 for span, end in zip(spans, far, strict=True)]
+    own = [READING**2 + (span.prior_sd / end) ** 2 for span, end in zip(ranges, far, strict=True)]
     sigma[range(n, n + m), range(n, n + m)] = own + [1 + CHECKED**2] * len(sources)
     shifts = {}
     for key, each in sizes.items():

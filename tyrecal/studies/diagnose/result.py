@@ -282,7 +282,7 @@ def diagnosis_result(
         parameter=_explained(d, shown),
         parameters={
             id: EffectSize(**d.parameter(shown, id))
-            for id in d.problem.spans
+            for id in d.problem.ranges
             if shown and holds(shown, id)
         },
         also=list(d.verdict.also),
@@ -298,7 +298,7 @@ def diagnosis_result(
         fit_p_value=d.verdict.check,
         groups=d.separability.groups(),
         detectability=dict(d.separability.lambdas),
-        judged_at={id: d.problem.spans[id].base + e for id, e in d.separability.sizes.items()},
+        judged_at={id: d.problem.ranges[id].base + e for id, e in d.separability.sizes.items()},
         full_size=dict(d.separability.full),
         smallest_visible=dict(d.separability.smallest),
         gap=_gap(d, under_load),

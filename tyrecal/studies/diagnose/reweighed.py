@@ -4,8 +4,9 @@ About a fit eta is linear in x, whose prior is normal with spread S_x: integrate
 
     ln Z = -r^T T^-1 r / 2 - ln|2 pi T| / 2 + ln p(labels) + ln p(splits),   T = S + J S_x J^T,
 
-r: what is left of the data at the prior's centre by these slopes (Bishop, Pattern Recognition and
-Machine Learning, 2.115). Where the fit is the best one this is Laplace's approximation itself.
+S (n, n): covariance of the n observations y = ln f; J (n, v) = d eta / dx at the fit; r: residual
+of y at the centre of the prior by this linear model (Bishop, Pattern Recognition and Machine
+Learning, 2.115). Where the fit is the best one this is Laplace's approximation itself.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ class Perturbation:
     words: str
     problem: InverseProblem  # with the same rows
     keep: Array  # (n,) mask of the rows that are used
-    laws: float = 1.0  # factor on the allowance for the laws of effects
+    response_factor: float = 1.0  # factor on the response errors of the effects
 
     @property
     def parts_near_modes(self) -> bool:
@@ -44,21 +45,21 @@ class LinearFit:
 
     place: int | None  # index of zeta in `veering.rule`; None: no modes are coupled
     residual: Array  # (q, n) at the centre of x
-    slopes: Array  # (q, n, v) by x
-    by_law: Array  # (q, n, n) covariance of what effects' laws are off by
-    beside: Array  # (q, n, n) of what their nature leaves open
-    ln_label: Array  # (q,) ln p of labels
-    split: Array  # (q, n) of pairs
+    slopes: Array  # (q, n, v) J = d eta / dx
+    by_response: Array  # (q, n, n) covariance by the response errors of the effects
+    by_shape: Array  # (q, n, n) covariance by their uncertain shapes
+    ln_label: Array  # (q,) ln probability of the labels
+    split: Array  # (q, n) distance of the two modes of a pair, in ln f
 
-    def covariance(self, problem: InverseProblem, laws: float = 1.0) -> Array:
-        """S (q, n, n)."""
+    def covariance(self, problem: InverseProblem, response_factor: float = 1.0) -> Array:
+        """S (q, n, n): covariance of the observations under the hypothesis."""
         at = problem if self.place is None else problem.integrand[self.place]
-        return np.asarray(at.sigma + laws**2 * self.by_law + self.beside)
+        return np.asarray(at.sigma + response_factor**2 * self.by_response + self.by_shape)
 
     def ln_evidence(self, other: Perturbation, extra: Array | None) -> tuple[Array, Array]:
         """ln Z and chi2 of the data (q,). extra (q, n, n): more covariance."""
         problem, keep = other.problem, other.keep
-        S = self.covariance(problem, other.laws)
+        S = self.covariance(problem, other.response_factor)
         S = (S if extra is None else S + extra)[:, keep][:, :, keep]
         r, J = self.residual[:, keep], self.slopes[:, keep] * problem.spread
         T = S + J @ J.transpose(0, 2, 1)
@@ -93,11 +94,11 @@ def line_about(problem: InverseProblem, added: Added, d: Array, place: int | Non
     eta, J, ln_label = model_of(problem, at, added)(d)
     back = d - (problem.centre - problem.expansion.x0)
     residual = problem.observations.y - eta + (J @ back[:, :, None])[:, :, 0]
-    laws = problem.laws(at.with_mixed_laws(added))
-    return LinearFit(place, residual, J, *laws, ln_label, added.split)
+    by_response, by_shape = problem.response_covariances(at.with_mixed_laws(added))
+    return LinearFit(place, residual, J, by_response, by_shape, ln_label, added.split)
 
 
-def reweighed(
+def perturbed_evidence(
     known: list[LinearFit],
     other: Perturbation,
     among: Mapping[int, float] | None = None,

@@ -30,7 +30,7 @@ from .evidence import (
     refit,
     refit_at,
 )
-from .reweighed import Perturbation, lines, reweighed
+from .reweighed import Perturbation, lines, perturbed_evidence
 from .several import coupled_most, present, probabilities
 from .verdict import NAMED, NO_GAP, UNDECIDED, Verdict, decide, holds
 
@@ -185,7 +185,7 @@ def _reevaluate(
             refitted = refit(fewer, h.values, len(d), among=among, near=d)
             ln, chi2 = refitted.ln_evidence, refitted.chi2
         else:
-            ln, chi2 = reweighed(fits, other, among)
+            ln, chi2 = perturbed_evidence(fits, other, among)
         total = float(np.logaddexp.reduce(ln + h.ln_weights))
         fitted = h.fitted._replace(ln_evidence=ln, chi2=chi2)
         result.append(replace(h, ln_evidence=total, fitted=fitted))
@@ -207,7 +207,7 @@ def _reevaluate_outside(
         else:
             now = families(other.problem)
             more = np.array([family.extra for family in now])
-            ln, _ = reweighed(fits, other, extra=more)
+            ln, _ = perturbed_evidence(fits, other, extra=more)
             there = np.array([each[np.ix_(other.keep, other.keep)].any() for each in more])
             shares = ln_shares([family for family, on in zip(now, there, strict=True) if on])
             total = float(np.logaddexp.reduce(ln[there] + shares))

@@ -31,7 +31,7 @@ HIDDEN_PAIRS = 4  # more, that explain most together
 FEW_ENOUGH = 8.0  # ln probability of a set behind the best of fewer, for few points to be enough
 
 
-def weigh(
+def weigh_hypotheses(
     problem: InverseProblem,
     pairs: bool = True,
     before: tuple[InverseProblem, Sequence[Hypothesis]] | None = None,
@@ -98,7 +98,7 @@ def _by_key(
 ) -> dict[str, float]:
     totals = {h.key: 0.0 for h in hypotheses}
     for h, whole in zip(hypotheses, p.tolist(), strict=True):
-        if not h.stated:
+        if not h.prior_sd:
             totals[h.key] += whole
             continue
         for key, share in h.shares(over(h)).items():
@@ -191,7 +191,7 @@ def _gains(problem: InverseProblem, base: Hypothesis) -> dict[str, tuple[Array, 
     at = {id: np.array([e]) for id, e in sizes.items()}
     d = base.fitted.d[best]
     added = problem.added(at, 1)
-    inverse = np.linalg.inv(problem.sigma + problem.law(added)[0])
+    inverse = np.linalg.inv(problem.sigma + problem.response_covariance(added)[0])
     columns, information = [problem.plain(d)[1] + added.tilt[0]], [problem.spread**-2.0]
     for id, e in sizes.items():
         low, high = problem.expansion.nodes[id].reach

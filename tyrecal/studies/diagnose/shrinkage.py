@@ -183,7 +183,7 @@ def _placebo(problem: InverseProblem, hold: Array, random: np.random.Generator) 
     for id in problem.expansion.nodes:
         values, ln_weights = grid(problem.expansion.nodes[id])
         added = problem.added({id: values}, len(values))
-        each = zip(added.shift, added.tilt, problem.law(added), strict=True)
+        each = zip(added.shift, added.tilt, problem.response_covariance(added), strict=True)
         lns, errors = zip(*(fitted(*of_size) for of_size in each), strict=True)
         ln = np.logaddexp.reduce(np.array(lns) + ln_weights[:, None], axis=0)
         here = np.array(errors)[np.argmax(lns, axis=0), np.arange(PLACEBOS)]

@@ -20,10 +20,10 @@ from ...tyre.effects import catalogue
 from ...tyre.number_units import EFFECT_PATH
 from ..fit.targets import rims_of
 from ..inference.check_units import check_units
+from ..inference.effect_ranges import effect_ranges
 from ..inference.inverse_problem import Assumed, Toggle
-from ..inference.model import Query, Span
+from ..inference.model import EffectRange, Query
 from ..inference.observations import Observations, observe
-from ..inference.spans import spans_of
 from ..inference.tyre_model import TyreModel
 from ..inference.uncertainties import Source, calibrated, sources
 from ..labelling.label import label
@@ -34,7 +34,7 @@ from .calibrated import calibrated_variables
 from .diagnosis import Diagnosis, diagnose
 from .evidence import NONE
 from .label_swap import rows_if_exchanged
-from .labelings import Reading, likely, weighed_anew
+from .labelings import Reading, likely, with_probabilities
 from .next_measurement import OtherStates
 from .result import DiagnosisResult, diagnosis_result
 from .section_told import section_posterior
@@ -76,8 +76,8 @@ class DiagnosedCase:
     @property
     def asked_for(self) -> tuple[str, ...] | None:
         """The effects considered, where they are not all of the catalogue."""
-        known = {*self.diagnosis.problem.spans, *self.inexpressible, *self.calibrated}
-        return None if known == set(catalogue()) else tuple(self.diagnosis.problem.spans)
+        known = {*self.diagnosis.problem.ranges, *self.inexpressible, *self.calibrated}
+        return None if known == set(catalogue()) else tuple(self.diagnosis.problem.ranges)
 
 
 def study(
@@ -135,12 +135,12 @@ def study(
         readings = likely(labelled, lambda run: observed(in_states(case, run)))
     per_reading = [rows_if_exchanged(each.observations) for each in readings]
     rows = list(dict.fromkeys(row for each in per_reading for row in each))
-    spans, inexpressible = spans_of(case, evaluator, [id for id in ids if id not in fitted])
-    changes = tuple(_counted_from(change, spans) for _, change in toggled)
+    ranges, inexpressible = effect_ranges(case, evaluator, [id for id in ids if id not in fitted])
+    changes = tuple(_counted_from(change, ranges) for _, change in toggled)
     for change in changes:
-        spans[change.id] = _reaching(spans[change.id], change)
+        ranges[change.id] = _reaching(ranges[change.id], change)
     own_sources, assumed_sources = sources(case)
-    model = TyreModel(case, evaluator, rows, own_sources, spans, jobs)
+    model = TyreModel(case, evaluator, rows, own_sources, ranges, jobs)
     variables = read_variables(case)
     begin = None
     if first_guess:
@@ -154,7 +154,7 @@ def study(
         assumed,
         parts=model.parts if section_map else None,
         further=OtherStates(
-            lambda more: TyreModel(case, evaluator, more, own_sources, spans, jobs),
+            lambda more: TyreModel(case, evaluator, more, own_sources, ranges, jobs),
             case.case.pressure_kPa,
         ),
         stage=stage,
@@ -169,7 +169,9 @@ def study(
         fitted,
         model,
         _under_load(case, evaluator, own, diagnosis, model),
-        labels_posterior(case, weighed_anew(labelled, diagnosis.readings)) if labelled else None,
+        labels_posterior(case, with_probabilities(labelled, diagnosis.readings))
+        if labelled
+        else None,
     )
 
 
@@ -233,23 +235,23 @@ def parse_change(text: str) -> Toggle:
     return Toggle(id, number, mark == "*")
 
 
-def _counted_from(change: Toggle, spans: Mapping[str, Span]) -> Toggle:
+def _counted_from(change: Toggle, ranges: Mapping[str, EffectRange]) -> Toggle:
     """The change, from what the case has of its effect. Raises InputError."""
-    if change.id not in spans:
+    if change.id not in ranges:
         raise InputError(
             f"'{change.id}' was changed in a toggled run, but is not among the effects that are"
             " considered: add it with --effect, or leave --without; the solver has to express it,"
             " and no variable may set it"
         )
-    return replace(change, base=spans[change.id].base)
+    return replace(change, base=ranges[change.id].base)
 
 
-def _reaching(span: Span, change: Toggle) -> Span:
+def _reaching(span: EffectRange, change: Toggle) -> EffectRange:
     """The span with a node where the toggled run was measured, beyond the range if need be."""
     e = change.value - change.base
-    if change.times or span.low <= e <= span.high or e in (0.0, *span.also):
+    if change.times or span.low <= e <= span.high or e in (0.0, *span.extra_nodes):
         return span
-    return replace(span, also=(*span.also, e))
+    return replace(span, extra_nodes=(*span.extra_nodes, e))
 
 
 def _check_copies(paths: Sequence[Path], runs: Mapping[Path, Sequence[Measurement]]) -> None:

@@ -125,11 +125,11 @@ def _conditional(line: LinearFit, problem: InverseProblem, count: int) -> tuple[
     """Mean and variance (q, m) of the rows after the first ``count``, given these."""
     J = line.slopes * problem.spread
     T = line.covariance(problem) + J @ J.transpose(0, 2, 1)
-    known, beside = T[:, :count, :count], T[:, :count, count:]
-    gain = np.linalg.solve(known, beside).transpose(0, 2, 1)
+    known, cross = T[:, :count, :count], T[:, :count, count:]
+    gain = np.linalg.solve(known, cross).transpose(0, 2, 1)
     r = line.residual[:, :, None]
     mean = problem.observations.y[count:] - (r[:, count:] - gain @ r[:, :count])[:, :, 0]
-    taken = np.einsum("qmn,qnm->qm", gain, beside)
+    taken = np.einsum("qmn,qnm->qm", gain, cross)
     return mean, np.diagonal(T, axis1=1, axis2=2)[:, count:] - taken
 
 

@@ -1,17 +1,21 @@
 """The model between the few points where it was evaluated.
 
-With d = x - x0, quadratic about the plain fit x0, plus what each effect adds:
+eta (n,) are the model's rows, ln f of each mode and state and ln mass; x (v,) the coordinates of
+the design variables; e_i the parameter of effect i (see `model`). With d = x - x0, quadratic about
+the plain fit x0, plus what each effect adds:
 
     eta(x, e) = eta0 + J0 d + d^T H d / 2 + sum over effects i of [a_i(e_i) + B_i(e_i) d]
 
-a_i, B_i: polynomials in e_i through its nodes, 0 at e_i = 0: differences of what the model says at
-x0 with and without the effect; a_i has its slopes there, too, where the model gives them (Hermite).
-First every effect is evaluated at the far end of its range, and near 0 if it is bent; those that
-matter get one size more (`refined`).
-An effect that is in play is asked once more where its re-fit lies, at x_a, e_a: what the expansion
-is off by there, eta_a and J_a, it gains (e / e_a)^3 times (once beyond e_a), being itself off by
-terms of third order. Effects add up, but for pairs that were asked together at e_i, e_j: what the
-sum is off by there, it gains e_i e_j / (that) times (no more beyond).
+The shift a_i (n,) and the tilt B_i (n, v) are the changes of eta and of d eta / dx at x0 by the
+effect: polynomials in e_i through its nodes, 0 at e_i = 0. If the model gives d a_i / d e_i at the
+nodes, a_i has these slopes, too (Hermite). First every effect is evaluated at the far end of its
+range, and near 0 if its shift is bent; those that matter get one size more (`refined`).
+
+An active effect is evaluated once more where its re-fit is, at x_a, e_a. The error of the expansion
+there, of eta and of J, is added (e / e_a)^3 times (once beyond e_a), because the expansion itself
+is off by terms of third order. Effects add up, except pairs that were evaluated together at e_i,
+e_j: the error of their sum there is added in proportion to the product of both parameters, and no
+more beyond.
 """
 
 from __future__ import annotations
@@ -21,7 +25,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .model import Answer, Coupling, Query, ResponseModel, Span
+from .model import Answer, Coupling, EffectRange, Query, ResponseModel
 
 Array = np.ndarray
 BY_VALUES = (0.5, 1.0)  # of a one-sided range, the sizes of an effect without any slope
@@ -35,20 +39,20 @@ CURVATURE_STEP = 0.05  # of a logarithm, for H from two Jacobians
 class Refinement:
     """A point where an effect was evaluated again, and the expansion's error there."""
 
-    e: float
+    e: float  # parameter of the effect
     d: Array  # (v,) x - x0
-    shift: Array  # (n,)
-    tilt: Array  # (n, v)
+    shift: Array  # (n,) error of eta
+    tilt: Array  # (n, v) error of d eta / dx
 
 
 @dataclass(frozen=True)
 class PairInteraction:
     """A point where two effects were evaluated together, and the error of their sum there."""
 
-    e: tuple[float, float]
+    e: tuple[float, float]  # parameters of the two effects
     d: Array  # (v,) x - x0
-    shift: Array  # (n,)
-    tilt: Array  # (n, v)
+    shift: Array  # (n,) error of eta
+    tilt: Array  # (n, v) error of d eta / dx
 
     def at(self, first: Array, second: Array) -> tuple[Array, Array]:
         """Additions to a (q, n) and B (q, n, v) at parameters (q,)."""
@@ -61,14 +65,15 @@ class PairInteraction:
 class EffectResponse:
     """An effect at the sizes where it was evaluated."""
 
-    values: Array  # (k,) of its parameter
-    shift: Array  # (k, n) a_k
+    values: Array  # (k,) nodes: values of its parameter e, 0 among them
+    shift: Array  # (k, n) a_i at the nodes
     slope: Array  # (k, n) d a / d e; NaN: values alone serve the row; 0 where not sloped
-    sloped: Array  # (k,) whether it does
-    tilt: Array  # (k, n, v) B_k
-    split: Array  # (k, n)
-    reach: tuple[float, float]  # of the parameter, between nodes that have a solution
-    beside: Mapping[float, Array] = field(default_factory=dict)  # (n,) at far ends, see `Answer`
+    sloped: Array  # (k,) whether the slope at a node is known
+    tilt: Array  # (k, n, v) B_i at the nodes
+    split: Array  # (k, n) distance of the two modes of a pair, in ln f
+    reach: tuple[float, float]  # lowest and highest e between nodes that have a solution
+    # (n,) by end of the range: `Answer.shape_uncertainty`
+    shape_uncertainty: Mapping[float, Array] = field(default_factory=dict)
     anchor: Refinement | None = None
 
     def at(self, e: Array) -> tuple[Array, Array, Array]:
@@ -102,11 +107,11 @@ class EffectResponse:
         ends = np.array([end for end in self.reach if end])
         return self.shift_at(ends) / np.sqrt(3 * len(ends))
 
-    def beside_at(self, e: Array) -> Array:
-        """Shift by one standard deviation of what else the effect's nature leaves open (q, n): in
-        proportion to the effect."""
+    def shape_uncertainty_at(self, e: Array) -> Array:
+        """Shift (q, n) by one standard deviation of the effect's second, uncertain number
+        (`Effect.shape_uncertainty`), in proportion to the effect's parameters e (q,)."""
         more = np.zeros((len(e), self.shift.shape[1]))
-        for end, each in self.beside.items():
+        for end, each in self.shape_uncertainty.items():
             more += np.maximum(e / end, 0.0)[:, None] * each
         return more
 
@@ -121,12 +126,12 @@ class EffectResponse:
 class Expansion:
     """The model about x0, there without effects."""
 
-    x0: Array  # (v,)
-    eta: Array  # (n,)
-    jacobian: Array  # (n, v)
-    hessian: Array  # (n, v, v)
-    split: Array  # (n,)
-    constants: Array  # (n, k)
+    x0: Array  # (v,) coordinates of the plain fit
+    eta: Array  # (n,) ln f and ln mass at x0
+    jacobian: Array  # (n, v) J0 = d eta / dx at x0
+    hessian: Array  # (n, v, v) H = d2 eta / dx2 at x0
+    split: Array  # (n,) distance of the two modes of a pair, in ln f
+    constants: Array  # (n, k) change of eta by one standard deviation of each source of error
     nodes: Mapping[str, EffectResponse]  # of effects by id
     failed: Mapping[str, str] = field(default_factory=dict)  # why effects, by id, have no nodes
     coupling: Coupling | None = None  # of modes by the sources of error
@@ -152,11 +157,11 @@ def expand(model: ResponseModel, x0: Array) -> Expansion:
     An effect that matters is evaluated at more sizes later, see `refined` and `anchored`.
     Raises what the model answered where it has no solution at x0 itself.
     """
-    ids, count = list(model.spans), len(x0)
+    ids, count = list(model.ranges), len(x0)
     steps = CURVATURE_STEP * np.eye(count)
     at_0 = tuple(id for id in ids if id in model.sloped_at_0)
     slopes = {id: (id in model.sloped_at_0) + (id in model.sloped) for id in ids}
-    values = {id: node_values(model.spans[id], slopes[id]) for id in ids}
+    values = {id: node_values(model.ranges[id], slopes[id]) for id in ids}
     points = [Query(x0, constants=True, slopes=at_0, coupled=True)]
     points += [Query(x0 + step, near=x0) for step in steps]
     pairs = [(id, float(e)) for id in ids for e in values[id]]
@@ -191,15 +196,15 @@ def expand(model: ResponseModel, x0: Array) -> Expansion:
         (id, e)
         for id in ids
         for e in (
-            *_nearer(model.spans[id], by_effect[id]),
-            *_bent(_nodes(id, plain, model.spans[id], by_effect[id])),
+            *_nearer(model.ranges[id], by_effect[id]),
+            *_bent(_nodes(id, plain, model.ranges[id], by_effect[id])),
         )
     ]
     again = model.answers([_with_effect(model, x0, id, e) for id, e in more]) if more else []
     for (id, e), answer in zip(more, again, strict=True):
         by_effect[id][e] = answer
     for id in ids:
-        made = _nodes(id, plain, model.spans[id], by_effect[id])
+        made = _nodes(id, plain, model.ranges[id], by_effect[id])
         if made is None:
             failed[id] = str(next(a for a in by_effect[id].values() if isinstance(a, Exception)))
         else:
@@ -237,16 +242,16 @@ def carried(known: Expansion, model: ResponseModel, x0: Array) -> Expansion:
     )
 
 
-def node_values(span: Span, slopes: int = 0) -> Array:
+def node_values(span: EffectRange, slopes: int = 0) -> Array:
     """Sizes at which an effect is evaluated first: parameters other than 0, rising.
 
     slopes: 1 if its slope is known at 0 or at these sizes, 2 if at both: then the farther end of
     a two-sided range is enough.
     """
     far = span.high if abs(span.high) >= abs(span.low) else span.low
-    if span.low < 0 < span.high and (slopes < 2 or span.second):
-        return np.sort([span.low, span.high, *span.also])
-    return np.sort([*(far * np.array([1.0] if slopes else BY_VALUES)), *span.also])
+    if span.low < 0 < span.high and (slopes < 2 or span.has_shape_uncertainty):
+        return np.sort([span.low, span.high, *span.extra_nodes])
+    return np.sort([*(far * np.array([1.0] if slopes else BY_VALUES)), *span.extra_nodes])
 
 
 def refined(expansion: Expansion, model: ResponseModel, sizes: Mapping[str, float]) -> Expansion:
@@ -285,16 +290,16 @@ def anchored(expansion: Expansion, model: ResponseModel, wanted: Sequence[Query]
 
 
 def _with_effect(model: ResponseModel, x: Array, id: str, e: float) -> Query:
-    """The question for one effect, its slope where the model has that, and, at the ends of its
-    range, what else its nature leaves open."""
-    span = model.spans[id]
-    beside = span.second and e in (span.low, span.high)
+    """The query for one effect, with its slope if the model has that and, at the ends of its range,
+    the shift by its uncertain shape."""
+    span = model.ranges[id]
+    uncertain = span.has_shape_uncertainty and e in (span.low, span.high)
     slopes = (id,) if id in model.sloped else ()
-    return Query(x, {id: e}, slopes=slopes, beside=beside, near=x)
+    return Query(x, {id: e}, slopes=slopes, shape_uncertainty=uncertain, near=x)
 
 
 def _nodes(
-    id: str, plain: Expansion, span: Span, replies: Mapping[float, Answer | Exception]
+    id: str, plain: Expansion, span: EffectRange, replies: Mapping[float, Answer | Exception]
 ) -> EffectResponse | None:
     """Nodes from 0 outwards as far as there are solutions; None where there is none at all."""
     known = {0.0: Answer(plain.eta, plain.jacobian, plain.split), **replies}
@@ -324,14 +329,14 @@ def _nodes(
         np.array([each.split for each in answers]),
         (low, high),
         {
-            e: each.beside
+            e: each.shape_uncertainty
             for e, each in zip(map(float, values), answers, strict=True)
-            if e in (low, high) and each.beside is not None
+            if e in (low, high) and each.shape_uncertainty is not None
         },
     )
 
 
-def _nearer(span: Span, replies: Mapping[float, Answer | Exception]) -> list[float]:
+def _nearer(span: EffectRange, replies: Mapping[float, Answer | Exception]) -> list[float]:
     """Parameters nearer to 0, and on its other side, where none so far has a solution."""
     if any(isinstance(reply, Answer) for e, reply in replies.items() if e):
         return []

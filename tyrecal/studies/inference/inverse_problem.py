@@ -1,4 +1,9 @@
-"""Observations and the model: one set of rows, covariance and prior for every hypothesis."""
+"""Observations and the model: one set of rows, covariance and prior for every hypothesis.
+
+    y = eta(x, e) + error,   error ~ N(0, Sigma),   x ~ N(centre, spread^2)
+
+y (n,): ln of the measured values; eta: the model's rows (`model`); Sigma: see `covariance`.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +16,7 @@ import numpy as np
 
 from .covariance import alike, covariance
 from .expansion import Expansion
-from .model import Span
+from .model import EffectRange
 from .observations import Observations
 from .splits import Splits
 from .veering import Veering, rule, veering
@@ -39,10 +44,13 @@ class Toggle:
 class Assumed:
     """Numbers, all of them relative, that the diagnosis takes for granted and states."""
 
-    # error of the model in ln f of every mode; None: the recorded one, and that of material laws
+    # standard deviation of the model's error in ln f of every mode; None: the recorded one of each
+    # mode (`form_error`), and that of material laws
     form: float | None = None
     split: float = 0.003  # distance of the two modes of a pair by non-uniformity, in ln f
-    law: float | None = None  # error of an effect's shift over that shift; None: `Effect.law`
+    # standard deviation of the error of an effect's shift over that shift; None: that of each
+    # effect (`Effect.response_error`)
+    response_error: float | None = None
     further: float = 0.05  # prior of k + 1 effects over that of k, from k = 1 on
 
 
@@ -52,8 +60,8 @@ class Added(NamedTuple):
     shift: Array  # (q, n) change of eta at x0
     tilt: Array  # (q, n, v) change of the sensitivities d eta / dx
     split: Array  # (q, n) distance of the two modes of a pair with the effects, in ln f
-    off: Array  # (k, q, n) standard deviation of the shift by the effect's law, mode by mode
-    beside: Array  # (k, q, n) shift by one standard deviation of its second number: `Effect.beside`
+    off: Array  # (k, q, n) standard deviation of the shift by `response_error`, mode by mode
+    shape_uncertainty: Array  # (k, q, n) shift by one standard deviation of the uncertain shape
 
 
 @dataclass(frozen=True)
@@ -62,7 +70,7 @@ class InverseProblem:
 
     observations: Observations
     expansion: Expansion
-    spans: Mapping[str, Span]
+    ranges: Mapping[str, EffectRange]
     places: Array  # (n,) of the observations among the model's rows
     centre: Array  # (v,) mean of the prior of x
     spread: Array  # (v,) standard deviation of the prior of x
@@ -82,7 +90,7 @@ class InverseProblem:
 
     @cached_property
     def sigma(self) -> Array:
-        """Sigma (n, n)."""
+        """Sigma (n, n): covariance of y - eta without effects."""
         mixed = self.mixed if self.zeta else None
         return self.covariance(self.observations, self.constants, mixed)
 
@@ -143,8 +151,8 @@ class InverseProblem:
         if not self.zeta:
             return eta, jacobian, np.zeros(len(eta))
         eta, own, part, ln_label = self.veering.mixed(eta, self.zeta)
-        beside = jacobian[:, self.veering.partner]
-        return eta, own[:, :, None] * jacobian + part[:, :, None] * beside, ln_label
+        partners = jacobian[:, self.veering.partner]
+        return eta, own[:, :, None] * jacobian + part[:, :, None] * partners, ln_label
 
     def added(self, effects: Mapping[str, Array], count: int) -> Added:
         """Contribution of effects, each (count,). Squares of splits add up, each counted from the
@@ -155,7 +163,7 @@ class InverseProblem:
         square = np.tile(own, (count, 1))
         runs = np.array([row.run for row in self.observations.rows])
         ids = [id for id in self.expansion.nodes if id in effects or id in self._switched]
-        off, beside = np.zeros((2, len(ids), count, n))
+        off, shape_uncertainty = np.zeros((2, len(ids), count, n))
         for run in sorted(set(runs.tolist())):
             rows = np.flatnonzero(runs == run)
             here = dict(effects)
@@ -167,9 +175,9 @@ class InverseProblem:
                     shift[:, rows] += a[:, self.places[rows]]
                     tilt[:, rows] += B[:, self.places[rows]]
                     square[:, rows] += s[:, self.places[rows]] ** 2 - own[rows]
-                    off[ids.index(id)][:, rows] = self._law(id) * a[:, self.places[rows]]
-                    more = self.expansion.nodes[id].beside_at(e)
-                    beside[ids.index(id)][:, rows] = more[:, self.places[rows]]
+                    off[ids.index(id)][:, rows] = self._response_error(id) * a[:, self.places[rows]]
+                    more = self.expansion.nodes[id].shape_uncertainty_at(e)
+                    shape_uncertainty[ids.index(id)][:, rows] = more[:, self.places[rows]]
             for both, joint in self.expansion.joint.items():
                 if set(both) <= set(here):
                     a, B = joint.at(*(here[id] for id in both))
@@ -178,30 +186,29 @@ class InverseProblem:
         if self.zeta:
             shift, tilt = shift @ self.mixed.T, self.mixed @ tilt
         split = np.sqrt(np.maximum(square, 0.0))
-        return self.with_mixed_laws(Added(shift, tilt, split, off, beside))
+        return self.with_mixed_laws(Added(shift, tilt, split, off, shape_uncertainty))
 
     def with_mixed_laws(self, added: Added) -> Added:
         """Transform the response errors of effects to the coupled modes."""
         if not self.zeta:
             return added
-        off, beside = (each @ self.mixed.T for each in (added.off, added.beside))
-        return added._replace(off=off, beside=beside)
+        by_mode, by_shape = added.off @ self.mixed.T, added.shape_uncertainty @ self.mixed.T
+        return added._replace(off=by_mode, shape_uncertainty=by_shape)
 
-    def law(self, added: Added) -> Array:
+    def response_covariance(self, added: Added) -> Array:
         """Covariance (q, n, n) of the errors of what effects add to eta."""
-        by_mode, beside = self.laws(added)
-        return by_mode + beside
+        return np.add(*self.response_covariances(added))
 
-    def laws(self, added: Added) -> tuple[Array, Array]:
-        """The two parts of `law`: by the laws of the effects mode by mode, and by their second
-        numbers."""
-        off, beside = (each.transpose(1, 2, 0) for each in (added.off, added.beside))
+    def response_covariances(self, added: Added) -> tuple[Array, Array]:
+        """The two parts (q, n, n) of `response_covariance`: by the response errors of the effects,
+        mode by mode, and by their uncertain shapes."""
+        off, shape = (each.transpose(1, 2, 0) for each in (added.off, added.shape_uncertainty))
         by_mode = off @ off.swapaxes(1, 2) * self._alike
-        return np.asarray(by_mode), np.asarray(beside @ beside.swapaxes(1, 2))
+        return np.asarray(by_mode), np.asarray(shape @ shape.swapaxes(1, 2))
 
-    def _law(self, id: str) -> float:
-        stated = self.assumed.law
-        return self.spans[id].law if stated is None else stated
+    def _response_error(self, id: str) -> float:
+        stated = self.assumed.response_error
+        return self.ranges[id].response_error if stated is None else stated
 
     @property
     def _switched(self) -> list[str]:

@@ -1,8 +1,11 @@
 """Interface between the diagnosis and the model that answers it.
 
-eta(x, e, c) = ln f over rows (mode, pressure) and ln mass; x: logarithms of the design variables
-(linear ones: in units of the width of their bounds); e: parameters of effects; c: constants that
-nobody calibrates. All else works on this alone, so that an emulator can take its place.
+    eta(x, e, c)
+
+eta (n,): ln f of n rows, each a mode in a state, and ln mass. x (v,): logarithms of the v design
+variables (linear ones: in units of the width of their bounds). e: parameters of effects, 0 if
+absent. c: constants that no fit calibrates, the sources of error. The diagnosis works on this
+interface alone, so that an emulator can take the place of the finite element model.
 """
 
 from __future__ import annotations
@@ -22,19 +25,20 @@ ModelRow = tuple[Label | None, Where]  # a mode, None: the mass
 
 
 @dataclass(frozen=True)
-class Span:
-    """An effect that can be evaluated: the range of its parameter."""
+class EffectRange:
+    """An effect that the solver can express on this case, and the range of its parameter e."""
 
-    low: float
-    high: float
-    unit: str = ""
-    title: str = ""
-    toggle: str = ""
-    base: float = 0.0  # what the case has of it; low, high and all parameters count from there
-    also: tuple[float, ...] = ()  # beyond the range, at which toggled runs were measured
-    law: float = 0.04  # of its shift of a mode, by which a real one's may be off
-    second: bool = False  # whether there is more to it than its parameter, see `Query.beside`
-    stated: float = 0.0  # standard deviation of it by the case's uncertainties; 0: it states none
+    low: float  # lowest e
+    high: float  # highest e
+    unit: str = ""  # of e
+    title: str = ""  # the effect's name in words
+    toggle: str = ""  # the experiment that would prove it
+    base: float = 0.0  # value that the case has; low, high and e count from there
+    extra_nodes: tuple[float, ...] = ()  # e beyond the range, where toggled runs were measured
+    response_error: float = 0.04  # see `Effect.response_error`
+    has_shape_uncertainty: bool = False  # whether the effect has `Effect.shape_uncertainty`
+    # standard deviation of e by the case's `uncertainties`; 0: the case states none
+    prior_sd: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -43,10 +47,10 @@ class Query:
 
     x: Array  # (v,)
     effects: Mapping[str, float] = field(default_factory=dict)  # parameter by id, absent: 0
-    constants: bool = False  # whether for slopes by the sources of error, too
-    slopes: tuple[str, ...] = ()  # effects for slopes by whose parameters, too
-    coupled: bool = False  # whether for what couples modes, too
-    beside: bool = False  # whether for what else the nature of its effect leaves open, too
+    constants: bool = False  # whether `Answer.constants` is wanted
+    slopes: tuple[str, ...] = ()  # ids of the effects of which `Answer.slopes` are wanted
+    coupled: bool = False  # whether `Answer.coupling` is wanted
+    shape_uncertainty: bool = False  # whether `Answer.shape_uncertainty` is wanted
     # (v,) x of a plain tyre: a model may evaluate the lowest and the highest pressure only, and
     # interpolate the shift from that tyre between them
     near: Array | None = None
@@ -57,8 +61,9 @@ class Coupling:
     """Coupling of modes by the sources of error, see `veering`."""
 
     partner: Array  # (n,) row of the other mode at the same pressure, -1: there is none
-    size: Array  # (n,) standard deviation of q over lambda
-    rise: Array  # (n,) of the two modes' mean, for q at one standard deviation
+    size: Array  # (n,) standard deviation of the coupling q over lambda = (2 pi f)^2
+    # (n,) relative rise of the mean of both modes' lambda if q is one standard deviation
+    rise: Array
 
 
 @dataclass(frozen=True)
@@ -68,10 +73,12 @@ class Answer:
     eta: Array  # (n,) ln f or ln mass
     jacobian: Array  # (n, v) d eta / d x
     split: Array  # (n,) ln of the ratio of a pair's frequencies
-    constants: Array | None = None  # (n, k) change by one standard deviation of each source
+    # (n, k) change of eta by one standard deviation of each of the k sources of error
+    constants: Array | None = None
     slopes: Mapping[str, Array] = field(default_factory=dict)  # (n,) d eta / d e; NaN: unknown
     coupling: Coupling | None = None
-    beside: Array | None = None  # (n,) more eta, by one standard deviation of that
+    # (n,) change of eta by one standard deviation of the effect's `Effect.shape_uncertainty`
+    shape_uncertainty: Array | None = None
     by_pressure: Array | None = None  # (n,) d eta / d ln(pressure), if it was evaluated
 
 
@@ -84,10 +91,10 @@ class ResponseModel(Protocol):
     """A model that answers queries."""
 
     variables: Sequence[str]  # names of x
-    start: Array  # (v,) centre of what x can be
-    spread: Array  # (v,) its standard deviation
-    sources: Sequence[str]  # names of the sources of error
-    spans: Mapping[str, Span]  # effects by id
+    start: Array  # (v,) mean of the prior of x
+    spread: Array  # (v,) standard deviation of the prior of x
+    sources: Sequence[str]  # names of the k sources of error: constants that no fit calibrates
+    ranges: Mapping[str, EffectRange]  # effects by id
     material_laws: float  # standard deviation of ln f by laws other than its own
 
     @property

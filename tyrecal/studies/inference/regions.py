@@ -75,14 +75,14 @@ def regions(model: Parted, x: Array) -> list[SectionPart]:
         if not isinstance(each, LabelledModes):
             raise each
         at[state] = each
-    weighed = at[model.states[0]].evaluation
+    first = at[model.states[0]].evaluation
     result = []
     for material, name in parts.items():
         columns = np.zeros((2, len(model.rows)))
         for i, (label, where) in enumerate(model.rows):
             if label is None:
                 path = density[material]
-                columns[1, i] = weighed.mass_gradients[path] * design[path] / weighed.mass_kg
+                columns[1, i] = first.mass_gradients[path] * design[path] / first.mass_kg
                 continue
             answer = at[state_of(where)]
             mode, gradients = answer.wanted[label], answer.evaluation.gradients

@@ -25,7 +25,7 @@ from ..variable import read_variables
 from .between import Between
 from .expansion import node_values
 from .form_error import MATERIAL_LAWS
-from .model import Answer, Coupling, ModelRow, Query, Span, state_of
+from .model import Answer, Coupling, EffectRange, ModelRow, Query, state_of
 from .regions import SectionPart, regions
 from .section_design import SectionDesign
 from .section_fields import OF_COMPOUNDS, known_from
@@ -55,7 +55,7 @@ class TyreModel:
         evaluator: Evaluator,
         rows: Sequence[ModelRow],
         own_sources: list[Source],
-        spans: Mapping[str, Span],
+        ranges: Mapping[str, EffectRange],
         jobs: int = 1,
     ):
         if not evaluator.has_gradients and "gradients" in evaluator.solver.capabilities:
@@ -71,7 +71,7 @@ class TyreModel:
                 " 'tyrecal solvers' shows which one does (gradients)"
             )
         self.rows, self.found, self.jobs = list(rows), own_sources, jobs
-        self.spans: Mapping[str, Span] = spans
+        self.ranges: Mapping[str, EffectRange] = ranges
         self._present = case.case.effects
         found_in = {state_of(where) for label, where in rows if label}
         self.states = sorted(found_in, key=lambda s: (s.pressure_kPa, s.rim or "")) or [
@@ -93,7 +93,7 @@ class TyreModel:
         self.spread = np.array([v.spread for v in read_variables(case)])
         self._plain = values_of(case, own_sources)
         self._plain.setdefault("pressure_kPa", case.case.pressure_kPa)
-        self._slopeless = {id for id, span in spans.items() if not self._has_slopes(id, span)}
+        self._slopeless = {id for id, span in ranges.items() if not self._has_slopes(id, span)}
         self._between = Between.of(self.rows, self.states)
         self._known_moves: dict[tuple[str, float], bool] = {}
         self._plain_answers: dict[bytes, Answer] = {}
@@ -102,21 +102,21 @@ class TyreModel:
     @cached_property
     def sloped(self) -> Collection[str]:
         """Effects with whose parameter numbers of the decks change, and no keywords."""
-        ends = {id: node_values(span, 1).tolist() for id, span in self.spans.items()}
-        able = [id for id in self.spans if id not in self._slopeless]
+        ends = {id: node_values(span, 1).tolist() for id, span in self.ranges.items()}
+        able = [id for id in self.ranges if id not in self._slopeless]
         return {id for id in able if all(self._moves(id, e) for e in ends[id])}
 
     @cached_property
     def sloped_at_0(self) -> Collection[str]:
         """Effects that change numbers of the decks, and no keywords, from 0 on. A splice is to
         first order its share of the circumference, all round."""
-        return {id for id in self.spans if self._moves(id, 0.0)}
+        return {id for id in self.ranges if self._moves(id, 0.0)}
 
     @cached_property
     def _sloped_sources(self) -> Collection[str]:
         """Sources of error that are effects with exact sensitivities at 0; none without effects to
         weigh, because the standard errors of a fit are defined by the step."""
-        if not self.spans:
+        if not self.ranges:
             return set()
         paths = {path for source in self.found for path in source.steps}
         ids = [path.removeprefix(EFFECT_PATH) for path in paths if path.startswith(EFFECT_PATH)]
@@ -225,8 +225,8 @@ class TyreModel:
             if not isinstance(plain, Answer):
                 return plain
             answer = replace(answer, jacobian=plain.jacobian)
-        if point.beside:
-            answer = replace(answer, beside=self._beside(point, answer.eta))
+        if point.shape_uncertainty:
+            answer = replace(answer, shape_uncertainty=self._shape_uncertainty(point, answer.eta))
         constants = None
         if _needs_constants(point):
             assert answer.constants is not None
@@ -253,17 +253,17 @@ class TyreModel:
             split=answer.split[:n],
             constants=cut(answer.constants),
             slopes={id: slope[:n] for id, slope in answer.slopes.items()},
-            beside=cut(answer.beside),
+            shape_uncertainty=cut(answer.shape_uncertainty),
             by_pressure=cut(answer.by_pressure),
         )
 
-    def _beside(self, point: Query, eta: Array) -> Array | None:
+    def _shape_uncertainty(self, point: Query, eta: Array) -> Array | None:
         """More eta (n,) by what else the nature of the point's effect leaves open, evaluated at the
         highest pressure; None where the case cannot have it. The tyre at x is written first, so
         that all is of its numbers."""
         ((id, e),) = point.effects.items()
         own = with_values(self.case, {**self.values(point.x), EFFECT_PATH + id: 0.0})
-        add = catalogue()[id].beside
+        add = catalogue()[id].shape_uncertainty
         assert add
         try:
             made = add(own, self._present.get(id, 0.0) + e)
@@ -294,7 +294,7 @@ class TyreModel:
         self._known_parts.append((np.array(x), regions(self, x)))
         return self._known_parts[-1][1]
 
-    def _has_slopes(self, id: str, span: Span) -> bool:
+    def _has_slopes(self, id: str, span: EffectRange) -> bool:
         """Whether the solver gives slopes with an effect."""
         try:
             far = span.base + span.high or span.base + span.low

@@ -81,7 +81,7 @@ class Labelings:
     z: Array  # (v,) the variables' mean under the first
     discrepancy: float  # the model's, its mean over all
 
-    def weighed_anew(self, shares: Array) -> Labelings:
+    def with_probabilities(self, shares: Array) -> Labelings:
         """The first ones sharing otherwise, ``shares`` (first,), what they have together."""
         first = len(shares)
         p = np.append(self.probabilities[:first].sum() * shares, self.probabilities[first:])

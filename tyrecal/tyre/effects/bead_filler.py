@@ -82,6 +82,6 @@ EFFECT = Effect(
     add_to_deck=add_to_deck,
     part="bead_filler",
     # it gets softer towards its tip; its height is integrated over
-    law=0.08,
-    beside=higher,
+    response_error=0.08,
+    shape_uncertainty=higher,
 )

@@ -110,5 +110,5 @@ EFFECT = Effect(
     aliases=("rim_width",),
     add=add,
     # how far a bead rolls about its wires
-    law=0.08,
+    response_error=0.08,
 )

@@ -55,5 +55,5 @@ EFFECT = Effect(
     add_to_deck=add_to_deck,
     part="belts",
     # cords turn as a pantograph from crown to edge, where this turns all alike
-    law=0.06,
+    response_error=0.06,
 )

@@ -71,5 +71,5 @@ EFFECT = Effect(
     aliases=("cap_ply", "belt_angle", "bead_filler"),
     add=add,
     # belts end in steps, which move by their own amounts
-    law=0.06,
+    response_error=0.06,
 )

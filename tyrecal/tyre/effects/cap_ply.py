@@ -62,6 +62,6 @@ EFFECT = Effect(
     aliases=("belt_width", "bead_filler", "belt_angle"),
     add=add,
     # one layer or more at the edges; wound at 0 to 5 degrees; its width is integrated over
-    law=0.10,
-    beside=to_the_edge,
+    response_error=0.10,
+    shape_uncertainty=to_the_edge,
 )

@@ -58,5 +58,5 @@ EFFECT = Effect(
     aliases=("temperature_drift",),
     add=add,
     # cords fan as the lift of the drum was, not quite as the radius
-    law=0.06,
+    response_error=0.06,
 )

@@ -79,5 +79,5 @@ EFFECT = Effect(
     aliases=("rim_width",),
     add=add,
     # it ends anywhere from the filler's tip to the shoulder
-    law=0.10,
+    response_error=0.10,
 )

@@ -34,5 +34,5 @@ EFFECT = Effect(
     add_to_deck=add,
     needs="cavity",
     # a gas in a hollow ring: both laws are known
-    law=0.04,
+    response_error=0.04,
 )

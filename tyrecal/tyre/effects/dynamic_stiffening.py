@@ -90,5 +90,5 @@ EFFECT = Effect(
     add_to_deck=add_to_deck,
     needs="vibration_modulus",
     # compounds differ in it by a third, and so do parts
-    law=0.08,
+    response_error=0.08,
 )

@@ -39,11 +39,12 @@ class Effect:
     # `add` for a case of a user's deck, None = it changes lines or regions of a section
     add_to_deck: Callable[[LoadedCase, float], LoadedCase] | None = None
     part: str = ""  # of ``deck.parts``, which a case of a user's deck must name for it, "" = none
-    # relative error of its shift of a mode against a real tyre's, one standard deviation
-    law: float = 0.04
-    # `add` with a second, uncertain number of the effect, such as the height of a filler, one
-    # standard deviation off; a diagnosis integrates over it; None: there is none
-    beside: Callable[[LoadedCase, float], LoadedCase] | None = None
+    # standard deviation of the error of the effect's shift of a frequency over that shift: a real
+    # tyre responds a little otherwise than this model of the effect
+    response_error: float = 0.04
+    # `add` with one standard deviation more of a second, uncertain number of the effect, such as
+    # the height of a bead filler; a diagnosis integrates over it; None: there is none
+    shape_uncertainty: Callable[[LoadedCase, float], LoadedCase] | None = None
     pressure_power: int = 0  # power of the tyre's pressure that its range scales with: `range_on`
 
     def __repr__(self) -> str:

@@ -36,5 +36,5 @@ EFFECT = Effect(
     add=add,
     needs="frequency_modulus",
     # compounds differ in it by a third, and so do parts
-    law=0.08,
+    response_error=0.08,
 )

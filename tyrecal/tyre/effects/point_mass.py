@@ -34,5 +34,5 @@ EFFECT = Effect(
     add_to_deck=add,
     needs="coupled",
     # a mass is a mass; it may sit beside the middle
-    law=0.04,
+    response_error=0.04,
 )

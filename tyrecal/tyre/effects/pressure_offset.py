@@ -35,5 +35,5 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add,
     # the same pressure everywhere; a gauge may be off by a share, too
-    law=0.04,
+    response_error=0.04,
 )

@@ -94,5 +94,5 @@ EFFECT = Effect(
     aliases=("carcass_turn_up", "bead_seat"),
     add=add,
     # how the sidewall bends where the flange holds it
-    law=0.05,
+    response_error=0.05,
 )

@@ -43,5 +43,5 @@ EFFECT = Effect(
     add_to_deck=add,
     needs="coupled",
     # the patch is no point, and sticks in part
-    law=0.10,
+    response_error=0.10,
 )

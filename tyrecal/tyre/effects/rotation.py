@@ -33,5 +33,5 @@ EFFECT = Effect(
     add_to_deck=add,
     needs="rotation",
     # Coriolis' forces are exact; the tread's heating is not in them
-    law=0.04,
+    response_error=0.04,
 )

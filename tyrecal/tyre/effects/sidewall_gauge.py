@@ -46,5 +46,5 @@ EFFECT = Effect(
     add_to_deck=add_to_deck,
     part="sidewall",
     # thicker in its upper or its lower half, inside or outside the ply
-    law=0.06,
+    response_error=0.06,
 )

@@ -43,8 +43,8 @@ def _spindle(key: str, along: str, **entry: Any) -> Effect:
         add=add,
         add_to_deck=add,
         needs="spindle",
-        law=0.04,  # springs in series; its mass is integrated over
-        beside=lambda case, value: heavier(add(case, value)),
+        response_error=0.04,  # springs in series; its mass is integrated over
+        shape_uncertainty=lambda case, value: heavier(add(case, value)),
         **entry,
     )
 

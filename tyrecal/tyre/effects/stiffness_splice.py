@@ -54,5 +54,5 @@ EFFECT = Effect(
     add_to_deck=add_to_deck,
     needs="coupled",
     # plies and tread overlap by widths of their own
-    law=0.10,
+    response_error=0.10,
 )

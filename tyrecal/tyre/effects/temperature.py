@@ -50,5 +50,5 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add_to_deck,
     # the tread is warmer than the sidewall, or colder
-    law=0.08,
+    response_error=0.08,
 )

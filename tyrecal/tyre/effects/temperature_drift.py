@@ -38,5 +38,5 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add,
     # the tread is warmer than the sidewall, and warming levels off
-    law=0.08,
+    response_error=0.08,
 )

@@ -64,6 +64,6 @@ EFFECT = Effect(
     add_to_deck=add_to_deck,
     part="tread",
     # voids lie in the middle or at the shoulders; what stiffness they take is integrated over
-    law=0.08,
-    beside=as_voids,
+    response_error=0.08,
+    shape_uncertainty=as_voids,
 )

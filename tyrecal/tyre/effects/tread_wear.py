@@ -66,6 +66,6 @@ EFFECT = Effect(
     add_to_deck=add_to_deck,
     part="tread",
     # heel and toe, blocks; the profile across is integrated over
-    law=0.06,
-    beside=at_shoulders,
+    response_error=0.06,
+    shape_uncertainty=at_shoulders,
 )

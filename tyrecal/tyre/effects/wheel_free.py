@@ -49,5 +49,5 @@ EFFECT = Effect(
     add_to_deck=add,
     needs="spindle",
     # a rigid mass; cords give it no more than 1 to 2 Hz
-    law=0.04,
+    response_error=0.04,
 )

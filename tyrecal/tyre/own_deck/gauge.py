@@ -45,15 +45,15 @@ def _growth(model: DeckModel, sets: Sets) -> Mapping[int, Point]:
     held, pressed = set(model.rim), {face[:2] for face in model.cavity}
     free = {face[:2] for face in model.boundary if face[:2] not in pressed}
     outer = list[Face]()
-    beside: dict[frozenset[int], Face] = {}
+    unmatched: dict[frozenset[int], Face] = {}
     for number in sorted(own):
         for name, nodes in faces_of(model.elements[number]):
             face = number, name, nodes
             if (number, name) in free and not held.issuperset(nodes):
                 outer.append(face)
-            elif beside.pop(frozenset(nodes), None) is None:
-                beside[frozenset(nodes)] = face
-    inner = list(beside.values())  # of one element of the part alone
+            elif unmatched.pop(frozenset(nodes), None) is None:
+                unmatched[frozenset(nodes)] = face
+    inner = list(unmatched.values())  # of one element of the part alone
     if not outer or not inner:
         raise sections[0].block.refused(f"a gauge of {sets[0]} needs a free outer surface")
     members = sorted({n for number in own for n in model.elements[number].nodes})

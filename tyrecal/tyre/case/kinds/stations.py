@@ -74,7 +74,7 @@ class Stations(TyreKind):
 
     def shape_uncertainty(self, effect: Any) -> Change | None:
         """The effect's own."""
-        change: Change | None = effect.beside
+        change: Change | None = effect.shape_uncertainty
         return change
 
     def parts(self, case: Case, section: Section) -> tuple[Case, Mapping[str, str]]:

@@ -9,13 +9,13 @@ from ...tyre.case import LoadedCase
 from ...tyre.case.mistakes import suggestion
 from ...tyre.effects import Effect, catalogue
 from ...tyre.number_units import EFFECT_PATH
-from .model import Span
+from .model import EffectRange
 from .uncertainties import sources
 
 
-def spans_of(
+def effect_ranges(
     case: LoadedCase, evaluator: Evaluator, ids: Sequence[str] | None = None
-) -> tuple[dict[str, Span], dict[str, str]]:
+) -> tuple[dict[str, EffectRange], dict[str, str]]:
     """Effects that the evaluator's solver can express, and why it cannot the others, or a case of a
     user's deck cannot have them. Raises ValueError where one of ``ids`` is no effect; InputError
     for decks in three dimensions.
@@ -23,7 +23,7 @@ def spans_of(
     case.kind.require_section(
         "a diagnosis needs a section, and this tyre is given by decks in three dimensions"
     )
-    able: dict[str, Span] = {}
+    able: dict[str, EffectRange] = {}
     unable: dict[str, str] = {}
     stated = {path: abs(step) for each in sources(case)[0] for path, step in each.steps.items()}
     for id in ids or ():
@@ -39,14 +39,14 @@ def spans_of(
         else:
             base, words = case.case.effects.get(id, 0.0), (effect.unit, effect.title, effect.toggle)
             low, high = effect.range_on(case)
-            able[id] = Span(
+            able[id] = EffectRange(
                 low - base,
                 high - base,
                 *words,
                 base,
-                law=effect.law,
-                stated=stated.get(EFFECT_PATH + id, 0.0),
-                second=case.kind.shape_uncertainty(effect) is not None,
+                response_error=effect.response_error,
+                prior_sd=stated.get(EFFECT_PATH + id, 0.0),
+                has_shape_uncertainty=case.kind.shape_uncertainty(effect) is not None,
             )
     return able, unable
 
