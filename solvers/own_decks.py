@@ -13,14 +13,16 @@ OWN_DECKS_FILE = "own_decks.json"
 
 @dataclass(frozen=True)
 class DecksOfRun:
-    """Own decks of a run."""
+    """The decks of a run, in the order in which the solver runs them."""
 
-    jobs: list[tuple[str, str]]  # each with the one that it continues, or ""
-    modes: int | None  # requested of the last one, None where a range of frequencies decides
-    pressure_Pa: float
-    length_m: float  # unit of the decks
-    mass_kg: float  # unit of the decks
-    mass_sets: list[str]  # element sets that have a mass
+    jobs: list[
+        tuple[str, str]
+    ]  # name of each job, and of the one that it continues (restart) or ""
+    modes: int | None  # number requested of the last job, None if a range of frequencies decides
+    pressure_Pa: float  # inflation pressure
+    length_m: float  # metres per unit of length of the decks, 0.001 if they are in mm
+    mass_kg: float  # kilograms per unit of mass of the decks, 1000 if they are in t
+    mass_sets: list[str]  # names of the element sets that have a mass
 
     @property
     def last(self) -> str:

@@ -16,6 +16,7 @@ ROOMS = re.findall(r"^(\w+) {2,}", MAP.split("```")[1], re.MULTILINE)  # from th
 LEAVES = ("errors", "files", "interrupt", "units", "version")
 FACES = ("__init__", "__main__")  # what is offered, and the command
 PACKAGES = {"tyrecal": "tyrecal", "solvers": "tyrecal_solvers"}
+DOCS = (ast.Module, ast.ClassDef, ast.FunctionDef)
 OTHER_LIMITS = r"(MOST|LEAST(?!_SQUARES)|LARGEST|SMALLEST|LONGEST|SHORTEST|FEWEST|HIGHEST|LOWEST)_"
 
 
@@ -204,3 +205,50 @@ def test_few_branches_by_kind_of_tyre() -> None:
         for node in branches_by_kind(path)
     }
     assert len(branches) == BRANCHES_BY_KIND_LEFT, "\n".join(map(str, sorted(branches)))
+
+
+SHAPE = re.compile(r"\(((?:\d*[a-z]|\d)(?:, (?:\d*[a-z]|\d|[a-z]{2,}))*,?)\)")
+COORDINATES = frozenset("rzxycui")  # tuples with one of these are places, labels, vectors
+LETTERS = [
+    (re.findall(r"`([\w/]+)`", folders), set(re.findall(r"`(\w)`", letters)))
+    for folders, letters in re.findall(
+        r"^\| ([^|]+) \| ([^|]+) \|$",
+        MAP.partition("## Letters in docstrings")[2].partition("\nIn `solvers`")[0],
+        re.MULTILINE,
+    )
+]
+
+
+def shape_letters(text: str) -> set[str]:
+    """Letters of the shapes of arrays, as n and v of "(n, v)", in a docstring or comment."""
+    letters: set[str] = set()
+    for (inner,) in map(re.Match.groups, SHAPE.finditer(text)):
+        sizes = {size.lstrip("0123456789") for size in re.findall(r"\w+", inner)}
+        if "," in inner and not inner.startswith("a, b") and not sizes & COORDINATES:
+            letters |= {size for size in sizes if len(size) == 1}
+    return letters
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_letters_of_shapes_are_in_the_map_or_explained(package: str) -> None:
+    """In the table of letters, by folder, or in the file as "q: ...", "q and w: ...", "q rows" or
+    "rows (q, ...)"."""
+    unknown = {}
+    for path in sorted((ROOT / package).rglob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        docs = [ast.get_docstring(n) or "" for n in ast.walk(tree(path)) if isinstance(n, DOCS)]
+        words = "\n".join([*docs, *re.findall(r"(?:^ *|  )# (.*)$", text, re.MULTILINE)])
+        name = path.relative_to(ROOT).as_posix()
+        known = {
+            letter
+            for folders, letters in LETTERS
+            if name.startswith(tuple(f"{folder}/" for folder in folders))
+            for letter in letters
+        }
+        explained = r"\b{0}(, \w)*( and \w)?(:| [a-z]{{4,}}| = )|s \({0},"
+        left = [
+            x for x in shape_letters(words) - known if not re.search(explained.format(x), words)
+        ]
+        if left:
+            unknown[name] = sorted(left)
+    assert not unknown

@@ -1,5 +1,13 @@
 """Coordinate systems of universal files (data sets 18 and 2420): where nodes are, and where their
-directions 1, 2, 3 point, in the file's global system."""
+directions 1, 2, 3 point, in the file's global system.
+
+    18    per system: number, kind, reference system, ...; a name; 9 numbers on two lines, which are
+          three points in the reference system: the origin, one on +x, one on the +xz plane
+    2420  two lines of the part; per system: number, kind, colour; a name; three lines with the unit
+          vectors of its x, y, z in the global system; one line with its origin
+
+kind: 0 Cartesian, 1 cylindrical, 2 spherical.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +21,8 @@ Array = np.ndarray
 CARTESIAN, CYLINDRICAL, SPHERICAL = 0, 1, 2
 SYSTEM_KINDS = ("Cartesian", "cylindrical", "spherical")
 GLOBAL = (0, 1)  # numbers that mean the global system where the file does not define them
-LINES_18, LINES_2420 = 4, 6  # of one system
-WIDTH_18 = 13  # characters of a number
+LINES_18, LINES_2420 = 4, 6  # lines of one system
+WIDTH_18 = 13  # characters of a number in data set 18
 
 
 @dataclass(frozen=True)
@@ -53,7 +61,7 @@ def read_systems(kind: int, lines: Sequence[str]) -> dict[int, CoordinateSystem]
 
 
 def _systems_18(lines: Sequence[str]) -> dict[int, CoordinateSystem]:
-    """An origin, a point on +x, and one on the +xz plane, in a reference system."""
+    """Systems of data set 18, each by three points in a reference system."""
     systems: dict[int, CoordinateSystem] = {}
     for head, _, *points in _groups(lines, LINES_18):
         number, kind, reference, *_ = (int(word) for word in head.split())
@@ -73,7 +81,7 @@ def _systems_18(lines: Sequence[str]) -> dict[int, CoordinateSystem]:
 
 
 def _systems_2420(lines: Sequence[str]) -> dict[int, CoordinateSystem]:
-    """The axes in the global system, a row each, and the origin."""
+    """Systems of data set 2420, each by its axes and origin in the global system."""
     systems: dict[int, CoordinateSystem] = {}
     for head, _, *rows in _groups(lines[2:], LINES_2420):
         number, kind, *_ = (int(word) for word in head.split())
@@ -85,12 +93,14 @@ def _systems_2420(lines: Sequence[str]) -> dict[int, CoordinateSystem]:
 
 
 def _groups(lines: Sequence[str], size: int) -> list[Sequence[str]]:
+    """The lines of each system, ``size`` of them. Raises ValueError."""
     if not lines or len(lines) % size:
         raise ValueError("the last coordinate system is incomplete")
     return [lines[k : k + size] for k in range(0, len(lines), size)]
 
 
 def _system(number: int, systems: dict[int, CoordinateSystem]) -> CoordinateSystem:
+    """The system of a number among those read so far. Raises ValueError."""
     if number not in systems and number not in GLOBAL:
         raise ValueError(f"coordinate system {number} is not defined")
     return systems.get(number, WORLD)

@@ -1,8 +1,9 @@
-"""Covariance of the signals of a mode under each label [c, m], on one layout of sensors.
+"""Covariance of the k signals of a mode under each label [c, m], on one layout of sensors.
 
-A label says which motions are large: on the belt those of its order (``modes.label``: r P_m,
-theta P_m, z P_m-1, cosines and sines of c Theta), on the sidewalls those that are symmetric about
-the middle plane for even m, antisymmetric for odd m. The others are small, not absent:
+A label says which motions are large. On the belt they are those of its order m: radial and
+tangential ones as P_m(Z / half width), lateral ones as P_(m-1), P_m being Legendre's polynomials
+across the belt, each times cos and sin of c Theta. On the sidewalls they are symmetric about the
+middle plane for even m, antisymmetric for odd m. The others are small, not absent:
 
     S = own / |own| + a same / |same| + b other / |other| + w all / |all|
 
@@ -10,6 +11,10 @@ a, b, w: SAME_PARITY, OTHER_PARITY, OTHER_WAVES. own, same, other (k, k): covari
 motions of the label's order, of the other orders of its parity, and of the other parity; all: of
 every c; |A|: the mean of the diagonal. So no order has cleaner shapes than another. A belt's half
 width is known from a case, or not: then S is the mean over HALF_WIDTHS of the radius.
+
+A column is the index of an order among the five of a harmonic in `modes.label`: COLUMNS has the
+motions of each, PARITY whether it is even (0) or odd (1). DEGREE is the highest polynomial, BELT
+the radius, over the largest one, from which a sensor is on the belt.
 
 ``labels`` judges with these covariances; they say nothing about frequencies.
 """
@@ -37,10 +42,10 @@ MIN_SEEN = 0.1  # share of all motions' mean square from which sensors see a lab
 def label_covariances(
     sensors: Sensors, highest: int, half_width: float | None = None
 ) -> list[tuple[int, int, Array, float]]:
-    """(c, column, S (k, k) of unit mean diagonal, share of all motions' mean square that the
-    label's own have on these sensors) for each label with up to ``highest`` waves.
+    """(c, column, S (k, k), share) for each label with up to ``highest`` waves.
 
-    half_width: of the belt (m); None: not known. Columns as in ``modes.label``.
+    S: covariance with a unit mean diagonal; share: of the mean square of all motions, the part that
+    the label's own motions have on these sensors. half_width: of the belt (m); None: not known.
     """
     widths = half_widths(sensors, half_width)
     bases = [

@@ -1,4 +1,9 @@
-"""Measurements (CSV) as the targets of a case."""
+"""Measurements (CSV) as the targets of a case.
+
+A target has a state: pressure, load and rim. None in a state means "as the case has it". The case
+that a user has changed (`--set`, `LoadedCase.overrides`) keeps the file's own one as
+``LoadedCase.as_read``.
+"""
 
 from __future__ import annotations
 
@@ -21,18 +26,19 @@ from .measurement import Measurement
 from .tables import read_measurements
 
 SAME_PRESSURE_kPa = 0.5  # pressures that differ by less are one
-PRESSED_RIM: RimSupport = "fixed"  # of all that is measured of the patch
+PRESSED_RIM: RimSupport = "fixed"  # footprints are computed with the rim clamped
 
 
 def with_measured(
     case: LoadedCase, path: Path, labelled: Sequence[Measurement] | None = None
 ) -> tuple[LoadedCase, list[str]]:
-    """The case with what was measured as targets, each in its state, and what was left out, why.
+    """The case with the measurements of a file as its targets, each in its state, and sentences on
+    the values that are left out.
 
-    labelled: the file's measurements, where labels were found for those that had none. Of a doublet
-    with two members of the unloaded tyre their mean. Where the user has set the pressure or the
-    rim, or a variable sets the pressure, only what was measured there is taken. Raises InputError
-    where nothing is left, or the case cannot be in a state; OSError.
+    labelled: the file's measurements, if labels were found for those that had none. If both modes
+    of a pair of the unloaded tyre were measured, the target is their mean. If the user has set the
+    pressure or the rim, or a variable sets the pressure, only values measured there are taken.
+    Raises InputError if nothing is left, or the case cannot be in a state; OSError.
     """
     readings = readings_of(case, path) if labelled is None else labelled
     placed = _placed(case, readings)
@@ -69,7 +75,8 @@ def readings_of(case: LoadedCase, path: Path, labelled: bool = True) -> list[Mea
 
 
 def _placed(case: LoadedCase, readings: Sequence[Measurement]) -> list[Measurement]:
-    """Measurements that have a state, with pressures that differ by little made one."""
+    """All measurements but the mass, which has no state; pressures that differ by less than
+    `SAME_PRESSURE_kPa` are made one."""
     rest = [each for each in readings if each.quantity != "mass_kg"]
     known = [case.case.pressure_kPa]
     for each in rest:
@@ -82,8 +89,8 @@ def _placed(case: LoadedCase, readings: Sequence[Measurement]) -> list[Measureme
 def _with_targets(
     case: LoadedCase, path: Path, placed: Sequence[Measurement], readings: Sequence[Measurement]
 ) -> LoadedCase:
-    """The case with those that are ``placed``, and the mass among ``readings``, as its targets.
-    Raises InputError where it cannot be in a state."""
+    """The case with the measurements ``placed``, and the mass among ``readings``, as its targets.
+    Raises InputError if it cannot be in a state."""
     _refuse_states(case, placed)
     analysis, own = case.case.analysis, case.case.targets.source if path == case.measured else ""
     targets = Targets(
@@ -101,10 +108,10 @@ def _with_targets(
 
 
 def in_set_state(case: LoadedCase, held: Collection[str] = ()) -> tuple[LoadedCase, list[str]]:
-    """The case with those of its targets alone that were measured in the state that its user has
-    set, pressure or rim, and what was left out. held: variables that do not vary.
+    """The case with only the targets that were measured at the pressure and on the rim that its
+    user has set, and sentences on those left out. held: names of variables that the fit keeps.
 
-    Raises InputError where none was measured there.
+    Raises InputError if none was measured there.
     """
     targets, name = case.case.targets, pressure_name(case)
     stated = case.case.pressure_kPa
@@ -123,9 +130,12 @@ def in_set_state(case: LoadedCase, held: Collection[str] = ()) -> tuple[LoadedCa
 def _in_set_state(
     case: LoadedCase, source: str, states: Sequence[TyreState], at_pressure: bool
 ) -> tuple[list[bool], list[str]]:
-    """Which targets count, by the states of all, and which do not: those at the case's pressure,
-    where its user has set it or ``at_pressure``; those with its wheel free, or held, where he has
-    set that. Raises InputError where none does."""
+    """Whether each target counts, by its state, and sentences on those that do not.
+
+    A target counts if it was measured at the case's pressure, and with the wheel free or held as in
+    the case. The first is checked if the user has set the pressure, or ``at_pressure``; the second
+    if the user has set the rim. source: the file, for messages. Raises InputError if none counts.
+    """
     set_by_user = case.overrides.keys()
     at_pressure = at_pressure or PRESSURE_PATH in set_by_user
     on_rim = not set_by_user.isdisjoint((RIM_FREE, WHEEL_FREE))
@@ -156,7 +166,7 @@ def _in_set_state(
 
 
 def _refuse_states(case: LoadedCase, readings: Sequence[Measurement]) -> None:
-    """Raises InputError, a sentence a line of the file, where the case cannot be in a state."""
+    """Raise InputError, one sentence per measurement, if the case cannot be in its state."""
     mistakes = []
     for each in readings:
         try:
@@ -173,14 +183,15 @@ def _refuse_states(case: LoadedCase, readings: Sequence[Measurement]) -> None:
 
 
 def in_states(case: LoadedCase, readings: Sequence[Measurement]) -> list[Measurement]:
-    """Measurements with a rim only where it is held otherwise than in the case. Raises InputError
-    where the case cannot be in a state."""
+    """Measurements whose ``rim`` is stated only if it differs from the case's. Raises InputError if
+    the case cannot be in a state."""
     with_rims = [replace(each, rim=each.state.of(case).rim) for each in readings]
     _refuse_states(case, [each for each in with_rims if each.rim])
     return with_rims
 
 
 def _modes(case: LoadedCase, readings: Sequence[Measurement]) -> list[TargetMode]:
+    """Targets of modes; frequency and sigma of a pair are those of its members' mean."""
     groups: dict[tuple[Label, str, TyreState], list[Measurement]] = {}
     for each in readings:
         if each.label:
@@ -203,6 +214,7 @@ def _modes(case: LoadedCase, readings: Sequence[Measurement]) -> list[TargetMode
 
 
 def _footprint(case: LoadedCase, readings: Sequence[Measurement]) -> list[TargetFootprint]:
+    """Targets of the footprint, one quantity each."""
     return [
         TargetFootprint.model_validate(
             {

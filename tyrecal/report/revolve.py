@@ -26,10 +26,10 @@ MAX_NODE_DISTANCE = 1e-3  # m, within which a node of another mesh stands for on
 def placed(
     evaluation: Evaluation, modes: Sequence[Mode], mesh: SectionMesh
 ) -> tuple[dict[int, Array], list[Mode]]:
-    """The inflation's displacement, r, theta, z in m, by node of the rubber, and the modes with
-    their shapes on its nodes; both empty where they are not known there.
+    """Displacement by the inflation (r, theta, z in m) by number of the rubber's nodes, and the
+    modes with shapes on these nodes; both are empty if the solver does not give them there.
 
-    Where a solver has nodes or numbers of its own, each node takes what is known nearest to it.
+    If a solver has other nodes or numbers, each node takes the values of the nearest one.
     """
     shapes = [mode.raw.shape for mode in modes]
     known = [shape for shape in shapes if isinstance(shape, HarmonicShape)]
@@ -56,16 +56,17 @@ def placed(
 
 
 def swept(nodes: Array, mesh: SectionMesh, angles: Array) -> Array:
-    """Undeformed points (node, angle, 3), m."""
+    """Undeformed points (node, angle, 3) x, y, z in m of ``nodes`` at ``angles`` Theta, rad."""
     R, Z = np.array([mesh.nodes[int(n)] for n in nodes]).T
     points = np.stack(np.broadcast_arrays(R[:, None], angles, Z[:, None]), -1)
     return cartesian(points, points * [1, 0, 1])
 
 
 def motion(mode: RawMode, nodes: Array, angles: Array, phase: float = 0.0) -> Array:
-    """Displacement (node, angle, 3) of Re[amplitude exp(i (n Theta + phase))].
+    """Displacement (node, angle, 3) in x, y, z: Re[amplitude exp(i (n Theta + phase))].
 
-    Raises InputError.
+    amplitude: the mode's complex shape, whose scale is the solver's; n: its number of waves;
+    angles, phase: rad. Raises InputError if the shape is not known on the section's nodes.
     """
     if not isinstance(mode.shape, HarmonicShape):
         raise InputError("only modes known on the section's nodes can be swept")

@@ -2,11 +2,18 @@
 cavity's air.
 
     [K   Kx  .   C^T] [u]   [b]        q: see `wheel`; u of the rim's nodes is T q
-    [Kx* Kq  .   Cq*] [q] = [b]        w, s: see `cavity`; s = Q^-1 (C u + H w) stands in so that
-    [.   .   .   H^T] [w]   [b]        the air's stiffness, a full matrix on all nodes of its
-    [C   Cq  H   -Q ] [s]   [0]        wall, leaves the band as it is
+    [Kx* Kq  .   Cq*] [q] = [b]        w, s: see `cavity`; s = Q^-1 (C u + H w) is an unknown so
+    [.   .   .   H^T] [w]   [b]        that the air's stiffness, a full matrix on all nodes of
+    [C   Cq  H   -Q ] [s]   [0]        its wall, leaves the band as it is
 
-K is the band; what stands beside it is eliminated by its Schur complement.
+    Kx = K T of the rim's nodes, Kq = T* K T + the wheel's own springs; the same for the mass.
+    C u, Cq q: volume that the wall and the rim sweep, weighted by the terms of the pressure.
+    H, Q: stiffness 1/rho int grad . grad and compressibility 1/B int of the air's pressure terms;
+    w* H w is the kinetic energy of the flow, so H is its mass, too.
+
+K (size, size) is the tyre's banded stiffness, less shift times its mass; shift = omega^2, 1/s2. The
+further rows and columns are eliminated by their Schur complement. q, w and s are also the numbers
+of these unknowns; b right sides are solved at once.
 """
 
 from __future__ import annotations
@@ -26,13 +33,13 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Border:
-    """Columns of the unknowns q, w and s on the band."""
+    """Rows and columns of the unknowns q, w and s next to the band."""
 
     fields: Array  # T (nodes, 3, q)
-    stiffness: tuple[Array, Array]  # (size, q) on the band, (q, q) on q
-    mass: tuple[Array, Array]  # likewise
-    wall: Array  # C on the band (s, size)
-    wall_rim: Array  # C on q (s, q)
+    stiffness: tuple[Array, Array]  # Kx (size, q), Kq (q, q)
+    mass: tuple[Array, Array]  # of the same shapes
+    wall: Array  # C (s, size)
+    wall_rim: Array  # Cq (s, q)
     air: GasCoupling | None
 
     @property
@@ -45,13 +52,13 @@ class Border:
 
     @property
     def flow_mass(self) -> Array:
-        """H of w (w, w), kg per radian, where there is air."""
+        """H (w, w) of the terms w of the flow: its mass, kg per radian. For a tyre with air."""
         assert self.air is not None
         flow: Array = self.air.H[self.air.flowing, self.air.flowing]
         return flow
 
     def columns(self, shift: float) -> tuple[Array, Array]:
-        """E (size, q + w + s) and D next to the band of K - shift M."""
+        """E (size, q + w + s) and D (q + w + s, q + w + s) next to the band of K - shift M."""
         q, w, s = self.widths
         k = q + w
         E = np.zeros((len(self.stiffness[0]), k + s), self.stiffness[0].dtype)
@@ -79,7 +86,10 @@ class Border:
 
 
 class Bordered:
-    """Factor of a band with its border; ``tyre``: that of the band alone. Raises Indefinite."""
+    """Factor of the band of K - shift M with its border; ``tyre``: factor of the band alone.
+
+    Raises Indefinite.
+    """
 
     def __init__(self, tyre: Factor, border: Border, shift: float):
         self.tyre = tyre
@@ -99,7 +109,7 @@ class Bordered:
             raise Indefinite("the wheel or the air has no stiffness") from None
 
     def solve(self, right: Array) -> Array:
-        """For (size + q + w, b)."""
+        """u, q and w (size + q + w, b) for the right sides (size + q + w, b)."""
         x = self.tyre.solve(right[: self._size])
         if not self._schur.size:
             return x
@@ -140,7 +150,7 @@ def assemble(
 
 
 def apply(parts: OfElements, fields: Array) -> Array:
-    """Element matrices on ``fields`` (nodes, 3, k), zero at most nodes."""
+    """Element matrices times k fields (nodes, 3, k), which are zero at most nodes."""
     touched: Array = np.asarray(fields.any((1, 2)))
     image = np.zeros_like(fields)
     for connectivity, matrices in parts:

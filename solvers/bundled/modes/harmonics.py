@@ -63,7 +63,8 @@ class HarmonicModes:
     n: int
     eigenvalues: Array
     shapes: Array
-    # amplitudes of the rim's motions (m, q), in ``shapes`` too, and of the cavity's flow (m, w)
+    # amplitudes of the q motions of the rim (m, q), which are in ``shapes`` too, and of the
+    # w terms of the cavity's flow (m, w), see `bordered`
     rim: Array = field(default_factory=lambda: np.zeros((0, 0)))
     air: Array = field(default_factory=lambda: np.zeros((0, 0)))
     # (m,), where each doublet has split into two modes, 1 and 2 in turn; the shape is then the part
@@ -138,7 +139,8 @@ class Vibration:
             self._shifted_mass = numbering.assemble(three)
 
     def at(self, ratios: Array) -> Vibration:
-        """The vibration with the modulus ratios of the model's laws of frequency (l,)."""
+        """The vibration with the modulus ratios ``ratios`` of the model's frequency-dependent laws,
+        one each."""
         other = copy.copy(self)
         other.weights = np.concatenate([[1.0], np.asarray(ratios) - 1])
         other._borders = {}

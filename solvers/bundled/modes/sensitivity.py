@@ -83,8 +83,8 @@ def eigenvalue_rates(
 
 @dataclass(frozen=True)
 class RimAndAir:
-    """Rim and air with the tangent of a number p, and the amplitudes of their motions in each mode,
-    (q,) and (w,)."""
+    """Rim and air with the tangent of a number p, and the amplitudes of their motions in each mode:
+    of the q motions of the rim and of the w terms of the air's flow."""
 
     wheel: Wheel | None
     air: GasCavity | None

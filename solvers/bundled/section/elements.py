@@ -116,7 +116,8 @@ class Lines:
 
     connectivity: Array  # (e, a)
     X: Array  # (e, a, 2): R, Z of the nodes, m
-    N: Array  # (g, a); of lines in other elements (e, g, h), of the hosts' nodes
+    # (g, a) shape functions; of lines inside other elements (e, g, h), for the h nodes of the hosts
+    N: Array
     slope: Array  # (e, g, a) or (e, g, h): dN/ds, 1/m
     R: Array  # (e, g), m
     tangent: Array  # (e, g, 2): dX/ds
@@ -137,7 +138,8 @@ def lines(
     weights: Array | None = None,
 ) -> Lines:
     """Operators along two- or three-node lines in the section; share (e, 1): as for `solids`;
-    weights (e, a, h): of the nodes that they are connected to in their own ones."""
+    weights (e, a, h): of the h nodes of the hosts, to which they are connected, in their a own
+    ones."""
     ends = X[connectivity] if weights is None else weights @ X[connectivity]
     rule = shapes.line(ends.shape[1], points)
     dX = np.einsum("ga,eaj->egj", rule.dN[..., 0], ends)

@@ -31,11 +31,11 @@ MAX_MAPPING_STEPS, XI_SETTLED = (
 class Guest:
     """A node in its host element."""
 
-    X: Array  # (2,)
+    X: Array  # (2,): R, Z, m
     kind: ElementType  # of the host
     nodes: Array  # (a,): rows of the mesh
-    xi: Array  # (2,)
-    kept: Array  # (a,): which weights are not zero
+    xi: Array  # (2,): its natural coordinates in the host
+    kept: Array  # (a,): which shape functions of the host are not zero there
 
     @property
     def rows(self) -> Array:
@@ -61,7 +61,7 @@ class Embedded:
 
     line: str
     points: Array  # (e, a): rows of the mesh, or of guests as -1, -2, ...
-    rows: Array  # (e, h): what its elements are connected to
+    rows: Array  # (e, h): the h host nodes of each element, rows of the mesh
 
     def weights(self, X: Array, guests: Sequence[Guest]) -> Array:
         """Weights of the host nodes in the line's own nodes (e, a, h)."""

@@ -71,6 +71,8 @@ def equilibrium(
 
 
 def _reached(solve: _Solver, start: Array, check: Callable[[], None]) -> Array:
+    """Equilibrium U (n, 3) by the first of three paths that reaches it: the whole load at once, by
+    stiffened rubber, in load steps. Raises NoEquilibrium."""
     U = solve(start, 1.0, 1.0, MAX_QUICK_ITERATIONS if solve.pressures else MAX_ITERATIONS)
     if U is None:
         check()
@@ -114,12 +116,14 @@ class _Solver:
 
     @cached_property
     def mass(self) -> Array:
-        """Lumped, of each equation (size,); row sums are negative at Q8 corners."""
+        """Lumped mass (size,) of each equation, kg per radian: the diagonal of the consistent one,
+        because row sums are negative at the corners of eight-node elements."""
         lumped = mechanics.mass(self.model).diagonal()
         return self.numbering.gather(np.repeat(lumped[:, None], 3, 1))
 
     def __call__(self, U: Array, share: float, stiffness: float, longest: int) -> Array | None:
-        """Displacements from the start U, or None and ``why``."""
+        """Equilibrium (n, 3) from the start U in at most ``longest`` iterations; None, and the
+        reason in ``why``, if it fails. share: of the load; stiffness: factor on the rubber's."""
         model = self.model.with_laws(methodcaller("stiffened", stiffness))
         loads = [
             Pressure(load.lines, load.pressure * share) if isinstance(load, Pressure) else load
@@ -178,6 +182,11 @@ def _newton(
     tension: float,
     longest: int,
 ) -> tuple[Array | None, int, str]:
+    """Equilibrium (n, 3) by Newton's method from U, number of factorisations, and why it failed.
+
+    mass: lumped (size,), which holds back a wrinkling path; tension: artificial tension of the
+    cords at first, N/m, which vanishes on the way; longest: most iterations.
+    """
     scale = np.linalg.norm(_load_force(model, U, loads, numbering))
     with np.errstate(all="ignore"):  # a guess may turn elements inside out
         energy = mechanics.potential(model, U, loads)

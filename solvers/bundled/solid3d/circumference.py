@@ -62,14 +62,14 @@ class HalfCircle(Circumference):
     """
 
     ends: Array  # of the elements, from 0 on, rad
-    waves: Array  # (2, j, f): the even and the odd functions as sums of cos j x, of sin j x
+    waves: Array  # (2, j, f): the even and the odd functions as sums of j waves, cos j x or sin j x
     stations: Array  # (s,), rad
     pieces: tuple[Piece, ...]
     even: Array
     odd: Array
 
     def at(self, angles: Array) -> Array:
-        """Values (a, k) of the functions at angles, rad."""
+        """Values of the functions (k) at ``angles``, rad: (angles, k)."""
         return _functions(self.ends, self.waves, angles)[0]
 
     def turn(self, n: int) -> Array:
@@ -157,7 +157,7 @@ def _waves(join: float, highest: int) -> Array:
 
 def _sines(x: Array, highest: int) -> tuple[Array, Array]:
     """cos j x for j from 0, and sin j x for j from 1 on, equally many, and their derivatives by
-    x, (2, p, j)."""
+    x: each (2, points, waves)."""
     j = np.arange(highest + 1)
     a, b = np.multiply.outer(x, j), np.multiply.outer(x, j + 1)
     return np.array([np.cos(a), np.sin(b)]), np.array([-j * np.sin(a), (j + 1) * np.cos(b)])

@@ -1,9 +1,10 @@
-"""A case's own templates, rendered in a process apart, which is ended where they take too much.
+"""A case's own templates, rendered in a separate process, which is ended if they take too much.
 
 A template may loop for ever, or ask for all memory in one expression: nothing in this process could
 end that, in a thread or on Windows. The process is kept for the next deck, and ends with this one.
 It inherits no environment variables: they may hold the user's passwords, and decks are sent to
-others.
+others. A request is a pickled tuple, a reply is `GOOD` or `BAD` and a text; both are preceded by
+their length in 8 bytes.
 """
 
 from __future__ import annotations
@@ -23,22 +24,25 @@ from ...tyre.templates import TemplateFailed, environment, render
 CPU_S, WALL_S = 5, 60.0  # of one template; shipped ones take a tenth of a second
 MEMORY = 2_000_000_000  # bytes of address space, where the system limits it
 MAX_TEXT_BYTES = 50_000_000  # bytes of text
-GOOD, BAD = b"+", b"-"
+GOOD, BAD = b"+", b"-"  # first byte of a reply: the text is the deck, or the error
 # without these some interpreters do not start; the process forgets them before it renders
 TO_START = ("SYSTEMROOT", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "PYTHONHOME")
 _own = threading.local()
 
 
 class TemplateProcess:
-    """Templates of a dialect, the user's own in ``folder`` before the tool's."""
+    """Templates of a dialect (abaqus or calculix), the user's own in ``folder`` before the tool's.
 
-    auto_reload = True
+    It has the two members of a Jinja environment that `deck` uses.
+    """
+
+    auto_reload = True  # templates are read anew for each deck
 
     def __init__(self, dialect: str, folder: Path):
         self.dialect, self.folder = dialect, folder.absolute()
 
     def render(self, template: str, names: dict[str, Any]) -> str:
-        """The text of a template. Raises TemplateFailed."""
+        """The deck by a template, given the values of its ``names``. Raises TemplateFailed."""
         request = pickle.dumps((self.dialect, self.folder, template, names))
         process = _process()
         timer = threading.Timer(WALL_S, process.kill)
@@ -86,6 +90,7 @@ def _process() -> subprocess.Popen[bytes]:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
+    """Kill the process and close its pipes."""
     atexit.unregister(_end)
     process.kill()
     with contextlib.suppress(Exception):
@@ -103,6 +108,7 @@ def _read(stream: IO[bytes], most: int) -> bytes:
 
 
 def _exactly(stream: IO[bytes], count: int) -> bytes:
+    """``count`` bytes. Raises EOFError if the stream ends before."""
     data = stream.read(count)
     if len(data) < count:
         raise EOFError
@@ -134,7 +140,7 @@ def serve() -> None:
 
 
 def _limit() -> None:
-    """Memory, and processor time from now on, as far as the system limits them."""
+    """Limit this process' memory, and its processor time from now on, if the system can."""
     with contextlib.suppress(ImportError, ValueError, OSError):
         import resource
 

@@ -18,7 +18,8 @@ GB = 1e9
 
 
 def packages() -> list[dict[str, Any]]:
-    """Packages that tyrecal needs: ``name``, ``needed``, ``version`` (None: missing), ``ok``."""
+    """Packages that tyrecal needs: ``name``, ``needed`` (version specifier such as ">=1.26"),
+    ``version`` that is installed (None: missing), ``ok``: whether it is a needed one."""
     return [_status(each) for each in _requirements("")]
 
 
@@ -53,7 +54,7 @@ def machine() -> dict[str, Any]:
 
 def records(shared: Path | None) -> list[dict[str, Any]]:
     """The evaluation store ``shared`` between cases, or else those in the results folders of the
-    current folder: ``folder``, ``records``, ``MB``."""
+    current folder: ``folder``, ``records`` (number of finished evaluations), ``MB``."""
     from ..evaluate.store import Store
 
     folders = [shared] if shared else sorted(Path().glob("*/record"))
@@ -86,6 +87,7 @@ def _status(requirement: Requirement) -> dict[str, Any]:
 
 
 def _memory() -> float | None:
+    """Memory of the machine, GB; None if the system does not report it."""
     try:
         return round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / GB, 1)
     except (AttributeError, OSError, ValueError):  # Windows has no sysconf
@@ -93,6 +95,7 @@ def _memory() -> float | None:
 
 
 def _free_memory() -> float | None:
+    """Memory that is available now, GB; None if the system does not report it."""
     try:
         (line,) = (
             line

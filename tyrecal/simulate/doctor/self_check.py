@@ -1,4 +1,7 @@
-"""Check of a solver on a small known tyre: ``check.yaml`` against the results recorded here."""
+"""Check of a solver on a small known tyre: ``check.yaml`` against the results recorded here.
+
+The rim is fixed and the pressure that of the file.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,7 @@ RECORDED_HZ = {
     "[2,1]": 73.6586,
     "[2,0]": 88.5548,
 }
-RECORDED_KG = 12.7887
+RECORDED_KG = 12.7887  # mass of the whole tyre
 TOLERANCE_PERCENT = {"bundled": 0.1}  # far above the differences by rounding between machines
 OTHERS_PERCENT = 2.5  # tolerance for solvers with other elements and other laws of the cords
 
@@ -70,4 +73,5 @@ def self_check(solver: str = "bundled") -> dict[str, Any]:
 
 
 def _percent(value: float | None, recorded: float) -> float | None:
+    """Deviation from the recorded value, %; None if there is no value."""
     return None if value is None else 100 * (value / recorded - 1)

@@ -51,7 +51,7 @@ class Rings:
         return np.asarray((shapes * np.sqrt(self.areas)[:, :, None]).reshape(len(shapes), -1))
 
     def overlaps(self, a: Array, b: Array) -> Array:
-        """MACs (p, q) of shapes a (p, k, j, 3) and b (q, k, j, 3)."""
+        """MACs (p, q) of p shapes a (p, k, j, 3) and q shapes b (q, k, j, 3)."""
         x, y = self.flat(a), self.flat(b)
         return np.asarray((x @ y.T) ** 2 / np.outer((x * x).sum(1), (y * y).sum(1)))
 

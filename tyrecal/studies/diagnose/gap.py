@@ -1,9 +1,14 @@
-"""Is there a gap, and in which measurements does it lie?
+"""Is there a gap, and in which measurements is it?
 
     P = S^-1 - S^-1 J (J^T S^-1 J + Sx^-1)^-1 J^T S^-1        what calibration cannot absorb
-    T = r^T P r + splits ~ chi2(n - v + n_split)               where there is no gap
+    T = r^T P r + splits ~ chi2(n - v + n_split)               if there is no gap
 
-The residuals of the fit have covariance C = S P S; a group of them, r_G^T C_GG^-1 r_G ~ chi2.
+r (n,) = y - eta: residuals of the plain fit, ln measured less ln computed, of n rows; S (n, n):
+their covariance before the fit (repeatability, errors of the model, uncertain constants); J (n, v)
+= d eta / dx by the v variables; Sx (v, v): covariance of the prior of x. splits: chi2 of the
+n_split measured distances between the two modes of a pair (`inference.splits`).
+
+The residuals of the fit have covariance C = S P S; a group G of them, r_G^T C_GG^-1 r_G ~ chi2.
 """
 
 from __future__ import annotations
@@ -24,15 +29,15 @@ FAMILY_NAMES = {"in-plane": "in-plane", "out-of-plane": "lateral"}
 
 @dataclass(frozen=True)
 class ResidualGroup:
-    """Residuals of some rows."""
+    """Test of the residuals of some rows: whether they are larger than expected."""
 
     kind: str  # family, harmonic, pressure, rim or mass
-    name: str
+    name: str  # of the group among its kind, such as "in-plane" or "240" (kPa)
     rms_percent: float
     chi2: float
-    freedom: int  # of chi2
+    freedom: int  # degrees of freedom of chi2
     p_value: float
-    corrected: float  # p-value for so many groups (Holm)
+    corrected: float  # p-value corrected for the number of groups (Holm)
 
 
 @dataclass(frozen=True)
@@ -45,7 +50,7 @@ class Contrast:
 
     @property
     def p_value(self) -> float:
-        """Two-sided."""
+        """Two-sided p-value of the contrast without a gap."""
         return float(2 * ndtr(-abs(self.percent) / self.sigma_percent))
 
 
@@ -53,15 +58,17 @@ class Contrast:
 class Gap:
     """Gap that the plain fit leaves."""
 
-    chi2: float
-    freedom: int
-    p_value: float
-    residuals: Array  # (n,) ln measured - ln model
-    spread: Array  # (n,) their standard deviation without a gap
+    chi2: float  # T
+    freedom: int  # degrees of freedom of T
+    p_value: float  # probability of a larger T without a gap
+    residuals: Array  # (n,) r = ln measured - ln model
+    spread: Array  # (n,) their standard deviation without a gap, the root of C's diagonal
     groups: tuple[ResidualGroup, ...]
     contrasts: tuple[Contrast, ...]
-    absorbed: Mapping[str, float]  # share of each effect that calibration hides
-    bias_percent: Mapping[str, Mapping[str, float]]  # of variables, by effect at full size
+    # by effect: share of its squared shift, in standard deviations, that a fit hides
+    absorbed: Mapping[str, float]
+    # by variable and effect: change of the fitted variable by the effect at the end of its range
+    bias_percent: Mapping[str, Mapping[str, float]]
 
     @property
     def rms_percent(self) -> float:
@@ -70,7 +77,8 @@ class Gap:
 
 
 def projection(problem: InverseProblem, d: Array) -> tuple[Array, Array, Array]:
-    """P (n, n), Sigma^-1 (n, n), and (J^T S^-1 J + Sx^-1)^-1 J^T S^-1 (v, n), at x0 + d."""
+    """P (n, n), S^-1 (n, n), and the change of x by that of y, (J^T S^-1 J + Sx^-1)^-1 J^T S^-1
+    (v, n), at x = x0 + d with d (v,)."""
     _, J = problem.plain(d)
     inverse = np.linalg.inv(problem.sigma)
     absorbing = np.linalg.solve(J.T @ inverse @ J + np.diag(problem.spread**-2.0), J.T @ inverse)
@@ -79,11 +87,12 @@ def projection(problem: InverseProblem, d: Array) -> tuple[Array, Array, Array]:
 
 
 def find_gap(problem: InverseProblem, d: Array, variables: tuple[str, ...]) -> Gap:
-    """The gap at the plain fit x0 + d."""
+    """The gap that the plain fit leaves at x = x0 + d, d (v,); variables: names of x."""
     P, inverse, absorbing = projection(problem, d)
     sigma = problem.sigma
     C = sigma @ P @ sigma
-    shift, tilt, *_ = problem.added({}, 1)  # of what was switched on purpose
+    # toggled runs: the effect that was switched on purpose changes eta and J
+    shift, tilt, *_ = problem.added({}, 1)
     eta, _ = problem.plain(d)
     r = problem.observations.y - eta - shift[0] - tilt[0] @ d
     total = float(r @ P @ r) + problem.splits.chi2()
@@ -112,6 +121,7 @@ def find_gap(problem: InverseProblem, d: Array, variables: tuple[str, ...]) -> G
 
 
 def _groups(rows: tuple[Observable, ...], r: Array, C: Array) -> list[ResidualGroup]:
+    """Every group of residuals r (n,) with their covariance C (n, n), not yet corrected."""
     kinds = {
         "family": [family(row) for row in rows],
         "harmonic": [str(row.label.c) if row.label else None for row in rows],
@@ -132,7 +142,8 @@ def _groups(rows: tuple[Observable, ...], r: Array, C: Array) -> list[ResidualGr
 
 
 def family(row: Observable) -> str | None:
-    """in-plane, lateral (out-of-plane), [0,0], or None."""
+    """Family of a row's mode: in-plane, lateral (out-of-plane) or [0,0]; None of overtones and of
+    the mass."""
     if row.label is None:
         return None
     return "[0,0]" if row.label.kind else FAMILY_NAMES.get(row.label.family or "")
@@ -162,6 +173,7 @@ def _corrected(groups: list[ResidualGroup]) -> list[ResidualGroup]:
 
 
 def _contrasts(rows: tuple[Observable, ...], r: Array, C: Array) -> list[Contrast]:
+    """Weighted sums of the residuals r (n,), each with its standard deviation by C (n, n)."""
     modes = np.array([row.label is not None for row in rows])
     c = np.array([row.label.c if row.label else -1 for row in rows], float)
     lateral = np.array([family(row) == "lateral" for row in rows])
@@ -196,6 +208,7 @@ def _slope(mask: Array, x: Array, span: float) -> Array:
 
 
 def _as_number(name: str) -> tuple[float, str]:
+    """Key by which names that are numbers are sorted by value, the others by name."""
     try:
         return float(name), ""
     except ValueError:

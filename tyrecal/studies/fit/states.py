@@ -3,6 +3,10 @@
 Standard errors are those of the linearised fit (see `uncertainty`): without a state its rows of the
 Jacobian are left out; with another one rows are added, of the same modes as the best measured
 state has, with the same relative standard deviations, at the fitted design.
+
+A residual of the fit is ``scale`` (model - target), ``scale`` being 1 / Hz or 1 / unit of the
+target, 0 if the target does not count (`targets`). ``sigma`` are the targets' standard deviations.
+The Jacobian has the derivatives of the residuals by the coordinates of the variables.
 """
 
 from __future__ import annotations
@@ -23,30 +27,29 @@ from .targets import Target, ValueTarget
 from .uncertainty import FitUncertainty, standard_errors
 
 Array = np.ndarray
-STEP_OUT = 1.25  # of pressure, below and above those measured
+STEP_OUT = 1.25  # factor on the highest measured pressure, and divisor of the lowest, to propose
 ROUNDED_kPa = 10.0  # pressures that are proposed are multiples of it
-Errors = dict[str, float | None]  # by variable
+# standard error by variable, in its own unit; None: the data do not determine it
+Errors = dict[str, float | None]
 
 
 @dataclass(frozen=True)
 class StateReport:
-    """A measured state: how many values count, their rms deviation in standard deviations, and the
-    standard errors of a fit without it."""
+    """A measured state, and the part of the fit that depends on it."""
 
     state: TyreState
-    values: int
-    rms_sigmas: float | None
-    standard_errors_without: Errors
+    values: int  # number of its targets that count
+    rms_sigmas: float | None  # rms deviation, in standard deviations; None: no sigma is stated
+    standard_errors_without: Errors  # of a fit without the state
 
 
 @dataclass(frozen=True)
 class NextState:
-    """A state that was not measured: the standard errors of a fit with it, and their geometric mean
-    over those without it."""
+    """A state that was not measured, and the gain of the fit by it."""
 
     state: TyreState
-    standard_errors_with: Errors
-    ratio: float
+    standard_errors_with: Errors  # of a fit with the state
+    ratio: float  # geometric mean over the variables: error with the state over error without
 
 
 def state_reports(problem: Problem, point: Point, known: FitUncertainty) -> list[StateReport]:
@@ -69,9 +72,9 @@ def state_reports(problem: Problem, point: Point, known: FitUncertainty) -> list
 
 
 def next_states(problem: Problem, point: Point, known: FitUncertainty) -> list[NextState]:
-    """States of the unloaded tyre that were not measured, the most telling first; none where the
-    solver gives no exact slopes, what was known before enters the fit, or the data do not determine
-    the variables as they are."""
+    """States of the unloaded tyre that were not measured, the smallest ratio first; none if the
+    solver gives no exact sensitivities, prior knowledge enters the fit, or the data do not
+    determine the variables as they are."""
     before = _named(problem, known.standard_errors)
     unknown = problem.difference_step is not None or problem.spread is not None
     if unknown or not all(before.values()):
@@ -107,8 +110,8 @@ def next_states(problem: Problem, point: Point, known: FitUncertainty) -> list[N
 
 
 def _best_measured(problem: Problem, known: FitUncertainty) -> list[tuple[Target, float]]:
-    """Modes of the state that has most that count, and their relative sigmas; of one under a load,
-    each mode once, where no unloaded one was measured."""
+    """Targets, with relative sigmas, of the unloaded state that has most of them. If only loaded
+    states were measured, of one of these, each mode once."""
     rows: dict[TyreState, dict[Label, tuple[Target, float]]] = {}
     for each, sigma in zip(problem.measured, known.sigma, strict=True):
         if isinstance(each, ValueTarget):
@@ -156,15 +159,18 @@ def is_possible(problem: Problem, state: TyreState) -> bool:
 
 
 def _errors(problem: Problem, point: Point, J: Array, root: Array, sigma: Array) -> Errors:
+    """Standard errors by the Jacobian J (n, v), the scales ``root`` (n,) and sigma (n,) of its
+    rows."""
     covariance, seen = fit_covariance(J, root, sigma)
     return _named(problem, standard_errors(problem, point, covariance, seen))
 
 
 def _named(problem: Problem, errors: Sequence[float | None]) -> Errors:
+    """Errors in the order of the problem's variables, by name."""
     return {v.name: error for v, error in zip(problem.variables, errors, strict=True)}
 
 
 def plain(problem: Problem, state: TyreState) -> dict[str, Any]:
-    """A state for result files, with nothing left to the case."""
+    """A state for result files: pressure, load and rim are stated, none is left to the case."""
     complete = state.with_defaults(problem.case)
     return {"pressure_kPa": complete.pressure_kPa, "load_N": complete.load_N, "rim": complete.rim}

@@ -26,11 +26,11 @@ MIN_SPLIT_WIDTH = 1e-9  # of u
 class Splits:
     """Splits of m pairs in up to k states, empty places aside."""
 
-    places: Array  # (m, k) among the observations
-    there: Array  # (m, k) whether there is one
-    s: Array  # (m, k)
-    tau: Array  # (m, k)
-    width: float  # w
+    places: Array  # (m, k) place of each pair and state among the observations
+    there: Array  # (m, k) whether it was measured
+    s: Array  # (m, k) measured split, in ln f
+    tau: Array  # (m, k) its standard deviation
+    width: float  # w, in ln f
     known: dict[bytes, float] = field(default_factory=dict, repr=False)  # ln p(s) by what is apart
 
     @classmethod
@@ -50,6 +50,7 @@ class Splits:
 
     @property
     def count(self) -> int:
+        """Number of measured splits."""
         return int(self.there.sum())
 
     def ln_likelihood(self, apart: Array) -> Array:
@@ -85,7 +86,7 @@ class Splits:
         return float(((weight * total).sum(-1) - 1).sum())
 
     def _grid(self, most_apart: float) -> tuple[Array, float]:
-        """u (g,), and the step between."""
+        """The g points u (g,) of the trapezoidal rule, and the step between."""
         measured = np.where(self.there, self.tau**-2.0, 0.0).sum(1).max()
         precision = measured + self.width**-2.0
         # u that the splits leave has its middle at this share of what was measured at most
@@ -95,7 +96,8 @@ class Splits:
         return u, float(u[1] - u[0])
 
     def _integrand(self, a: Array, u: Array) -> tuple[Array, Array]:
-        """Its ln (q, m, g), and the probability (q, m, k, g) of s having the sign of a + u."""
+        """ln of the integrand (q, m, g) at u (g,), and the probability (q, m, k, g) that s has the
+        sign of a + u."""
         s, tau = self.s[..., None], self.tau[..., None]
         centre = a[..., None] + u
         plus, minus = -(((s - centre) / tau) ** 2) / 2, -(((s + centre) / tau) ** 2) / 2

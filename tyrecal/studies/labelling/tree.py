@@ -147,7 +147,8 @@ def _of_each(modes: Array, probabilities: Array, shape: tuple[int, ...]) -> Arra
 
 
 def discrepancy(labels: Sequence[Label], tau: float) -> Array:
-    """Covariance (l, l) of ln f: the error of form of each mode alone, and tau, which goes smoothly
+    """Covariance (l, l) of ln f of l labelled modes: the error of form of each mode alone, and
+    tau, which goes smoothly
     over the waves of a family, as what a model lacks does."""
     c = np.array([label.c for label in labels])
     family = np.array([FAMILIES.index(label.family or FAMILIES[0]) for label in labels])

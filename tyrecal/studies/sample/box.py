@@ -25,7 +25,7 @@ class Draws:
     """A posterior with its draws."""
 
     posterior: Posterior
-    optima: Array  # (o, v)
+    optima: Array  # (o, v) coordinates x of the o optima of the density
     height: Array  # (o,) ln p at the optima
     covariance: Array  # (v, v) the linear one about the first optimum
     chains: Chains

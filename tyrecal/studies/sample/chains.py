@@ -92,8 +92,8 @@ def walk(
     density: Callable[[Array], Array], start: Array, covariance: Array, count: int, seed: int
 ) -> Chains:
     """About ``count`` draws in all, and up to `MAX_TIMES` as many until they are `Chains.enough`;
-    walkers begin about the rows of ``start`` (s, v) with a ``covariance`` (v, v). Raises InputError
-    where emcee is not installed."""
+    walkers begin about the s starts, rows of ``start`` (s, v), with a ``covariance`` (v, v).
+    Raises InputError if emcee is not installed."""
     needs_emcee()
     import emcee
 

@@ -111,7 +111,8 @@ class Posterior:
 
 
 def optima(posterior: Posterior) -> tuple[Array, Array]:
-    """Maxima (o, v) of the density in the box from many starts, the highest first, and ln p (o,).
+    """The o maxima x (o, v) of the density in the box from many starts, the highest first, and
+        ln p (o,).
 
     Damped Gauss-Newton steps from all starts at a time, each with a damping of its own; what leaves
     the box stops at its edge.

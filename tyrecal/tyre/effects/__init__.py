@@ -1,5 +1,8 @@
-"""Effects that a plain model leaves out: one file an effect, each with one parameter; 0 =
-absent."""
+"""The catalogue: effects that a plain model leaves out, each one number; 0 is absent.
+
+One file an effect. `plugins` lists their ids without importing them: OWN of this folder, ADDED of
+installed packages, IDS of both.
+"""
 
 from __future__ import annotations
 
@@ -27,9 +30,10 @@ class Catalogue(dict[str, Effect]):
 
 @cache
 def catalogue() -> Catalogue:
-    """Every effect by its id; an installed package's that cannot be loaded is named and left out.
+    """Every effect by its id, in the order of the catalogue.
 
-    (Modules are imported here: the case's schema needs the ids only.)
+    An effect of an installed package that cannot be loaded is left out, with a warning. Modules are
+    imported here, because the case's schema needs the ids only.
     """
     modules = [import_module(f".{name}", __package__) for name in dict.fromkeys(OWN.values())]
     own = [x for m in modules for x in (m.EFFECTS if hasattr(m, "EFFECTS") else [m.EFFECT])]
@@ -49,6 +53,7 @@ def _load(id: str) -> Effect:
 
 
 def _checked(effect: Effect) -> Effect:
+    """The effect itself. Raises TypeError if a package offers something else."""
     if not isinstance(effect, Effect):
         raise TypeError(f"it is a {type(effect).__name__}, no Effect")
     return effect

@@ -9,21 +9,22 @@ from .edit import with_part, with_rubbers_at
 from .effect import Effect
 from .parts import carcass_line, held_regions, lower_sidewall, sidewall, stations, turned_up
 
-HIGHER_m = 0.010  # fillers of one size reach 30 to 60 mm above the rim
+# standard deviation of a filler's height: fillers of one size reach 30 to 60 mm above the rim
+HIGHER_m = 0.010
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
     """Shear and bulk modulus of the rubber of lower sidewall and bead times 1 + value. If the
-    carcass has a turn-up, only the rubber between the two is meant. If the rim holds only the
-    bead's surface, the filler within the bead deforms."""
+    carcass has a turn-up, only the rubber between carcass and turn-up gets stiffer. If the rim
+    holds only the bead's surface, the filler within the bead deforms."""
     if not value > -1:
         raise ValueError("must be greater than -1")
     return _stiffer(case, _place(case)[0], 1 + value)
 
 
 def higher(case: LoadedCase, value: float) -> LoadedCase:
-    """The same, reaching 10 mm further: the region above as much stiffer on the whole. Raises
-    ValueError if none is above."""
+    """The same with a filler that reaches `HIGHER_m` further up: the region above gets stiffer by
+    the share of its length that the filler covers. Raises ValueError if no region is above."""
     top = stations(case.section, _place(case)[0][0])[0]
     above = [name for name in sidewall(case) if stations(case.section, name)[1] == top]
     if not above:
@@ -35,7 +36,7 @@ def higher(case: LoadedCase, value: float) -> LoadedCase:
 
 
 def _place(case: LoadedCase) -> tuple[list[str], tuple[str, str]]:
-    """Regions, from the upper one down, and lines (inner, outer) that the filler lies in."""
+    """The filler's regions, from the upper one down, and its inner and outer line."""
     regions = [*lower_sidewall(case), *held_regions(case.section)]
     if turn_up := turned_up(case):
         line, up = turn_up
@@ -44,6 +45,8 @@ def _place(case: LoadedCase) -> tuple[list[str], tuple[str, str]]:
 
 
 def _stiffer(case: LoadedCase, regions: list[str], factor: float) -> LoadedCase:
+    """The case with shear and bulk modulus (C10, C01, 1 / D1) of the filler in ``regions`` times
+    ``factor``."""
     return with_rubbers_at(
         case,
         regions,
@@ -56,7 +59,8 @@ def _stiffer(case: LoadedCase, regions: list[str], factor: float) -> LoadedCase:
 
 
 def add_to_deck(case: LoadedCase, value: float) -> LoadedCase:
-    """The same of the compounds of ``deck.parts.bead_filler``."""
+    """The same factor on the compounds that ``deck.parts.bead_filler`` of a case of your own deck
+    names."""
     if not value > -1:
         raise ValueError("must be greater than -1")
     return with_compounds(case, "bead_filler", "HYPERELASTIC", stiffer(1 + value, bulk=True))
@@ -81,7 +85,7 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add_to_deck,
     part="bead_filler",
-    # it gets softer towards its tip; its height is integrated over
+    # large, because a filler gets softer towards its tip; a diagnosis integrates over its height
     response_error=0.08,
     shape_uncertainty=higher,
 )

@@ -1,6 +1,11 @@
 """Where the parts of a tyre are in its section: carcass, belt, tread, sidewall, bead.
 
-They are told by the lines' lengths: the carcass runs from bead to bead, belts end.
+The lengths of the lines tell them apart: the carcass runs from bead to bead, belts end before.
+
+A `Section` is half a cross-section, from the crown to the bead. Its lines go from the inner surface
+(first) to the outer one (last), its stations from the crown (first) to the bead (last): ``points``
+(line, station, 2) are r and z in m, NaN where a line is absent. Regions are runs of stations with a
+name, the first one at the crown. ``rigid`` (station,) are the stations that the rim holds.
 """
 
 from __future__ import annotations
@@ -14,7 +19,7 @@ Array = np.ndarray
 
 
 def present(section: Section) -> Array:
-    """Whether a line really is there, (line, station)."""
+    """Whether a line is present at a station, (line, station)."""
     there: Array = ~np.isnan(section.points).any(-1)
     return there
 
@@ -29,7 +34,7 @@ def carcass_line(case: LoadedCase) -> str:
 
 
 def carcass(case: LoadedCase) -> list[str]:
-    """Names of the layers on the carcass' line. Raises ValueError."""
+    """Names of the cord layers on the carcass line. Raises ValueError."""
     line = carcass_line(case)
     return [name for name, layer in case.case.rebar_layers.items() if layer.line == line]
 
@@ -52,8 +57,12 @@ def belt_lines(case: LoadedCase) -> list[str]:
 
 
 def belts(case: LoadedCase) -> list[str]:
-    """Names of the layers on the belts' lines, from inside to outside: not those that go round the
-    tyre, as cap plies do, nor turn-ups on what is a belt's line at the crown. Raises ValueError."""
+    """Names of the cord layers on the belts' lines at the crown, from inside to outside. Raises
+    ValueError.
+
+    Left out are layers round the tyre (90 degrees), such as cap plies, and turn-ups, which are on
+    the same line but not at the crown.
+    """
     layers = case.case.rebar_layers
     top = case.section.regions[0][0]
     names = [
@@ -68,7 +77,7 @@ def belts(case: LoadedCase) -> list[str]:
 
 
 def tread(case: LoadedCase) -> tuple[str, str]:
-    """Lines between which the tread lies: outside all cords, of one rubber. Raises ValueError."""
+    """Inner and outer line of the tread: outside all cords, of one rubber. Raises ValueError."""
     names, top = case.section.names, case.section.regions[0][0]
     inner = names.index(belt_lines(case)[-1])
     owner = None
@@ -80,7 +89,7 @@ def tread(case: LoadedCase) -> tuple[str, str]:
 
 
 def turned_up(case: LoadedCase) -> tuple[str, list[str]] | None:
-    """The line that the carcass' turn-up lies on and its regions; None where there is none.
+    """Line and regions of the carcass' turn-up; None if there is none.
 
     Raises ValueError.
     """
@@ -94,26 +103,26 @@ def turned_up(case: LoadedCase) -> tuple[str, list[str]] | None:
 
 
 def held_regions(section: Section) -> list[str]:
-    """Regions that the rim holds."""
+    """Names of the regions that end at a station that the rim holds."""
     edge = rim_edge(section)
     return [name for name, _, last in _regions(section) if last > edge]
 
 
 def belt_edge(case: LoadedCase) -> int:
-    """Station at which the widest belt ends. Raises ValueError."""
+    """Index of the station at which the widest belt ends. Raises ValueError."""
     there = present(case.section)
     places = [case.section.names.index(line) for line in belt_lines(case)]
     return int(max(np.flatnonzero(np.logical_and.accumulate(there[k]))[-1] for k in places))
 
 
 def crown(case: LoadedCase) -> list[str]:
-    """Regions of which most lies within the belt. Raises ValueError."""
+    """Names of the regions whose middle is within the widest belt. Raises ValueError."""
     edge = belt_edge(case)
     return [name for name, first, last in _regions(case.section) if (first + last) / 2 < edge]
 
 
 def sidewall(case: LoadedCase) -> list[str]:
-    """Regions between the belt and where the rim holds the tyre. Raises ValueError."""
+    """Names of the regions whose middle is between belt and rim. Raises ValueError."""
     edge, held = belt_edge(case), rim_edge(case.section)
     return [
         name for name, first, last in _regions(case.section) if edge <= (first + last) / 2 < held
@@ -121,7 +130,8 @@ def sidewall(case: LoadedCase) -> list[str]:
 
 
 def lower_sidewall(case: LoadedCase) -> list[str]:
-    """Regions of the sidewall below the section's widest point. Raises ValueError."""
+    """Names of the regions of the sidewall below the widest point of the carcass. Raises
+    ValueError."""
     line = case.section.points[case.section.names.index(carcass_line(case))]
     widest = int(np.argmax(line[:, 1]))
     middle = {name: (first + last) / 2 for name, first, last in _regions(case.section)}
@@ -132,15 +142,16 @@ def lower_sidewall(case: LoadedCase) -> list[str]:
 
 
 def rim_edge(section: Section) -> int:
-    """The first station that the rim holds."""
+    """Index of the first station that the rim holds."""
     return int(np.flatnonzero(section.rigid)[0])
 
 
 def stations(section: Section, region: str) -> tuple[int, int]:
-    """First and last station of a region; neighbours share one."""
+    """Indices of the first and last station of a region; neighbours share one."""
     return next((first, last) for name, first, last in _regions(section) if name == region)
 
 
 def _regions(section: Section) -> list[tuple[str, int, int]]:
+    """Name, first and last station of each region."""
     ends = np.cumsum([0, *(count for _, count in section.regions)])
     return [(name, int(ends[i]), int(ends[i + 1])) for i, (name, _) in enumerate(section.regions)]
