@@ -128,6 +128,7 @@ def _order(blocks: Sequence[Block], before: Sequence[Block]) -> Iterator[Finding
 
 
 def _parameters(block: Block, rule: KeywordRule, names: _Names) -> Iterator[Finding]:
+    """Findings about the parameters of a keyword: unknown ones, wrong values, missing ones."""
     for name, value in block.parameters.items():
         if name not in rule.parameters:
             yield Finding(
@@ -207,6 +208,8 @@ def _value(
 
 
 def _elements(block: Block, names: _Names) -> Iterator[Finding]:
+    """Findings about the nodes of the elements of an *ELEMENT block; notes their type in
+    ``names``."""
     kind = named(block.parameters.get("TYPE", ""))
     if kind not in NODES_AND_SECTION:
         yield Finding(

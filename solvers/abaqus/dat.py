@@ -34,6 +34,7 @@ def read_dat(path: Path) -> DatTable:
 
 
 def _rows(text: str) -> dict[int, float]:
+    """Numbers of the first table of eigenvalues, by mode number."""
     by_number: dict[int, float] = {}
     for line in text.splitlines():
         row = _ROW.match(line)

@@ -42,6 +42,7 @@ def read_fil(path: Path) -> ResultModes:
 
 
 def _modes(text: str) -> ResultModes:
+    """Eigenvalues, shapes and nodes from the records of a results file. Raises ValueError."""
     places: dict[int, list[float]] = {}
     mode_data: dict[int, tuple[float, float]] = {}
     shapes: dict[int, dict[int, list[float]]] = {}
@@ -75,6 +76,8 @@ def _arrays(
     mode_data: dict[int, tuple[float, float]],
     shapes: dict[int, dict[int, list[float]]],
 ) -> ResultModes:
+    """The same as arrays, modes by rising number. Raises ValueError if there are none, or nodes
+    differ."""
     if not mode_data:
         raise ValueError("it has no mode")
     order = sorted(mode_data)

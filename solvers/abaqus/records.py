@@ -42,6 +42,7 @@ def records(text: str) -> Iterator[tuple[int, list[Item]]]:
 
 
 def _item(data: str, at: int) -> tuple[Item, int]:
+    """The item of a record at place ``at``, and the place after it. Raises ValueError."""
     kind = data[at]
     if kind == "A":
         return data[at + 1 : at + 9], at + 9

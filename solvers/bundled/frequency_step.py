@@ -108,6 +108,7 @@ class FrequencyStep:
         return [m.below(self.row.number(2)) for m in modes] if self.row.text(2) else modes
 
     def _modes(self, solver: HasModes) -> list[HarmonicModes]:
+        """Modes of the wanted harmonics, coupled if the tyre is not uniform."""
         tyre, step = self.tyre, self.step
         harmonics = tyre.request.harmonics if step.revolved else [0]
         count, nonuniform = tyre.request.modes_per_harmonic, is_nonuniform(tyre, step)

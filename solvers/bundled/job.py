@@ -296,6 +296,7 @@ class Job:
         return RimRequest(np.array(motions), float(np.real(self.model.mesh.X[row, 1])))
 
     def _static(self, step: DeckStep) -> None:
+        """Inflate: find the equilibrium under a step's loads, which becomes the tyre's state."""
         self._check_time()
         model = self.inflating(None, step.long_term, False)
         acting, equations = loads(model, step), numbering(model, step)

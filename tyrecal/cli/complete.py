@@ -77,6 +77,7 @@ def numbers(ctx: click.Context, param: click.Parameter, incomplete: str) -> Item
 
 
 def _starting(names: Iterable[str], incomplete: str) -> Items:
+    """Completions of a word among ``names``."""
     if incomplete.endswith("="):  # a number follows
         return []
     return [
@@ -87,6 +88,7 @@ def _starting(names: Iterable[str], incomplete: str) -> Items:
 
 
 def _yaml(folder: Path, depth: int) -> Iterator[Path]:
+    """Case files of a folder and of those inside it, ``depth`` levels deep."""
     with contextlib.suppress(OSError):
         for path in sorted(folder.iterdir()):
             if path.name.startswith("."):

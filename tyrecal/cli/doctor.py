@@ -83,6 +83,7 @@ def command(solver: str, store: Path | None, terminal: Terminal) -> int:
 
 
 def _words(report: dict[str, Any]) -> list[str]:
+    """Lines of the report for people."""
     from ..simulate.modes.label import in_words
 
     here, check = report["machine"], report["self_check"]

@@ -227,6 +227,7 @@ def _modes(case: Path) -> str:
 
 
 def _draw(loaded: Any, picture: Path, terminal: Terminal) -> None:
+    """Draw the section of a new case."""
     from ..report.figure import save
     from ..report.section import draw_section
     from ..report.shape_data import section_data

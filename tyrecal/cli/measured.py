@@ -350,6 +350,7 @@ def _refuse_universal_options(file: Path) -> None:
 
 
 def _print_labels(labels: LabelsResult, run: Run, study: options.Study) -> None:
+    """Print and write the labels of frequencies."""
     from ..report.table import shown
 
     run.finish()
@@ -371,6 +372,7 @@ def _layout(
     band: str | None = None,
     response: str = "",
 ) -> Layout:
+    """Layout of the sensors by the options. Raises click.UsageError."""
     from ..measured.modal import Layout
     from ..simulate.modes.label import MAX_SAMPLED_HARMONIC
 

@@ -107,6 +107,7 @@ def lock(folder: Path, command: str, started: str) -> Lock | None:
 
 
 def _owner(path: Path) -> str:
+    """The command that uses a results folder, in words."""
     try:
         return "'tyrecal {command}', process {pid} on {host} since {started}".format(
             **read_json(path, follow=False)

@@ -158,6 +158,7 @@ class Terminal:
 
 @contextmanager
 def _listening(progress: Progress) -> Iterator[Progress]:
+    """Context in which the solver's messages on loads move the progress bar."""
     listener = _Loads(progress)
     log = logging.getLogger(SOLVERS)
     level = log.level

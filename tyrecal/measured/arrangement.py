@@ -89,6 +89,7 @@ def _reference(each: Function) -> tuple[str, int, int]:
 
 
 def _exchange(each: Function) -> Function:
+    """The function with response and reference exchanged, which reciprocity allows."""
     return replace(
         each,
         response=each.reference,

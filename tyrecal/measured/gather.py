@@ -179,6 +179,7 @@ def label_entry(label: Label | None) -> dict[str, Any]:
 
 
 def _entry(run: ModalTest, labelled: LabelledMode) -> dict[str, Any]:
+    """A labelled mode of a run as an entry of the result file."""
     finite = lambda x: x if isfinite(x) else None
     return {
         "file": run.name,

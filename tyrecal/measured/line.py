@@ -97,6 +97,8 @@ class Line:
             )
 
     def _quantities(self) -> list[str]:
+        """Quantities that the line states: the one named, or each that has a column. Raises
+        ValueError."""
         if not self.cell("value"):
             if quantities := [quantity for quantity in QUANTITIES if self.cell(quantity)]:
                 return quantities
@@ -124,6 +126,8 @@ class Line:
         )
 
     def _label(self) -> Label | None:
+        """Label by the cells ``label``, ``c``, ``m`` and ``kind``; None if the line has none.
+        Raises ValueError."""
         c, m, kind = self.cell("c"), self.cell("m"), self.cell("kind")
         if not self.labelled and not any(map(self.cell, ("label", "c", "m", "kind", "member"))):
             return None
@@ -158,6 +162,7 @@ class Line:
         return Label(int(c), int(m), KIND_WORDS[word] if zero else None)
 
     def _member(self, label: Label, loaded: bool) -> str:
+        """Member of a pair, or symmetry under load, by the cell ``member``. Raises ValueError."""
         word = self.cell("member").lower()
         if loaded and word in LOADED_MEMBERS:
             return word

@@ -228,6 +228,7 @@ def _signals(shape: MeasuredShape) -> tuple[Signal, ...]:
 
 
 def _from_shapes(file: Universal) -> list[_UnlabelledMode]:
+    """Modes of a file that holds mode shapes. Raises InputError."""
     modes = []
     for shape in file.shapes:
         signals = _signals(shape)
@@ -240,6 +241,8 @@ def _from_shapes(file: Universal) -> list[_UnlabelledMode]:
 
 
 def _from_functions(file: Universal, layout: Layout) -> tuple[list[_UnlabelledMode], ModalTest]:
+    """Modes identified in a file's frequency-response functions, and the test with its functions.
+    Raises InputError."""
     if not file.functions:
         others = ", ".join(f"{count} x {what}" for what, count in file.skipped.items())
         raise InputError(
@@ -354,6 +357,7 @@ def label_in_turn(identified: Sequence[tuple[MeasuredMode, Labeller, str]]) -> l
 def _labelled(
     mode: MeasuredMode, labeller: Labeller, place: str, below: Collection[Label] = ()
 ) -> LabelledMode:
+    """The mode with its label, or with the reason why it has none."""
     shape, collinearity = _unit(mode)
     judged = labeller.judge(shape, below, mode.frequency_Hz)
     R = labeller.sensors.points[:, 0]

@@ -80,6 +80,7 @@ def label_parts(text: str, aliases: Mapping[str, str]) -> tuple[str, str, str] |
 
 
 def _named(text: str) -> tuple[str, str, str] | None:
+    """c, m and kind, as text, of a mode's name in words; None if it is unknown."""
     words = _words(text)
     for label, names in MODE_NAMES.items():
         match = BRACKETED_LABEL.match(label)

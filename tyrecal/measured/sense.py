@@ -62,6 +62,7 @@ def doubts(rows: Sequence[Measurement]) -> list[str]:
 
 
 def _of_one_rim(rows: list[Measurement]) -> Iterator[str]:
+    """Sentences on values measured on one rim that fit better if they are exchanged."""
     rows = list(rows)
     for _ in range(min(MAX_DOUBTS, len(rows) - 1)):
         weight, deviation = _pattern(rows)

@@ -190,6 +190,7 @@ def is_gap(cell: str) -> bool:
 
 
 def _sigma_mistake(each: Measurement) -> str | None:
+    """Why a measurement's standard deviation cannot be right, or None."""
     if isnan(each.sigma):
         return "sigma is '', must be the standard deviation, greater than 0"
     if each.sigma > MAX_SIGMA * each.value:

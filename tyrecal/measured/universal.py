@@ -217,6 +217,7 @@ def _length(units: Sequence[_Set]) -> float:
 
 
 def _systems(sets: Sequence[_Set]) -> dict[int, CoordinateSystem]:
+    """All coordinate systems of a file, by number. Raises InputError."""
     systems: dict[int, CoordinateSystem] = {}
     for each in sets:
         try:
@@ -234,6 +235,7 @@ def _systems(sets: Sequence[_Set]) -> dict[int, CoordinateSystem]:
 def _add_nodes(
     result: Universal, each: _Set, systems: dict[int, CoordinateSystem], length: float
 ) -> None:
+    """Add the nodes of a data set, in m and in the global system. Raises InputError."""
     content = each.content
     numbers = [content[name] for name in ("node_nums", "def_cs", "disp_cs", "x", "y", "z")]
     if len(set(map(len, numbers))) > 1:
@@ -265,6 +267,7 @@ def is_same_place(one: Place, other: Place) -> bool:
 
 
 def _add_shape(result: Universal, each: _Set) -> None:
+    """Add the mode shape of a data set 55 or 2414; count what is no mode shape as skipped."""
     content = _like_55(each.content) if each.kind == 2414 else each.content
     motion = content.get("spec_data_type") in (*NOT_STATED, *MOTION_FORMS)
     vectors = content.get("n_data_per_node") in (3, 6)
@@ -328,6 +331,8 @@ def _unmeasured(shapes: list[MeasuredShape]) -> None:
 
 
 def _add_function(result: Universal, each: _Set) -> None:
+    """Add the frequency-response function of a data set 58; count other functions as skipped.
+    Raises InputError."""
     content = each.content
     if content["func_type"] != RESPONSE_FUNCTION:
         code = content["func_type"]

@@ -49,6 +49,7 @@ def drift_table(drift: Mapping[str, Any]) -> Table | None:
 
 
 def _table(*columns: str) -> Table:
+    """An empty table with right-aligned columns of figures."""
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 0, 0, 1), pad_edge=False, show_edge=False)
     for name in columns:
         figures = name in FIGURES

@@ -79,6 +79,7 @@ def page(study: DiagnosedCase, case: str, measured: str) -> str:
 
 
 def _counted(d: Diagnosis) -> str:
+    """The measurements in words: number of modes, pressures, rims and runs."""
     rows = d.problem.observations.rows
     pressures = sorted({row.pressure_kPa for row in rows if row.label})
     modes = len({row.label for row in rows if row.label})
@@ -98,6 +99,7 @@ def _title(study: DiagnosedCase, key: str) -> str:
 
 
 def _headline(study: DiagnosedCase) -> str:
+    """The verdict as a headline."""
     v = study.diagnosis.verdict
     if v.kind == NAMED and v.key:
         others = " or ".join(_title(study, each.id) for each in v.also)
@@ -110,6 +112,7 @@ def _headline(study: DiagnosedCase) -> str:
 
 
 def _answer(study: DiagnosedCase) -> Iterator[str]:
+    """Sentences of the first section: the verdict, and what speaks for it."""
     d = study.diagnosis
     v, p = d.verdict, d.probabilities
     if study.asked_for is not None:
@@ -225,6 +228,7 @@ def _sized(d: Diagnosis, key: str, id: str) -> str:
 
 
 def _gap(d: Diagnosis) -> Iterator[str]:
+    """Sentences on the misfit that the calibration leaves."""
     g = d.gap
     seen = "larger than" if g.p_value < 0.05 else "within"
     yield (
@@ -246,6 +250,7 @@ def _gap(d: Diagnosis) -> Iterator[str]:
 
 
 def _where(d: Diagnosis) -> Iterator[str]:
+    """Sentences on the groups of modes with a misfit beyond chance."""
     groups = [g for g in d.gap.groups if g.corrected < 0.05]
     if groups:
         words = ", ".join(
@@ -304,6 +309,7 @@ def _fields(study: DiagnosedCase) -> Iterator[str]:
 
 
 def _under_load(study: DiagnosedCase) -> Iterator[str]:
+    """Sentences and table on measurements under load, which are not fitted."""
     under_load = study.under_load
     if not under_load:
         return
@@ -336,6 +342,7 @@ def _measured(row: LoadedRow) -> str:
 
 
 def _which(study: DiagnosedCase) -> Iterator[str]:
+    """Table of the explanations with probability, size and detectability."""
     d = study.diagnosis
     order = sorted(d.probabilities.items(), key=lambda item: -item[1])
     rows = [
@@ -398,6 +405,7 @@ def _ranged(q: Mapping[str, Any]) -> str:
 
 
 def _shrinkage(d: Diagnosis) -> Iterator[str]:
+    """Sentences on the prediction of held-out data."""
     s = d.shrinkage
     if s is None:
         yield "There are too few data for held-out data."
@@ -450,6 +458,7 @@ def _calibrated(variable: Mapping[str, Any]) -> str:
 
 
 def _next(d: Diagnosis) -> Iterator[str]:
+    """List of the next measurements that gain most per hour."""
     worth = [c for c in d.choices if c.gain > 0][:4]
     if not worth:
         yield "None of the possible measurements would separate the explanations further."
@@ -461,6 +470,7 @@ def _next(d: Diagnosis) -> Iterator[str]:
 
 
 def _assumptions(study: DiagnosedCase) -> Iterator[str]:
+    """Sentences on the numbers that the diagnosis takes for granted."""
     d = study.diagnosis
     kind = "assumed, not in the case" if study.assumed_sources else "stated by the case"
     words = ", ".join(source.words for source in study.sources if source.words) or "none"

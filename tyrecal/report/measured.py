@@ -89,6 +89,7 @@ def draw_measured(path: Path, runs: Sequence[ModalTest]) -> None:
 
 
 def _draw(path: Path, runs: Sequence[ModalTest]) -> None:
+    """Draw functions and mode shapes of the first run that has functions."""
     from .figure import new_figure, save
 
     run = next((each for each in runs if each.functions is not None), runs[0])

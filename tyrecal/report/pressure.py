@@ -80,6 +80,7 @@ def draw_pressure_sweep(
 
 
 def _draw(top: Axes, bottom: Axes, curve: Any, design: str, c: int) -> None:
+    """Add a mode's frequency and its rise over the pressure to both panels."""
     style: dict[str, Any] = {
         "color": COLOURS[c % len(COLOURS)],
         "ls": LINE_STYLES.get(design, ":"),

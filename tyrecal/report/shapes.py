@@ -107,6 +107,8 @@ def _drawn(mesh: SectionMesh) -> Array:
 
 
 def _surface(mode: Mode, mesh: SectionMesh) -> _Surface:
+    """The outer surface at rest and moved by a mode; of a pair, the member with its crest at the
+    top."""
     nodes = _drawn(mesh)
     angles = 2 * np.pi * np.arange(ANGLES + 1) / ANGLES
     rest = swept(nodes, mesh, angles)

@@ -184,6 +184,7 @@ def shown(table: Table, *sections: Table) -> rich.Table:
 
 
 def _empty(table: Table) -> rich.Table:
+    """An empty table of the terminal with the columns of ``table``."""
     # figures never break: on a narrow terminal only names and words do
     made = rich.Table(box=box.SIMPLE_HEAD, padding=(0, 0, 0, 1), pad_edge=False, show_edge=False)
     made.title, made.caption = table.title or None, table.caption or None
@@ -199,6 +200,7 @@ def _empty(table: Table) -> rich.Table:
 
 
 def _cell(cell: Cell) -> Text:
+    """A cell as text; a deviation is coloured by its size."""
     # square brackets of names and labels are markup to rich unless they come as Text
     if isinstance(cell, Deviation):
         off = abs(cell.percent)

@@ -62,6 +62,7 @@ def settings() -> Any:
 
 @lru_cache(maxsize=1)
 def _read(path: Path | None, changed: float) -> Any:
+    """The settings of a file, checked. Raises InputError."""
     from pydantic import BaseModel, ConfigDict, Field
 
     from ..tyre.case.parts import Name

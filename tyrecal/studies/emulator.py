@@ -228,6 +228,7 @@ def emulator(
 
 
 def _evaluated(x: Array, answer: LabelledModes, variables: Sequence[DesignVariable]) -> Evaluated:
+    """The design x (v,) with ln f and its slopes by x, from the labelled modes."""
     modes, gradients = {mode.label: mode for mode in answer.modes}, answer.evaluation.gradients
     per_x = [v.slope(v.value(float(xi))) for v, xi in zip(variables, x, strict=True)]
     by_name = np.array([gradients[v.name] for v in variables])  # (v, modes)

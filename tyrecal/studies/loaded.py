@@ -140,6 +140,7 @@ def _unloaded(
 def _loaded_tyre(
     case: LoadedCase, unloaded: LabelledModes, pressed: Pressed | EvaluationFailed, with_zero: bool
 ) -> LoadOutcome:
+    """Modes of a pressed tyre at its loads, followed from the unloaded ones."""
     if isinstance(pressed, EvaluationFailed):
         return pressed
     first = pressed.footprints[0]

@@ -93,6 +93,8 @@ def sweep(
 def _outcome(
     design: str, pressure_kPa: float, answer: LabelledModes | EvaluationFailed, name: str
 ) -> SweepOutcome:
+    """The tyre at one pressure: its modes, with exact slopes by the pressure if the solver has
+    them."""
     if isinstance(answer, EvaluationFailed):
         return Failure(design, pressure_kPa, answer)
     modes = labelled(answer.evaluation)

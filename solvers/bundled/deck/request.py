@@ -56,6 +56,7 @@ def read_request(path: Path, jobs: Sequence[str]) -> Request:
 
 
 def _request(content: Any, folder: Path, jobs: Sequence[str]) -> Request:
+    """The checked content of a request file. Raises Refused with the key that is wrong."""
     _object("the request", content, [each.name for each in fields(Request)])
     for key, value in content.items():
         if value is not None or key not in ("harmonics", "cavity", "sector", "response"):

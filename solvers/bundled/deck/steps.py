@@ -67,6 +67,7 @@ class Deck:
 
 
 def _steps(model: list[Block], blocks: list[list[Block]], revolved: bool) -> list[DeckStep]:
+    """The steps of a deck, each with all supports and loads that act in it. Raises DeckError."""
     steps: list[DeckStep] = []
     held: Sequence[Row] = [row for k in model if k.name == "BOUNDARY" for row in k.rows]
     pressures: dict[str, complex | float] = {}
@@ -107,6 +108,7 @@ def _steps(model: list[Block], blocks: list[list[Block]], revolved: bool) -> lis
 
 
 def _pressures(k: Block) -> dict[str, complex | float]:
+    """Pressure (Pa) by surface of a *DSLOAD. Raises DeckError."""
     pressures = {}
     for row in k.rows:
         if row.name(1) != "P":

@@ -196,6 +196,8 @@ class Vibration:
         return self._borders[n]
 
     def _new_border(self, n: int) -> Border | None:
+        """Border of harmonic n for a rim that moves and for the cavity's air; None if there is
+        neither."""
         moving = self.wheel is not None and self.wheel.motions(n)
         if not moving and self.air is None:
             return None

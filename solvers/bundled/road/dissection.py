@@ -196,6 +196,8 @@ def _levels(connectivities: list[Array], symmetry: HalfTurn) -> Array:
 
 
 def _steps(connectivities: list[Array], start: Array, free: Array) -> Array:
+    """Number of elements between each node and the nodes ``start`` (n,), along free nodes; -1: none
+    leads there."""
     level = np.where(start & free, 0, -1)
     current = 0
     while (level == current).any():

@@ -146,6 +146,8 @@ class _Path:
 def _solved(
     work: ContactNewton, tangent: Tangent, force: Array, lacking: float
 ) -> tuple[Array, float]:
+    """Derivatives of the parts and of the road's height by a number whose force is ``force``.
+    Raises NoEquilibrium."""
     parts, rise, left = work.solve_closely(tangent, force, lacking, SMOOTH_RTOL)
     if left > SMOOTH_RTOL:
         raise NoEquilibrium(f"a derivative was not found in {MAX_GMRES} iterations")

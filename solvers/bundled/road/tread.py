@@ -133,6 +133,8 @@ class Points:
 
     @cached_property
     def _functions(self) -> tuple[Array, Array]:
+        """Functions round the tyre and their derivatives by the angle at the points, each (i, j, p,
+        l)."""
         half = self.tread.length[self.t, None, None] / 2
         three = functions(self.angle - self.tread.begin[self.t, None, None] - half, half)
         third, fourth = self.tread.columns[self.t, 2:3], self.tread.columns[self.t, 3:]

@@ -99,6 +99,7 @@ def check_open_ends(mesh: DeckMesh, step: DeckStep) -> None:
 
 
 def _free(mesh: DeckMesh, step: DeckStep) -> Array:
+    """Mask (n, 3) of the components r, theta, z that a step leaves free. Raises DeckError."""
     free = np.zeros((len(mesh.X), 3), bool)
     for rows in mesh.connectivity.values():
         free[rows] = True
@@ -153,6 +154,7 @@ def _range(row: Row) -> tuple[int, int]:
 
 
 def _components(row: Row, revolved: bool) -> list[int]:
+    """Components (0, 1, 2 of r, theta, z) that a row of *BOUNDARY holds. Raises DeckError."""
     first, last = _range(row)
     if row.text(3) and row.value(3) != 0.0:
         raise DeckError(row.place, "only zero displacements are honoured")

@@ -244,6 +244,8 @@ def _inverse(kind: ElementType, corners: Array, place: Array) -> Array | None:
 
 
 def _step(kind: ElementType, corners: Array, place: Array, xi: Array) -> Array:
+    """Newton step of the natural coordinates xi (2,) of ``place`` (2,) in an element with nodes
+    ``corners`` (a, 2)."""
     N, dN = (each[0] for each in kind.at(xi[None]))
     tangent = corners.T @ dN  # dX_j / dxi_k
     off = place - N @ corners

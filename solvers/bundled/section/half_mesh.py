@@ -33,6 +33,7 @@ def _half_like(mesh: DeckMesh, like: DeckMesh) -> DeckMesh | None:
 
 
 def _half(mesh: DeckMesh) -> DeckMesh | None:
+    """The elements on z >= 0 of a mirror-symmetric mesh; None if it is not mirror-symmetric."""
     try:
         symmetry = MirrorHalf(mesh.X)
         guests = _alike(mesh.guests)

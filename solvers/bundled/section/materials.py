@@ -162,6 +162,8 @@ def _hyperelastic(m: Material, k: Block) -> None:
 
 
 def _viscoelastic(m: Material, k: Block) -> None:
+    """Read a *VISCOELASTIC block into a material: Prony terms (g, k, tau) or a table of moduli.
+    Raises DeckError."""
     if "FREQUENCY" in k.parameters:
         m.table = _modulus_table(k)
         m.loss = _with_losses(m, k)

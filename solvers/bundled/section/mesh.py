@@ -45,6 +45,7 @@ class DeckMesh:
         return {kind: self._block(kind, rows) for kind, rows in self.connectivity.items()}
 
     def _block(self, kind: str, rows: Array) -> elements.Solids | elements.Lines:
+        """Operators of the elements of one type. Raises DeckError if one has no positive area."""
         share = self.symmetry.share(rows)
         if kind in self.embedded:
             weights = self.embedded[kind].weights(self.X, self.guests)
@@ -114,6 +115,7 @@ def _with_tangents(mesh: DeckMesh, seeded: list[Block]) -> DeckMesh:
 
 
 def _mesh(keywords: list[Block]) -> DeckMesh:
+    """The mesh of a deck's nodes, elements, sets and surfaces. Raises DeckError."""
     index: dict[int, int] = {}
     coordinates: list[tuple[complex | float, complex | float]] = []
     node_sets: dict[str, list[int]] = {}
@@ -197,6 +199,8 @@ def _elements(
     place: dict[int, tuple[str, int]],
     sets: dict[str, list[int]],
 ) -> None:
+    """Add the elements of an *ELEMENT block to ``connectivity``, ``place`` and ``sets``. Raises
+    DeckError."""
     kind = k.need("TYPE")
     if kind not in TYPES:
         raise DeckError(
@@ -219,6 +223,7 @@ def _elements(
 
 
 def _members(k: Block, sets: dict[str, list[int]], known: dict) -> list[int]:
+    """Numbers in a set by a *NSET or *ELSET block. Raises DeckError."""
     members: list[int] = []
     in_order = sorted(known) if "GENERATE" in k.parameters else []
     for row in k.rows:
@@ -251,6 +256,7 @@ def _surface(
     place: dict[int, tuple[str, int]],
     sets: dict[str, list[int]],
 ) -> Array:
+    """Nodes (edges, 2 or 3) of the edges of a *SURFACE. Raises DeckError."""
     rows: list[list[int]] = []
     for row in k.rows:
         name, face = row.name(0), row.name(1)

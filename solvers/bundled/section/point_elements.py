@@ -92,6 +92,7 @@ def _row(number: int, place: Place, mesh: DeckMesh) -> int:
 
 
 def _positive(k: Block, line: int) -> complex | float:
+    """The positive number on data line ``line`` of a block. Raises DeckError."""
     if len(k.rows) != line + 1:
         raise DeckError(k.place, f"*{k.name} takes {line + 1} data line{'s' * line}")
     value = k.rows[line].value(0)

@@ -34,6 +34,7 @@ def narrow_order(pairs: Array, n: int) -> Array:
 
 @lru_cache(maxsize=8)  # of the same mesh from one evaluation to the next
 def _narrow_order(pairs: bytes, n: int) -> list[int]:
+    """Order of Cuthill and McKee of n nodes, from pairs (k, 2) as bytes."""
     beside: list[set[int]] = [set() for _ in range(n)]
     for i, j in np.frombuffer(pairs, np.int64).reshape(-1, 2).tolist():
         beside[i].add(j)

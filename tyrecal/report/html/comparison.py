@@ -63,6 +63,7 @@ def comparison(results: Sequence[Results]) -> list[Group]:
 
 
 def _whole(fits: Sequence[FitResult | None]) -> Iterator[ComparisonRow]:
+    """Rows of the comparison that belong to no single variable or mode."""
     yield ComparisonRow(
         "objective", "initial", _cells(fits, lambda fit: _objective(fit, "initial_"))
     )
@@ -117,6 +118,7 @@ def _aim(mode: FittedMode) -> tuple[str, str]:
 
 
 def _variable(fit: FitResult, name: str) -> str:
+    """Value and standard error of a variable in one fit, as text."""
     if name in fit.fixed:
         return f"{fit.fixed[name]:.4g} held"
     known = fit.variables.get(name)

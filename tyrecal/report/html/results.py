@@ -126,6 +126,7 @@ def _is_filled(result: Result) -> bool:
 
 
 def _read(path: Path, kind: type[File]) -> File | None:
+    """The checked content of a result file; None if there is none. Raises InputError."""
     text = _text(path)
     if text is None:
         return None
@@ -154,6 +155,7 @@ def _runs(folder: Path) -> dict[str, RunFacts]:
 
 
 def _text(path: Path) -> str | None:
+    """Text of a file; None if there is none. Raises InputError."""
     try:
         return read_text(path, follow=False)
     except FileNotFoundError:
@@ -165,6 +167,7 @@ def _text(path: Path) -> str | None:
 
 
 def _history(path: Path) -> list[dict[str, Any]]:
+    """Design points of a fit's history.csv; empty if there is none. Raises InputError."""
     text = _text(path)
     if text is None:
         return []

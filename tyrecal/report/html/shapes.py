@@ -22,6 +22,7 @@ def packed(shapes: Shapes) -> dict[str, Any]:
 
 
 def _swept(shapes: Shapes) -> dict[str, Any]:
+    """Shapes of unloaded modes for the viewer, to be swept round the axle. Raises ValueError."""
     R, Z = np.array(shapes.R_m, float), np.array(shapes.Z_m, float)
     if len(R) != len(Z) or len(R) < 2:
         raise ValueError("points")
@@ -42,6 +43,7 @@ def _swept(shapes: Shapes) -> dict[str, Any]:
 
 
 def _loaded(shapes: Shapes) -> dict[str, Any]:
+    """Shapes of modes under load for the viewer, node by node. Raises ValueError."""
     angles, place = np.array(shapes.angles, float), np.array(shapes.surface_m, float)
     if place.ndim != 3 or place.shape[::2] != (len(angles), 3):
         raise ValueError("points")

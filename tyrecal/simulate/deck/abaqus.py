@@ -122,6 +122,7 @@ def _well(mesh: SectionMesh) -> dict[str, Any]:
 
 
 def _material(material: Any, analysis: Analysis) -> dict[str, Any]:
+    """A material's numbers for a template, in SI."""
     if material.kind == "cord":
         return {
             "kind": "cord",

@@ -86,6 +86,8 @@ def calculix_context(tyre: Tyre) -> dict[str, Any]:
 
 
 def _solids(tyre: Tyre, sector: Sector, numbers: dict[int, int]) -> list[dict[str, Any]]:
+    """Bricks by compound: name of the set, of the material, and rows of element and node
+    numbers."""
     case = tyre.case
     claims, rows = solid_claims(case), tuple(case.mesh.levels[case.mesh.level].rows)
     blocks: dict[int, list[tuple[int, ...]]] = {}

@@ -116,6 +116,7 @@ def _normals(line: Array) -> Array:
 
 
 def _strip(mesh: SectionMesh, number: int) -> PlyStrip:
+    """The strip of an element of a ply, by its number in the section."""
     corner = np.array([mesh.nodes[n] for n in mesh.solids[number][:4]])
     start, end = (corner[0] + corner[1]) / 2, (corner[3] + corner[2]) / 2
     length = np.linalg.norm(end - start)

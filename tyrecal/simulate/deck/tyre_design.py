@@ -185,6 +185,7 @@ class TyreDesign:
 
 
 def _abaqus(tyre: Tyre, env: Any, request: DeckRequest) -> dict[str, str]:
+    """Texts of the ABAQUS decks by file name. Raises TemplateFailed."""
     names = _with_mesh(tyre, env)
     names["modes"] = 2 * request["modes_per_harmonic"] * (request["highest_harmonic"] + 1)
     names["loads"], names["loaded_modes"] = request["loads_N"], request["loaded_modes"]

@@ -137,6 +137,8 @@ class Evaluator:
         return self._inflated(nominal) if nominal else None
 
     def _inflated(self, nominal: Design) -> Array | None:
+        """Shape (n, 4), node number and displacement in m, of the nominal tyre to start from; None
+        if there is none."""
         if "start" not in self.solver.capabilities:
             return None
         if (key := _key(nominal)) not in self.shapes:
@@ -247,6 +249,8 @@ class Evaluator:
                 raise DeckRefused(f"solver '{self.solver.name}' cannot express {lack}")
 
     def _with(self, values: Mapping[str, float]) -> Design:
+        """The design with values of variables. Raises EvaluationFailed if there is no such tyre, or
+        InputError."""
         try:
             design = self.design.at(values)
         except ValueError as error:  # no such tyre: the optimiser steps back from it
@@ -340,6 +344,8 @@ class Evaluator:
         return _not_refused(self._each("press", list(questions), jobs))
 
     def _each(self, ask: str, questions: Sequence[Any], jobs: int) -> Iterator[Any]:
+        """Answers to questions in order, by ``jobs`` workers or the scheduler; ``ask`` is evaluate
+        or press."""
         self.on_progress(0, len(questions))
         if len(questions) <= 1 or (jobs <= 1 and not self.scheduler):
             for done, arguments in enumerate(questions, start=1):
@@ -418,6 +424,8 @@ class Evaluator:
             raise EvaluationFailed("no_results", words)
 
     def _recall(self, key: str, decks: Decks, folder: Path) -> dict[str, Any] | None:
+        """The stored answer of a question; None if there is none. Raises EvaluationFailed if it is
+        a failure."""
         content = self.store.read(key) if self.store else None
         if not self.store or content is None:
             return None

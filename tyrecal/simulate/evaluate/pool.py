@@ -161,6 +161,7 @@ def _work(function: Callable[..., Any], *task: Any) -> Any:
 
 
 def _begin() -> None:
+    """Start of a worker: it ignores interrupts, and ends if its parent ends."""
     leave_interrupts_to_parent()
     parent = parent_process()
 

@@ -114,6 +114,7 @@ def installed() -> list[dict[str, Any]]:
 
 
 def _described(entry: EntryPoint) -> dict[str, Any]:
+    """Facts on an installed solver for lists; ``problem`` is the reason if it cannot be loaded."""
     facts: dict[str, Any] = {
         "name": entry.name,
         "version": None,

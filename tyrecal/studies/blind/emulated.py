@@ -109,6 +109,7 @@ class Emulated:
         return [known[i] if i in known else self._answer(p) for i, p in enumerate(points)]
 
     def _answer(self, point: Query) -> Answer:
+        """Answer to a query by the polynomials."""
         there = (point.x - self.start) / self.reach
         t = np.clip(there, -1.0, 1.0)
         eta, slope = self._plain.at(t)
@@ -189,6 +190,8 @@ def _effect(
     plain: Sequence[Answer | Exception],
     reach: float,
 ) -> EmulatedEffect | None:
+    """The emulated effect; None if so few designs have an answer that no polynomial is
+    determined."""
     powers = up_to(len(signs[0]), EFFECT_DEGREE)
     chosen = [i for i in range(EFFECT_DESIGNS) if isinstance(plain[i], Answer)]
     nodes, added, split = [], [], []

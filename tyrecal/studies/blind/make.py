@@ -255,6 +255,8 @@ def sealed_trial(trial: Trial, protocol: Protocol) -> dict[str, Any]:
 
 
 def kept_seed(sealed: Path, seed: int | None) -> int:
+    """The seed of the sealed folder, which is drawn and kept at first. Raises InputError for
+    another one."""
     path = sealed / "seed.json"
     if path.exists():
         known = int(read_json(path)["seed"])

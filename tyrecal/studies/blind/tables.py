@@ -92,6 +92,7 @@ def page(figures: dict[str, Any], maker: str) -> str:
 
 
 def _band(effects: Sequence[Scored], low: float, high: float) -> dict[str, Any]:
+    """Rates of right first and second answers among the effects of one band of difficulty."""
     here = [t for t in effects if low <= t.band < high]
     return {
         "top_1_group": rate([t.right for t in here]),
@@ -184,6 +185,7 @@ def _lines(f: dict[str, Any], maker: str) -> Iterator[str]:
 
 
 def _rate(each: dict[str, Any]) -> str:
+    """A rate in words: right of count, share and its 95 % interval."""
     if not each["count"]:
         return "none"
     return (

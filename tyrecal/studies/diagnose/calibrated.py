@@ -27,6 +27,7 @@ def calibrated_variables(diagnosis: Diagnosis, model: TyreModel) -> dict[str, An
 
 
 def _calibrated(diagnosis: Diagnosis, model: TyreModel, key: str) -> dict[str, dict[str, Any]]:
+    """Value, standard error and unit of each variable under the hypothesis ``key``."""
     hypothesis = diagnosis.hypothesis(key)
     p, d = hypothesis.posterior, hypothesis.fitted.d
     apart = d - p @ d

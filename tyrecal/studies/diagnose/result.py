@@ -322,6 +322,7 @@ def diagnosis_result(
 
 
 def _gap(diagnosis: Diagnosis, under_load: UnderLoad | None) -> GapPart:
+    """The part ``gap`` of diagnosis.json."""
     gap, rows = diagnosis.gap, diagnosis.problem.observations.rows
     by = {
         kind: {g.name: g.rms_percent for g in gap.groups if g.kind == kind}
@@ -355,6 +356,7 @@ def _gap(diagnosis: Diagnosis, under_load: UnderLoad | None) -> GapPart:
 
 
 def _under_load(comparison: UnderLoad | None) -> UnderLoadPart | None:
+    """The part ``under_load`` of diagnosis.json; None if nothing was measured under load."""
     if comparison is None:
         return None
     effect = comparison.tyres[1] if len(comparison.tyres) > 1 else None

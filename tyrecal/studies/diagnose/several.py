@@ -96,6 +96,8 @@ def present(p: Mapping[str, float], ids: Sequence[str]) -> float:
 def _by_key(
     hypotheses: Sequence[Hypothesis], p: Array, over: Callable[[Hypothesis], Array]
 ) -> dict[str, float]:
+    """Sum of ``p`` by key; of effects that the case states as uncertain, the share ``over`` each
+    key."""
     totals = {h.key: 0.0 for h in hypotheses}
     for h, whole in zip(hypotheses, p.tolist(), strict=True):
         if not h.prior_sd:

@@ -108,6 +108,7 @@ def _mean(same: Sequence[Measurement]) -> tuple[float, float]:
 def _footprints(
     case: LoadedCase, evaluator: Evaluator, values: Values, places: Sequence[LoadedKey]
 ) -> Iterator[tuple[LoadedKey, float]]:
+    """Computed quantities of the footprint at their loads."""
     wanted = [place for place in places if place[1] is None]
     loads = sorted({load for _, _, load in wanted})
     if not loads:
@@ -125,6 +126,7 @@ def _footprints(
 def _modes(
     case: LoadedCase, evaluator: Evaluator, values: Values, places: Sequence[LoadedKey]
 ) -> Iterator[tuple[LoadedKey, float]]:
+    """Computed frequencies (Hz) of modes under load."""
     wanted = [place for place in places if place[1]]
     loads = sorted({load for _, _, load in wanted})
     if not loads:

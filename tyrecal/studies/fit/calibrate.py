@@ -169,6 +169,7 @@ def _refuse_far_off(problem: Problem, initial: Point, readings: Sequence[Measure
 
 
 def _run(problem: Problem, start: Array, method: str) -> StartReport:
+    """One search from ``start`` (v,), and whether it converged."""
     first = problem.evaluate(start)
     tolerance = _tolerance(problem)
     outcome = minimise(problem, start, tolerance, METHODS[method])
@@ -199,6 +200,8 @@ def _more_starts(
     method: str,
     finished: Callable[[int, int], None],
 ) -> tuple[list[StartReport], int]:
+    """Searches from ``count`` random starts, and how many starts without a solution were
+    replaced."""
     generator = np.random.default_rng(seed)
     reports: list[StartReport] = []
     replaced = 0
@@ -253,6 +256,7 @@ def _start_alone(task: tuple[Problem, Array, str]) -> tuple[StartReport | Evalua
 
 
 def _history(problem: Problem) -> list[dict[str, Any]]:
+    """Entries of history.csv: objective, or failure, and values of each design point."""
     names = list(problem.fixed) + [v.name for v in problem.variables]
     return [
         {

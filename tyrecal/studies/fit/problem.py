@@ -226,6 +226,7 @@ class Problem:
         return known
 
     def _evaluate(self, values: dict[str, float]) -> Point:
+        """Residuals and Jacobian at values of the variables. Raises EvaluationFailed."""
         names = tuple(v.name for v in self.variables)
         exact = self.difference_step is None
         (by_state,) = self._in_states([values], names if exact else ())

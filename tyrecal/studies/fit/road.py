@@ -124,6 +124,7 @@ def _loads(targets: Placed) -> list[float]:
 def _footprints(
     case: LoadedCase, evaluator: Evaluator, targets: Placed, designs: Designs, jobs: int
 ) -> Iterator[Quantities | EvaluationFailed]:
+    """Quantities of the footprint of each design, or why it has none."""
     questions = [PressQuestion(values, _loads(targets)) for values in designs]
     outcomes = evaluator.press_all(questions, jobs)
     for values, outcome in zip(designs, outcomes, strict=True):
@@ -138,6 +139,7 @@ def _footprints(
 def _of_patches(
     evaluator: Evaluator, values: Mapping[str, float], pressed: Pressed, targets: Placed
 ) -> Quantities:
+    """Quantities of the footprint at their targets, from one pressed tyre."""
     mesh = cast(TyreDesign, evaluator.design.at(values)).tyre.mesh
     rows = {each.load_N: footprint_row(pressed, each, mesh) for each in pressed.footprints}
     return {
@@ -149,6 +151,7 @@ def _of_patches(
 def _modes(
     case: LoadedCase, evaluator: Evaluator, targets: Placed, designs: Designs, jobs: int
 ) -> Iterator[Quantities | EvaluationFailed]:
+    """Frequencies under load of each design, or why it has none."""
     loads = _loads(targets)
     labels = list(dict.fromkeys(t.member.label for t in targets.values() if t.member))
     named = {str(place): values for place, values in enumerate(designs)}

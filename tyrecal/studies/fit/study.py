@@ -157,6 +157,7 @@ class FitStudy:
         return provenance(case, self.evaluator.solver, files, **states_of(self.case))
 
     def _fit_with_labels(self, calibrated: Callable[[], Fit], jobs: int) -> Fit:
+        """Label and fit in turn until the labels stay the same, at most `MAX_FITS` times."""
         case, evaluator, readings, fixed = self._plain, self.evaluator, self.readings, self.fixed
         likeliest = label(case, evaluator, readings, fixed=fixed, jobs=jobs)
         for _ in range(MAX_FITS):

@@ -366,6 +366,8 @@ class TyreModel:
     def _modes(
         self, wanted: Sequence[tuple[dict[str, float], tuple[str, ...]]]
     ) -> list[ModesAnswer]:
+        """Labelled modes of designs, each with the names of which sensitivities are wanted. Raises
+        SolverUnavailable."""
         jobs = self.jobs if len(wanted) >= WORTH_A_POOL else 1
         # the longest first, so that the last ones end together
         order = sorted(range(len(wanted)), key=lambda i: -self._effort(wanted[i][0]))
@@ -387,6 +389,8 @@ class TyreModel:
     def _answer(
         self, point: Query, designs: list[dict[str, float]], answers: Sequence[ModesAnswer]
     ) -> Answer | Exception:
+        """Answer of one query from the modes of its designs, one for each state; or why there is
+        none."""
         labelled: list[LabelledModes] = []
         for each in answers:
             if isinstance(each, DeckRefused) and not point.effects:

@@ -49,6 +49,7 @@ def sources(case: LoadedCase) -> tuple[list[Source], bool]:
 
 
 def _constants(case: LoadedCase) -> tuple[list[Source], bool]:
+    """Uncertain constants of a case, and whether they are assumed because the case states none."""
     stated, taken = case.case.uncertainties, calibrated(case)
     if not stated:
         return list(_assumed(case, taken)), True

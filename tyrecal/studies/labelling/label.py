@@ -86,6 +86,8 @@ def fitted_prior(case: LoadedCase, fit: FitResult) -> Prior:
 
 
 def _prior(variables: Sequence[DesignVariable], values: Mapping[str, float], root: Array) -> Prior:
+    """Prior of the variables about ``values``, in their coordinates; ``root`` (v, v) of its
+    covariance."""
     mean, lower, upper = (
         np.array([v.scaled(value) for v, value in zip(variables, own, strict=True)])
         for own in (

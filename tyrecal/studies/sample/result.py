@@ -357,6 +357,7 @@ def _values(log: bool, lower: float, upper: float, x: Array) -> Array:
 
 
 def _variable(sample: Sample, j: int) -> SampledVariable:
+    """The sampled variable j: quantiles, standard error, best value and correlations."""
     v, drawn = sample.variables[j], sample.drawn
     x, ends = drawn.chains.flat[:, j], drawn.posterior.box[j]
     values = _values(v.log, v.lower, v.upper, x)
@@ -379,6 +380,7 @@ def _variable(sample: Sample, j: int) -> SampledVariable:
 
 
 def _predicted(sample: Sample) -> list[PredictedRow]:
+    """Measured and predicted frequency of each row, with quantiles of the draws."""
     measured = {
         (row.label, row.state): (float(np.exp(y)), float(scatter * np.exp(y)))
         for row, y, scatter in zip(

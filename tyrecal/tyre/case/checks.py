@@ -96,6 +96,7 @@ def _names(data: Mapping[str, Any]) -> Problems:
 
 
 def _targets(data: Mapping[str, Any]) -> Problems:
+    """Disagreements of targets with each other and with the analysis."""
     seen: dict[tuple[Any, ...], int] = {}
     default = Analysis.model_fields["highest_harmonic"].default
     highest = number({"highest_harmonic": default, **table(data, "analysis")}, "highest_harmonic")

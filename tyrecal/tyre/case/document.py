@@ -88,6 +88,7 @@ def compose(text: str) -> Node | None:
 
 
 def _text(path: Path, document: Document) -> str | None:
+    """Text of a case file; None, and a mistake in the document, if it cannot be read."""
     try:
         if path.is_dir():
             document.refuse(0, f"is a folder, must be a case file{nearby(path, '.yaml')}")
@@ -177,6 +178,7 @@ class _Reader:
         return self.scalar(node, keys)
 
     def mapping(self, node: MappingNode, keys: Keys) -> dict[str, Any]:
+        """Content of a mapping; a wrong or repeated key is a mistake with its line."""
         data: dict[str, Any] = {}
         for name, content in node.value:
             line = name.start_mark.line
@@ -203,6 +205,7 @@ class _Reader:
         return data
 
     def scalar(self, node: ScalarNode, keys: Keys) -> Any:
+        """Value of a scalar; WRONG, and a mistake, if it is no plain or finite value."""
         if "\0" in node.value:  # no path and no command can hold one
             self.document.add(keys, "must hold no NUL character")
             return WRONG

@@ -160,6 +160,7 @@ def _bead_wire(made: Construction, section: Section) -> Keys:
 
 
 def _rubber(compound: Compound) -> Keys:
+    """Entry of ``materials`` for a compound, Pa and kg/m3."""
     return {
         "kind": "rubber",
         "C10_Pa": _three(compound.C10_Pa),
@@ -175,6 +176,7 @@ def _prony(g: float) -> list[Keys]:
 
 
 def _cord(cord: CordMaterial) -> Keys:
+    """Entry of ``materials`` for a cord, Pa and kg/m3."""
     keys: Keys = {
         "kind": "cord",
         "youngs_modulus_Pa": cord.youngs_modulus,
@@ -185,6 +187,7 @@ def _cord(cord: CordMaterial) -> Keys:
 
 
 def _layer(line: str, ply: Ply) -> Keys:
+    """Entry of ``rebar_layers`` for a ply on a line of the section."""
     return {
         "line": line,
         "material": ply.cord,
@@ -195,6 +198,7 @@ def _layer(line: str, ply: Ply) -> Keys:
 
 
 def _areas(layers: list[str], start: float, lower: float) -> Keys:
+    """Variable that sets the cord areas (m2) of layers."""
     return {
         "sets": [f"rebar_layers.{name}.area_m2" for name in layers],
         "start": start,

@@ -81,6 +81,7 @@ def _text(
     variables: Mapping[str, Sequence[str]],
     **more: Any,
 ) -> str:
+    """Text of the case file for a user's decks."""
     env = environment("case", None)
     env.filters["text"] = plain_text
     all_numbers = {**numbers, **{f"deck.numbers.{name}": x for name, x in marked.items()}}

@@ -64,6 +64,7 @@ class InvariantLaw(Hyperelastic):
     def isochoric_tangent(
         self, F: Array, J: Array, G: Array, on_GG: Array, on_swap: Array, weights: Array | float
     ) -> Array:
+        """See `Hyperelastic`: from the derivatives of Wbar by the invariants."""
         p = len(F)
         J23, I1, I2 = self._invariants(F, J)
         of = J23 * I1, J23**2 * I2

@@ -60,6 +60,7 @@ class PrincipalLaw(Hyperelastic):
     def isochoric_tangent(
         self, F: Array, J: Array, G: Array, on_GG: Array, on_swap: Array, weights: Array | float
     ) -> Array:
+        """See `Hyperelastic`: from stresses and stiffnesses in the principal directions."""
         p, weights = len(F), np.reshape(weights, (-1, 1, 1))
         x, N = _principal(F)
         S = (N * self.stresses(x)[:, None]) @ N.swapaxes(1, 2) * weights

@@ -59,6 +59,7 @@ class LogarithmicCord(EnergyLaw):
         return np.asarray((self.stiffness * borne / length**2)[:, None] * z)
 
     def tangent(self, z: Array, weights: Array | float = 1.0) -> Array:
+        """d2W/dzdz (p, 3, 3) of cord vectors z (p, 3), times ``weights``."""
         length = stretch(z)
         strain = np.log(length)
         borne, slope = self._borne(strain, 1), self._borne(strain, 2)

@@ -61,6 +61,7 @@ def _sections(job: SectionJob) -> Iterator[tuple[str, np.ndarray, Hyperelastic, 
 
 
 def _part(job: SectionJob, kind: str, sections: list[tuple[np.ndarray, list]]) -> TyrePart:
+    """The membranes of one element type, each row of ``sections`` with its law and thickness."""
     block = job.mesh.blocks[kind]
     assert isinstance(block, Lines)
     lines = block.pick(np.concatenate([rows for rows, _ in sections]))

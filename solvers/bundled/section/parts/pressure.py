@@ -154,6 +154,8 @@ class PressureAtStations(AtStations):
         return tuple(np.ascontiguousarray(f.swapaxes(2, 3)) for f in fields)  # type: ignore[return-value]
 
     def _forces(self, by_x: Array, by_dx: Array, by_around: Array) -> tuple[Array, Array]:
+        """Forces (e, 3a, s) by u and by du/dTheta from the gradients of V by x, x' and
+        dx/dTheta."""
         lines = self.lines
         e, g, s, _ = by_x.shape
         w = self.weights[..., None, None]

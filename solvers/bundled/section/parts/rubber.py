@@ -97,6 +97,7 @@ def _rubber(job: SectionJob, kind: str, sections: list[_Section]) -> list[TyrePa
 def _of_one_law(
     job: SectionJob, solids: Solids, sections: list[_Section], owner: Array
 ) -> list[TyrePart]:
+    """Parts of the elements of one type whose materials have the same kind of law."""
     g = solids.weights.shape[1]
     table, laws = [], []
     for section in sections:
