@@ -7,8 +7,8 @@ sensitivities {variable: [d f / d variable, Hz per unit]},
 mass_sensitivities {variable: kg per unit}}].
 JOB.npz: ``nodes`` (k,), ``points`` (k, 2) R, Z in m, and per step S ``displacement_S`` (k, 3) and
 ``shapes_S`` (modes, k, 3): complex amplitudes of u = Re[U exp(i n Theta)] in r, theta, z, scaled
-to unit modal mass of the whole tyre; of a response its frequencies, receptances and forces on the
-hub (`modes.response`).
+to a modal mass of 1 kg of the whole tyre. Displacements are in m. Of a response its frequencies,
+receptances and forces on the hub (`modes.response`).
 """
 
 from __future__ import annotations
@@ -31,14 +31,16 @@ Array = np.ndarray
 class StepResult:
     """Results of one step."""
 
-    step: int
+    step: int  # its number in the deck
     pressure_Pa: float
-    mass_kg: float
-    modes: list[HarmonicModes]
-    rates: dict[str, list[Array]]  # variable to d lambda per harmonic
-    U: Array
-    factorisations: int
-    mass_rates: dict[str, float] = field(default_factory=dict)  # variable to d mass, kg
+    mass_kg: float  # of the whole tyre
+    modes: list[HarmonicModes]  # by harmonic
+    # by variable and harmonic: d lambda / d variable (m,) of its modes, lambda = (2 pi f)^2
+    rates: dict[str, list[Array]]
+    U: Array  # (k, 3) displacements by the load, m
+    factorisations: int  # number of them until the equilibrium
+    # by variable: d mass / d variable, kg
+    mass_rates: dict[str, float] = field(default_factory=dict)
     damping: list[Array] | None = None  # damping ratios per harmonic; None: no loss factor is known
     response: ResponseResult | None = None
 

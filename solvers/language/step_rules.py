@@ -1,4 +1,9 @@
-"""Keywords of steps, and those that may stand in one, by ABAQUS' manual."""
+"""Keywords of steps, and those that may be in one, by ABAQUS' manual.
+
+`rule` explains the notation: levels, parameters ("NAME=kind; OTHER=ONE|TWO"), fields of the data
+lines ("4*number?"), and ``honoured`` by kind of job, where ~ marks an option that changes no
+answer.
+"""
 
 from __future__ import annotations
 

@@ -13,7 +13,9 @@ A label's probability is its share of the sum of prior p(u | label). The prior k
 about tyres: [c,m+2] is above [c,m], so a file in which [c,m] was not found below is hardly of
 [c,m+2]. Labels that these sensors cannot distinguish share their probability by their priors
 alone: how clean a shape looks says nothing about its order there. Where a case is given, its shapes
-are in the covariances and its frequencies in the prior (``case_modes``).
+are in the covariances and its frequencies in the prior (``case_modes``). A label whose own motions
+have less than `MIN_SEEN` of the mean square of all motions on these sensors is not seen, and never
+given. A column is the index of an order m among those of a harmonic (``covariance``).
 
 ``modal`` judges the shapes of a file with it, lowest frequency first. `Labeller.looks_like` draws
 shapes and judges them the same way, so it says what an import will do.
@@ -122,6 +124,7 @@ class Labeller:
         return float(np.logaddexp.reduce(each) - np.log(len(each)))
 
     def _prior(self, below: Collection[Label]) -> Array:
+        """Prior (labels,), not normalised, given the labels ``below`` in the same file."""
         lower = [_lower(label) for label in self.labels]
         return np.array([1.0 if own in (None, *below) else WITHOUT_LOWER for own in lower])
 
@@ -188,6 +191,7 @@ def _evidence(values: Array, vectors: Array, shapes: Array) -> Array:
 
 
 def _label(c: int, column: int) -> Label:
+    """The label of an order: column m, and on c = 0 the two modes [0,0]."""
     if c == 0 and column in (0, AXIAL_COLUMN):
         return Label(0, 0, "axial" if column == AXIAL_COLUMN else "torsional")
     return Label(c, column)

@@ -16,7 +16,7 @@ from .columns import TableColumn
 from .measurement import AS_CASE, Measurement
 from .mode_names import label_parts
 
-MAX_ORDERS = {"c": 20, "m": 3}
+MAX_ORDERS = {"c": 20, "m": 3}  # largest numbers of a label in a table
 KIND_WORDS = {"": None, "axial": "axial", "lateral": "axial"}
 KIND_WORDS |= dict.fromkeys(("torsional", "torsion", "rotational"), "torsional")
 DOUBLET_WORDS = {"": "", "1": "1", "2": "2", "a": "1", "b": "2", "lower": "1", "upper": "2"}
@@ -30,6 +30,7 @@ class Line:
     place: str  # file and line
     # by meaning, a key of `columns.HEADINGS`: a quantity, "pressure", "label", "sigma", ...
     cells: Mapping[str, str]
+    # by meaning: index of the column, and the factor from its unit to that of the meaning
     columns: Mapping[str, TableColumn]
     marks: NumberMarks  # decimal mark and separator of thousands of the file
     labelled: bool = True  # whether a frequency must have a label

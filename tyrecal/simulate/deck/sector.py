@@ -28,8 +28,8 @@ INNER_FACE = "P6"  # a brick's face over side 4 of the section's element
 class PlyStrip:
     """An element of a ply."""
 
-    element: int  # in the section
-    along: tuple[float, float]  # its meridian (r, z)
+    element: int  # its number in the section
+    along: tuple[float, float]  # unit vector (r, z) along its meridian
     radius: float  # of the cord line's middle, m
     # its volume over the cord surface's area, m: less than the ply's where the line has a kink
     thickness: float
@@ -43,14 +43,14 @@ class Sector:
     bricks: dict[int, tuple[int, ...]]  # section element to nodes (8 or 20)
     # section element to its row in the mesh without plies, a ply's being that inside it
     rows: dict[int, int]
-    regions: dict[int, str]
+    regions: dict[int, str]  # section element to its region
     strips: dict[str, list[PlyStrip]]  # per line, from -z to +z
     section: list[int]  # nodes on the front face
     behind: list[int]  # nodes on the other face
     # (node halfway between the faces, node in front of it), the held ones left out
     between: list[tuple[int, int]]
     rim: list[int]  # held nodes except those behind
-    inner: list[int]  # section elements
+    inner: list[int]  # section elements at the inner surface, on which the pressure acts
 
 
 @lru_cache(maxsize=4)
@@ -66,6 +66,8 @@ def build_sector(
 ) -> Sector:
     """A sector of 360/``sectors`` degrees, one element long, with plies of ``thickness`` (m).
 
+    elements: numbers along each region; rows: numbers between neighbouring lines; grading: as in
+    `build_mesh`; quadratic: bricks of 20 nodes, else 8; whole_bead: the mesh goes round the bead.
     Raises SectionError where rows fold over, as they do when plies overlap.
     """
     split = with_plies(section, thickness)
@@ -79,6 +81,7 @@ def build_sector(
         below = int(np.sum(plies < row))
         row_of[number] = row - below - (row in plies)
     names = section.names[1:-1]
+    # numbers of `build_mesh`: cords 1000000 line + column, elements 1000 column + row + 1
     strips = {
         name: [_strip(mesh, 1000 * (n % 1000000) + int(row) + 1) for n in mesh.cords[f"{name}-"]]
         for name, row in zip(names, plies, strict=True)

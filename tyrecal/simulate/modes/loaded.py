@@ -21,8 +21,8 @@ from .label import Label, Mode
 Array = np.ndarray
 MAX_LOAD_STEP, MIN_LOAD_SHARE = 1 / 16, 1e-7  # steps, of the way from load to load
 MIN_OVERLAP = 0.8  # least overlap over a step, else it is halved
-SPANNED = 1e-6  # of the largest direction
-ABOVE = 2.0  # times the highest omega^2 known, for what is not known
+SPANNED = 1e-6  # singular value over the largest one, above which a direction counts
+ABOVE = 2.0  # omega^2 of directions outside the known modes, over the highest one of these
 SYMMETRIES = ("symmetric", "antisymmetric")
 MIRROR = np.array([1.0, -1.0, 1.0])  # theta -> -theta
 
@@ -31,8 +31,8 @@ MIRROR = np.array([1.0, -1.0, 1.0])  # theta -> -theta
 class Member:
     """One of the two modes that a doublet splits in, or a single mode."""
 
-    label: Label
-    symmetry: str
+    label: Label  # of the unloaded mode
+    symmetry: str  # about the patch, one of `SYMMETRIES`
 
     def __str__(self) -> str:
         return f"{self.label.display} {self.symmetry}"
@@ -40,11 +40,11 @@ class Member:
 
 @dataclass(frozen=True)
 class Rings:
-    """Where shapes are known: angles (k,) in rad; nodes (j,): deck numbers; areas (k, j)."""
+    """Where shapes are known: nodes of the section, on rings round the tyre."""
 
-    angles: Array
-    nodes: Array
-    areas: Array
+    angles: Array  # (k,) of the rings, rad, 0 in the middle of the patch
+    nodes: Array  # (j,) deck numbers
+    areas: Array  # (k, j) of the undeformed tyre, m2, that each point stands for
 
     def flat(self, shapes: Array) -> Array:
         """Shapes (p, k, j, 3) as vectors (p, size) with the scalar product above."""
@@ -108,22 +108,19 @@ def state(frequencies: Array, shapes: Array, where: Rings) -> ModesAtLoad:
 
 @dataclass(frozen=True)
 class ModesAtLoad:
-    """Modes of the tyre at one load: frequencies (m,) in Hz, shapes (m, ring, node, 3), and
-    whether each is symmetric about the patch (m,)."""
+    """Modes of the tyre at one load."""
 
-    frequencies: Array
-    shapes: Array
-    symmetric: Array
+    frequencies: Array  # (m,) Hz
+    shapes: Array  # (m, ring, node, 3), any scale
+    symmetric: Array  # (m,) whether a mode is symmetric about the patch
 
 
 @dataclass(frozen=True)
 class Followed:
-    """Where each mode of one load went at the next: ``position`` (m,) there, -1 where it left the
-    modes that are known there; ``spanned`` (m,): share of its shape there that the modes known
-    before make up, 0 to 1."""
+    """Where each mode of one load went at the next."""
 
-    position: Array
-    spanned: Array
+    position: Array  # (m,) index of the mode there, -1 if it is none of the known ones
+    spanned: Array  # (m,) share of its shape there that the modes known before span, 0 to 1
 
 
 def follow(before: ModesAtLoad, after: ModesAtLoad, where: Rings) -> Followed:

@@ -97,8 +97,10 @@ def one_answer(
     further: float,
     trial: Path,
 ) -> dict[str, Any]:
-    """The diagnosis of one file of measurements, and what it predicts at the held-out pressure;
-    known: about the start, for all trials."""
+    """The diagnosis of one file of measurements, and its prediction at the held-out pressure.
+
+    known: the model's expansion about its start, which serves all trials.
+    """
     observations = observe(read_measurements(trial), split=protocol.split)
     assumed = Assumed(split=protocol.split, further=further)
     diagnosis = diagnose(model, rows, observations, assumed=assumed, known=known, ranked=False)
@@ -132,8 +134,8 @@ def predicted(
 def intervals(
     diagnosis: Diagnosis, rows: Sequence[ModelRow], pressure_kPa: float
 ) -> dict[str, list[float]]:
-    """Hz by label as all explanations of the catalogue together expect them beside what was
-    measured, with the ends of their 90 % intervals."""
+    """Hz by label at a pressure that was not fitted: mean of all explanations of the catalogue,
+    weighted by their probabilities, and the ends of its 90 % interval."""
     places = places_at(rows, pressure_kPa)
     prediction = expected(diagnosis.problem, diagnosis.hypotheses, rows, places)
     three = np.exp([prediction.mean, *prediction.interval()]).T

@@ -38,14 +38,13 @@ MAX_REPLACED = 20  # replaced starts per start asked for
 
 @dataclass
 class Fit:
-    """A finished fit; history: design points in order; left_out: measurements that were no
-    targets, and why."""
+    """A finished fit."""
 
-    found: FitResult
-    history: list[dict[str, Any]]
-    initial: Point
-    fitted: Point
-    left_out: list[str] = field(default_factory=list)
+    found: FitResult  # content of fit.json
+    history: list[dict[str, Any]]  # design points in order, rows of history.csv
+    initial: Point  # at the case's start values
+    fitted: Point  # at the least objective of all starts
+    left_out: list[str] = field(default_factory=list)  # sentences on measurements without a target
 
     def __repr__(self) -> str:
         result, before, after = self.found, self.initial.objective, self.fitted.objective
@@ -74,13 +73,14 @@ def calibrate(
 ) -> Fit:
     """Fit the case's free variables to its targets.
 
-    starts: the case's own start and ``starts - 1`` drawn uniformly in the scaled box; drawn
-    starts that cannot be evaluated are counted and replaced. jobs: processes for the drawn starts,
-    and for the neighbours of a point of the first one, where the solver gives no slopes. notify is
-    told of every design here, finished of every start; readings: lines of the file that the targets
-    are from; prior: what is known of the variables and of the model's errors enters the fit
-    (`PriorProblem`). Raises what `check` does; EvaluationFailed when the case's own start cannot be
-    evaluated; InputError where a target is far off it.
+    fixed: values of variables that are held. starts: the case's own start and ``starts - 1`` drawn
+    uniformly within the bounds, in the variables' coordinates; drawn starts that cannot be
+    evaluated are counted and replaced. jobs: processes for the drawn starts, and for the neighbours
+    of a point of the first one if the solver gives no sensitivities. notify is called for every
+    design of this process, finished for every start. readings: lines of the file that the targets
+    are from. prior: knowledge of the variables and of the model's errors that enters the fit
+    (`PriorProblem`). Raises what `check` does; EvaluationFailed if the case's own start cannot be
+    evaluated; InputError if a target is far off it.
 
     >>> fixed = {"A_belt": 2.6e-7, "A_carcass": 6.9e-8}
     >>> fit = calibrate(case, evaluator, method="gauss-newton", fixed=fixed)
@@ -131,8 +131,8 @@ def noise_Hz(
 
 
 def check(problem: Problem) -> None:
-    """Raises InputError; DeckRefused where there are targets on the road and the solver has none,
-    or it cannot express a state of theirs."""
+    """Raise InputError for a problem that no fit can solve; DeckRefused if the solver has no road
+    for targets on it, or cannot express the state of a target."""
     if not len(problem.scale):
         raise InputError(
             "the case has no targets: there is nothing to fit to; add measured modes to it, as in"
@@ -243,6 +243,7 @@ def _run_all(
 
 
 def _start_here(problem: Problem, start: Array, method: str) -> StartReport | EvaluationFailed:
+    """One search in this process, or why its start has no solution."""
     alone = problem.again(problem.evaluator, problem.notify)
     try:
         return _run(alone, start, method)
@@ -269,6 +270,7 @@ def _history(problem: Problem) -> list[dict[str, Any]]:
 
 
 def _joined(histories: list[list[dict[str, Any]]]) -> list[dict[str, Any]]:
+    """Histories of all starts in one list, with number of point and start."""
     rows: list[dict[str, Any]] = []
     for start, history in enumerate(histories, start=1):
         for row in history:

@@ -48,18 +48,16 @@ BOUND_MARGIN = 1e-6  # of a scaled variable
 
 @dataclass(frozen=True)
 class Point:
-    """One evaluated design: coordinates x, residuals sqrt(w) (q - q_ref) / sigma (a doublet's by
-    sqrt 2), their Jacobian by x, the modes that were matched in each state, and the labels' margin;
-    of each other target its quantity, in its own unit."""
+    """One evaluated design."""
 
-    values: Mapping[str, float]
-    x: Array
-    residuals: Array
-    jacobian: Array
-    states: dict[TyreState, dict[Label, Mode]]
-    clarity: float
+    values: Mapping[str, float]  # by variable, in its own unit
+    x: Array  # (v,) coordinates of the free variables
+    residuals: Array  # (n,) sqrt(w) (q - q_ref) / sigma of quantity q; of a pair times sqrt 2
+    jacobian: Array  # (n, v) d residual / d x
+    states: dict[TyreState, dict[Label, Mode]]  # modes that match the targets, by state
+    clarity: float  # smallest `Mode.clarity` of the modes
     mass_kg: float
-    others: Array
+    others: Array  # quantities of the targets that are no unloaded modes, each in its own unit
 
     @property
     def plain(self) -> Point:

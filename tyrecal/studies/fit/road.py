@@ -3,9 +3,10 @@
 Every design is pressed, in each state, at the loads with a target alone, in one run; friction
 remembers the loads on the way, which changes a stiffness by 0.2 % at most.
 
-Slopes of all but modes are the solver's own where it has them. Else, and of modes at a load, they
-are differences: areas, lengths and widths are reproducible to 1e-12 of themselves, stiffnesses to
-1e-10, so that over 1e-5 they have five digits.
+Slopes d q / d variable are in the unit of the quantity q over that of the variable. The solver's
+own ones are used if it has them, except for modes at a load. All others are differences: areas,
+lengths and widths are reproducible to 1e-12 of themselves, stiffnesses to 1e-10, so that over 1e-5
+they have five digits.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ from .targets import ValueTarget
 Array = np.ndarray
 Designs = Sequence[Mapping[str, float]]
 Placed = Mapping[int, ValueTarget]  # targets by their places among all
-Quantities = dict[int, float]  # by place
-PRESS_STEP = 1e-5  # of a scaled variable: the root of the precision of a stiffness
+Quantities = dict[int, float]  # values of targets by their places, each in its own unit
+PRESS_STEP = 1e-5  # of a variable's coordinate: the root of the precision of a stiffness
 
 
 def press(
@@ -84,7 +85,7 @@ def press_with_slopes(
     questions = []
     for state, here in groups.items():
         loads = _loads(here)
-        # a state's own numbers hang on no variable
+        # a variable that sets a number of the state, such as the pressure, has no slope
         left = tuple(without(case, dict.fromkeys(names, 0.0), state.numbers(case)))
         begin = _base(case, targets, loads, base)
         design = state.design(case, values)
@@ -118,6 +119,7 @@ def _base(
 
 
 def _loads(targets: Placed) -> list[float]:
+    """Loads (N) of targets, rising."""
     return sorted({t.state.load_N for t in targets.values()})
 
 
@@ -165,6 +167,7 @@ def _modes(
 
 
 def _at_loads(tyre: LoadedTyre, targets: Placed) -> Quantities | EvaluationFailed:
+    """Frequencies (Hz) of a loaded tyre at their targets, or why one is missing."""
     hertz = {(at.load_N, m.member): m.frequency_Hz for at in tyre.loads for m in at.modes}
     for t in targets.values():
         if t.member and (t.state.load_N, t.member) not in hertz:

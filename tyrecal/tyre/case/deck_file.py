@@ -1,4 +1,8 @@
-"""How a case gives its tyre: by stations, or by decks that must be in its folder."""
+"""How a case gives its tyre: by stations, or by decks that must be in its folder.
+
+A mark is a name in braces, {{ NAME }}, in the place of a number of a deck. ``deck.numbers`` gives
+the numbers of marks, and may give other values to numbers that the deck states itself.
+"""
 
 from __future__ import annotations
 
@@ -53,6 +57,7 @@ def read_kind(
         for name in given:
             if name not in marks and name not in known:
                 hint = suggestion(name, [*marks, *known], "")
+                # idle: numbers of the deck that do not change the section, and why
                 message = kind.idle.get(name, f"is no mark and no number of the deck{hint}")
                 document.add(("deck", "numbers", name), message)
         for variable in table(data, "variables").values():  # a mark's value may be its start
@@ -81,7 +86,7 @@ def read_kind(
 
 
 def completed(data: dict[str, Any], lines: Mapping[str, Any]) -> dict[str, Any]:
-    """Put the ``lines`` that ``data`` lacks into it; those."""
+    """Put the keys of ``lines`` that ``data`` lacks into it. Returns what was put in."""
     lacking: dict[str, Any] = {}
     for key, value in lines.items():
         if key not in data:
@@ -94,5 +99,6 @@ def completed(data: dict[str, Any], lines: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _in_3d(paths: Sequence[Path], source: dict[str, Any], units: Units) -> DecksIn3D:
+    """Decks in three dimensions; ``deck.crown`` names the node set of the crown."""
     crown = source.get("crown", DeckSource.model_fields["crown"].default)
     return DecksIn3D(read_own_decks(paths, units, crown if isinstance(crown, str) else ""))

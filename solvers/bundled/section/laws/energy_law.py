@@ -17,9 +17,11 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class EnergyLaw(ABC):
-    """W per unit of the rows' integration weight."""
+    """Energy W of a row z: J/m3 of rubber, J/m2 of cords, as the rows' integration weights are
+    volumes or areas."""
 
-    # the tangent takes the weights in while it is formed, a pass over 81 numbers a point less
+    # whether `tangent` multiplies by its ``weights`` itself, which saves a pass over 81 numbers a
+    # point; else its caller does
     weighted_tangent: ClassVar[bool] = False
 
     @abstractmethod
@@ -35,11 +37,12 @@ class EnergyLaw(ABC):
         """d2W/dzdz (p, k, k) times ``weights`` (p,)."""
 
     def bears(self, z: Array) -> bool:
-        """Whether an iteration may go on from these rows."""
+        """Whether the law is defined at these rows, so that an iteration may go on from there."""
         return True
 
     def stiffened(self, factor: float) -> Self:
-        """The law as soft parts have it while wrinkles are to be kept away."""
+        """The law with ``factor`` times the stiffness of rubber, so that nothing wrinkles on the
+        way to a load; cords keep theirs."""
         return self
 
     def tautened(self, tension: float) -> Self:
