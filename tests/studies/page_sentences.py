@@ -103,12 +103,12 @@ SENTENCES: list[tuple[str, str, Callable[[Record], list[float]]]] = [
     ),
     (
         REAL_DATA,
-        "the verdict would be the same: {} % left, p = {}e-12",
-        of("diagnosed, section exact", "rms %", ("p", 1e12)),
+        "the verdict would be the same: {} % left, p = {}e-34",
+        of("diagnosed, section exact", "rms %", ("p", 1e34)),
     ),
     (
         REAL_DATA,
-        "the tread, stiffness {} % ± {} %",
+        "the lower sidewall, stiffness {} % ± {} %",
         of("diagnosed, section exact", "part %", "part sigma %"),
     ),
     (
