@@ -346,6 +346,9 @@ STEPS = {
     "sizes": Step(
         "python -m tests.studies.sizes tests/benchmarks/sizes.jsonl", "", of_table, is_quick=True
     ),
+    "slips": Step(
+        "python -m tests.studies.slips tests/benchmarks/slips.jsonl", "", of_table, is_quick=True
+    ),
     "cluster": Step("python tests/benchmarks/cluster.py --tasks 3000", "", of_table),
 }
 

@@ -311,6 +311,35 @@ def cluster_table(record: Record) -> list[list[float]]:
     ]
 
 
+SLIPS = (
+    *("digit", "decimal place", "exchanged digits", "exchanged rows", "exchanged pressures"),
+    *("with a slip", "clean: something named"),
+)
+# of `tyrecal fit cases/p235_75r17.yaml --solver calculix --method gauss-newton`
+CALCULIX_FIT = {
+    "initial_objective_Hz": 31.394,
+    "objective_Hz": 3.123,
+    f"fitted {AXIAL}": 33.173,
+    "fitted [0,0] torsional": 33.395,
+    "A_belt": 2.654e-7,
+    "A_carcass": 6.253e-8,
+    "C10": 5.313e5,
+}
+
+
+def calculix_fit(record: Record) -> list[list[float] | None]:
+    """The fit by the bundled solver, by CalculiX, and the difference in %."""
+    figures = record["fit gauss-newton"]
+    rows: list[list[float] | None] = []
+    for name, other in CALCULIX_FIT.items():
+        own = figures[name]
+        is_objective = "objective" in name
+        rows.append([own, other, *([] if is_objective else [100 * other / own - 100])])
+        if name.endswith("torsional"):
+            rows.append(None)  # range over seven other modes
+    return rows
+
+
 SIZES = (
     *("145/80R13 75T", "205/55R16 91V", "P235/75R17 108S", "255/55R18 105V"),
     *("LT265/70R17/C 112/109S", "11R22.5 144/142L", "315/80R22.5 156/150L"),
@@ -397,6 +426,11 @@ TABLES: dict[str, Rows] = {
     ),
     "effects": effects_table,
     "cluster": cluster_table,
+    "calculix fit": calculix_fit,
+    "slips": rows(
+        *(of("slips", *(f"1: {name} {k}" for k in range(3))) for name in SLIPS),
+        of("slips", "1: 'fits' with chi2/dof above 5 0"),
+    ),
     "sizes": rows(
         *(of("sizes", *(f"1: {size} {k}" for k in (0, 2, 3, 4, 5, 7))) for size in SIZES)
     ),

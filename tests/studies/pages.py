@@ -33,7 +33,7 @@ RECORD = ROOT / "tests" / "benchmarks" / "pages.json"
 DOCUMENTS = (
     *("README.md", "solvers/README.md"),
     *(f"cases/{path.name}" for path in sorted((ROOT / "cases").glob("*.md"))),
-    *(f"tests/benchmarks/{name}.md" for name in ("README", "SIZES", "FOOTPRINT", "EFFECTS")),
+    *(f"tests/benchmarks/{path.name}" for path in sorted((ROOT / "tests/benchmarks").glob("*.md"))),
 )
 NUMBER = r"([+\-]?\d+(?:\.\d+)?)"
 IN_A_CELL = re.compile(
