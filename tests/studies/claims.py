@@ -5,7 +5,8 @@
 Draws among sentences of at least five words that have a number or state a behaviour. Of the 60 of
 seed 20261128, 5 were wrong on 2026-11-27 and are mended: one start of 50 that ends elsewhere, what
 a batch's pruning keeps, a truck's soft liner (stable), the shift by another law of cords, the rim
-of a case of decks.
+of a case of decks. Of the 60 of seed 20261203, 1 was wrong on the same day and is mended: the least
+shortfall of the real tyre's predicted modes.
 """
 
 from __future__ import annotations

@@ -30,6 +30,13 @@ def rises(record: Record, what: str) -> list[float]:
     return [100 * a / b - 100 for a, b in zip(after, before, strict=True)]
 
 
+def too_low(record: Record) -> list[float]:
+    """Least and largest shortfall, %, of the six predicted frequencies of the real tyre."""
+    figures = record["labels"]
+    off = [100 - 100 * figures[f"{hertz} Hz"] / hertz for hertz in (114, 137, 165, 196, 228, 260)]
+    return [min(off), max(off)]
+
+
 def distance(record: Record, step: str, hertz: Sequence[float]) -> float:
     """Equation (1) to the paper's frequencies, Hz."""
     twice = [1 + (not label.startswith("[0,0]")) for label in LABELS]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from .page_figures import AXIAL, LABELS, VARIABLES, change, of, rises
+from .page_figures import AXIAL, LABELS, VARIABLES, change, of, rises, too_low
 from .page_steps import Record
 
 PAPER, REAL_DATA, OWN_TYRE = "cases/paper.md", "cases/real_data.md", "cases/own_tyre.md"
@@ -88,6 +88,7 @@ SENTENCES: list[tuple[str, str, Callable[[Record], list[float]]]] = [
         "The narrow rim's section ends at {} and {} Hz",
         of("narrow rim", "line 13 1", "line 13 2"),
     ),
+    (REAL_DATA, "Modes of a free 205/60R15 are predicted {} to {} % too low", too_low),
     (REAL_DATA, "All six together are {} % probable", of("labels", "labeling 0")),
     (REAL_DATA, "next, with {} %, is [9,0]", of("labels", "labeling 1")),
     (
