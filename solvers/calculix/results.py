@@ -18,11 +18,12 @@ MASS = r"total mass for set {} and time\s+\S+\s+(\S+)"
 
 @dataclass
 class Fields:
-    """Contents of a .frd file: nodes (k,), points x, y, z (k, 3) in m; blocks: (mode number, 0
-    for a static step; name, DISP or DISPI; values (k, 3) on ``nodes``) in the file's order."""
+    """Contents of a .frd file."""
 
-    nodes: Array
-    points: Array
+    nodes: Array  # (k,) numbers
+    points: Array  # (k, 3) x, y, z, m
+    # in the file's order: mode number (0 of a static step), name (DISP, or DISPI for an imaginary
+    # part), values (k, 3) on the nodes
     blocks: list[tuple[int, str, Array]]
 
 

@@ -56,10 +56,10 @@ class Layout:
 
 @dataclass(frozen=True)
 class Geometry:
-    """Places of the nodes, m, and unit vectors (3, 3) of directions 1 to 3."""
+    """Places and directions of the nodes, by number."""
 
-    nodes: Mapping[int, Place]
-    axes: Mapping[int, Array]
+    nodes: Mapping[int, Place]  # x, y, z, m
+    axes: Mapping[int, Array]  # (3, 3) unit vectors of the directions 1 to 3, a row each
 
 
 @dataclass(frozen=True)

@@ -85,12 +85,12 @@ class MeasuredShape:
 class Function:
     """A frequency-response function: data set 58."""
 
-    frequency_Hz: Array
-    values: Array
+    frequency_Hz: Array  # (n,)
+    values: Array  # (n,) complex, in ``unit``
     form: str | None  # receptance, mobility or accelerance; None where not stated
-    response: Signal
-    reference: Signal
-    place: str
+    response: Signal  # node and direction where the motion was measured
+    reference: Signal  # node and direction of the force
+    place: str  # file and line, for messages
     response_part: str = ""  # component that the response is on, "" where it has no name
     reference_part: str = ""
     unit: str = ""  # of the values, in small letters without blanks and brackets; "": not stated
@@ -98,18 +98,16 @@ class Function:
 
 @dataclass(frozen=True)
 class Universal:
-    """Contents of a universal file.
-
-    axes: of nodes with a coordinate system of their own, unit vectors (3, 3) of the directions 1,
-    2, 3 in the global system, a row each; all others measure along its x, y, z.
-    """
+    """Contents of a universal file."""
 
     path: Path
-    nodes: dict[int, Place]
+    nodes: dict[int, Place]  # x, y, z in the global system, m, by number
     shapes: list[MeasuredShape]
     functions: list[Function]
     lines: list[tuple[int, ...]] = field(default_factory=list)
     skipped: Counter[str] = field(default_factory=Counter)  # what was not used, how often
+    # (3, 3) unit vectors of the directions 1, 2, 3 in the global system, a row each, of nodes with
+    # a coordinate system of their own; all others measure along the global x, y, z
     axes: dict[int, Array] = field(default_factory=dict)
 
 

@@ -5,9 +5,9 @@ In the box, t = (x - centre) / half, |t_j| <= 1, x the logarithms of the variabl
     q(t) = sum over |k| <= D of a_k P_k1(t_1) P_k2(t_2) ...    (P: Legendre's polynomials)
 
 by least squares of values and slopes together: an evaluation gives 1 + v equations. q is ln f of
-every mode but the two [0, 0] ones. Where those meet, they avoid each other and change names: not
-they are smooth, but the trace and the discriminant of the 2 x 2 problem that they solve (see
-fit/crossing.py),
+every mode except the two [0, 0] ones. Where those meet, they avoid each other and change names.
+Then their frequencies are not smooth, but the trace and the discriminant of the 2 x 2 problem that
+they solve are (see fit/crossing.py),
 
     m = (ln f_axial + ln f_torsional) / 2,    s = (ln f_axial - ln f_torsional)^2
 
@@ -53,22 +53,17 @@ SHARE_Z, SURE_Z = 2.326, 1.645  # normal quantiles of 99 and 95 %
 
 @dataclass(frozen=True)
 class Evaluated:
-    """An evaluated design: x (v,); of each of its labels ln f, and d ln f / d x (v,); d, see above,
-    0 where the two [0, 0] modes are not both there."""
+    """An evaluated design."""
 
-    x: Array
+    x: Array  # (v,) logarithms of the variables
     ln_f: Mapping[Label, float]
-    slopes: Mapping[Label, Array]
-    apart: float
+    slopes: Mapping[Label, Array]  # (v,) d ln f / d x
+    apart: float  # d, see above; 0 if the two [0, 0] modes are not both there
 
 
 @dataclass(frozen=True)
 class Emulator:
-    """Frequencies of ``labels`` for any design in the box, by what `fitted` found.
-
-    degrees (k, v) of the products; coefficients (k, n + 1), the last of d; designs: what it is made
-    of; errors, relative: the median of all; of each label (n,) what 99 % of designs keep; what they
-    keep in all labels; covariance (n, n) of the labels' errors in a design.
+    """Frequencies of n labels for any design in the box, by polynomials.
 
     >>> import tyrecal
     >>> surrogate = tyrecal.emulate(case, reach=0.1, evaluations=10)
@@ -78,16 +73,16 @@ class Emulator:
 
     variables: tuple[DesignVariable, ...]
     labels: tuple[Label, ...]
-    centre: Array
-    half: Array
-    degrees: Array
-    coefficients: Array
-    designs: tuple[Evaluated, ...]
-    failed: int  # designs of the box that could not be evaluated
-    median_error: float
-    stated_errors: Array
-    stated_error: float
-    error_covariance: Array
+    centre: Array  # (v,) middle of the box in x
+    half: Array  # (v,) half widths of the box in x
+    degrees: Array  # (k, v) degrees of the k products of polynomials
+    coefficients: Array  # (k, n + 1) of ln f of each label, m and s for the two [0, 0], then of d
+    designs: tuple[Evaluated, ...]  # from which it was made
+    failed: int  # number of designs of the box that could not be evaluated
+    median_error: float  # relative, of all frequencies
+    stated_errors: Array  # (n,) relative errors that 99 % of designs keep, by label
+    stated_error: float  # relative error that 99 % of designs keep in all labels
+    error_covariance: Array  # (n, n) covariance of the relative errors of the labels in a design
 
     def __repr__(self) -> str:
         names = ", ".join(v.name for v in self.variables)

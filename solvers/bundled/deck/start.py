@@ -29,10 +29,10 @@ class PressedStart:
     deck numbers (n,), displacements (n, 3) before any load and (ring, n, 3) on the road, of rings
     all round, m."""
 
-    texts: Mapping[str, str]
-    nodes: Array
-    inflated: Array
-    displacement: Array
+    texts: Mapping[str, str]  # its decks, file name to text
+    nodes: Array  # (n,) deck numbers
+    inflated: Array  # (n, 3) displacements before any load, m
+    displacement: Array  # (ring, n, 3) displacements on the road, of rings all round, m
     load_N: float
     deflection_m: float
     sha256: str = ""  # names it once it is written

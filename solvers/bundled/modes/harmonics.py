@@ -55,14 +55,15 @@ class SeededTyre:
 
 @dataclass
 class HarmonicModes:
-    """The m modes of harmonic n: omega^2 (m,), 1/s2, and shapes (m, nodes, 3), u^H M u = 1.
+    """The m modes of harmonic n.
 
-    M is the mass per radian: over the whole circle the kinetic mass is 2 pi for n = 0, pi else.
+    Shapes have u^H M u = 1, M being the mass per radian: over the whole circle the modal mass is
+    2 pi kg for n = 0, pi kg else.
     """
 
-    n: int
-    eigenvalues: Array
-    shapes: Array
+    n: int  # number of waves round the circumference
+    eigenvalues: Array  # (m,) lambda = omega^2, 1/s2, rising
+    shapes: Array  # (m, nodes, 3) amplitudes of r, theta, z, complex if n is not 0
     # amplitudes of the q motions of the rim (m, q), which are in ``shapes`` too, and of the
     # w terms of the cavity's flow (m, w), see `bordered`
     rim: Array = field(default_factory=lambda: np.zeros((0, 0)))

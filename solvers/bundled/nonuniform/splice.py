@@ -218,12 +218,11 @@ def sector_modes(
 
 @dataclass(frozen=True)
 class _Apart:
-    """Modes (m,) of one of the kinds of fields that vibrate apart; held (m,): how much of the plain
-    mode (n, k) is in each; shape: the field (k, nodes, 3) of a mode by its place."""
+    """Modes of one of the two kinds of fields, kept or reversed by half a turn."""
 
-    eigenvalues: Array
-    held: dict[tuple[int, int], Array]
-    shape: Callable[[int], Array]
+    eigenvalues: Array  # (m,) lambda = omega^2, 1/s2
+    held: dict[tuple[int, int], Array]  # (m,) how much of the plain mode (n, k) is in each
+    shape: Callable[[int], Array]  # the field (k, nodes, 3) of a mode, by its place
 
 
 def _modes_of(

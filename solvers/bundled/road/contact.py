@@ -133,18 +133,17 @@ class Contact:
     """Forces of half the tyre on the road, in the road's frame: down, along, across."""
 
     road: FlatRoad
-    U: Array
-    height: float
+    U: Array  # (k, n, 3) displacements, m
+    height: float  # of the road, measured downwards from the axle, m
     points: Points  # of the patch
-    positions: Array  # (i, j, p, 3), m
-    normal: Array  # (i, j, p), N
-    coulomb: bool
-    # of the friction: where it acts, its bound, way since the last load, share of it on the road
-    grip: Points
-    pressed: Array
-    moved: Array
-    share: Array
-    growth: Array  # of the share with the road's height, 1/m
+    positions: Array  # (i, j, p, 3) of the points in the road's frame, m
+    normal: Array  # (i, j, p) normal force, N
+    coulomb: bool  # whether friction is bounded by the normal force here, or by one known before
+    grip: Points  # where friction acts
+    pressed: Array  # (i, j, p) normal force that bounds friction, N
+    moved: Array  # (i, j, p, 2) way along and across since the last load, m
+    share: Array  # (i, j, p) part of that way that was on the road
+    growth: Array  # (i, j, p) d share / d height, 1/m
 
     def bound(self, share: Array | float) -> Bound:
         """Limit of the friction for a step of which the points spend ``share`` on the road."""

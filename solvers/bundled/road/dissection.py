@@ -44,7 +44,7 @@ class Front:
     """Unknowns, flat indices of the two parts, that are eliminated together."""
 
     parts: tuple[int, ...]
-    own: Array
+    own: Array  # the unknowns that are eliminated
     left: Array  # what they are coupled with that goes later
     inner: list[int]  # the boxes inside, by their place in the order
     # columns and pieces of a box that is not cut any more, else None

@@ -65,8 +65,8 @@ class HalfCircle(Circumference):
     waves: Array  # (2, j, f): the even and the odd functions as sums of j waves, cos j x or sin j x
     stations: Array  # (s,), rad
     pieces: tuple[Piece, ...]
-    even: Array
-    odd: Array
+    even: Array  # (f,) rows of the coefficients that an even field has
+    odd: Array  # (f,) rows of the coefficients that an odd field has
 
     def at(self, angles: Array) -> Array:
         """Values of the functions (k) at ``angles``, rad: (angles, k)."""

@@ -23,14 +23,10 @@ class HarmonicShape:
 
 @dataclass(frozen=True)
 class RingShape:
-    """A real shape sampled at points anywhere on the tyre (3-D solvers, measurements).
+    """A real shape sampled at points anywhere on the tyre (3-D solvers, measurements)."""
 
-    points (k, 3): R (m), Theta (rad), Z (m), uninflated; displacement (k, 3): r, theta, z,
-    NaN where a component was not measured.
-    """
-
-    points: Array
-    displacement: Array
+    points: Array  # (k, 3) R (m), Theta (rad), Z (m), uninflated
+    displacement: Array  # (k, 3) r, theta, z, any scale; NaN where a component was not measured
 
 
 @dataclass(frozen=True)

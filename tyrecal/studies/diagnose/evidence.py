@@ -253,10 +253,10 @@ def refit_at(
 
 
 class Family(NamedTuple):
-    """A family of errors outside the catalogue, as additional covariance (n, n) of ln f."""
+    """A family of errors that the catalogue does not have."""
 
-    words: str
-    extra: Array
+    words: str  # for the verdict
+    extra: Array  # (n, n) additional covariance of ln f
     reading: bool  # whether it is an error of reading, and not of the model
 
 

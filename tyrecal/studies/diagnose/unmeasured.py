@@ -33,10 +33,10 @@ HALF_90 = 1.6449  # half of a 90 % interval of a normal distribution, in standar
 
 @dataclass(frozen=True)
 class Expected:
-    """Predicted ln values (m,) of the tyre itself, without the scatter of a measurement."""
+    """Predicted ln values of the tyre itself, without the scatter of a measurement."""
 
-    mean: Array
-    deviation: Array  # standard deviation
+    mean: Array  # (m,) ln f
+    deviation: Array  # (m,) standard deviation of ln f
 
     def interval(self) -> tuple[Array, Array]:
         """Lower and upper ends of the 90 % intervals."""

@@ -31,12 +31,11 @@ TELLING = 0.3  # clearness from which on the slope of g tells that of d
 
 @dataclass(frozen=True)
 class Crossing:
-    """The linear model of d, Hz, about coordinates x: its value there and slopes (variables,); the
-    state that it is of."""
+    """The linear model of d about a design, in one state."""
 
-    x: Array
-    value: float
-    slopes: Array
+    x: Array  # (v,) coordinates of the variables
+    value: float  # d at x, Hz
+    slopes: Array  # (v,) d d / d x, Hz
     state: TyreState = AS_THE_CASE
 
     def at(self, x: Array) -> float:

@@ -80,29 +80,25 @@ class FitReason(ResultPart):
 class Shift:
     """A possible reason other than a slip: how ln q of all values would move.
 
-    columns (n, k): shifts of unknown amount, with standard deviation ``spread`` each; k = 0: the
-    shift ``known`` (n,) alone. words: the sentence, by the likeliest amounts (k,). It is a reason
-    only if it takes half of chi2 away: real tyres are never quite as computed.
+    It is a reason only if it takes half of chi2 away: real tyres are never quite as computed.
     """
 
     kind: Literal["pressure", "rim", "wheel"]
-    columns: Array
-    known: Array
-    words: Callable[[Array], str]
-    spread: float = 0.2
+    columns: Array  # E (n, k): k shifts of unknown amounts; k = 0: the known shift alone
+    known: Array  # s (n,): known shift
+    words: Callable[[Array], str]  # the sentence, given the likeliest amounts (k,)
+    spread: float = 0.2  # t: standard deviation of the amounts
 
 
 @dataclass(frozen=True)
 class Remainder:
-    """Remainder of a fit of n values: rows, as they were measured; deviation (n,), covariance
-    (n, n), sensitivities (n, v), see above. is_stated: whether anything states the scatter; if
-    not, the covariance is known but for a factor."""
+    """Remainder of a fit of n values, about the fitted design."""
 
-    rows: Sequence[Measurement]
-    deviation: Array
-    covariance: Array
-    sensitivities: Array
-    is_stated: bool = True
+    rows: Sequence[Measurement]  # the values, as they were measured
+    deviation: Array  # d (n,) = ln (measured / model)
+    covariance: Array  # C (n, n) of d; up to a factor if no scatter is stated
+    sensitivities: Array  # J (n, v) = d ln q / d x
+    is_stated: bool = True  # whether the measurements or the case state the scatter
 
     @cached_property
     def weight(self) -> Array:

@@ -24,35 +24,35 @@ SAME_DESIGN = 0.01  # of its prior standard deviations
 
 @dataclass(frozen=True)
 class Prior:
-    """Prior of the variables' coordinates: mean (v,), a root (v, v) of the covariance, and bounds
-    (v,)."""
+    """Prior of the variables' coordinates x."""
 
-    mean: Array
-    root: Array
-    lower: Array
-    upper: Array
+    mean: Array  # (v,)
+    root: Array  # (v, v) a root of the covariance, root root^T
+    lower: Array  # (v,) bounds of x
+    upper: Array  # (v,)
 
 
 @dataclass(frozen=True)
 class ModesNearDesign:
-    """The model at a design: label and state (a number) of each mode of a family (those across the
-    belt, and overtones, are told by no list), ln f (n,), slopes (n, v)."""
+    """The model at a design: its n in-plane and out-of-plane modes. A list of frequencies cannot
+    tell modes across the belt and overtones."""
 
     labels: tuple[Label, ...]
-    states: Array
-    ln_f: Array
-    slopes: Array
+    states: Array  # (n,) number of the state of each mode
+    ln_f: Array  # (n,)
+    slopes: Array  # (n, v) d ln f / d x
 
 
 @dataclass(frozen=True)
 class LabelSearch:
-    """Labelings about the model's ``expansion`` at x (v,), how many it took, and whether another
-    would find the same; else it is the surest of those that take turns."""
+    """Labelings of the frequencies, and the design about which the model was expanded."""
 
     labelings: Labelings
     expansion: ModesNearDesign
-    x: Array
-    rounds: int
+    x: Array  # (v,) coordinates of that design
+    rounds: int  # number of expansions that it took
+    # whether another expansion would give the same labels; if not, labelings take turns, and this
+    # is the most probable one
     settled: bool
 
     def labels(self, place: int = 0) -> list[Label | None]:

@@ -47,14 +47,12 @@ FOREIGN_MODE = -1
 
 @dataclass(frozen=True)
 class Modes:
-    """The tyre's modes that may have been measured: label and state (a number) of each, mu (n,),
-    expected ln f of the prior's centre; H (n, v), its slopes by the variables, each in prior
-    standard deviations."""
+    """The tyre's n modes that may have been measured."""
 
     labels: tuple[Label, ...]
-    states: Array
-    mu: Array
-    H: Array
+    states: Array  # (n,) number of the state of each mode
+    mu: Array  # (n,) ln f at the centre of the prior
+    H: Array  # (n, v) d ln f by the variables, each in standard deviations of its prior
 
 
 @dataclass(frozen=True)

@@ -38,13 +38,12 @@ MISSING = (
 
 @dataclass(frozen=True)
 class Chains:
-    """draws (steps, walkers, v) after ``dropped`` steps; acceptance: share of accepted moves; tau
-    (v,): of each variable, in steps."""
+    """Draws by several walkers."""
 
-    draws: Array
-    dropped: int
-    acceptance: float
-    tau: Array
+    draws: Array  # (steps, walkers, v) coordinates, without the first steps
+    dropped: int  # number of first steps that are left out
+    acceptance: float  # share of accepted moves
+    tau: Array  # (v,) autocorrelation time of each variable, in steps
 
     @property
     def flat(self) -> Array:

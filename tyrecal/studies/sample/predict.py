@@ -25,10 +25,10 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Conditional:
-    """pull (m, n): K Sigma^-1; covariance (m, m) that is left."""
+    """Distribution of m unmeasured rows, given n measured ones."""
 
-    pull: Array
-    covariance: Array
+    pull: Array  # (m, n) K Sigma^-1: shift of their mean by the residuals of the measured rows
+    covariance: Array  # (m, m) that is left
 
     def drawn(self, other: Array, off: Array, seed: int) -> Array:
         """ln f' (p, m) from eta' (p, m) and y - eta (p, n) of the same draws."""

@@ -27,13 +27,13 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Nodes that may touch a rigid surface, whose pieces (k, 2, 2) have the tyre on their left."""
+    """Nodes that may touch a rigid surface."""
 
     block: Block
     row: Row | None
     name: str
     nodes: tuple[int, ...]
-    pieces: Array
+    pieces: Array  # (k, 2, 2) start and end (r, z) of the surface's pieces, the tyre on their left
     reference: int  # node of the rigid surface
 
 

@@ -37,13 +37,13 @@ SHARPEST_TURN = 0.6  # of the carcass at the seat: its curvature times the gauge
 
 @dataclass(frozen=True)
 class Meridian:
-    """A carcass line by its arc s from the crown, m: points at (s, 2), widest, rim and end at s."""
+    """A carcass line from the crown to the bead, all in m."""
 
-    arc: Array
-    points: Array
-    widest: float
-    rim: float
-    end: float
+    arc: Array  # (s,) arc length of each of its points from the crown
+    points: Array  # (s, 2) r and z
+    widest: float  # arc length to the widest point
+    rim: float  # arc length to where the rim holds the tyre
+    end: float  # arc length to the end
 
     def at(self, s: Array) -> Array:
         """Points (s, 2), r and z in m, at arcs s."""

@@ -101,11 +101,11 @@ class CordsAtStations(ElasticAtStations):
 
 
 class CompressedCords(NamedTuple):
-    """The lowest logarithmic strain, the layer that it is in, and the nodes of its element."""
+    """The most compressed cord."""
 
-    strain: float
-    layer: str
-    nodes: Array
+    strain: float  # logarithmic, negative in compression
+    layer: str  # its name
+    nodes: Array  # of its element, rows of the mesh
 
     def in_words(self, X: Array) -> str:
         """Message that the cords buckle, and where; X (n, 2): R, Z of all nodes, m."""

@@ -28,10 +28,10 @@ Array = np.ndarray
 class Elastic(TyrePart):
     """Elements of one kind with their rows, their law and their mass."""
 
-    connectivity: Array
+    connectivity: Array  # (e, a) nodes of each element
     rows: Rows
     law: EnergyLaw
-    mass: Array | None = None
+    mass: Array | None = None  # (e, a, a) consistent, kg per radian, of each component
 
     def at(self, U: Array) -> Array:
         """z (e * g, k)."""
