@@ -18,9 +18,11 @@ Array = np.ndarray
 
 RADIUS_RANGE_m = (0.15, 1.5)  # m, of tyres
 MAX_ASPECT = 0.75  # a tyre's width over its diameter is less
-OUTER_RADIUS = 0.8  # of the largest radius, of sensors on the tread and its shoulders
+# radius over the largest one, above which a sensor is on the tread or its shoulders; `BELT` is the
+# same for the belt alone
+OUTER_RADIUS = 0.8
 MAX_OFF_CENTRE = 0.1  # of the radius
-CIRCLE_FITS = 3  # fitted one after the other
+CIRCLE_FITS = 3  # circles that are fitted one after the other
 AXIS_NAMES = "xyz"
 
 
@@ -81,7 +83,7 @@ def _axle(X: Array) -> str:
 
 
 def _check_centre(places: Array, axle: str) -> None:
-    """Raises where the outermost sensors lie on a circle about another centre.
+    """Raise InputError if the outermost sensors are on a circle about another centre.
 
     The circle x^2 + y^2 = 2 a x + 2 b y + c by least squares, through those that stand outermost
     about the last centre.

@@ -146,7 +146,10 @@ def draw_section_map(
     parts: DiagnosisSection, places: Sequence[PartChange], effective_rank: int | None = None
 ) -> Figure:
     """Parts of the section, coloured by the evidence for a change of them alone; below, that
-    evidence as bars, the largest first; with an ``effective_rank`` what the data see."""
+    evidence as bars, the largest first.
+
+    effective_rank: number of combinations of parts that the data see, for the title.
+    """
     by_name: dict[str, PartChange] = {}
     for place in places:  # of several rubbers in a region the likelier one
         by_name.setdefault(place.region.split(",")[0], place)

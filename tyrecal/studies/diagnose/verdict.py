@@ -16,8 +16,11 @@ VerdictKind = Literal["named", "undecided", "no_gap", "outside"]
 NAMED: Final = "named"
 UNDECIDED: Final = "undecided"
 NO_GAP: Final = "no_gap"
-SURE, RULED_OUT, CHECK, SET = 0.7, 0.05, 0.01, 0.9
-PERHAPS = 0.1  # probability of a further effect, from which it is told
+SURE = 0.7  # probability from which an effect is named
+RULED_OUT = 0.05  # probability of no effect, below which there is a gap
+CHECK = 0.01  # p-value of an explanation's own fit, below which it does not fit
+SET = 0.9  # probability that the candidates hold together
+PERHAPS = 0.1  # probability of a further effect, from which it is mentioned
 
 
 @dataclass(frozen=True)

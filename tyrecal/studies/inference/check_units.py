@@ -13,7 +13,8 @@ from .model import Answer, Query
 from .observations import Observations
 from .tyre_model import TyreModel
 
-MAX_MASS_RATIO = 1.5  # as the mass: a rim weighs as much as its tyre
+# measured mass over the model's, from which it is refused: with its rim a tyre weighs twice as much
+MAX_MASS_RATIO = 1.5
 
 
 def check_units(
@@ -22,8 +23,11 @@ def check_units(
     runs: Sequence[str],
     changes: Sequence[Toggle] = (),
 ) -> None:
-    """Raises InputError where a value of one of the ``runs`` is not even near the model's start;
-    InputError where the model has no answer with what was switched."""
+    """Raise InputError if a measured value is not even near the model at its start, or if the model
+    has no answer with an effect that a toggled run switched.
+
+    runs: names of the files, by number of the run; changes: the effect switched in each.
+    """
     set_to = [c for c in changes if not c.times and c.value != c.base]
     points = [Query(model.start, {c.id: c.value - c.base}) for c in set_to]
     answer, *others = model.answers([Query(model.start, constants=True), *points])

@@ -83,9 +83,9 @@ def grow_box(
     """Draws from a box (v, 2) with less than `AT_EDGE` of them at its edges, or from the last one
     that could be had.
 
-    ask: the posterior on an emulator of a box, each one larger than the last; tolerance (n,): its
-    largest rms errors, row by row; stage: hears whether sampling begins, or asking. Raises what
-    ``ask`` does of the first box.
+    ask: the posterior on an emulator of a box, each one larger than the last. tolerance (n,): its
+    largest rms errors of ln f, row by row. stage: called with True if sampling begins, with False
+    if evaluating. Raises what ``ask`` does of the first box.
     """
     last: Posterior | None = None
     evaluations, boxes, stopped = 0, 0, f"it was made larger {GROWTHS} times"

@@ -31,7 +31,7 @@ class ClassifiedDeck:
     model: list[Block] = field(default_factory=list)
     options: dict[Block, list[Block]] = field(default_factory=dict)  # of materials and sections
     inflation: list[Block] = field(default_factory=list)  # of the step that inflates
-    passed: list[Block] = field(default_factory=list)  # over, as they change nothing
+    passed: list[Block] = field(default_factory=list)  # requests of output, which change nothing
     contact: list[Block] = field(default_factory=list)  # superfluous where the bead is held
     later: list[Block] = field(default_factory=list)  # *STEP of those after it
     is_nonlinear: bool = False  # NLGEOM, which stays on in later steps

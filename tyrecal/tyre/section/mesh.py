@@ -1,4 +1,10 @@
-"""Mesh of the whole section: element rows with their edges on the cord lines."""
+"""Mesh of the whole section: element rows with their edges on the cord lines.
+
+Numbers in the deck, with the row i counted from the inner surface and the column j from the bead at
+-z, both from 0: a node has 1000 (j + 1) + i + 1, a solid the same with i, j of the elements. The
+element in column j of cord line k has 1000000 k + j + 1; k of the innermost line is the number of
+lines.
+"""
 
 from __future__ import annotations
 
@@ -27,6 +33,7 @@ class SectionMesh:
     inner: list[int]  # solids whose faces S4 are the inner surface
     outer: list[int]  # solids whose faces S2 are the outer surface
     shape: tuple[int, int]  # (elements along, rows)
+    # nodes of the outer surface where the outermost cord line is below, from -z to +z
     crown_outer: list[int] = field(default_factory=list)
 
     def region_of(self, cord: int) -> str:

@@ -3,7 +3,9 @@
     Wbar = sum over i of 2 mu_i / alpha_i^2 (y_1^alpha_i + y_2^alpha_i + y_3^alpha_i - 3)
     U = sum over i of (J - 1)^(2i) / D_i,   G = sum of mu_i
 
-With Y_a = y_a^alpha and Y its mean, s_a x_a = sum of 2 mu / alpha (Y_a - Y).
+With x_a = lambda_a^2, s_a = 2 dWbar/dx_a (`principal`), Y_a = y_a^alpha and Y its mean,
+
+    s_a x_a = sum of 2 mu / alpha (Y_a - Y).
 """
 
 from __future__ import annotations
