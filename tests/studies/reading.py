@@ -1,0 +1,56 @@
+"""Files drawn by lot, to be read by someone who knows only ARCHITECTURE.md and the glossary.
+
+    python -m tests.studies.reading [--seed 20261201]
+
+Draws three files of 40 to 250 lines of each of six rooms. The reader notes each question that a
+file leaves open although its answer is needed to check a function or a value against a textbook:
+an unknown symbol, letter of a shape, unit, or word. Then each is answered in the code. Questions
+on 2026-11-27, each lot read after those of the lots before were answered, and by the same reader:
+
+| seed | tyre | simulate | measured | studies | report, batch, cli | solvers |
+|---|---|---|---|---|---|---|
+| 20261201 | 4 | 3 | 7 | 10 | 2 | 8 |
+| 20261202 | 2 | 4 | 3 | 4 | 0 | 5 |
+| 20261204 | 3 | 0 | 1 | 3 | 1 | 2 |
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+ROOMS = {
+    "tyre": ["tyrecal/tyre"],
+    "simulate": ["tyrecal/simulate"],
+    "measured": ["tyrecal/measured"],
+    "studies": ["tyrecal/studies"],
+    "report": ["tyrecal/report", "tyrecal/batch", "tyrecal/cli"],
+    "solvers": ["solvers"],
+}
+MIN_LINES, MAX_LINES = 40, 250
+FILES_A_ROOM = 3
+
+
+def draw(seed: int) -> dict[str, list[str]]:
+    """Paths of the files drawn, by room."""
+    lot = random.Random(seed)
+    drawn = {}
+    for room, folders in ROOMS.items():
+        paths = [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
+        lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in paths}
+        names = sorted(
+            path.relative_to(ROOT).as_posix()
+            for path, length in lengths.items()
+            if MIN_LINES <= length <= MAX_LINES
+        )
+        drawn[room] = lot.sample(names, FILES_A_ROOM)
+    return drawn
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--seed", type=int, default=20261201)
+    for room, names in draw(parser.parse_args().seed).items():
+        print(f"{room}: {', '.join(names)}")
