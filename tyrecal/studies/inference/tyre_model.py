@@ -45,7 +45,7 @@ QueryKey = tuple[bytes, tuple[tuple[str, float], ...], bool]  # of an evaluation
 class TyreModel:
     """ln f of the modes ``rows`` (label, where), and ln mass where the label is None.
 
-    case: its variables are x; found: sources of error; spans: effects that may be asked for;
+    case: its variables are x; found: sources of error; ranges: effects that may be evaluated;
     jobs: evaluations at a time. Raises DeckRefused where the solver has no exact slopes.
     """
 
