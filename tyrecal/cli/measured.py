@@ -220,11 +220,11 @@ def sensors(
         terminal.note(note)
     alike_labels = sensors_in(test, layout).looks_like()
     if terminal.as_json:
-        told_apart = [
+        similar = [
             {**label_entry(label), "told": not alike, "looks_like": [str(x) for x in alike]}
             for label, alike in alike_labels.items()
         ]
-        terminal.result(told_apart)
+        terminal.result(similar)
     else:
         terminal.say(sensors_words(alike_labels))
     return 0

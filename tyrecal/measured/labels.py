@@ -156,9 +156,11 @@ class Labeller:
             rivals = p.mean(1)
             rivals[i] = 0.0
             order = [int(j) for j in np.argsort(-rivals) if rivals[j] > MIN_TAKEN]
-            is_told = self.is_seen[i] and np.mean(p[i] >= MIN_LABEL_PROBABILITY) >= MIN_LABELLED
+            is_recognised = (
+                self.is_seen[i] and np.mean(p[i] >= MIN_LABEL_PROBABILITY) >= MIN_LABELLED
+            )
             order = order or [int(np.argmax(rivals))]
-            result[self.labels[i]] = [] if is_told else [self.labels[j] for j in order]
+            result[self.labels[i]] = [] if is_recognised else [self.labels[j] for j in order]
         return result
 
     def _why(self, p: Array, order: Array) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..files import json_text
-from ..studies.diagnose.constants_told import constants_posterior
+from ..studies.diagnose.constants_posterior import constants_posterior
 from ..studies.diagnose.diagnosis import Diagnosis
 from ..studies.diagnose.evidence import COVERAGE, NONE, OUTSIDE, PRIOR_OUTSIDE
 from ..studies.diagnose.gap import OWN_RIM

@@ -105,14 +105,14 @@ def over_labels(
         other = decide(per_reading[k], here, len(readings[k].observations.rows), variables)
         if (other.kind, other.key) != (verdict.kind, verdict.key):
             same = same and k != best
-            changes.append(f"{_told(readings, p, k, best)}, {in_words(other)})")
+            changes.append(f"{_labels_words(readings, p, k, best)}, {in_words(other)})")
     if same:  # else what the likeliest one hangs on is another verdict
         between += [alone.low, alone.high]
         changes += alone.hangs_on
     return Robustness(not changes, tuple(changes), min(between), max(between))
 
 
-def _told(readings: Sequence[Reading], p: Array, k: int, best: int) -> str:
+def _labels_words(readings: Sequence[Reading], p: Array, k: int, best: int) -> str:
     """A reading by what it has otherwise than the likeliest one, or the next where it is that."""
     other = best if k != best else int(np.argsort(-p, kind="stable")[1])
     own = readings[k].labels

@@ -21,7 +21,7 @@ from .. import named
 from ..inference.observations import Observable
 from ..labels import Labels
 from ..result import CsvRow, Result, ResultPart, StudyInput, rows_csv
-from .constants_told import ConstantShift, constants_posterior
+from .constants_posterior import ConstantShift, constants_posterior
 from .evidence import NONE, OUTSIDE
 from .gap import projection
 from .shrinkage import Shrinkage

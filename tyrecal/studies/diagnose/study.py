@@ -37,7 +37,7 @@ from .label_swap import rows_if_exchanged
 from .labelings import Reading, likely, with_probabilities
 from .next_measurement import OtherStates
 from .result import DiagnosisResult, diagnosis_result
-from .section_told import section_posterior
+from .section_posterior import section_posterior
 from .under_load import UnderLoad, Values, compare
 from .where import FieldValue
 
