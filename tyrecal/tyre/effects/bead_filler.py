@@ -15,8 +15,8 @@ HIGHER_m = 0.010
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
     """Shear and bulk modulus of the rubber of lower sidewall and bead times 1 + value. If the
-    carcass has a turn-up, only the rubber between carcass and turn-up gets stiffer. If the rim
-    holds only the bead's surface, the filler within the bead deforms."""
+    carcass has a turn-up, only the rubber between the two is meant. If the rim holds only the
+    bead's surface, the filler within the bead deforms."""
     if not value > -1:
         raise ValueError("must be greater than -1")
     return _stiffer(case, _place(case)[0], 1 + value)
