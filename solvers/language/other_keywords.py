@@ -1,4 +1,7 @@
-"""Keywords that are known by name alone: their parameters and data are not checked."""
+"""Keywords that are known by name alone: their parameters and data are not checked.
+
+`rule` explains levels, ``honoured`` and ``instead``.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ SHARE_NODES = "share nodes, or *TIE surfaces of the same nodes"
 
 
 def _unjudged(level: str, names: str, **more: str | bool) -> dict[str, KeywordRule]:
+    """Rules of keywords of one level, by name."""
     return {name: KeywordRule(level, is_judged=False, **more) for name in names.split(", ")}  # type: ignore[arg-type]
 
 

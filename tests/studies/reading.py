@@ -12,6 +12,7 @@ on 2026-11-27, each lot read after those of the lots before were answered, and b
 | 20261201 | 4 | 3 | 7 | 10 | 2 | 8 |
 | 20261202 | 2 | 4 | 3 | 4 | 0 | 5 |
 | 20261204 | 3 | 0 | 1 | 3 | 1 | 2 |
+| 20261205 | 3 | 1 | 0 | 1 | 1 | 2 |
 """
 
 from __future__ import annotations

@@ -2,8 +2,9 @@
 
 A surface element is a span round the tyre times a line element of the section: its displacements
 are u = sum N_l(theta) M_a(s) u_la. Across it run lines at fixed Gauss points s_j; the patch is
-where the depth d(theta) on such a line exceeds the road's height, so its ends are roots of
-d - H, and Gauss points lie between them: what is summed over them moves smoothly with the edge.
+where the depth d(theta) on such a line, measured downwards from the axle, exceeds that of the road,
+H ("height" in names). So its ends are roots of d - H, and Gauss points are between them: sums over
+them move smoothly with the edge.
 """
 
 from __future__ import annotations
@@ -30,13 +31,13 @@ ROOT_STEPS = 4  # of Newton's method, from the root of a parabola
 class Tread:
     """Spans t, line elements e with nodes a and lines j."""
 
-    begin: Array  # (t,), rad
-    length: Array  # (t,), rad
+    begin: Array  # (t,) angle where a span begins, rad
+    length: Array  # (t,) angle over a span, rad
     # (t, l): functions round the tyre, three or, where waves follow, a fourth; where that is the
     # third again it counts for nothing
     columns: Array
-    nodes: Array  # (e, a)
-    M: Array  # (j, a)
+    nodes: Array  # (e, a) rows of the mesh
+    M: Array  # (j, a) shape functions on the lines
     slope: Array  # (e, j, a): dM/ds, 1/m
     X: Array  # (e, j, 2): R, Z, m
     tangent: Array  # (e, j, 2): dX/ds

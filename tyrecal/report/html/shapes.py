@@ -16,8 +16,11 @@ PAGE_ANGLES = 60  # round the circumference, in the page
 
 def packed(shapes: Shapes) -> dict[str, Any]:
     """Data that `viewer.js` reads: points and modes; a surface round the section's outside that the
-    script sweeps, or the loaded tyre's as it is. Raises ValueError where lists that belong together
-    differ in length."""
+    script sweeps, or the loaded tyre's as it is.
+
+    Places are over the largest radius, angles over a full turn: all are from -1 to 1. Raises
+    ValueError where lists that belong together differ in length.
+    """
     return _loaded(shapes) if shapes.load_N else _swept(shapes)
 
 

@@ -120,7 +120,10 @@ class Store:
         return content
 
     def write(self, key: str, about: dict[str, Any], content: Any) -> None:
-        """Record ``content`` (see `pack`) whole or not at all; warns once where it cannot."""
+        """Record ``content`` (see `pack`) whole or not at all; warns once if it cannot.
+
+        about: facts on the evaluation for people, such as case and solver.
+        """
         path = self.path(key)
         try:
             data = pack(key, about, content)

@@ -4,9 +4,9 @@ The held-out set is chosen by rule. Everything is attributed and fitted on the r
 R = 1 - G_after / G_before, G the rms of the errors on the held-out rows. The placebo: the same on
 tyres without any effect, drawn from the plain model and Sigma, each with its own likeliest effect.
 
-The fits of a diagnosis leave to the uncalibrated constants what is theirs; a calibration as usual,
-least squares of ln f, does not, and comes closer. So its errors without and with the effect, at the
-size that the diagnosis found on the rest, stand beside.
+The fits of a diagnosis attribute a part of the errors to the uncalibrated constants. An ordinary
+calibration, least squares of ln f, does not, and comes closer. So its errors without and with the
+effect, at the size that the diagnosis gives on the rest, are listed, too.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Shrinkage:
     effect: str  # its key
     before_percent: float
     after_percent: float
-    fraction: float  # R
+    fraction: float  # R = 1 - after / before
     low: float  # 90 % interval of R over the posterior
     high: float
     placebo_95: float  # the 95 % quantile of R on tyres without any effect
@@ -165,10 +165,11 @@ def _placebo(problem: InverseProblem, hold: Array, random: np.random.Generator) 
     best_ln, best = np.full(PLACEBOS, -np.inf), np.zeros((PLACEBOS, int(hold.sum())))
     information = np.diag(problem.spread**-2.0)
 
-    def fitted(shift: Array, tilt: Array, law: Array | float) -> tuple[Array, Array]:
-        """ln evidence but for a constant, and held-out errors, of all placebos."""
+    def fitted(shift: Array, tilt: Array, error: Array | float) -> tuple[Array, Array]:
+        """ln evidence up to a constant, and held-out errors, of all placebos with an effect of this
+        shift (n,), tilt (n, v) and covariance of its error (n, n)."""
         Je = J + tilt
-        S = (sigma + law)[np.ix_(keep, keep)]
+        S = (sigma + error)[np.ix_(keep, keep)]
         inverse = np.linalg.inv(S)
         normal = Je[keep].T @ inverse @ Je[keep] + information
         r = noise - shift

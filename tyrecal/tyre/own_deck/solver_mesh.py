@@ -1,4 +1,9 @@
-"""The flat deck's nodes, elements, sets and surfaces, and the outlines of the section."""
+"""Nodes, elements, sets and surfaces of the deck that a solver gets for a user's deck, and the
+outlines of the section.
+
+That deck is flat: without parts, assembly and generated sets, in m, its nodes and elements numbered
+from 1. A face is (solid, name of the face such as S3, its nodes in order).
+"""
 
 from __future__ import annotations
 
@@ -18,26 +23,22 @@ OVER_THE_BELT = 0.94  # of the largest radius: nodes of the outer surface beyond
 
 @dataclass(frozen=True, eq=False)
 class SolverMesh:
-    """Nodes and elements under the flat deck's numbers, m.
+    """Nodes and elements under the flat deck's numbers, m."""
 
-    outer, inner: nodes of the outer and of the inner surface in order, from -z to +z; around: of
-    all the boundary, closed, from the inner surface's first on.
-    """
-
-    nodes: dict[int, Point]
-    solids: dict[int, tuple[int, ...]]
-    plies: dict[int, tuple[int, ...]]
+    nodes: dict[int, Point]  # number to (r, z)
+    solids: dict[int, tuple[int, ...]]  # number to nodes
+    plies: dict[int, tuple[int, ...]]  # number to nodes
     section_of: dict[int, int]  # solid to its place among the solid sections
-    rim: tuple[int, ...]
-    cavity: tuple[Face, ...]
-    tread: tuple[Face, ...]
-    outer: tuple[int, ...]
-    inner: tuple[int, ...]
-    around: tuple[int, ...]
-    reference: Point
-    element_at: dict[int, int]  # the deck's number of an element to the flat one
-    lines: tuple[str, ...]
-    origins: tuple[Place, ...]
+    rim: tuple[int, ...]  # nodes that the rim holds
+    cavity: tuple[Face, ...]  # faces on which the pressure acts
+    tread: tuple[Face, ...]  # faces that are free
+    outer: tuple[int, ...]  # nodes of the outer surface in order, from -z to +z
+    inner: tuple[int, ...]  # nodes of the inner surface in order, from -z to +z
+    around: tuple[int, ...]  # nodes of the whole boundary, closed, from the inner surface's first
+    reference: Point  # (r, z) of the rim's reference node
+    element_at: dict[int, int]  # number of an element in the user's deck to the flat one
+    lines: tuple[str, ...]  # of the flat deck: its model, without materials and steps
+    origins: tuple[Place, ...]  # file and line of the user's deck that each line comes from
 
     @cached_property
     def crown(self) -> tuple[int, ...]:
