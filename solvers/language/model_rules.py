@@ -364,7 +364,6 @@ MODEL_RULES: dict[str, KeywordRule] = {
     "DAMPING": KeywordRule(
         "model part step",
         "ALPHA=number; BETA=number; COMPOSITE=number; STRUCTURAL=number",
-        rows=NO_ROWS,
         needs=("ALPHA|BETA|COMPOSITE|STRUCTURAL",),
         honoured={"section": "STRUCTURAL"},
         is_output=True,

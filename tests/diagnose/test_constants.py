@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tyrecal.studies.diagnose.constants_told import constants_posterior
+from tyrecal.studies.diagnose.constants_posterior import constants_posterior
 from tyrecal.studies.diagnose.diagnosis import diagnose
 from tyrecal.studies.inference.inverse_problem import Assumed
 from tyrecal.studies.sensitivities.selection import likeliest_shifts
