@@ -15,7 +15,7 @@ from tyrecal.studies.sensitivities.result import SensitivitiesResult
 from ..conftest import CASES
 from .test_cli import run
 
-CASE, DATA = str(CASES / "p235_75r17.yaml"), str(CASES / "p235_75r17_wheeler.csv")
+CASE = str(CASES / "p235_75r17.yaml")
 COARSE = ("--mesh", "coarse")
 TWO = ("--by", "C10", "--by", "rebar_layers.belt_1.angle_deg")
 
@@ -41,23 +41,45 @@ def test_the_screen_has_the_numbers_of_the_files(
 
 
 @pytest.mark.slow
-def test_measurements_select_numbers_and_a_second_run_is_answered_from_the_store(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_a_number_that_is_off_is_selected_and_a_fit_that_frees_it_recovers_it(
+    case_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    command = ["sensitivities", CASE, *COARSE, *TWO, "--measured", DATA, "--no-pictures"]
-    for _ in range(2):
-        assert run(*command, "--output", str(tmp_path), "--report") == 0
-    text = capsys.readouterr().out
-    assert json.loads((tmp_path / "run.json").read_text())["sensitivities"]["solver_runs"] == 0
-    content = json.loads((tmp_path / "sensitivities.json").read_text())
-    selection = content["selection"]
-    assert selection["steps"] == [] and selection["next_p_value"] > 0.05
-    assert (
-        f"Free no number: no gain is better than chance at 5% (chi2 {selection['chi2']:.4g}" in text
-    )
-    assert f"With an exact section chi2 would be {selection['chi2_exact_section']:.4g}" in text
+    """Sidewalls of the real tyre, thicker by three standard deviations; the selection of a second
+    run is answered from the store."""
+    path = case_folder / "p235_75r17.yaml"
+    path.write_text(path.read_text().replace("known_from: size_code", "known_from: exact"))
+    case = tyrecal.load_case(path, mesh="coarse")
+    lines = ["quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma"]
+    for pressure in (180.0, 300.0):
+        off = tyrecal.with_values(case, {"effects.sidewall_gauge": 0.09, "pressure_kPa": pressure})
+        for mode in tyrecal.evaluate_modes(off):
+            place = f"{mode.label.c},{mode.label.m},{mode.label.kind or ''},,{pressure:g},0"
+            hertz = mode.frequency_Hz
+            lines.append(f"frequency_Hz,{place},{hertz!r},{1e-3 * hertz!r}")
+    data = tmp_path / "data.csv"
+    data.write_text("\n".join(lines) + "\n")
+    out = ["--mesh", "coarse", "--measured", str(data), "--output", str(tmp_path / "out")]
+    assert run("sensitivities", str(path), *TWO, *out, "--no-pictures") == 0
+    assert "Free sidewall_gauge: chi2" in capsys.readouterr().out
+    content = json.loads((tmp_path / "out/sensitivities.json").read_text())
+    (step,) = content["selection"]["steps"]
+    assert step["sets"] == ["effects.sidewall_gauge"] and step["p_value"] < 1e-3
+    assert step["shift_in_sd"] == pytest.approx(3, abs=0.5)
     assert content["provenance"]["measured_sha256"]
-    assert "<h2>Sensitivities</h2>" in (tmp_path / "report.html").read_text()
+
+    free = ["--free", "effects.sidewall_gauge", "--no-pictures", "--method", "gauss-newton"]
+    assert run("fit", str(path), *out, *free) == 0
+    fit = json.loads((tmp_path / "out/fit.json").read_text())
+    assert fit["freed"]["sidewall_gauge"]["shift_in_sd"] == pytest.approx(3, abs=0.3)
+    assert fit["variables"]["C10"]["value"] == pytest.approx(1e6, rel=0.05)
+    given = ["--fitted", str(tmp_path / "out"), "--by", "C10", "--no-pictures"]
+    assert run("sensitivities", str(path), *out, *given) == 0
+    facts = json.loads((tmp_path / "out/run.json").read_text())["sensitivities"]
+    assert facts["solver_runs"] == 1 and facts["answered_from_record"] > 5
+    content = json.loads((tmp_path / "out/sensitivities.json").read_text())
+    hertz = content["quantity_values"]["frequency_Hz [2,0]"]
+    at = {m["pressure_kPa"]: m["fitted_Hz"] for m in fit["modes"] if (m["c"], m["m"]) == (2, 0)}
+    assert content["design"] == "fitted" and at[180.0] < hertz < at[300.0]
 
 
 @pytest.mark.slow

@@ -164,32 +164,3 @@ PROVENANCE = {
     "state": {"pressure_kPa": 240.0, "load_N": 0.0, "rim": "fixed"},
     "mesh": "coarse",
 }
-
-
-@pytest.mark.slow
-def test_the_command_frees_a_number_and_other_studies_take_the_design(tmp_path: Path) -> None:
-    """The planted density of the real tyre comes back, and `sensitivities` has the fitted one."""
-    from ..cli.test_cli import run
-
-    case, out = str(CASES / "p235_75r17.yaml"), tmp_path / "out"
-    coarse = ["--mesh", "coarse", "--store", str(tmp_path / "store")]
-    heavy = ["--set", "materials.rubber.density_kg_per_m3=1130"]
-    assert run("modes", case, *coarse, *heavy, "--output", str(tmp_path / "m")) == 0
-    modes = json.loads((tmp_path / "m/modes.json").read_text())
-    lines = ["quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma"]
-    lines += [
-        f"frequency_Hz,{m['c']},{m['m']},{m['kind'] or ''},,240,0,{m['frequency_Hz']!r},0.01"
-        for m in modes["modes"]
-    ]
-    lines.append(f"mass_kg,,,,,,,{modes['mass_kg']!r},0.001")
-    (tmp_path / "m.csv").write_text("\n".join(lines) + "\n")
-    options = ["--measured", str(tmp_path / "m.csv"), "--free", "rubber_density", "--no-pictures"]
-    assert run("fit", case, *coarse, *options, "--output", str(out)) == 0
-    result = json.loads((out / "fit.json").read_text())
-    assert result["variables"]["rubber_density"]["value"] == pytest.approx(1130, abs=3)
-    assert result["variables"]["rubber_density"]["standard_error_total"]
-    given = ["--fitted", str(out), "--by", "C10", "--of", "mass", "--no-pictures"]
-    assert run("sensitivities", case, *coarse, *given, "--output", str(out)) == 0
-    table = json.loads((out / "sensitivities.json").read_text())
-    assert table["design"] == "fitted"
-    assert table["quantity_values"]["mass_kg"] == pytest.approx(modes["mass_kg"], rel=1e-3)
