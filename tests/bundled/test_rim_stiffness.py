@@ -148,6 +148,8 @@ def test_the_deck_moves_the_rim_in_six_steps(
     with pytest.raises(RunFailed, match="enough"):
         job.run(tmp_path, "press", "inflate")
     assert requests.keys() == {1000.0, 2000.0}
+    lengths = re.findall(r"(.*), 1, 1.0, C\n", (tmp_path / "press.inp").read_text())
+    assert max(map(float, lengths)) <= 12.0  # degrees: the whole tyre bends
     for each in requests.values():
         np.testing.assert_array_equal(each.motions, np.eye(6))
         assert each.reference_z == 0.0

@@ -72,10 +72,11 @@ class PressingPlan:
         """Likely time on quiet processors, nothing answered from the record; None: not known."""
         if not self.is_timed:
             return None
-        # designs and states begin at the first one's equilibrium, except where modes are wanted
-        total = 0.0 if all(each.modes for each in self.states) else FIRST_LOAD_S - FURTHER_DESIGN_S
-        for each in self.states:
-            begun = FIRST_LOAD_S if each.modes else FURTHER_DESIGN_S
+        # designs and states begin at the first one's equilibrium, except where more is wanted
+        alone = [each.modes or each.rim_stiffness for each in self.states]
+        total = 0.0 if all(alone) else FIRST_LOAD_S - FURTHER_DESIGN_S
+        for each, is_alone in zip(self.states, alone, strict=True):
+            begun = FIRST_LOAD_S if is_alone else FURTHER_DESIGN_S
             press = begun + FURTHER_LOAD_S * (each.loads - 1) + self._more_s(each)
             share = 1 + SENSITIVITY_SHARE * each.sensitivities + each.neighbours
             total += self.designs * press * share

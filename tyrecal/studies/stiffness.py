@@ -147,8 +147,7 @@ def run(
         )
     states = [(name, kPa) for name in designs for kPa in at_kPa]
     values = [{**designs[name], pressure_name(case): kPa} for name, kPa in states]
-    base = values[0] if len(states) > 1 else None
-    questions = [PressQuestion(each, loads_N, base=base, rim_stiffness=True) for each in values]
+    questions = [PressQuestion(each, loads_N, rim_stiffness=True) for each in values]
     rows: list[StiffnessRow] = []
     failed: list[Failed] = []
     answers = evaluator.press_all(questions, jobs)

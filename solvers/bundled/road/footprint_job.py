@@ -76,7 +76,7 @@ def press(
     """
     by_elements = half_circle(data.lengths)
     rings = by_elements.angles
-    around = waves_beyond(data.lengths) if vibrations else by_elements
+    around = waves_beyond(data.lengths) if vibrations or rim_requests else by_elements
     if data.tread not in model.mesh.faces:
         raise DeckError(WHOLE_DECK, f"surface {data.tread} is not defined in the section's job")
     if any(isinstance(p, Elastic) and isinstance(p.law, Hourglass) for p in model.parts):

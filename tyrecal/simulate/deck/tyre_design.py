@@ -24,6 +24,7 @@ from .own import explained, own_jobs
 from .template_process import TemplateProcess
 
 ELEMENTS_A_WAVE = 7.5  # of quadratic ones: the frequencies are right to 0.4 %
+WAVES_OF_STIFFNESS = 4  # round the circumference, that a motion of the rim bends the tyre into
 DeckRequest = Mapping[str, Any]  # what is asked of a deck, see `Decks.request`
 OWN_TEXT = "own deck"  # of a user's deck, as it stands
 NEAR_ZERO = 1e-4  # of a variable's span: below, steps are shares of this
@@ -190,8 +191,11 @@ def _abaqus(tyre: Tyre, env: Any, request: DeckRequest) -> dict[str, str]:
     names["modes"] = 2 * request["modes_per_harmonic"] * (request["highest_harmonic"] + 1)
     names["loads"], names["loaded_modes"] = request["loads_N"], request["loaded_modes"]
     names["rim_motions"] = range(1, 7) if request["rim_stiffness"] else ()
-    if names["loaded_modes"]:
-        half = fine_enough(tyre.case.road.element_angles_deg, request["highest_harmonic"])
+    waves = request["highest_harmonic"] if names["loaded_modes"] else 0
+    if names["rim_motions"]:
+        waves = max(waves, WAVES_OF_STIFFNESS)
+    if names["loaded_modes"] or names["rim_motions"]:
+        half = fine_enough(tyre.case.road.element_angles_deg, waves)
         names["road"]["angles"] = half + half[::-1]
     jobs = ("inflate", "press" if names["loads"] else "modes")
     texts = {f"{job}.inp": render(env, f"{job}.inp.j2", names) for job in jobs}

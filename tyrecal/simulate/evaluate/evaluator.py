@@ -169,7 +169,7 @@ class Evaluator:
         self.needs_road(bool(modes), rim_stiffness)
         design, loads = self._with(values), tuple(loads_N)
         start = None
-        if base and not modes and _key(self._with(base)) != _key(design):
+        if base and not (modes or rim_stiffness) and _key(self._with(base)) != _key(design):
             start = self._pressed(base, loads, gradients)
         decks = Decks(
             design,
