@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, Protocol
 
 
@@ -15,3 +16,12 @@ class WrittenDecks(Protocol):
 
     def texts(self, dialect: str) -> dict[str, str]:
         """File name to text."""
+
+
+def save_texts(texts: Mapping[str, str], folder: Path) -> list[Path]:
+    """Write decks into a run folder. Raises OSError."""
+    paths = [folder / name for name in texts]
+    for path, text in zip(paths, texts.values(), strict=True):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8", newline="")
+    return paths

@@ -11,16 +11,14 @@ from typing import Any
 import numpy as np
 
 from .. import own_decks
-from ..decks import WrittenDecks
+from ..decks import WrittenDecks, save_texts
 from ..errors import Refused, RunFailed
 from ..rings import about_axle, ring_modes
 from .dat import DatTable, read_dat
 from .evidence import checked_modes
 from .launch import run_job
 from .options import load, read_options
-from .question import read_question
-
-JOB, OLDJOB = "modes", "inflate"
+from .question import section_jobs
 
 
 class Abaqus:
@@ -59,18 +57,15 @@ class Abaqus:
         units = decks.request.get("own_deck", {})
         paths = [read_options(decks.options, **units).save(folder)]
         paths += (own := own_decks.save(decks.request, folder))
-        for name, text in decks.texts("own deck" if units else self.dialect).items():
-            paths.append(folder / name)
-            paths[-1].parent.mkdir(parents=True, exist_ok=True)
-            paths[-1].write_text(text, encoding="utf-8", newline="")
+        paths += save_texts(decks.texts("own deck" if units else self.dialect), folder)
         if not own:
-            read_question(folder / f"{JOB}.inp")  # refused before it runs, not after
+            section_jobs(folder)  # refused before it runs, not after
         return paths
 
     def run(self, folder: Path, time_limit_s: float) -> None:
         """Run all jobs, ``time_limit_s`` for them together. Raises ``failures``."""
-        options, own = load(folder), own_decks.load(folder)
-        for job, before in own.jobs if own else [(OLDJOB, ""), (JOB, OLDJOB)]:
+        options, run = load(folder), own_decks.load(folder) or section_jobs(folder)
+        for job, before in run.jobs:
             left = max(time_limit_s, 0.0)
             time_limit_s -= run_job(job, before or None, self.command, options, folder, left)
 
@@ -79,29 +74,23 @@ class Abaqus:
 
         Raises RunFailed where the results are stale, not whole, or no result.
         """
-        units, own = load(folder), own_decks.load(folder)
-        job = own.last if own else JOB
-        length_m, mass_kg = (own or units).length_m, (own or units).mass_kg
-        if own:
-            count, pressure_Pa = own.modes, own.pressure_Pa
-        else:
-            question = read_question(folder / f"{JOB}.inp")
-            count, pressure_Pa = question.modes, question.pressure * mass_kg / length_m
-        table = read_dat(folder / f"{job}.dat")
+        own = own_decks.load(folder)
+        run = own or section_jobs(folder)
+        table = read_dat(folder / f"{run.last}.dat")
         if own:  # the mass is told with the model, not where a job only goes on
             tables = [read_dat(folder / f"{each}.dat") for each, _ in own.jobs]
             masses = [each.mass for each in tables if each.mass is not None]
             table = DatTable(table.frequencies_Hz, masses[-1] if masses else None)
-        raw_modes = checked_modes(folder / f"{job}.fil", count, table)
-        points, vectors = length_m * raw_modes.coordinates, raw_modes.displacement
+        raw_modes = checked_modes(folder / f"{run.last}.fil", run.modes, table)
+        points, vectors = run.length_m * raw_modes.coordinates, raw_modes.displacement
         if own:
             points, turn = about_axle(points)
             vectors = vectors @ turn.T
-        norms = np.sqrt(raw_modes.masses * mass_kg)[:, None, None]
+        norms = np.sqrt(raw_modes.masses * run.mass_kg)[:, None, None]
         places, modes = ring_modes(raw_modes.eigenvalues, points, vectors / norms)
         return {
-            "pressure_Pa": pressure_Pa,
-            "mass_kg": table.mass and table.mass * mass_kg,
+            "pressure_Pa": run.pressure_Pa,
+            "mass_kg": table.mass and table.mass * run.mass_kg,
             "modes": modes,
             "gradients": {},
             "nodes": np.empty(0, int),

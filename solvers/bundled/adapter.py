@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..decks import WrittenDecks
+from ..decks import WrittenDecks, save_texts
 from ..errors import Refused, RunFailed
 from . import VERSION
 from .deck.start import PressedStart, write_pressed_start, write_start
@@ -60,14 +60,12 @@ class Bundled:
 
     def write(self, decks: RoadDecks, folder: Path) -> list[Path]:
         """Write the decks and, next to them, the requests that only this solver reads."""
-        paths = []
-        for name, text in decks.texts(self.dialect).items():
-            paths.append(folder / name)
-            if decks.start is not None and name == f"{OLDJOB}.inp":
-                text += write_start(folder, decks.start)
-            if decks.pressed_start is not None and name == f"{PRESS}.inp":
-                text += write_pressed_start(folder, decks.pressed_start)
-            paths[-1].write_text(text, encoding="utf-8", newline="")
+        texts = dict(decks.texts(self.dialect))
+        if decks.start is not None and f"{OLDJOB}.inp" in texts:
+            texts[f"{OLDJOB}.inp"] += write_start(folder, decks.start)
+        if decks.pressed_start is not None and f"{PRESS}.inp" in texts:
+            texts[f"{PRESS}.inp"] += write_pressed_start(folder, decks.pressed_start)
+        paths = save_texts(texts, folder)
         request = {k: decks.request[k] for k in REQUEST_KEYS if k in decks.request}
         if decks.loads_N:
             loaded, slopes = bool(decks.request.get("loaded_modes")), decks.tangents(self.dialect)

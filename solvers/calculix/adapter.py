@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from .. import own_decks
-from ..decks import WrittenDecks
+from ..decks import WrittenDecks, save_texts
 from ..errors import Refused, RunFailed
 from ..process import end_commands
 from ..rings import about_axle, ring_modes
@@ -57,10 +57,7 @@ class CalculiX:
         """Write the decks and, next to them, how to run them. Raises Refused."""
         settings = _settings(decks.options)
         paths = own_decks.save(decks.request, folder)
-        for name, text in decks.texts(self.dialect).items():
-            paths.append(folder / name)
-            paths[-1].parent.mkdir(parents=True, exist_ok=True)
-            paths[-1].write_text(text, encoding="utf-8", newline="")
+        paths += save_texts(decks.texts(self.dialect), folder)
         paths.append(folder / SETTINGS)
         paths[-1].write_text(json.dumps(settings), encoding="utf-8", newline="")
         return paths
