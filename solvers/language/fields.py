@@ -9,16 +9,13 @@ from .rule import Field
 from .table import RULES
 from .text import Block
 
-# L, M, T exponents of units of fields; constants of laws by their first letters
-Dimension = tuple[int, int, int]
-OF_STRESS: Dimension = (-1, 1, -2)
-OF_COMPLIANCE: Dimension = (1, -1, 2)
-DIMENSIONS: dict[str, Dimension] = {
-    "stress": OF_STRESS,
-    "compliance": OF_COMPLIANCE,
-    "density": (-3, 1, 0),
-    "area": (2, 0, 0),
-    "length": (1, 0, 0),
+# exponents of the units of length and mass in those of fields
+DIMENSIONS: dict[str, tuple[int, int]] = {
+    "stress": (-1, 1),
+    "compliance": (1, -1),
+    "density": (-3, 1),
+    "area": (2, 0),
+    "length": (1, 0),
 }
 
 

@@ -125,7 +125,7 @@ class _Writer(DeckLines):
 
     def scale(self, unit: str) -> float:
         """The factor to SI units on a field of a kind of unit."""
-        L, M, _ = fields.DIMENSIONS.get(unit, (0, 0, 0))
+        L, M = fields.DIMENSIONS.get(unit, (0, 0))
         return self.length**L * self.mass**M
 
     def block(self, block: Block, head: str, angular: bool = False) -> None:
