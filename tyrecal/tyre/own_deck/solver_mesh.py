@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 
 from .model import DeckModel
 from .numbers import written
@@ -34,17 +33,12 @@ class SolverMesh:
     tread: tuple[Face, ...]  # faces that are free
     outer: tuple[int, ...]  # nodes of the outer surface in order, from -z to +z
     inner: tuple[int, ...]  # nodes of the inner surface in order, from -z to +z
+    crown: tuple[int, ...]  # nodes of the outer surface over the belt
     around: tuple[int, ...]  # nodes of the whole boundary, closed, from the inner surface's first
     reference: Point  # (r, z) of the rim's reference node
     element_at: dict[int, int]  # number of an element in the user's deck to the flat one
     lines: tuple[str, ...]  # of the flat deck: its model, without materials and steps
     origins: tuple[Place, ...]  # file and line of the user's deck that each line comes from
-
-    @cached_property
-    def crown(self) -> tuple[int, ...]:
-        """Nodes of the outer surface over the belt."""
-        most = max(self.nodes[n][0] for n in self.outer)
-        return tuple(n for n in self.outer if self.nodes[n][0] > OVER_THE_BELT * most)
 
 
 @dataclass
@@ -122,8 +116,9 @@ def solver_mesh(model: DeckModel, length: float) -> SolverMesh:
     line("*NSET, NSET=RIM", start)
     write.numbers(rim, start)
     most = max(nodes[n][0] for n in outer)
+    crown = tuple(n for n in outer if nodes[n][0] > OVER_THE_BELT * most)
     line("*NSET, NSET=CROWN", start)
-    write.numbers([n for n in outer if nodes[n][0] > OVER_THE_BELT * most], start)
+    write.numbers(crown, start)
     for name, faces in (("CAVITY", cavity), ("TREAD", tread)):
         line(f"*SURFACE, NAME={name}, TYPE=ELEMENT", start)
         for n, face, _ in faces:
@@ -148,6 +143,7 @@ def solver_mesh(model: DeckModel, length: float) -> SolverMesh:
         tuple(tread),
         tuple(outer),
         tuple(inner),
+        crown,
         tuple(_around(boundary, inner)),
         reference,
         element_at,
