@@ -8,6 +8,7 @@ import pytest
 
 from tyrecal.tyre.load import load_case, validate
 from tyrecal.tyre.own_deck.own_deck import read_own_deck
+from tyrecal.tyre.own_deck.text import OwnDeckError
 from tyrecal.tyre.usual_deck import deck_slips, unusual_numbers, usual_numbers
 from tyrecal.tyre.values import unusual_value
 
@@ -230,3 +231,12 @@ def test_an_angular_spacing_is_in_degrees_whatever_its_path(tmp_path: Path) -> N
     deck = read_own_deck(file)
     ranges = usual_numbers(deck, deck.flat({}))
     assert {each.unit for path, each in ranges.items() if path.endswith("spacing")} == {"degrees"}
+
+
+def test_the_density_that_is_off_is_named(tmp_path: Path) -> None:
+    """Where units are derived from the densities, and one of them fits none."""
+    text = plain().replace("1500.0\n", "150000.0\n")
+    (tmp_path / "tyre.inp").write_text(text)
+    line = text.splitlines().index("150000.0")  # from 1, that of *DENSITY
+    with pytest.raises(OwnDeckError, match=f"line {line}: .* cannot be inferred"):
+        read_own_deck(tmp_path / "tyre.inp")

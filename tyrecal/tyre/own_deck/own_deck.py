@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -158,12 +159,17 @@ def read_own_deck(path: Path, units: Units | None = None) -> OwnDeck:
 def recognised(blocks: Sequence[Block]) -> Units:
     """The units that the densities are in. Raises OwnDeckError where these do not determine
     them."""
-    rows = [row for b in blocks if b.name == "DENSITY" for row in b.rows[:1]]
-    values = [row.number(0) for row in rows if "{{" not in row.text(0) and "<" not in row.text(0)]
-    for units, (low, high) in DENSITIES.items():
-        if values and all(low <= value <= high for value in values):
+    rows = [(b, b.rows[0]) for b in blocks if b.name == "DENSITY" and b.rows]
+    plain = [(b, row) for b, row in rows if not re.search(r"{{|<", row.text(0))]
+    values = [(b, row.number(0)) for b, row in plain]
+    outside = {
+        units: [b for b, value in values if not low <= value <= high]
+        for units, (low, high) in DENSITIES.items()
+    }
+    for units, others in outside.items():
+        if values and not others:
             return units
-    block = next((b for b in blocks if b.name == "DENSITY"), blocks[0])
+    block = (min(outside.values(), key=len) or blocks)[0]  # the odd one
     raise block.refused(
         "the units cannot be inferred from the densities: give --units m or --units mm"
     )
