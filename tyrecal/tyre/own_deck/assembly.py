@@ -19,14 +19,15 @@ class Assembly:
 
     root: Scope = field(default_factory=Scope)
     taken: dict[str, set[int]] = field(default_factory=dict)  # numbers outside parts
-    sections: list[tuple[Block, str]] = field(default_factory=list)  # with the prefix
+    others: list[tuple[Block, str]] = field(default_factory=list)  # sections, rigid bodies, ...
     surfaces: dict[str, tuple[Block, str]] = field(default_factory=dict)
-    rebars: list[tuple[Block, str]] = field(default_factory=list)
-    rules: list[tuple[Block, str]] = field(default_factory=list)  # rigid bodies, ties, embedded
-    held: list[Block] = field(default_factory=list)
     instance_nodes: dict[int, tuple[str, int]] = field(default_factory=dict)  # name, own number
     shifts: dict[str, Point] = field(default_factory=dict)  # of instances, by their prefix
     reflect: Block | None = None
+
+    def of(self, *names: str) -> list[tuple[Block, str]]:
+        """Blocks of these keywords in their order, each with its prefix."""
+        return [(block, prefix) for block, prefix in self.others if block.name in names]
 
 
 @dataclass
@@ -138,18 +139,11 @@ def _other(made: Assembly, block: Block, prefix: str, parts: dict[str, DeckPart]
                 labels.add_to_set(block.need(name), block, of)
                 return
         raise block.refused(f"the instance {block.get('INSTANCE')} is not defined above")
-    if name in ("SOLID SECTION", "SURFACE SECTION", "MEMBRANE SECTION"):
-        made.sections.append((block, prefix))
-    elif name == "REBAR":
-        made.rebars.append((block, prefix))
-    elif name == "SURFACE":
+    made.others.append((block, prefix))
+    if name == "SURFACE":
         if prefix + block.need("NAME") in made.surfaces:
             raise block.refused(f"the surface {block.get('NAME')} is defined twice")
         made.surfaces[prefix + block.need("NAME")] = block, prefix
-    elif name in ("RIGID BODY", "TIE", "EMBEDDED ELEMENT"):
-        made.rules.append((block, prefix))
-    elif name == "BOUNDARY":
-        made.held.append(block)
     elif name == "SYMMETRIC MODEL GENERATION":
         if made.reflect:
             raise block.refused("is there twice")

@@ -62,14 +62,10 @@ class Constraints:
 
     def _rules(self) -> None:
         """Rigid bodies, then what is tied or embedded."""
-        for block, prefix in self.made.rules:
-            if block.name == "RIGID BODY":
-                self._rigid(block, prefix)
-        for block, prefix in self.made.rules:
-            if block.name == "TIE":
-                self._tie(block, prefix)
-            elif block.name == "EMBEDDED ELEMENT":
-                self._embed(block, prefix)
+        for block, prefix in self.made.of("RIGID BODY"):
+            self._rigid(block, prefix)
+        for block, prefix in self.made.of("TIE", "EMBEDDED ELEMENT"):
+            (self._tie if block.name == "TIE" else self._embed)(block, prefix)
         self._choose_rim()
 
     def _choose_rim(self) -> None:
@@ -193,7 +189,8 @@ class Constraints:
     def _held(self) -> None:
         """Collect what *BOUNDARY holds: the rim's reference node, the bead, or the plane of a
         half."""
-        blocks = [*self.made.held, *(b for b in self.blocks.inflation if b.name == "BOUNDARY")]
+        blocks = [b for b, _ in self.made.of("BOUNDARY")]
+        blocks += [b for b in self.blocks.inflation if b.name == "BOUNDARY"]
         fixed: dict[int, set[int]] = {}
         for block in blocks:
             for row in block.rows:

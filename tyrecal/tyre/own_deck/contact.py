@@ -167,7 +167,8 @@ class DeckContact:
                 lines.append(", ".join(map(str, numbers[k : k + NODES_ON_A_LINE])))
         where = "before *END ASSEMBLY" if known else "before the first *STEP"
         steps = [block for block in self.blocks.inflation if block.name == "BOUNDARY"]
-        released = [block for block in (*self.made.held, *steps) if block.get("OP") == "NEW"]
+        blocks = (*(block for block, _ in self.made.of("BOUNDARY")), *steps)
+        released = [block for block in blocks if block.get("OP") == "NEW"]
         head = "*BOUNDARY" + ", OP=NEW" * any(block in released for block in steps)
         held = [head, f"{name}, ENCASTRE"]
         if known or released:

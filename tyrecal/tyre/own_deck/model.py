@@ -121,7 +121,7 @@ class _Builder:
         """Section options with their elements; every element has one."""
         owner: dict[int, Block] = {}
         solids, plies = list[Assigned](), list[Assigned]()
-        for block, prefix in self.made.sections:
+        for block, prefix in self.made.of("SOLID SECTION", "SURFACE SECTION", "MEMBRANE SECTION"):
             name = prefix + block.need("ELSET")
             elements = self.root.elements.members(name, block)
             if not elements:
@@ -147,7 +147,7 @@ class _Builder:
     def _with_rebars(self, plies: Sequence[Assigned]) -> Iterator[Assigned]:
         """Plies, membranes split into elements with the same lines of *REBAR."""
         lines: dict[int, list[tuple[Block, Row]]] = {}
-        for block, prefix in self.made.rebars:
+        for block, prefix in self.made.of("REBAR"):
             for row in block.rows:
                 for n in self.root.elements.members(prefix + row.name(0), block, row):
                     if not self.root.elements[n].kind.startswith("MGAX"):
