@@ -17,6 +17,7 @@ from .text import Block, Row, fields, named, number_from, table
 
 DECK_MARK = re.compile(r"\{\{\s*([A-Za-z][A-Za-z0-9_\-]*)\s*\}\}")
 PARAMETER = re.compile(r"<\s*(\w+)\s*>")
+GIVEN = re.compile(r"{{|<")  # in a text whose numbers are given elsewhere
 IN_PATHS = {*table.MATERIAL_OPTIONS, "REBAR LAYER", "REBAR"}  # blocks whose numbers have paths
 Numbers = Mapping[str, float]
 
@@ -140,9 +141,8 @@ def written(value: float) -> str:
 
 def is_marked(block: Block) -> bool:
     """Whether its numbers depend on marks or parameters."""
-    return any("{{" in row.line or "<" in row.line for row in block.rows) or any(
-        "<" in value for value in block.parameters.values()
-    )
+    in_data = any(GIVEN.search(row.line) for row in block.rows)
+    return in_data or any("<" in value for value in block.parameters.values())
 
 
 def filled(block: Block, numbers: Numbers, parameters: Mapping[str, Any]) -> Block:
@@ -157,19 +157,16 @@ def filled(block: Block, numbers: Numbers, parameters: Mapping[str, Any]) -> Blo
                 raise block.refused(f"the mark {field} has no number: give it in deck.numbers")
         return PARAMETER.sub(lambda m: _parameter(block, parameters, m[1]), field)
 
-    rows = tuple(
-        Row(row.place, text(row.line)) if "{{" in row.line or "<" in row.line else row
-        for row in block.rows
-    )
+    rows = [Row(row.place, text(row.line)) if GIVEN.search(row.line) else row for row in block.rows]
     values = {k: text(v) if "<" in v else v for k, v in block.parameters.items()}
     return Block(block.name, block.place, values, rows)
 
 
 def _parameter(block: Block, parameters: Mapping[str, Any], name: str) -> str:
-    for known, value in parameters.items():
-        if known.upper() == name.upper():
-            return value if isinstance(value, str) else written(value)
-    raise block.refused(f"the parameter <{name}> is not defined above")
+    if name.upper() not in parameters:
+        raise block.refused(f"the parameter <{name}> is not defined above")
+    value = parameters[name.upper()]
+    return value if isinstance(value, str) else written(value)
 
 
 MAX_RESULT = 1e300  # result of an expression
@@ -190,7 +187,8 @@ EXPRESSION_FUNCTIONS = {
 
 
 def parameters(block: Block, known: dict[str, Any]) -> None:
-    """Add the parameters that a *PARAMETER defines: NAME = expression, of those above too."""
+    """Add the parameters that a *PARAMETER defines, NAME = expression, of those above too, by their
+    names in upper case."""
     for row in block.rows:
         text = ",".join(row.fields)[:60]
         name, expression = assigned(row)
@@ -206,19 +204,18 @@ def parameters(block: Block, known: dict[str, Any]) -> None:
             raise block.refused(f"'{text}' is nested too deep", row) from None
         except (ValueError, SyntaxError, KeyError, TypeError, OverflowError) as error:
             raise block.refused(f"'{text}' is not honoured: {error}", row) from None
-        known[name] = value
+        known[name.upper()] = value
 
 
 def _evaluate(node: ast.AST, known: Mapping[str, Any]) -> Any:
     if isinstance(node, ast.Constant) and type(node.value) in (int, float, str):
         return node.value
     if isinstance(node, ast.Name):
-        same = [value for name, value in known.items() if name.upper() == node.id.upper()]
         if node.id == "pi":
             return math.pi
-        if not same:
+        if node.id.upper() not in known:
             raise ValueError(f"{node.id} is not defined above")
-        return same[0]
+        return known[node.id.upper()]
     if isinstance(node, ast.UnaryOp) and type(node.op) in OPERATORS:
         return OPERATORS[type(node.op)](_number(_evaluate(node.operand, known)))
     if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -160,7 +159,7 @@ def recognised(blocks: Sequence[Block]) -> Units:
     """The units that the densities are in. Raises OwnDeckError where these do not determine
     them."""
     rows = [(b, b.rows[0]) for b in blocks if b.name == "DENSITY" and b.rows]
-    plain = [(b, row) for b, row in rows if not re.search(r"{{|<", row.text(0))]
+    plain = [(b, row) for b, row in rows if not numbers_of.GIVEN.search(row.text(0))]
     values = [(b, row.number(0)) for b, row in plain]
     outside = {
         units: [b for b, value in values if not low <= value <= high]
