@@ -67,6 +67,7 @@ def test_ten_modes_are_right_however_they_are_written(tmp_path: Path, way: str) 
     assert len(result.runs) == 1 and result.runs[0].explained > 0.99
     damping = [mode.mode.damping for mode in result.runs[0].modes]
     assert damping == pytest.approx([0.025] * 10, rel=0.05)
+    assert [row.damping_ratio for row in result.rows] == pytest.approx([0.025] * 10, rel=0.05)
     if way in NOTES:
         assert any(NOTES[way] in note for note in result.notes), result.notes
     else:

@@ -166,6 +166,7 @@ def result(gathered: Gathered) -> dict[str, Any]:
                 **({"rim": row.rim} if row.rim else {}),
                 "value": row.value,
                 "sigma": row.sigma,
+                **({"damping_ratio": row.damping_ratio} if isfinite(row.damping_ratio) else {}),
             }
             for row in gathered.rows
         ],

@@ -13,7 +13,7 @@ from ..tyre.number_table import NumberMarks
 from ..tyre.state import RIMS
 from ..units import QUANTITIES
 from .columns import TableColumn
-from .measurement import AS_CASE, Measurement
+from .measurement import AS_CASE, DAMPING_RATIO, OF_A_MODE, Measurement
 from .mode_names import label_parts
 
 MAX_ORDERS = {"c": 20, "m": 3}  # largest numbers of a label in a table
@@ -73,7 +73,7 @@ class Line:
         for quantity in quantities:
             value = self.number("value" if self.cell("value") else quantity)
             label, member = None, ""
-            if quantity == "frequency_Hz":
+            if quantity in OF_A_MODE:
                 label = self._label()
                 member = self._member(label, bool(load)) if label else ""
             has_sigma = sigma and (not sigma.of or quantity in sigma.of)
@@ -107,9 +107,12 @@ class Line:
                 "nothing was measured: the cell of the value is empty; write n.a. if that is meant"
             )
         quantity = self.cell("quantity")
-        if quantity not in QUANTITIES:
-            raise ValueError(f"quantity is '{quantity}', must be one of {', '.join(QUANTITIES)}")
-        if quantity != "frequency_Hz" and any(map(self.cell, ("c", "m", "kind", "member"))):
+        known = [*QUANTITIES, DAMPING_RATIO]
+        if quantity not in known:
+            raise ValueError(f"quantity is '{quantity}', must be one of {', '.join(known)}")
+        if quantity == DAMPING_RATIO and not self.cell("c"):
+            raise ValueError(f"c is '', must be a whole number for {quantity}")
+        if quantity not in OF_A_MODE and any(map(self.cell, ("c", "m", "kind", "member"))):
             raise ValueError(f"c, m, kind and member must be empty for {quantity}")
         return [quantity]
 

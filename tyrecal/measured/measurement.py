@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import nan
+from math import isfinite, nan
 
 from ..simulate.modes.label import Label
 from ..tyre.case.parts import RimSupport
@@ -17,6 +17,9 @@ CSV_COLUMNS = ("quantity", "c", "m", "kind", "member", "pressure_kPa", "load_N",
 RIM_COLUMN = "rim"  # written only if a value was measured on another rim than the case's
 AS_CASE = "case"
 PRESSURE_USUAL = Usual(20, 2000, "kPa", PRESSURE)
+DAMPING_RATIO = "damping_ratio"  # a row of its own in a CSV, read as part of its mode's frequency
+OF_A_MODE = ("frequency_Hz", DAMPING_RATIO)
+DAMPING_SIGMA = 0.25  # of a damping ratio, where a CSV is written
 MIN_CARRIED, MAX_CARRIED = 0.05, 3.0  # contact area times pressure over the load
 MeasurementKey = tuple[str, Label | None, str, float, float, RimSupport | None]
 
@@ -35,6 +38,7 @@ class Measurement:
     run: str = ""  # name of the test: the tyre mounted once and measured
     place: str = ""  # file and line
     rim: RimSupport | None = None  # None: as the case has it
+    damping_ratio: float = nan  # of the mode of a frequency, fraction of critical; NaN: not stated
 
     @property
     def key(self) -> MeasurementKey:
@@ -78,7 +82,7 @@ class Measurement:
                     f" {self.pressure_kPa:g} kPa it would carry {share * self.load_N:.3g} N; check"
                     " the units and marks of area, load and pressure"
                 )
-        if self.rim not in (None, "fixed") and self.quantity != "frequency_Hz":
+        if self.rim not in (None, "fixed") and self.quantity not in OF_A_MODE:
             return f"rim is {self.rim}, must be fixed or empty for {self.quantity}"
         if self.is_unlabelled and self.load_N:
             return (
@@ -101,4 +105,9 @@ def measurements_csv(measurements: Sequence[Measurement]) -> str:
         state = f"{each.member},{pressure},{each.load_N:g}"
         rim = f",{each.rim or AS_CASE}" * on_rims
         lines.append(f"{each.quantity},{mode},{state},{each.value:.6g},{each.sigma:.3g}{rim}")
+        if label and isfinite(each.damping_ratio):
+            ratio = each.damping_ratio
+            lines.append(
+                f"{DAMPING_RATIO},{mode},{state},{ratio:.4g},{DAMPING_SIGMA * ratio:.3g}{rim}"
+            )
     return "\n".join(lines) + "\n"

@@ -11,16 +11,18 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import compress
+from math import nan
 
 import numpy as np
 
 from ..errors import InputError
 from ..simulate.modes.label import BELT, MAX_SAMPLED_HARMONIC, TAKES_PART, Label
+from ..tyre.usual import USUAL_MEASUREMENTS
 from .case_modes import CaseModes
 from .geometry import sensors_of
 from .identify import FORMS, Responses, identify
 from .labels import Judged, Labeller
-from .measurement import Measurement
+from .measurement import DAMPING_RATIO, Measurement
 from .sensors import MeasuredMode, Sensors, real_part
 from .universal import Function, MeasuredShape, Place, Signal, Universal, channel_name
 
@@ -403,7 +405,9 @@ def without_overtones(labelled: list[LabelledMode]) -> list[LabelledMode]:
 
 
 def measurements_of(test: ModalTest, pressure_kPa: float) -> list[Measurement]:
-    """The frequencies of all modes, also of those without a label."""
+    """The frequencies of all modes, also of those without a label; with the damping ratios that
+    modes can have."""
+    usual = USUAL_MEASUREMENTS[DAMPING_RATIO]
     return [
         Measurement(
             quantity="frequency_Hz",
@@ -415,6 +419,7 @@ def measurements_of(test: ModalTest, pressure_kPa: float) -> list[Measurement]:
             sigma=each.mode.sigma_Hz,
             run=test.name,
             place=each.place,
+            damping_ratio=each.mode.damping if usual.holds(each.mode.damping) else nan,
         )
         for each in test.modes
     ]

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import isnan
+from math import isnan, nan
 
 import numpy as np
 
@@ -63,8 +63,14 @@ def combined(
                 f" {100 * MAX_SIGMA:.0f} % of the value {mean:.4g}: is it a mistake, or another"
                 " mode?"
             )
-        rows.append(replace(runs[0], value=mean, sigma=sigma))
+        rows.append(replace(runs[0], value=mean, sigma=sigma, damping_ratio=mean_damping(runs)))
     return sorted(rows, key=_order)
+
+
+def mean_damping(values: Sequence[Measurement]) -> float:
+    """The mean of the damping ratios that are stated; NaN where none is."""
+    stated = [each.damping_ratio for each in values if not isnan(each.damping_ratio)]
+    return sum(stated) / len(stated) if stated else nan
 
 
 def _pooled(groups: dict[object, list[Measurement]], quantity: str) -> float | None:
@@ -93,7 +99,8 @@ def one_for_both(values: Sequence[Measurement]) -> list[Measurement]:
                 result += run
             elif {each.member for each in run} == {"1", "2"}:
                 mean = sum(each.value for each in run) / len(run)
-                result.append(replace(run[0], value=mean, member="", sigma=run[0].sigma))
+                damping = mean_damping(run)
+                result.append(replace(run[0], value=mean, member="", damping_ratio=damping))
             else:
                 result += [replace(each, member="") for each in run]
     return result

@@ -22,7 +22,7 @@ from ..units import QUANTITIES
 from .columns import NUMBER_MEANINGS, TableColumn, is_unit, meaning_of, read_columns, unit_of
 from .formats import other_format
 from .line import Line
-from .measurement import CSV_COLUMNS, RIM_COLUMN, Measurement
+from .measurement import CSV_COLUMNS, DAMPING_RATIO, RIM_COLUMN, Measurement
 
 MAX_LINES = 10_000  # of a file
 MAX_TITLES = 20  # lines in which the headings are looked for
@@ -120,7 +120,30 @@ def _measurements(
         except ValueError as error:
             mistakes.append(f"{place}: {error}")
     _refuse(mistakes)
-    return measurements
+    return _with_damping(measurements)
+
+
+def _with_damping(measurements: list[Measurement]) -> list[Measurement]:
+    """Frequencies with the damping ratios of their modes, and all else. Raises InputError where
+    there is a damping ratio without the frequency of its mode in the same state."""
+    ratios = {_of_mode(each): each for each in measurements if each.quantity == DAMPING_RATIO}
+    others = [each for each in measurements if each.quantity != DAMPING_RATIO]
+    known = {_of_mode(each) for each in others if each.quantity == "frequency_Hz"}
+    _refuse(
+        f"{each.place}: there is no frequency_Hz of {each.name} in the same state"
+        for mode, each in ratios.items()
+        if mode not in known
+    )
+    return [
+        replace(each, damping_ratio=ratios[_of_mode(each)].value)
+        if each.quantity == "frequency_Hz" and _of_mode(each) in ratios
+        else each
+        for each in others
+    ]
+
+
+def _of_mode(each: Measurement) -> tuple[object, ...]:
+    return (*each.key[1:], each.run)
 
 
 def _refuse(mistakes: Iterable[str]) -> None:
@@ -193,7 +216,7 @@ def _sigma_mistake(each: Measurement) -> str | None:
     """Why a measurement's standard deviation cannot be right, or None."""
     if isnan(each.sigma):
         return "sigma is '', must be the standard deviation, greater than 0"
-    if each.sigma > MAX_SIGMA * each.value:
+    if each.sigma > (1.0 if each.quantity == DAMPING_RATIO else MAX_SIGMA) * each.value:
         most = f"{100 * MAX_SIGMA:.0f} %"
         return f"sigma is {each.sigma:g}, more than {most} of the value {each.value:g}"
     return None

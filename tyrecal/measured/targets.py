@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import compress
-from math import hypot
+from math import hypot, isnan
 from pathlib import Path
 
 from ..errors import InputError
@@ -23,6 +23,7 @@ from ..tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ..tyre.state import AS_THE_CASE, PRESSURE_PATH, RIM_FREE, WHEEL_FREE, TyreState, pressure_name
 from ..tyre.values import set_values
 from .measurement import Measurement
+from .repeats import mean_damping
 from .tables import read_measurements
 
 SAME_PRESSURE_kPa = 0.5  # pressures that differ by less are one
@@ -204,6 +205,7 @@ def _modes(case: LoadedCase, readings: Sequence[Measurement]) -> list[TargetMode
             kind=label.kind,  # type: ignore[arg-type]
             frequency_Hz=sum(each.value for each in group) / len(group),
             sigma_Hz=hypot(*(each.sigma for each in group)) / len(group),
+            damping_ratio=None if isnan(damping := mean_damping(group)) else damping,
             pressure_kPa=state.pressure_kPa,
             rim=state.rim,
             load_N=state.load_N or None,

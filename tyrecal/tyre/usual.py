@@ -112,6 +112,7 @@ USUAL_MEASUREMENTS = {
     "contact_width_m": Usual(0.005, 0.8, "m", LENGTH),
     "vertical_stiffness_N_per_m": Usual(1e4, 1e7, "N/m", STIFFNESS),
     "mass_kg": Usual(0.5, 500, "kg", QUANTITIES["mass_kg"]),
+    "damping_ratio": Usual(1e-4, 0.5, "", SHARE, reason=" of critical damping"),
 }
 MAX_SIGMA = 0.2  # of the value: such a number tells nothing
 MIN_SIGMA = 1e-5  # of the value: nothing is measured so well
@@ -185,6 +186,7 @@ USUAL: dict[str, Usual] = {
     "road.elastic_slip_m": Usual(1e-6, 1e-2, "m", LENGTH),
     "road.loads_N.*": Usual(100, 6e4, "N", LOAD),
     "targets.modes.*.frequency_Hz": USUAL_MEASUREMENTS["frequency_Hz"],
+    "targets.modes.*.damping_ratio": USUAL_MEASUREMENTS["damping_ratio"],
     "targets.modes.*.weight": Usual(0, 1e4, "", least=1e-4),
     "targets.modes.*.pressure_kPa": Usual(50, 1200, "kPa", PRESSURE),
     "targets.modes.*.load_N": Usual(100, 6e4, "N", LOAD),

@@ -67,6 +67,10 @@ BY_DATA = (
     " is the one that was known. Deviations are left where section, laws or constants explain them."
 )
 MAX_PROPOSED = 4  # states in a table
+DAMPING_COLUMNS = {
+    "damping_ratio": Column("damping %", ".2f", 100),
+    "target_damping_ratio": Column("target %", ".2f", 100),
+}
 HERTZ, RESULT_DIGITS = Column("Hz"), Column("", ".4g")
 
 
@@ -142,6 +146,8 @@ class FittedMode(Named):
     target_Hz: PositiveNumber
     deviation_percent: float
     sigma_Hz: float | None = None
+    damping_ratio: float | None = None  # of the fitted tyre, fraction of critical damping
+    target_damping_ratio: float | None = None
     pressure_kPa: float | None = None
     load_N: float = 0.0
     rim: str | None = None
@@ -288,7 +294,7 @@ class FitResult(Result):
 
     def csv(self) -> str:
         keys = ["c", "m", "kind", "multiplicity", "initial_Hz", "fitted_Hz", "target_Hz"]
-        keys.append("deviation_percent")
+        keys += ["deviation_percent", *self._damping_columns]
         if self.others:
             keys += ["load_N", "quantity", "initial", "fitted", "target", "sigma"]
         if self.states:
@@ -389,12 +395,15 @@ class FitResult(Result):
     def _every_target(self) -> Table:
         heads = [*NAME_COLUMNS, *map(Column, ("initial", "fitted", "target", "deviation %"))]
         heads[:0] = [Column("state", "")] * bool(self.states)
+        damping = self._damping_columns
+        heads += damping.values()
         rows: list[list[Any]] = [
             [
                 *[mode.state] * bool(self.states),
                 *mode.named(),
                 *map(HERTZ.cell, (mode.initial_Hz, mode.fitted_Hz, mode.target_Hz)),
                 Deviation(mode.deviation_percent),
+                *(column.cell(getattr(mode, key)) for key, column in damping.items()),
             ]
             for mode in self.modes
         ]
@@ -403,10 +412,19 @@ class FitResult(Result):
             figures = map(quantity.cell, (each.initial, each.fitted, each.target))
             off = Deviation(each.deviation_percent)
             place = [each.state, ""] if self.states else [each.state]
-            rows.append([*place, quantity.name, *figures, off])
+            rows.append([*place, quantity.name, *figures, off, *[None] * len(damping)])
         in_hertz = self.objective_unit == "Hz"
         units = f"frequencies{' and objective' * in_hertz} in Hz"
         return Table(heads, rows, caption=self._caption(units))
+
+    @property
+    def _damping_columns(self) -> dict[str, Column]:
+        """Columns of damping, where it is known of any mode or target."""
+        return {
+            key: column
+            for key, column in DAMPING_COLUMNS.items()
+            if any(getattr(mode, key) is not None for mode in self.modes)
+        }
 
     def _side_by_side(self) -> Table:
         """Fitted values and their deviations from the targets, a column a state."""
@@ -625,6 +643,9 @@ def _modes(problem: Problem, initial: Point, point: Point, several: bool) -> lis
         hertz = (before.frequency_Hz, after.frequency_Hz, target.frequency_Hz)
         of = _mode(target.label, after.multiplicity, hertz)
         own = plain(problem, target.state) | {"sigma_Hz": target.sigma_Hz}
+        ratios = after.raw.damping_ratio, target.damping_ratio
+        known = zip(DAMPING_COLUMNS, ratios, strict=True)
+        of |= {key: ratio for key, ratio in known if ratio is not None}
         result.append(FittedMode.model_validate(of | (own if several else {})))
     for i, road in enumerate(problem.road):
         if road.member:

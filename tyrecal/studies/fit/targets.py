@@ -35,6 +35,7 @@ class Target:
     weight: float = 1.0
     sigma_Hz: float | None = None
     state: TyreState = AS_THE_CASE
+    damping_ratio: float | None = None  # compared with the fitted tyre's, not fitted
 
     quantity = "frequency_Hz"
 
@@ -91,6 +92,7 @@ def read_targets(case: LoadedCase) -> list[Target]:
             t.weight,
             t.sigma_Hz,
             TyreState(t.pressure_kPa, 0.0, t.rim).of(case),
+            t.damping_ratio,
         )
         for t in case.case.targets.modes
         if not t.load_N

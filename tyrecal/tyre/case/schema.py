@@ -158,6 +158,7 @@ class TargetMode(Part):
     frequency_Hz: Frequency
     weight: Weight = 1.0
     sigma_Hz: Positive | None = None
+    damping_ratio: Positive | None = None  # fraction of critical; compared, not fitted
     pressure_kPa: Pressure | None = None
     rim: RimSupport | None = None
     load_N: Load | None = None
