@@ -45,11 +45,15 @@ HEADS = {  # columns with their units, as a user's script reads them
     "fit.csv": "c,m,kind,multiplicity,initial_Hz,fitted_Hz,target_Hz,deviation_percent,load_N,"
     "quantity,initial,fitted,target,sigma",
     "fit_variables.csv": "variable,initial,value,lower,upper,standard_error,standard_error_total,"
-    "at_bound,unit",
+    "total_holds,explained_by_data,at_bound,unit",
     "modes.csv": "c,m,kind,frequency_Hz,multiplicity,symmetry,overlap,spanned",
     "pressure_sweep.csv": "design,pressure_kPa,c,m,kind,multiplicity,frequency_Hz,d_ln_f_d_ln_p",
     "footprint.csv": "design,load_N,deflection_m,area_m2,length_m,width_m,mean_pressure_Pa,"
     "peak_pressure_Pa,vertical_stiffness_N_per_m",
+    "stiffness.csv": "design,pressure_kPa,load_N,vertical_N_per_m,lateral_N_per_m,"
+    "longitudinal_N_per_m,torsional_Nm_per_rad,vertical_sliding_N_per_m,loaded_radius_m,"
+    "rolling_radius_m,deflection_m,length_m,width_m",
+    "frf.csv": "excite,respond,quantity,unit,frequency_Hz,real,imag",
     "sensitivities.csv": "quantity,by,value,per",
     "sensitivities_selection.csv": "name,sets,gain,p_value,shift_in_sd,alike",
     "sensitivities_uncertain.csv": "name,sets,shift_in_sd",
@@ -70,8 +74,11 @@ HEADS = {  # columns with their units, as a user's script reads them
 }
 FIRST_ROWS = {  # numbers in their columns
     "fit.csv": "0,0,axial,1,36.85,30.86,31.7,-2.649842271293379,,,,,,",
-    "fit_variables.csv": "A_belt,2e-07,3.6e-07,1e-07,1e-05,3.6e-08,,False,",
+    "fit_variables.csv": "A_belt,2e-07,3.6e-07,1e-07,1e-05,3.6e-08,,True,,False,",
     "effects.csv": "filler,K,3.0,0.1,4.5,1.5,0.886,1000000.0,1100000.0",
+    "stiffness.csv": "initial,240.0,4000.0,210000.0,110000.0,350000.0,4800.0,200000.0,0.29,0.3,"
+    "0.02,0.13,0.14",
+    "frf.csv": "tread:0deg:radial,hub:fz,force,N/N,0.0,1.0,0.0",
     "sensitivities.csv": '"frequency_Hz [2,0]",C10,0.5,',
     "sensitivities_selection.csv": "belt_angle,rebar_layers.belt.angle_deg,31.0,5e-05,2.75,gauge",
     "footprint.csv": "initial,1000.0,0.005,0.003,0.1,0.08,330000.0,500000.0,200000.0",

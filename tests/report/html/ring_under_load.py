@@ -116,3 +116,48 @@ def patches(name: str) -> dict[str, Any]:
                 }
             )
     return {"format": 1, "case": name, "patches": entries}
+
+
+def stiffness() -> dict[str, Any]:
+    row = {
+        "design": "initial",
+        "pressure_kPa": 240.0,
+        "load_N": 4000.0,
+        "vertical_N_per_m": 2.1e5,
+        "lateral_N_per_m": 1.1e5,
+        "longitudinal_N_per_m": 3.5e5,
+        "torsional_Nm_per_rad": 4800.0,
+        "vertical_sliding_N_per_m": 2e5,
+        "loaded_radius_m": 0.29,
+        "rolling_radius_m": 0.3,
+        "deflection_m": 0.02,
+        "length_m": 0.13,
+        "width_m": 0.14,
+        "rim_stiffness": [[1e5 * (i == j) for j in range(6)] for i in range(6)],
+    }
+    return {"format": 1, "designs": {"initial": {}}, "rows": [row], "failed": [], "findings": []}
+
+
+def response() -> dict[str, Any]:
+    function = {
+        "excite": "tread:0deg:radial",
+        "respond": "hub:fz",
+        "quantity": "force",
+        "unit": "N/N",
+        "at_lowest": 1.0,
+        "peak_Hz": 60.0,
+        "peak": 8.0,
+        "real": [1.0, 2.0, -0.5],
+        "imag": [0.0, -8.0, -0.1],
+    }
+    return {
+        "format": 1,
+        "design": "initial",
+        "pressure_kPa": 240.0,
+        "patch_mm": 20.0,
+        "radius_m": 0.3,
+        "harmonics": 9,
+        "frequency_Hz": [0.0, 60.0, 120.0],
+        "functions": [function],
+        "findings": {"words": []},
+    }

@@ -8,7 +8,15 @@ from typing import Any
 
 from .ring import fit, parts, pressure_sweep, provenance, shapes
 from .ring_inference import diagnosis, effects, sample, sensitivities
-from .ring_under_load import footprint, load_sweep, loaded_modes, loaded_shapes, patches
+from .ring_under_load import (
+    footprint,
+    load_sweep,
+    loaded_modes,
+    loaded_shapes,
+    patches,
+    response,
+    stiffness,
+)
 
 
 def write(folder: Path, name: str = "Toy & sons", effect: str = "rim_width") -> Path:
@@ -34,6 +42,8 @@ def write(folder: Path, name: str = "Toy & sons", effect: str = "rim_width") -> 
         "load_sweep.json": load_sweep(),
         "footprint.json": footprint(),
         "footprint_patches.json": patches(name),
+        "stiffness.json": stiffness(),
+        "frf.json": response(),
         "sensitivities.json": sensitivities(),
         "effects.json": effects(name),
         "sample.json": sample(),
