@@ -157,6 +157,8 @@ def test_an_export_writes_over_no_other_file(
     assert run("export", str(fit)) == 2
     assert "give it by --case CASE" in capsys.readouterr().err
     arguments = ["export", str(fit), "--case", str(case)]
+    assert run(*arguments, "--solver", "abaqus") == 2
+    assert "--solver goes with --format deck" in capsys.readouterr().err
     assert run(*arguments) == 0 == run(*arguments)
     new = fit.parent / "export" / "tyre_fitted.yaml"
     content = new.read_text()

@@ -31,7 +31,13 @@ from .terminal import Terminal
     help="Case of the fit (default: the one in run.json of DIR).",
 )
 @option("--force", is_flag=True, help="Write over files that exist.")
-@options.every(options.solver, options.output)
+@option(
+    "--output",
+    type=FileOrFolder(),
+    metavar="FOLDER",
+    help="Folder for the files (default: export in DIR).",
+)
+@options.solver
 @options.with_terminal
 def command(
     folder: Path,
@@ -54,6 +60,8 @@ def command(
     tyrecal export p235_75r17 --format deck --solver calculix --output decks
     tyrecal modes p235_75r17/export/p235_75r17_fitted.yaml
     """
+    if form == "case" and "--solver" in options.given():
+        raise click.UsageError("--solver goes with --format deck")
     from ..files import atomic_write, private_dir, read_json
     from ..measured.load import load_case
     from ..studies.export import case_files, deck_files, parts_left_out, settings_left_out
