@@ -448,3 +448,20 @@ def test_a_later_load_on_another_surface_is_no_inflation(tmp_path: Path) -> None
     path.write_text(own_decks.plain(step=own_decks.STEP + road + own_decks.STEP))
     deck = read_own_deck(path)
     assert contents(deck, deck.flat({}))["later_steps"] == ["ROAD", "INFLATE"]
+
+
+def test_a_real_parameter_stays_real(tmp_path: Path) -> None:
+    """A third of 2200000. is no whole number, which ABAQUS and we make of 2200000/3; a whole one
+    that its user wrote so stays whole."""
+    path = tmp_path / "tyre.inp"
+    text = own_decks.parameters().replace("c01=shear/2.-c10", "count = 6\nc01=shear/count-c10/2")
+    path.write_text(text.replace("name='RUBBER'", "name='RUBBER'\nthird = shear/3"))
+    deck = read_own_deck(path)
+    numbers = {"parameter / shear": 2.2e6, "parameter / count": 7.0}
+    new = own_texts(deck, numbers)["tyre.inp"]
+    assert "shear = 2200000.\n" in new and "count = 7\n" in new
+    for blocks in (deck.with_numbers(numbers), None):
+        path.write_text(new)
+        blocks = blocks or read_own_deck(path, "m").with_numbers({})
+        (law,) = (block for block in blocks if block.name == "HYPERELASTIC")
+        assert law.rows[0].number(1) == pytest.approx(2.2e6 / 7 - 0.2 * 2.2e6)

@@ -139,6 +139,14 @@ def written(value: float) -> str:
     return format(value, ".13g")
 
 
+def written_as(value: float, before: str) -> str:
+    """A *PARAMETER's number in place of ``before``: a real one stays real, because in expressions
+    the quotient of two whole numbers is whole."""
+    text = written(value)
+    is_whole = text.lstrip("-").isdigit()
+    return f"{text}." if is_whole and not before.lstrip("+-").isdigit() else text
+
+
 def is_marked(block: Block) -> bool:
     """Whether its numbers depend on marks or parameters."""
     in_data = any(GIVEN.search(row.line) for row in block.rows)
@@ -248,7 +256,8 @@ def replaced(block: Block, changes: Mapping[tuple[int, int], float]) -> Block:
     for (i, j), value in changes.items():
         fields = list(rows[i].fields)
         if j < 0:
-            fields = [f"{assigned(rows[i])[0]} = {written(value)}"]
+            name, before = assigned(rows[i])
+            fields = [f"{name} = {written_as(value, before)}"]
         else:
             fields[j] = written(value)
         rows[i] = Row(rows[i].place, ",".join(fields))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 
-from .numbers import DECK_MARK, assigned, written
+from .numbers import DECK_MARK, assigned, written, written_as
 from .own_deck import OwnDeck
 from .text import Row
 
@@ -39,7 +39,8 @@ def _with(line: str, row: Row, index: int, value: float) -> str:
     """A data line with a number at a field, or NAME = value, the rest as it stands."""
     if index < 0:
         name, _, rest = line.partition("=")
-        return f"{name}={rest.replace(assigned(row)[1], written(value), 1)}"
+        before = assigned(row)[1]
+        return f"{name}={rest.replace(before, written_as(value, before), 1)}"
     fields = line.split(",")
     fields[index] = re.sub(r"\S.*\S|\S", written(value), fields[index], count=1)
     return ",".join(fields)
