@@ -18,6 +18,7 @@ from tyrecal.studies.fit.free import with_freed, without_freed
 from tyrecal.studies.fit.freed import freed_variables
 from tyrecal.studies.fit.result import FitResult
 from tyrecal.studies.fitted import read_fitted
+from tyrecal.studies.inference.regions import split_by_region
 from tyrecal.tyre.case import LoadedCase, number_at, start_values, with_level
 from tyrecal.tyre.case.identity import tyre_sha256
 from tyrecal.tyre.case.schema import TargetMode, Targets, Uncertainty
@@ -122,9 +123,19 @@ def test_numbers_are_freed_by_name_or_path_and_those_alike_together() -> None:
     assert (belts.start, belts.upper, belts.numbers(71.0)) == (70.0, 76.0, [71.0, 109.0])
     moved = with_values(with_freed(case, ["belts"]), {"belts": 71.0})
     assert [number_at(moved, path) for path in angles] == [71.0, 109.0]
+    wide = Uncertainty(sets=["materials.rubber.density_kg_per_m3"], percent=50.0)
+    (v,) = freed_variables(with_freed(case_with(None, {"wide": wide}), ["wide"])).values()
+    assert v.lower == pytest.approx(DENSITY / 1.5**3) and v.scale == "log"  # no density is below 0
+    assert v.upper == pytest.approx(2.5 * DENSITY)
     (none,) = freed_variables(with_freed(CASE, ["tread_gauge"])).values()
     assert (none.scale, none.start, none.upper) == ("linear", 0.0, pytest.approx(0.09))
     assert tyre_sha256(without_freed(with_freed(CASE, [path]))) == tyre_sha256(CASE)
+
+
+def test_a_share_of_nothing_is_refused() -> None:
+    none = Uncertainty(sets=["materials.rubber.C01_Pa"], percent=5.0)
+    with pytest.raises(InputError, match="none is stated in percent of a number that is 0"):
+        with_freed(case_with(None, {"none": none}), ["none"])
 
 
 @pytest.mark.parametrize(
@@ -141,6 +152,21 @@ def test_what_cannot_be_freed_is_refused_in_one_sentence(name: str, words: str) 
     with pytest.raises(InputError, match=words) as refused:
         with_freed(CASE, [name])
     assert "\n" not in str(refused.value)
+
+
+def test_numbers_of_a_compound_move_in_every_part_that_is_made_of_it() -> None:
+    """As the section is split for its uncertain compounds."""
+    angles = [f"rebar_layers.belt_{k}.angle_deg" for k in (1, 2)]
+    path = "materials.rubber.density_kg_per_m3"
+    both = Uncertainty(sets=[path, *angles], absolute=2.0, signs=[1, 1, -1])
+    case = with_freed(case_with(None, {"both": both}), ["both"])
+    split, parts = split_by_region(case)
+    moved = with_values(split, {"both": DENSITY + 1.0})
+    copies = [part for part in parts if part.startswith("part_")]
+    assert len(copies) > 3
+    for material in ("rubber", *copies):
+        assert number_at(moved, f"materials.{material}.density_kg_per_m3") == DENSITY + 1.0
+    assert [number_at(moved, each) for each in angles] == [71.0, 109.0]
 
 
 def test_a_fitted_design_has_its_freed_numbers_by_path(tmp_path: Path) -> None:

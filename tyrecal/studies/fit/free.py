@@ -14,6 +14,7 @@ from typing import Any
 from ...errors import InputError
 from ...tyre.case import LoadedCase, number_at
 from ...tyre.case.mistakes import suggestion
+from ...tyre.number_units import EFFECT_PATH, unit_of
 from ...tyre.own_deck.numbers import as_known
 from ..inference.uncertainties import Source, sources
 from .freed import FreedVariable, freed_variables
@@ -68,10 +69,17 @@ def _uncertainty(case: LoadedCase, name: str, known: Sequence[Source]) -> Source
 
 
 def _variable(case: LoadedCase, source: Source) -> FreedVariable:
-    """The variable of an uncertainty."""
+    """The variable of an uncertainty. Raises InputError where it is 0."""
     starts = [float(number_at(case, path)) for path in source.steps]
     start, sd = starts[0], abs(next(iter(source.steps.values())))
+    if not sd:
+        raise InputError(
+            f"{source.name} is stated in percent of a number that is 0: state its standard"
+            " deviation as absolute in uncertainties to free it"
+        )
     lower, upper = start - FREED_WITHIN * sd, start + FREED_WITHIN * sd
+    if start > 0 >= lower and not _is_signed(next(iter(source.steps))):
+        lower = start / (1 + sd / start) ** FREED_WITHIN  # as many factors of one deviation below
     return FreedVariable(
         sets=list(source.steps),
         start=start,
@@ -82,3 +90,8 @@ def _variable(case: LoadedCase, source: Source) -> FreedVariable:
         starts=starts,
         steps=list(source.steps.values()),
     )
+
+
+def _is_signed(path: str) -> bool:
+    """Whether the number may be below 0."""
+    return path.startswith(EFFECT_PATH) or unit_of(path) == "degrees"

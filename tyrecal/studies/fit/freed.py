@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from typing import Self
+
+import numpy as np
+
 from ...tyre.case import LoadedCase
 from ...tyre.case.schema import Variable
 
@@ -26,6 +31,13 @@ class FreedVariable(Variable):
         """Each number: as it is known, and as many of its standard deviations as the first."""
         z = self.in_sd(value)
         return [start + step * z for start, step in zip(self.starts, self.steps, strict=True)]
+
+    def with_copies(self, copies: Callable[[str], Sequence[str]]) -> Self:
+        """The variable that moves each of its numbers and the copies of it alike."""
+        counts = [1 + len(copies(path)) for path in self.sets]
+        starts, steps = (np.repeat(each, counts).tolist() for each in (self.starts, self.steps))
+        more = super().with_copies(copies)
+        return more.model_copy(update={"starts": starts, "steps": steps})
 
 
 def freed_variables(case: LoadedCase) -> dict[str, FreedVariable]:

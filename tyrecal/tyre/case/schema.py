@@ -6,9 +6,9 @@ measured, and the whole.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field
 
@@ -133,6 +133,11 @@ class Variable(Part):
     def numbers(self, value: float) -> list[float]:
         """The numbers at ``sets`` where the variable has a value."""
         return [value] * len(self.sets)
+
+    def with_copies(self, copies: Callable[[str], Sequence[str]]) -> Self:
+        """The variable that sets each of its numbers and the copies of it, by path."""
+        sets = [each for path in self.sets for each in (path, *copies(path))]
+        return self.model_copy(update={"sets": sets})
 
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:

@@ -103,15 +103,14 @@ class Stations(TyreKind):
         for name, own in case.materials.items():
             if not isinstance(own, Rubber):
                 parts[name] = name.replace("_", " ") + "s"
-        variables = {}
-        for name, variable in case.variables.items():
-            sets = []
-            for path in variable.sets:
-                head, _, rest = path.partition(".")
-                material, _, key = rest.partition(".")
-                same = copies.get(material, []) if head == "materials" else []
-                sets += [path, *(f"materials.{copy}.{key}" for copy in same)]
-            variables[name] = variable.model_copy(update={"sets": sets})
+
+        def paths_of_copies(path: str) -> list[str]:
+            head, _, rest = path.partition(".")
+            material, _, key = rest.partition(".")
+            same = copies.get(material, []) if head == "materials" else []
+            return [f"materials.{copy}.{key}" for copy in same]
+
+        variables = {name: v.with_copies(paths_of_copies) for name, v in case.variables.items()}
         wanted = {"materials": materials, "solids": solids, "variables": variables}
         return case.model_copy(update=wanted), parts
 
