@@ -72,7 +72,7 @@ def test_several_folders(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
         ([], "Missing argument"),
         (["none"], "'none' does not exist"),
         (["file"], "'file' is a file; give a folder of results"),
-        (["empty"], "'empty' holds no results of fit, modes, sweep-pressure"),
+        (["empty"], "'empty' holds no results of a study: fit, modes, sweep-pressure"),
         (["toy", "empty"], "'empty' holds no results"),
         (["batch"], "it is a folder of a batch: give the folders of the cases"),
         (["broken"], "'broken/fit.json' is damaged: it is no JSON"),

@@ -67,7 +67,7 @@ from .parameters import Number, OneOf, option
     show_default=True,
     help="Motion of the tread per force: displacement or acceleration.",
 )
-@options.fitted("fit.json of the case: take the fitted design.")
+@options.fitted()
 @option("--pictures/--no-pictures", default=True, help="Draw magnitude and phase.")
 @options.figure_format
 @options.study
@@ -101,12 +101,11 @@ def command(
 
     options.say_idle(study.terminal, study.jobs, "only one design is evaluated")
     response_request(excite, respond, from_Hz, to_Hz, step_Hz, patch_mm)
-    loaded, values = study.load(case, assignments, pressure_kPa)
+    loaded, _ = study.load(case, assignments, pressure_kPa)
+    loaded, values = arguments.one_design(fitted, loaded, assignments, study.terminal)
     evaluator = study.evaluator(loaded)
     evaluator.needs_response()
-    designs = {"initial": values}
-    if fitted:
-        designs = {"fitted": arguments.fitted_values(fitted, loaded, study.terminal)}
+    designs = {"fitted" if fitted else "initial": values}
     output = study.run(loaded, "frf", evaluator)
     given = StudyInput(loaded, evaluator, designs)
     result = FrfResult.run(

@@ -42,7 +42,7 @@ from .parameters import FileOrFolder, option
     help="Measurements (CSV), to select the numbers worth freeing in a fit (default: the file of"
     " the case's targets).",
 )
-@options.fitted("fit.json of the case: sensitivities of the fitted design.")
+@options.fitted()
 @option("--pictures/--no-pictures", default=True, help="Draw the heat map.")
 @options.figure_format
 @options.study
@@ -75,7 +75,8 @@ def command(
     from ..studies.sensitivities.result import SensitivitiesResult, loads_on_road
     from ..studies.sensitivities.table import kinds_of, needs_gradients, numbers_of
 
-    loaded, values = study.load(case, assignments, pressure_kPa)
+    loaded, _ = study.load(case, assignments, pressure_kPa)
+    loaded, values = arguments.one_design(fitted, loaded, assignments, study.terminal)
     kinds_of(kinds), numbers_of(loaded, by)
     loads_N = None
     if loads is not None:
@@ -85,9 +86,7 @@ def command(
             raise click.UsageError(f"--loads-N {loads}: give --of a quantity on the road too")
     evaluator = study.evaluator(loaded)
     needs_gradients(evaluator)
-    designs = {"initial": values}
-    if fitted:
-        designs["fitted"] = arguments.fitted_values(fitted, loaded, study.terminal)
+    designs = {"fitted" if fitted else "initial": values}
     file = measured or loaded.measured
     if file:
         measured_values(loaded, file)

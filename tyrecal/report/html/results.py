@@ -14,7 +14,7 @@ from pydantic import Field, ValidationError
 from ...errors import InputError
 from ...files import NotAFile, read_runs, read_text
 from ...simulate.program import join_command
-from ...studies import result_types
+from ...studies import STUDIES, result_types
 from ...studies.diagnose.result import DiagnosisResult
 from ...studies.effects import Effects
 from ...studies.fit.result import FitResult
@@ -114,8 +114,7 @@ def read_results(folder: Path) -> Results:
         if (folder / "batch.json").exists():
             last = "; it is a folder of a batch: give the folders of the cases in it"
         raise InputError(
-            f"'{folder}' holds no results of fit, modes, sweep-pressure, footprint,"
-            f" sensitivities, effects, sample or diagnose{last}"
+            f"'{folder}' holds no results of a study: {', '.join(STUDIES)}{last}"
         )
     return results
 
