@@ -360,13 +360,18 @@ MODEL_RULES: dict[str, KeywordRule] = {
         },
         calculix="its hyperelastic rubber does not relax",
     ),
-    # of materials, masses and springs; it changes no frequency
+    # an option of materials, but also of masses and springs: so it is under no keyword
     "DAMPING": KeywordRule(
         "model part step",
-        "ALPHA=number; BETA=number; COMPOSITE=number; STRUCTURAL=number",
-        needs=("ALPHA|BETA|COMPOSITE|STRUCTURAL",),
+        (
+            "ALPHA=any; BETA=any; BAND LIMITED=any; COMPOSITE=number; STRUCTURAL=any; "
+            "DEPENDENCIES=integer"
+        ),
+        "number...",
+        rows=ANY_ROWS,
         honoured={"section": "STRUCTURAL"},
         is_output=True,
+        is_judged=False,
     ),
     "ACOUSTIC MEDIUM": KeywordRule(
         "model",

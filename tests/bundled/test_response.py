@@ -222,6 +222,7 @@ WANTED: dict[str, Any] = {
 }
 
 
+@pytest.mark.slow
 def test_half_and_whole_sections_respond_alike(monkeypatch: pytest.MonkeyPatch) -> None:
     texts = Decks(TyreDesign(CASE)).texts("abaqus")
     texts["inflate.inp"] = texts["inflate.inp"].replace(

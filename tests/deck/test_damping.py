@@ -6,6 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from tyrecal_solvers.abaqus.check import findings
+from tyrecal_solvers.language.text import read_keywords
 
 import tyrecal
 from tyrecal.simulate.deck.decks import Decks
@@ -39,6 +41,7 @@ def test_a_constant_is_a_keyword_and_changes_no_frequency(tmp_path: Path) -> Non
     texts = [Decks(TyreDesign(case)).texts("abaqus") for case in (plain, lossy)]
     line = "*DAMPING, STRUCTURAL=0.2\n"
     assert line in texts[1]["inflate.inp"]
+    assert not findings(read_keywords(texts[1]["inflate.inp"]))  # ABAQUS's rules
     heads = [text["inflate.inp"].partition("*HEADING")[2] for text in texts]
     assert heads[0] == heads[1].replace(line, "")
     before, after = result(plain), result(lossy)
@@ -53,7 +56,11 @@ def test_a_constant_is_a_keyword_and_changes_no_frequency(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize(
     "values",
-    [{}, {"analysis.vibration_frequency_Hz": 80.0}, {"materials.rubber.frequency_exponent": 0.1}],
+    [
+        {},
+        pytest.param({"analysis.vibration_frequency_Hz": 80.0}, marks=pytest.mark.slow),
+        pytest.param({"materials.rubber.frequency_exponent": 0.1}, marks=pytest.mark.slow),
+    ],
 )
 def test_a_table_of_one_value_is_the_constant(tmp_path: Path, values: dict[str, float]) -> None:
     """Modulus by the Prony series, or of each mode's frequency, and losses go together."""

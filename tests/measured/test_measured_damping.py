@@ -70,6 +70,7 @@ def test_rows_that_are_refused(tmp_path: Path, row: str, words: str) -> None:
         read_measurements(written(tmp_path / "m.csv", FREQUENCY, row))
 
 
+@pytest.mark.slow
 def test_a_fit_compares_damping(tmp_path: Path) -> None:
     """The fitted tyre's with the measured one's, in the table and in files."""
     path = written(tmp_path / "m.csv", FREQUENCY, "damping_ratio,1,0,,,240,0,0.049,0.012")

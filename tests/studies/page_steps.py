@@ -150,6 +150,8 @@ def of_measurements(text: str) -> Figures:
     """A measurements CSV: each value and its sigma by label and kPa."""
     figures: Figures = {}
     for row in csv.DictReader(StringIO(text)):
+        if row["quantity"] == "damping_ratio":
+            continue
         label = Label(int(row["c"]), int(row["m"]), row["kind"])
         figures[f"{label} {row['pressure_kPa']}"] = float(row["value"])
         figures[f"{label} {row['pressure_kPa']} sigma"] = float(row["sigma"])

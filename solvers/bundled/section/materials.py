@@ -205,6 +205,8 @@ def _damping(m: Material, k: Block) -> None:
     structural = k.number("STRUCTURAL")
     if structural is None or structural < 0:
         raise DeckError(k.place, "*DAMPING needs STRUCTURAL=, a loss factor of 0 or more")
+    if k.rows:
+        raise DeckError(k.rows[0].place, "*DAMPING takes no data lines here")
     m.loss = replace(m.loss or LossFactor(), structural=structural)
 
 
