@@ -96,6 +96,22 @@ def test_a_batch_and_python_give_the_same_numbers(tmp_path: Path) -> None:
         assert numbers[key] == pytest.approx(row.value, rel=1e-9)
 
 
+def test_a_file_of_the_case_that_selects_nothing_costs_no_table(
+    case_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its frequencies have no labels; only a file that the user names is refused for that."""
+    path = case_folder / "p235_75r17.yaml"
+    text = path.read_text()
+    targets = text[text.index("targets:") : text.index("uncertainties:")]
+    path.write_text(text.replace(targets, "targets: {file: d.csv}\n\n"))
+    head = "quantity,c,m,kind,member,pressure_kPa,load_N,value,sigma"
+    (case_folder / "d.csv").write_text(f"{head}\nfrequency_Hz,,,,,240,0,37.1,0.2\n")
+    out = ["--output", str(tmp_path / "out"), "--no-pictures"]
+    assert run("sensitivities", str(path), *COARSE, *TWO, *out) == 0
+    text = capsys.readouterr().out
+    assert "No numbers are selected to free: " in text and "line 2: the frequency has no" in text
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

@@ -88,8 +88,8 @@ def command(
     needs_gradients(evaluator)
     designs = {"fitted" if fitted else "initial": values}
     file = measured or loaded.measured
-    if file:
-        measured_values(loaded, file)
+    if measured:
+        measured_values(loaded, measured)
     on_road = loads_on_road(loaded, kinds, loads_N)
     files = [file] if file else []
     output = study.run(loaded, "sensitivities", evaluator, measured=files, load_N=on_road or 0.0)

@@ -8,12 +8,13 @@ from pathlib import Path
 
 from pydantic import Field
 
+from ...errors import InputError
 from ...simulate.modes.label import FAMILIES, Label, in_words
 from ...tyre.case import LoadedCase
 from ...tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ..inference.section_fields import known_from
 from ..result import Cell, Column, CsvRow, Result, ResultPart, StudyInput, Table, csv_text
-from .deviations import deviations
+from .deviations import deviations, measured_values
 from .selection import CHANCE, Candidates, likeliest_shifts, select_numbers
 from .table import FREQUENCY_KIND, Sensitivity, kinds_of, loads_of, sensitivities
 
@@ -71,6 +72,7 @@ class SensitivitiesResult(Result):
     unmoved: list[str] = Field(default=[])  # numbers that move nothing
     without_sensitivity: dict[str, str] = Field(default={})  # numbers, and why
     selection: Selection | None = None
+    selection_unknown: str = ""  # why there is none, though the case's targets are in a file
 
     @classmethod
     def run(
@@ -88,7 +90,12 @@ class SensitivitiesResult(Result):
         case, loads = given.case, loads_on_road(given.case, of, loads_N)
         design, values = list(given.designs.items())[-1]
         table = sensitivities(case, given.evaluator, values, by, of, loads, given.jobs)
-        file = measured or case.measured
+        file, unknown = measured or case.measured, ""
+        if case.measured and not measured:
+            try:
+                measured_values(case, case.measured)
+            except InputError as error:
+                file, unknown = None, str(error)
         result = cls(
             format=1,
             design=design,
@@ -98,6 +105,7 @@ class SensitivitiesResult(Result):
             unmoved=table.unmoved,
             without_sensitivity=dict(table.refused),
             selection=select(given, file) if file else None,
+            selection_unknown=unknown,
         )
         return given.stamped(result, measured=[file] if file else [], load_N=loads or 0.0)
 
@@ -186,6 +194,8 @@ class SensitivitiesResult(Result):
             sentences.append(f"No quantity depends on {', '.join(self.unmoved)}.")
         for name, why in self.without_sensitivity.items():
             sentences.append(f"{name} has no sensitivity: {why}.")
+        if self.selection_unknown:
+            sentences.append(f"No numbers are selected to free: {self.selection_unknown}.")
         return sentences + (selection_words(self.selection) if self.selection else [])
 
     def summary(self) -> list[str]:
