@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -18,7 +20,7 @@ from .toy import flat, problem
 def test_constants_are_their_mean_over_all_tyres_that_fit(spread: float) -> None:
     """Also where the variables are known before, so that they do not absorb all that they could:
     the closed form, by the covariance of deviations at the variables' prior."""
-    toy = flat(effects=0, pressures=(160.0, 240.0))
+    toy: Any = flat(effects=0, pressures=(160.0, 240.0))
     toy.spread = np.full(3, spread)
     toy.constants *= 3
     base = problem(toy, assumed=Assumed(form=0.001))
