@@ -113,9 +113,7 @@ def read_results(folder: Path) -> Results:
         last = "" if run.finished else f": its last run, 'tyrecal {run.command}', did not finish"
         if (folder / "batch.json").exists():
             last = "; it is a folder of a batch: give the folders of the cases in it"
-        raise InputError(
-            f"'{folder}' holds no results of a study: {', '.join(STUDIES)}{last}"
-        )
+        raise InputError(f"'{folder}' holds no results of a study: {', '.join(STUDIES)}{last}")
     return results
 
 
