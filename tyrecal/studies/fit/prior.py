@@ -21,7 +21,7 @@ import numpy as np
 
 from ...simulate.evaluate.evaluator import Evaluator
 from ...tyre.case import LoadedCase
-from .model_errors import model_errors
+from .model_errors import ModelErrors, model_errors
 from .problem import FitNotify, Point, Problem
 from .targets import KNOWLEDGE
 
@@ -68,16 +68,21 @@ class PriorProblem(Problem):
         self.mean = self.start()
         self.spread: Array = np.array([v.spread for v in self.variables])
         self.weighed_at: Array | None = None
+        self.model: ModelErrors | None = None  # at that design
         self.covariance = self.root = np.empty((0, 0))  # Sigma (n, n), and L^-1 with L L^T = Sigma
 
     def weigh(self, point: Point) -> None:
         """Take Sigma of the design ``point``."""
-        self.covariance = model_errors(self, point).covariance(self.scatter)
+        self.model = model_errors(self, point)
+        self.covariance = self.model.covariance(self.scatter)
         self.root = np.linalg.inv(np.linalg.cholesky(self.covariance))
         self.weighed_at = point.x
 
     def again(self, evaluator: Evaluator, notify: FitNotify | None = None) -> PriorProblem:
-        return PriorProblem(self.case, evaluator, self.fixed, notify, noise_Hz=self.noise_Hz)
+        other = PriorProblem(self.case, evaluator, self.fixed, notify, noise_Hz=self.noise_Hz)
+        other.weighed_at, other.model = self.weighed_at, self.model
+        other.covariance, other.root = self.covariance, self.root
+        return other
 
     def evaluate(self, x: Array) -> PriorPoint:
         plain = super().evaluate(x)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from .model_errors import ModelErrors, model_errors
+from .prior import PriorProblem
 from .problem import Point, Problem
 from .responses import FitResponse
 from .targets import Target, ValueTarget
@@ -67,15 +68,16 @@ class TotalError:
 def total_error(problem: Problem, point: Point, scatter: FitUncertainty) -> TotalError:
     """The whole uncertainty of the fitted variables at ``point``.
 
-    scatter: that of the measurement alone. One more design is evaluated in every state. Raises
-    DeckRefused if the solver has no exact sensitivities; EvaluationFailed; ValueError with the
-    reason if targets are on the road or their standard deviation is unknown.
+    scatter: that of the measurement alone. One more design is evaluated in every state, unless a
+    prior took its weights there. Raises what `model_errors` does; ValueError with the reason if the
+    standard deviation of a target is unknown.
     """
     counts = problem.scale > 0
     sigma = scatter.sigma[counts]
     if not np.isfinite(sigma).all():
         raise ValueError("the standard deviation of the measured values is not known")
-    errors = model_errors(problem, point)
+    known = problem.model if isinstance(problem, PriorProblem) else None
+    errors = known or model_errors(problem, point)
     point = point.plain
     measured = problem.counted
     wanted = np.array([t.value for t in measured])
