@@ -75,8 +75,7 @@ def command(
     from ..studies.sensitivities.result import SensitivitiesResult, loads_on_road
     from ..studies.sensitivities.table import kinds_of, needs_gradients, numbers_of
 
-    loaded, _ = study.load(case, assignments, pressure_kPa)
-    loaded, values = arguments.one_design(fitted, loaded, assignments, study.terminal)
+    loaded, values = study.load(case, assignments, pressure_kPa)
     kinds_of(kinds), numbers_of(loaded, by)
     loads_N = None
     if loads is not None:
@@ -86,7 +85,11 @@ def command(
             raise click.UsageError(f"--loads-N {loads}: give --of a quantity on the road too")
     evaluator = study.evaluator(loaded)
     needs_gradients(evaluator)
-    designs = {"fitted" if fitted else "initial": values}
+    designs = {
+        "initial": values
+    }  # about which numbers are selected: a fitted one has the data in it
+    if fitted:
+        designs["fitted"] = arguments.fitted_values(fitted, loaded, study.terminal)
     file = measured or loaded.measured
     if measured:
         measured_values(loaded, measured)

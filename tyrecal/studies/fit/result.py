@@ -384,7 +384,7 @@ class FitResult(Result):
         if unsure:
             yield (
                 f"The totals of {', '.join(unsure)} may be several times too small: they are"
-                " linear, and large or next to a variable at its bound. Errors that hold:"
+                " linear, and large or next to a variable at its bound. These hold:"
                 f" {'tyrecal sample' if self.prior else 'tyrecal fit --prior, tyrecal sample'}."
             )
 
