@@ -14,10 +14,12 @@ from tyrecal.errors import InputError
 from tyrecal.files import read_json
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.failure import DeckRefused
 from tyrecal.studies.fit import model_errors
 from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.prior import PriorProblem
 from tyrecal.studies.fit.uncertainty import uncertainty
+from tyrecal.tyre.case.schema import TargetMode
 
 from ..chance import generator
 from ..conftest import CASES
@@ -102,6 +104,20 @@ def test_a_fit_ends_where_its_weights_hold(method: str, monkeypatch: Any) -> Non
         for name, value in fit.fitted.plain.values.items():
             assert value == pytest.approx(wanted[name], rel=0.02 if size < 1 else 0.2), name
         assert fit.found.prior and fit.found.converged
+
+
+def test_targets_and_solvers_without_model_errors_are_refused_before_a_run() -> None:
+    """Modes under load, and a solver without sensitivities: one sentence, nothing evaluated."""
+    tyre = TyreInStates()
+    tyre.solver.capabilities = {"spindle", "loaded_modes"}
+    loaded = TargetMode(c=1, m=0, symmetry="symmetric", load_N=4000, frequency_Hz=60, sigma_Hz=1)
+    case = case_with([*measured()[:4], loaded])
+    with pytest.raises(InputError, match="--prior takes no frequencies under load"):
+        calibrate(case, tyre, prior=True)  # type: ignore[arg-type]
+    tyre.has_gradients = False
+    with pytest.raises(DeckRefused, match=r"--prior needs.*\(gradients\)"):
+        calibrate(case_with(measured()[:4]), tyre, prior=True)  # type: ignore[arg-type]
+    assert not tyre.asked
 
 
 @pytest.mark.slow

@@ -20,6 +20,7 @@ from ..far_off import far_off
 from ..result import csv_text
 from . import gauss_newton, slsqp
 from .judge import measured_rows
+from .model_errors import needs_model_errors
 from .prior import PriorProblem
 from .problem import FitNotify, Point, Problem
 from .result import FitResult, StartReport, fit_result
@@ -87,12 +88,12 @@ def calibrate(
     >>> f"{fit.initial.objective:.1f} to {fit.fitted.objective:.1f} Hz"
     '17.4 to 3.7 Hz'
     """
+    kind = PriorProblem if prior else Problem
+    problem = kind(case, evaluator, fixed, notify, jobs)
+    check(problem)
     if prior:
         noise = noise_Hz(case, evaluator, fixed, jobs)
-        problem: Problem = PriorProblem(case, evaluator, fixed, notify, jobs, noise)
-    else:
-        problem = Problem(case, evaluator, fixed, notify, jobs)
-    check(problem)
+        problem = PriorProblem(case, evaluator, fixed, notify, jobs, noise)
     initial = problem.evaluate(problem.start())
     if not np.isfinite(initial.objective):
         raise InputError("the targets' weights and standard deviations leave no finite objective")
@@ -132,7 +133,8 @@ def noise_Hz(
 
 def check(problem: Problem) -> None:
     """Raise InputError for a problem that no fit can solve; DeckRefused if the solver has no road
-    for targets on it, or cannot express the state of a target."""
+    for targets on it, cannot express the state of a target, or lacks sensitivities that a prior
+    needs."""
     if not len(problem.scale):
         raise InputError(
             "the case has no targets: there is nothing to fit to; add measured modes to it, as in"
@@ -143,6 +145,8 @@ def check(problem: Problem) -> None:
     needed = len(problem.variables) if problem.spread is None else 1
     if reason := cannot_fit([t.weight for t in problem.measured], needed):
         raise InputError(reason)
+    if problem.spread is not None:
+        needs_model_errors(problem)
     if problem.road:
         problem.evaluator.needs_road(modes=any(t.member for t in problem.road))
     for state in {t.state.unloaded for t in problem.measured}:

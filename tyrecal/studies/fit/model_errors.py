@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...errors import InputError
+from ...simulate.evaluate.failure import DeckRefused
 from ...tyre.case import LoadedCase
 from ..inference.covariance import covariance, model_form
 from ..inference.observations import Observable, Observations
@@ -74,6 +76,26 @@ def model_errors(problem: Problem, point: Point) -> ModelErrors:
             case, problem.evaluator, pressed, point.values, known, problem.jobs
         )
     return ModelErrors(rows, known, by_constants, laws, road)
+
+
+def needs_model_errors(problem: Problem) -> None:
+    """Raises InputError for targets whose model errors are not computed, DeckRefused if the solver
+    lacks the sensitivities, before anything is evaluated."""
+    pressed = [each for each in problem.counted if each.state.load_N]
+    if any(isinstance(each, ValueTarget) and each.member for each in pressed):
+        raise InputError(
+            "--prior takes no frequencies under load: leave them out of the measurements, or fit"
+            " without --prior"
+        )
+    evaluator, solver = problem.evaluator, problem.evaluator.solver
+    lacking = "" if evaluator.has_gradients else "gradients"
+    if pressed and "footprint_gradients" not in solver.capabilities:
+        lacking = "footprint_gradients"
+    if lacking:
+        raise DeckRefused(
+            f"solver '{solver.name}' gives no exact sensitivities of this case, which --prior"
+            f" needs: 'tyrecal solvers' shows which one does ({lacking})"
+        )
 
 
 def _observable(case: LoadedCase, target: Target | ValueTarget) -> Observable:
