@@ -17,14 +17,17 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import DeckRefused
 from tyrecal.studies.fit import model_errors
 from tyrecal.studies.fit.calibrate import calibrate
+from tyrecal.studies.fit.free import with_freed
+from tyrecal.studies.fit.freed import freed_variables
 from tyrecal.studies.fit.prior import PriorProblem
 from tyrecal.studies.fit.uncertainty import uncertainty
+from tyrecal.studies.variable import read_variable
 from tyrecal.tyre.case.schema import TargetMode
 
 from ..chance import generator
 from ..conftest import CASES
 from .test_total_error import coarse
-from .tyre_in_states import START, TRUTH, TyreInStates, case_with, measured
+from .tyre_in_states import CASE, START, TRUTH, TyreInStates, case_with, measured
 
 Array = np.ndarray
 
@@ -118,6 +121,15 @@ def test_targets_and_solvers_without_model_errors_are_refused_before_a_run() -> 
     with pytest.raises(DeckRefused, match=r"--prior needs.*\(gradients\)"):
         calibrate(case_with(measured()[:4]), tyre, prior=True)  # type: ignore[arg-type]
     assert not tyre.asked
+
+
+@pytest.mark.parametrize("name", ["rubber_density", "belt_1_angle", "sidewall_gauge"])
+def test_a_freed_number_is_known_as_its_uncertainty_states(name: str) -> None:
+    """A logarithm, an angle, and a number that is 0: the coordinate's spread is one sd of it."""
+    case = with_freed(CASE, [name])
+    own = read_variable(case, name)
+    sd = freed_variables(case)[name].sd
+    assert own.spread * own.slope(own.start) == pytest.approx(sd)
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ START_SPREAD = 0.5  # of ln of a variable that the case says no more of: 2.7 tim
 @dataclass(frozen=True)
 class DesignVariable:
     """A design variable: bounds in its own unit; ``log`` scaled inside the optimiser or not;
-    percent: standard deviation of its start, None where it is not stated.
+    percent, sd: standard deviation of its start, sd in its own unit, None where it is not stated.
 
     >>> stiffness = DesignVariable("C10", start=1e6, lower=1e5, upper=1e7)
     >>> stiffness.value(stiffness.scaled(1e6)), round(stiffness.slope(2e6))
@@ -28,13 +28,16 @@ class DesignVariable:
     upper: float
     log: bool = True
     percent: float | None = None
+    sd: float | None = None
 
     @property
     def spread(self) -> float:
         """Standard deviation of the coordinate about the start's, before any measurement; at most
         that of a uniform distribution within the bounds."""
         width = self.scaled(self.upper) - self.scaled(self.lower)
-        if self.percent is None:
+        if self.sd is not None:
+            stated = self.sd / self.slope(self.start)
+        elif self.percent is None:
             stated = START_SPREAD if self.log else width
         elif self.log:
             stated = math.log1p(self.percent / 100)
@@ -81,4 +84,4 @@ def read_variable(case: LoadedCase, name: str) -> DesignVariable:
     least = NEAR_ZERO * max(abs(v.lower), abs(v.upper)) if effect else 0.0
     lower, upper = v.lower or least, v.upper or -least
     start = min(max(start, lower), upper)
-    return DesignVariable(name, start, lower, upper, v.scale == "log", v.percent)
+    return DesignVariable(name, start, lower, upper, v.scale == "log", v.percent, v.sd)

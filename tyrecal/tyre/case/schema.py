@@ -130,6 +130,11 @@ class Variable(Part):
     percent: Positive | None = None
     scale: Literal["log", "linear"] = "log"
 
+    @property
+    def sd(self) -> float | None:
+        """Standard deviation of the start in the variable's own unit, None if it is in percent."""
+        return None
+
     def numbers(self, value: float) -> list[float]:
         """The numbers at ``sets`` where the variable has a value."""
         return [value] * len(self.sets)
