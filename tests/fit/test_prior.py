@@ -132,6 +132,15 @@ def test_a_freed_number_is_known_as_its_uncertainty_states(name: str) -> None:
     assert own.spread * own.slope(own.start) == pytest.approx(sd)
 
 
+def test_too_few_values_without_sigma_are_refused_without_a_fit() -> None:
+    """Two frequencies without sigma for three variables: the message says what --prior lacks."""
+    two = [each.model_copy(update={"sigma_Hz": None}) for each in measured()[:2]]
+    tyre = TyreInStates()
+    with pytest.raises(InputError, match="have no sigma_Hz, and are too few"):
+        calibrate(case_with(two), tyre, prior=True)  # type: ignore[arg-type]
+    assert not tyre.asked
+
+
 @pytest.mark.slow
 def test_it_agrees_with_sample() -> None:
     """Where the data determine the variables and the model is nearly linear, the errors are those

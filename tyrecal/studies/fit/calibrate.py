@@ -122,7 +122,9 @@ def noise_Hz(
     """
     if all(target.sigma for target in read_targets(case) if target.weight):
         return None
-    noise = calibrate(case, evaluator, fixed=fixed, jobs=jobs).found.noise_Hz
+    problem, noise = Problem(case, evaluator, fixed), None
+    if not cannot_fit([t.weight for t in problem.measured], len(problem.variables)):
+        noise = calibrate(case, evaluator, fixed=fixed, jobs=jobs).found.noise_Hz
     if noise is None:
         raise InputError(
             "the targets have no sigma_Hz, and are too few to estimate it from the residuals:"
