@@ -100,6 +100,10 @@ def test_the_example_of(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
         (lambda case: tyrecal.run("footprint", case, loads_N=[2, 1]), "above 0 and rise"),
         (lambda case: tyrecal.run("sweep-pressure", case, pressures_kPa=2.4), "usual is 50"),
         (lambda case: tyrecal.run("fit", case, method="bfgs"), "none of slsqp, gauss-newton"),
+        (lambda case: tyrecal.run("fit", case, prior="no"), "prior must be True or False"),
+        (lambda case: tyrecal.run("frf", case, form="mobility"), "none of receptance"),
+        (lambda case: tyrecal.run("frf", case, excite=["tread:0deg:radial"]), "must be text"),
+        (lambda case: tyrecal.run("frf", case, step_Hz="1"), "step_Hz must be a number"),
     ],
 )
 def test_wrong_input_is_a_value_error_in_a_sentence(

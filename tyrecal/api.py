@@ -15,14 +15,14 @@ are free: a search may try what it likes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from inspect import signature
 from itertools import pairwise
 from math import inf, log
 from numbers import Integral, Real
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 from .files import printable, read_json
 from .measured.load import load_case as _load_case
@@ -40,6 +40,7 @@ from .studies.fit.calibrate import METHODS, Fit
 from .studies.fit.study import FitStudy
 from .studies.fit.targets import target_labels
 from .studies.pressure import State
+from .studies.response import ResponseForm
 from .studies.result import Result, StudyInput
 from .tyre.case import CaseError, LoadedCase, as_written, start_values, with_level
 from .tyre.case.mistakes import suggestion
@@ -459,9 +460,19 @@ def _files(name: str, values: Path | str | Iterable[Path | str]) -> list[Path]:
 
 
 def _method(name: str, value: str) -> str:
-    if _text(name, value) not in METHODS:
-        raise ValueError(f"{name} '{value}' is none of {', '.join(METHODS)}")
+    return _one_of(name, value, METHODS)
+
+
+def _one_of(name: str, value: str, known: Collection[str]) -> str:
+    if _text(name, value) not in known:
+        raise ValueError(f"{name} '{value}' is none of {', '.join(known)}")
     return value
+
+
+def _flag(name: str, value: bool) -> bool:
+    if isinstance(value, bool):
+        return value
+    raise _wrong(name, "True or False", value)
 
 
 def _pressures(
@@ -553,6 +564,14 @@ OPTION_READERS: dict[str, Callable[[LoadedCase, str, Any], Any]] = {
     "free": lambda case, name, value: _names(name, value),
     "by": lambda case, name, value: _names(name, value),
     "of": lambda case, name, value: _names(name, value),
+    "excite": lambda case, name, value: _text(name, value),
+    "respond": lambda case, name, value: _text(name, value),
+    "form": lambda case, name, value: _one_of(name, value, get_args(ResponseForm)),
+    "from_Hz": lambda case, name, value: _number(name, value),
+    "to_Hz": lambda case, name, value: _number(name, value),
+    "step_Hz": lambda case, name, value: _number(name, value),
+    "patch_mm": lambda case, name, value: _number(name, value),
+    "prior": lambda case, name, value: _flag(name, value),
     "method": lambda case, name, value: _method(name, value),
     "starts": lambda case, name, value: _count(name, value, 1),
     "draws": lambda case, name, value: _count(name, value, 1000),
