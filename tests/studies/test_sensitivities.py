@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.modes.label import labelled
 from tyrecal.studies.fit.targets import ValueTarget
 from tyrecal.studies.sensitivities import table as table_module
+from tyrecal.studies.sensitivities.deviations import deviations
 from tyrecal.studies.sensitivities.table import Sensitivities, numbers_of, sensitivities
 from tyrecal.tyre.case import start_values
 from tyrecal.tyre.values import tyre_numbers
@@ -83,6 +85,14 @@ def test_each_sensitivity_is_that_of_central_differences() -> None:
     for by in dict.fromkeys(row.by for row in table().rows):
         change = ln_q({by: moved(by, STEP)}) - ln_q({by: moved(by, -STEP)})
         assert change / 2 / STEP == pytest.approx(slope(by), abs=1e-5), by
+
+
+@pytest.mark.slow
+def test_fewer_values_than_variables_leave_as_many_degrees_of_freedom(tmp_path: Path) -> None:
+    """chi2 has the variables' spread in its covariance, so no value is lost to them."""
+    data = tmp_path / "two.csv"
+    data.write_text("c,m,frequency_Hz,sigma_Hz,pressure_kPa\n2,0,79.5,0.3,240\n1,1,37.8,0.3,240\n")
+    assert deviations(CASE, EVALUATOR, data).freedom == 2
 
 
 def test_a_number_that_is_0_has_its_sensitivity_per_unit() -> None:

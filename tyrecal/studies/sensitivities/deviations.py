@@ -34,7 +34,7 @@ class Deviations:
     numbers: tuple[Source, ...]  # k numbers that may be off
     G: Array  # (n, k) change of ln q by one standard deviation of each
     chi2_exact_section: float  # of r, if the section's fields were known
-    freedom: int  # of chi2: values less variables
+    freedom: int  # of chi2: n, as the covariance has the variables' spread
     left_out: tuple[str, ...]  # measurements that are not used, and why
 
 
@@ -80,7 +80,7 @@ def deviations(case: LoadedCase, evaluator: Evaluator, measured: Path, jobs: int
         tuple(source for source in known if source.field is None),
         constants[:, ~of_section],
         Candidates.of(r, exact, np.zeros((len(r), 0))).fit([])[0],
-        len(observations.y) - len(x),
+        len(observations.y),
         observations.left_out,
     )
 
