@@ -67,6 +67,9 @@ def test_a_fit_is_judged_by_chi2_per_degree_of_freedom() -> None:
     good = fit(verdict="fits", chi2_per_dof=1.0, reason=None)
     assert fit_verdict(good)[0].startswith("Converged") and not fit_doubts(good)
     assert "chi2 per degree of freedom is 1:" in fit_verdict(good)[-1]
+    blind = fit(singular_values=[1.0, 0.0])
+    assert "do not determine all" in fit_doubts(blind)[0]
+    assert not fit_doubts({**blind, "prior": True})
     bad = fit(verdict="does_not_fit", chi2_per_dof=491.0, reason=None)
     assert fit_verdict(bad)[0] == "Does not fit at 240 kPa, 12.40 kg."
     (doubt,) = fit_doubts(bad)

@@ -150,7 +150,7 @@ def fit_doubts(result: Mapping[str, Any]) -> list[str]:
             " right labels, at this pressure?"
         )
     values = result["singular_values"]
-    if values and values[-1] < 1e-3 * values[0]:
+    if not result.get("prior") and values and values[-1] < 1e-3 * values[0]:
         doubts.append("the data do not determine all variables: see singular_values in fit.json")
     if labels := result.get("labels"):
         doubts += Labels(**labels).doubts()
