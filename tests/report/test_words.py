@@ -60,6 +60,13 @@ def test_whether_starts_agree(starts: list[dict[str, Any]], words: str) -> None:
     assert fit_verdict(fit(starts=starts))[-1].startswith(words)
 
 
+def test_starts_of_a_fit_with_a_prior_are_compared_by_what_it_minimises() -> None:
+    """Not by the deviations alone, the objective of the table."""
+    starts = [start(1.74), start(1.743), start(1.9, 2.5)]
+    words = fit_verdict(fit(starts=starts, prior=True, objective_Hz=10.7))[-1]
+    assert words == "2 of 3 starts end here, the others at 1.90 sigma or more."
+
+
 def test_a_fit_is_judged_by_chi2_per_degree_of_freedom() -> None:
     """The first line has the verdict, a warning the likeliest reason; nothing is judged without
     standard deviations."""

@@ -68,7 +68,8 @@ def ended_words(result: Mapping[str, Any]) -> str:
 
 def _starts(result: Mapping[str, Any]) -> str:
     """Whether the fits from several starts found one and the same."""
-    starts, best = result["starts"], result["objective_Hz"]
+    starts = result["starts"]
+    best = min(start["objective_Hz"] for start in starts)
     alike = [start for start in starts if start["objective_Hz"] <= SAME_RATIO * best + 1e-9]
     spread = {
         name: max(abs(start["values"][name] / v["value"] - 1) for start in alike)
@@ -83,7 +84,7 @@ def _starts(result: Mapping[str, Any]) -> str:
         )
     others = [start["objective_Hz"] for start in starts if start not in alike]
     if others:
-        unit = result["objective_unit"]
+        unit = "sigma" if result.get("prior") else result["objective_unit"]
         return (
             f"{len(alike)} of {len(starts)} starts end here, the others at {min(others):.2f} {unit}"
             " or more."

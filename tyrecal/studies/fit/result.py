@@ -574,7 +574,7 @@ def fit_result(
         "starts": [
             {
                 "initial": r.initial,
-                "objective_Hz": r.point.plain.objective,
+                "objective_Hz": r.point.objective,  # what is minimised: with a prior, F of `prior`
                 "converged": r.converged,
                 "evaluations": len(r.history),
                 "message": r.message,
