@@ -27,7 +27,7 @@ from tyrecal.tyre.case.schema import TargetMode
 from ..chance import generator
 from ..conftest import CASES
 from .test_total_error import coarse
-from .tyre_in_states import CASE, START, TRUTH, TyreInStates, case_with, measured
+from .tyre_in_states import CASE, SIGMA, START, TRUTH, TyreInStates, case_with, fitted, measured
 
 Array = np.ndarray
 
@@ -36,7 +36,8 @@ class _Errors:
     """Model errors with a covariance that is given, plus the scatter."""
 
     def __init__(self, covariance: Array):
-        self.of_model = covariance
+        self.of_model = self.form = covariance
+        self.known, self.by_constants = list[Any](), np.zeros((len(covariance), 0))
 
     def covariance(self, scatter: Array) -> Array:
         return self.of_model + np.diag(scatter**2)
@@ -75,10 +76,9 @@ def test_a_linear_model_has_its_normal_posterior(count: int, monkeypatch: Any) -
     scatter, used = problem.scatter * problem.reference, problem.scale > 0
     np.testing.assert_allclose(problem.errors(there, scatter, used)[0], C, rtol=1e-6, atol=1e-12)
     # the same by what the fit answers to the data and to what was known before
-    at = problem.reference + there.plain.residuals / problem.scale
-    B = problem.response(there)[0] * at
+    B = problem.response(there)[0] * problem.reference
     parts = B @ sigma @ B.T + problem.left_of_prior(there)
-    np.testing.assert_allclose(parts, C, rtol=0.02, atol=1e-6)
+    np.testing.assert_allclose(parts, C, rtol=1e-6, atol=1e-12)
     assert len(uncertainty(problem, there.plain).standard_errors) == len(START)
 
 
@@ -92,6 +92,21 @@ def test_a_state_left_out_is_its_rows_left_out(monkeypatch: Any) -> None:
     J = J[:4]
     expected = S - S @ J.T @ np.linalg.solve(J @ S @ J.T + own, J @ S)
     np.testing.assert_allclose(C, expected, rtol=1e-6, atol=1e-12)
+
+
+def test_a_weight_divides_a_values_variance(monkeypatch: Any) -> None:
+    """100 times the weight of 10 times the sigma is the same value, in the errors and chi2 too."""
+    errors = lambda *_: _Errors(1e-4 * np.eye(4))
+    for module in ("prior", "total_error"):
+        monkeypatch.setattr(f"tyrecal.studies.fit.{module}.model_errors", errors)
+    plain, loose = measured()[:4], measured(sigma=10 * SIGMA)[:4]
+    heavy = [each.model_copy(update={"weight": 100.0}) for each in loose]
+    own, same = (fitted(case_with(rows), prior=True).found for rows in (plain, heavy))
+    assert same.chi2_per_dof == pytest.approx(own.chi2_per_dof, rel=1e-3)
+    for name, each in own.variables.items():
+        total = same.variables[name].standard_error_total
+        assert total == pytest.approx(each.standard_error_total, rel=1e-3)
+        assert each.explained_by_data is not None and 0 <= each.explained_by_data < 1
 
 
 @pytest.mark.parametrize("method", ["slsqp", "gauss-newton"])

@@ -3,9 +3,9 @@
     cov x = B Q Sigma Q B^T + left of what was known before,  Q = diag(q)   (`Problem.response`)
     Sigma = Sigma_rep + Sigma_form + sum_k s_k^2 g_k g_k^T                   (inference/covariance)
 
-q: fitted values; Sigma: covariance of ln q, as `diagnose` and `sample` have it. If chi^2 by Sigma
-exceeds its degrees of freedom (`verdict`), cov x is multiplied by their ratio; not with a prior,
-where cov x is the posterior, as in `sample`.
+q: fitted values, with a prior measured ones; Sigma: covariance of ln q, as `diagnose` and `sample`
+have it. If chi^2 by Sigma exceeds its degrees of freedom (`verdict`), cov x is multiplied by their
+ratio; not with a prior, where cov x is the posterior, as in `sample`.
 """
 
 from __future__ import annotations
@@ -82,10 +82,12 @@ def total_error(problem: Problem, point: Point, scatter: FitUncertainty) -> Tota
     measured = problem.counted
     wanted = np.array([t.value for t in measured])
     fitted = wanted + point.residuals[counts] / problem.scale[counts]
-    relative = sigma / wanted
+    relative, at = sigma / wanted, fitted
+    if problem.spread is not None:  # with weights in the variances, cov x is the posterior's
+        relative, at = relative / np.sqrt([t.weight for t in measured]), wanted
     whole = errors.covariance(relative)
     response, is_determined = problem.response(point)
-    response = response * fitted  # d x / d ln q
+    response = response * at  # d x / d ln q
     unseen = problem.left_of_prior(point)
     parts = _parts(response, relative, errors, np.diag(unseen))
     spread = response @ whole @ response.T + unseen
