@@ -419,7 +419,7 @@ def test_the_tables_on_record_are_what_the_scorer_says(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_an_answer_on_record_is_given_again(tmp_path: Path) -> None:
-    """Of a group of series 17 the first by name with the fewest effects, by today's diagnosis.
+    """The first trial by name with the fewest effects, in a group of series 17.
 
     Only the effects that the record gives a probability are in the model: to evaluate the others,
     which together have less than 1e-4, takes five times as long.

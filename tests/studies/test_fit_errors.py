@@ -35,10 +35,12 @@ def test_what_a_90_percent_interval_holds_is_counted() -> None:
 def test_the_page_states_the_counts_of_the_record() -> None:
     page = (BENCHMARKS / "VERDICTS.md").read_text()
     lines = [json.loads(x) for x in (BENCHMARKS / "fit_errors.jsonl").read_text().splitlines()]
-    held = {
-        row.split("|")[2].strip(): row.split("|")[3].strip()
-        for row in table(lines)
-        if row[0] == "|"
-    }
-    for name in ("all modes", "A_belt", "A_carcass", "C10", "[0,0] axial"):
-        assert held[name] in page
+    rows = [row.strip("| ").split(" | ")[:3] for row in table(lines) if row[0] == "|"]
+    held = {(size, name): count for size, name, count in rows[2:]}
+    tyre, prior = "P235/75R17", "P235/75R17, --prior"
+    names = ["all modes", "[1,1]", "A_belt", "C10", "A_carcass"]
+    counts = [held[prior, name] for name in names]
+    unsure = [f"{name}, said not to hold" for name in ("A_belt", "C10", "A_carcass")]
+    counts += [held[tyre, name] for name in ("all modes", "[4,0]", "C10", *unsure)]
+    for count in counts:
+        assert count in page, count

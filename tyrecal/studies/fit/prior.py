@@ -4,7 +4,8 @@
 
 Sigma: covariance of ln q by scatter, material laws, section and uncalibrated constants
 (`model_errors`); x_0, s: start of a variable and its standard deviation (`DesignVariable.spread`).
-The minimum is the likeliest design of a normal posterior with covariance
+Where Sigma is that of one design, the minimum is the likeliest one of a normal posterior with the
+covariance
 
     C = (J^T Sigma^-1 J + diag(s)^-2)^-1,   J = d ln q / d x
 
