@@ -143,6 +143,7 @@ def fit_case(
     method: str = "slsqp",
     fixed: Mapping[str, float] | Iterable[str] | str | None = None,
     free: Iterable[str] | str = (),
+    prior: bool = False,
     starts: int = 1,
     seed: int = 0,
     jobs: int = 1,
@@ -153,7 +154,8 @@ def fit_case(
     place, as ``tyrecal fit --measured`` does: frequencies without labels get the likeliest ones.
 
     ``fixed`` holds variables at values, or at their start where it is a name or several. ``free``
-    frees uncertain numbers, one or several, within what is known of them.
+    frees uncertain numbers, one or several, within what is known of them. ``prior`` includes what
+    is known of the variables, the section and the constants.
     ``method`` is "slsqp" (SciPy's) or "gauss-newton", which needs about a third of the designs.
     ``result`` holds what fit.json does, ``provenance`` too, ``fitted`` the design: ``values``,
     ``objective`` in Hz, ``modes`` by label and, of targets in several states, ``states``: modes of
@@ -167,7 +169,8 @@ def fit_case(
     held = _held(case, fixed)
     file = None if measured is None else _file("measured", measured)
     counts = _count("starts", starts, 1), _count("seed", seed, 0), _count("jobs", jobs, 1)
-    study = FitStudy(case, _evaluator(case, solver, record), file, held, _names("free", free))
+    freed, known = _names("free", free), _flag("prior", prior)
+    study = FitStudy(case, _evaluator(case, solver, record), file, held, freed, known)
     return study.run(method, *counts)
 
 

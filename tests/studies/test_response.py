@@ -20,6 +20,8 @@ from tyrecal.studies.response import FrfResult, read_points, response_request
 from tyrecal.studies.result import StudyInput
 from tyrecal.tyre.case import LoadedCase, start_values
 
+from ..conftest import CASES
+
 Array = np.ndarray
 CASE_FILE = Path(__file__).parents[2] / "cases" / "p235_75r17.yaml"
 PATCH_MM, RADIUS_m = 100.0, 0.3927
@@ -160,3 +162,17 @@ def test_points_that_are_refused(text: str, hub: bool, words: str) -> None:
 def test_requests_that_are_refused(change: dict[str, float], words: str) -> None:
     with pytest.raises(InputError, match=words):
         response_request("tread:0deg:radial", "hub:fz", **{**BAND, **change})
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [("rim.free=true", "a rim that moves"), ("splice.share=0.01", "couples harmonics")],
+)
+def test_tyres_that_are_refused_before_anything_runs(
+    setting: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = ["--set", setting, "--output", str(tmp_path / "out")]
+    with pytest.raises(SystemExit) as leave:
+        main(["frf", str(CASES / "p235_75r17.yaml"), "--mesh", "coarse", *out])
+    assert leave.value.code == 2
+    assert words in capsys.readouterr().err and not (tmp_path / "out").exists()

@@ -28,6 +28,7 @@ SETTLED = ("no_equilibrium", "unstable")  # the deck's own doing: another run wo
 MODES_ON_TOP = 3  # times the time limit of a load, where modes are sought there too
 T = TypeVar("T")
 Array = np.ndarray
+RESPONDS_NOT = {"spindle", "frequency_modulus", "cavity", "coupled", "rotation"}  # needs of a tyre
 
 
 @dataclass(frozen=True)
@@ -235,12 +236,18 @@ class Evaluator:
             )
 
     def needs_response(self) -> None:
-        """Raises DeckRefused where the solver computes no responses."""
+        """Raises DeckRefused where the solver computes no responses, or none of such a tyre."""
         if "response" not in self.solver.capabilities:
             raise DeckRefused(
                 f"solver '{self.solver.name}' computes no response functions; 'tyrecal solvers'"
                 " shows which one can (response)"
             )
+        for need, words in self.design.needs.items():
+            if need in RESPONDS_NOT:
+                raise DeckRefused(
+                    "response functions are of a tyre that is the same all round, without gas, on a"
+                    f" rim that is held: the case has {words.partition(';')[0]}"
+                )
 
     def refuse_lacking(self, design: Design) -> None:
         """Raises DeckRefused where the solver cannot express what the design has."""
