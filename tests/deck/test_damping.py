@@ -10,6 +10,7 @@ from tyrecal_solvers.abaqus.check import findings
 from tyrecal_solvers.language.text import read_keywords
 
 import tyrecal
+from tyrecal.cli.main import main
 from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
@@ -124,3 +125,23 @@ def test_one_loss_factor_of_a_real_tyre() -> None:
     for vertical, torsional in ((0.056, 0.050), (0.049, 0.052)):
         assert ratios["[1,0]"] == pytest.approx(vertical, rel=0.3)
         assert ratios["[0,0] torsional"] == pytest.approx(torsional, rel=0.3)
+
+
+def test_a_solver_without_damping_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else a loss factor would do nothing without a word."""
+    own = modes.run
+
+    def without_damping(*arguments: object) -> tuple:
+        answered = own(*arguments)  # type: ignore[arg-type]
+        bare = [m.model_copy(update={"damping_ratio": None}) for m in answered[0].modes]
+        return answered[0].model_copy(update={"modes": bare}), *answered[1:]
+
+    monkeypatch.setattr(modes, "run", without_damping)
+    with_loss(tmp_path, "0.1")
+    words = ["modes", str(tmp_path / CASE_FILE.name), "--mesh", "coarse"]
+    with pytest.raises(SystemExit) as leave:
+        main([*words, "--output", str(tmp_path / "out")])
+    assert not leave.value.code
+    assert "solver 'bundled' computes no damping" in capsys.readouterr().err

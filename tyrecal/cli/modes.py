@@ -98,6 +98,9 @@ def command(
         plan = plan_pressing(loaded, evaluator, pressed_to, len(designs), study.jobs)
         if study.print_plan(plan, dry_run):
             return 0
+    lossy = any(getattr(m, "loss_factor", None) for m in loaded.case.materials.values())
+    if lossy and loads:
+        terminal.note("no damping is computed on the road: loss factors have no effect")
     if sweep is not None:
         run = study.run(loaded, "modes", evaluator, "sweep-load", load_N=loads)
         draw = pictures is not False
@@ -107,6 +110,9 @@ def command(
     if loads:
         return at_load(loaded, evaluator, run, values, loads[0], study)
     result, evaluation, modes = studies.run(loaded, evaluator, values)
+    if lossy and all(mode.damping_ratio is None for mode in result.modes):
+        name = evaluator.solver.name
+        terminal.note(f"solver '{name}' computes no damping: loss factors have no effect")
     result = run.write(result)
     run.write_json("modes_shapes.json", tyre_data(loaded, evaluation, modes))
     if pictures:
