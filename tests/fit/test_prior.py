@@ -173,6 +173,9 @@ def test_it_agrees_with_sample() -> None:
         own = sample.variables[name]
         assert each.standard_error_total == pytest.approx(own.standard_error, rel=0.05), name
         assert abs(each.value - own.best) < 0.2 * own.standard_error, name
+        for other, correlation in fit.correlations[name].items():
+            if other != name:
+                assert correlation == pytest.approx(sample.correlations[name][other], abs=0.05)
 
 
 @pytest.mark.slow

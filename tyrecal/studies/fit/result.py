@@ -525,6 +525,10 @@ def fit_result(
     mass = [each for each in others if each.quantity == "mass_kg"]
     moved = float(abs(point.x - initial.x).max()) > MIN_STEP
     total = _total_error(problem, point, known)
+    correlations = known.correlations
+    if problem.spread is not None and isinstance(total, TotalError):  # of the posterior
+        sd = np.sqrt(np.diag(total.of_coordinates))
+        correlations = total.of_coordinates / np.outer(sd, sd)
     good = best.converged and moved
     covariance = None if isinstance(total, str) else total.of_values
     judged = judge(problem, point, known, covariance, good, readings)
@@ -567,7 +571,7 @@ def fit_result(
             else {"responses": [] if problem.freed else total.responses}
         ),
         "correlations": {
-            a: {b: _finite(known.correlations[i, j]) for j, b in enumerate(names)}
+            a: {b: _finite(correlations[i, j]) for j, b in enumerate(names)}
             for i, a in enumerate(names)
         },
         "singular_values": [float(s) for s in known.singular_values],
