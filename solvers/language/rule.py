@@ -3,10 +3,11 @@
 Of each: the level it belongs to, its parameters, what it must stand under, come after or have, how
 often it may stand, and its data lines.
 
-Levels: ``part`` is a part, an instance, the assembly, or a model that has no parts. Parameters:
+Levels: ``model``, ``step``, and ``part``: a part, an instance, the assembly, or a model without
+parts. Kinds are number, integer, name, node and their like (`fields`). Parameters:
 ``NAME`` takes no value, ``NAME=ONE|TWO`` these (an empty one: none), ``NAME=kind`` a kind,
-``NAME=+kind`` gives a name of it, and ``NAME!`` must be given. Fields of a data line: kinds,
-``3*number`` three of them, ``number?`` may be blank, ``node...`` none or more.
+``NAME=+kind`` defines a name of that kind, and ``NAME!`` must be given. Fields of a data line:
+kinds, ``3*number`` three of them, ``number?`` may be blank, ``node...`` none or more.
 """
 
 from __future__ import annotations

@@ -13,6 +13,12 @@ on 2026-11-27, each lot read after those of the lots before were answered, and b
 | 20261202 | 2 | 4 | 3 | 4 | 0 | 5 |
 | 20261204 | 3 | 0 | 1 | 3 | 1 | 2 |
 | 20261205 | 3 | 1 | 0 | 1 | 1 | 2 |
+
+By another reader, who had read no lot before; about half of them are answered:
+
+| seed | tyre | simulate | measured | studies | report, batch, cli | solvers |
+|---|---|---|---|---|---|---|
+| 20261206 | 10 | 12 | 8 | 6 | 4 | 7 |
 """
 
 from __future__ import annotations

@@ -36,12 +36,12 @@ class Studied:
 class StudyOutcome:
     """Outcome of a study (see `case`), its numbers, and its result files, name to text."""
 
-    status: str = "good"
-    cause: str | None = None
-    words: str | None = None
+    status: str = "good"  # or "failed", "skipped"
+    cause: str | None = None  # of a failure, a key
+    words: str | None = None  # of a failure, for people
     quantities: dict[str, float] = field(default_factory=dict)
     files: dict[str, str] = field(default_factory=dict)
-    conclusion: dict[str, str | None] = field(default_factory=dict)
+    conclusion: dict[str, str | None] = field(default_factory=dict)  # `Result.conclusion`
 
 
 def study(name: str, state: Studied) -> StudyOutcome:

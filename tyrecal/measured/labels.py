@@ -4,8 +4,8 @@ The signals u (k,) of a mode are normal about 0,
 
     u ~ N(0, s^2 (S + nu I)),
 
-S (k, k): the covariance of a label (``covariance``), nu: noise, over a grid, s: any size,
-p(s) ~ 1/s:
+S (k, k): the covariance of a label (``covariance``), nu: variance of the noise, over a grid; s: any
+size, p(s) ~ 1/s:
 
     ln p(u | label, nu) = -1/2 ln|S + nu I| - k/2 ln(u^T (S + nu I)^-1 u) + constant
 
@@ -38,7 +38,7 @@ Array = np.ndarray
 MIN_LABEL_PROBABILITY = 0.9  # probability from which a label is given
 MIN_LN_ODDS = 5.0  # expected logarithm of the odds below which sensors cannot tell two labels apart
 ODDS_NOISE = 0.02  # noise at which it is expected
-NOISE_VARIANCES = (1e-4, 1e-3, 1e-2, 5e-2, 0.2)  # variance, of the mean signal's
+NOISE_VARIANCES = (1e-4, 1e-3, 1e-2, 5e-2, 0.2)  # over the mean variance of a label's signals
 WITHOUT_LOWER = 0.02  # prior of [c,m+2] without [c,m] below it, of 1
 SHAPES_DRAWN, DRAWN_NOISE = 64, 0.01  # shapes drawn of each label, and their noise
 MIN_LABELLED = 0.9  # share of a label's shapes that get it, for the sensors to tell it
@@ -119,7 +119,7 @@ class Labeller:
 
     def ln_evidence(self, shape: Array) -> float:
         """ln of the mean probability density of a real shape (k,) over all labels, but for a
-        constant: comparable between readings of one shape's directions."""
+        constant: comparable between assumptions on which way the sensors of one shape point."""
         each = [_evidence(*spectrum, shape[:, None])[0] for spectrum in self._spectra]
         return float(np.logaddexp.reduce(each) - np.log(len(each)))
 
@@ -200,7 +200,8 @@ def _label(c: int, column: int) -> Label:
 
 
 def _lower(label: Label) -> Label | None:
-    """The mode of the same c and parity that every tyre has below one that bends the belt."""
+    """The lower mode that a mode with bending of the belt implies: of the same c, even or odd
+    about the mid-plane like it. Every tyre has it."""
     if label.m < 2 and not (label.c == 0 and label.m == 1):
         return None
     if label.c == 0:

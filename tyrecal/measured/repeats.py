@@ -3,7 +3,7 @@
 The value is the mean over n runs, and sigma that of the mean:
 
     sigma^2 = max( v / n, sum sigma_i^2 / n^2, (floor value)^2 ),
-    v = (4 v_all + sum_i (x_i - mean x)^2) / (4 + n - 1)
+    v = (4 v_all (mean x)^2 + sum_i (x_i - mean x)^2) / (4 + n - 1)
 
 sigma_i are what each run states itself, v_all the variance of one run (relative) pooled over all
 labels: a variance from three runs is drawn towards it, as if it were known from four more. The
@@ -30,7 +30,8 @@ PRIOR_REPEATS = 4.0  # repeats that the scatter of all values is worth for that 
 def combined(
     values: Sequence[Measurement], floor: float = FLOOR, assumed: float = 0.0
 ) -> list[Measurement]:
-    """One value a key, the mean of its runs, with the standard deviation of that mean.
+    """One value for each quantity, label, member and state, the mean of its runs, with the
+    standard deviation of that mean.
 
     floor, assumed: relative; ``assumed`` is the standard deviation of one run that states none.
     Raises InputError where neither repeats nor anything else tell a standard deviation, or
@@ -86,7 +87,8 @@ def _pooled(groups: dict[object, list[Measurement]], quantity: str) -> float | N
 
 def one_for_both(values: Sequence[Measurement]) -> list[Measurement]:
     """The values with the two members of a doublet as one, their mean, where some runs have other
-    members than others have."""
+    members than others have. The mean keeps the first one's sigma, and a member alone stands for
+    both; values under load stay as they are."""
     places: dict[tuple[object, ...], dict[str, list[Measurement]]] = {}
     for each in values:
         place = (each.quantity, each.label, each.state)

@@ -41,12 +41,15 @@ class _Failure(_Part):
 
 
 class _Mode(_Part):
-    """A mode as `Solver.read` gives it: on the section (n, amplitude) or in three dimensions."""
+    """A mode as `Solver.read` gives it: on the section, with its harmonic and amplitude, or in
+    three dimensions, with its displacement."""
 
     frequency_Hz: of.Hertz
-    multiplicity: Annotated[Any, of.shaped("iu", least=0, most=2)]
-    n: Annotated[Any, of.shaped("iu", least=-1)] = 0
+    multiplicity: Annotated[Any, of.shaped("iu", least=0, most=2)]  # 2: both of a pair
+    n: Annotated[Any, of.shaped("iu", least=-1)] = 0  # harmonic of the amplitude
+    # (points, 3) along r, theta, z
     amplitude: Annotated[Any, of.shaped("c" + of.REAL, None, 3)] = None
+    # (points, 3) along x, y, z; NaN where the solver does not give it
     displacement: Annotated[Any, of.shaped(of.REAL, None, 3, nan=True)] = None
     members: of.HertzPair | None = None
     damping_ratio: of.Finite | None = None

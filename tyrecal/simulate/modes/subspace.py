@@ -19,7 +19,7 @@ def mac(a: HarmonicShape, b: HarmonicShape) -> float:
     """MAC of two shapes on the same nodes, 0 to 1; 0 for different harmonics.
 
     The product is complex, so a phase, which turns a pair round the tyre, changes nothing: for
-    n >= 1 this is the MAC of the two pairs' spans.
+    harmonics n >= 1 this is the MAC of the two pairs' spans.
 
     Raises ValueError when the nodes differ.
     """

@@ -1,4 +1,5 @@
-"""Answers of simpler methods from the same measurements, with the ruler's sensitivities.
+"""Answers of simpler methods from the same measurements, with the sensitivities of `Ruler`, the
+model of ln f by which all methods are judged.
 
 All fit ln x first, in the ruler's quadratic model with weights by repeatability alone. Nearest
 signature: the effect whose residual, after its own fit, points most along the measured one; "none"

@@ -64,7 +64,8 @@ class Observations:
     rows: tuple[Observable, ...]
     y: Array  # (n,) ln value
     scatter: Array  # (n,) standard deviation of y by repeatability, without ``common``
-    # standard deviation of a shift that all frequencies of one run share, in addition to scatter
+    # standard deviation of the mean, over the repeats, of a shift that all frequencies of one run
+    # share, in addition to scatter
     common: float
     split: Array  # (n,) distance of the two modes of a pair in ln f; NaN unless both were measured
     split_scatter: Array  # (n,) its standard deviation

@@ -1,14 +1,17 @@
 """Which uncertain numbers, freed within what is known of them, reduce deviations most.
 
-With r the deviations of ln q at the case's own numbers, S their covariance with the variables'
-spread in it, W^T W = S^-1, and G the change of ln q by one standard deviation of each number,
+With r = ln q measured - ln q computed at the case's own numbers, S their covariance with the
+variables' spread in it, W^T W = S^-1, and G the change of ln q by one standard deviation of each
+number,
 
     chi2(A) = min |W (r - G z)|^2 over z_k, |z_k| <= 3 for k in A, z_k = 0 otherwise.
 
-With u = g^T P (r - G z) and s = g^T P g, P the projection of S^-1 beyond those numbers in A that
-are not at their limit, freeing k gains
+With g the column of k in G, u = g^T P (r - G z) and s = g^T P g, freeing k gains
 
-    max over |z| <= 3 of 2 u z - s z^2.
+    max over |z| <= 3 of 2 u z - s z^2,
+
+P = S^-1 - S^-1 F (F^T S^-1 F)^-1 F^T S^-1, F the columns of the numbers in A that are not at their
+limit.
 
 1. The number with the largest gain is freed. Where r ~ N(0, S), the largest gain over all numbers
    that are left has a distribution, which draws of r show. A gain that it exceeds with a
@@ -17,7 +20,7 @@ are not at their limit, freeing k gains
 3. A number in A whose gain beyond the others is chance is taken out.
 
 Numbers that leave a chi2 within 4 of the least in the place of one in A are not distinguished from
-it: two standard deviations of the ratio of likelihoods.
+it: a number that is off by two standard deviations changes chi2 by 4.
 """
 
 from __future__ import annotations

@@ -19,7 +19,8 @@ CHAIN_TERMS = (1 / 2, 1 / 20, 11 / 1050, 19 / 7000, 519 / 673750)  # c_i
 
 @dataclass(frozen=True)
 class ArrudaBoyce(InvariantLaw):
-    """mu, Pa; the locking stretch lambda_m; 1 / D, Pa."""
+    """mu, Pa; the locking stretch lambda_m; 1 / D, Pa. The initial shear modulus is
+    mu (1 + 3 / (5 lambda_m^2) + ...)."""
 
     shear_moduli: ClassVar[tuple[str, ...]] = ("mu",)
     numbers: ClassVar[tuple[str, ...]] = ("lambda_m",)

@@ -1,6 +1,6 @@
 """Rubber, and what else fills solid elements: one part for each element type and law.
 
-The rows are the deformation gradient F, row by row (p, 9).
+The rows are the deformation gradient F, row by row (p, 9): F_rR, F_rTheta, F_rZ, F_thetaR, ...
 """
 
 from __future__ import annotations

@@ -155,7 +155,8 @@ class TyreKind:
         raise NotImplementedError
 
     def moduli(self, case: Case, material: str) -> dict[str, int]:
-        """Paths of a material's moduli, -1 for a reciprocal one."""
+        """Paths of a material's moduli: 1 where a number grows with the stiffness, -1 where it
+        falls."""
         return {}
 
     def density(self, material: str) -> str:

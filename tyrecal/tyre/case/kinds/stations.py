@@ -115,7 +115,8 @@ class Stations(TyreKind):
         return case.model_copy(update=wanted), parts
 
     def moduli(self, case: Case, material: str) -> dict[str, int]:
-        """Constants of a rubber, or the modulus of a cord."""
+        """Constants of a rubber, or the modulus of a cord, by path: 1 where it grows with the
+        stiffness, -1 where it falls (D1)."""
         rubber = isinstance(case.materials[material], Rubber)
         signs = {"C10_Pa": 1, "C01_Pa": 1, "D1_per_Pa": -1} if rubber else {"youngs_modulus_Pa": 1}
         return {f"materials.{material}.{key}": sign for key, sign in signs.items()}
