@@ -106,11 +106,11 @@ def test_the_command(
     monkeypatch.setattr(door_module, "find_solver", lambda name, *command: Stiff())
     out = tmp_path / "out"
     arguments = ["stiffness", CASE_FILE, "--mesh", "coarse", "--output", str(out)]
-    wanted = ["--loads-N", "2000,4000", "--pressures-kPa", "200,240"]
+    wanted = ["--loads-N", "2000,4000", "--pressure-kPa", "200,240"]
     assert tyrecal(*arguments, *wanted, "--no-pictures") == 0
     printed = capsys.readouterr()
     assert "torsional Nm/°" in printed.out and "2 states x 2 loads: 4 runs" in printed.err
     rows = json.loads((out / "stiffness.json").read_text())["rows"]
     assert [row["load_N"] for row in rows] == [2000, 4000] * 2
-    assert tyrecal(*arguments, "--pressures-kPa", "240,240") == 2
+    assert tyrecal(*arguments, "--pressure-kPa", "240,240") == 2
     assert "each once" in capsys.readouterr().err

@@ -122,10 +122,8 @@ def parse_pressures(
     return PressureRange(low, high, steps)
 
 
-def parse_pressure_list(loaded: Any, text: str, allowed: bool) -> list[float]:
-    """The pressures of --pressures-kPa, kPa; ``allowed``: unusual ones too. Raises
-    click.UsageError."""
-    flag = "--pressures-kPa"
+def parse_pressure_list(flag: str, loaded: Any, text: str, allowed: bool) -> list[float]:
+    """The pressures of an option, kPa; ``allowed``: unusual ones too. Raises click.UsageError."""
     pressures = parse_numbers(flag, text, "numbers in kPa, as in 160,240")
     for pressure in pressures:
         if not 0 < pressure < 2000 or pressures.count(pressure) > 1:

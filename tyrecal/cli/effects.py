@@ -97,7 +97,9 @@ def command(
         )
     kPa = [round(loaded.case.pressure_kPa * share / 3, 6) for share in (2, 3, 4)]
     if pressures is not None:
-        kPa = arguments.parse_pressure_list(loaded, pressures, study.allow_unusual)
+        kPa = arguments.parse_pressure_list(
+            "--pressures-kPa", loaded, pressures, study.allow_unusual
+        )
     output = study.run(loaded, "effects", evaluator, pressure_kPa=kPa)
     entries = [CatalogueEntry.of(catalogue()[id], solvers, loaded) for id in chosen]
     if name and not terminal.as_json:

@@ -15,7 +15,7 @@ from .parameters import option
 @click.command()
 @options.every(options.case_or_last, options.assignments, options.loads)
 @option(
-    "--pressures-kPa",
+    "--pressure-kPa",
     "pressures",
     metavar="P1,P2,...",
     help="Inflation pressures, kPa (default: the case's). Example: 200,240.",
@@ -46,7 +46,7 @@ def command(
 
     \b
     tyrecal stiffness cases/205_60r15.yaml --loads-N 2000,4000,6000
-    tyrecal stiffness cases/205_60r15.yaml --loads-N 4000 --pressures-kPa 200,220,240 --jobs 2
+    tyrecal stiffness cases/205_60r15.yaml --loads-N 4000 --pressure-kPa 200,220,240 --jobs 2
     tyrecal stiffness cases/p235_75r17.yaml --fitted p235_75r17 --dry-run
     """
     from ..studies.pressing_plan import PlannedState, plan_pressing
@@ -58,7 +58,7 @@ def command(
     if loads is not None:
         arguments.refuse_set(assignments, "road.loads_N", "--loads-N")
     if pressures is not None:
-        arguments.refuse_set(assignments, "pressure_kPa", "--pressures-kPa")
+        arguments.refuse_set(assignments, "pressure_kPa", "--pressure-kPa")
     loaded, values = study.load(case, assignments)
     loads_N = loaded.case.loads_N
     if loads is not None:
@@ -66,7 +66,9 @@ def command(
         arguments.refuse_unusual_loads(loaded, "--loads-N", loads_N, study.allow_unusual)
     kPa = [loaded.case.pressure_kPa]
     if pressures is not None:
-        kPa = arguments.parse_pressure_list(loaded, pressures, study.allow_unusual)
+        kPa = arguments.parse_pressure_list(
+            "--pressure-kPa", loaded, pressures, study.allow_unusual
+        )
     evaluator = study.evaluator(loaded)
     evaluator.needs_road(rim_stiffness=True)
     designs = {"initial": values}
