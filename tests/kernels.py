@@ -3,7 +3,7 @@
     python -m tests.kernels [--every] [pytest's arguments]
 
 Each kernel once, with one thread and with two in turn, this processor's own with two, as `pytest`
-itself has it with one; ``--every``: all kernels with one and with two. As many runs at a time as
+itself has it with one; ``--every``: all kernels with one and with two. One run more at a time than
 there are cores. A kernel that the processor cannot run, or for which the libraries have another's,
 is said.
 Exits with 1 where a run failed.
@@ -82,7 +82,7 @@ def main(more: list[str]) -> int:
     jobs = [
         (name, core, n, more) for name, core in chosen for n in THREADS if every or n == turns[core]
     ]
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+    with ThreadPoolExecutor((os.cpu_count() or 1) + 1) as pool:  # no core idles
         return not all([*pool.map(lambda job: tested(*job), jobs)])  # a failure stops no other
 
 
