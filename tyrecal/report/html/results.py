@@ -164,7 +164,7 @@ def _text(path: Path) -> str | None:
 
 
 def _history(path: Path) -> list[dict[str, Any]]:
-    """Design points of a fit's history.csv; empty if there is none. Raises InputError."""
+    """Design points of fit_history.csv; empty if there is none. Raises InputError."""
     text = _text(path)
     if text is None:
         return []

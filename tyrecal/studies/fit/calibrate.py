@@ -42,7 +42,7 @@ class Fit:
     """A finished fit."""
 
     found: FitResult  # content of fit.json
-    history: list[dict[str, Any]]  # design points in order, rows of history.csv
+    history: list[dict[str, Any]]  # design points in order, rows of fit_history.csv
     initial: Point  # at the case's start values
     fitted: Point  # at the least objective of all starts
     left_out: list[str] = field(default_factory=list)  # sentences on measurements without a target
@@ -263,7 +263,7 @@ def _start_alone(task: tuple[Problem, Array, str]) -> tuple[StartReport | Evalua
 
 
 def _history(problem: Problem) -> list[dict[str, Any]]:
-    """Entries of history.csv: objective, or failure, and values of each design point."""
+    """Entries of fit_history.csv: objective, or failure, and values of each design point."""
     names = list(problem.fixed) + [v.name for v in problem.variables]
     return [
         {
