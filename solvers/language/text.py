@@ -141,6 +141,11 @@ class Block:
         """Content of the block without its place: a key for what is derived from it."""
         return self.name, tuple(self.parameters.items()), tuple(row.line for row in self.rows)
 
+    @cached_property
+    def is_seeded(self) -> bool:
+        """Whether a number of a data line carries a tangent."""
+        return any(row.tangents for row in self.rows)
+
     def get(self, parameter: str, default: str = "") -> str:
         """A parameter as a name, ``default`` if it is not given."""
         return named(self.parameters.get(parameter, default))
@@ -325,7 +330,8 @@ def seed(blocks: Sequence[Block], tangents: Sequence[tuple[int, int, float]]) ->
         by_line.setdefault(line, {})[index] = value
     result = []
     for block in blocks:
-        if any(row.place.line in by_line for row in block.rows):
+        first, last = (block.rows[i].place.line for i in (0, -1)) if block.rows else (1, 0)
+        if any(first <= line <= last for line in by_line):
             rows = [replace(row, tangents=by_line.pop(row.place.line, None)) for row in block.rows]
             for row in rows:
                 if row.tangents and max(row.tangents) >= len(row.fields):

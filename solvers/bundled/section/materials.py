@@ -4,6 +4,7 @@ loss factors."""
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -66,7 +67,7 @@ class LossFactor:
         return whole + shear, whole + bulk
 
 
-@dataclass
+@dataclass(eq=False)
 class Material:
     """Constants as the deck gives them."""
 
@@ -130,21 +131,31 @@ class Material:
 
 def read_materials(keywords: list[Block]) -> dict[str, Material]:
     """All materials by upper-case name. Raises DeckError."""
-    materials: dict[str, Material] = {}
-    current: Material | None = None
+    blocks: dict[str, list[Block]] = {}  # of each material
+    own: list[Block] = []
     for k in keywords:
         if k.name == "MATERIAL":
             name = k.need("NAME")
-            if name in materials:
+            if name in blocks:
                 raise DeckError(k.place, f"material {name} is defined twice")
-            current = materials[name] = Material(name, k.place)
-        elif k.name in _READERS:
-            if current is None:
+            own = blocks[name] = [k]
+        elif k.name in MATERIAL_OPTIONS:
+            if not own:
                 raise DeckError(k.place, f"*{k.name} must follow a *MATERIAL")
-            _READERS[k.name](current, k)
-            if current.rubber is not None and current.youngs_modulus is not None:
-                raise DeckError(current.place, f"material {current.name} has two laws")
-    return materials
+            own.append(k)
+    return {name: _material(tuple(own)) for name, own in blocks.items()}
+
+
+@lru_cache(maxsize=256)
+def _material(blocks: tuple[Block, ...]) -> Material:
+    """The material of a *MATERIAL and its options, remembered while these are the same objects, as
+    those are that carry no tangent. Raises DeckError."""
+    material = Material(blocks[0].need("NAME"), blocks[0].place)
+    for k in blocks[1:]:
+        MATERIAL_OPTIONS[k.name](material, k)
+        if material.rubber is not None and material.youngs_modulus is not None:
+            raise DeckError(material.place, f"material {material.name} has two laws")
+    return material
 
 
 def _density(m: Material, k: Block) -> None:
@@ -229,7 +240,7 @@ def _acoustic(m: Material, k: Block) -> None:
     m.bulk_modulus = _positive(k, 0, "bulk modulus")
 
 
-_READERS = {
+MATERIAL_OPTIONS = {
     "ACOUSTIC MEDIUM": _acoustic,
     "DAMPING": _damping,
     "DENSITY": _density,

@@ -77,13 +77,13 @@ class DeckMesh:
 
 
 _MESHES: OrderedDict[tuple[object, ...], DeckMesh] = OrderedDict()
-_TOPOLOGY = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "RIGID BODY", "EMBEDDED ELEMENT"}
+TOPOLOGY = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "RIGID BODY", "EMBEDDED ELEMENT"}
 
 
 def read_mesh(keywords: list[Block]) -> DeckMesh:
     """The mesh of a section job, remembered while its blocks stay the same. Raises DeckError."""
-    topology = [k for k in keywords if k.name in _TOPOLOGY]
-    seeded = [k for k in topology if any(row.tangents for row in k.rows)]
+    topology = [k for k in keywords if k.name in TOPOLOGY]
+    seeded = [k for k in topology if k.is_seeded]
     if any(k.name != "NODE" for k in seeded):
         return _mesh(topology)
     key = tuple(k.identity for k in topology)

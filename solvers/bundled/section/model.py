@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from ...language.text import Block
 from .half_mesh import half_mesh
 from .laws.energy_law import EnergyLaw
-from .materials import Material, ModulusTable, read_materials
-from .mesh import DeckMesh, read_mesh
+from .materials import MATERIAL_OPTIONS, Material, ModulusTable, read_materials
+from .mesh import TOPOLOGY, DeckMesh, read_mesh
 from .parts import cords, membrane, rubber
 from .parts.elastic import Elastic
 from .parts.part import SectionJob, TyrePart
 
-READERS = (rubber.read, membrane.read, cords.read)
+READERS = (rubber.read, membrane.read, cords.read)  # take materials by `SectionJob.material`
+NO_SECTIONS = {*TOPOLOGY, "MATERIAL", *MATERIAL_OPTIONS}
 
 
 @dataclass
@@ -72,4 +74,45 @@ def build(
     tables = list(dict.fromkeys(known)) if own_frequency else []
     lossy = [m for m in materials.values() if m.loss is not None]
     job = SectionJob(keywords, mesh, materials, tables, lossy, dynamic_Hz, long_term)
-    return Model(mesh, [part for read in READERS for part in read(job)], tables, lossy)
+    return Model(mesh, [part for read in READERS for part in _parts(read, job)], tables, lossy)
+
+
+@dataclass(frozen=True)
+class _Known:
+    """Parts that one of `READERS` has read of a job that carries no tangent."""
+
+    read: Callable[[SectionJob], list[TyrePart]]
+    job: SectionJob
+    parts: list[TyrePart]
+
+    def same(self, read: Callable[[SectionJob], list[TyrePart]], job: SectionJob) -> bool:
+        """Whether the parts that ``read`` reads of ``job`` are these."""
+        own = self.job
+        return (
+            read is self.read
+            and job.mesh is own.mesh
+            and _sections(job) == _sections(own)
+            and (job.tables, job.lossy) == (own.tables, own.lossy)
+            and (job.dynamic_Hz, job.long_term) == (own.dynamic_Hz, own.long_term)
+            and all(job.materials.get(name) is m for name, m in own.used.items())
+        )
+
+
+_KNOWN: deque[_Known] = deque(maxlen=12)
+
+
+def _sections(job: SectionJob) -> list[Block]:
+    """The blocks of a job without those of its materials and of its mesh."""
+    return [k for k in job.keywords if k.name not in NO_SECTIONS]
+
+
+def _parts(read: Callable[[SectionJob], list[TyrePart]], job: SectionJob) -> list[TyrePart]:
+    """The parts that a reader reads; where a tangent changes none of them, those that are known."""
+    for known in _KNOWN:
+        if known.same(read, job):
+            return known.parts
+    own = replace(job, used={})
+    parts = read(own)
+    if not any(k.is_seeded for k in job.keywords):
+        _KNOWN.append(_Known(read, own, parts))
+    return parts

@@ -10,7 +10,7 @@ from __future__ import annotations
 import copy
 from abc import ABC, abstractmethod
 from collections.abc import Container
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -255,12 +255,14 @@ class SectionJob:
     lossy: list[Material]  # with a loss factor
     dynamic_Hz: float | None  # at which the vibration's modulus is evaluated; None = static
     long_term: bool  # the static state is relaxed, else its moduli are the instantaneous ones
+    used: dict[str, Material] = field(default_factory=dict)  # materials named so far
 
     def material(self, k: Block, name: str) -> Material:
         """A material that a keyword names. Raises DeckError."""
         if name not in self.materials:
             raise DeckError(k.place, f"material {name} is not defined")
-        return self.materials[name]
+        self.used[name] = self.materials[name]
+        return self.used[name]
 
     def by_type(self, k: Block, kinds: Container[str]) -> dict[str, Array]:
         """The elements of a keyword's set: element type to rows of its block. Raises DeckError."""
