@@ -5,6 +5,10 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import pytest
+
+from tyrecal.tyre.effects import catalogue
+
 from ..conftest import CASES
 
 COARSE = """
@@ -34,6 +38,13 @@ def vary(folder: Path, count: int, coarse: bool = True) -> list[Path]:
     return paths
 
 
+def few_effects(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave three effects in the catalogue, for the duration of a test."""
+    for id in [*catalogue()]:
+        if id not in ("rim_width", "bead_filler", "spindle_radial"):
+            monkeypatch.delitem(catalogue(), id)
+
+
 def measured_elsewhere(path: Path) -> Path:
     """Put the case's targets in a file beside it; the file."""
     file = path.with_suffix(".csv")
@@ -43,6 +54,15 @@ def measured_elsewhere(path: Path) -> Path:
     end = text.index("\n\n", start)
     path.write_text(f"{text[:start]}  file: {file.name}{text[end:]}")
     return file
+
+
+def nearly_certain(path: Path) -> Path:
+    """Make the section of a case exact, and all but two of its numbers; a sample or diagnosis of it
+    takes a third of the time. Return the path."""
+    text = path.read_text().replace("known_from: size_code", "known_from: exact")
+    start, end = text.index("  rubber_density: {"), text.index("  rim_width: {")
+    path.write_text(text[:start] + text[end:])
+    return path
 
 
 def poison(path: Path) -> None:

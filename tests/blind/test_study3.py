@@ -405,14 +405,14 @@ def test_recorded_trials_are_those_that_were_sealed(name: str, tmp_path: Path) -
 
 @pytest.mark.slow
 def test_the_tables_on_record_are_what_the_scorer_says(tmp_path: Path) -> None:
-    """The tables of every fifth series; `python -m tests.blind.study3 score` gives them all."""
-    series = sorted({group.series for group in GROUPS})[::5]
+    """The tables of every ninth series; `python -m tests.blind.study3 score` gives them all."""
+    series = sorted({group.series for group in GROUPS})[::9]
     names = {group.name for group in GROUPS if group.series in series}
     for name in names & seals().keys():
         unpack(name, tmp_path / "all" / name, tmp_path / "all-truth" / name)
     recorded = (ARCHIVE / "study_3.md").read_text(encoding="utf-8")
     _, *sections = result(tmp_path / "all").split("\n## ")
-    assert len(sections) == len(series) > 3
+    assert len(sections) == len(series) > 1
     for part in sections:
         assert "\n## " + part.rstrip() in recorded
 

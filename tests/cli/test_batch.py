@@ -21,7 +21,7 @@ from tyrecal.studies import STUDIES, result_types
 from tyrecal.studies.result import Result
 
 from ..batch.data import entry, report
-from ..batch.support import measured_elsewhere, poison, vary
+from ..batch.support import few_effects, measured_elsewhere, nearly_certain, poison, vary
 from ..conftest import ROOT
 from .test_after_a_good_fit import contents, unmoved
 from .test_cli import run
@@ -96,7 +96,7 @@ def test_each_case_has_the_results_of_the_commands(
 
 @pytest.mark.slow
 def test_a_batch_samples_as_the_command_does(tmp_path: Path) -> None:
-    (case,) = vary(tmp_path / "cases", 1)
+    case = nearly_certain(*vary(tmp_path / "cases", 1))
     out, own = tmp_path / "out", tmp_path / "own"
     expected = {0: 0, 5: 4}  # good, or in doubt: a box that could not grow
     status = batched([case], out, "--studies", "sample")
@@ -134,9 +134,13 @@ def test_a_batch_fits_to_the_file_that_a_case_names(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_batch_diagnoses_as_the_command_does(tmp_path: Path) -> None:
-    (case,) = vary(tmp_path / "cases", 1)
+def test_a_batch_diagnoses_as_the_command_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With three effects of the catalogue."""
+    case = nearly_certain(*vary(tmp_path / "cases", 1))
     measured_elsewhere(case)
+    few_effects(monkeypatch)
     out, own = tmp_path / "out", tmp_path / "own"
     options = ["--studies", "diagnose", "--baseline", str(tmp_path / "b.json"), "--write-baseline"]
     assert batched([case], out, *options, "--junit", str(out / "junit.xml")) == 0

@@ -15,6 +15,7 @@ from tyrecal.tyre.case import LoadedCase, with_level
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.state import TyreState
 
+from ..batch.support import nearly_certain
 from ..conftest import CASES
 from .test_cli import run
 
@@ -72,6 +73,7 @@ def test_a_case_holds_targets_in_several_states(case: Path, tmp_path: Path) -> N
 @pytest.mark.slow
 def test_other_studies_take_such_a_case(case: Path, tmp_path: Path) -> None:
     """Sweeps with the fitted design, pictures, batches, modes and draws."""
+    case = nearly_certain(Path(shutil.copytree(case.parent, tmp_path / "cases")) / case.name)
     common = ["--mesh", "coarse", "--output", str(tmp_path)]
     assert run("validate", str(case)) == 0
     assert run("fit", str(case), *common, "--jobs", "2") == 0
