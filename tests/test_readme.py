@@ -198,14 +198,18 @@ def test_ci_runs_the_readmes_test_command_then_what_it_leaves_out() -> None:
     lines = (ROOT / "README.md").read_text().splitlines()
     (test_command,) = [line for line in lines if OWN_SETUP in line and "pytest" in line]
     script = (ROOT / ".ci/run").read_text().splitlines()
-    debians = tuple(f"command -v {program} >/dev/null ||" for program in PACKAGED)
-    asked_for = '[ -z "${FENICS-}" ] ||'
+    debians = tuple(f"  command -v {program} >/dev/null ||" for program in PACKAGED)
+    asked_for = '  [ -z "${FENICS-}" ] ||'
     settings = "export PYTEST_ADDOPTS=--durations=25", "unset PYTHONDONTWRITEBYTECODE"
-    aside = ("#", "set ", "cd ", *settings, *debians, asked_for)
+    aside = ("#", "  #", "set ", "cd ", *settings, *debians, asked_for)
     assert [line for line in script if line and not line.startswith(aside)] == [
+        "(",
+        ") & programs=$!",
         f"{test_command} || failed=1",
+        ".venv-test/bin/python -m tests.versions & versions=$!",
         ".venv-test/bin/python -m tests.kernels || failed=1",
-        ".venv-test/bin/python -m tests.versions || failed=1",
+        "wait $versions || failed=1",
+        "wait $programs",
         '.venv-test/bin/pytest -n 3 -m "not quick" || failed=1',
         "exit ${failed:-0}",
     ]
