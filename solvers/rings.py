@@ -1,6 +1,6 @@
 """Modes at nodes round a tyre, in cylindrical components.
 
-Axes: y is the axle, from x. With Theta turning about +y a node lies at (R cos Theta, Z,
+Axes: y is the axle. Theta turns about +y, from the x axis on: a node lies at (R cos Theta, Z,
 -R sin Theta). That sense is an assumption, but no result depends on it: Theta is taken from the
 nodes' own coordinates, and (r, theta, z) is right-handed either way.
 """

@@ -15,7 +15,7 @@ from ..errors import RunFailed
 from .records import Item, records
 
 Array = np.ndarray
-NODE, MODE, U, COORD, START, END = 1901, 1980, 101, 107, 2000, 2001
+NODE, MODE, U, COORD, START, END = 1901, 1980, 101, 107, 2000, 2001  # keys of records
 SIM = (
     "a mode without a shape cannot be labelled; a release that uses the SIM architecture may"
     " need SIM=NO on *FREQUENCY to write shapes to the results file"

@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterator
 
 Item = int | float | str
-RECORD_LINE = 80
+RECORD_LINE = 80  # characters of a line
 
 
 def records(text: str) -> Iterator[tuple[int, list[Item]]]:

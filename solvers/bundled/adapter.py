@@ -148,7 +148,7 @@ def examine(text: str, long_term: bool) -> float | tuple[int, str]:
     from .section.model import build
 
     try:
-        section, _ = check(read_keywords(text), False)
+        section, _ = check(read_keywords(text), revolve=False)
         return total_mass(build(section, None, long_term)).real
     except DeckError as error:
         return error.place.line, error.message

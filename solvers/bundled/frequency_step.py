@@ -127,7 +127,7 @@ class FrequencyStep:
 
     def rates(self, modes: list[HarmonicModes]) -> tuple[dict[str, list[Array]], dict[str, float]]:
         """Derivatives by each variable: of the eigenvalues omega^2 (1/s2), one array per entry of
-        ``modes``, and of the mass (kg)."""
+        ``modes`` (m,), and of the mass (kg)."""
         sensitivities = self.tyre.request.sensitivities
         if not sensitivities:
             return {}, {}
@@ -140,7 +140,7 @@ class FrequencyStep:
         }
 
     def damping(self, modes: list[HarmonicModes]) -> list[Array] | None:
-        """Damping ratios, one array per entry of ``modes``; None if no material has a loss
+        """Damping ratios, one array (m,) per entry of ``modes``; None if no material has a loss
         factor."""
         if not self.model.lossy:
             return None
@@ -185,7 +185,7 @@ class FrequencyStep:
         """Factor of the static tangent at U, for dU / d variable; the vibration's if it is the same
         matrix."""
         if self.dynamic_Hz is not None or self.vibration.shift:
-            still = _model(self.tyre, self.step, None, False)
+            still = _model(self.tyre, self.step, None, own=False)
             return stable_factor(still, self.tyre.U, loads(still, self.step), self.equations)
         return self.factor.tyre if isinstance(self.factor, Bordered) else self.factor
 
@@ -204,7 +204,7 @@ class FrequencyStep:
         models = partial(build, section, half=self.tyre.half)
         seeded = replace(self.tyre, section=section, revolve=revolve, models=models)
         step, U, own = steps[self.place], seeded.U, seeded.request.own_frequency
-        still = moving = _model(seeded, step, None, False)
+        still = moving = _model(seeded, step, None, own=False)
         V = state_rate(still, U, loads(still, step), self.equations, self.static_factor)
         if self.dynamic_Hz is not None or own:
             moving = _model(seeded, step, self.dynamic_Hz, own)
@@ -233,7 +233,7 @@ def _fields(modes: list[HarmonicModes]) -> tuple[ModeShapes, Array]:
 
 
 def _of_modes(modes: list[HarmonicModes], forms: Array, tyre: SeededTyre) -> list[Array]:
-    """d lambda, one array per entry of ``modes``, from the forms of all modes."""
+    """d lambda, one array (m,) per entry of ``modes``, from the forms of all modes."""
     each = np.split(forms, np.cumsum([len(m.eigenvalues) for m in modes])[:-1])
     return [
         m.combination.rates(its, tyre) if m.combination else its
@@ -242,6 +242,7 @@ def _of_modes(modes: list[HarmonicModes], forms: Array, tyre: SeededTyre) -> lis
 
 
 def _model(tyre: Inflated, step: DeckStep, dynamic_Hz: float | None, own: bool) -> Model:
+    """The model in a step, see `section.model.build`; own: of each mode's own frequency."""
     return tyre.models(dynamic_Hz, step.long_term, own)
 
 

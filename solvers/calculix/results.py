@@ -67,7 +67,8 @@ def read_mass(path: Path, elements: str = "EVERYTHING") -> float:
 
 
 def pairs(eigenvalues: Array, name: str) -> Array:
-    """One eigenvalue of each pair. Raises RunFailed (``no_results``) where two do not match."""
+    """One eigenvalue (m,), 1/s2, of each pair. Raises RunFailed (``no_results``) where two do not
+    match."""
     first, second = eigenvalues[::2], eigenvalues[1::2]
     if len(first) != len(second) or (abs(second - first) > SAME * second).any():
         raise RunFailed("no_results", f"{name}: modes do not come in pairs")

@@ -37,7 +37,7 @@ class Strip:
     region: str
     material: str
     angle_deg: float
-    ends: list[list[int]]
+    ends: list[list[int]]  # node numbers
 
 
 def read_strips(sector: Path) -> list[Strip]:

@@ -78,7 +78,7 @@ def read_sector(folder: Path, sector: dict[str, Any]) -> list[Block]:
     """The model blocks of the sector's section job. Raises DeckError, OSError."""
     job = sector["job"]
     text = read_deck(folder / f"{job}.inp")
-    return grammar.check(read_keywords(text, job), False)[0]
+    return grammar.check(read_keywords(text, job), revolve=False)[0]
 
 
 def _must(holds: object, key: str, value: Any, right: str) -> None:

@@ -52,7 +52,8 @@ class Border:
 
     @property
     def flow_mass(self) -> Array:
-        """H (w, w) of the terms w of the flow: its mass, kg per radian. For a tyre with air."""
+        """H (w, w) of the terms w of the flow: its mass, m4/kg per radian, as w is in kg/m. For a
+        tyre with air."""
         assert self.air is not None
         flow: Array = self.air.H[self.air.flowing, self.air.flowing]
         return flow

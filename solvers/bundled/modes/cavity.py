@@ -8,7 +8,8 @@ tyre's frequencies. Weakly,
     Q P'' + H P = -C u'',    Q = 1/B int psi psi dV,  H = 1/rho int grad psi . grad psi dV,
                              C u = int psi u . n dA   (volume that the wall sweeps, weighted)
 
-(Morand and Ohayon, Fluid Structure Interaction, ch. 8.) With P = -Q^-1 (C u + H w) it is symmetric:
+rho, B: the air's density and bulk modulus (Morand and Ohayon, Fluid Structure Interaction, ch. 8).
+With P = -Q^-1 (C u + H w) it is symmetric:
 
     stiffness  (C u + H w)^T Q^-1 (C u + H w),   mass  w^T H w
 
@@ -33,7 +34,7 @@ from ..section.parts.part import SPIN_AXIS, cross
 from ..section.parts.pressure import surface_point
 
 Array = np.ndarray
-MONOMIAL_DEGREE = 4
+MONOMIAL_DEGREE = 4  # of the pressure terms in R and Z
 POINTS_ALONG = 6  # points of a line of the wall; the well is one line
 GAUSS = np.polynomial.legendre.leggauss(7)
 ACROSS, ACROSS_WEIGHTS = (GAUSS[0] + 1) / 2, GAUSS[1] / 2
@@ -70,9 +71,9 @@ class GasCoupling:
     """Matrices of a harmonic, per radian."""
 
     C: Array  # (k, nodes, 3), m2
-    H: Array  # (k, k)
-    Q: Array  # (k, k)
-    flowing: slice  # columns of H that w has
+    H: Array  # (k, k), m4/kg
+    Q: Array  # (k, k), m3/Pa
+    flowing: slice  # columns of H that w, kg/m, has
 
     def strain(self, u: Array, w: Array) -> Array:
         """C u + H w for u (nodes, 3) and w, real or of a complex step."""

@@ -22,7 +22,7 @@ Array = np.ndarray
 START_HZ = 60.0  # amid the modes of a tyre
 FREQUENCY_RTOL = 1e-13  # of a frequency for a given shape
 SHAPE_RTOL = 1e-4  # of a frequency, from one shape to the next: its square is what is left
-MAX_SETTLING = 40
+MAX_SETTLING = 40  # iterations of a mode at its own modulus
 
 
 class SelfConsistent:

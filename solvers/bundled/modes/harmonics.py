@@ -26,7 +26,7 @@ from .cavity import GasCavity, GasCoupling, coupling
 from .wheel import Wheel
 
 Array = np.ndarray
-MAX_HARMONICS = 60
+MAX_HARMONICS = 60  # that are searched for the lowest modes
 # share of a mode's kinetic energy above which it is the cavity's, not the tyre's
 MIN_AIR_SHARE = 0.5
 

@@ -16,7 +16,7 @@ from ...errors import RunFailed
 Array = np.ndarray
 # residual of the inverse, in the norm of M, over 1 / lambda; lambda's is its square
 INVERSE_RTOL = 1e-7
-MAX_BASIS = 300
+MAX_BASIS = 300  # vectors
 
 
 def lowest(
@@ -72,7 +72,8 @@ def _bordered(matrix: Array, column: Array) -> Array:
 
 
 def _orthonormal(block: Array, image: Array) -> tuple[Array, Array, Array]:
-    """Block and its image M block made M-orthonormal in itself, and the Gram matrix before.
+    """Block (n, b) and its image M block made M-orthonormal in itself, and the Gram matrix (b, b)
+    before.
 
     Directions that depend on the others drop out.
     """

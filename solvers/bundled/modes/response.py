@@ -42,8 +42,8 @@ class ResponseResult:
     """Responses to unit forces, as `Response.at` has them, at frequencies (f,) in Hz."""
 
     frequency_Hz: Array
-    receptance: Array
-    hub: Array
+    receptance: Array  # m/N or rad/N
+    hub: Array  # N/N or N m/N
     radius_m: float  # of the inflated tread
     harmonics: int  # that were summed
     harmonics_wanted: int  # more than that where cords buckle in the shorter waves
@@ -56,7 +56,7 @@ class TreadPatch:
     size: float
     radius: float  # of the inflated tread there, m
     nodes: Array
-    weights: Array
+    weights: Array  # (k,), 1 together
 
     @property
     def half_angle(self) -> float:
@@ -211,8 +211,8 @@ class Response:
 class _Reduced:
     """A harmonic on its basis, in which M is 1."""
 
-    n: int
-    K: Array
+    n: int  # harmonic
+    K: Array  # (basis, basis), rad2/s2
     lossy: list[Array]
     tables: list[Array]
     forces: Array  # of the patch in each direction (basis, 3)

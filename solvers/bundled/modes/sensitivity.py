@@ -110,7 +110,8 @@ class RimAndAir:
         fields: ModeShapes,
         eigenvalues: Array,
     ) -> Array:
-        """Their part of phi^H (K - lambda M) phi per mode, with the tangent of p."""
+        """Part of the rim and the gas in phi^H (K - lambda M) phi per mode (m,), complex: with the
+        tangent of the number p of the deck."""
         total = np.zeros(len(eigenvalues), complex)
         X = model.mesh.X
         forces = mechanics.gradient(model, state, loads) if self.wheel else state

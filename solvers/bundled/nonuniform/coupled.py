@@ -187,11 +187,11 @@ class CoupledShapes:
     at: Array  # (d, m): displacement of the attached components
 
     def forms(self) -> tuple[Array, Array, Array, Array]:
-        """A sum of parts for each mode."""
+        """As `HarmonicModes.forms`: each mode is the sum of several parts."""
         return self.n, self.shapes, self.mode, self.eigenvalues
 
     def rates(self, forms: Array, change: SeededTyre) -> Array:
-        """psi^T (K' - lambda M') psi of the whole."""
+        """psi^T (K' - lambda M') psi (m,) of the whole: d lambda by the change."""
         return forms + change.attached.rates(self.eigenvalues, self.at)
 
     def where(self, keep: Array | slice) -> CoupledShapes:
@@ -257,7 +257,7 @@ def tell(
 
 
 def assigned(overlap: Array) -> Array:
-    """The column of each row of ``overlap``, none twice, whose sum is the largest."""
+    """The column (m,) of each row of ``overlap``, none twice, whose sum is the largest."""
 
     from scipy.optimize import linear_sum_assignment  # late: a third of a second
 

@@ -66,7 +66,7 @@ class Whirl:
 
     @property
     def fixed(self) -> Array:
-        """omega - n Omega: as a sensor that stands still sees them, rad/s."""
+        """omega - n Omega (m,): as a sensor that stands still sees them, rad/s."""
         return self.omega - self.n * self.spin
 
     def forms(self) -> tuple[Array, Array, Array, Array]:
@@ -75,7 +75,8 @@ class Whirl:
         return np.full(modes, self.n), self.shapes, np.arange(modes), self.omega**2
 
     def rates(self, forms: Array, change: SeededTyre) -> Array:
-        """omega' = U^H (K' + omega C' - omega^2 M') U / (2 omega - U^H C U)."""
+        """d lambda (m,) of lambda = `fixed`^2, from omega' = U^H (K' + omega C' - omega^2 M') U /
+        (2 omega - U^H C U)."""
         faster = np.imag(change.spin) / COMPLEX_STEP
         by_spin = self.coriolis * faster / self.spin
         for connectivity, M in mass_matrices(change.model):
@@ -121,7 +122,7 @@ def _turned(vibration: Vibration, x: Array) -> Array:
 
 
 def _coriolis(vibration: Vibration, spin: float, family: HarmonicFamily) -> Array:
-    """C = 2 i Omega M S on the basis."""
+    """C = 2 i Omega M S (m, m) on the basis; S: turn by 90 degrees in the wheel's plane."""
     x = vibration.numbering.gather(np.moveaxis(family.shapes, 0, -1))
     i = 1.0 if np.iscomplexobj(vibration.numbering.spread(x)) else 1j
     return 2 * i * spin * (x.conj().T @ vibration.times_mass(_turned(vibration, x)))

@@ -44,7 +44,7 @@ Array = np.ndarray
 SPARE_START_HARMONICS = 2
 EXTRA_SHAPE_HARMONICS = 6  # harmonics of the displacements beyond the highest wanted
 SPLICE_FORCE_RTOL = 1e-9  # out-of-balance force over the rim's
-MAX_SPLICE_ITERATIONS = 20
+MAX_SPLICE_ITERATIONS = 20  # of Newton's method, and of the linear solver in each
 SPLICE_LINEAR_RTOL = 1e-4  # of each step of Newton's method
 MIN_GRAM = 1e-11  # of the basis' Gram matrix
 RESPONSE_ROUNDS = 2  # of responses
@@ -119,15 +119,15 @@ class FullCircle:
         return np.asarray(back[:, self._other] * HALF_TURN)
 
     def part(self, field: Array) -> Array:
-        """Projection of a field on the fields of this symmetry."""
+        """Projection of a field (k, nodes, 3) on the fields of this symmetry."""
         return (field + self.turn * self.turned(field)) / 2 if self.turn else field
 
     def whole(self, sums: Array) -> Array:
-        """Forces of all elements from those of the elements there."""
+        """Forces (k, nodes, 3) of all elements from those of the elements that are there."""
         return sums + self.turn * self.turned(sums) if self.turn else sums
 
     def field(self, n: int, shape: Array) -> Array:
-        """Re[shape exp(i n Theta)]."""
+        """Re[shape exp(i n Theta)] (k, nodes, 3) of a shape (nodes, 3)."""
         turned = np.exp(1j * n * self.tyre.around.angles)[:, None, None] * shape
         return np.asarray(turned.real)
 
@@ -136,16 +136,16 @@ class FullCircle:
         return np.asarray(np.fft.rfft(field, axis=0)[n] / len(field) * (2 if n else 1))
 
     def forces(self, field: Array) -> Array:
-        """K~ u, N."""
+        """K~ u (k, nodes, 3), N, of a field u."""
         return self.whole(self.tyre.product(field)) * self.free
 
     def out_of_balance(self, state: Array) -> Array:
-        """Forces inside the tyre less the pressure's, N, those at the rim among them. Raises
-        Inverted."""
+        """Forces (k, nodes, 3) inside the tyre less the pressure's, N, those at the rim among them.
+        Raises Inverted."""
         return self.whole(self.tyre.residual(state))
 
     def inertia(self, field: Array) -> Array:
-        """M~ u, kg m."""
+        """M~ u (k, nodes, 3), kg m, of a field u."""
         flat = field.swapaxes(0, 1).reshape(self.free.shape[0], -1)
         shape = self.free.shape[0], len(field), 3
         image = (self._each * (self.vibration.mass @ flat)).reshape(shape)
@@ -156,8 +156,8 @@ class FullCircle:
         return self.whole(image.swapaxes(0, 1)) * self.free
 
     def response(self, force: Array) -> Array:
-        """K^-1 of the plain tyre times forces, harmonic by harmonic. Waves of a field that half a
-        turn reverses are those of a kept one times -i."""
+        """K^-1 of the plain tyre times forces (k, nodes, 3), N, in m, harmonic by harmonic. Waves
+        of a field that half a turn reverses are those of a kept one times -i."""
         numbering, phase = self.vibration.numbering, 1j if self.turn < 0 else 1.0
         waves = np.fft.rfft(force, axis=0) * len(force) / (2 * np.pi) * phase  # N per radian
         for n, factor in enumerate(self.factors):

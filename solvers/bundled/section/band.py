@@ -56,8 +56,8 @@ class Numbering:
         return self.equation[connectivity].reshape(len(connectivity), -1)
 
     def lower(self, connectivity: Array) -> tuple[Array, Array]:
-        """Indices of the flat entries of element matrices that are assembled, and of their places
-        in the flat band."""
+        """Indices (k,) of the flat entries of element matrices that are assembled, and of their
+        places (k,) in the flat band."""
         key = connectivity.tobytes()
         if key not in self._scatter:
             e = self.elements(connectivity)

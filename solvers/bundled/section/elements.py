@@ -25,10 +25,10 @@ class Solids:
     """Quadrilaterals or triangles of one type, at Gauss points; B1 is as in `parts.elastic`."""
 
     connectivity: Array  # (e, a)
-    weights: Array  # (e, g): w det(dX/dxi) R, m2 per radian
-    B0: Array  # (e, g, 9, 3a)
-    hoop: Array  # (e, g, a): N / R, the only rows of B1
-    hourglass: Array | None  # (e, a), of quadrilaterals with one Gauss point
+    weights: Array  # (e, g): w det(dX/dxi) R, m3 per radian
+    B0: Array  # (e, g, 9, 3a), 1/m
+    hoop: Array  # (e, g, a): N / R, 1/m, the only rows of B1
+    hourglass: Array | None  # gamma (e, a) of quadrilaterals with one Gauss point, see `_hourglass`
     # (e, g, g), of what the points have onto the pressure's terms; None: onto itself
     projection: Array | None
     # a rule that integrates the mass in full

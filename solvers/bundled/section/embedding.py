@@ -39,7 +39,7 @@ class Guest:
 
     @property
     def rows(self) -> Array:
-        """The nodes that it moves with."""
+        """The nodes (k,) that it moves with."""
         return self.nodes[self.kept]
 
     def renumbered(self, new: Array) -> Guest:

@@ -21,8 +21,8 @@ from .parts.pressure import Pressure
 Array = np.ndarray
 FORCE_RTOL = 1e-9  # out-of-balance force over pressure force; the next step is at round-off
 ROUND_OFF_RTOL = 1e-6  # accepted where round-off lets the force fall no further
-MIN_PRESSURE_STEP = 1 / 256
-MAX_ITERATIONS = 30
+MIN_PRESSURE_STEP = 1 / 256  # share of the pressure
+MAX_ITERATIONS = 30  # of Newton's method
 MAX_QUICK_ITERATIONS = 18  # iterations after which another path is likely to be shorter
 STIFFENING = 8.0  # multiple of the rubber's stiffness that inflates without trouble
 SECTION_RADIUS = 0.3  # meridional radius of curvature over the section's height, for the start
@@ -84,7 +84,7 @@ def _reached(solve: _Solver, start: Array, check: Callable[[], None]) -> Array:
 
 def stopped(reached: float, pressure: float, why: str) -> NoEquilibrium:
     """Error of an inflation that has no stable equilibrium beyond ``reached`` times the requested
-    load."""
+    ``pressure``, Pa."""
     full, reached_kPa = pressure / 1e3, reached * pressure / 1e3
     return NoEquilibrium(f"inflation stopped at {reached_kPa:.4g} of {full:.4g} kPa: {why}")
 
@@ -138,8 +138,8 @@ class _Solver:
 
 
 def _by_stiffness(solve: _Solver, start: Array, check: Callable[[], None]) -> Array | None:
-    """Inflate from rubber ``STIFFENING`` times as stiff down to its own stiffness, in adaptive
-    factors."""
+    """U (n, 3) inflated from rubber ``STIFFENING`` times as stiff down to its own stiffness, in
+    adaptive factors; None if that fails."""
     stiffness, factor = STIFFENING, STIFFENING
     U = solve(start, 1.0, stiffness, MAX_ITERATIONS)
     while U is not None and stiffness > 1.0:
@@ -156,7 +156,7 @@ def _by_stiffness(solve: _Solver, start: Array, check: Callable[[], None]) -> Ar
 
 
 def _by_pressure(solve: _Solver, start: Array, check: Callable[[], None]) -> Array:
-    """Inflate in adaptive load steps, which show how far the tyre can be inflated."""
+    """U (n, 3) inflated in adaptive load steps, which show how far the tyre can be inflated."""
     U, reached, step = start, 0.0, 0.25
     while reached < 1.0:
         check()
@@ -238,8 +238,8 @@ def _newton(
 
 
 def _load_force(model: Model, U: Array, loads: Sequence[TyrePart], numbering: Numbering) -> Array:
-    """Force of the pressure alone, of at least 1 Pa, or of the spin where there is none: the scale
-    of what counts as balanced."""
+    """Force (size,), N, of the pressure alone, of at least 1 Pa, or of the spin where there is
+    none: the scale of what counts as balanced."""
     pressures = [load for load in loads if isinstance(load, Pressure)]
     felt = [Pressure(p.lines, max(float(np.real(p.pressure)), 1.0)) for p in pressures]
     if not loads:

@@ -48,7 +48,7 @@ class KeptFields:
         self._corner[self._order[first:]] = np.arange(len(self._order) - first)
         self._near = inner.size - int(first)
         self._scatter: dict[bytes, tuple[Array, Array]] = {}
-        # of the field for a coordinate of 1, and of the elements' sums to be the whole's
+        # a component's value where its coordinate is 1; its factor on each side of the half's M
         self._length, self._weight = np.full((2, len(self._order), 1), [[[1 / ROOT2]], [[1.0]]])
         self._length[inner.size :], self._weight[inner.size :] = 1.0, ROOT2
         real = self._order % 3 == 0

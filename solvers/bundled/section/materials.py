@@ -23,7 +23,7 @@ class ModulusTable:
     """Storage over static shear modulus by frequency."""
 
     frequency_Hz: tuple[float, ...]  # rising
-    ratios: tuple[Scalar, ...]
+    ratios: tuple[Scalar, ...]  # at each frequency
 
     def ratio(self, frequency_Hz: float) -> Scalar:
         """rho, constant beyond the table's ends; complex where the table carries a tangent."""
@@ -53,12 +53,12 @@ class LossFactor:
 
     structural: float = 0.0
     frequency_Hz: tuple[float, ...] = ()  # rising; empty: there is no table
-    shear: tuple[float, ...] = ()
-    bulk: tuple[float, ...] = ()
+    shear: tuple[float, ...] = ()  # loss over storage modulus at each frequency
+    bulk: tuple[float, ...] = ()  # the same of the bulk modulus
 
     def at(self, frequency_Hz: Array) -> tuple[Array, Array]:
-        """Loss factors of shear and bulk at frequencies, linear in ln f between the table's rows,
-        constant beyond its ends."""
+        """Loss factors of shear and bulk at frequencies (f,), linear in ln f between the table's
+        rows, constant beyond its ends."""
         whole = np.full(np.shape(frequency_Hz), self.structural)
         if not self.frequency_Hz:
             return whole, whole

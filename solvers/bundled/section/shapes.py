@@ -114,7 +114,7 @@ class ElementType:
 
     nodes: int
     rule: Callable[[int], Rule]  # of so many Gauss points a direction, in a triangle in all
-    points: int = 2
+    points: int = 2  # Gauss points a direction, in a triangle in all
     mass_points: int = 2  # that integrate the mass in full
     faces: tuple[tuple[int, ...], ...] = ()  # the nodes of a solid's faces; a line has none
     # terms of the pressure in the element: 1, or 1, R and Z; 0: each point has its own
@@ -137,18 +137,18 @@ class ElementType:
 
 TYPES = {
     "CGAX8R": ElementType(8, partial(quad, 8), 2, 3, FACES_QUADRATIC),
-    "CGAX8RH": ElementType(8, partial(quad, 8), 2, 3, FACES_QUADRATIC, 3, True),
+    "CGAX8RH": ElementType(8, partial(quad, 8), 2, 3, FACES_QUADRATIC, 3, hybrid=True),
     "CGAX8": ElementType(8, partial(quad, 8), 3, 3, FACES_QUADRATIC),
-    "CGAX8H": ElementType(8, partial(quad, 8), 3, 3, FACES_QUADRATIC, 3, True),
+    "CGAX8H": ElementType(8, partial(quad, 8), 3, 3, FACES_QUADRATIC, 3, hybrid=True),
     "CGAX4R": ElementType(4, partial(quad, 4), 1, 2, FACES_LINEAR),
-    "CGAX4RH": ElementType(4, partial(quad, 4), 1, 2, FACES_LINEAR, 1, True),
+    "CGAX4RH": ElementType(4, partial(quad, 4), 1, 2, FACES_LINEAR, 1, hybrid=True),
     "CGAX4": ElementType(4, partial(quad, 4), 2, 2, FACES_LINEAR, 1),  # as ABAQUS integrates it
-    "CGAX4H": ElementType(4, partial(quad, 4), 2, 2, FACES_LINEAR, 1, True),
+    "CGAX4H": ElementType(4, partial(quad, 4), 2, 2, FACES_LINEAR, 1, hybrid=True),
     "CGAX6": ElementType(6, partial(triangle, 6), 3, 7, FACES_TRIANGLE_QUADRATIC),
     # linear in three points, the pressure would lock: 10 % and 0.05 % of a thick tube, two across
-    "CGAX6H": ElementType(6, partial(triangle, 6), 3, 7, FACES_TRIANGLE_QUADRATIC, 1, True),
+    "CGAX6H": ElementType(6, partial(triangle, 6), 3, 7, FACES_TRIANGLE_QUADRATIC, 1, hybrid=True),
     "CGAX3": ElementType(3, partial(triangle, 3), 1, 7, FACES_TRIANGLE),
-    "CGAX3H": ElementType(3, partial(triangle, 3), 1, 7, FACES_TRIANGLE, 1, True),
+    "CGAX3H": ElementType(3, partial(triangle, 3), 1, 7, FACES_TRIANGLE, 1, hybrid=True),
     "SFMGAX2": ElementType(3, partial(line, 3)),
     "SFMGAX1": ElementType(2, partial(line, 2)),
     "MGAX2": ElementType(3, partial(line, 3)),

@@ -85,16 +85,16 @@ class MirrorHalf(Whole):
 
     @cached_property
     def _nodes(self) -> tuple[Array, Array]:
-        """Nodes beyond the middle plane and their images before it."""
+        """Nodes (k,) beyond the middle plane and their images before it."""
         beyond = np.flatnonzero(~self.here)
         return beyond, self.other[beyond]
 
     def turned(self, u: Array) -> Array:
-        """S conj u(-z)."""
+        """S conj u(-z) of u (n, 3): the field turned by half a turn."""
         return _signed(u[self.other].conj())
 
     def images(self, rows: Array) -> Array:
-        """Nodes of the elements' mirror images, the other way round as their sense is."""
+        """Nodes (e, a) of the elements' mirror images, the other way round as their sense is."""
         return np.asarray(self.other[rows][:, ::-1])
 
     def keeps(self, rows: Array) -> Array:
@@ -107,8 +107,8 @@ class MirrorHalf(Whole):
         return np.where(beside, 1.0, 0.5)[:, None]
 
     def alike(self, X: Array) -> Array:
-        """X with tangents (imaginary) that move both sides alike. What moves them against each
-        other is reversed by the half turn, and changes no eigenvalue at first order."""
+        """X (n, 2) with tangents (imaginary) that move both sides alike. What moves them against
+        each other is reversed by the half turn, and changes no eigenvalue at first order."""
         if not np.iscomplexobj(X):
             return X
         return X.real + 0.5j * (X.imag + X.imag[self.other] * [1, -1])
@@ -130,5 +130,5 @@ class MirrorHalf(Whole):
 
 
 def _signed(u: Array) -> Array:
-    """S u."""
+    """S u (n, 3), S = diag(1, -1, -1)."""
     return u * HALF_TURN.reshape(3, *[1] * (u.ndim - 2))

@@ -20,11 +20,9 @@ import numpy as np
 Array = np.ndarray
 MAX_NEAR_LENGTH = np.radians(10.0)  # of elements near the patch
 FARTHEST_ELEMENT = np.radians(45.0)  # from its middle, but for the last one
-WAVE_BY_ELEMENTS = (
-    2 * np.pi / 7.5
-)  # of the highest harmonic, over the elements' length that hold it
+WAVE_BY_ELEMENTS = 2 * np.pi / 7.5  # highest harmonic that elements hold, times their length, rad
 MORE_WAVES = 5  # than a mode's own, for a pressed tyre mixes them
-MIN_WAVES = 4 + MORE_WAVES
+MIN_WAVES = 4 + MORE_WAVES  # functions of the angle
 SPARE_WAVE_POINTS = 8  # Gauss points of the waves beyond those that their products need
 
 
@@ -62,7 +60,7 @@ class HalfCircle(Circumference):
     """
 
     ends: Array  # of the elements, from 0 on, rad
-    waves: Array  # (2, j, f): the even and the odd functions as sums of j waves, cos j x or sin j x
+    waves: Array  # (2, j, w): w even and w odd functions as sums of j waves, cos j x or sin j x
     stations: Array  # (s,), rad
     pieces: tuple[Piece, ...]
     even: Array  # (f,) rows of the coefficients that an even field has
@@ -140,8 +138,8 @@ def waves_beyond(lengths: Array) -> HalfCircle:
 
 
 def _waves(join: float, highest: int) -> Array:
-    """Even and odd functions from ``join`` (rad) to the top as sums of waves: first one that is 1
-    at the join, then those that vanish there, orthonormal and orthogonal to it."""
+    """Even and odd functions from ``join`` (rad) to the top as sums of waves (2, waves, k): first
+    one that is 1 at the join, then those that vanish there, orthonormal and orthogonal to it."""
     x, w = np.polynomial.legendre.leggauss(SPARE_WAVE_POINTS + 2 * highest)
     x, w = (np.pi - join) * (1 + x) / 2, (np.pi - join) * w / 2
     sums = []

@@ -32,8 +32,9 @@ class Hyperelastic(EnergyLaw):
 
     weighted_tangent: ClassVar[bool] = True
     shear_moduli: ClassVar[tuple[str, ...]]  # the constants, Pa, that Wbar is proportional to
-    bulk_moduli: ClassVar[tuple[str, ...]] = ("inverse_D1",)  # those, Pa, that U is
-    numbers: ClassVar[tuple[str, ...]] = ()  # and those without a unit
+    # the constants, Pa, that U is proportional to
+    bulk_moduli: ClassVar[tuple[str, ...]] = ("inverse_D1",)
+    numbers: ClassVar[tuple[str, ...]] = ()  # the constants without a unit
 
     # of a small vibration, over the static ones; None: the same
     shear_ratio: Array | None = None
@@ -42,7 +43,7 @@ class Hyperelastic(EnergyLaw):
     table: Array | None = None
     # place among the model's materials with a loss factor, -1 = none; None: there are none
     compound: Array | None = None
-    # not so: the tangent is without the initial stress, as that of a ratio has it
+    # False: the tangent is without the initial stress, which no modulus of a vibration scales
     stressed: bool = True
     # dU/dJ as a hybrid element has it, Pa, which does not change with J; None: the law's own
     pressure: Array | None = None
@@ -54,7 +55,7 @@ class Hyperelastic(EnergyLaw):
 
     @abstractmethod
     def volume(self, J: Array) -> tuple[Array, Array, Array]:
-        """U in J/m3, dU/dJ and d2U/dJ2 in Pa."""
+        """U (p,) in J/m3, dU/dJ and d2U/dJ2 in Pa."""
 
     @abstractmethod
     def isochoric_energy(self, F: Array, J: Array) -> Array:
@@ -97,19 +98,19 @@ class Hyperelastic(EnergyLaw):
         return 0 * J, self.pressure, 0 * J
 
     def energy(self, z: Array) -> Array:
-        """J/m3."""
+        """W (p,), J/m3."""
         F = square(z)
         J, _ = determinant(F)
         return self.isochoric_energy(F, J) + self._volume(J)[0]
 
     def force(self, z: Array) -> Array:
-        """First Piola-Kirchhoff stress P = dW/dF, Pa; dJ/dF = J G."""
+        """First Piola-Kirchhoff stress P = dW/dF (p, 9), Pa; dJ/dF = J G."""
         F = square(z)
         J, G = determinant(F)
         return self.isochoric_stress(F, J, G, self._volume(J)[1] * J).reshape(-1, 9)
 
     def tangent(self, z: Array, weights: Array | float = 1.0) -> Array:
-        """First elasticity tensor A = d2W/dFdF, Pa: material and geometric part in one.
+        """First elasticity tensor A = d2W/dFdF (p, 9, 9), Pa: material and geometric part in one.
 
         With ``shear_ratio`` the material part is scaled, the initial stress is not: a small
         vibration about the static state at the modulus of its own frequency.
@@ -128,7 +129,8 @@ class Hyperelastic(EnergyLaw):
         ).reshape(-1, 9, 9)
 
     def _dynamic_tangent(self, z: Array, weights: Array | float) -> Array:
-        """Tangent at the dynamic moduli, less the initial stress that they would bring along."""
+        """Tangent (p, 9, 9) at the dynamic moduli, less the initial stress that they would bring
+        along."""
         assert self.shear_ratio is not None and self.bulk_ratio is not None
         dynamic = replace(self.scaled(self.shear_ratio, self.bulk_ratio), shear_ratio=None)
         more = dynamic.force(z) - self.force(z)
@@ -147,7 +149,7 @@ class Hyperelastic(EnergyLaw):
 
     @property
     def bulk_over_shear(self) -> Array:
-        """K / G of small strains."""
+        """K / G of small strains, (p,) or (1,)."""
         return np.asarray((self.volume(np.ones(1))[2] / self.shear_modulus).real)
 
     def eased(self, ratio: float) -> Self:
@@ -170,7 +172,7 @@ class Hyperelastic(EnergyLaw):
 
 
 def even_powers(J: Array, *inverse_D: Array) -> tuple[Array, Array, Array]:
-    """U = sum over i of (J - 1)^(2i) / D_i, dU/dJ and d2U/dJ2."""
+    """U = sum over i of (J - 1)^(2i) / D_i, dU/dJ and d2U/dJ2, (p,) each."""
     x, power = J - 1, np.ones(1)
     U, slope, curvature = (np.zeros(1) for _ in range(3))
     for i, of in enumerate(inverse_D, start=1):

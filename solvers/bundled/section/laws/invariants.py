@@ -20,7 +20,8 @@ Slopes = tuple[Array, Array | None]
 
 @dataclass(frozen=True)
 class InvariantLaw(Hyperelastic):
-    """A law is Wbar with its derivatives by the invariants."""
+    """A law is Wbar with its derivatives by the invariants. `Hyperelastic` defines on_G, on_GG and
+    on_swap of its stress and tangent."""
 
     @abstractmethod
     def of_invariants(self, I1: Array, I2: Array) -> Array:
@@ -28,15 +29,15 @@ class InvariantLaw(Hyperelastic):
 
     @abstractmethod
     def slopes(self, I1: Array, I2: Array) -> Slopes:
-        """dWbar/dI1bar, dWbar/dI2bar; None: it is zero."""
+        """dWbar/dI1bar, dWbar/dI2bar, (p,) each; None: it is zero."""
 
     @abstractmethod
     def curvatures(self, I1: Array, I2: Array) -> tuple[Array, Array, Array] | None:
-        """Second derivatives 11, 12, 22; None: they are zero."""
+        """d2Wbar/dI1bar2, d2Wbar/dI1bar dI2bar, d2Wbar/dI2bar2, (p,) each; None: they are zero."""
 
     @property
-    def of_I2(self) -> bool:
-        """Whether I2bar counts; where it does not, it is not formed."""
+    def needs_I2(self) -> bool:
+        """Whether Wbar depends on I2bar; if it does not, I2bar is not formed."""
         return False
 
     @property
@@ -50,9 +51,9 @@ class InvariantLaw(Hyperelastic):
         return self.of_invariants(J ** (-2 / 3) * I1, J ** (-4 / 3) * I2)
 
     def _invariants(self, F: Array, J: Array) -> tuple[Array, Array, Array]:
-        """J^(-2/3), I1, and I2 or a number that does not count."""
+        """J^(-2/3), I1, and I2 or a number that does not count, (p,) each."""
         I1 = (F * F).sum((1, 2))
-        return J ** (-2 / 3), I1, second_invariant(F)[1] if self.of_I2 else I1
+        return J ** (-2 / 3), I1, second_invariant(F)[1] if self.needs_I2 else I1
 
     def isochoric_stress(self, F: Array, J: Array, G: Array, on_G: Array) -> Array:
         J23, I1, I2 = self._invariants(F, J)
@@ -87,7 +88,7 @@ class InvariantLaw(Hyperelastic):
         if (curved := self.curvatures(*of)) is not None:
             one = np.ones(p, F.dtype)
             by_I1 = J23[:, None] * (2 * f - (2 / 3 * I1)[:, None] * g)
-            by_I2 = _stress_I2(F, J, G, one).reshape(p, 9) if self.of_I2 else by_I1
+            by_I2 = _stress_I2(F, J, G, one).reshape(p, 9) if self.needs_I2 else by_I1
             W11, W12, W22 = (W * weights for W in curved)
             one_two = np.stack([by_I1, by_I2], -1)
             W = np.stack([np.stack([W11, W12], -1), np.stack([W12, W22], -1)], -1)
@@ -103,7 +104,7 @@ def second_invariant(F: Array) -> tuple[Array, Array, Array]:
 
 
 def _stress_I2(F: Array, J: Array, G: Array, W2: Array) -> Array:
-    """W2 dI2bar/dF."""
+    """W2 dI2bar/dF (p, 3, 3); W2 (p,): dWbar/dI2bar."""
     I1, I2, C = second_invariant(F)
     b = W2 * J ** (-4 / 3)
     Y = 2 * (I1[:, None, None] * F - F @ C)  # dI2/dF
@@ -111,7 +112,7 @@ def _stress_I2(F: Array, J: Array, G: Array, W2: Array) -> Array:
 
 
 def _tangent_I2(F: Array, J: Array, G: Array, W2: Array) -> Array:
-    """W2 d2I2bar/dFdF."""
+    """W2 d2I2bar/dFdF (p, 9, 9)."""
     p = len(F)
     I1, I2, C = second_invariant(F)
     b = W2 * J ** (-4 / 3)

@@ -45,7 +45,7 @@ class LinearElastic(PrincipalLaw):
         return np.reshape(2 * self.G, (-1, 1)) * self._deviator(x) / x
 
     def stiffnesses(self, x: Array) -> tuple[Array, Array]:
-        """See `Principal`: of the energy in logarithmic strains."""
+        """See `PrincipalLaw`: of the energy in logarithmic strains."""
         a, b, d = pairs_of(x)
         one, twice = np.eye(3), np.reshape(2 * self.G, (-1, 1, 1))
         e = self._deviator(x)

@@ -27,14 +27,14 @@ class MooneyRivlin(InvariantLaw):
     inverse_D1: Array
 
     @property
-    def of_I2(self) -> bool:
+    def needs_I2(self) -> bool:
         return bool(np.any(self.C01))
 
     def of_invariants(self, I1: Array, I2: Array) -> Array:
         return self.C10 * (I1 - 3) + self.C01 * (I2 - 3)
 
     def slopes(self, I1: Array, I2: Array) -> Slopes:
-        return self.C10, self.C01 if self.of_I2 else None
+        return self.C10, self.C01 if self.needs_I2 else None
 
     def curvatures(self, I1: Array, I2: Array) -> None:
         return None

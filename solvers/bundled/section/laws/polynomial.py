@@ -33,7 +33,7 @@ class PolynomialLaw(InvariantLaw):
     inverse_D2: Array
 
     @property
-    def of_I2(self) -> bool:
+    def needs_I2(self) -> bool:
         return True
 
     def of_invariants(self, I1: Array, I2: Array) -> Array:

@@ -87,7 +87,7 @@ def _principal(F: Array) -> tuple[Array, Array]:
 
 
 def _with_slope(function: Callable[[Array], Array], z: Array) -> Array:
-    """The function of complex rows, to the first order of their imaginary parts."""
+    """The function at complex rows z (p, 9), to the first order of their imaginary parts."""
     if not np.iscomplexobj(z):
         return function(z)
     size = abs(z.imag).max()
@@ -99,7 +99,7 @@ def _with_slope(function: Callable[[Array], Array], z: Array) -> Array:
 
 
 def over(difference: Array, d: Array, limit: Array | float) -> Array:
-    """``difference`` / d, and its ``limit`` where d is zero."""
+    """``difference`` / d elementwise, and its ``limit`` where d is zero."""
     return np.where(d == 0.0, limit, difference / np.where(d == 0.0, 1.0, d))
 
 

@@ -36,11 +36,12 @@ class LogarithmicCord(EnergyLaw):
     """Constants per Gauss point."""
 
     stiffness: Array  # E A / s, N/m
-    tension: float = 0.0  # artificial, N/m: no energy, but a tangent
+    tension: float = 0.0  # artificial, N/m, of slack cords at the start: in the tangent only
     compressed: Array | float = 1.0  # share of the stiffness that it has in compression: 1 or 0
 
     def _borne(self, strain: Array, order: int) -> Array:
-        """W / (E A / s), or its first or second derivative by the logarithmic strain (p,)."""
+        """W / (E A / s) (p,), or its first or second derivative by the logarithmic strain (p,):
+        ``order`` 0, 1 or 2."""
         borne = (strain**2 / 2, strain, np.ones_like(strain))[order]
         if np.all(self.compressed):
             return borne
@@ -138,7 +139,7 @@ def stretch(q: Array) -> Array:
 
 def cord_rows(lines: Lines, cos: Array | float, sin: Array | float) -> Rows:
     """q = a + B0 u + B1 du/dTheta of cords at an angle from the meridian, given by its ``cos`` and
-    ``sin``, per element (e,) or one for all."""
+    ``sin``, per element (e,) or one for all. Along the cord, d/ds and sin/R d/dTheta add up."""
     cos, sin = (np.broadcast_to(np.asarray(x).reshape(-1, 1), lines.R.shape) for x in (cos, sin))
     direction = np.stack([cos * lines.tangent[..., 0], sin, cos * lines.tangent[..., 1]], -1)
     along = cos[..., None] * lines.slope
@@ -217,7 +218,7 @@ def _cords(layers: list[_Layer]) -> Cords:
         join(lambda layer: layer.rows.rest),
         join(lambda layer: layer.rows.weights),
     )
-    shared = layers[0].lines.N.ndim == 2
+    one_N = layers[0].lines.N.ndim == 2  # shape functions (g, a) of all elements
     per_radian = join(lambda layer: layer.mass * layer.lines.R * layer.lines.weights)
     return Cords(
         join(lambda layer: layer.lines.connectivity),
@@ -226,6 +227,6 @@ def _cords(layers: list[_Layer]) -> Cords:
             join(lambda layer: layer.stiffness).ravel(),
             compressed=join(lambda layer: np.full(layer.mass.size, float(not layer.tension_only))),
         ),
-        consistent_mass(layers[0].lines.N if shared else join(lambda y: y.lines.N), per_radian),
+        consistent_mass(layers[0].lines.N if one_N else join(lambda y: y.lines.N), per_radian),
         tuple(layer.name for layer in layers for _ in layer.lines.connectivity),
     )

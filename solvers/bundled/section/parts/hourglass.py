@@ -1,6 +1,8 @@
 """Control of the patterns that one Gauss point does not see (Flanagan and Belytschko, 1981).
 
-W = k / 2 (gamma . u_i)^2 for each component i of the displacements,   k = 0.005 G
+W = k / 2 (gamma . u_i)^2 per radian, for each component i of the displacements,   k = 0.005 G
+
+gamma (m^0.5) are the hourglass vectors of `elements.Solids`, u_i (a,) of an element's nodes.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from .elastic import Elastic
 from .part import Rows, on_diagonals
 
 Array = np.ndarray
-SHARE_OF_SHEAR_MODULUS = 0.005
+SHARE_OF_SHEAR_MODULUS = 0.005  # the hourglass stiffness where a deck states none
 
 
 @dataclass(frozen=True)

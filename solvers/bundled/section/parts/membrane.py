@@ -36,7 +36,8 @@ def read(job: SectionJob) -> list[TyrePart]:
 
 
 def _sections(job: SectionJob) -> Iterator[tuple[str, np.ndarray, Hyperelastic, list]]:
-    """Element type, its rows, law of small volumes; thickness, density, dynamic ratios."""
+    """Element type, rows (e,) of its block, law of the material; thickness (m), density (kg/m3),
+    dynamic over static shear and bulk modulus."""
     for k in job.keywords:
         if k.name != "MEMBRANE SECTION":
             continue

@@ -64,7 +64,7 @@ class TyrePart(ABC):
     def form(self, U: Array, fields: ModeShapes) -> Array:
         """phi^H K phi (m,) of the modes phi. K0 and K2 are symmetric, K1 antisymmetric, so that
         (a - i b)^T K(n) (a + i b) = a.K0 a + b.K0 b + n^2 (a.K2 a + b.K2 b) + 2 n b.K1 a."""
-        K0, K1, K2 = self.tangents(U, True)
+        K0, K1, K2 = self.tangents(U, harmonics=True)
         a, b = (
             np.moveaxis(part[:, self.connectivity].reshape(len(fields.n), *K0.shape[:2]), 0, -1)
             for part in (fields.real, fields.imag)
@@ -107,11 +107,11 @@ class AtStations(ABC):
 
     @abstractmethod
     def energy(self) -> Array:
-        """(s,), J per radian."""
+        """Energy at each station (s,), J per radian."""
 
     @abstractmethod
     def product(self, u: Array, du: Array) -> tuple[Array, Array]:
-        """Change of the forces with small u and du."""
+        """Changes of the forces by u and by du, (e, 3a, s) each, with small u and du."""
 
     @abstractmethod
     def tangents(self, precision: Precision) -> tuple[Array, Array, Array]:
@@ -132,7 +132,7 @@ def consistent_mass(N: Array, weights: Array) -> Array:
 
 
 def cross(a: Array, b: Array) -> Array:
-    """a x b over the last axis; np.cross spends ten times as long on its arguments."""
+    """a x b (..., 3) over the last axis; np.cross spends ten times as long on its arguments."""
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
     bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], -1)
@@ -140,17 +140,17 @@ def cross(a: Array, b: Array) -> Array:
 
 @dataclass(frozen=True)
 class Rows:
-    """z at Gauss points of elements of one kind."""
+    """z = z0 + B0 u + B1 du/dTheta at Gauss points of elements of one kind (`elastic`)."""
 
-    B0: Array  # (e, g, k, 3a)
-    hoop: Array  # (e, g, a): B1 (e, g, 3, 3a) is this on its three diagonals
-    around: slice  # the three of the k rows that B1 has
-    rest: Array  # z0, (k,) or (e, g, k)
-    weights: Array  # (e, g): of the integral per radian
+    B0: Array  # (e, g, k, 3a): dz/du
+    hoop: Array  # (e, g, a): B1 = dz/d(du/dTheta) (e, g, 3, 3a) is this on its three diagonals
+    around: slice  # the three of the k rows that du/dTheta changes
+    rest: Array  # z0 of the undeformed tyre, (k,) or (e, g, k)
+    weights: Array  # (e, g): of the integral, m3 (solids) or m2 (lines) per radian
 
     @cached_property
     def B1(self) -> Array:
-        """Rows that du/dTheta adds to the rows ``around``."""
+        """dz/d(du/dTheta) (e, g, 3, 3a) of the rows ``around``."""
         return on_diagonals(self.hoop)
 
 
@@ -251,8 +251,9 @@ class SectionJob:
     keywords: list[Block]
     mesh: DeckMesh
     materials: dict[str, Material]
-    tables: list[ModulusTable]  # whose rubber keeps its static modulus: the table is the model's
-    lossy: list[Material]  # with a loss factor
+    # modulus tables whose rubber keeps its static modulus: the model scales it mode by mode
+    tables: list[ModulusTable]
+    lossy: list[Material]  # those with a loss factor
     dynamic_Hz: float | None  # at which the vibration's modulus is evaluated; None = static
     long_term: bool  # the static state is relaxed, else its moduli are the instantaneous ones
     used: dict[str, Material] = field(default_factory=dict)  # materials named so far
@@ -265,7 +266,8 @@ class SectionJob:
         return self.used[name]
 
     def by_type(self, k: Block, kinds: Container[str]) -> dict[str, Array]:
-        """The elements of a keyword's set: element type to rows of its block. Raises DeckError."""
+        """The elements of a keyword's set: element type to rows (e,) of its block. Raises
+        DeckError."""
         name = k.need("ELSET")
         if name not in self.mesh.element_sets:
             raise DeckError(k.place, f"element set {name} is not defined")

@@ -30,8 +30,8 @@ class Pressure(TyrePart):
     """A pressure (Pa) on the faces of a surface."""
 
     lines: Lines
-    pressure: complex | float
-    connectivity: Array = field(init=False)
+    pressure: complex | float  # Pa
+    connectivity: Array = field(init=False)  # (e, a), of ``lines``
 
     def __post_init__(self) -> None:
         self.connectivity = self.lines.connectivity
@@ -112,7 +112,7 @@ def second(x: Array, dx: Array) -> tuple[Array, Array, Array]:
 
 
 def density(x: Array, dx: Array, around: Array | float) -> Array:
-    """V's integrand (...) from x, x' and ``around`` = dx/dTheta."""
+    """Integrand (...) of the volume V from x, x' = dx/ds and ``around`` = dx/dTheta, (..., 3)."""
     y, d = x @ IN_PLANE, around + x @ SPIN_AXIS.T
     return np.asarray((y * cross(dx, d)).sum(-1) / 2)
 
@@ -181,7 +181,8 @@ class PressureAtStations(AtStations):
         return self._forces(*change(*self.at, *self._fields(u, du)))
 
     def tangents(self, precision: Precision) -> tuple[Array, Array, Array]:
-        """Tangents by the product with unit displacements of each element's own nodes."""
+        """Tangents (s, e, 3a, 3a) by the product with unit displacements of each element's own
+        nodes."""
         lines = self.lines
         e, g, a = lines.slope.shape
         s = self.at[0].shape[2]

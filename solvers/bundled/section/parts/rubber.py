@@ -97,7 +97,8 @@ def _rubber(job: SectionJob, kind: str, sections: list[_Section]) -> list[TyrePa
 def _of_one_law(
     job: SectionJob, solids: Solids, sections: list[_Section], owner: Array
 ) -> list[TyrePart]:
-    """Parts of the elements of one type whose materials have the same kind of law."""
+    """Parts of the elements of one type whose materials have the same kind of law. owner (e,): the
+    section of each element; constants of a section become those of its Gauss points."""
     g = solids.weights.shape[1]
     table, laws = [], []
     for section in sections:
@@ -105,23 +106,28 @@ def _of_one_law(
         assert law is not None
         scaled = law.scaled(*material.static_scale(job.long_term))
         laws.append(scaled.nearly_incompressible() if law.incompressible else scaled)
-        place = job.tables.index(material.table) if material.table in job.tables else -1
-        ratio = (1.0, 1.0) if place >= 0 else material.dynamic_ratio(job.dynamic_Hz, job.long_term)
-        hold = section.hourglass
+        modulus_table = job.tables.index(material.table) if material.table in job.tables else -1
+        ratio = (
+            (1.0, 1.0)
+            if modulus_table >= 0
+            else material.dynamic_ratio(job.dynamic_Hz, job.long_term)
+        )
+        hold = section.hourglass  # hourglass stiffness, Pa
         if hold is None:
             hold = hourglass.SHARE_OF_SHEAR_MODULUS * np.ravel(laws[-1].shear_modulus)[0]
         compound = job.lossy.index(material) if material in job.lossy else -1
-        table.append([*ratio, material.density, hold, place, compound])
-    shear, bulk, density, hold, place, compound = np.array(table).T[:, owner]
-    point = lambda values: np.repeat(values, g)
-    still = job.dynamic_Hz is None or not (np.any(shear != 1) or np.any(bulk != 1))
+        table.append([*ratio, material.density, hold, modulus_table, compound])
+    shear, bulk, density, hold, modulus_table, compound = np.array(table).T[:, owner]
+    point = lambda values: np.repeat(values, g)  # of elements to Gauss points
+    is_static = job.dynamic_Hz is None or not (np.any(shear != 1) or np.any(bulk != 1))
     law = replace(
         laws[0].of_points(laws, point(owner)),
-        shear_ratio=None if still else point(shear),
-        bulk_ratio=None if still else point(bulk),
-        table=point(place.real.astype(int)) if job.tables else None,
+        shear_ratio=None if is_static else point(shear),
+        bulk_ratio=None if is_static else point(bulk),
+        table=point(modulus_table.real.astype(int)) if job.tables else None,
         compound=point(compound.real.astype(int)) if job.lossy else None,
     )
+    # z = F row by row; du/dTheta changes the rows 1, 4, 7: F_rTheta, F_thetaTheta, F_zTheta
     rows = Rows(solids.B0, solids.hoop, slice(1, None, 3), np.eye(3).ravel(), solids.weights)
     mass = consistent_mass(solids.mass_N, density[:, None] * solids.mass_weights)
     rubber = Elastic(solids.connectivity, rows, law, mass)

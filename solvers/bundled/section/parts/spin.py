@@ -16,9 +16,9 @@ Array = np.ndarray
 class Spin(TyrePart):
     """The force on the mass of one other part."""
 
-    connectivity: Array
-    coupled_mass: Array  # (e, a, a): the other part's mass
-    R: Array  # (e, a): radius of its nodes
+    connectivity: Array  # (e, a)
+    coupled_mass: Array  # (e, a, a): the other part's mass, kg per radian
+    R: Array  # (e, a): radius of its nodes, m
     spin2: complex | float  # square of the spin about the axle, rad2/s2
 
     def _place(self, U: Array) -> Array:
