@@ -68,6 +68,7 @@ def unfit_targets(loaded: LoadedCase) -> Mistake | None:
 
 
 def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mistake]]:
+    """The case without its measurements, None if it is wrong, and its mistakes."""
     document = read_document(path)
     data = document.data
     if data is None:

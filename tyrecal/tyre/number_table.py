@@ -39,7 +39,7 @@ class TextTable:
     """Lines of a table that are not empty: their numbers in the file and their cells, stripped."""
 
     separator: str
-    lines: list[tuple[int, list[str]]]
+    lines: list[tuple[int, list[str]]]  # line from 1, cells
 
 
 def read_text_table(path: Path) -> TextTable:

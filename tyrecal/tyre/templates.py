@@ -61,7 +61,7 @@ def environment(dialect: str, own_folder: Path | None) -> Environment:
 
 
 class Templates(Protocol):
-    """Templates that are rendered elsewhere, see `apart`."""
+    """Templates that are rendered elsewhere, see `simulate.deck.template_process`."""
 
     def render(self, template: str, names: dict[str, Any]) -> str:
         """The text of a template. Raises TemplateFailed."""

@@ -20,8 +20,8 @@ from .parts import WRONG
 
 MAX_TABLE_BYTES = 1_000_000  # of a table beside a case
 MAX_CASE_BYTES = 100_000  # bytes of YAML; shipped cases have 5000, and it is read at 30 kB/s
-MAX_EVENTS = 20_000
-DEEPEST = 20
+MAX_EVENTS = 20_000  # keys and values
+DEEPEST = 20  # keys within keys
 
 
 @dataclass
@@ -33,7 +33,7 @@ class Document:
 
     file: str
     data: dict[str, Any] | None = None
-    places: dict[Keys, tuple[int, str]] = field(default_factory=dict)
+    places: dict[Keys, tuple[int, str]] = field(default_factory=dict)  # line from 1, and its text
     mistakes: list[Mistake] = field(default_factory=list)
 
     def add(self, keys: Keys, message: str) -> None:

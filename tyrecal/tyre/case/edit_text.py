@@ -17,8 +17,9 @@ Edit = tuple[int, int, str]  # start and end of a part of the text, and what rep
 
 
 def set_in_text(text: str, values: Mapping[Keys, Any]) -> str:
-    """The YAML ``text`` with the ``values``, numbers, words or lists of them, at their keys. A key
-    that it lacks is added to the part that it belongs to. Raises YAMLError."""
+    """The YAML ``text`` with the ``values``, numbers, words or lists of them, at their keys: keys
+    and list indices from the top of the file on. A key that it lacks is added to the part that it
+    belongs to. Raises YAMLError."""
     stated = [keys for keys in values if is_stated(text, keys)]
     lacking = [[keys] for keys in values if keys not in stated]  # each changes what the next finds
     for together in (stated, *lacking):
@@ -62,7 +63,7 @@ def _edit(text: str, node: Node, keys: Keys, value: Any) -> Edit:
 
 
 def _flow(keys: Sequence[str | int], value: Any) -> str:
-    """A value under the keys, as a flow mapping."""
+    """A value under the keys, as a flow mapping such as {a: {b: 1.5}}; without keys, the value."""
     if keys:
         return f"{{{_name(keys[0])}: {_flow(keys[1:], value)}}}"
     if isinstance(value, list):

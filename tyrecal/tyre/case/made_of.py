@@ -15,7 +15,7 @@ from ..section.section import Section, SectionError
 Keys = dict[str, Any]
 RELAXATION_S = 0.1  # of the one Prony term that usual values say anything of
 COMPOUND_DENSITY_PERCENT, CORD_MODULUS_PERCENT = 2.0, 5.0  # standard deviations over makers
-BELT_ANGLE_DEG, WIRE_ANGLE_DEG = 2.0, 90.0
+BELT_ANGLE_DEG, WIRE_ANGLE_DEG = 2.0, 90.0  # standard deviation of belts; angle of bead wires
 BELT_CORD = CordMaterial(172.2e9, 0.3, 5900.0)  # Bekakos et al. (2016), like the carcass
 CARCASS_CORD = CordMaterial(9.87e9, 0.3, 1500.0, bears_compression=False)
 

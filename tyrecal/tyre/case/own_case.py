@@ -26,8 +26,9 @@ def own_case(
     numbers: Mapping[str, float] = NO_NUMBERS,
 ) -> str:
     """YAML of a case whose deck is ``deck``: what a fit most often changes is a variable, the
-    marks, the layers' areas and the rubbers' first constants. numbers: of the marks."""
-    r, z = flat.mesh.reference
+    marks, the layers' areas and the rubbers' first constants. flat: the same deck as the solvers
+    get it, all sets and parts written out; numbers: of the marks."""
+    r, z = flat.mesh.reference  # node of the rim, m
     return _text(
         [deck],
         deck.numbers,

@@ -52,7 +52,7 @@ def reaches_the_bead(case: LoadedCase, layer: str) -> bool:
     """Whether cords of a layer run into the bead along the meridian, as a carcass and its turn-up
     do."""
     own, section = case.case.rebar_layers[layer], case.section
-    last = section.regions[-1][0]
-    there = section.points[section.names.index(own.line), -1, 0]
+    last = section.regions[-1][0]  # name of the region at the bead
+    there = section.points[section.names.index(own.line), -1, 0]  # r, m; NaN: the line ends before
     ends_there = own.regions is None or last in own.regions
     return bool(ends_there and not np.isnan(there) and abs(own.angle_deg) < MERIDIONAL_DEG)

@@ -9,7 +9,7 @@ from .effect import Effect
 from .parts import belt_lines, present
 
 NYLON = Cord(kind="cord", youngs_modulus_Pa=3.5e9, poissons_ratio=0.3, density_kg_per_m3=1140.0)
-SPACING_M = 1e-3
+SPACING_M = 1e-3  # of its cords
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:

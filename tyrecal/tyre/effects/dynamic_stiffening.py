@@ -11,7 +11,7 @@ from .deck_numbers import with_prony
 from .edit import changed, with_part, with_rubbers
 from .effect import Effect
 
-# One term that has relaxed in a static step and has not in any vibration: 1/(2 pi f tau)^2 = 2e-12
+# A term relaxed in a static step, and in no vibration: 1/(2 pi f tau)^2 = 2.5e-12
 FREQUENCY_HZ, TAU_S = 100.0, 1000.0
 
 

@@ -47,7 +47,7 @@ def _mounted(section: Section, line: int, start: int, end: int, distance: float)
     lever = np.column_stack([np.ones(len(middle)), (middle - middle.mean(0)) / length.sum()])
 
     def turned(moment: Array) -> tuple[Array, Array]:
-        """Angle at each station (rad), and its displacement."""
+        """Angle at each station (n,), rad, and its displacement (n, 2), m."""
         phi = np.concatenate([[0.0], np.cumsum(lever @ moment * length / length.sum())])
         new = _rotated(step, (phi[1:] + phi[:-1]) / 2)
         return phi, np.concatenate([np.zeros((1, 2)), np.cumsum(new - step, axis=0)])

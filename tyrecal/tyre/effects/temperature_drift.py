@@ -11,6 +11,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     """A temperature of value (p - p0) / 100 kPa, p0 being the pressure in the case file."""
     nominal = case.file_data["pressure_kPa"]
     kelvin = value * (case.case.pressure_kPa - nominal) / 100
+    # `Effect.of`: the change of a section, or that of a user's deck
     try:
         return temperature.EFFECT.of(case)(case, kelvin)
     except ValueError as error:

@@ -93,14 +93,14 @@ class Belt:
 
 @dataclass(frozen=True)
 class Construction:
-    """A type of tyre. Gauges, m: crown, sidewall, bead = (a, b): a + b S1, as in `Gauges`; liner to
-    step, too."""
+    """A type of tyre. Gauges, m: crown, sidewall, bead = (a, b): a + b S1, S1 the nominal section
+    width; liner to under_tread, too. step, m: by how much a belt is narrower than the widest."""
 
     name: str
     compounds: dict[str, Compound]
     cords: dict[str, CordMaterial]
-    carcass: tuple[Ply, ...]
-    belts: tuple[Belt, ...]
+    carcass: tuple[Ply, ...]  # from inside to outside
+    belts: tuple[Belt, ...]  # from inside to outside
     cap: Ply | None
     crown: tuple[float, float]
     sidewall: tuple[float, float]
@@ -113,8 +113,9 @@ class Construction:
     step: float
     wires: int  # how many are in a bead
     wire: float  # m2 of each
-    filler: float  # its height of the arc from the rim to the widest point; the turn-up ends there
-    high: bool  # the turn-up ends at the widest point
+    # its height, share of the arc from the rim to the widest point: the turn-up's end
+    filler: float
+    high: bool  # the turn-up ends at the widest point instead
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -142,7 +143,7 @@ PASSENGER = Construction(
     compounds=SOFT,
     cords={"steel_cord": STEEL_CORD, "polyester_cord": POLYESTER_CORD, "nylon_cord": NYLON_CORD},
     carcass=(Ply("polyester_cord", 2.42e-7, 1.0e-3, 0.0),),
-    # 2 + 2 x 0.25
+    # cords of 2 + 2 wires of 0.25 mm
     belts=(
         Belt(Ply("steel_cord", 1.96e-7, 1.2e-3, 70.0)),
         Belt(Ply("steel_cord", 1.96e-7, 1.2e-3, 110.0), steps=1),
@@ -158,7 +159,7 @@ PASSENGER = Construction(
     under_tread=1.5e-3,
     step=0.010,
     wires=20,
-    wire=7.2e-7,  # 0.96 mm
+    wire=7.2e-7,  # 0.96 mm wide
     filler=0.45,
     high=True,
 )
@@ -168,7 +169,7 @@ LIGHT_TRUCK = Construction(
     cords=PASSENGER.cords,
     carcass=2 * PASSENGER.carcass,
     belts=(
-        Belt(Ply("steel_cord", 2.83e-7, 1.4e-3, 70.0)),  # 4 x 0.30
+        Belt(Ply("steel_cord", 2.83e-7, 1.4e-3, 70.0)),  # 4 wires of 0.30 mm
         Belt(Ply("steel_cord", 2.83e-7, 1.4e-3, 110.0), steps=1),
     ),
     cap=PASSENGER.cap,
@@ -186,7 +187,7 @@ LIGHT_TRUCK = Construction(
     filler=0.5,
     high=True,
 )
-HEAVY = Ply("steel_cord", 6.7e-7, 2.0e-3, 72.0)  # 3 x 0.20 + 6 x 0.35
+HEAVY = Ply("steel_cord", 6.7e-7, 2.0e-3, 72.0)  # wires: 3 of 0.20 and 6 of 0.35 mm
 TRUCK = Construction(
     name="truck",
     compounds={
@@ -199,7 +200,7 @@ TRUCK = Construction(
         "belt_skim": Compound(78, 1190),
     },
     cords={"steel_cord": STEEL_CORD, "carcass_cord": replace(STEEL_CORD, bears_compression=False)},
-    carcass=(Ply("carcass_cord", 6.5e-7, 2.0e-3, 0.0),),  # 3 + 9 + 15 x 0.175
+    carcass=(Ply("carcass_cord", 6.5e-7, 2.0e-3, 0.0),),  # 27 of 0.175 mm
     belts=(
         Belt(Ply("steel_cord", HEAVY.area, HEAVY.spacing, 50.0), share=0.75),  # transition belt
         Belt(HEAVY),

@@ -28,7 +28,7 @@ CROWN_RADIUS = 1.5  # of the carcass, times the section width over the aspect ra
 SHOULDER = 0.85  # gauge at the wider belt's edge over the crown's
 BUTTRESS = 0.55  # of the arc from the belt to the widest point, where the sidewall's gauge begins
 STRIP = 0.4  # of what lies outside the carcass at the rim: the rim strip outside the turn-up
-NANOMETRE = 1e-9
+NANOMETRE = 1e-9  # m, of round-off in arc lengths
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def build(size: TyreSize, gauges: Gauges) -> GaugeTable:
         belt=half_belt,
         widest=(radius, width / 2 - (g.sidewall - g.liner)),
         rim=(flange, g.rim / 2),
-        # of a 15 degree seat, under the carcass; one of 5 degrees is as good as flat
+        # the carcass ends 2 mm above the seat; one of 5 degrees counts as flat, of 15 degrees not
         seat=seat + 2e-3 - np.tan(np.radians(15 * size.truck)) * (g.bead - inside_bead),
         offset=g.bead - inside_bead,
     )
@@ -138,7 +138,7 @@ def _layers(g: Gauges, made: Construction) -> dict[str, tuple[float, float]]:
 
 
 def _stations(ends: list[float]) -> tuple[Array, list[str]]:
-    """Arcs of the stations of regions that end at ``ends``, and each station's region."""
+    """Arcs (n,), m, of the stations of regions that end at ``ends``, and each station's region."""
     belted = len(ends) - len(BELOW)
     names = ["crown", *["belt_edges"][: belted - 2], "shoulder"][:belted]
     counts = {**{name: BELTED[name] for name in names}, **BELOW}

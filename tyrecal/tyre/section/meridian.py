@@ -7,7 +7,7 @@ cords' tension a radian round the axle and g the share of the pressure that the 
 
 from the crown's centre (psi = 0) outwards, rho = T / p. The belt, of half width b, carries
 
-    g(s) = g0 (1 - (s/b)^n),   g0 = 1 - rho / (r0 R)      R: the carcass' radius at the crown
+    g(s) = g0 (1 - (s/b)^n),   g0 = 1 - rho / (r0 R)      R: its radius of curvature at the crown
 
 (a choice: any share that fades towards the edge would do) and nothing beyond, where
 cos psi = cos psi_b + (r^2 - r_b^2) / (2 rho). rho and n follow from the widest point. Below it,
@@ -29,7 +29,7 @@ from .section import SectionError
 from .spline import CubicSpline
 
 Array = np.ndarray
-STEPS_A_PART = 200  # of each part
+STEPS_A_PART = 200  # under the belt, and above and below the widest point
 EXPONENTS = np.log([1.0, 40.0])  # of the belt's share: from a roof to nearly a step
 MAX_RIM_SLOPE = np.tan(np.radians(75))  # of the carcass at the rim, from the wheel's plane
 SHARPEST_TURN = 0.6  # of the carcass at the seat: its curvature times the gauge outside it
@@ -95,7 +95,8 @@ def meridian(
 def _upper(
     crown: float, crown_radius: float, belt: float, radius: float, width: float
 ) -> tuple[Array, float]:
-    """Points from the crown to the widest one at z = ``width``, near r = ``radius``; and rho."""
+    """Points (n, 2), m, from the crown to the widest one at z = ``width``, near r = ``radius``;
+    and rho."""
 
     def rho_of(log_n: float) -> float:
         """ln rho with which the tyre is as wide as it should be."""
@@ -162,5 +163,5 @@ def _beyond(edge: Array, rho: float) -> Array:
 
 
 def _integral(f: Array, x: Array) -> Array:
-    """Integral from the first point to each, by trapezia."""
+    """Integral from the first point to each (n,), by trapezia."""
     return np.concatenate([[0.0], np.cumsum((f[1:] + f[:-1]) / 2 * np.diff(x))])

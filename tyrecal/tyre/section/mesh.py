@@ -47,14 +47,14 @@ class SectionMesh:
         return 1000 * (step * np.arange(along + 1) + 1) + step * np.arange(rows + 1)[:, None] + 1
 
     def grid(self) -> tuple[Array, Array]:
-        """Corner nodes, and where the four of each element stand among them."""
+        """Corner nodes (k,), and the places (e, 4) of each element's four among them."""
         nodes = self.corners()
         k = np.arange(nodes.size).reshape(nodes.shape)
         quads = np.stack([k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]], -1)
         return nodes.ravel(), quads.reshape(-1, 4)
 
     def skin(self) -> Array:
-        """Corner nodes of the outer surface from -z to +z, from inner bead edge to inner bead
+        """Corner nodes (k,) of the outer surface from -z to +z, from inner bead edge to inner bead
         edge."""
         grid = self.corners()
         return np.concatenate([grid[:-1, 0], grid[-1], grid[-2::-1, -1]])

@@ -44,7 +44,7 @@ def read_outline(path: Path) -> dict[str, Array]:
 
 
 def _from_crown(name: str, points: Array) -> Array:
-    """A curve in m, its first point on the centre plane."""
+    """A curve (n, 2), r and z in m, its first point on the centre plane; points in mm."""
     if len(points) < 5:
         raise SectionError(f"the {name} curve has {len(points)} points, at least 5 are needed")
     points = points[:: -1 if points[-1, 1] < points[0, 1] and points[-1, 0] > points[0, 0] else 1]
@@ -120,7 +120,8 @@ def section_of_outline(
 
 
 def _smooth(curve: Array) -> tuple[Array, Array]:
-    """Points and unit tangents at equal steps of the curve's length, without new bumps."""
+    """Points (n, 2) and unit tangents (n, 2) at equal steps of the curve's length, without new
+    bumps."""
     arc = length_along(curve)
     through = PchipInterpolator(arc, curve)
     at = np.linspace(0, arc[-1], DENSE)
@@ -129,8 +130,8 @@ def _smooth(curve: Array) -> tuple[Array, Array]:
 
 
 def _rays(inner: Array, tangent: Array, last: Array) -> Array:
-    """Unit directions through the thickness: upright at the crown, along the normal, and at the
-    bead from the end of one curve to that of the other."""
+    """Unit directions (n, 2) through the thickness: upright at the crown, along the normal, and at
+    the bead from the end of one curve to that of the other."""
     rays = np.stack([tangent[:, 1], -tangent[:, 0]], -1)
     rays[0] = [1.0, 0.0]
     share = np.clip((np.linspace(0, 1, len(inner)) - 1 + HELD) / HELD, 0, 1)[:, None]
@@ -140,7 +141,7 @@ def _rays(inner: Array, tangent: Array, last: Array) -> Array:
 
 
 def _thickness(start: Array, rays: Array, outer: Array) -> Array:
-    """Length of each ray from the inner surface to the outer, by the nearest crossing."""
+    """Length (n,), m, of each ray from the inner surface to the outer, by the nearest crossing."""
     a, side = outer[:-1], np.diff(outer, axis=0)
     turn = rays[:, None, 0] * side[None, :, 1] - rays[:, None, 1] * side[None, :, 0]
     gap = a[None] - start[:, None]

@@ -21,7 +21,7 @@ from .spline import CubicSpline
 
 Array = np.ndarray
 GAUGE = "_gauge_mm"
-STEPLESS = 1e-9  # m
+STEPLESS = 1e-9  # m, of a line between its two parts: less is no step
 GaugeFactor = tuple[tuple[str, ...], tuple[str, str], float]  # regions, (line, line), factor
 
 
@@ -155,7 +155,7 @@ def fill_lines(section: Section) -> Array:
     present = ~np.isnan(points).any(-1)
 
     def as_at(near: int, k: int, j: int) -> Array:
-        """Line k at station j as its fraction at ``near`` has it."""
+        """Line k (2,) at station j, at the fraction of the thickness that it has at ``near``."""
         both = present[:, j] & present[:, near]
         above = next(m for m in range(k + 1, len(section.names)) if both[m])
         start, end = points[k - 1, near], points[above, near]  # already made whole
@@ -233,7 +233,7 @@ def with_gauges(section: Section, gauges: tuple[GaugeFactor, ...]) -> Section:
 
 
 def _share(section: Section, regions: tuple[str, ...], factor: float) -> np.ndarray:
-    """The factor at each station."""
+    """The factor at each station (n,): its geometric mean where two regions meet."""
     logs = np.zeros((2, section.points.shape[1]))  # of the region before and after a station
     start = 0
     for name, count in section.regions:

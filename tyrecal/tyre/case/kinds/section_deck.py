@@ -108,7 +108,7 @@ class SectionDeck(UserDecks):
         """The deck and what it includes. Raises OwnDeckError for gauges and moduli that are not the
         deck's."""
         flat, c = tyre.flat, tyre.case
-        why = {
+        why = {  # reason of a refusal, and whether it applies
             "deck.gauges must be 1, because the deck has its own nodes": self.source(c).thickened,
             "analysis.static_moduli must be those of its *STATIC": (
                 (c.analysis.static_moduli == "long_term") != flat.long_term
@@ -143,7 +143,8 @@ class SectionDeck(UserDecks):
         return case, dict(zip(able, able, strict=True))
 
     def moduli(self, case: Case, material: str) -> dict[str, int]:
-        """Paths of the moduli that are plain numbers."""
+        """Paths of the moduli that are plain numbers: 1 where a number grows with the stiffness, -1
+        where it falls (D1)."""
         return moduli(self.numbers(case), material)
 
 
