@@ -30,7 +30,7 @@ Array = np.ndarray
 FREQUENCY_OFF = 0.15  # standard deviation of ln frequency
 SHAPE_OFF = 0.05  # mean square error of a shape of the case over its mean square
 MAX_OFF_TYRE = 0.03  # m, largest distance of a sensor from the case's tyre
-PER_HARMONIC = 4  # modes evaluated: orders 0 to 3
+PER_HARMONIC = 4  # modes evaluated of each harmonic c: m = 0 to 3
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class CaseModes:
 
     @property
     def half_width(self) -> float:
-        """Half the width of the belt, m."""
+        """Half the width of the belt, m: the largest |Z| where R > `BELT` times the largest R."""
         R, Z = self._points.T
         return float(np.abs(Z[R / R.max() > BELT]).max())
 

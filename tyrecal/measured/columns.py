@@ -52,7 +52,7 @@ LENGTHS = {name for name, table in units.QUANTITIES.items() if table is units.LE
 class TableColumn:
     """The column of a table that holds one meaning, a key of `HEADINGS`."""
 
-    index: int
+    index: int  # from 0
     # from the unit in the heading to that of the meaning's name; pressure: kPa, load: N
     factor: float = 1.0
     percent: bool = False  # whether a sigma is in % of the value

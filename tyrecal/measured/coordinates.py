@@ -29,7 +29,7 @@ WIDTH_18 = 13  # characters of a number in data set 18
 class CoordinateSystem:
     """A Cartesian or cylindrical coordinate system."""
 
-    kind: int
+    kind: int  # a number of the data set, see above
     axes: Array  # (3, 3) unit vectors along its x, y, z, a row each, in the global system
     origin: Array  # (3,) in the global system, in the file's unit of length
 

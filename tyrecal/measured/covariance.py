@@ -66,8 +66,8 @@ def label_covariances(
 
 
 def half_widths(sensors: Sensors, known: float | None = None) -> Array:
-    """Half widths (m) that the belt may have, each as likely: the one known, or `WIDTHS` between
-    those of narrow and wide tyres, none narrower than the sensors on the belt."""
+    """Half widths (k,), m, that the belt may have, each as likely: the one known, or `WIDTHS`
+    between those of narrow and wide tyres, none narrower than the sensors on the belt."""
     R, _, Z = sensors.points.T
     outermost = float(np.abs(Z[R / R.max() > BELT]).max())
     if known is not None:
@@ -78,7 +78,7 @@ def half_widths(sensors: Sensors, known: float | None = None) -> Array:
 
 
 def _unit(S: Array) -> Array:
-    """S with a unit mean diagonal."""
+    """S (k, k) scaled to a mean diagonal of 1."""
     return S * (len(S) / max(np.trace(S), 1e-300))
 
 

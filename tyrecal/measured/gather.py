@@ -31,7 +31,7 @@ class Gathered:
     rows: list[Measurement]  # one value each with its sigma
     runs: list[ModalTest]  # of the universal files
     notes: list[str]  # what a user has to know
-    doubts: list[str]  # about the sense of the rows
+    doubts: list[str]  # sentences on labels or pressures that may be exchanged, see `sense`
 
 
 def gather(
@@ -45,8 +45,9 @@ def gather(
 ) -> Gathered:
     """Measurements of several files; those of the same thing are repeats.
 
-    pressure_kPa: of files that do not say theirs; floor, assumed: relative, see ``combined``;
-    leave_out: channels, see ``arrange``; keep_going: leave out repeats that contradict each other.
+    pressure_kPa: of files that do not state theirs; layout: axle, centre, directions and band of
+    the universal files; floor, assumed: relative, see ``combined``; leave_out: names of channels,
+    see ``arrange``; keep_going: leave out repeats that contradict each other.
     Frequencies without labels come last. Raises InputError, where repeats contradict each other
     too; OSError.
     """
@@ -54,7 +55,7 @@ def gather(
         if path.resolve() in [other.resolve() for other in paths[:k]]:
             raise InputError(f"{path}: is given twice; a file cannot be its own repeat")
     universal = [read_universal(path) for path in paths if is_universal(path)]
-    axes = {node: each for file in universal for node, each in file.axes.items()}
+    axes = {node: each for file in universal for node, each in file.axes.items()}  # of the sensors
     geometry = Geometry(all_nodes(universal), axes)
     tables = [path for path in paths if path not in [file.path for file in universal]]
     values = [row for path in tables for row in read_table(path, pressure_kPa)]
@@ -65,6 +66,7 @@ def gather(
         for file in universal
         for what, count in file.skipped.items()
     ]
+    # a file with nodes alone is the geometry of the others
     measured = [f for f in universal if f.shapes or f.functions or not f.nodes]
     arranged = arrange(measured or universal, leave_out)
     notes += arranged.notes

@@ -16,7 +16,7 @@ from .universal import Place, Signal
 
 Array = np.ndarray
 
-RADIUS_RANGE_m = (0.15, 1.5)  # m, of tyres
+RADIUS_RANGE_m = (0.15, 1.5)  # of tyres
 MAX_ASPECT = 0.75  # a tyre's width over its diameter is less
 # radius over the largest one, above which a sensor is on the tread or its shoulders; `BELT` is the
 # same for the belt alone

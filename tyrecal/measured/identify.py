@@ -86,15 +86,15 @@ def identify(measured: Responses, low_Hz: float, high_Hz: float) -> Identified:
     modes = _modes(_poles(triangles, f[used]), low_Hz, high_Hz)
     if not len(modes):
         raise InputError(f"no mode is stable between {low_Hz:g} and {high_Hz:g} Hz")
-    hertz, z, spread = modes.T
+    hertz, damping, spread = modes.T
     others = [np.delete(triangles, j, axis=0) for j in range(count if count > 2 else 0)]
     again = [_modes(_poles(each, f[used]), low_Hz, high_Hz) for each in others]
     sigma = np.hypot(_jackknife(again, hertz), spread)
     inside = (f >= low_Hz) & (f <= high_Hz)
-    residues, fitted = _residues(f, mobility, inside, _pole(hertz, z))
+    residues, fitted = _residues(f, mobility, inside, _pole(hertz, damping))
     fitted[:, ~inside] = np.nan
-    rows = zip(hertz, z, residues, sigma, strict=True)
-    found_modes = [MeasuredMode(float(h), u, float(zk), float(s)) for h, zk, u, s in rows]
+    rows = zip(hertz, damping, residues, sigma, strict=True)
+    found_modes = [MeasuredMode(float(h), u, float(d), float(s)) for h, d, u, s in rows]
     return Identified(tuple(found_modes), fitted / to_mobility)
 
 
@@ -114,8 +114,8 @@ def _triangle(H: Array, order: int) -> Array:
 
 
 def _poles(triangles: Array, f: Array) -> list[Array]:
-    """Poles, rad/s, of each order from 1 on; the highest coefficient is 1, so that those which
-    only follow the noise are unstable."""
+    """Poles (order,), rad/s, of each order from 1 on; the highest coefficient is 1, so that those
+    which only follow the noise are unstable."""
     size = triangles.shape[-1]
     ridge = RIDGE * np.linalg.norm(triangles) / np.sqrt(size) * np.eye(size)
     R = np.asarray(np.linalg.qr(np.vstack([*triangles, ridge]), mode="r"))
@@ -132,7 +132,7 @@ def _poles(triangles: Array, f: Array) -> list[Array]:
 
 
 def _pole(hertz: Array, damping: Array) -> Array:
-    """Poles, rad/s, of frequencies and damping ratios."""
+    """Poles (modes,), rad/s, of frequencies and damping ratios."""
     return 2 * np.pi * hertz * (-damping + 1j * np.sqrt(1 - damping**2))
 
 
@@ -183,8 +183,8 @@ def _modes(poles: list[Array], low_Hz: float, high_Hz: float) -> Array:
 
 
 def _jackknife(again: list[Array], frequencies: Array) -> Array:
-    """Standard deviation of each frequency, Hz, from the modes found without one group each; NaN
-    where fewer than three saw it."""
+    """Standard deviation of each frequency (modes,), Hz, from the modes (modes, 3) found without
+    one group each; NaN where fewer than three saw it."""
     nearest = np.full((len(again), len(frequencies)), np.nan)
     for j, modes in enumerate(again):
         for i, hertz in enumerate(frequencies):

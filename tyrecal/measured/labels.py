@@ -37,10 +37,10 @@ Array = np.ndarray
 
 MIN_LABEL_PROBABILITY = 0.9  # probability from which a label is given
 MIN_LN_ODDS = 5.0  # expected logarithm of the odds below which sensors cannot tell two labels apart
-ODDS_NOISE = 0.02  # noise at which it is expected
-NOISE_VARIANCES = (1e-4, 1e-3, 1e-2, 5e-2, 0.2)  # over the mean variance of a label's signals
+ODDS_NOISE = 0.02  # nu at which it is expected
+NOISE_VARIANCES = (1e-4, 1e-3, 1e-2, 5e-2, 0.2)  # nu, over the mean variance of a label's signals
 WITHOUT_LOWER = 0.02  # prior of [c,m+2] without [c,m] below it, of 1
-SHAPES_DRAWN, DRAWN_NOISE = 64, 0.01  # shapes drawn of each label, and their noise
+SHAPES_DRAWN, DRAWN_NOISE = 64, 0.01  # shapes drawn of each label, and their nu
 MIN_LABELLED = 0.9  # share of a label's shapes that get it, for the sensors to tell it
 MIN_TAKEN = 0.03  # mean probability that a rival takes, to be named
 

@@ -41,7 +41,9 @@ def _with_own_file(loaded: LoadedCase, to_fit: bool = False) -> LoadedCase:
     from .targets import with_measured, with_own_file
 
     try:
-        if to_fit and not any(each.is_unlabelled for each in read_measurements(path, False)):
+        if to_fit and not any(
+            each.is_unlabelled for each in read_measurements(path, labelled=False)
+        ):
             with_measured(loaded, path)
         return with_own_file(loaded)
     except OSError as error:

@@ -71,7 +71,7 @@ class LabelledMode:
     mode: MeasuredMode
     sensors: Sensors
     shape: Array  # (k,) real, largest value 1
-    collinearity: float
+    collinearity: float  # modal phase collinearity, 0 to 1 (a real shape)
     judged: Judged
     place: str  # file and data set
     member: str = ""  # 1 or 2 if both modes of a doublet were measured
@@ -82,7 +82,7 @@ class ModalTest:
     """Modes of one test. The functions are None if the file has mode shapes."""
 
     name: str
-    modes: tuple[LabelledMode, ...]
+    modes: tuple[LabelledMode, ...]  # by rising frequency
     frequency_Hz: Array | None = None  # (n,)
     functions: Array | None = None  # (k, n) from which the modes were identified
     fitted: Array | None = None  # (k, n) the functions of the modes, NaN outside the band

@@ -86,9 +86,9 @@ def _pooled(groups: dict[object, list[Measurement]], quantity: str) -> float | N
 
 
 def one_for_both(values: Sequence[Measurement]) -> list[Measurement]:
-    """The values with the two members of a doublet as one, their mean, where some runs have other
-    members than others have. The mean keeps the first one's sigma, and a member alone stands for
-    both; values under load stay as they are."""
+    """The values, with the two members of a doublet averaged where not all runs measured the same
+    members. The mean keeps the first one's sigma, and a member alone stands for both; values under
+    load stay as they are."""
     places: dict[tuple[object, ...], dict[str, list[Measurement]]] = {}
     for each in values:
         place = (each.quantity, each.label, each.state)

@@ -40,10 +40,10 @@ SHAPE_SD_ELSE, SHAPE_SD_FREE = 0.02, 0.2  # with more waves; on a free rim with 
 RISE, RISE_SD, OWN_RISE_SD = 0.35, 0.08, 0.05  # of s and s_label
 # of [0,0] torsional, in which cords carry nearly all: computed for tyres of ten sizes
 TORSIONAL_RISE, TORSIONAL_RISE_SD = 0.24, 0.08
-MIN_NOISE = 0.003
+MIN_NOISE = 0.003  # of ln f
 EXCHANGED, OFF = 16.0, 25.0  # chi-squared that a doubt takes away
 NEXT_SLIP = 6.0  # chi-squared between a slip and the next likely: below, both are named
-MAX_DOUBTS = 5
+MAX_DOUBTS = 5  # sentences
 
 
 def doubts_of_file(path: Path) -> list[str]:
@@ -169,7 +169,8 @@ def _usual(row: Measurement) -> float:
 
 
 def _pattern(rows: Sequence[Measurement]) -> tuple[Array, Array]:
-    """The inverse covariance of ln f by the pattern, and the deviations from its mean."""
+    """The inverse covariance (n, n) of ln f by the pattern, and the deviations (n,) from its
+    mean."""
     labels = [row.label or Label(0, 9) for row in rows]
     y = np.log([row.value / _usual(row) for row in rows])
     p = np.log([row.pressure_kPa for row in rows])

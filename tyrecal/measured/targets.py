@@ -1,6 +1,7 @@
 """Measurements (CSV) as the targets of a case.
 
-A target has a state: pressure, load and rim. None in a state means "as the case has it". The case
+A target has a state: pressure, load and rim. None in a state means "as the case has it"
+(`TyreState.of` writes it so, `with_defaults` writes the case's own). The case
 that a user has changed (`--set`, `LoadedCase.overrides`) keeps the file's own one as
 ``LoadedCase.as_read``.
 """
@@ -38,8 +39,9 @@ def with_measured(
 
     labelled: the file's measurements, if labels were found for those that had none. If both modes
     of a pair of the unloaded tyre were measured, the target is their mean. If the user has set the
-    pressure or the rim, or a variable sets the pressure, only values measured there are taken.
-    Raises InputError if nothing is left, or the case cannot be in a state; OSError.
+    pressure or the rim, or a variable sets the pressure, only values measured there are taken; so,
+    too, if all values were measured at one pressure that is not the case's. Raises InputError if
+    nothing is left, or the case cannot be in a state; OSError.
     """
     readings = readings_of(case, path) if labelled is None else labelled
     placed = _placed(case, readings)
@@ -61,13 +63,15 @@ def with_own_file(case: LoadedCase) -> LoadedCase:
     each in its state. Raises InputError, OSError."""
     if case.measured is None:
         return case
-    readings = [each for each in readings_of(case, case.measured, False) if not each.is_unlabelled]
+    readings = readings_of(case, case.measured, labelled=False)
+    readings = [each for each in readings if not each.is_unlabelled]
     return _with_targets(case, case.measured, _placed(case, readings), readings)
 
 
 def readings_of(case: LoadedCase, path: Path, labelled: bool = True) -> list[Measurement]:
-    """The measurements of a file. In the case's own one a value on the case's rim stays on the rim
-    that the case file has, whatever its user has set since. Raises as `read_measurements` does."""
+    """The measurements of a file; labelled: each frequency needs a label. In the case's own file a
+    value on the case's rim stays on the rim that the case file has, although its user has set
+    another since. Raises as `read_measurements` does."""
     readings = read_measurements(path, labelled)
     if path != case.measured:
         return readings

@@ -76,7 +76,7 @@ class MeasuredShape:
 
     frequency_Hz: float
     damping: float  # ratio; NaN where not stated
-    nodes: tuple[int, ...]
+    nodes: tuple[int, ...]  # (k,) numbers
     values: Array  # (k, 3) complex, in each node's own directions; NaN: 0 in every mode of the file
     place: str
 
@@ -104,6 +104,7 @@ class Universal:
     nodes: dict[int, Place]  # x, y, z in the global system, m, by number
     shapes: list[MeasuredShape]
     functions: list[Function]
+    # node numbers along each trace line that the file draws
     lines: list[tuple[int, ...]] = field(default_factory=list)
     skipped: Counter[str] = field(default_factory=Counter)  # what was not used, how often
     # (3, 3) unit vectors of the directions 1, 2, 3 in the global system, a row each, of nodes with
@@ -146,7 +147,7 @@ def read_universal(path: Path) -> Universal:
 def _add(
     result: Universal, each: _Set, systems: dict[int, CoordinateSystem], length: float
 ) -> None:
-    """Add one data set to what the file holds."""
+    """Add one data set to what the file holds; ``length``: see `_length`."""
     if each.kind in NODES:
         _add_nodes(result, each, systems, length)
     elif each.kind == 82:
@@ -161,7 +162,7 @@ def _add(
 class _Set:
     """A data set: its type, place, lines after the type, and content as pyuff has it."""
 
-    kind: int
+    kind: int  # number of the data set, such as 58
     place: str
     lines: list[str]
     content: dict[str, Any]
@@ -233,7 +234,8 @@ def _systems(sets: Sequence[_Set]) -> dict[int, CoordinateSystem]:
 def _add_nodes(
     result: Universal, each: _Set, systems: dict[int, CoordinateSystem], length: float
 ) -> None:
-    """Add the nodes of a data set, in m and in the global system. Raises InputError."""
+    """Add the nodes of a data set, in m and in the global system; ``length``: the file's units in a
+    metre. Raises InputError."""
     content = each.content
     numbers = [content[name] for name in ("node_nums", "def_cs", "disp_cs", "x", "y", "z")]
     if len(set(map(len, numbers))) > 1:

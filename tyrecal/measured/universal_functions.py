@@ -23,6 +23,7 @@ QUANTITIES_58 = {  # code, exponents of length, force and temperature, label, un
     "none": (0, 0, 0, 0, "NONE", "NONE"),
 }
 SYSTEM_NUMBER = 2  # of the cylindrical system; 1 is often taken for the global one
+SYSTEM_COLOUR, NODE_COLOUR = 8, 11  # numbers of colours, without a meaning here
 
 
 @dataclass(frozen=True)
@@ -52,12 +53,14 @@ def universal_text(
         f"{1:10d}{'SI: m, N':<20}{2:10d}\n{_double(1)}{_double(1)}{_double(1)}\n{_double(273.15)}"
     )
     axes = [*system.axes, system.origin]
-    systems = [f"{1:10d}", _text(title), f"{SYSTEM_NUMBER:10d}{CYLINDRICAL:10d}{8:10d}", "TYRE"]
+    head = f"{SYSTEM_NUMBER:10d}{CYLINDRICAL:10d}{SYSTEM_COLOUR:10d}"
+    systems = [f"{1:10d}", _text(title), head, "TYRE"]
     systems += ["".join(map(_double, row)) for row in axes]
     places = []
     for number, place in nodes.items():
         moves_in = SYSTEM_NUMBER if number in cylindrical else 0
-        places += [f"{number:10d}{0:10d}{moves_in:10d}{11:10d}", "".join(map(_double, place))]
+        systems_and_colour = f"{0:10d}{moves_in:10d}{NODE_COLOUR:10d}"
+        places += [f"{number:10d}{systems_and_colour}", "".join(map(_double, place))]
     sets = [_set(151, header), _set(164, [units]), _set(2420, systems), _set(2411, places)]
     sets += [_function(title, each, frequency_Hz) for each in functions]
     return "".join(sets)

@@ -19,7 +19,7 @@ from ...tyre.templates import TemplateFailed
 
 MAX_NAME_LENGTH = 200  # of a case, as a line of a deck has at most 256 characters
 FIRST = b"** Written by tyrecal: "
-HEADER_LINES = 3
+HEADER_LINES = 3  # comments at the start of a deck, of its version: no part of its meaning
 UNITS_IN_WORDS = {"m": "SI units: m, kg, s, Pa", "mm": "units: mm, t, s, MPa"}
 LEADS_OUTSIDE = re.compile(  # but for comments: an absolute path or one upwards, code of one's own
     r"^(?!\*\*).*=[ \t]*[\"']?(?:[/\\~@]|\.\.|[a-z]:[/\\]).*|^\*[ \t]*USER[ \t]*SUBROUTINE.*",
@@ -118,9 +118,9 @@ class PressedTyre:
 
     of: DesignKey
     texts: Mapping[str, str]
-    nodes: np.ndarray
-    inflated: np.ndarray
-    displacement: np.ndarray
+    nodes: np.ndarray  # (n,) numbers
+    inflated: np.ndarray  # (n, 3) before the load, m
+    displacement: np.ndarray  # (rings, n, 3) under the load, m
     load_N: float
     deflection_m: float
 

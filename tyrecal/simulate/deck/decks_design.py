@@ -32,7 +32,7 @@ class DecksDesign:
     def __init__(self, case: LoadedCase, values: Mapping[str, float] | None = None):
         """Raises ValueError for an unknown name, or a value that the case cannot have."""
         self.values: Mapping[str, float] = dict(values or {})
-        self.case = resolved(set_values(case, self.values)).written
+        self.case = resolved(set_values(case, self.values)).written  # its effects as numbers
         self.decks = self.case.kind.decks
 
     def at(self, values: Mapping[str, float]) -> DecksDesign:
@@ -77,7 +77,8 @@ class DecksDesign:
         return self.case.case.solver
 
     def neighbour(self, name: str, side: int) -> tuple[Design, float]:
-        """None: a fit takes differences of frequencies."""
+        """Raises TemplateFailed: these decks have no neighbours, a fit takes differences of
+        frequencies."""
         raise TemplateFailed(f"{name}: decks in three dimensions have no exact sensitivities")
 
     def check(self, evaluator: DesignEvaluator) -> None:
@@ -97,7 +98,7 @@ class DecksDesign:
 
     @property
     def advice_on_buckling(self) -> str:
-        """None: these decks are not pressed."""
+        """Nothing: these decks are not pressed."""
         return ""
 
     def texts(self, dialect: str, request: Mapping[str, Any]) -> dict[str, str]:
@@ -162,7 +163,7 @@ def added_words(decks: OwnDecks, dialect: str) -> str:
 def _abaqus(decks: OwnDecks) -> Added:
     """Eigenvalues in addition to the shapes, and the file that holds them as text: once in an
     analysis, "and the format cannot be changed upon restart" (manual, *FILE FORMAT)."""
-    blocks = [block for deck in decks.restarted for block in deck.blocks]
+    blocks = [block for deck in decks.restarted for block in deck.blocks]  # of one analysis
     formats = [block for block in blocks if block.name == "FILE FORMAT"]
     if formats and "ASCII" not in formats[0].parameters:
         raise formats[0].refused("must have ASCII: shapes are read from the results file as text")

@@ -19,7 +19,7 @@ GB = 1e9
 
 def packages() -> list[dict[str, Any]]:
     """Packages that tyrecal needs: ``name``, ``needed`` (version specifier such as ">=1.26"),
-    ``version`` that is installed (None: missing), ``ok``: whether it is a needed one."""
+    ``version`` that is installed (None: missing), ``ok``: whether that is a version needed."""
     return [_status(each) for each in _requirements("")]
 
 

@@ -21,7 +21,7 @@ def fresh(parent: Path | None) -> Path:
 
 
 def keep(folder: Path, outcome: str) -> Path:
-    """Leave the folder, with a word on what came of it."""
+    """Leave the folder, and write in it how the run ended: a word of ``outcome``."""
     with contextlib.suppress(OSError):
         (folder / OUTCOME).write_text(outcome + "\n", encoding="utf-8")
     return folder
@@ -29,7 +29,7 @@ def keep(folder: Path, outcome: str) -> Path:
 
 def drop(folder: Path) -> None:
     """Remove the folder."""
-    with defer_interrupts():  # it would close a file twice, and say that instead
+    with defer_interrupts():  # one inside rmtree ends as the error of a file closed twice
         shutil.rmtree(folder, ignore_errors=True)
 
 

@@ -21,8 +21,8 @@ from typing import Any
 
 from ...interrupt import defer_interrupts, exit_code, pending_interrupt, remember_interrupts
 
-WARM = "tyrecal.batch.warm"
-ANSWERED_S = 0.1  # within which an interruption is
+WARM = "tyrecal.batch.warm"  # imported by the server that forks the processes, once
+ANSWERED_S = 0.1  # the longest delay of an interruption while `first_done` waits
 PATIENCE_S = 5.0  # for processes that were told to end
 PARENTS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(signal, name))
 

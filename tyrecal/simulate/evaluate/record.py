@@ -20,7 +20,7 @@ from ...errors import InputError
 
 ARRAY = "__array__"
 MAX_JSON_BYTES = 2_000_000  # a hundred times the longest line of an answer
-MAX_ARRAYS = 5000
+MAX_ARRAYS = 5000  # in one record
 DIGEST = 65  # bytes of the first line: 64 hexadecimal digits and the line's end
 
 

@@ -49,7 +49,7 @@ class _Mode(_Part):
     n: Annotated[Any, of.shaped("iu", least=-1)] = 0  # harmonic of the amplitude
     # (points, 3) along r, theta, z
     amplitude: Annotated[Any, of.shaped("c" + of.REAL, None, 3)] = None
-    # (points, 3) along x, y, z; NaN where the solver does not give it
+    # (points, 3) along r, theta, z; NaN where the solver does not give it
     displacement: Annotated[Any, of.shaped(of.REAL, None, 3, nan=True)] = None
     members: of.HertzPair | None = None
     damping_ratio: of.Finite | None = None

@@ -18,7 +18,7 @@ class HarmonicShape:
     n: int  # circumferential harmonic
     nodes: Array  # (k,) deck numbers
     points: Array  # (k, 2) R, Z in m, uninflated
-    amplitude: Array  # (k, 3) complex: r, theta, z
+    amplitude: Array  # (k, 3) complex: r, theta, z, any scale
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class RawMode:
 
     frequency_Hz: float
     shape: HarmonicShape | RingShape
-    multiplicity: int
+    multiplicity: int  # 2: a pair with n > 0, 1: a single mode
     members: tuple[float, float] | None = None
     damping_ratio: float | None = None  # fraction of critical damping; None: not known
 
@@ -54,14 +54,15 @@ class Evaluation:
     # variable name to d f / d variable (mode,), Hz per unit of the variable
     gradients: dict[str, Array] = field(default_factory=dict)
     nodes: Array = field(default_factory=lambda: np.empty(0, int))  # (k,) deck numbers
-    displacement: Array = field(default_factory=lambda: np.empty((0, 3)))  # (k, 3) by the inflation
+    # (k, 3) r, theta, z in m by the inflation; (0, 3) if the solver does not give it
+    displacement: Array = field(default_factory=lambda: np.empty((0, 3)))
     # variable name to d mass, kg per unit
     mass_gradients: dict[str, float] = field(default_factory=dict)
     response: dict[str, Any] = field(default_factory=dict)  # as `Solver.read` has it
 
 
 def evaluation(answer: dict[str, Any]) -> Evaluation:
-    """A solver's answer, which is one (see `recorded.check`)."""
+    """The typed form of what `Solver.read` gave and `recorded.check` has passed."""
     nodes, points, displacement = (  # laid out alike, so that sums are too, recorded or not
         np.ascontiguousarray(answer[name]) for name in ("nodes", "points", "displacement")
     )

@@ -53,7 +53,7 @@ def find_modes(
             if not isinstance(answer, Evaluation):
                 yield place, answer
                 continue
-            modes = paired_labels(answer.modes)
+            modes = paired_labels(answer.modes)  # the two modes of each pair as one
             try:
                 labels = wanted(place, modes) if callable(wanted) else wanted
                 yield place, LabelledModes(answer, modes, match(modes, labels))

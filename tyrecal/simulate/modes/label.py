@@ -39,7 +39,7 @@ Array = np.ndarray
 # radius over the largest radius above which a point is on the belt: a belt is nearly flat, and a
 # sidewall soon leaves this height
 BELT = 0.94
-DEGREE = 3
+DEGREE = 3  # of the polynomials P0 to P3 in z across the belt
 CONDITION = 30.0  # of the polynomials on the points at hand; fewer rings carry a lower degree
 MAX_SAMPLED_HARMONIC = 12  # that is looked for in sampled shapes
 ALIASED = 1e-4  # of what a harmonic holds: solvers print angles and shapes with six digits
@@ -105,7 +105,7 @@ class Mode:
 
     label: Label
     frequency_Hz: float
-    multiplicity: int
+    multiplicity: int  # 2: both modes of a pair, 1: one
     clarity: float
     position: int
     raw: RawMode
@@ -127,7 +127,7 @@ def _columns(c_is_zero: bool) -> Array:
     return table
 
 
-COLUMNS = (_columns(False), _columns(True))
+COLUMNS = (_columns(False), _columns(True))  # of c > 0, of c = 0
 
 
 @dataclass(frozen=True)

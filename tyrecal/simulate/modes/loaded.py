@@ -63,7 +63,7 @@ class Rings:
 
     def evenness(self, shapes: Array) -> Array:
         """Share (p,) of each shape that is symmetric about the patch."""
-        even, whole = self.flat(self.part(shapes, True)), self.flat(shapes)
+        even, whole = self.flat(self.part(shapes, symmetric=True)), self.flat(shapes)
         return np.asarray((even**2).sum(1) / (whole**2).sum(1))
 
 
@@ -152,7 +152,8 @@ def follow(before: ModesAtLoad, after: ModesAtLoad, where: Rings) -> Followed:
 
 
 def _homotopy(f_before: Array, a: Array, f_after: Array, b: Array) -> Array:
-    """For each column of a its column of b, or -1; both orthonormal, frequencies in Hz."""
+    """For each column of a (n, m) the place (m,) of its column in b, or -1; columns orthonormal,
+    frequencies (m,) in Hz."""
     from scipy.optimize import linear_sum_assignment  # late: longer than most evaluations
 
     u, size, _ = np.linalg.svd(np.hstack([a, b]), full_matrices=False)
@@ -176,6 +177,6 @@ def _homotopy(f_before: Array, a: Array, f_after: Array, b: Array) -> Array:
 
 
 def _nearest_orthonormal(v: Array) -> Array:
-    """The orthonormal columns nearest to those of v (Loewdin)."""
+    """The orthonormal columns (n, m) nearest to those of v (Loewdin)."""
     u, _, w = np.linalg.svd(v / np.linalg.norm(v, axis=0), full_matrices=False)
     return np.asarray(u @ w)
