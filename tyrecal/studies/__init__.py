@@ -38,37 +38,37 @@ STUDIES = {  # in the order of a page and of a batch
     "fit": Entry(
         "tyrecal.studies.fit.result:FitResult",
         "Calibrate the case's variables to its target frequencies.",
-        True,
+        runs_by_name=True,
     ),
     "modes": Entry(
         "tyrecal.studies.modes:ModesResult",
         "Evaluate one design, unloaded or on a road: frequencies with their labels.",
-        True,
+        runs_by_name=True,
     ),
     "sweep-pressure": Entry(
         "tyrecal.studies.pressure_result:PressureSweep",
         "Follow every mode over the inflation pressure.",
-        True,
+        runs_by_name=True,
     ),
     "footprint": Entry(
         "tyrecal.studies.footprint:FootprintResult",
         "Press the tyre on a road: contact area and pressure over load.",
-        True,
+        runs_by_name=True,
     ),
     "sensitivities": Entry(
         "tyrecal.studies.sensitivities.result:SensitivitiesResult",
         "State how each number of the case moves frequencies, and which numbers to free.",
-        True,
+        runs_by_name=True,
     ),
     "frf": Entry(
         "tyrecal.studies.response:FrfResult",
         "Compute response functions of the tread and the hub.",
-        True,
+        runs_by_name=True,
     ),
     "stiffness": Entry(
         "tyrecal.studies.stiffness:StiffnessResult",
         "Find the static stiffnesses of the pressed tyre, over load and pressure.",
-        True,
+        runs_by_name=True,
     ),
     "effects": Entry(
         "tyrecal.studies.effects:Effects", "List and explain effects that a plain model leaves out."
@@ -77,13 +77,13 @@ STUDIES = {  # in the order of a page and of a batch
     "sample": Entry(
         "tyrecal.studies.sample.result:SampleResult",
         "Sample the variables that fit the measurements, and predict frequencies.",
-        True,
+        runs_by_name=True,
     ),
     "labels": Entry("tyrecal.studies.labels:LabelsResult"),
     "diagnose": Entry(
         "tyrecal.studies.diagnose.result:DiagnosisResult",
         "Find where model and measurements differ, and which effect explains it.",
-        True,
+        runs_by_name=True,
     ),
 }
 

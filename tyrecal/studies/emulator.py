@@ -56,7 +56,7 @@ class Evaluated:
     """An evaluated design."""
 
     x: Array  # (v,) logarithms of the variables
-    ln_f: Mapping[Label, float]
+    ln_f: Mapping[Label, float]  # ln of Hz
     slopes: Mapping[Label, Array]  # (v,) d ln f / d x
     apart: float  # d, see above; 0 if the two [0, 0] modes are not both there
 
@@ -156,7 +156,7 @@ class Emulator:
         return products(self.degrees, (x - self.centre) / self.half)
 
     def ln_f_of(self, terms: Array) -> Array:
-        """`ln_f` of the designs that have these ``products``."""
+        """`ln_f` (p, n) of the p designs that have these ``products``."""
         q = terms @ self.coefficients
         return unpaired(self._pair, q[:, :-1], q[:, -1])
 
@@ -374,7 +374,7 @@ def legendre(t: Array, highest: int) -> Array:
 
 
 def _rates(P: Array) -> Array:
-    """P'_n of `legendre`: P'_n+1 = P'_n-1 + (2 n + 1) P_n."""
+    """P'_n of `legendre`, of its shape: P'_n+1 = P'_n-1 + (2 n + 1) P_n."""
     rates = np.zeros_like(P)
     for n in range(len(P) - 1):
         rates[n + 1] = (rates[n - 1] if n else 0.0) + (2 * n + 1) * P[n]

@@ -228,7 +228,8 @@ class _Trail:
         self._place = np.arange(len(free.frequencies))
 
     def to(self, here: ModesAtLoad) -> tuple[np.ndarray, np.ndarray]:
-        """Each unloaded mode's place at the next load, -1 where it is lost, and `spanned`."""
+        """Each unloaded mode's place (m,) at the next load, -1 if it is lost, and `spanned`
+        (m,)."""
         step = follow(self._before, here, self._where)
         spanned = np.where(self._place < 0, 0.0, step.spanned[self._place])
         self._place = np.where(spanned < MIN_SPANNED, -1, step.position[self._place])
@@ -237,7 +238,7 @@ class _Trail:
 
 
 def _grip_mm(footprint: Footprint, friction: float) -> np.ndarray | None:
-    """Per mode the largest motion on the rings, mm, at which friction is used up."""
+    """Per mode (m,) the largest motion on the rings, mm, at which friction is used up."""
     if footprint.mode_traction_N is None or footprint.mode_shape is None:
         return None
     largest = np.linalg.norm(footprint.mode_shape, axis=-1).max((1, 2))

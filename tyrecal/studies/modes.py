@@ -25,7 +25,7 @@ from .result import (
 if TYPE_CHECKING:
     from ..simulate.evaluate.evaluator import Evaluator
 
-EXTRA = {  # further columns of the table
+EXTRA = {  # further columns of the table, of fields of `ModeEntry`
     "damping_ratio": Column("damping %", ".2f", 100),
     "sliding_Hz": Column("sliding_Hz"),
     "grip_mm": Column("grip_mm"),

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from .fit.prediction import FitResponses
 
 FITTED = "fitted"  # name of the design that a fit found
-QUANTILE_90 = 1.645
+QUANTILE_90 = 1.645  # standard deviations: 90 % are between -1.645 and 1.645
 AROUND_THE_CASE = PressureRange(None, None, 12)
 
 

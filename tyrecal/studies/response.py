@@ -24,7 +24,7 @@ from .result import Column, CsvRow, Result, ResultPart, StudyInput, Table, csv_t
 Array = np.ndarray
 ResponseForm = Literal["receptance", "accelerance"]
 EXCITE, RESPOND = "tread:0deg:radial", "hub:fz,tread:0deg:radial"
-TO_HZ, STEP_HZ, PATCH_MM = 300.0, 0.5, 20.0
+TO_HZ, STEP_HZ, PATCH_MM = 300.0, 0.5, 20.0  # defaults of the options
 ZERO_BY_SYMMETRY = 1e-10  # of the largest response of its kind
 MAX_BAND_HZ, MAX_RESPONSE_STEPS = 1000.0, 5000
 TREAD_POINT = re.compile(r"tread:([+-]?\d+(?:\.\d+)?)deg:(radial|tangential|lateral)")
@@ -33,7 +33,7 @@ HUB_CHANNELS = {  # place among the solver's forces and moments, and the sign of
     **{"fx": (1, -1), "fy": (2, 1), "fz": (0, -1)},
     **{"mx": (4, -1), "my": (5, 1), "mz": (3, -1)},
 }
-HUB_NODE, FIRST_TREAD_NODE = 1, 101
+HUB_NODE, FIRST_TREAD_NODE = 1, 101  # numbers in universal files
 EXAMPLES = "such as tread:0deg:radial, tread:90deg:lateral"
 # axes of the tread's r, theta, z at the angle 0: down, backwards, along the axle
 TREAD_SYSTEM = CoordinateSystem(

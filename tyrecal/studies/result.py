@@ -134,7 +134,7 @@ class StudyInput:
     evaluator: Evaluator
     designs: dict[str, dict[str, float]]  # values of the variables by name of the design
     responses: ResultPart | None = None  # `FitResponses` of the fit that found the design "fitted"
-    jobs: int = 1
+    jobs: int = 1  # evaluations at a time
 
     def stamped(self, result: AnyResult, **of: Any) -> AnyResult:
         """The result with its provenance, whose state is the case's except for ``of``."""

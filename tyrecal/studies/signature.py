@@ -25,7 +25,7 @@ class Signature:
     """An effect of one size at some pressures."""
 
     id: str
-    value: float
+    value: float  # the effect's size, in its unit
     pressures_kPa: tuple[float, ...]
     labels: tuple[Label, ...]
     # (pressure, label) per cent of the plain tyre's frequency, NaN where a mode got lost

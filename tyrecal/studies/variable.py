@@ -9,7 +9,8 @@ from ..errors import InputError
 from ..simulate.deck.tyre_design import NEAR_ZERO
 from ..tyre.case import LoadedCase, start_values
 
-START_SPREAD = 0.5  # of ln of a variable that the case says no more of: 2.7 times at most, of 95 %
+# sd of ln of a start whose uncertainty the case does not state: 95 % within a factor of 2.7
+START_SPREAD = 0.5
 
 
 @dataclass(frozen=True)

@@ -145,7 +145,7 @@ def intervals(
 
 
 def places_at(rows: Sequence[ModelRow], pressure_kPa: float) -> np.ndarray:
-    """Places among the rows of the modes at a pressure."""
+    """Places (n,) among the rows of the modes at a pressure."""
     return np.array([i for i, (label, p) in enumerate(rows) if label and p == pressure_kPa], int)
 
 

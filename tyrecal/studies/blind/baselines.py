@@ -15,7 +15,7 @@ import numpy as np
 from .ruler import SIZE_POINTS, Ruler
 
 Array = np.ndarray
-MAX_RULE_STEPS = 8
+MAX_RULE_STEPS = 8  # of Gauss and Newton's method
 MAX_LN_STEP = 0.5  # of ln x, a step
 NONE = "none"
 PRIOR_NONE = 0.25
@@ -52,7 +52,7 @@ def guesses(ruler: Ruler, y: Array, places: Array, sigma: Array) -> dict[str, st
 
 
 def _fit(ruler: Ruler, y: Array, places: Array, inverse: Array) -> Array:
-    """d = ln x - ln x0 by Gauss and Newton's steps."""
+    """d (v,) = ln x - ln x0 by Gauss and Newton's steps."""
     d = np.zeros(len(ruler.x0))
     information = np.diag(ruler.spread**-2.0)
     for _ in range(MAX_RULE_STEPS):

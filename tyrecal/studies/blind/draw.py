@@ -27,7 +27,7 @@ class Truth:
     kind: str  # effect, none or outside
     law: str  # id of the effect, or name of the family outside the catalogue, "" for none
     size: float  # its parameter
-    variables: dict[str, float]
+    variables: dict[str, float]  # by name, in their own units
     constants: dict[str, float]  # in standard deviations
     scatter: int  # seed of noise, missing values and members
     swapped: bool  # two labels

@@ -30,7 +30,7 @@ Array = np.ndarray
 # half width of the box in ln of a variable: blind trials draw within 0.4, and an effect that a fit
 # ignores moves its variables by the rest
 REACH = 0.8
-PLAIN_DEGREE, EFFECT_DEGREE, SOURCE_DEGREE = 4, 3, 2
+PLAIN_DEGREE, EFFECT_DEGREE, SOURCE_DEGREE = 4, 3, 2  # of polynomials in the variables
 PLAIN_DESIGNS, EFFECT_DESIGNS, SOURCE_DESIGNS = 20, 10, 12
 ONE_SIDED_SHARES, TWO_SIDED_SHARES = (0.1, 0.4, 0.75, 1.0), (0.5, 1.0)
 SEED = 1

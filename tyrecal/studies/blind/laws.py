@@ -22,8 +22,8 @@ class EffectLaw:
     low: float  # of the parameter's range
     high: float
     add: Callable[[LoadedCase, float], LoadedCase]  # pure; ValueError where the tyre cannot be
+    # what a laboratory reads, by pressure, of what is there and the parameter; None: just that
     read: Callable[[Mapping[float, Frequencies], float], Mapping[float, Frequencies]] | None = None
-    # what a laboratory reads of what is there, by pressure; None: just that
 
     def drawn(self, random: np.random.Generator, smallest: float) -> float:
         """A parameter, uniform over ``smallest`` to 1 of the range on a side drawn by chance."""

@@ -14,7 +14,7 @@ from .laws import EffectLaw, Frequencies
 
 
 def thick_cushion(case: LoadedCase, e: float) -> LoadedCase:
-    """Rubber between carcass and inner belt is thicker by e."""
+    """Rubber between carcass and inner belt is 1 + e times as thick."""
     return with_gauge(case, (carcass_line(case), belt_lines(case)[0]), crown(case), 1 + e)
 
 

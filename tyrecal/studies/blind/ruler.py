@@ -31,7 +31,7 @@ Array = np.ndarray
 RULER_FILE = "ruler.json"
 CURVATURE_STEP = 0.05  # of ln x, for the curvature
 SHARES = (0.15, 0.5, 1.0)  # of each side of a range
-SIZE_POINTS = 61
+SIZE_POINTS = 61  # of the grid over the sizes of an effect
 BETWEEN_PRESSURES = 0.9  # of form errors: as all studies on record were scored
 EARLIER_LAWS_LENGTH = 0.5  # of ln p, over which laws were alike in rulers that do not say it
 NUMBERS = ("x0", "spread", "eta", "jacobian", "hessian", "constants")
@@ -131,7 +131,7 @@ class Difficulty:
         return min(self.lam, self.nearest)
 
 
-MIN_LAMBDA_APART = 9.0
+MIN_LAMBDA_APART = 9.0  # lambda between two effects, below which they look the same
 
 
 def difficulty(

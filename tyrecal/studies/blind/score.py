@@ -45,7 +45,7 @@ class Scored:
     verdict: str
     named: str | None
     ranked: tuple[str, ...]  # keys by falling probability
-    probabilities: dict[str, float]
+    probabilities: dict[str, float]  # by key, 1 together
     on_truth: float  # probability of ``truth`` in the answer
     on_group: float  # and of all keys of ``group``
     in_set: bool  # whether ``truth`` is one of the answer's candidates
@@ -149,7 +149,7 @@ def scored(
 
 
 def means(readings: Sequence[Measurement], ruler: Ruler) -> tuple[Array, Array, Array]:
-    """For each of n rows: mean of ln f over its members, index in the ruler, number of members."""
+    """Per row, (n,) each: mean of ln f over its members, index in the ruler, number of members."""
     logarithms: dict[tuple[Label | None, float], list[float]] = {}
     for each in readings:
         pressure = each.pressure_kPa if each.label else 0.0

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import binomtest
 
 Array = np.ndarray
-BINS, SIMULATIONS = 10, 2000
+BINS, SIMULATIONS = 10, 2000  # of stated probabilities, 0 to 1; draws of the quantile
 
 
 def clopper_pearson(right: int, count: int, level: float = 0.95) -> tuple[float, float]:

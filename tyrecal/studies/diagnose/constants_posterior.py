@@ -1,10 +1,10 @@
 """Constants that nobody calibrates, as the data describe them: reported, and never named as a
 cause.
 
-With z ~ N(0, 1) of each and g its slopes: E z = G^T S^-1 r, r the residual of the likeliest fit,
-which has weighed the variables' prior. An effect that the case states as uncertain
-(``uncertainties``) is such a constant as far as that reaches (`evidence.COVERAGE`); only what is
-beyond is an effect.
+z: shifts of the constants in their standard deviations, with the prior N(0, 1); G (n, k): changes
+of ln f by z = 1. Then E z = G^T S^-1 r, r the residual of the likeliest fit, which has weighed the
+variables' prior. An effect that the case states as uncertain (``uncertainties``) is such a constant
+up to `evidence.COVERAGE` of its standard deviations; only what is beyond is an effect.
 """
 
 from __future__ import annotations
@@ -35,9 +35,10 @@ def constants_posterior(diagnosis: Diagnosis) -> list[ConstantShift]:
     best = hypothesis.best
     problem = replace(diagnosis.problem, zeta=float(hypothesis.fitted.zeta[best]))
     d = hypothesis.fitted.d[best]
-    effects = {id: e[[best]] for id, e in hypothesis.values.items()}
+    effects = {id: e[[best]] for id, e in hypothesis.values.items()}  # (1,) each
     r = problem.observations.y - problem.predicted(effects, d[None])[0]
-    _, inverse, _ = projection(problem, d)
+    _, inverse, _ = projection(problem, d)  # S^-1
+    # zeta: coupling of near modes; `mixed` takes changes of uncoupled modes to coupled ones
     G = problem.mixed @ problem.constants if problem.zeta else problem.constants
     shifts = [
         ConstantShift(name, float(z))

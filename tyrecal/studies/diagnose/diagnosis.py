@@ -52,10 +52,10 @@ class Diagnosis:
 
     problem: InverseProblem  # as it was solved
     bare: InverseProblem  # before effects were asked again, near modes coupled as without effects
-    variables: tuple[str, ...]
-    sources: tuple[str, ...]
+    variables: tuple[str, ...]  # names of x
+    sources: tuple[str, ...]  # names of the sources of error
     hypotheses: tuple[Hypothesis, ...]
-    probabilities: Mapping[str, float]
+    probabilities: Mapping[str, float]  # by key of hypothesis
     verdict: Verdict
     gap: Gap
     separability: Separability

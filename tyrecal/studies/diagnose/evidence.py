@@ -28,12 +28,12 @@ from .gap import family
 Array = np.ndarray
 NONE: Final = "none"
 OUTSIDE: Final = "outside"
-PRIOR_OUTSIDE: Final = 0.10
+PRIOR_OUTSIDE: Final = 0.10  # of a cause that no effect of the catalogue explains, before the data
 RULE_POINTS = {1: 25, 2: 15, 3: 9}  # of the rule in each parameter, by the number of effects
 FEW_POINTS = {2: 7, 3: 5}  # that show which sets of effects matter: ln Z within 0.5
 COVERAGE = 2.0  # standard deviations within which a stated number may be off (GUM, k = 2)
 SHARP_FALL = 2.0  # of ln Z from the best point to its neighbours, above which points are added
-MAX_ZOOMS = 6
+MAX_ZOOMS = 6  # refinements of a grid about its best point
 REFIT_STEPS = 16  # of Gauss and Newton, halved where they rise, in a model that is quadratic
 COUPLED_STEPS = 8  # more where near modes are coupled
 REFITTED = 1e-6  # expected fall of the misfit below which a re-fit has converged
@@ -66,12 +66,12 @@ class Hypothesis:
     """An explanation of the data, over a grid of q parameters."""
 
     key: str  # "none", "outside", an id, "id1+id2", "id1+id2+id3"
-    prior: float
-    ln_evidence: float
+    prior: float  # probability before the data
+    ln_evidence: float  # ln Z
     values: Mapping[str, Array]  # parameters (q,) by id
     ln_weights: Array  # ln of weight times prior density (q,)
     fitted: Fitted
-    words: str = ""
+    words: str = ""  # description for people
     # first and last parameter of the whole grid by id: ``values`` may be a part of it
     ends: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     prior_sd: Mapping[str, float] = field(default_factory=dict)  # by id, see `EffectRange.prior_sd`
@@ -257,7 +257,7 @@ class Family(NamedTuple):
 
     words: str  # for the verdict
     extra: Array  # (n, n) additional covariance of ln f
-    reading: bool  # whether it is an error of reading, and not of the model
+    reading: bool = False  # whether it is an error of reading, and not of the model
 
 
 def outside(problem: InverseProblem) -> Hypothesis:
@@ -283,28 +283,28 @@ def families(problem: InverseProblem) -> list[Family]:
         of_one_mode(rows) * between * between_runs(rows) * [row.label is not None for row in rows]
     )
     result = [
-        Family(f"modes are off by {size:.1%} in a way of their own", size**2 * same, False)
+        Family(f"modes are off by {size:.1%} in a way of their own", size**2 * same)
         for size in UNKNOWN
     ]
     for over, together in _smooth(rows, problem.observations.y):
         words = f"smoothly over {over}"
         result += [
-            Family(f"modes are off by {size:.1%}, {words}", size**2 * between * together, False)
+            Family(f"modes are off by {size:.1%}, {words}", size**2 * between * together)
             for size in UNKNOWN
         ]
     result += [
-        Family(f"all scatter is {k:g} times as large", (k**2 - 1) * problem.sigma, False)
+        Family(f"all scatter is {k:g} times as large", (k**2 - 1) * problem.sigma)
         for k in INFLATION
     ]
     for label in sorted({row.label for row in rows if row.label}, key=str):
         hit = np.array([row.label == label for row in rows])
         misread = MISREAD**2 * same * np.outer(hit, hit)
-        result.append(Family(f"{label.display} is misread", misread, True))
+        result.append(Family(f"{label.display} is misread", misread, reading=True))
     return result
 
 
 def ln_shares(known: Sequence[Family]) -> Array:
-    """ln of the prior of each family: half for unknown effects, half for errors of reading."""
+    """ln of the prior of each family (k,): half for unknown effects, half for errors of reading."""
     reading = np.array([each.reading for each in known])
     return np.asarray(-np.log(2 * np.where(reading, reading.sum(), (~reading).sum())))
 
@@ -401,7 +401,8 @@ def _gauss_legendre(count: int) -> tuple[Array, Array]:
 
 
 def grid(nodes: EffectResponse) -> tuple[Array, Array]:
-    """Parameters over the range of an effect, and ln of their prior weights, whose sum is 1."""
+    """Parameters (q,) over the range of an effect, and ln of their prior weights, which sum to
+    1."""
     low, high = nodes.reach
     points, weights = _rule(low, high, RULE_POINTS[1])
     return points, np.log(weights / (high - low))

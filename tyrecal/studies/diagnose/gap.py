@@ -45,7 +45,7 @@ class Contrast:
     """A combination of residuals in per cent with its standard deviation."""
 
     name: str
-    percent: float
+    percent: float  # weighted sum of residuals, 100 (ln measured - ln model)
     sigma_percent: float
 
     @property
@@ -195,12 +195,12 @@ def _contrasts(rows: tuple[Observable, ...], r: Array, C: Array) -> list[Contras
 
 
 def _mean(mask: Array) -> Array:
-    """Weights of a mean over rows; NaN where there are none."""
+    """Weights (n,) of a mean over rows; NaN if there are none."""
     return mask / mask.sum() if mask.any() else np.full(len(mask), np.nan)
 
 
 def _slope(mask: Array, x: Array, span: float) -> Array:
-    """Weights of the least-squares slope over x, times ``span``; NaN where x is the same in all."""
+    """Weights (n,) of the least-squares slope over x, times ``span``; NaN if all x are the same."""
     if not mask.any() or not np.ptp(x[mask]):
         return np.full(len(x), np.nan)
     off = np.where(mask, x - x[mask].mean(), 0.0)

@@ -38,7 +38,7 @@ class Reading:
     came without."""
 
     observations: Observations
-    ln_prior: float = 0.0
+    ln_prior: float = 0.0  # ln P(a), before the diagnosis
     labels: Sequence[tuple[str, Label | None]] = ()
 
 

@@ -79,7 +79,7 @@ CHECKED = 0.25  # of a constant's standard deviation, likewise
 OFFERED = (0.4, 2 / 3, 5 / 6, 1.0)  # of the tyre's inflation pressure
 MIN_OFFERED_STEP = 0.25  # of it, from every pressure measured so far, for a new one to be offered
 ABOVE_kPa = (40.0, 80.0)  # it, offered too: as much as any tyre bears
-MASS_PERCENT = 0.5
+MASS_PERCENT = 0.5  # standard deviation of weighing a tyre
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,9 @@
 """The section's fields as the data describe them, where nothing else is wrong.
 
-With z ~ N(0, 1) of each component and g its slopes: E z = G^T S^-1 r, cov z = I - G^T P G, r what
-the plain calibration leaves and P what it cannot absorb. (P r of the deviations at the variables'
-prior is S^-1 r of those at the calibration.)
+z: components of the fields in their standard deviations, with the prior N(0, 1); G (n, k): changes
+of ln f by z = 1. Then E z = G^T S^-1 r, cov z = I - G^T P G, r what the plain calibration leaves
+and P what it cannot absorb. (P r of the deviations at the variables' prior is S^-1 r of those at
+the calibration.)
 """
 
 from __future__ import annotations

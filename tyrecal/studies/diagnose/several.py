@@ -21,8 +21,8 @@ from ..inference.inverse_problem import InverseProblem
 from .evidence import NONE, OUTSIDE, PRIOR_OUTSIDE, Hypothesis, explain, grid, outside, refit
 
 Array = np.ndarray
-PRIOR_NONE: Final = 0.25
-MAX_EFFECTS = 3
+PRIOR_NONE: Final = 0.25  # probability of no effect, before the data
+MAX_EFFECTS = 3  # at a time
 COUPLED_POINTS = 3  # of the rule in what couples modes, that stand for all from two effects on
 PARTNERS = 4  # singles that are tried with every other
 BASES, BASES_WITHIN = 3, 3.0  # pairs that a third is added to; ln probability behind the best

@@ -23,8 +23,8 @@ from ..inference.plain_fit import MAX_STEP
 from .evidence import NONE, Hypothesis, explain, grid, refit
 
 Array = np.ndarray
-PLACEBOS, DRAWS = 200, 200
-LEAST_SQUARES_STEPS = 8
+PLACEBOS, DRAWS = 200, 200  # simulated tyres without effects; sizes drawn from the posterior
+LEAST_SQUARES_STEPS = 8  # of Gauss and Newton's method
 
 
 @dataclass(frozen=True)
@@ -121,8 +121,8 @@ def shrink(problem: InverseProblem, key: str | None = None, seed: int = 0) -> Sh
 
 
 def _least_squares(problem: InverseProblem, hold: Array, sizes: Mapping[str, float]) -> Array:
-    """Errors on the held-out rows after least squares of the other frequencies' ln, of run 0, with
-    effects of these sizes in the model; bounds hold x as in all fits."""
+    """Errors in ln f on the held-out rows (n,) after least squares of the other frequencies' ln, of
+    run 0, with effects of these sizes in the model; the prior holds x as in all fits."""
     rows = problem.observations.rows
     used = ~hold & np.array([bool(row.label) and not row.run for row in rows])
     out = problem.only(hold & np.array([not row.run for row in rows]))

@@ -33,7 +33,7 @@ class LoadedRow:
     pressure_kPa: float
     load_N: float
     value: float  # in the unit of ``quantity``
-    sigma: float
+    sigma: float  # standard deviation of ``value``
     off: Mapping[str, float]  # ln value less ln of each tyre's, where it has one
 
 

@@ -39,7 +39,7 @@ class Expected:
     deviation: Array  # (m,) standard deviation of ln f
 
     def interval(self) -> tuple[Array, Array]:
-        """Lower and upper ends of the 90 % intervals."""
+        """Lower and upper ends of the 90 % intervals, each of the shape of ``mean``."""
         half = HALF_90 * self.deviation
         return self.mean - half, self.mean + half
 

@@ -60,7 +60,7 @@ def other_states(problem: Problem, point: Point, keep: Array) -> list[Shift]:
 
 
 def _column(problem: Problem, state: TyreState, by_label: Mapping[Label, float]) -> Array:
-    """A number for each row measured in a state, by its label; 0 for all other rows."""
+    """A column (n,): the number of each row measured in a state, by its label; 0 for other rows."""
     column = np.zeros(len(problem.measured))
     for i, target in enumerate(problem.targets):
         if target.state == state:

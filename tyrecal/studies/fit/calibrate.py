@@ -41,7 +41,7 @@ MAX_REPLACED = 20  # replaced starts per start asked for
 class Fit:
     """A finished fit."""
 
-    found: FitResult  # content of fit.json
+    found: FitResult  # what fit.json holds: `result` is its content
     history: list[dict[str, Any]]  # design points in order, rows of fit_history.csv
     initial: Point  # at the case's start values
     fitted: Point  # at the least objective of all starts

@@ -17,7 +17,7 @@ from scipy.optimize import nnls
 Array = np.ndarray
 MAX_NEWTON_STEPS = 20  # on the model, which no evaluation is asked for
 MIN_MOVE = 1e-7  # of a coordinate
-MAX_HALVINGS = 12
+MAX_HALVINGS = 12  # of a step on the model
 ROUND_OFF = 1e-12  # of numbers of the order of 1
 
 
@@ -30,7 +30,7 @@ def with_secant(C: Array, s: Array, change: Array) -> Array:
 
 
 def foreseen(J: Array, r: Array, C: Array, d: Array) -> Array:
-    """r(x + d) by the model."""
+    """r(x + d) (m,) by the model."""
     return np.asarray(r + J @ d + C @ d @ d / 2)
 
 

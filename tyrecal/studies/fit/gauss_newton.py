@@ -1,10 +1,11 @@
 """A damped Gauss-Newton method that learns the residuals' curvature: for solvers that take minutes.
 
 Each step minimises a model of second order of the residuals, with the curvature that the designs
-seen so far tell (`curvature`), within the bounds, damped as Levenberg and Marquardt's are, by how
-much of the promised decrease comes true (Nocedal and Wright, Numerical Optimization, ch. 10). It
-needs a third to a half of the designs of SLSQP, because it knows each residual's slopes and not
-their sum alone.
+seen so far show (`curvature`), within the bounds. Steps are damped as Levenberg and Marquardt's
+are, by how much of the promised decrease comes true (Nocedal and Wright, Numerical Optimization,
+ch. 10). An ``edge`` bounds steps where the two [0, 0] modes change labels (`crossing`). It needs a
+third to a half of the designs of SLSQP, because it knows each residual's slopes and not their sum
+alone.
 """
 
 from __future__ import annotations
@@ -39,9 +40,10 @@ HALVINGS = 5  # of a step towards a design without a solution
 def descend(
     problem: Problem, point: Point, tolerance: float, known: Point | None = None
 ) -> Descent:
-    """Lower the objective from ``point``; ``known``: see `CrossingWatch`."""
+    """Lower the objective F from ``point`` until the norm of its projected gradient is below
+    ``tolerance``; known: the end of an earlier search beyond the crossing, or None."""
     damping, watch = DAMPING, CrossingWatch(problem, known)
-    curvature = np.zeros((*point.jacobian.shape, len(point.x)))
+    curvature = np.zeros((*point.jacobian.shape, len(point.x)))  # C of `curvature`
     for _ in range(MAX_DESIGNS):
         if is_converged(problem, point, tolerance):
             return Descent(point, CONVERGED)
@@ -60,7 +62,7 @@ def descend(
         reached = min(point, there, key=lambda p: p.objective)
         if end:
             return Descent(reached, end, watch.edge)
-        if watch.edge:  # its slopes are best known where the search is
+        if watch.edge:  # its sensitivities are best known where the search is
             watch.edge = crossing(problem, (point, there), reached) or watch.edge
         change, gain = there.x - point.x, point.objective**2 - there.objective**2
         wanted = promised(point, curvature, change)
@@ -74,7 +76,7 @@ def descend(
 
 
 def promised(point: Point, curvature: Array, change: Array) -> float:
-    """Fall of F^2 that the model promises."""
+    """Fall of F^2, the sum of squared residuals, that the model promises."""
     r = foreseen(point.jacobian, point.residuals, curvature, change)
     return float(point.objective**2 - r @ r)
 
@@ -94,5 +96,5 @@ def _step(
     problem: Problem, point: Point, curvature: Array, damping: float, edge: Crossing | None
 ) -> Array:
     """The step (variables,) on this side of ``edge``."""
-    G, h = room_to_move(problem, point, edge)
+    G, h = room_to_move(problem, point, edge)  # G step >= h
     return curved_step(point.jacobian, point.residuals, curvature, damping, G, h)

@@ -31,9 +31,9 @@ class ModelErrors:
 
     rows: tuple[Observable, ...]
     known: list[Source]
-    by_constants: Array
-    laws: float
-    road: Array
+    by_constants: Array  # (n, k)
+    laws: float  # of ln f
+    road: Array  # (n,) of ln q
 
     @property
     def form(self) -> Array:

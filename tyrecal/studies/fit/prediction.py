@@ -84,6 +84,7 @@ def predicted_errors(
     evaluated = tuple(Observable("frequency_Hz", label, p) for label in labels for p in nodes)
     R = np.array([[each.response.get(name, 0.0) for each in fit.responses] for name in names])
     known, _ = sources(case)
+    # d ln q / d x and changes of ln q by each source of error, rows as in the tuple
     J, G, laws = linear_answer(case, evaluator, values, (*measured, *evaluated), known, jobs)
     both, n = np.hstack([J, G]), len(measured)
     curves = both[n:].reshape(len(labels), len(nodes), -1)

@@ -80,6 +80,7 @@ class PriorProblem(Problem):
         self.weighed_at = point.x
 
     def again(self, evaluator: Evaluator, notify: FitNotify | None = None) -> PriorProblem:
+        """The same problem, with the same Sigma, on another evaluator."""
         other = PriorProblem(self.case, evaluator, self.fixed, notify, noise_Hz=self.noise_Hz)
         other.weighed_at, other.model = self.weighed_at, self.model
         other.covariance, other.root = self.covariance, self.root
@@ -106,13 +107,14 @@ class PriorProblem(Problem):
         return C @ weighted.T / self.reference, seen
 
     def left_of_prior(self, point: Point) -> Array:
-        """(I - B J) diag(s)^2 (I - B J)^T, B = C J^T Sigma^-1."""
+        """(I - B J) diag(s)^2 (I - B J)^T (v, v), B = C J^T Sigma^-1."""
         seen = self.response(point)[0] * self.reference @ self._counted(point.plain)[1]
         unseen = (np.eye(len(seen)) - seen) * self.spread
         return np.asarray(unseen @ unseen.T)
 
     def errors(self, point: Point, sigma: Array, used: Array) -> tuple[Array, Array]:
-        """C of these targets alone, with all that is uncertain."""
+        """C (v, v) of the targets ``used`` alone, with all that is uncertain, and which variables
+        (v,) they determine: all, by the prior."""
         keep = used[self.scale > 0]
         J = self._counted(point.plain)[1][keep]
         information = J.T @ np.linalg.solve(self.covariance[np.ix_(keep, keep)], J)

@@ -76,7 +76,7 @@ class Point:
 
     @property
     def gradient(self) -> Array:
-        """dF/dx, Hz."""
+        """dF/dx (v,), Hz per unit of x."""
         return self.jacobian.T @ self.residuals / max(self.objective, 1e-300)
 
 
@@ -156,7 +156,7 @@ class Problem:
         self.best: Point | None = None  # from whose state on the road the next design begins
 
     def start(self) -> Array:
-        """Coordinates of the case's start values."""
+        """Coordinates x (v,) of the case's start values."""
         return np.array([v.scaled(v.start) for v in self.variables])
 
     @property

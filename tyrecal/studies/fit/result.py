@@ -82,7 +82,7 @@ class StartReport:
     point: Point
     message: str  # the optimiser's own words
     converged: bool
-    history: list[dict[str, Any]]
+    history: list[dict[str, Any]]  # one entry an evaluation
 
 
 class FittedVariable(ResultPart):

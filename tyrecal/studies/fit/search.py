@@ -18,7 +18,7 @@ from .problem import Point, Problem
 
 Array = np.ndarray
 MAX_DESIGNS = 100
-EXACT = 1e-3  # Hz, an objective below every measurement's resolution
+EXACT = 1e-3  # Hz, an objective below every measurement's resolution: the fit is exact
 MIN_OBJECTIVE_GAIN = 1e-9  # of the squared objective: a smaller gain is none
 NO_GAIN = 1e-6  # of the squared objective: half of this of the objective, below every resolution
 DAMPING = 0.01  # share of the mean diagonal of J^T J that is added to it at the start of a search
@@ -151,10 +151,11 @@ def _are_mixed(*points: Point) -> bool:
 def _designs_beyond(
     problem: Problem, point: Point, edge: Crossing | None = None
 ) -> Iterator[Array]:
-    """Designs on the other side of the [0, 0] modes' crossing, the nearest in the metric first.
+    """Designs x (v,) on the other side of the [0, 0] modes' crossing, the nearest in the metric
+    H = J^T J first.
 
-    d of the crossing, see there, is carried to the other side of 0 with the least change of the
-    residuals: dx = -(d +- wanted) H^-1 grad d / (grad d . H^-1 grad d).
+    d of the crossing, see `crossing`, is carried to the other side of 0 with the least change of
+    the residuals: dx = -(d +- wanted) H^-1 grad d / (grad d . H^-1 grad d).
     """
     edge = edge or crossing(problem, [point], point)
     if edge is None:

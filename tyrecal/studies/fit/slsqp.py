@@ -1,9 +1,10 @@
 """Sequential least-squares quadratic programming: SciPy's SLSQP, `scipy.optimize.minimize`.
 
-SLSQP (Kraft, DFVLR-FB 88-28) starts with a unit matrix as Hessian. Here it minimises
-F^2 / (2 F0^2) by coordinates y with x = x0 + F0 L^-T y and L L^T = J0^T J0, whose Hessian at the
-start x0 is the unit matrix but for the residuals' curvature. Without this scaling its first steps
-lead to the bounds. The bounds and the crossing of the two [0, 0] modes are linear inequalities.
+SLSQP (Kraft, DFVLR-FB 88-28) starts with a unit matrix as Hessian. Here it minimises F^2 / (2
+F0^2), F the objective and F0 at the start, by coordinates y with x = x0 + F0 L^-T y and L L^T =
+J0^T J0, whose Hessian at the start x0 is the unit matrix but for the residuals' curvature. Without
+this scaling its first steps lead to the bounds. The bounds and the crossing of the two [0, 0] modes
+are linear inequalities.
 
 A design that cannot be evaluated has an infinite objective, from which SLSQP's line search steps
 back. It is started again, from the best design, where a step has found the crossing in its way or
@@ -97,8 +98,8 @@ class _Run:
         return 0.5 * (point.objective / self.F0) ** 2
 
     def gradient(self, y: Array) -> Array:
-        """Gradient at a design that SLSQP accepts. Raises StopIteration if it is no lower than the
-        one accepted before."""
+        """Gradient (v,) of (F / F0)^2 / 2 by y at a design that SLSQP accepts. Raises StopIteration
+        if it is no lower than the one accepted before."""
         try:
             point = self.evaluate(y)
         except EvaluationFailed:  # the line search has given up

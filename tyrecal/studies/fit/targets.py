@@ -15,7 +15,7 @@ from ...tyre.state import AS_THE_CASE, TyreState
 from .freed import freed_variables
 
 KNOWLEDGE = "knowledge"  # of a number that the fit frees, see `free`
-KNOWLEDGE_SIGMA = 0.01
+KNOWLEDGE_SIGMA = 0.01  # of 1 + 0.01 z: a freed number has z = (value - known) / sd
 RIM_WORDS = {"springs": "spindle"}  # of provenance
 
 

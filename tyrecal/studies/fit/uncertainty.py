@@ -73,7 +73,7 @@ def standard_errors(
 
 
 def _noise(problem: Problem, point: Point, counts: Array, leverage: Array) -> Array:
-    """Standard deviation of each target that counts, in its unit; NaN where nothing determines it.
+    """Standard deviation of each target that counts, in its unit; NaN if nothing determines it.
 
     leverage: diagonal of J (J^T J)^-1 J^T, whose sum is the number of variables that the data see:
     what the targets with a sigma do not determine of them, the others lose as freedom.

@@ -152,7 +152,7 @@ class _Suspicion:
 
     reason: FitReason
     chi2: float
-    parameters: int
+    parameters: int  # numbers that it frees
 
 
 def likeliest_reason(left: Remainder, shifts: Sequence[Shift] = ()) -> FitReason | None:

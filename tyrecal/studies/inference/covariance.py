@@ -19,7 +19,7 @@ from .form_error import FORM_LENGTH, at_pressures, form_error, laws_alike
 from .observations import Observable, Observations
 
 Array = np.ndarray
-BETWEEN_SUPPORTS, BETWEEN_RUNS = 0.9, 0.97
+BETWEEN_SUPPORTS, BETWEEN_RUNS = 0.9, 0.97  # correlations of one mode's errors in two
 
 
 @lru_cache(16)

@@ -243,7 +243,7 @@ def carried(known: Expansion, model: ResponseModel, x0: Array) -> Expansion:
 
 
 def node_values(span: EffectRange, slopes: int = 0) -> Array:
-    """Sizes at which an effect is evaluated first: parameters other than 0, rising.
+    """Sizes (k,) at which an effect is evaluated first: parameters other than 0, rising.
 
     slopes: 1 if its slope is known at 0 or at these sizes, 2 if at both: then the farther end of
     a two-sided range is enough.

@@ -220,6 +220,6 @@ class InverseProblem:
 
 
 def places(observations: Observations, rows: Sequence[tuple]) -> Array:
-    """Where each observation stands among the model's rows."""
+    """Index (n,) of each observation among the model's rows."""
     known = {row: i for i, row in enumerate(rows)}
     return np.array([known[row.row] for row in observations.rows], int)

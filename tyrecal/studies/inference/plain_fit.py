@@ -12,7 +12,7 @@ from .model import Answer, Query, ResponseModel
 from .observations import Observations
 
 Array = np.ndarray
-MAX_STEPS, MAX_STEP, CLOSE_ENOUGH = 12, 0.7, 0.02
+MAX_STEPS, MAX_STEP, CLOSE_ENOUGH = 12, 0.7, 0.02  # steps; largest and last one, in x
 MAX_COVARIANCES, SAME_COVARIANCE = 4, 0.1  # of x, within which constants stand for one another
 
 
@@ -32,8 +32,7 @@ def plain_fit(
     The covariance is that of the constants at the start and, where x has gone far, anew from there.
     known: of the model about its start, on which the fit goes first; moved (n, k): what else may
     have moved the observations, as more constants; begin (v,): first guess of x, None: the model's
-    start. Raises the model's own failure where the start
-    has no solution.
+    start. Raises the model's own failure if the start has no solution.
     """
     run0 = np.array([row.run == 0 for row in observations.rows])
     rows, observed = places[run0], observations.only(run0)
@@ -43,7 +42,7 @@ def plain_fit(
     def descended(
         x: Array, evaluate: Callable[[Array], Answer | Exception], answer: Answer
     ) -> Array:
-        """Descend from x, where ``answer`` is the model's."""
+        """x (v,) after a descent from x, where ``answer`` is the model's."""
 
         def misfit(x: Array, answer: Answer) -> float:
             r, off = observed.y - answer.eta[rows], (x - model.start) / model.spread

@@ -23,8 +23,8 @@ class SectionPart:
     """A part of the section."""
 
     name: str
-    stiffness: Array  # (n,) d ln f by its logarithm
-    mass: Array  # likewise
+    stiffness: Array  # (n,) d ln f by ln of its moduli
+    mass: Array  # (n,) d ln f, or d ln mass, by ln of its density
     material: str  # what the split case calls it
     rubber: bool = True  # or cords
 
@@ -55,6 +55,7 @@ def regions(model: Parted, x: Array) -> list[SectionPart]:
     EvaluationFailed.
     """
     case, parts = split_by_region(model.case)
+    # 1 or -1 by path: whether a constant grows or falls with the stiffness
     signs = {material: case.kind.moduli(case.case, material) for material in parts}
     density = {material: case.kind.density(material) for material in parts}
     paths = (path for material in parts for path in (*signs[material], density[material]))

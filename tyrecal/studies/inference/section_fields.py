@@ -59,8 +59,9 @@ COMPOUNDS_ALIKE = 0.5  # correlation of two compounds at one place
 class SectionField:
     """One component at one standard deviation."""
 
-    kind: str
-    values: Array  # (stations,) m outwards, towards the crown, or relative; of compounds (parts,)
+    kind: str  # one of FIELD_KINDS
+    # (stations,) m outwards, towards the crown, or relative; of compounds (parts,) relative
+    values: Array
 
     @property
     def moves(self) -> bool:

@@ -16,8 +16,8 @@ import numpy as np
 from .inverse_problem import InverseProblem
 
 Array = np.ndarray
-VISIBLE, APART = 10.0, 9.0
-GRID_POINTS = 81
+VISIBLE, APART = 10.0, 9.0  # lambda of a visible effect, and between two that can be told apart
+GRID_POINTS = 81  # sizes of an effect
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Separability:
     sizes: Mapping[str, float]  # the parameter that each is judged at
     lambdas: Mapping[str, float]  # at those sizes
     full: Mapping[str, float]  # lambda at the far end of the range
-    cosines: Array  # (m, m)
+    cosines: Array  # (m, m) g_i P g_j / (|P^1/2 g_i| |P^1/2 g_j|): 1 where two look alike
     distances: Array  # (m, m) delta_ij^2, row i at its size
     smallest: Mapping[str, float | None]  # the parameter with lambda = 10; None beyond the range
 

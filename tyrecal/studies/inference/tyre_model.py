@@ -536,7 +536,8 @@ def _needs_constants(point: Query) -> bool:
 
 
 def asked_for(case: LoadedCase, labels: Sequence[Label]) -> LoadedCase:
-    """The case with the measured modes as targets, and enough harmonics for them."""
+    """The case with the modes of these labels as targets, and enough harmonics for them; the
+    targets' frequencies, 1 Hz, count for nothing."""
     modes = [TargetMode(c=x.c, m=x.m, kind=x.kind, frequency_Hz=1.0) for x in labels]  # type: ignore[arg-type]
     analysis = case.case.analysis
     highest = max([analysis.highest_harmonic, *(label.c for label in labels)])

@@ -11,6 +11,7 @@ from ...tyre.number_units import EFFECT_PATH, unit_of
 from ...units import in_engineers_units
 from .section_fields import SectionField, fields, known_from, words
 
+# standard deviations of numbers for which a case states none
 DENSITY_PERCENT, MODULUS_PERCENT, SPACING_PERCENT, GAUGE_PERCENT = 1.5, 3.0, 1.0, 3.0
 ANGLE_deg, PRESSURE_kPa = 1.0, 1.0
 RIM_WIDTH = EFFECT_PATH + "rim_width"

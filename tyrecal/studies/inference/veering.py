@@ -24,7 +24,7 @@ from .model import Coupling
 from .observations import Observations
 
 Array = np.ndarray
-MAX_ZETA = 4.0
+MAX_ZETA = 4.0  # standard deviations, from 0 to which zeta is integrated
 ZETA_POINTS, ZETA_GRID = 8, 64  # Gauss and Legendre's up to there, and a finer grid between
 NEGLIGIBLE_SHIFT = 5e-4  # shift of ln f at 3 standard deviations of q
 MISLABELLED = 0.01  # of laboratories that give a mode to the label of which it has nothing

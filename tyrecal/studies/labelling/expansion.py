@@ -17,7 +17,7 @@ from .tree import Frequencies, Labelings, Modes, labelings
 
 Array = np.ndarray
 
-ROUNDS = 10
+ROUNDS = 10  # of expansion and labelling
 MAX_EXPANSION_STEP = 0.5  # of a variable's coordinate, between expansions
 SAME_DESIGN = 0.01  # of its prior standard deviations
 

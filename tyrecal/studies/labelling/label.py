@@ -26,7 +26,7 @@ from .tree import Frequencies
 Array = np.ndarray
 
 BAND_ABOVE = 1.25  # of the highest measured frequency, up to which modes are looked for
-MAX_EXPANDED_HARMONICS = 20
+MAX_EXPANDED_HARMONICS = 20  # c of the modes that may have been measured
 MODES_PER_HARMONIC = 3  # at least: both families, and one across the belt that comes between
 
 

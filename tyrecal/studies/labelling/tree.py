@@ -42,7 +42,7 @@ UNSEEN = 0.02  # probability of being measured, of a mode of the other family
 DISCREPANCIES = (0.0, 0.01, 0.03, 0.1)  # standard deviations of ln f, each as likely
 ALIKE = 4.0  # waves over which the discrepancy of a family's modes falls by e
 BRANCHES, CUT = 800, 20.0
-FOREIGN_MODE = -1
+FOREIGN_MODE = -1  # what was measured is no mode of the tyre
 
 
 @dataclass(frozen=True)
@@ -146,8 +146,7 @@ def _of_each(modes: Array, probabilities: Array, shape: tuple[int, ...]) -> Arra
 
 def discrepancy(labels: Sequence[Label], tau: float) -> Array:
     """Covariance (l, l) of ln f of l labelled modes: the error of form of each mode alone, and
-    tau, which goes smoothly
-    over the waves of a family, as what a model lacks does."""
+    tau, which goes smoothly over the waves of a family, as what a model lacks does."""
     c = np.array([label.c for label in labels])
     family = np.array([FAMILIES.index(label.family or FAMILIES[0]) for label in labels])
     alike = np.exp(-abs(c[:, None] - c) / ALIKE) * (family[:, None] == family)

@@ -54,7 +54,7 @@ def _flat(box: Array) -> Array:
 
 
 def edge_probability(posterior: Posterior, bounds: Array, seed: int) -> Array:
-    """Forecast of `shares_at_edge` of the posterior's draws by importance sampling: draws of
+    """Forecast of `shares_at_edge` (v, 2) of the posterior's draws by importance sampling: draws of
     Student's t about the likely optima, each weighted by the posterior's density over theirs."""
     best, height = posterior.optima
     best = best[height > height[0] - LIKELY]
@@ -128,7 +128,7 @@ def shares_at_edge(x: Array, box: Array, bounds: Array, weights: Array | None = 
 
 
 def larger(box: Array, bounds: Array, at_edge: Array) -> Array:
-    """The box moved outwards where draws are at its edge, at most to the bounds."""
+    """The box (v, 2) moved outwards where draws are at its edge, at most to the bounds."""
     out = GROWTH * np.ptp(box, axis=1)[:, None] * np.array([-1, 1])
     moved = np.where(at_edge >= AT_EDGE / at_edge.size, box + out, box)
     return np.clip(moved, bounds[:, :1], bounds[:, 1:])

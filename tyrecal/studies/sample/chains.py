@@ -23,7 +23,7 @@ from ...errors import InputError
 
 Array = np.ndarray
 WALKERS = (100, 400)  # at least and at most: a step of many takes hardly longer than one of few
-STEPS = 400  # that as many walkers as that leave of the draws
+STEPS = 400  # of each walker, which decide how many walkers share the draws
 ENOUGH = 20  # tau, of steps
 WARM_UP = 5  # tau, of steps that are dropped
 WINDOW = 5  # tau: beyond, what is seen of rho is noise
@@ -76,7 +76,7 @@ def walkers(count: int, size: int) -> int:
 def enough_draws(tau: float) -> float:
     """How many draws in all would be enough, of some variables."""
     steps = SPARE_STEPS * (WARM_UP + ENOUGH) * tau
-    return steps * WALKERS[steps > STEPS]
+    return steps * (WALKERS[1] if steps > STEPS else WALKERS[0])
 
 
 def needs_emcee() -> None:

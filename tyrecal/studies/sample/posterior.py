@@ -3,7 +3,7 @@
     ln p(x | y) = -1/2 r^T Sigma^-1 r + constant,   r = y - eta(x),   x within the variables' bounds
 
 eta: ln f of the measured modes; Sigma: scatter, the model's form and what nobody calibrates, as a
-diagnosis has it (diagnose/covariance.py), and the emulator's error. Before the measurement every x
+diagnosis has it (inference/covariance.py), and the emulator's error. Before the measurement every x
 within the bounds is as good as another: of a variable on a logarithmic scale, every ratio.
 """
 
@@ -31,7 +31,7 @@ class Posterior:
     emulators: tuple[Emulator, ...]  # one for each way of holding the rim
     states: Array  # (s, 1 + k): the emulator, and values of its further coordinates (pressure)
     rows: Array  # (n, 2): of every measured value the places of its state and its label
-    y: Array  # (n,)
+    y: Array  # (n,) ln of the measured values
     whitened: Array  # (n, n): W with W^T W = Sigma^-1
     box: Array  # (v, 2): within it alone the density is known
 
@@ -101,7 +101,7 @@ class Posterior:
 
     @cached_property
     def optima(self) -> tuple[Array, Array]:
-        """Optima of the posterior, see the function `optima`."""
+        """Optima (o, v) of the posterior and ln p (o,), see the function `optima`."""
         return optima(self)
 
     def information(self, x: Array) -> Array:
@@ -111,8 +111,8 @@ class Posterior:
 
 
 def optima(posterior: Posterior) -> tuple[Array, Array]:
-    """The o maxima x (o, v) of the density in the box from many starts, the highest first, and
-        ln p (o,).
+    """The o maxima x (o, v) of the density in the box from many starts, the highest first,
+    and ln p (o,).
 
     Damped Gauss-Newton steps from all starts at a time, each with a damping of its own; what leaves
     the box stops at its edge.

@@ -53,8 +53,8 @@ def conditional(
     other_constants: Array,
     laws: float,
 ) -> Conditional:
-    """sigma (n, n): of the measured rows; constants (n, k), other_constants (m, k): s_k g_k; laws:
-    see `model_form`."""
+    """sigma (n, n): of the measured rows; constants (n, k), other_constants (m, k): changes of ln f
+    by one standard deviation of each source; laws: see `model_form`."""
     every, n = measured + others, len(measured)
     g = np.vstack([constants, other_constants])
     common = model_form(every, laws) + g @ g.T

@@ -352,7 +352,7 @@ def _thinned(sample: Sample) -> list[tuple[Any, Array]]:
 
 
 def _values(log: bool, lower: float, upper: float, x: Array) -> Array:
-    """A variable's values from its coordinates."""
+    """A variable's values (d,), in its own unit, from its coordinates x (d,)."""
     return np.exp(x) if log else lower + x * (upper - lower)
 
 

@@ -56,9 +56,9 @@ class SelectedNumbers:
 
     numbers: tuple[SelectedNumber, ...]
     chi2: float  # with none of them
-    chi2_left: float
+    chi2_left: float  # with all of them
     next_place: int | None  # the number with the largest gain that is left
-    next_p_value: float
+    next_p_value: float  # of its gain, by chance alone
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class Candidates:
         return gains[k], _tail(by_chance, gains[k])
 
     def fit(self, freed: Sequence[int]) -> tuple[float, Array]:
-        """chi2(A), and the shifts z of the numbers in A."""
+        """chi2 with the numbers ``freed``, and their shifts z, in standard deviations."""
         if not freed:
             return float(self.r @ self.r), np.zeros(0)
         from scipy.optimize import lsq_linear  # late: not for those who read results
@@ -176,7 +176,7 @@ def _exchanged(candidates: Candidates, freed: Sequence[int]) -> list[int]:
 
 
 def _bounded_gain(u: Array, s: Array) -> Array:
-    """max of 2 u z - s z^2 over |z| <= 3."""
+    """max of 2 u z - s z^2 over |z| <= 3, (k,)."""
     z = np.clip(u / s, -FREED_SD, FREED_SD)
     return np.asarray(2 * u * z - s * z**2)
 

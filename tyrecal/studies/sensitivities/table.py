@@ -216,7 +216,7 @@ def _on_the_road(
             " solvers' shows which one does (footprint_gradients)"
         )
     wanted = [
-        ValueTarget(kind, 1.0, 1.0, state=TyreState(None, load))
+        ValueTarget(kind, value=1.0, sigma=1.0, state=TyreState(None, load))
         for load in loads_N or loads_of(case)
         for kind in kinds
     ]
