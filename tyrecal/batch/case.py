@@ -65,7 +65,7 @@ class CaseTask:
     name: str
     path: Path
     folder: Path  # of the results
-    studies: tuple[str, ...]
+    studies: tuple[str, ...]  # names of studies, in the order to run
     asked: Asked
     solver: str = ""
     mesh: str = ""  # level, empty for the case's own

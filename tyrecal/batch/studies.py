@@ -39,7 +39,7 @@ class StudyOutcome:
     status: str = "good"  # or "failed", "skipped"
     cause: str | None = None  # of a failure, a key
     words: str | None = None  # of a failure, for people
-    quantities: dict[str, float] = field(default_factory=dict)
+    quantities: dict[str, float] = field(default_factory=dict)  # `Result.quantities`, by name
     files: dict[str, str] = field(default_factory=dict)
     conclusion: dict[str, str | None] = field(default_factory=dict)  # `Result.conclusion`
 

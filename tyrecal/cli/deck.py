@@ -128,7 +128,7 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
     numbers: Mapping[str, float] = {}
     gauges: Gauges = ()
     if path.suffix in (".yaml", ".yml"):
-        loaded, _ = arguments.load(path, mesh, assignments, None, terminal, True)
+        loaded, _ = arguments.load(path, mesh, assignments, None, terminal, allow_unusual=True)
         if isinstance(loaded.kind, DecksIn3D):
             content = known_of_decks(loaded, loaded.kind.decks, terminal)
             terminal.result(content)

@@ -150,7 +150,7 @@ def command(
     for _, change in [] if study.allow_unusual else changes:
         if not change.times:
             option, name = f"--toggled {change.id}={change.value:g}", f"effects.{change.id}"
-            arguments.refuse_unusual(loaded, option, name, change.value, False)
+            arguments.refuse_unusual(loaded, option, name, change.value, allowed=False)
     first_guess = arguments.fitted_values(fitted, loaded, terminal) if fitted else None
     evaluator = study.evaluator(loaded)
     others = [*repeats, *(path for path, _ in changes)]

@@ -210,7 +210,7 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(EXIT_INPUT)
     except Interrupted as interrupted:
         say(f"\n{interrupted}", err=True)
-        exec("")  # forgets one that has passed through exec(): Python would die of it at its end
+        exec("")  # forgets an interrupt inside exec(), of which Python would die at its end
         sys.exit(interrupted.exit_code)
     except Exception as failure:
         code = _exit_code(failure)

@@ -264,12 +264,12 @@ class Study:
     terminal: Terminal
     mesh: str
     solver: str
-    solver_command: tuple[str, ...]
+    solver_command: tuple[str, ...]  # words of --solver-command; (): the solver's own
     output: Path | None
     store: Path | None
     no_store: bool
     allow_unusual: bool
-    jobs: int = 1
+    jobs: int = 1  # designs evaluated at a time
     report: bool = False
     figure_format: str = "png"
 

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from ..simulate.modes.label import in_words
 
-MAX_ROWS = 40
+MAX_ROWS = 40  # cases in the table, and in that of the drift
 FIGURES = ("baseline", "now", "change", "allowed")
 OUTCOME_COLOURS = {"error": "red", "failed": "red", "skipped": "yellow"}
 

@@ -28,7 +28,7 @@ RUNGS = {
     3: "corroborated: its size agrees with an independent measurement",
     4: "shown to be the cause: changing it moved the frequencies as predicted",
 }
-SHOWN = 6
+SHOWN = 6  # candidates at most
 GROUP_WORDS = {  # names in diagnosis.json that the page has in the words of the guides
     "lateral": "out-of-plane",
     "lateral less in-plane": "out-of-plane less in-plane",

@@ -67,7 +67,8 @@ def read_drawn_numbers(path: Path) -> list[Panel]:
 
 
 def _values(artist: Artist) -> Iterator[np.ndarray]:
-    """Coordinates that an artist draws, and the values behind its colours, each as one array."""
+    """Coordinates that an artist draws, and the values behind its colours, each as one array (n,)
+    or (n, k)."""
     if isinstance(artist, Line2D):
         yield from (np.asarray(each, float) for each in artist.get_data(orig=False))
     elif isinstance(artist, Patch):

@@ -8,7 +8,7 @@ from textwrap import fill
 from ..studies.effects import CatalogueEntry
 from ..studies.result import Column, Table
 
-WIDTH = 98
+WIDTH = 98  # characters of a line
 
 
 def effects_table(effects: Sequence[CatalogueEntry]) -> Table:

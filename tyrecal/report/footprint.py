@@ -16,7 +16,7 @@ from .figure import COLOUR_MAP, COLOURS, GREY, headline, in_house_style, new_fig
 from .shape_data import PatchData
 
 MAX_BANDS = 12  # of colour
-MAX_COLUMNS = 4
+MAX_COLUMNS = 4  # patches next to each other
 MARGIN = 10.0  # mm round the largest patch
 DESIGN_STYLES: dict[str, dict[str, Any]] = {
     "initial": {"ls": (0, (4, 2)), "marker": "o", "mfc": "white"},

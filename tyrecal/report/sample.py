@@ -73,7 +73,7 @@ def _tick_labels(v: SampledVariable) -> list[str]:
 
 
 def _edges(v: SampledVariable, count: int) -> Array:
-    """Steps of the box, in the variable's own unit."""
+    """Ends (count + 1,) of equal steps of the box, in the variable's own unit."""
     low, high = v.box
     steps = np.geomspace if v.log else np.linspace
     return np.asarray(steps(low, high, count + 1))
@@ -85,6 +85,7 @@ def _ticks(v: SampledVariable) -> list[float]:
 
 
 def _alone(axes: Axes, v: SampledVariable, name: str) -> None:
+    """Draw the shares of one variable's draws, and the normal density of the linear error."""
     edges, share = _edges(v, len(v.density)), np.array(v.density)
     axes.stairs(share, edges, color=DRAWN_COLOUR, fill=True, alpha=0.3)
     axes.stairs(share, edges, color=DRAWN_COLOUR, lw=1.2, label="draws")
@@ -124,6 +125,6 @@ def _together(axes: Axes, counts: Array, across: SampledVariable, up: SampledVar
 
 
 def _middles(v: SampledVariable, count: int) -> Array:
-    """Middles of the steps of the box, in the variable's own unit."""
+    """Middles (count,) of the steps of the box, in the variable's own unit."""
     edges = _edges(v, count)
     return np.asarray(np.sqrt(edges[1:] * edges[:-1]) if v.log else (edges[1:] + edges[:-1]) / 2)

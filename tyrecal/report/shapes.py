@@ -20,7 +20,7 @@ from .revolve import motion, swept
 
 Array = np.ndarray
 
-ANGLES = 72
+ANGLES = 72  # steps round the tyre
 MAX_MERIDIAN_POINTS = 33  # more are not seen
 MAX_IN_OVERVIEW = 12  # modes
 MAX_MOTION = 0.12  # displacement in the picture over the tyre's radius
@@ -64,7 +64,8 @@ class _Sheet:
 def _key(
     sheet: _Sheet, modes: Sequence[Mode], words_at: tuple[float, float], more: str = ""
 ) -> None:
-    """Draw : key at, foot : the, and : lines, in inches from : lower left corner."""
+    """Draw the key of the colours at the foot of the sheet, and at ``words_at`` (x, y), in inches
+    from its lower left corner, what the lines mean."""
     left, right, low, high = 5.9, 8.3, 0.3, 0.38
     shades = np.linspace(0, 1, 65)
     x, y = np.meshgrid(left + shades * (right - left), [low, high])
@@ -90,7 +91,7 @@ def _twists(mode: Mode) -> bool:
 
 @dataclass(frozen=True)
 class _Surface:
-    """The tyre's outer surface at rest and in a mode."""
+    """The tyre's outer surface at rest and in a mode: x, y, z in m, or a view of it in inches."""
 
     rest: Array  # (k, angle, 3)
     moved: Array  # (k, angle, 3)
@@ -100,7 +101,7 @@ class _Surface:
 
 
 def _drawn(mesh: SectionMesh) -> Array:
-    """The nodes of a drawn meridian: of the outer surface, its ends among them."""
+    """The nodes (k,) of a drawn meridian: of the outer surface, its ends among them."""
     nodes = mesh.skin()
     count = min(len(nodes), MAX_MERIDIAN_POINTS)
     return nodes[np.linspace(0, len(nodes) - 1, count).round().astype(int)]

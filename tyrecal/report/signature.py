@@ -10,7 +10,7 @@ from ..tyre.effects import catalogue
 from .figure import COLOURS, GREY, headline, in_house_style, new_figure
 from .table import MINUS
 
-BAR = 0.38
+BAR = 0.38  # thickness of a bar, of the distance of two labels
 
 
 @in_house_style

@@ -94,6 +94,7 @@ def _write(
 
 
 def _hexahedra(quads: np.ndarray, sectors: int) -> np.ndarray:
+    """Corners (element, 8) of the elements (quad, 4) of a section swept round."""
     here = quads[:, None] * sectors + np.arange(sectors)[:, None]
     there = np.roll(here, -1, axis=1)
     # counter-clockwise in (r, z) looks against Theta, so the face with the larger one comes first

@@ -51,8 +51,8 @@ class Page:
     """A page that was written: bytes, and the commands whose results each folder holds."""
 
     path: Path
-    size: int
-    found: dict[str, list[str]]
+    size: int  # bytes
+    found: dict[str, list[str]]  # folder to commands
 
 
 Draw = Callable[[str, str, str, Callable[[], Figure]], Markup]  # see `_picture`

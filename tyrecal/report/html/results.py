@@ -28,10 +28,10 @@ StudyContent = TypeVar("StudyContent", bound=Result)
 class RunFacts(ResultPart):
     """A study's entry in run.json."""
 
-    case: str | None = None
-    command: str | None = None
+    case: str | None = None  # path of its file, relative to the folder
+    command: str | None = None  # name of the study
     finished: bool = True
-    started: str = ""
+    started: str = ""  # UTC, as 2026-11-27T08:30:00+00:00
     arguments: list[str] = Field(default=[])
     host: str = ""
 
