@@ -14,11 +14,24 @@ on 2026-11-27, each lot read after those of the lots before were answered, and b
 | 20261204 | 3 | 0 | 1 | 3 | 1 | 2 |
 | 20261205 | 3 | 1 | 0 | 1 | 1 | 2 |
 
-By another reader, who had read no lot before; about half of them are answered:
+By two others, who had read no lot before. The second also mended the like of each question in all
+files and then read most of them, so that from the fourth lot on it knew the words; of the last row
+it read no pages of `solvers/bundled/road` and `solvers/language`:
 
 | seed | tyre | simulate | measured | studies | report, batch, cli | solvers |
 |---|---|---|---|---|---|---|
 | 20261206 | 10 | 12 | 8 | 6 | 4 | 7 |
+| 20261301 | 4 | 5 | 9 | 6 | 0 | 9 |
+| 20261302 | 6 | 4 | 1 | 1 | 1 | 0 |
+| 20261303 | 5 | 0 | 0 | 1 | 1 | 1 |
+| 20261304 | 0 | 1 | 0 | 3 | 0 | 0 |
+| 20261305 | 0 | 0 | 0 | 0 | 0 | 2 |
+| 20261306 | 0 | 0 | 1 | 0 | 1 | 0 |
+| 20261307 | 3 | 0 | 1 | 4 | 0 | 1 |
+| 20261308 | 2 | 1 | 0 | 1 | 0 | 2 |
+| 20261309 | 2 | 0 | 0 | 1 | 0 | 2 |
+| 20261310 | 0 | 0 | 1 | 1 | 0 | 1 |
+| 20261311 to 26, at most | 1 | 0 | 1 | 1 | 0 | 2 |
 """
 
 from __future__ import annotations
