@@ -55,8 +55,9 @@ def findings(blocks: Sequence[Block], before: Sequence[Block] = ()) -> list[Find
     """Faults in the keywords of a job, which may continue from the model of another, ``before``."""
     names = _Names()
     for block in before:
-        list(_parameters(block, RULES.get(block.name, KeywordRule("")), names))
-        list(_data(block, RULES.get(block.name, KeywordRule("")), names))
+        if block.name in RULES:
+            list(_parameters(block, RULES[block.name], names))
+            list(_data(block, RULES[block.name], names))
     names.used.clear()
     names.bare.clear()
     faults = [*_order(blocks, before)]
@@ -151,10 +152,9 @@ def _parameters(block: Block, rule: KeywordRule, names: _Names) -> Iterator[Find
 
 def _data(block: Block, rule: KeywordRule, names: _Names) -> Iterator[Finding]:
     """Data lines: their number, then each field."""
-    forms = rule.forms(block.parameters)
-    if not forms and rule.fields:  # a variant whose data the table does not know
+    lines = rule.forms(block.parameters)
+    if not lines and rule.fields:  # a variant whose data the table does not know
         return
-    lines = (forms,) if isinstance(forms, str) else forms
     least, most = rule.rows if rule.fields else (0, 0)
     least = max(least, len(lines) if len(lines) > 1 else 0)
     least = (
@@ -168,7 +168,7 @@ def _data(block: Block, rule: KeywordRule, names: _Names) -> Iterator[Finding]:
         yield from _elements(block, names)
     if block.name == "NODE":
         names.nodes |= {row.fields[0].strip() for row in block.rows}
-    for i, row in enumerate(block.rows if lines != ("",) else ()):
+    for i, row in enumerate(block.rows if lines else ()):
         kinds, rest = _form(lines[min(i, len(lines) - 1)])
         fields = [text.strip() for text in row.fields]
         while fields and not fields[-1]:

@@ -4,16 +4,9 @@ from __future__ import annotations
 
 from difflib import get_close_matches
 
+from .rule import PLACES
 from .table import OUTPUT_KEYWORDS, RULES
 from .text import Block
-
-PLACES = {
-    "deck": "the model",
-    "section": "the model",
-    "revolve": "the model",
-    "deck step": "a step",
-    "step": "a step",
-}
 
 
 def check_honoured(block: Block, place: str) -> None:

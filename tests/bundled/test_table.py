@@ -8,6 +8,7 @@ frequencies, mass and inflated shape; of a pair with a road it is what the conta
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
@@ -19,11 +20,21 @@ from tyrecal_solvers.bundled.deck.steps import Deck
 from tyrecal_solvers.bundled.job import Job
 from tyrecal_solvers.errors import Refused, RunFailed
 from tyrecal_solvers.language.laws import LAW_CONSTANTS
+from tyrecal_solvers.language.model_rules import MODEL_RULES
+from tyrecal_solvers.language.other_keywords import OTHER_KEYWORDS
+from tyrecal_solvers.language.rule import PLACES as PLACES_OF_BLOCKS
 from tyrecal_solvers.language.rule import QUIET
+from tyrecal_solvers.language.step_rules import STEP_RULES
 from tyrecal_solvers.language.table import RULES
 from tyrecal_solvers.language.text import Block
 
 PLACES = ("section", "revolve", "step")
+NOTES = {
+    "output",
+    "contact",
+    "not judged",
+    *(f"once a {each}" for each in ("job", "step", "parent")),
+}
 Pair = dict[str, Sequence[Block]]
 SECTION = """*NODE, NSET=ALL
 1, 0.2, -0.06
@@ -369,3 +380,17 @@ def test_what_is_admitted_changes_the_answer_or_is_refused(
                     return
     assert seen, "no pair here has it"
     raise AssertionError("the answer is the same without it, and with all its other words")
+
+
+def test_every_line_of_the_tables_begins_with_a_word_that_is_read() -> None:
+    words = r"lines \d([-+]\d?)?|(if|names)( .+)?|needs|alone|under|after|within|instead|calculix"
+    places = "|".join(PLACES_OF_BLOCKS)
+    known = re.compile(rf"\*.+ \(.+\)|  ({words}|({places})(\|({places}))*):")
+    text = re.sub(r"\n {4,}", " ", (MODEL_RULES + STEP_RULES + OTHER_KEYWORDS).strip())
+    for line in re.split(r"\n+", text):
+        assert known.match(line), line
+    notes = {
+        note for head in re.findall(r"^\*.+? \((.+?)\)", text, re.M) for note in head.split(", ")
+    }
+    levels = {word for note in notes - NOTES for word in note.split()}
+    assert levels == {"model", "part", "step"}
