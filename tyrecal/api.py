@@ -4,9 +4,8 @@
 ``solver``, the name of an installed solver ("": the case's), and ``record``, a folder that answers
 what was evaluated before and keeps what is new (None: neither). ``jobs`` is how many designs are
 evaluated at a time, where they are independent. Values of variables are in the units of the numbers
-that they set; those not given are the case's start values. A wrong argument raises ValueError in a
-sentence that names it, a case with mistakes CaseError, which is one, and a solver that fails
-EvaluationFailed.
+that they set; those not given are the case's start values. A wrong argument raises InputError in a
+sentence that names it, a case with mistakes CaseError, a solver that fails EvaluationFailed.
 
 Numbers that no tyre has, most often slips of unit, are wrong input of `load_case`, `with_values`,
 `sweep_pressure` and `evaluate_footprint`, unless ``allow_unusual``. Values of designs to evaluate
@@ -24,6 +23,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
+from .errors import InputError
 from .files import printable, read_json
 from .measured.load import load_case as _load_case
 from .simulate.deck.decks_design import design_of
@@ -99,7 +99,7 @@ def with_values(
 ) -> LoadedCase:
     """The case with any of its numbers set, by path, and with variables that start at other values,
     by name; ``overrides`` and the provenance of results list them. A path takes None, and a word
-    among those of its key, where the case file does. Raises ValueError for an unknown name, an
+    among those of its key, where the case file does. Raises InputError for an unknown name, an
     impossible value, or one that no tyre has.
 
     >>> case = load_case("cases/p235_75r17.yaml", mesh="coarse")
@@ -107,7 +107,7 @@ def with_values(
     {'rebar_layers.belt_1.angle_deg': 68.0}
     >>> with_values(case, {"pressure_kPa": 2.2})  # doctest: +ELLIPSIS
     Traceback (most recent call last):
-    ValueError: pressure_kPa is 2.2: usual is 50 to 1200 kPa; did you mean 2.2 bar, 220 kPa? ...
+    tyrecal.errors.InputError: pressure_kPa is 2.2: usual is 50 to 1200 kPa; did you mean 2.2 ...
     """
     given = _mapping("values", values)
     changed = overridden(_case(case), given)
@@ -264,7 +264,7 @@ def diagnose_case(
     case = _case(case)
     file = case.measured if measured is None else _file("measured", measured)
     if file is None:
-        raise ValueError("measured must be given: the case's targets are not in a file")
+        raise InputError("measured must be given: the case's targets are not in a file")
     others = _files("repeats", repeats)
     ids = None if effects is None else _names("effects", effects)
     jobs, evaluator = _count("jobs", jobs, 1), _evaluator(case, solver, record)
@@ -301,11 +301,11 @@ def emulate(
 
     case = _case(case)
     if not _number("reach", reach) > 0:
-        raise ValueError(f"reach must be above 0, got {reach:g}")
+        raise InputError(f"reach must be above 0, got {reach:g}")
     evaluations, jobs = _count("evaluations", evaluations, 0), _count("jobs", jobs, 1)
     variables = read_variables(case)
     if not variables:
-        raise ValueError("the case has no variables: there is nothing to emulate")
+        raise InputError("the case has no variables: there is nothing to emulate")
     box = [
         (max(x - reach, v.scaled(v.lower)), min(x + reach, v.scaled(v.upper)))
         for v in variables
@@ -314,10 +314,10 @@ def emulate(
     if pressures_kPa is not None:
         ends = _numbers("pressures_kPa", pressures_kPa)
         if len(ends) != 2:
-            raise ValueError(f"pressures_kPa must be two, from one to another, got {ends}")
+            raise InputError(f"pressures_kPa must be two, from one to another, got {ends}")
         low, high = ends
         if not 0 < low < high < inf:
-            raise ValueError(f"pressures_kPa must rise from above 0, got {low:g} to {high:g}")
+            raise InputError(f"pressures_kPa must rise from above 0, got {low:g} to {high:g}")
         start = min(max(case.case.pressure_kPa, low), high)
         variables.append(DesignVariable("pressure_kPa", start, low, high))
         box.append((log(low), log(high)))
@@ -352,7 +352,7 @@ def run(
     known = list(signature(kind.run).parameters)[1:]
     for name, value in options.items():
         if name not in known:
-            raise ValueError(f"{study} has no option '{name}': it has {', '.join(known) or 'none'}")
+            raise InputError(f"{study} has no option '{name}': it has {', '.join(known) or 'none'}")
         if name in OPTION_READERS:
             options[name] = OPTION_READERS[name](case, name, value)
     given = StudyInput(case, _evaluator(case, solver, record), {"initial": _design(case, values)})
@@ -392,7 +392,7 @@ def read_results(folder: Path | str) -> dict[str, Any]:
 
 
 def _design(case: LoadedCase, values: Mapping[str, float] | None) -> dict[str, float]:
-    """The whole design. Raises ValueError where the case cannot have it."""
+    """The whole design. Raises InputError where the case cannot have it."""
     design = {**start_values(case), **({} if values is None else _mapping("values", values))}
     _with_values(case, design)
     return design
@@ -401,7 +401,7 @@ def _design(case: LoadedCase, values: Mapping[str, float] | None) -> dict[str, f
 def _held(
     case: LoadedCase, fixed: Mapping[str, float] | Iterable[str] | str | None
 ) -> dict[str, float]:
-    """Values of the variables that are held. Raises ValueError."""
+    """Values of the variables that are held. Raises InputError."""
     if fixed is None or isinstance(fixed, Mapping):
         held = {} if fixed is None else _mapping("fixed", fixed)
     else:
@@ -409,7 +409,7 @@ def _held(
     for name in held:
         if name not in case.case.variables:
             known = suggestion(name, case.case.variables)
-            raise ValueError(f"fixed: there is no variable '{name}'{known}")
+            raise InputError(f"fixed: there is no variable '{name}'{known}")
     _with_values(case, {**start_values(case), **held})
     return held
 
@@ -417,10 +417,10 @@ def _held(
 def _refuse_unusual(
     case: LoadedCase, what: str, name: str, value: Setting, allowed: bool = False
 ) -> None:
-    """Raises ValueError where no tyre has such a value of ``name``; the message calls it
+    """Raises InputError where no tyre has such a value of ``name``; the message calls it
     ``what``."""
     if not allowed and (message := unusual_value(case, name, value)):
-        raise ValueError(f"{what} is {as_written(value)}: {message}")
+        raise InputError(f"{what} is {as_written(value)}: {message}")
 
 
 def _evaluator(case: LoadedCase, solver: str, record: Path | str | None) -> Evaluator:
@@ -428,14 +428,14 @@ def _evaluator(case: LoadedCase, solver: str, record: Path | str | None) -> Eval
     if record is not None:
         folder = _path("record", record)
         if folder.exists() and not folder.is_dir():
-            raise ValueError(f"record must be a folder, '{folder}' is a file")
+            raise InputError(f"record must be a folder, '{folder}' is a file")
         store = Store(folder.resolve())
     evaluator = Evaluator(design_of(case), _text("solver", solver), store=store)
     evaluator.solver  # noqa: B018  a solver that is not there is refused before anything else
     return evaluator
 
 
-# Arguments as callers write them. Each function raises ValueError in a sentence that names one.
+# Arguments as callers write them. Each function raises InputError in a sentence that names one.
 
 
 def _case(case: LoadedCase | Path | str) -> LoadedCase:
@@ -453,7 +453,7 @@ def _path(name: str, value: Path | str, wanted: str = "a path") -> Path:
 def _file(name: str, value: Path | str) -> Path:
     path = _path(name, value, "the path of a file")
     if not path.is_file():
-        raise ValueError(f"{name}: there is no file '{path}'")
+        raise InputError(f"{name}: there is no file '{path}'")
     return path
 
 
@@ -468,7 +468,7 @@ def _method(name: str, value: str) -> str:
 
 def _one_of(name: str, value: str, known: Collection[str]) -> str:
     if _text(name, value) not in known:
-        raise ValueError(f"{name} '{value}' is none of {', '.join(known)}")
+        raise InputError(f"{name} '{value}' is none of {', '.join(known)}")
     return value
 
 
@@ -485,8 +485,8 @@ def _pressures(
     for pressure in pressures:
         try:
             _with_values(case, {**start_values(case), path: pressure})
-        except ValueError as error:
-            raise ValueError(f"{name}: {error}") from None
+        except InputError as error:
+            raise InputError(f"{name}: {error}") from None
         _refuse_unusual(case, name, path, pressure, allowed)
     return pressures
 
@@ -497,7 +497,7 @@ def _loads(
     loads = _numbers(name, values)
     rise = [after - before for before, after in pairwise([0.0, *loads])]
     if not rise or not all(0 < each < inf for each in rise):
-        raise ValueError(f"{name} must be above 0 and rise, got {loads}")
+        raise InputError(f"{name} must be above 0 and rise, got {loads}")
     for load in loads:
         _refuse_unusual(case, name, "road.loads_N.0", load, allowed)
     return loads
@@ -519,7 +519,7 @@ def _count(name: str, value: int, least: int) -> int:
     if not isinstance(value, Integral) or isinstance(value, bool):
         raise _wrong(name, "a whole number", value)
     if value < least:
-        raise ValueError(f"{name} must be at least {least}, got {value}")
+        raise InputError(f"{name} must be at least {least}, got {value}")
     return int(value)
 
 
@@ -549,10 +549,10 @@ def _listed(name: str, values: Any, one: str) -> list[Any]:
     raise _wrong(name, f"{one}, or a list of several", values)
 
 
-def _wrong(name: str, wanted: str, value: object) -> ValueError:
+def _wrong(name: str, wanted: str, value: object) -> InputError:
     text = printable(repr(value))
     shown = text if len(text) <= MAX_SHOWN_CHARACTERS else f"{text[:MAX_SHOWN_CHARACTERS]}..."
-    return ValueError(f"{name} must be {wanted}, got {shown}")
+    return InputError(f"{name} must be {wanted}, got {shown}")
 
 
 # how `run` reads an option, by its name: case, name and value; others are passed on as they are

@@ -41,7 +41,7 @@ from ..measured.load import load_case
 from ..simulate.case_folder import owner
 from ..simulate.deck.decks_design import design_of
 from ..simulate.evaluate.evaluator import Evaluator
-from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
+from ..simulate.evaluate.failure import EvaluationFailed, SolverUnavailable
 from ..simulate.evaluate.solver import solver_facts
 from ..simulate.evaluate.sources import sources
 from ..simulate.evaluate.store import Store, solver_identity
@@ -173,18 +173,15 @@ def _write_runs(
 
 
 def _loaded(task: CaseTask) -> LoadedCase:
-    """The case at its mesh level and start values. Raises CaseError, DeckRefused."""
+    """The case at its mesh level and start values. Raises InputError."""
     loaded = load_case(task.path, task.allow_unusual)
-    try:
-        if task.mesh:
-            loaded = with_level(loaded, task.mesh)
-        loaded = with_values(loaded, start_values(loaded))
-        for load in () if task.allow_unusual else task.asked.loads_N or ():
-            if message := unusual_value(loaded, "road.loads_N.0", load):
-                raise DeckRefused(f"a load of {load:g} N: {message}")
-        return loaded
-    except ValueError as error:
-        raise DeckRefused(str(error)) from None
+    if task.mesh:
+        loaded = with_level(loaded, task.mesh)
+    loaded = with_values(loaded, start_values(loaded))
+    for load in () if task.allow_unusual else task.asked.loads_N or ():
+        if message := unusual_value(loaded, "road.loads_N.0", load):
+            raise InputError(f"a load of {load:g} N: {message}")
+    return loaded
 
 
 def _failed(error: Exception) -> StudyOutcome:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from ..errors import InputError
 from . import arguments, complete, options
 from .parameters import FileOrFolder, NumberWithin, option
 
@@ -204,7 +205,7 @@ def _with_effects(case: Path, added: tuple[str, ...], output: Path | None, allow
             id, value = parse_assignment(text)
             arguments.refuse_unusual(loaded, f"--add {text}", f"effects.{id}", value, allowed)
             if effects.setdefault(id, value) != value:
-                raise ValueError(f"{id} is given twice, as {effects[id]:g} and {value:g}")
+                raise InputError(f"{id} is given twice, as {effects[id]:g} and {value:g}")
         return add(case, effects, output)
-    except ValueError as error:
+    except InputError as error:
         raise click.UsageError(f"--add: {error}") from None

@@ -249,7 +249,7 @@ def _numbers_of_marks(deck: OwnDeck | OwnDecks, assigned: tuple[str, ...]) -> di
 
     try:
         given = dict(parse_assignment(text) for text in assigned)
-    except ValueError as error:
+    except InputError as error:
         raise click.UsageError(f"--set: {error}") from None
     for name in given.keys() - deck.marks.keys():
         known = ", ".join(deck.marks) or "none"

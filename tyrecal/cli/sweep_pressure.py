@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from ..errors import InputError
 from . import arguments, options
 from .default_case import default_case
 from .main import EXIT_SOLVER
@@ -99,6 +100,6 @@ def _pressures(
     for end, value in (("--from-kPa", pressures[0]), ("--to-kPa", pressures[-1])):
         try:
             with_values(loaded, {name: value})
-        except ValueError as error:
+        except InputError as error:
             raise click.UsageError(f"{end} {value:g}: {error}") from None
     return pressures

@@ -95,7 +95,7 @@ def read_columns(
             raise InputError(f"{place}: two columns are the {meaning}; rename one")
         try:
             columns[meaning] = _column(index, heading, meaning, unit)
-        except ValueError as error:
+        except InputError as error:
             raise InputError(f"{place}: '{heading}'{error}") from None
     held = columns.keys()
     if not held & units.QUANTITIES.keys() and not {"quantity", "value"} <= held:
@@ -120,13 +120,13 @@ def _refuse_state(heading: str, unit: str, place: str) -> None:
 
 
 def _column(index: int, heading: str, meaning: str, unit: str) -> TableColumn:
-    """Raises ValueError with what is wrong with the unit."""
+    """Raises InputError with what is wrong with the unit."""
     if table := TABLES.get(meaning):
         if not unit and meaning != "frequency_Hz":
-            raise ValueError(f" has no unit; write it as '{heading} [{next(iter(table))}]'")
+            raise InputError(f" has no unit; write it as '{heading} [{next(iter(table))}]'")
         factor = units.factor(table, unit) if unit else 1.0
         if factor is None:
-            raise ValueError(f": the unit must be one of {', '.join(table)}")
+            raise InputError(f": the unit must be one of {', '.join(table)}")
         return TableColumn(index, factor)
     if meaning == "sigma" and unit and unit != "%":
         factors = {
@@ -135,10 +135,10 @@ def _column(index: int, heading: str, meaning: str, unit: str) -> TableColumn:
             if (factor := units.factor(table, unit))
         }
         if not factors:
-            raise ValueError(": unknown unit")
+            raise InputError(": unknown unit")
         return TableColumn(index, next(iter(factors.values())), of=tuple(factors))
     if meaning == "value" and unit:
-        raise ValueError(": values are in the unit of their quantity, as Hz of frequency_Hz")
+        raise InputError(": values are in the unit of their quantity, as Hz of frequency_Hz")
     return TableColumn(index, percent=unit == "%")
 
 

@@ -16,6 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import InputError
+
 Array = np.ndarray
 
 CARTESIAN, CYLINDRICAL, SPHERICAL = 0, 1, 2
@@ -56,7 +58,7 @@ WORLD = CoordinateSystem(CARTESIAN, np.eye(3), np.zeros(3))
 
 def read_systems(kind: int, lines: Sequence[str]) -> dict[int, CoordinateSystem]:
     """Coordinate systems, by number, of a data set of type ``kind``, 18 or 2420, given its lines
-    after the type. Raises ValueError, a phrase that names the fault."""
+    after the type. Raises InputError, a phrase that names the fault."""
     return _systems_18(lines) if kind == 18 else _systems_2420(lines)
 
 
@@ -72,7 +74,7 @@ def _systems_18(lines: Sequence[str]) -> dict[int, CoordinateSystem]:
         ]
         base = _system(reference, systems)
         if base.kind != CARTESIAN:
-            raise ValueError(f"system {number} is given in a {SYSTEM_KINDS[base.kind]} system")
+            raise InputError(f"system {number} is given in a {SYSTEM_KINDS[base.kind]} system")
         origin, on_x, on_xz = (base.place(each) for each in np.reshape(numbers, (3, 3)))
         x = on_x - origin
         y = np.cross(on_xz - origin, x)
@@ -93,30 +95,30 @@ def _systems_2420(lines: Sequence[str]) -> dict[int, CoordinateSystem]:
 
 
 def _groups(lines: Sequence[str], size: int) -> list[Sequence[str]]:
-    """The lines of each system, ``size`` of them. Raises ValueError."""
+    """The lines of each system, ``size`` of them. Raises InputError."""
     if not lines or len(lines) % size:
-        raise ValueError("the last coordinate system is incomplete")
+        raise InputError("the last coordinate system is incomplete")
     return [lines[k : k + size] for k in range(0, len(lines), size)]
 
 
 def _system(number: int, systems: dict[int, CoordinateSystem]) -> CoordinateSystem:
-    """The system of a number among those read so far. Raises ValueError."""
+    """The system of a number among those read so far. Raises InputError."""
     if number not in systems and number not in GLOBAL:
-        raise ValueError(f"coordinate system {number} is not defined")
+        raise InputError(f"coordinate system {number} is not defined")
     return systems.get(number, WORLD)
 
 
 def _add(
     systems: dict[int, CoordinateSystem], number: int, kind: int, axes: Array, origin: Array
 ) -> None:
-    """Add a system, once its axes are right-angled. Raises ValueError."""
+    """Add a system, once its axes are right-angled. Raises InputError."""
     length = np.linalg.norm(axes, axis=1, keepdims=True)
     unit = axes / np.where(length > 0, length, 1.0)
     if axes.shape != (3, 3) or not np.allclose(unit @ unit.T, np.eye(3), atol=1e-3):
-        raise ValueError(f"the axes of system {number} are not at right angles")
+        raise InputError(f"the axes of system {number} are not at right angles")
     if kind not in (CARTESIAN, CYLINDRICAL):
         name = SYSTEM_KINDS[kind] if kind == SPHERICAL else f"of type {kind}"
-        raise ValueError(f"system {number} is {name}; tyrecal reads Cartesian and cylindrical ones")
+        raise InputError(f"system {number} is {name}; tyrecal reads Cartesian and cylindrical ones")
     if number in systems:
-        raise ValueError(f"system {number} is given twice")
+        raise InputError(f"system {number} is given twice")
     systems[number] = CoordinateSystem(kind, unit, origin)

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import isfinite, nan
 
+from ..errors import InputError
 from ..simulate.modes.label import Label
 from ..simulate.settings import settings
 from ..tyre.case.parts import RimSupport
@@ -25,7 +26,7 @@ LOADED_MEMBERS = ("symmetric", "antisymmetric")
 
 @dataclass(frozen=True)
 class Line:
-    """A line of a table. Its methods raise ValueError, whose text says what is wrong."""
+    """A line of a table. Its methods raise InputError, whose text says what is wrong."""
 
     place: str  # file and line
     # by meaning, a key of `columns.HEADINGS`: a quantity, "pressure", "label", "sigma", ...
@@ -46,10 +47,10 @@ class Line:
             return default
         try:
             value = self.marks.number(cell)
-        except ValueError as error:
-            raise ValueError(f"{meaning} is '{cell}', {error}") from None
+        except InputError as error:
+            raise InputError(f"{meaning} is '{cell}', {error}") from None
         if not isfinite(value):
-            raise ValueError(f"{meaning} is '{cell}', must be a number")
+            raise InputError(f"{meaning} is '{cell}', must be a number")
         return value * self.columns[meaning].factor
 
     def measurements(self, pressure_kPa: float, run: str) -> Iterator[Measurement]:
@@ -59,14 +60,14 @@ class Line:
         """
         pressure, load = self.number("pressure", pressure_kPa), self.number("load", 0.0)
         if load < 0:
-            raise ValueError(f"load is {load:g}, must be at least 0")
+            raise InputError(f"load is {load:g}, must be at least 0")
         quantities = self._quantities()
         sigma = self.columns["sigma"] if self.cell("sigma") else None
         if sigma and sigma.of and not {*sigma.of} & {*quantities}:
             which = " or ".join(sigma.of)
-            raise ValueError(f"sigma has the unit of {which}, which has no value here")
+            raise InputError(f"sigma has the unit of {which}, which has no value here")
         if sigma and not sigma.of and not sigma.percent and len(quantities) > 1:
-            raise ValueError(
+            raise InputError(
                 f"sigma can be that of {' or '.join(quantities)}: write its unit, as in"
                 " 'sigma [Hz]', or 'sigma [%]' for all of them"
             )
@@ -103,17 +104,17 @@ class Line:
         if not self.cell("value"):
             if quantities := [quantity for quantity in QUANTITIES if self.cell(quantity)]:
                 return quantities
-            raise ValueError(
+            raise InputError(
                 "nothing was measured: the cell of the value is empty; write n.a. if that is meant"
             )
         quantity = self.cell("quantity")
         known = [*QUANTITIES, DAMPING_RATIO]
         if quantity not in known:
-            raise ValueError(f"quantity is '{quantity}', must be one of {', '.join(known)}")
+            raise InputError(f"quantity is '{quantity}', must be one of {', '.join(known)}")
         if quantity == DAMPING_RATIO and not self.cell("c"):
-            raise ValueError(f"c is '', must be a whole number for {quantity}")
+            raise InputError(f"c is '', must be a whole number for {quantity}")
         if quantity not in OF_A_MODE and any(map(self.cell, ("c", "m", "kind", "member"))):
-            raise ValueError(f"c, m, kind and member must be empty for {quantity}")
+            raise InputError(f"c, m, kind and member must be empty for {quantity}")
         return [quantity]
 
     def _rim(self) -> RimSupport | None:
@@ -125,25 +126,25 @@ class Line:
             if word == rim:
                 return rim
         known = ", ".join((*RIMS, AS_CASE))
-        raise ValueError(
+        raise InputError(
             f"rim is '{self.cell('rim')}', must be one of {known} (as the case has it)"
         )
 
     def _label(self) -> Label | None:
         """Label by the cells ``label``, ``c``, ``m`` and ``kind``; None if the line has none.
-        Raises ValueError."""
+        Raises InputError."""
         c, m, kind = self.cell("c"), self.cell("m"), self.cell("kind")
         if not self.labelled and not any(map(self.cell, ("label", "c", "m", "kind", "member"))):
             return None
         parts = label_parts(self.cell("label"), settings().mode_names) or ()
         if parts and c and m and (c, m) != parts[:2]:
-            raise ValueError(f"label is '{self.cell('label')}', but c is {c} and m is {m}")
+            raise InputError(f"label is '{self.cell('label')}', but c is {c} and m is {m}")
         if parts and kind and parts[2] and KIND_WORDS.get(kind) != KIND_WORDS.get(parts[2]):
-            raise ValueError(f"label is '{self.cell('label')}', but kind is '{kind}'")
+            raise InputError(f"label is '{self.cell('label')}', but kind is '{kind}'")
         # in a table that has a column c, the label is the running number of the mode
         if self.cell("label") and "c" not in self.cells:
             if not parts:
-                raise ValueError(
+                raise InputError(
                     f"label is '{self.cell('label')}', must be like [2,1], or [0,0] lateral or"
                     " torsional, vertical, '2nd in-plane bending'; the settings file may add others"
                     " under mode_names"
@@ -151,22 +152,22 @@ class Line:
             c, m, kind = *parts[:2], kind or parts[2]
         for name, cell in (("c", c), ("m", m)):
             if not (cell.isdecimal() and int(cell) <= MAX_ORDERS[name]):
-                raise ValueError(
+                raise InputError(
                     f"{name} is '{cell}', must be a whole number from 0 to {MAX_ORDERS[name]}"
                 )
         word = kind.strip().lower()
         if word not in KIND_WORDS:
-            raise ValueError(f"kind is '{kind}', must be lateral (axial), torsional or empty")
+            raise InputError(f"kind is '{kind}', must be lateral (axial), torsional or empty")
         zero = int(c) == int(m) == 0
         if zero and not word:
-            raise ValueError("[0,0] needs a kind, lateral (axial) or torsional")
+            raise InputError("[0,0] needs a kind, lateral (axial) or torsional")
         # in tables of other programs the column may describe every mode; only [0,0] needs it
         if word and not zero and self.cell("value"):
-            raise ValueError(f"kind is '{kind}', must be empty: only [0,0] has one")
+            raise InputError(f"kind is '{kind}', must be empty: only [0,0] has one")
         return Label(int(c), int(m), KIND_WORDS[word] if zero else None)
 
     def _member(self, label: Label, loaded: bool) -> str:
-        """Member of a pair, or symmetry under load, by the cell ``member``. Raises ValueError."""
+        """Member of a pair, or symmetry under load, by the cell ``member``. Raises InputError."""
         word = self.cell("member").lower()
         if loaded and word in LOADED_MEMBERS:
             return word
@@ -174,4 +175,4 @@ class Line:
             return DOUBLET_WORDS[word]
         wanted = "1, 2 or empty" if label.c else f"empty for {label}"
         wanted = "symmetric or antisymmetric under load" if loaded else wanted
-        raise ValueError(f"member is '{self.cell('member')}', must be {wanted}")
+        raise InputError(f"member is '{self.cell('member')}', must be {wanted}")

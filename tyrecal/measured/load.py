@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from ..errors import InputError
 from ..tyre import load
 from ..tyre.case import CaseError, LoadedCase
 from ..tyre.case.mistakes import Mistake
@@ -48,7 +49,7 @@ def _with_own_file(loaded: LoadedCase, to_fit: bool = False) -> LoadedCase:
         return with_own_file(loaded)
     except OSError as error:
         mistakes = [Mistake(str(path), 0, "", "", f"cannot be read: {error.strerror or error}")]
-    except ValueError as error:
+    except InputError as error:
         mistakes = [_mistake(path, line) for line in str(error).splitlines()]
     raise CaseError(mistakes)
 

@@ -103,7 +103,7 @@ def _measurements(
         try:
             if len(cells) != len(headings) and any(OPENED.match(cell) for cell in cells):
                 hint = 'write labels in quotes, "[1,1]", or in columns c and m'
-                raise ValueError(f"{len(cells)} cells, the headings are {len(headings)}; {hint}")
+                raise InputError(f"{len(cells)} cells, the headings are {len(headings)}; {hint}")
             cells = cells_under(headings, cells)
             text = {meaning: cells[column.index] for meaning, column in columns.items()}
             if any(is_gap(text.get(name, "")) for name in ("value", *QUANTITIES)) and not any(
@@ -115,9 +115,9 @@ def _measurements(
             values = list(line.measurements(pressure_kPa, f"{path}"))
             for each in values:
                 if mistake := each.mistake or more(each):
-                    raise ValueError(mistake)
+                    raise InputError(mistake)
             measurements += values
-        except ValueError as error:
+        except InputError as error:
             mistakes.append(f"{place}: {error}")
     _refuse(mistakes)
     return _with_damping(measurements)

@@ -176,12 +176,12 @@ def _refuse_states(case: LoadedCase, readings: Sequence[Measurement]) -> None:
     for each in readings:
         try:
             numbers = each.state.numbers(case)
-        except ValueError as error:
+        except InputError as error:
             mistakes.append(f"{each.place}: the rim {error}")
             continue
         try:
             set_values(case, numbers)
-        except ValueError as error:
+        except InputError as error:
             mistakes.append(f"{each.place}: {error}")
     if mistakes:
         raise InputError("\n".join(mistakes))

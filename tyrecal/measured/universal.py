@@ -221,10 +221,11 @@ def _systems(sets: Sequence[_Set]) -> dict[int, CoordinateSystem]:
     for each in sets:
         try:
             more = read_systems(each.kind, each.lines)
-        except (ValueError, IndexError) as error:
-            known = type(error) is ValueError and "system" in str(error)
-            why = str(error) if known else "cannot be read; it is damaged or cut off"
-            raise InputError(f"{each.place}: {why}") from None
+        except InputError as error:
+            raise InputError(f"{each.place}: {error}") from None
+        except (ValueError, IndexError):
+            words = "cannot be read; it is damaged or cut off"
+            raise InputError(f"{each.place}: {words}") from None
         if twice := sorted(systems.keys() & more.keys()):
             raise InputError(f"{each.place}: system {twice[0]} is given in two data sets")
         systems |= more

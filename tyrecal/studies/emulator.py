@@ -91,15 +91,15 @@ class Emulator:
 
     def frequencies(self, values: Mapping[str, float]) -> dict[Label, float]:
         """Hz by label of a design, by the values of its variables; those not given are at their
-        start. Raises ValueError for an unknown name, and outside the box."""
+        start. Raises InputError for an unknown name, and outside the box."""
         names = [v.name for v in self.variables]
         if not isinstance(values, Mapping):
-            raise ValueError(f"values must be names with values, got {values!r}")
+            raise InputError(f"values must be names with values, got {values!r}")
         for name, value in values.items():
             if name not in names:
-                raise ValueError(f"there is no variable '{name}', only {', '.join(names)}")
+                raise InputError(f"there is no variable '{name}', only {', '.join(names)}")
             if not isinstance(value, Real):
-                raise ValueError(f"{name} is {value!r}, must be a number")
+                raise InputError(f"{name} is {value!r}, must be a number")
         given = [(v, values.get(v.name, v.start)) for v in self.variables]
         x = np.array([v.scaled(y) if y > 0 or not v.log else -np.inf for v, y in given])
         for v, t, edges in zip(
@@ -107,7 +107,7 @@ class Emulator:
         ):
             if not abs(t) <= 1 + 1e-9:
                 low, high = map(v.value, edges)
-                raise ValueError(
+                raise InputError(
                     f"{v.name} is {values.get(v.name, v.start):g}: the emulator covers"
                     f" {low:g} to {high:g}"
                 )

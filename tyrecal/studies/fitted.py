@@ -61,7 +61,7 @@ def read_fitted(path: Path, case: LoadedCase) -> tuple[dict[str, float], list[st
         design["pressure_kPa"] = pressure  # else its variable stands among the others
     try:
         with_values(case, design)
-    except ValueError as error:
+    except InputError as error:
         raise InputError(f"'{path}' has a design that this case cannot have: {error}") from None
     return values, _made_otherwise(of, case)
 

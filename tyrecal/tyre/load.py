@@ -12,6 +12,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from ..errors import InputError
 from .case.checks import problems
 from .case.deck_file import completed, read_kind
 from .case.document import Document, read_document
@@ -115,7 +116,7 @@ def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mist
     for place, target in enumerate(case.targets.modes):
         try:
             TyreState(target.pressure_kPa, 0.0, target.rim).numbers(loaded)
-        except ValueError as error:
+        except InputError as error:
             document.add(("targets", "modes", place, "rim"), str(error))
     return (None, document.mistakes) if document.mistakes else (loaded, [])
 

@@ -144,13 +144,13 @@ def _regularity(table: TextTable) -> int:
 
 def cells_under(headings: Sequence[str], cells: Sequence[str]) -> list[str]:
     """The cells of a line, one for each heading; only the first column, a number of the line, may
-    have none. Raises ValueError where there are others."""
+    have none. Raises InputError where there are others."""
     width = len(headings)
     if len(cells) < width or any(cells[width:]):
-        raise ValueError(f"{len(cells)} cells, the headings are {width}")
+        raise InputError(f"{len(cells)} cells, the headings are {width}")
     for heading, cell in zip(headings[1:], cells[1:], strict=False):
         if cell and not heading:
-            raise ValueError(f"'{cell}' is in a column without a heading")
+            raise InputError(f"'{cell}' is in a column without a heading")
     return list(cells[:width])
 
 
@@ -175,7 +175,7 @@ class NamedRow:
         cell = self.cells[column]
         try:
             value = self.marks.number(cell) if cell else nan
-        except ValueError as error:
+        except InputError as error:
             must = str(error).replace("must be a number", "must be a number in mm")
             raise InputError(f"{column} is '{cell}', {must}", self.line) from None
         if abs(value) == inf:
@@ -195,7 +195,7 @@ def read_named_table(path: Path) -> NamedTable:
     for line, cells in table.lines[1:]:
         try:
             lines.append((line, dict(zip(headings, cells_under(headings, cells), strict=True))))
-        except ValueError as error:
+        except InputError as error:
             raise InputError(str(error), line) from None
     numbers = [c for _, row in lines for name, c in row.items() if name.endswith("_mm")]
     marks = NumberMarks.of(numbers, table.separator)
@@ -221,11 +221,11 @@ class NumberMarks:
         return cls(frozenset(decimal) - {""}, frozenset(thousands) - {""})
 
     def number(self, cell: str) -> float:
-        """The number in a cell. Raises ValueError with what would be right, in words that follow
+        """The number in a cell. Raises InputError with what would be right, in words that follow
         those of the cell."""
         match = NUMBER.fullmatch(_plain(cell))
         if not match:
-            raise ValueError("must be a number")
+            raise InputError("must be a number")
         sign, digits, exponent = match[1], match[2], match[3] or ""
         decimal, thousands = _marks(digits)
         if _is_ambiguous(match) and not self._is_decimal(digits, decimal):
@@ -236,11 +236,11 @@ class NumberMarks:
         if not all(each.isdigit() for each in filter(None, [*groups, part])) or (
             len(groups) > 1 and not (groups[0] and three)
         ):
-            raise ValueError("must be a number")
+            raise InputError("must be a number")
         return float(f"{sign}{''.join(groups)}.{part}{exponent}")
 
     def _is_decimal(self, digits: str, mark: str) -> bool:
-        """Whether the mark before three digits is a decimal one. Raises ValueError where the file
+        """Whether the mark before three digits is a decimal one. Raises InputError where the file
         has numbers for both readings."""
         other = ".,"[mark == "."]
         if mark in self.thousands and mark not in self.decimal:
@@ -250,7 +250,7 @@ class NumberMarks:
         thousand, small = digits.replace(mark, ""), digits.replace(mark, ".").rstrip("0")
         small = small.rstrip(".")
         reason = "commas" if other == "," else "points"
-        raise ValueError(
+        raise InputError(
             f"which can be {thousand} or {small}, because other numbers of the file have decimal"
             f" {reason}: write {thousand} or {small.replace('.', other)}"
         )

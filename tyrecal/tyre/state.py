@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import get_args
 
+from ..errors import InputError
 from .case.loaded import LoadedCase
 from .case.parts import RimSupport
 
@@ -73,7 +74,7 @@ class TyreState:
     def numbers(self, case: LoadedCase) -> dict[str, float]:
         """Numbers that the state sets in the case, by path: none where it is as the case.
 
-        Raises ValueError where the case cannot be in it.
+        Raises InputError where the case cannot be in it.
         """
         state, numbers = self.of(case), dict[str, float]()
         if state.rim:
@@ -81,7 +82,7 @@ class TyreState:
         if state.pressure_kPa is not None:
             numbers["pressure_kPa"] = state.pressure_kPa
         if state.rim == "springs":
-            raise ValueError(
+            raise InputError(
                 "has no springs in this case: give a compliance in rim.spindle, as"
                 " rim: {spindle: {lateral_m_per_N: 1e-7}}"
             )
@@ -93,7 +94,7 @@ class TyreState:
             if state.rim == "free":
                 numbers[STANDING] = 0.0
             if state.rim == "free" and point.r:
-                raise ValueError(
+                raise InputError(
                     "cannot move: rim.reference_point_m must be on the axle, with r = 0, got"
                     f" {point.r:g}"
                 )
@@ -101,7 +102,7 @@ class TyreState:
 
     def design(self, case: LoadedCase, values: Mapping[str, float]) -> dict[str, float]:
         """Values of variables, or other numbers of the case by path, and the state's own, which win
-        over a variable that sets the same. Raises ValueError."""
+        over a variable that sets the same. Raises InputError."""
         own = self.numbers(case)
         return {**without(case, values, own), **own}
 

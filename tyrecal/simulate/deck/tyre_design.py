@@ -10,6 +10,7 @@ from itertools import takewhile
 from math import ceil
 from typing import Any
 
+from ...errors import InputError
 from ...tyre.case import LoadedCase, number_at, start_values
 from ...tyre.case.schema import SolverChoice
 from ...tyre.case.slack_hint import slack_cord_hint
@@ -61,7 +62,7 @@ class TyreDesign:
         case = replace(self.plain, case=self.plain.case.model_copy(update=update))
         try:
             return TyreDesign(case, start_values(read))
-        except ValueError:  # only with what was set is it a tyre
+        except InputError:  # only with what was set is it a tyre
             return None
 
     @property
@@ -133,7 +134,7 @@ class TyreDesign:
             moved = value
         try:
             other = self.at({name: moved})
-        except ValueError:
+        except InputError:
             return self.at({name: value}), value
         return (other if self.tyre.case.splice.share else other._all_round()), moved
 
@@ -221,7 +222,7 @@ def _with_splice_of(tyre: Tyre, share: float) -> Tyre:
     try:
         values = {path: number_at(case, path) * (1 + share) for path in splice.numbers}
         return Tyre(set_values(case, {**values, "splice.share": 0.0}))
-    except ValueError as error:
+    except InputError as error:
         raise TemplateFailed(f"splice.numbers: {error}") from None
 
 

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from ...errors import InputError
 from ...files import NotWritten, printable
 from ...interrupt import defer_interrupts, raise_interrupt
 from ..deck.decks import Decks, Design, DesignKey, PressedTyre
@@ -260,7 +261,7 @@ class Evaluator:
         InputError."""
         try:
             design = self.design.at(values)
-        except ValueError as error:  # no such tyre: the optimiser steps back from it
+        except InputError as error:  # no such tyre: the optimiser steps back from it
             raise EvaluationFailed("refused", str(error)) from None
         self.refuse_lacking(design)
         return design

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from ...errors import InputError
 from ...simulate.modes.find import LabelledModes
 from ...simulate.modes.label import Label
 from ...tyre.state import RIMS, TyreState
@@ -153,7 +154,7 @@ def is_possible(problem: Problem, state: TyreState) -> bool:
     try:
         own = state.numbers(problem.case)
         design = problem.evaluator.design.at(own)
-    except ValueError:
+    except InputError:
         return False
     return problem.evaluator.solver.capabilities >= design.needs.keys()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ...errors import InputError
 from ...simulate.evaluate.evaluator import Evaluator
 from ...tyre.case import LoadedCase
 from ...tyre.case.mistakes import suggestion
@@ -17,7 +18,7 @@ def effect_ranges(
     case: LoadedCase, evaluator: Evaluator, ids: Sequence[str] | None = None
 ) -> tuple[dict[str, EffectRange], dict[str, str]]:
     """Effects that the evaluator's solver can express, and why it cannot the others, or a case of a
-    user's deck cannot have them. Raises ValueError where one of ``ids`` is no effect; InputError
+    user's deck cannot have them. Raises InputError where one of ``ids`` is no effect; InputError
     for decks in three dimensions.
     """
     case.kind.require_section(
@@ -28,7 +29,7 @@ def effect_ranges(
     stated = {path: abs(step) for each in sources(case)[0] for path, step in each.steps.items()}
     for id in ids or ():
         if id not in catalogue():
-            raise ValueError(f"'{id}' is not one of the effects{suggestion(id, catalogue())}")
+            raise InputError(f"'{id}' is not one of the effects{suggestion(id, catalogue())}")
     for id, effect in catalogue().items():
         if ids is not None and id not in ids:
             continue
@@ -55,6 +56,6 @@ def _lacking(case: LoadedCase, effect: Effect) -> str:
     """Reason why a case of a user's deck cannot have an effect, "" = none."""
     try:
         case.kind.check_effect(effect, case)
-    except ValueError as error:
+    except ValueError as error:  # an effect from outside may raise one
         return str(error)
     return ""

@@ -84,7 +84,7 @@ def fields(case: LoadedCase) -> dict[str, SectionField]:
         return {}
     try:
         s = arc_length(case)
-    except ValueError:
+    except InputError:
         if case.case.section.known_from is None:
             return {}
         raise InputError(

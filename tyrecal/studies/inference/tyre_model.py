@@ -9,6 +9,7 @@ from math import exp, log
 
 import numpy as np
 
+from ...errors import InputError
 from ...simulate.deck.decks import Decks
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
@@ -19,7 +20,6 @@ from ...tyre.case.schema import TargetMode, Targets
 from ...tyre.effects import catalogue
 from ...tyre.number_units import EFFECT_PATH, unit_of
 from ...tyre.state import TyreState, without
-from ...tyre.templates import TemplateFailed
 from ...tyre.values import with_values
 from ..variable import read_variables
 from .between import Between
@@ -267,7 +267,7 @@ class TyreModel:
         assert add
         try:
             made = add(own, self._present.get(id, 0.0) + e)
-        except ValueError:
+        except ValueError:  # an effect from outside may raise one
             return None
         top = sorted(set(self._between.high.tolist()))
         rows = [self._between.rows[i] for i in top]
@@ -299,7 +299,7 @@ class TyreModel:
         try:
             far = span.base + span.high or span.base + span.low
             return self.evaluator.has_gradients_at({EFFECT_PATH + id: far})
-        except ValueError:  # the case cannot have that much of it
+        except InputError:  # the case cannot have that much of it
             return True
 
     def _moves(self, id: str, e: float) -> bool:
@@ -313,7 +313,7 @@ class TyreModel:
                 design = self.evaluator.design.at({path: base + e})
                 Decks(design, (path,)).tangents(self.evaluator.solver.dialect)
                 self._known_moves[id, e] = True
-            except (ValueError, TemplateFailed):
+            except InputError:
                 self._known_moves[id, e] = False
         return self._known_moves[id, e]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...errors import InputError
 from ..case import LoadedCase
 from ..section.curve import length_along
 from .deck_numbers import stiffer, with_compounds
@@ -18,17 +19,17 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     carcass has a turn-up, only the rubber between the two is meant. If the rim holds only the
     bead's surface, the filler within the bead deforms."""
     if not value > -1:
-        raise ValueError("must be greater than -1")
+        raise InputError("must be greater than -1")
     return _stiffer(case, _place(case)[0], 1 + value)
 
 
 def higher(case: LoadedCase, value: float) -> LoadedCase:
     """The same with a filler that reaches `HIGHER_m` further up: the region above gets stiffer by
-    the share of its length that the filler covers. Raises ValueError if no region is above."""
+    the share of its length that the filler covers. Raises InputError if no region is above."""
     top = stations(case.section, _place(case)[0][0])[0]
     above = [name for name in sidewall(case) if stations(case.section, name)[1] == top]
     if not above:
-        raise ValueError("must be 0: no region of the sidewall is above the filler")
+        raise InputError("must be 0: no region of the sidewall is above the filler")
     line = case.section.points[case.section.names.index(carcass_line(case))]
     first, last = stations(case.section, above[0])
     length = float(length_along(line[first : last + 1])[-1])
@@ -62,7 +63,7 @@ def add_to_deck(case: LoadedCase, value: float) -> LoadedCase:
     """The same factor on the compounds that ``deck.parts.bead_filler`` of a case of your own deck
     names."""
     if not value > -1:
-        raise ValueError("must be greater than -1")
+        raise InputError("must be greater than -1")
     return with_compounds(case, "bead_filler", "HYPERELASTIC", stiffer(1 + value, bulk=True))
 
 

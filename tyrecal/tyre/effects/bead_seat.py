@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from ...errors import InputError
 from ..case import LoadedCase
 from ..section.curve import length_along
 from ..section.section import Section, fill_lines
@@ -24,15 +25,15 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     """The rim does not hold a share ``value`` of the bead's length, and `LEAST` of the rest. That
     part is a separate region with the bead's rubbers and cords, and half as many elements."""
     if not 0 <= value < 1:
-        raise ValueError("must be at least 0 and less than 1")
+        raise InputError("must be at least 0 and less than 1")
     section = case.section
     bead, *others = held_regions(section)
     first, last = stations(section, bead)
     if others or first != rim_edge(section):
-        raise ValueError(f"must be 0: the rim must hold one region, '{bead}'")
+        raise InputError(f"must be 0: the rim must hold one region, '{bead}'")
     for name, there in zip(section.names, present(section)[:, first + 1 : last + 1], strict=True):
         if there.any() and not there.all():
-            raise ValueError(f"must be 0: line '{name}' ends within the bead")
+            raise InputError(f"must be 0: line '{name}' ends within the bead")
     gap = unused(f"{bead}{GAP_ENDING}", [name for name, _ in section.regions])
 
     def wider(regions: list[str] | None) -> list[str] | None:

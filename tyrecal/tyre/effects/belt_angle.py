@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...errors import InputError
 from ..case import LoadedCase
 from .deck_numbers import with_angles
 from .edit import with_layers, with_part
@@ -19,10 +20,10 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 
 def _turned(name: str, angle_deg: float, value: float) -> float:
-    """A belt cord's angle, degrees, ``value`` further from the circumference. Raises ValueError."""
+    """A belt cord's angle, degrees, ``value`` further from the circumference. Raises InputError."""
     angle = angle_deg % 180  # a cord has no head
     if not 0 < abs(90 - angle) + value < 90:
-        raise ValueError(
+        raise InputError(
             f"must leave a belt cord between circumference and meridian, '{name}' is"
             f" {abs(90 - angle):g} degrees from the circumference"
         )

@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from ...errors import InputError
 from ..case import LoadedCase
 from ..section.curve import length_along
 from ..section.section import Section, fill_lines
@@ -27,7 +28,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     length = length_along(section.points[line])
     room = min(length[edge], length[end] - length[edge])
     if not abs(value) / 2 < 0.5 * room:
-        raise ValueError(f"must be less than {room:.3g} m either way")
+        raise InputError(f"must be less than {room:.3g} m either way")
     return replace(case, drawn=_slid(section, line, edge, end, value / 2))
 
 

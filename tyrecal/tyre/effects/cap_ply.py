@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...errors import InputError
 from ..case import LoadedCase
 from ..case.parts import Cord, RebarLayer
 from .edit import changed, unused, with_layers
@@ -24,13 +25,13 @@ def to_the_edge(case: LoadedCase, value: float) -> LoadedCase:
     length = dict(zip(case.section.names, present(case.section).sum(1), strict=True))
     widest = max(lines, key=lambda line: int(length[line]))
     if length[widest] == length[lines[-1]]:
-        raise ValueError("must be 0: no belt is wider than the outer one")
+        raise InputError("must be 0: no belt is wider than the outer one")
     return _over(case, widest, value)
 
 
 def _over(case: LoadedCase, line: str, value: float) -> LoadedCase:
     if not value > 0:
-        raise ValueError("must be at least 0")
+        raise InputError("must be at least 0")
     material = unused("cap_ply_cord", case.case.materials)
     layer = RebarLayer(
         line=line,

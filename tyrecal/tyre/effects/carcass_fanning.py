@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import degrees
 
+from ...errors import InputError
 from ..case import LoadedCase
 from .edit import unused, with_layers, with_part
 from .effect import Effect
@@ -17,14 +18,14 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     states the spacing on the building drum, of about the bead's diameter.
     """
     if not 0 < value <= 1:
-        raise ValueError("must be between 0 and 1")
+        raise InputError("must be between 0 and 1")
     line = case.section.points[case.section.names.index(carcass_line(case))]
     bead = float(line[rim_edge(case.section), 0])
     layers = dict(case.case.rebar_layers)
     for name in carcass(case):
         layer = layers[name]
         if layer.spacing_m is None:
-            raise ValueError(f"must be 0: the cords of '{name}' fan out already")
+            raise InputError(f"must be 0: the cords of '{name}' fan out already")
         fanned = with_part(
             layer,
             area_m2=value * layer.area_m2,

@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from ...errors import InputError
 from ..case import LoadedCase
 from ..section.section import Section, fill_lines
 from .edit import unused, with_layers, with_part
@@ -20,9 +21,9 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     It is on the next line outside the carcass, and this line continues to the bead.
     """
     if not value > 0:
-        raise ValueError("must be at least 0")
+        raise InputError("must be at least 0")
     if turned_up(case):
-        raise ValueError("must be 0: the carcass of this case is turned up already, as a layer")
+        raise InputError("must be 0: the carcass of this case is turned up already, as a layer")
     section, names = case.section, case.section.names
     line = carcass_line(case)
     outside = names[-2]

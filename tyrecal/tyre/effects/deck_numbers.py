@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 
+from ...errors import InputError
 from ..case import LoadedCase
 from ..own_deck.numbers import moduli, modulus_sign
 from ..own_deck.solver_deck import SolverDeck
@@ -28,7 +29,7 @@ def stiffer(factor: float, bulk: bool) -> Change:
 def with_compounds(case: LoadedCase, part: str, option: str, change: Change) -> LoadedCase:
     """The case with the numbers of an option of a part's compounds changed, "" = all compounds.
 
-    Raises ValueError where a compound of the part is of others, too, or has marks for numbers.
+    Raises InputError where a compound of the part is of others, too, or has marks for numbers.
     """
     numbers, flat, sets = _read(case, part)
     material_of = dict(zip(map(str.upper, flat.sections), flat.materials, strict=True))
@@ -36,11 +37,11 @@ def with_compounds(case: LoadedCase, part: str, option: str, change: Change) -> 
     for name in {material_of[own] for own in sets}:
         others = [own for own, m in material_of.items() if m == name and own not in sets]
         if others:
-            raise ValueError(f"needs a material of its own in {part}: {name} is of {others[0]} too")
+            raise InputError(f"needs a material of its own in {part}: {name} is of {others[0]} too")
         start = f"material {name} / {option} / "
         paths = [path for path in numbers if path.startswith(start)]
         if not paths:
-            raise ValueError(f"needs plain numbers of {start.removesuffix(' / ')}, not marks")
+            raise InputError(f"needs plain numbers of {start.removesuffix(' / ')}, not marks")
         for path in paths:
             numbers[path] = change(path.rpartition(" / ")[2], numbers[path])
     return _with(case, numbers)
@@ -48,7 +49,7 @@ def with_compounds(case: LoadedCase, part: str, option: str, change: Change) -> 
 
 def with_prony(case: LoadedCase, shear: float, tau_s: float) -> LoadedCase:
     """The case with one Prony term in all compounds, which leaves the relaxed state and makes what
-    is faster than ``tau_s`` ``shear`` times as stiff in shear. Raises ValueError."""
+    is faster than ``tau_s`` ``shear`` times as stiff in shear. Raises InputError."""
     numbers, flat, _ = _read(case, "")
     long_term: set[str] = set()
     material = ""
@@ -62,7 +63,7 @@ def with_prony(case: LoadedCase, shear: float, tau_s: float) -> LoadedCase:
         own = [path for path in numbers if path.startswith(start)]
         times = [path for path in own if path.endswith(" / tau")]
         if not times or name not in long_term:
-            raise ValueError(
+            raise InputError(
                 f"needs a Prony series of {name} in plain numbers, and its MODULI=LONG TERM"
             )
         numbers |= dict.fromkeys(own, 0.0) | dict.fromkeys(times, tau_s)
@@ -71,19 +72,19 @@ def with_prony(case: LoadedCase, shear: float, tau_s: float) -> LoadedCase:
 
 
 def stresses(case: LoadedCase) -> list[str]:
-    """Paths of the moduli of all materials. Raises ValueError where one has none, but marks."""
+    """Paths of the moduli of all materials. Raises InputError where one has none, but marks."""
     numbers, flat, _ = _read(case, "")
     result = []
     for name in dict.fromkeys((*flat.materials, *(ply.material for ply in flat.plies))):
         own = [path for path, sign in moduli(numbers, name).items() if sign > 0]
         if not own:
-            raise ValueError(f"needs plain numbers of material {name}, not marks")
+            raise InputError(f"needs plain numbers of material {name}, not marks")
         result += own
     return result
 
 
 def with_angles(case: LoadedCase, part: str, change: Change) -> LoadedCase:
-    """The case with the angles of a part's layers changed, by their names. Raises ValueError."""
+    """The case with the angles of a part's layers changed, by their names. Raises InputError."""
     numbers, flat, sets = _read(case, part)
     sets = _known(part, sets, [ply.set_name.upper() for ply in flat.plies])
     for ply in flat.plies:
@@ -91,13 +92,13 @@ def with_angles(case: LoadedCase, part: str, change: Change) -> LoadedCase:
             path = f"rebar {ply.name} / angle"
             path = path if path in numbers else f"section {ply.set_name} / {path}"
             if path not in numbers:
-                raise ValueError(f"needs a plain number for the angle of {ply.name}, not a mark")
+                raise InputError(f"needs a plain number for the angle of {ply.name}, not a mark")
             numbers[path] = change(ply.name, numbers[path])
     return _with(case, numbers)
 
 
 def with_thickness(case: LoadedCase, part: str, factor: float) -> LoadedCase:
-    """The case with a part so many times as thick. Raises ValueError."""
+    """The case with a part so many times as thick. Raises InputError."""
     numbers, flat, sets = _read(case, part)
     deck = case.kind.source(case.case)
     _known(part, sets, [name.upper() for name in flat.sections])
@@ -106,7 +107,7 @@ def with_thickness(case: LoadedCase, part: str, factor: float) -> LoadedCase:
     try:
         case.kind.deck.flat(numbers, deck.thickened)
     except OwnDeckError as error:
-        raise ValueError(f"cannot be: {error.message}") from None
+        raise InputError(f"cannot be: {error.message}") from None
     return changed(case, deck=deck)
 
 
@@ -116,10 +117,10 @@ def _read(case: LoadedCase, part: str) -> tuple[dict[str, float], SolverDeck, li
 
 
 def _known(part: str, sets: list[str], known: Collection[str]) -> list[str]:
-    """The sets of a part. Raises ValueError for one that is no section's."""
+    """The sets of a part. Raises InputError for one that is no section's."""
     for name in sets:
         if name not in known:
-            raise ValueError(
+            raise InputError(
                 f"needs sets of sections in deck.parts.{part}: {name} is none of {', '.join(known)}"
             )
     return sets

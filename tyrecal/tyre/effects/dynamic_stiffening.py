@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import pi
 
+from ...errors import InputError
 from ..case import LoadedCase
 from ..case.parts import Prony, Rubber
 from ..case.schema import Analysis
@@ -25,7 +26,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
         static, ratio = zip(*(_moduli(m, k, long_term, analysis) for k in "gk"), strict=True)
         shear, bulk = ratio[0] * (1 + value), ratio[1]
         if not (shear >= 1 and bulk >= 1):
-            raise ValueError("must leave the vibration at least as stiff as the inflated state")
+            raise InputError("must leave the vibration at least as stiff as the inflated state")
         return with_part(
             m,
             C10_Pa=m.C10_Pa * static[0],
@@ -48,9 +49,9 @@ def add_to_deck(case: LoadedCase, value: float) -> LoadedCase:
     """In a deck: all compounds, by their Prony series."""
     analysis = case.case.analysis
     if analysis.static_moduli != "long_term" or analysis.vibration_frequency_Hz is not None:
-        raise ValueError("needs static_moduli: long_term and vibration_frequency_Hz: null")
+        raise InputError("needs static_moduli: long_term and vibration_frequency_Hz: null")
     if value < 0:
-        raise ValueError("must leave the vibration at least as stiff as the inflated state")
+        raise InputError("must leave the vibration at least as stiff as the inflated state")
     return _fast(with_prony(case, 1 + value, TAU_S))
 
 

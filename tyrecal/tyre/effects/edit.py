@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
 
+from ...errors import InputError
 from ..case import Case, LoadedCase
 from ..case.parts import Gauge, Part, Rubber, Solid
 
@@ -87,11 +88,11 @@ def with_layers(loaded: LoadedCase, layers: Mapping[str, Any]) -> LoadedCase:
 
 
 def on_spindle(loaded: LoadedCase, key: str, compliance: float) -> LoadedCase:
-    """The case with that much more compliance at the rim's reference point. Raises ValueError."""
+    """The case with that much more compliance at the rim's reference point. Raises InputError."""
     rim = loaded.case.rim
     if rim.free:
-        raise ValueError("must be 0 where the rim is free: there is no spindle")
+        raise InputError("must be 0 where the rim is free: there is no spindle")
     if compliance < 0:
-        raise ValueError("must be at least 0")
+        raise InputError("must be at least 0")
     spindle = with_part(rim.spindle, **{key: getattr(rim.spindle, key) + compliance})
     return changed(loaded, rim=with_part(rim, spindle=spindle))

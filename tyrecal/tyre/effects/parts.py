@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...errors import InputError
 from ..case import LoadedCase
 from ..section.section import Section
 
@@ -25,16 +26,16 @@ def present(section: Section) -> Array:
 
 
 def carcass_line(case: LoadedCase) -> str:
-    """The innermost line of cords that runs from bead to bead. Raises ValueError."""
+    """The innermost line of cords that runs from bead to bead. Raises InputError."""
     used = {layer.line for layer in case.case.rebar_layers.values()}
     for name, there in zip(case.section.names, present(case.section), strict=True):
         if there.all() and name in used:
             return name
-    raise ValueError("must be 0: no layer of cords runs from bead to bead in this case")
+    raise InputError("must be 0: no layer of cords runs from bead to bead in this case")
 
 
 def carcass(case: LoadedCase) -> list[str]:
-    """Names of the cord layers on the carcass line. Raises ValueError."""
+    """Names of the cord layers on the carcass line. Raises InputError."""
     line = carcass_line(case)
     return [name for name, layer in case.case.rebar_layers.items() if layer.line == line]
 
@@ -42,7 +43,7 @@ def carcass(case: LoadedCase) -> list[str]:
 def belt_lines(case: LoadedCase) -> list[str]:
     """Lines of cords that start at the crown and end before the bead, from inside to outside.
 
-    Raises ValueError.
+    Raises InputError.
     """
     there = present(case.section)
     used = {layer.line for layer in case.case.rebar_layers.values()}
@@ -52,7 +53,7 @@ def belt_lines(case: LoadedCase) -> list[str]:
         if name in used and stations[0] and not stations.all()
     ]
     if not lines:
-        raise ValueError("must be 0: this case has no belt, no layer of cords ends at the shoulder")
+        raise InputError("must be 0: this case has no belt, no layer of cords ends at the shoulder")
     return lines
 
 
@@ -72,12 +73,12 @@ def belts(case: LoadedCase) -> list[str]:
         if layer.line == line and top in (layer.regions or [top]) and layer.angle_deg % 180 != 90
     ]
     if not names:
-        raise ValueError("must be 0: this case has no belt, all layers at the crown go round it")
+        raise InputError("must be 0: this case has no belt, all layers at the crown go round it")
     return names
 
 
 def tread(case: LoadedCase) -> tuple[str, str]:
-    """Inner and outer line of the tread: outside all cords, of one rubber. Raises ValueError."""
+    """Inner and outer line of the tread: outside all cords, of one rubber. Raises InputError."""
     names, top = case.section.names, case.section.regions[0][0]
     inner = names.index(belt_lines(case)[-1])
     owner = None
@@ -91,7 +92,7 @@ def tread(case: LoadedCase) -> tuple[str, str]:
 def turned_up(case: LoadedCase) -> tuple[str, list[str]] | None:
     """Line and regions of the carcass' turn-up; None if there is none.
 
-    Raises ValueError.
+    Raises InputError.
     """
     line = carcass_line(case)
     own = {case.case.rebar_layers[name].material for name in carcass(case)}
@@ -109,20 +110,20 @@ def held_regions(section: Section) -> list[str]:
 
 
 def belt_edge(case: LoadedCase) -> int:
-    """Index of the station at which the widest belt ends. Raises ValueError."""
+    """Index of the station at which the widest belt ends. Raises InputError."""
     there = present(case.section)
     places = [case.section.names.index(line) for line in belt_lines(case)]
     return int(max(np.flatnonzero(np.logical_and.accumulate(there[k]))[-1] for k in places))
 
 
 def crown(case: LoadedCase) -> list[str]:
-    """Names of the regions whose middle is within the widest belt. Raises ValueError."""
+    """Names of the regions whose middle is within the widest belt. Raises InputError."""
     edge = belt_edge(case)
     return [name for name, first, last in _regions(case.section) if (first + last) / 2 < edge]
 
 
 def sidewall(case: LoadedCase) -> list[str]:
-    """Names of the regions whose middle is between belt and rim. Raises ValueError."""
+    """Names of the regions whose middle is between belt and rim. Raises InputError."""
     edge, held = belt_edge(case), rim_edge(case.section)
     return [
         name for name, first, last in _regions(case.section) if edge <= (first + last) / 2 < held
@@ -137,7 +138,7 @@ def lower_sidewall(case: LoadedCase) -> list[str]:
     middle = {name: (first + last) / 2 for name, first, last in _regions(case.section)}
     names = [name for name in sidewall(case) if middle[name] > widest]
     if not names:
-        raise ValueError("must be 0: no region of this case is a lower half of the sidewall")
+        raise InputError("must be 0: no region of this case is a lower half of the sidewall")
     return names
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...errors import InputError
 from ..case import LoadedCase
 from .edit import changed, with_part
 from .effect import Effect
@@ -10,7 +11,7 @@ from .effect import Effect
 def add(case: LoadedCase, value: float) -> LoadedCase:
     """An additional mass on the middle of the tread."""
     if value < 0:
-        raise ValueError("must be at least 0")
+        raise InputError("must be at least 0")
     point = case.case.point_mass
     return changed(case, point_mass=with_part(point, mass_kg=point.mass_kg + value))
 

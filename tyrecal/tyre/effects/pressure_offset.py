@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...errors import InputError
 from ..case import LoadedCase
 from .edit import changed
 from .effect import Effect
@@ -11,7 +12,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     """p = p_stated + value."""
     true = case.case.pressure_kPa + value
     if not true >= 0:
-        raise ValueError(f"must leave a pressure of at least 0, this leaves {true:g} kPa")
+        raise InputError(f"must leave a pressure of at least 0, this leaves {true:g} kPa")
     return changed(case, pressure_kPa=true)
 
 

@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from ...errors import InputError
 from ..case import LoadedCase
 from ..section.section import Section
 from .effect import Effect
@@ -27,7 +28,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     free = section.points[line, belt_edge(case) : rim_edge(section) + 1]
     most = 0.2 * float(np.linalg.norm(free[-1] - free[0]))
     if not abs(value) / 2 < most:
-        raise ValueError(f"must be less than {2 * most:.3g} m either way")
+        raise InputError(f"must be less than {2 * most:.3g} m either way")
     edges = belt_edge(case), rim_edge(section)
     return replace(case, drawn=_mounted(section, line, *edges, value / 2))
 
@@ -60,7 +61,7 @@ def _mounted(section: Section, line: int, start: int, end: int, distance: float)
 
     solution = root(miss, np.zeros(3), tol=1e-13)
     if not abs(solution.fun).max() < 1e-9:
-        raise ValueError("must be smaller: the sidewall does not reach the rim")
+        raise InputError("must be smaller: the sidewall does not reach the rim")
     phi, moved = turned(solution.x)
     points = section.points.copy()
     offset = points[:, start : end + 1] - carcass

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...errors import InputError
 from ..case import LoadedCase
 from .edit import changed, with_part
 from .effect import Effect
@@ -11,7 +12,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     """Additional springs from the tread to the ground, as stiff along the road as vertically,
     because the patch sticks. The tyre stays round."""
     if value < 0:
-        raise ValueError("must be at least 0")
+        raise InputError("must be at least 0")
     spring = case.case.road_spring
     stiffer = with_part(
         spring,

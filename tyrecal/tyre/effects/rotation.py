@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...errors import InputError
 from ..case import LoadedCase
 from .edit import changed
 from .effect import Effect
@@ -10,7 +11,7 @@ from .effect import Effect
 def add(case: LoadedCase, value: float) -> LoadedCase:
     """A higher speed of rotation."""
     if value < 0:
-        raise ValueError("must be at least 0: both senses of rotation give the same frequencies")
+        raise InputError("must be at least 0: both senses of rotation give the same frequencies")
     return changed(case, spin_rad_per_s=case.case.spin_rad_per_s + value)
 
 

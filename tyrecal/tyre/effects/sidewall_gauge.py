@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...errors import InputError
 from ..case import LoadedCase
 from .deck_numbers import with_thickness
 from .edit import with_gauge
@@ -17,7 +18,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 def _factor(value: float) -> float:
     if not -0.9 <= value <= 9:
-        raise ValueError("must be between -0.9 and 9")
+        raise InputError("must be between -0.9 and 9")
     return 1 + value
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...errors import InputError
 from ..case import LoadedCase
 from ..case.parts import Rubber
 from .deck_numbers import stresses
@@ -22,10 +23,10 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 def _spliced(case: LoadedCase, value: float, numbers: list[str]) -> LoadedCase:
     if not value > -1:
-        raise ValueError("must be greater than -1")
+        raise InputError("must be greater than -1")
     splice = case.case.splice
     if splice.share:
-        raise ValueError("must be 0 where the case has a splice already")
+        raise InputError("must be 0 where the case has a splice already")
     return changed(case, splice=with_part(splice, share=value, numbers=numbers))
 
 

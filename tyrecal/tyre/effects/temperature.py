@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...errors import InputError
 from ..case import LoadedCase
 from .deck_numbers import stiffer, with_compounds
 from .edit import with_part, with_rubbers
@@ -21,7 +22,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 def _factor(value: float) -> float:
     factor = 1 + PER_KELVIN * value
     if not factor > 0:
-        raise ValueError(f"must be less than {-1 / PER_KELVIN:g} K")
+        raise InputError(f"must be less than {-1 / PER_KELVIN:g} K")
     return factor
 
 

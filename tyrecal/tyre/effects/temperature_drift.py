@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...errors import InputError
 from ..case import LoadedCase
 from . import temperature
 from .effect import Effect
@@ -14,8 +15,8 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     # `Effect.of`: the change of a section, or that of a user's deck
     try:
         return temperature.EFFECT.of(case)(case, kelvin)
-    except ValueError as error:
-        raise ValueError(f"gives {kelvin:g} K at this pressure, which {error}") from None
+    except InputError as error:
+        raise InputError(f"gives {kelvin:g} K at this pressure, which {error}") from None
 
 
 EFFECT = Effect(

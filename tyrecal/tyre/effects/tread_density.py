@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...errors import InputError
 from ..case import LoadedCase
 from .deck_numbers import with_compounds
 from .edit import with_part, with_rubbers_at
@@ -12,7 +13,7 @@ from .parts import crown, tread
 def add(case: LoadedCase, value: float) -> LoadedCase:
     """Density of the tread, outside belts and under-tread, times 1 + value."""
     if not value > -1:
-        raise ValueError("must be greater than -1")
+        raise InputError("must be greater than -1")
     return with_rubbers_at(
         case,
         crown(case),
@@ -39,7 +40,7 @@ def as_voids(case: LoadedCase, value: float) -> LoadedCase:
 def add_to_deck(case: LoadedCase, value: float) -> LoadedCase:
     """In a deck: the compounds of ``deck.parts.tread``."""
     if not value > -1:
-        raise ValueError("must be greater than -1")
+        raise InputError("must be greater than -1")
     return with_compounds(case, "tread", "DENSITY", lambda _, number: (1 + value) * number)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from ...errors import InputError
 from ..case import LoadedCase
 from ..section.section import fill_lines
 from .deck_numbers import with_thickness
@@ -21,7 +22,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 def _factor(value: float) -> float:
     if not -1 <= value <= 0.9:
-        raise ValueError("must be between -1 and 0.9 of the tread's gauge")
+        raise InputError("must be between -1 and 0.9 of the tread's gauge")
     return 1 - value
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...errors import InputError
 from ..case import LoadedCase
 from .edit import changed, with_part
 from .effect import Effect
@@ -14,9 +15,9 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     """
     rim = case.case.rim
     if value < 0:
-        raise ValueError("must be at least 0")
+        raise InputError("must be at least 0")
     if rim.moves:
-        raise ValueError("must be 0 where the rim moves already: a free wheel has no spindle")
+        raise InputError("must be 0 where the rim moves already: a free wheel has no spindle")
     scale = 1 / (value * rim.mass_kg)
     return changed(
         case,
