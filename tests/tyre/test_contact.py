@@ -40,6 +40,7 @@ MOUNT = """*AMPLITUDE, NAME=SLOW
  RIGHT, 5, 6
 *END STEP
 """
+EMPTY = "*SURFACE, NAME=NONE, TYPE=NODE\n"
 STEP = own_decks.STEP.replace("*BOUNDARY\n900001, 1, 6\n", "*CONTACT CONTROLS, STABILIZE\n")
 
 
@@ -267,6 +268,14 @@ def test_one_held_bead_holds_not_the_other(tmp_path: Path) -> None:
         (in_contact().replace("START", "LINE", 1), "begins with START"),
         (in_contact().replace("SURFACE=RIM_L", "SURFACE=BEAD_L"), "is no surface of TYPE=SEGMENTS"),
         (plain(bare_mesh() + GENERAL), "contact of the rubber with itself"),
+        (in_contact(PAIRS.replace("BEAD_L", "NONE"), EMPTY), "the surface NONE has no nodes"),
+        (plain(Tyre().mesh() + EMPTY + "*TIE, NAME=T\nCAVITY, NONE\n"), "NONE has no nodes"),
+        (
+            own_decks.embedded()
+            .replace("*EMBED", "*ELSET, ELSET=SOLID_0\n*EMBED")
+            .replace("HOST ELSET=SOLID", "HOST ELSET=SOLID_0"),
+            "SOLID_0 is empty",
+        ),
     ],
 )
 def test_contact_that_is_refused(text: str, words: str, tmp_path: Path) -> None:

@@ -147,11 +147,11 @@ class Constraints:
 
     def _embed(self, block: Block, prefix: str) -> None:
         """Plies on nodes of their own: those where the rubber has nodes are the rubber's."""
-        hosts = (
-            self.root.elements.members(prefix + block.get("HOST ELSET"), block)
-            if block.get("HOST ELSET")
-            else [n for n, e in self.root.elements.items() if e.is_solid]
-        )
+        hosts = [n for n, e in self.root.elements.items() if e.is_solid]
+        if name := block.get("HOST ELSET"):
+            hosts = self.root.elements.members(prefix + name, block)
+            if not hosts:
+                raise block.refused(f"the element set {name} is empty")
         rubber = list(dict.fromkeys(n for e in hosts for n in self.root.elements[e].nodes))
         lines, before = [], len(self.guests)
         for row in block.rows:

@@ -61,15 +61,14 @@ def boundary_of(root: Scope) -> tuple[Face, ...]:
 def surface_nodes(made: Assembly, name: str, block: Block, row: Row) -> list[int]:
     """Nodes of a surface of elements or of nodes. Raises OwnDeckError."""
     surface, prefix = made.surfaces.get(name, (None, ""))
-    if surface and surface.get("TYPE") == "NODE":
-        return [
-            n
-            for line in surface.rows
-            for n in made.root.nodes.members(prefix + line.name(0), surface, line)
-        ]
-    return list(
-        dict.fromkeys(n for _, _, nodes in surface_faces(made, name, block, row) for n in nodes)
-    )
+    if not surface or surface.get("TYPE") != "NODE":
+        faces = surface_faces(made, name, block, row)
+        return list(dict.fromkeys(n for *_, nodes in faces for n in nodes))
+    members = made.root.nodes.members
+    nodes = [n for line in surface.rows for n in members(prefix + line.name(0), surface, line)]
+    if not nodes:
+        raise surface.refused(f"the surface {name} has no nodes")
+    return nodes
 
 
 def elements_of(made: Assembly, surface: Block, prefix: str) -> list[tuple[Element, str]]:
