@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 
 from ..language.element_types import NODES_AND_SECTION
 from ..language.rule import KeywordRule
@@ -66,10 +66,8 @@ def findings(blocks: Sequence[Block], before: Sequence[Block] = ()) -> list[Find
         if rule and rule.is_judged:
             faults += _parameters(block, rule, names)
             faults += _data(block, rule, names)
-    if not any(
-        block.name in BEGIN_END for block in (*before, *blocks)
-    ):  # of parts, names have prefixes
-        faults += _unnamed(blocks, names)
+    if BEGIN_END.keys().isdisjoint(block.name for block in (*before, *blocks)):
+        faults += _unnamed(blocks, names)  # in parts, names have prefixes
     return faults
 
 
@@ -83,46 +81,44 @@ def _order(blocks: Sequence[Block], before: Sequence[Block]) -> Iterator[Finding
     parts = any(block.name == "PART" for block in blocks)
     guessed = False  # whether a keyword above may be what the next ones are options of
     for block in blocks:
-        name, inside = block.name, opened[-1].name if opened else ""
-        rule = RULES.get(name)
-        levels = rule.level if rule else ""
+        name, inside, rule = block.name, opened[-1].name if opened else "", RULES.get(block.name)
         level = "step" if inside == "STEP" else "part" if inside or not parts else "model"
-        here = {level, "model"} if not parts and not inside else {level}
-        if not levels:
-            yield Finding(block, None, "is not checked: the table has no rule for it", sure=False)
-        elif not here & set(levels.split()):
-            where = {"step": "a step", "part": "a part or assembly", "model": "the model"}[level]
-            yield Finding(block, None, f"does not belong in {where}")
+        fault = partial(Finding, block, None)
         if inside == "STEP" and not procedure:
             procedure = name
             if name not in STEP_PROCEDURES:
-                words = "is under *STEP, the place of the step's procedure"
-                yield Finding(block, None, words, sure=bool(levels))
+                yield fault("is under *STEP, the place of the step's procedure", bool(rule))
         elif inside == "STEP" and name in STEP_PROCEDURES:
-            yield Finding(block, None, f"is a second procedure of a step of *{procedure}")
-        if rule and rule.under and (parent is None or parent.name not in rule.under):
-            words = f"must be directly under *{' or *'.join(rule.under)}"
-            yield Finding(block, None, words, sure=not guessed)
-        if rule and rule.after and not seen & set(rule.after):
-            yield Finding(block, None, f"must come after *{' or *'.join(rule.after)}")
-        if rule and rule.within and inside == "STEP" and procedure not in rule.within:
-            yield Finding(block, None, f"does not belong in a step of *{procedure}")
-        if rule and rule.once:
-            scope = {"job": blocks[0], "step": opened[-1] if opened else None, "parent": parent}
-            if (key := (id(scope[rule.once]), name)) in once:
-                yield Finding(block, None, f"may be given once in a {rule.once}")
-            once[key] = block
+            yield fault(f"is a second procedure of a step of *{procedure}")
+        if rule is None:
+            yield fault("is not checked: the table has no rule for it", sure=False)
+        else:
+            here = {level, "model"} if not parts and not inside else {level}
+            if not here & set(rule.level.split()):
+                words = {"step": "a step", "part": "a part or assembly", "model": "the model"}
+                yield fault(f"does not belong in {words[level]}")
+            if rule.under and (parent is None or parent.name not in rule.under):
+                yield fault(f"must be directly under *{' or *'.join(rule.under)}", not guessed)
+            if rule.after and not seen & set(rule.after):
+                yield fault(f"must come after *{' or *'.join(rule.after)}")
+            if rule.within and inside == "STEP" and procedure not in rule.within:
+                yield fault(f"does not belong in a step of *{procedure}")
+            if rule.once:
+                scope = {"job": blocks[0], "step": opened[-1] if opened else None, "parent": parent}
+                if (key := (id(scope[rule.once]), name)) in once:
+                    yield fault(f"may be given once in a {rule.once}")
+                once[key] = block
+            if rule.is_judged and not rule.under:
+                parent = block
         if name == "STEP" or name in BEGIN_END:
             opened.append(block)
             procedure = ""
         elif name == "END STEP" or name in BEGIN_END.values():
             if inside != name.removeprefix("END "):
-                yield Finding(block, None, "ends what did not begin last")
+                yield fault("ends what did not begin last")
             else:
                 opened.pop()
-        guessed = not levels or (guessed and bool(rule and rule.under))
-        if rule and rule.is_judged and not rule.under:
-            parent = block
+        guessed = rule is None or (guessed and bool(rule.under))
         seen.add(name)
     for block in opened:
         yield Finding(block, None, f"has no *END {block.name}")
@@ -130,24 +126,23 @@ def _order(blocks: Sequence[Block], before: Sequence[Block]) -> Iterator[Finding
 
 def _parameters(block: Block, rule: KeywordRule, names: _Names) -> Iterator[Finding]:
     """Findings about the parameters of a keyword: unknown ones, wrong values, missing ones."""
+    fault = partial(Finding, block, None)
     for name, value in block.parameters.items():
         if name not in rule.parameters:
-            yield Finding(
-                block, None, f"its {name} is not checked: the table does not have it", sure=False
-            )
+            yield fault(f"its {name} is not checked: the table does not have it", sure=False)
             continue
         wanted = rule.parameters[name]
         if wanted.islower():
             yield from _value(block, None, wanted, value, names, f"{name}=")
         elif value.upper() not in wanted.split("|"):
             words = " or ".join(word or "no value" for word in wanted.split("|"))
-            yield Finding(block, None, f"{name}={value} must be {words}")
+            yield fault(f"{name}={value} must be {words}")
     for group in rule.needed:
         if not set(group.split("|")) & set(block.parameters):
-            yield Finding(block, None, f"needs {' or '.join(group.split('|'))}")
+            yield fault(f"needs {' or '.join(group.split('|'))}")
     both = [name for name in rule.alone if name in block.parameters]
     if len(both) > 1:
-        yield Finding(block, None, f"{both[0]} and {both[1]} exclude each other")
+        yield fault(f"{both[0]} and {both[1]} exclude each other")
 
 
 def _data(block: Block, rule: KeywordRule, names: _Names) -> Iterator[Finding]:
@@ -157,9 +152,8 @@ def _data(block: Block, rule: KeywordRule, names: _Names) -> Iterator[Finding]:
         return
     least, most = rule.rows if rule.fields else (0, 0)
     least = max(least, len(lines) if len(lines) > 1 else 0)
-    least = (
-        0 if block.parameters.get("OP") == "NEW" else least
-    )  # which takes all that there were away
+    if block.parameters.get("OP") == "NEW":  # which takes all that there were away
+        least = 0
     if not least <= len(block.rows) <= most:
         bounds = f"{least}" if least == most else f"{least} to {most}" if most < 9 else f"{least}"
         few = "at least " if len(block.rows) < least and most > 9 else ""
@@ -212,9 +206,8 @@ def _elements(block: Block, names: _Names) -> Iterator[Finding]:
     ``names``."""
     kind = named(block.parameters.get("TYPE", ""))
     if kind not in NODES_AND_SECTION:
-        yield Finding(
-            block, None, f"TYPE={kind} is not checked: the table does not have it", sure=False
-        )
+        words = f"TYPE={kind} is not checked: the table does not have it"
+        yield Finding(block, None, words, sure=False)
         return
     count, section = NODES_AND_SECTION[kind]
     for row in block.rows:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
-from .generation import MESH_READERS, members_of, read
+from .generation import MESH_KEYWORDS, members_of, read
 from .scope import Members, MeshTable, Point, Scope
 from .text import Block
 
@@ -63,10 +63,10 @@ def collect(blocks: Sequence[Block]) -> Assembly:
         elif part is not None:
             if instance and part.instances:
                 raise block.refused("is in an *INSTANCE: give it in the *PART")
-            if block.name in MESH_READERS:
+            if block.name in MESH_KEYWORDS:
                 read(part.scope, block)
             part.other.append(block)
-        elif block.name in MESH_READERS and not block.get("INSTANCE"):
+        elif block.name in MESH_KEYWORDS and not block.get("INSTANCE"):
             read(made.root, block)
         else:
             _other(made, block, "", parts)
@@ -121,7 +121,7 @@ def _instance(made: Assembly, parts: dict[str, DeckPart], block: Block) -> None:
             labels.sets[f"{name}.{n}"] = [(block, partial(list, [m]))]
         labels.put(block, list(numbers.values()))
     for other in part.other:
-        if other.name not in MESH_READERS:
+        if other.name not in MESH_KEYWORDS:
             _other(made, other, f"{name}.", parts)
 
 

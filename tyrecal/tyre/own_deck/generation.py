@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -22,13 +22,18 @@ from .text import Block, Row, element_types, is_label, named
 
 def read(scope: Scope, block: Block) -> None:
     """Add the nodes, elements or sets of a mesh keyword to a scope. Raises OwnDeckError."""
-    MESH_READERS[block.name](scope, block)
+    labels = scope.nodes if block.name[0] == "N" else scope.elements
+    if block.name in ("NSET", "ELSET"):
+        labels.add_to_set(block.need(block.name), block, members_of(scope, block))
+    elif block.name == "SYSTEM":
+        _system(scope, block)
+    else:
+        labels.put(block, list(MESH_READERS[block.name](scope, block)))
 
 
-def _node(scope: Scope, block: Block) -> None:
+def _node(scope: Scope, block: Block) -> Iterator[int]:
     """Number, r, z in the *SYSTEM of the moment."""
     (r0, z0), (c, s) = scope.system
-    numbers = []
     for row in block.rows:
         r, z = row.number(1, 0.0), row.number(2, 0.0)
         if any(row.fields[3:]) and row.number(3, 0.0):
@@ -40,8 +45,7 @@ def _node(scope: Scope, block: Block) -> None:
         )
         number = row.integer(0)
         scope.place(block, row, number, point)
-        numbers.append(number)
-    scope.nodes.put(block, numbers)
+        yield number
 
 
 def _system(scope: Scope, block: Block) -> None:
@@ -60,10 +64,9 @@ def _system(scope: Scope, block: Block) -> None:
     scope.system = (x[0], x[1]), (dr / size, dz / size)
 
 
-def _ngen(scope: Scope, block: Block) -> None:
+def _ngen(scope: Scope, block: Block) -> Iterator[int]:
     """First and last node, increment of the numbers: on a straight line, or on an arc about a
     node or a point."""
-    numbers: list[int] = []
     for row in block.rows:
         first, last, step = row.integer(0), row.integer(1), row.integer(2, 1)
         for n in (first, last):
@@ -80,10 +83,9 @@ def _ngen(scope: Scope, block: Block) -> None:
             else:
                 point = _between(a, b, share)
             scope.place(block, row, first + k * step, point)
-        numbers += range(first, last + (1 if step > 0 else -1), step)
+        yield from range(first, last + (1 if step > 0 else -1), step)
         if block.get("LINE") != "C" and any(row.fields[3:]):
             raise block.refused("a point of a curve needs LINE=C", row)
-    scope.nodes.put(block, numbers)
 
 
 def _between(a: np.ndarray, b: np.ndarray, share: float) -> Point:
@@ -108,12 +110,11 @@ def _on_arc(
     return float(r), float(z)
 
 
-def _nfill(scope: Scope, block: Block) -> None:
+def _nfill(scope: Scope, block: Block) -> Iterator[int]:
     """Two sets, intervals between, increment: nodes on straight lines between their nodes."""
     bias = Row(block.place, block.parameters.get("BIAS", "1")).number(0)
     if bias <= 0:
         raise block.refused("BIAS must be positive")
-    numbers: list[int] = []
     for row in block.rows:
         sets = [scope.nodes.members(row.name(i), block, row) for i in (0, 1)]
         pairs = [
@@ -135,15 +136,14 @@ def _nfill(scope: Scope, block: Block) -> None:
             a, b = np.array(scope.nodes[first]), np.array(scope.nodes[last])
             for k in range(1, count):
                 scope.place(block, row, first + k * step, _between(a, b, shares[k - 1]))
-            numbers += range(first, last + (1 if step > 0 else -1), step)
-    scope.nodes.put(block, numbers)
+            yield from range(first, last + (1 if step > 0 else -1), step)
 
 
 def _unsorted(scope: Scope, name: str) -> bool:
     return any("UNSORTED" in block.parameters for block, _ in scope.nodes.sets.get(name, ()))
 
 
-def _ncopy(scope: Scope, block: Block) -> None:
+def _ncopy(scope: Scope, block: Block) -> Iterator[int]:
     """Copies of a set, shifted, or mirrored about a line."""
     shift = block.integer("CHANGE NUMBER")
     old = scope.nodes.members(block.need("OLD SET"), block)
@@ -165,17 +165,10 @@ def _ncopy(scope: Scope, block: Block) -> None:
         move = lambda point, k: mirror(point)
         if times != 1:
             raise block.refused("MULTIPLE goes with SHIFT")
-    new = []
     for k in range(1, times + 1):
         for n in old:
             scope.place(block, None, n + k * shift, move(scope.nodes[n], k))
-            new.append(n + k * shift)
-    scope.nodes.put(block, new, "NEW SET")
-
-
-def _set(scope: Scope, block: Block) -> None:
-    labels = scope.nodes if block.name == "NSET" else scope.elements
-    labels.add_to_set(block.need(block.name), block, members_of(scope, block))
+            yield n + k * shift
 
 
 def members_of(scope: Scope, block: Block) -> Members:
@@ -215,7 +208,7 @@ def _listed(labels: MeshTable, block: Block) -> list[int]:
     return result
 
 
-def _element(scope: Scope, block: Block) -> None:
+def _element(scope: Scope, block: Block) -> Iterator[int]:
     kind = block.need("TYPE")
     count, _ = element_types.NODES_AND_SECTION.get(kind, (0, ""))
     if not count or not kind.startswith(BEGINNINGS):
@@ -223,7 +216,6 @@ def _element(scope: Scope, block: Block) -> None:
             f"TYPE={kind} is no element of a revolved tyre: CGAX for rubber, SFMGAX or MGAX"
             " for plies, RAX2 for a rim; give decks in three dimensions in deck.decks of a case"
         )
-    numbers = []
     for row in block.rows:
         fields = [field for field in row.fields if field]
         if len(fields) != count + 1:
@@ -231,13 +223,11 @@ def _element(scope: Scope, block: Block) -> None:
         number = row.integer(0)
         nodes = tuple(Row(row.place, text).integer(0) for text in fields[1:])
         scope.make(block, row, number, kind, nodes)
-        numbers.append(number)
-    scope.elements.put(block, numbers)
+        yield number
 
 
-def _elgen(scope: Scope, block: Block) -> None:
+def _elgen(scope: Scope, block: Block) -> Iterator[int]:
     """Master element; elements of a row with increments of nodes and of numbers; rows likewise."""
-    made: list[int] = []
     for row in block.rows:
         master = row.integer(0)
         if master not in scope.elements:
@@ -252,17 +242,15 @@ def _elgen(scope: Scope, block: Block) -> None:
         for j in range(rows):
             for i in range(along):
                 number = master + i * numbers + j * row_numbers
-                made.append(number)
                 if i or j:
                     shifted = (n + i * nodes + j * row_nodes for n in element.nodes)
                     scope.make(block, row, number, element.kind, tuple(shifted))
-    scope.elements.put(block, made)
+                yield number
 
 
-def _elcopy(scope: Scope, block: Block) -> None:
+def _elcopy(scope: Scope, block: Block) -> Iterator[int]:
     """Copies of a set, on nodes of shifted numbers; of mirrored nodes in the reverse order."""
     shift, nodes = block.integer("ELEMENT SHIFT"), block.integer("SHIFT NODES")
-    made = []
     for n in scope.elements.members(block.need("OLD SET"), block):
         element = scope.elements[n]
         shifted = tuple(node + nodes for node in element.nodes)
@@ -270,19 +258,16 @@ def _elcopy(scope: Scope, block: Block) -> None:
             shifted = reflected(element, shifted)
         row = block.rows[0] if block.rows else element.row
         scope.make(block, row, n + shift, element.kind, shifted)
-        made.append(n + shift)
-    scope.elements.put(block, made, "NEW SET")
+        yield n + shift
 
 
-MESH_READERS: dict[str, Callable[[Scope, Block], None]] = {
+MESH_READERS: dict[str, Callable[[Scope, Block], Iterator[int]]] = {
     "NODE": _node,
-    "SYSTEM": _system,
     "NGEN": _ngen,
     "NFILL": _nfill,
     "NCOPY": _ncopy,
-    "NSET": _set,
     "ELEMENT": _element,
     "ELGEN": _elgen,
     "ELCOPY": _elcopy,
-    "ELSET": _set,
 }
+MESH_KEYWORDS = (*MESH_READERS, "SYSTEM", "NSET", "ELSET")

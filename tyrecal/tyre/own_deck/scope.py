@@ -67,9 +67,9 @@ class MeshTable(dict[int, Content]):
         """Add members that a keyword puts into a set."""
         self.sets.setdefault(name, []).append((block, members))
 
-    def put(self, block: Block, numbers: list[int], parameter: str = "") -> None:
+    def put(self, block: Block, numbers: list[int]) -> None:
         """New ones go to the set that their keyword names, if it names one."""
-        if name := block.get(parameter or self.keyword):
+        if name := block.get("NEW SET") or block.get(self.keyword):
             self.add_to_set(name, block, lambda: numbers)
 
     def add(self, number: int, content: Content, block: Block, row: Row | None) -> None:

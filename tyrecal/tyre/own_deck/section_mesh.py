@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,24 +16,21 @@ Array = np.ndarray
 DRAWN_STATIONS = 40  # of the drawn half
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, kw_only=True)
 class OwnDeckMesh(SectionMesh):
     """A mesh of any arrangement; regions are its rubbers, lines the sets of its plies."""
 
-    path_outer: list[int] = field(default_factory=list)
-    path_inner: list[int] = field(default_factory=list)
-    around: list[int] = field(default_factory=list)
-    plies: tuple[RebarPly, ...] = ()
+    deck: SolverDeck
 
     @property
     def inner_ends(self) -> tuple[int, int]:
         """First and last node of the inner surface."""
-        return self.path_inner[0], self.path_inner[-1]
+        return self.deck.mesh.inner[0], self.deck.mesh.inner[-1]
 
     @property
     def outer_nodes(self) -> list[int]:
         """Nodes of the outer surface from -z to +z, midside ones too."""
-        return self.path_outer
+        return list(self.deck.mesh.outer)
 
     def grid(self) -> tuple[Array, Array]:
         """Corner nodes, and where the four of each element stand among them."""
@@ -44,7 +41,7 @@ class OwnDeckMesh(SectionMesh):
     def skin(self) -> Array:
         """Corner nodes of the outer surface from -z to +z."""
         corners = {n for nodes, c in self._corners() for n in nodes[:c]}
-        return np.array([n for n in self.path_outer if n in corners])
+        return np.array([n for n in self.deck.mesh.outer if n in corners])
 
     @property
     def angles(self) -> dict[str, float]:
@@ -56,9 +53,9 @@ class OwnDeckMesh(SectionMesh):
         """Nodes of the elements to draw each layer with: layers of one set take turns."""
         result = {}
         for name, ply in self._named().items():
-            sharing = [other.set_name for other in self.plies].count(ply.set_name)
-            turn = [other for other in self.plies if other.set_name == ply.set_name].index(ply)
-            result[name] = list(self.cords[ply.set_name].values())[turn::sharing]
+            sharing = [other for other in self.deck.plies if other.set_name == ply.set_name]
+            elements = list(self.cords[ply.set_name].values())
+            result[name] = elements[sharing.index(ply) :: len(sharing)]
         return result
 
     @property
@@ -74,15 +71,15 @@ class OwnDeckMesh(SectionMesh):
     def lines_by_cord(self) -> dict[str, list[tuple[int, ...]]]:
         """Nodes of the elements of its layers, by their material."""
         by_material: dict[str, list[tuple[int, ...]]] = {}
-        for ply in self.plies:
+        for ply in self.deck.plies:
             by_material.setdefault(ply.material, []).extend(self.cords[ply.set_name].values())
         return by_material
 
     def _named(self) -> dict[str, RebarPly]:
-        names = [ply.name for ply in self.plies]
+        names = [ply.name for ply in self.deck.plies]
         return {
             ply.name if names.count(ply.name) == 1 else f"{ply.set_name} {ply.name}": ply
-            for ply in self.plies
+            for ply in self.deck.plies
         }
 
     def _corners(self) -> list[tuple[tuple[int, ...], int]]:
@@ -90,7 +87,7 @@ class OwnDeckMesh(SectionMesh):
 
     def outline(self) -> list[int]:
         """Nodes round the section, closed, from the inner surface's first."""
-        return self.around
+        return list(self.deck.mesh.around)
 
 
 def section_mesh(flat: SolverDeck) -> OwnDeckMesh:
@@ -111,10 +108,7 @@ def section_mesh(flat: SolverDeck) -> OwnDeckMesh:
         outer=[face[0] for face in mesh.tread],
         shape=(len(mesh.solids), 1),
         crown_outer=list(mesh.crown),
-        path_outer=list(mesh.outer),
-        path_inner=list(mesh.inner),
-        around=list(mesh.around),
-        plies=flat.plies,
+        deck=flat,
     )
 
 
