@@ -44,22 +44,22 @@ class EffectMode(ResultPart):
         """[c, m]"""
         return Label(self.c, self.m, self.kind)
 
-    before_percent: float | None  # None: the mode got lost
-    after_percent: float | None
+    before_percent: float | None  # change of the frequency; null: the mode was lost
+    after_percent: float | None  # change that a new fit leaves
 
 
 class EffectRow(ResultPart):
     """An effect at one pressure."""
 
     pressure_kPa: PositiveNumber
-    modes: list[EffectMode]
+    modes: list[EffectMode]  # changes of the modes
 
 
 class Refitted(ResultPart):
     """A variable before and after the re-fit, in its own unit."""
 
-    before: float
-    after: float
+    before: float  # value before
+    after: float  # value after
 
     @property
     def display(self) -> str:
@@ -72,19 +72,19 @@ class Refitted(ResultPart):
 class CatalogueEntry(ResultPart):
     """An effect of the catalogue."""
 
-    provenance: Provenance | None = None
-    id: str
-    title: str
-    symbol: str
-    unit: str
-    low: float
-    high: float
-    about: list[str]
-    changes: list[str]
-    signature: str
-    toggle: str
-    aliases: list[str]
-    solvers: list[str]  # those installed that can express it
+    provenance: Provenance | None = None  # origin: see provenance below
+    id: str  # name of the effect in files
+    title: str  # name of the effect in words
+    symbol: str  # symbol of the parameter
+    unit: str  # unit of the parameter
+    low: float  # lower end of the parameter's range
+    high: float  # upper end of the parameter's range
+    about: list[str]  # explanation, in paragraphs
+    changes: list[str]  # keywords of the deck that it changes
+    signature: str  # which modes move, which way and how far
+    toggle: str  # the experiment that would prove it
+    aliases: list[str]  # effects that frequencies alone hardly distinguish from it
+    solvers: list[str]  # installed solvers that can express it
 
     @classmethod
     def of(
@@ -112,13 +112,13 @@ class CatalogueEntry(ResultPart):
 class EffectResult(CatalogueEntry):
     """An entry of effects.json."""
 
-    value: float
-    mass_kg: float
-    before_percent: float | None  # rms over modes and pressures
-    after_percent: float | None
-    absorbed: float | None  # share of it that the re-fit takes up
-    refitted: dict[str, Refitted]
-    rows: Annotated[list[EffectRow], Field(min_length=1)]
+    value: float  # size of the effect
+    mass_kg: float  # change of the tyre's mass
+    before_percent: float | None  # rms change of the frequencies, over modes and pressures
+    after_percent: float | None  # rms change that a new fit leaves
+    absorbed: float | None  # share of the change that a new fit absorbs
+    refitted: dict[str, Refitted]  # variables before and after the new fit
+    rows: Annotated[list[EffectRow], Field(min_length=1)]  # changes at each pressure
 
 
 class Effects(Result):
@@ -126,8 +126,8 @@ class Effects(Result):
 
     study, stem, heading = "effects", "effects", "Effects"
 
-    rows: list[EffectResult]
-    failed: list[Failed] = Field(default=[])
+    rows: list[EffectResult]  # effects, each an entry of the list
+    failed: list[Failed] = Field(default=[])  # effects without a solution
 
     @model_validator(mode="before")
     @classmethod

@@ -62,23 +62,30 @@ def progress(outcome: PressOutcome) -> tuple[int, EvaluationFailed | None]:
 class FootprintRow(ResultPart):
     """The tyre at one load, SI."""
 
-    design: Annotated[str, Column("design", "")]
+    design: Annotated[str, Column("design", "")]  # name of the design: initial, fitted or set
     load_N: Annotated[PositiveNumber, Column("load N", ".0f")]
+    # fall of the wheel's centre
     deflection_m: Annotated[float, Column("deflection mm", ".2f", 1e3)]
-    area_m2: Annotated[PositiveNumber, Column("area cm²", ".1f", 1e4)]
+    area_m2: Annotated[PositiveNumber, Column("area cm²", ".1f", 1e4)]  # area of the patch
+    # largest extent of the patch along the rolling direction
     length_m: Annotated[float, Column("length mm", ".1f", 1e3)]
+    # largest extent of the patch across the rolling direction
     width_m: Annotated[float, Column("width mm", ".1f", 1e3)]
-    mean_pressure_Pa: Annotated[float, Column("mean kPa", ".1f", 1e-3)]
+    mean_pressure_Pa: Annotated[float, Column("mean kPa", ".1f", 1e-3)]  # mean contact pressure
+    # largest contact pressure
     peak_pressure_Pa: Annotated[PositiveNumber, Column("peak kPa", ".1f", 1e-3)]
+    # tangent at the load
     vertical_stiffness_N_per_m: Annotated[float, Column("stiffness N/mm", ".1f", 1e-3)]
 
 
 class FootprintFindings(ResultPart):
     """Findings from the rows of footprints."""
 
-    fitted_over_initial: list[dict[str, float]] = Field(default=[])  # area, where both were pressed
-    mean_over_inflation: dict[str, list[dict[str, float]]] = Field(default={})  # pressure, by load
-    words: list[str]
+    # area of the fitted over that of the initial design, by load
+    fitted_over_initial: list[dict[str, float]] = Field(default=[])
+    # mean contact pressure over inflation pressure, by load
+    mean_over_inflation: dict[str, list[dict[str, float]]] = Field(default={})
+    words: list[str]  # findings in words
 
 
 class FootprintResult(Result):
@@ -87,11 +94,11 @@ class FootprintResult(Result):
     study, stem, heading = "footprint", "footprint", "Footprint"
     follows_fit = True
 
-    pressure_kPa: dict[str, float] = Field(default={})  # by design
-    designs: dict[str, dict[str, float]] = Field(default={})  # values of the variables
-    rows: list[FootprintRow]
-    failed: list[Failed]
-    findings: FootprintFindings
+    pressure_kPa: dict[str, float] = Field(default={})  # inflation pressure by design
+    designs: dict[str, dict[str, float]] = Field(default={})  # values of the variables by design
+    rows: list[FootprintRow]  # designs at loads
+    failed: list[Failed]  # loads that were not reached
+    findings: FootprintFindings  # findings from the rows
 
     @classmethod
     def run(cls, given: StudyInput, *, loads_N: Sequence[float] | None = None) -> FootprintResult:

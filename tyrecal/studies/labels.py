@@ -20,7 +20,7 @@ class LabelProbability(ResultPart):
     c: int | None = None
     m: int | None = None
     kind: str | None = None
-    probability: float
+    probability: float  # probability of this label; without c and m, that it is no mode
 
     @property
     def label(self) -> Label | None:
@@ -38,11 +38,11 @@ class LabelledFrequency(LabelProbability):
     that it is this frequency's; the ``rivals``' too."""
 
     frequency_Hz: PositiveNumber
-    sigma_Hz: PositiveNumber | None  # of a shape that states none
+    sigma_Hz: PositiveNumber | None  # standard deviation; null: not stated
     pressure_kPa: float
     rim: str
-    expected_Hz: float | None = None  # of the mode, where the variables are expected
-    rivals: list[LabelProbability]
+    expected_Hz: float | None = None  # frequency of the mode at the expected variables
+    rivals: list[LabelProbability]  # other labels
 
     @property
     def state(self) -> str:
@@ -53,18 +53,18 @@ class LabelledFrequency(LabelProbability):
 class Labeling(ResultPart):
     """All labels together, in the order of the frequencies, and their probability."""
 
-    labels: list[str]
-    probability: float
+    labels: list[str]  # labels in the order of the frequencies
+    probability: float  # probability of all labels together
 
 
 class Labels(ResultPart):
     """Labels of all frequencies that came without one."""
 
-    frequencies: list[LabelledFrequency]
-    labelings: list[Labeling]  # the likeliest first
-    model_off_percent: float  # how far the model is off the tyre, as the frequencies say
-    expansions: int  # of the model
-    settled: bool  # the labels are those of the design that they lead to
+    frequencies: list[LabelledFrequency]  # measured frequencies without a label
+    labelings: list[Labeling]  # all labels together, the likeliest first
+    model_off_percent: float  # how far the model is off the tyre, by these frequencies
+    expansions: int  # expansions of the model that were needed
+    settled: bool  # whether the labels are those of the design that they lead to
 
     @property
     def doubtful(self) -> list[LabelledFrequency]:
@@ -124,7 +124,7 @@ class LabelsResult(Result):
     study, stem, command, heading = "labels", "labels", "measured label", "Labels"
     is_seldom = True
 
-    labels: Labels
+    labels: Labels  # labels of frequencies that came without one
 
     def csv(self) -> str:
         keys = ["frequency_Hz", "sigma_Hz", "pressure_kPa", "rim", "c", "m", "kind", "probability"]

@@ -36,20 +36,21 @@ SPLIT_ATOL = 1e-3  # Hz, below which a split is none
 class LoadRow(ResultPart):
     """A design at a load; 0: the unloaded tyre."""
 
-    design: str
-    load_N: float
-    deflection_m: float
-    modes: list[ModeEntry]
-    cavity: list[CavityMode] = Field(default=[])
+    design: str  # name of the design: initial, fitted or set
+    load_N: float  # load; 0: the unloaded tyre
+    deflection_m: float  # fall of the wheel's centre
+    modes: list[ModeEntry]  # modes by rising frequency
+    cavity: list[CavityMode] = Field(default=[])  # first wave of the gas in the cavity
 
 
 class LoadFindings(ResultPart):
     """Findings about one design over the loads."""
 
-    design: str
-    splits: list[dict[str, Any]] = Field(default=[])  # of doublets, antisymmetric less symmetric
-    least_overlap: float = 1.0  # with the unloaded member
-    words: list[str]
+    design: str  # name of the design
+    # splits of the pairs, antisymmetric less symmetric
+    splits: list[dict[str, Any]] = Field(default=[])
+    least_overlap: float = 1.0  # least overlap with the unloaded member
+    words: list[str]  # findings in words
 
 
 class LoadSweep(Result):
@@ -58,11 +59,11 @@ class LoadSweep(Result):
     study, stem, heading = "sweep-load", "load_sweep", "Frequencies over load"
     command = "modes --sweep-load"
 
-    pressure_kPa: dict[str, float] = Field(default={})  # by design
-    designs: dict[str, dict[str, float]] = Field(default={})  # values of the variables
-    rows: list[LoadRow]
-    failed: list[Failed]
-    findings: list[LoadFindings]
+    pressure_kPa: dict[str, float] = Field(default={})  # inflation pressure by design
+    designs: dict[str, dict[str, float]] = Field(default={})  # values of the variables by design
+    rows: list[LoadRow]  # designs at loads
+    failed: list[Failed]  # loads that were not reached
+    findings: list[LoadFindings]  # findings on each design
 
     def csv(self) -> str:
         keys = ["design", "load_N", "deflection_m", "c", "m", "kind", "symmetry", "frequency_Hz"]

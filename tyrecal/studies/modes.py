@@ -39,7 +39,7 @@ EXTRA = {  # further columns of the table, of fields of `ModeEntry`
 class ModesFindings(ResultPart):
     """Doubts about the names of modes under a load."""
 
-    words: list[str] = Field(default=[])
+    words: list[str] = Field(default=[])  # findings in words
 
 
 class ModesResult(Result):
@@ -49,12 +49,13 @@ class ModesResult(Result):
 
     pressure_kPa: float
     load_N: float
-    mass_kg: float
-    variables: dict[str, float]
-    deflection_m: float | None = None
-    modes: Annotated[list[ModeEntry], Field(min_length=1)]
-    cavity: list[CavityMode] = Field(default=[])  # of the tyre on the road
-    findings: ModesFindings = ModesFindings()
+    mass_kg: float  # mass of the tyre without its rim
+    variables: dict[str, float]  # values of the variables
+    deflection_m: float | None = None  # deflection under the load
+    modes: Annotated[list[ModeEntry], Field(min_length=1)]  # modes by rising frequency
+    # first wave of the gas in the cavity of the tyre on the road
+    cavity: list[CavityMode] = Field(default=[])
+    findings: ModesFindings = ModesFindings()  # doubts about labels under a load
 
     @classmethod
     def run(cls, given: StudyInput) -> ModesResult:

@@ -110,13 +110,15 @@ class PressureFindings(ResultPart):
     """Findings about one design over the pressures."""
 
     design: str
-    from_kPa: float = 0.0
-    to_kPa: float = 0.0
-    modes: list[dict[str, Any]] = Field(default=[])  # rise and curvature
+    from_kPa: float = 0.0  # lowest pressure
+    to_kPa: float = 0.0  # highest pressure
+    modes: list[dict[str, Any]] = Field(default=[])  # rise and curvature of each mode
+    # in-plane and out-of-plane modes: rise of each, exceptions
     families: list[dict[str, Any]] = Field(default=[])
-    least_mac: float = 1.0  # between neighbouring pressures
-    disagreements: list[dict[str, Any]] = Field(default=[])  # of labels and shapes followed
-    words: list[str]
+    least_mac: float = 1.0  # least MAC of shapes between neighbouring pressures
+    # pressures between which a label and the shape followed differ
+    disagreements: list[dict[str, Any]] = Field(default=[])
+    words: list[str]  # findings in words
 
 
 def findings(states: Sequence[State], labels: Sequence[Label]) -> PressureFindings:

@@ -43,9 +43,9 @@ AROUND_THE_CASE = PressureRange(None, None, 12)
 class PressureRow(ResultPart):
     """A design at a pressure."""
 
-    design: str
+    design: str  # name of the design: initial, fitted or set
     pressure_kPa: PositiveNumber
-    modes: list[ModeEntry]  # by rising frequency
+    modes: list[ModeEntry]  # modes by rising frequency
 
 
 class PressureSweep(Result):
@@ -54,12 +54,12 @@ class PressureSweep(Result):
     study, stem, heading = "sweep-pressure", "pressure_sweep", "Frequencies over pressure"
     follows_fit = True
 
-    slopes: str = ""  # "exact", or by "differences"
-    designs: dict[str, dict[str, float]] = Field(default={})  # values of the variables
-    rows: list[PressureRow]
-    failed: list[Failed] = Field(default=[])
-    standard_errors_unknown: str = ""  # why the fitted design has none
-    findings: list[PressureFindings]  # of each design with two pressures or more
+    slopes: str = ""  # how sensitivities were computed: exact, or differences
+    designs: dict[str, dict[str, float]] = Field(default={})  # values of the variables by design
+    rows: list[PressureRow]  # designs at pressures
+    failed: list[Failed] = Field(default=[])  # pressures that were not reached
+    standard_errors_unknown: str = ""  # why the fitted design has no standard errors
+    findings: list[PressureFindings]  # findings on each design with two pressures or more
 
     @classmethod
     def run(

@@ -113,15 +113,16 @@ def _of_tread(
 class ResponseFunctionEntry(ResultPart):
     """A function of frequency: response per unit force."""
 
-    excite: Annotated[str, Column("force at", "")]
-    respond: Annotated[str, Column("response at", "")]
-    quantity: Annotated[str, Column("quantity", "")]
-    unit: Annotated[str, Column("unit", "")]
-    at_lowest: Annotated[float, Column("at the lowest Hz", ".4g")]  # magnitude
-    peak_Hz: Annotated[float, Column("peak at Hz", ".1f")]
-    peak: Annotated[float, Column("peak", ".4g")]  # magnitude
-    real: list[float]
-    imag: list[float]
+    excite: Annotated[str, Column("force at", "")]  # where the force acts, and its direction
+    respond: Annotated[str, Column("response at", "")]  # where the response is, and its direction
+    quantity: Annotated[str, Column("quantity", "")]  # receptance or accelerance
+    unit: Annotated[str, Column("unit", "")]  # unit of the function
+    # magnitude at the lowest frequency
+    at_lowest: Annotated[float, Column("at the lowest Hz", ".4g")]
+    peak_Hz: Annotated[float, Column("peak at Hz", ".1f")]  # frequency of the highest peak
+    peak: Annotated[float, Column("peak", ".4g")]  # magnitude of the highest peak
+    real: list[float]  # real part by frequency
+    imag: list[float]  # imaginary part by frequency
 
     @property
     def values(self) -> Array:
@@ -132,7 +133,7 @@ class ResponseFunctionEntry(ResultPart):
 class ResponseFindings(ResultPart):
     """Limits of the functions, in words."""
 
-    words: list[str] = Field(default=[])
+    words: list[str] = Field(default=[])  # limits in words
 
 
 class FrfResult(Result):
@@ -143,14 +144,14 @@ class FrfResult(Result):
     is_seldom = True
     follows_fit = True
 
-    design: str
+    design: str  # name of the design: initial, fitted or set
     pressure_kPa: float
-    patch_mm: float
-    radius_m: float
-    harmonics: int
-    frequency_Hz: list[float]
-    functions: list[ResponseFunctionEntry]
-    findings: ResponseFindings = ResponseFindings()
+    patch_mm: float  # width of the patch of the tread on which the force acts
+    radius_m: float  # radius of the tread's points
+    harmonics: int  # harmonics in the sum
+    frequency_Hz: list[float]  # frequencies
+    functions: list[ResponseFunctionEntry]  # response functions
+    findings: ResponseFindings = ResponseFindings()  # limits of the functions
 
     @classmethod
     def run(

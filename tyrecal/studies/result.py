@@ -102,23 +102,23 @@ class ResultState(ResultPart):
 
     pressure_kPa: float | list[float]
     load_N: float | list[float]
-    rim: str | list[str]  # how it is held
+    rim: str | list[str]  # how the rim was held: fixed, spindle or free
 
 
 class Provenance(ResultPart):
     """Origin of a result file: tool, solver, tyre, state and inputs."""
 
-    tyrecal: str
-    solver: str
-    solver_version: str
-    name: str
-    size: str
-    tyre_sha256: str
-    overrides: dict[str, float | bool | str | None]
-    state: ResultState
-    mesh: str
-    targets: str | None = None
-    measured_sha256: str | None = None
+    tyrecal: str  # version of tyrecal
+    solver: str  # name of the solver
+    solver_version: str  # version of the solver
+    name: str  # name of the case
+    size: str  # size code of the case
+    tyre_sha256: str  # hash of the tyre as numbers
+    overrides: dict[str, float | bool | str | None]  # numbers set by --set and --pressure-kPa
+    state: ResultState  # state that was evaluated
+    mesh: str  # mesh level
+    targets: str | None = None  # source of the targets
+    measured_sha256: str | None = None  # hash of the measured file, as by sha256sum
 
     def __str__(self) -> str:
         given = [f"{name}={as_written(value)}" for name, value in self.overrides.items()]
@@ -155,8 +155,8 @@ class Result(ResultPart):
     fits: ClassVar[bool] = False  # it finds a design, which it passes on
     follows_fit: ClassVar[bool] = False  # it studies the design of a fit before it too
 
-    format: Literal[1] = 1
-    provenance: Provenance | None = None
+    format: Literal[1] = 1  # version of the file's format
+    provenance: Provenance | None = None  # origin: see provenance below
     _files: dict[str, str] = PrivateAttr(default_factory=dict)  # further texts, by file name
 
     @classmethod
@@ -249,11 +249,11 @@ class Result(ResultPart):
 class Failed(ResultPart):
     """A state that a study could not reach."""
 
-    design: str
+    design: str  # name of the design
     load_N: float | None = None
     pressure_kPa: float | None = None
-    cause: str = ""
-    words: str = ""
+    cause: str = ""  # kind of failure
+    words: str = ""  # reason in words
 
     @property
     def place(self) -> str:
@@ -285,10 +285,10 @@ def not_reached(
 class Named(ResultPart):
     """A mode's label and frequency."""
 
-    c: Wave
-    m: Wave
-    kind: str | None
-    frequency_Hz: PositiveNumber
+    c: Wave  # waves round the circumference
+    m: Wave  # nodal circles on the belt
+    kind: str | None  # only of [0,0]: axial (lateral) or torsional
+    frequency_Hz: PositiveNumber  # frequency
 
     @property
     def label(self) -> Label:
@@ -304,17 +304,16 @@ class Named(ResultPart):
 class ModeEntry(Named):
     """A mode of modes.json or of a sweep."""
 
-    multiplicity: int = 1
+    multiplicity: int = 1  # 2: a pair of modes
     damping_ratio: float | None = None  # fraction of critical damping
-    clarity: float | None = None  # of its label, 0 to 1
-    member: int | None = None  # of a split doublet
-    symmetry: str | None = None  # about the patch
-    overlap: float | None = None  # with the unloaded shape of its name
-    spanned: float | None = None  # by the modes at the load before
-    sliding_Hz: float | None = None  # where nothing holds the patch along the road
-    # largest motion of the crown up to which friction bears the forces of a patch that sticks
-    grip_mm: float | None = None
-    d_ln_f_d_ln_p: float | None = None
+    clarity: float | None = None  # clarity of the label, 0 to 1
+    member: int | None = None  # 1 or 2: member of a split pair
+    symmetry: str | None = None  # symmetry about the patch
+    overlap: float | None = None  # overlap with the unloaded shape of this label
+    spanned: float | None = None  # share of the shape that the modes at the load before span
+    sliding_Hz: float | None = None  # frequency if nothing holds the patch along the road
+    grip_mm: float | None = None  # largest motion of the crown before the patch starts to slide
+    d_ln_f_d_ln_p: float | None = None  # sensitivity to the pressure
     standard_error_Hz: float | None = None  # of a fitted design, by all that is uncertain
 
     @property
@@ -331,7 +330,7 @@ class ModeEntry(Named):
 class CavityMode(ResultPart):
     """A member of the first wave round the cavity, between rigid walls."""
 
-    direction: Literal["fore-aft", "vertical"]  # in which the gas pushes the wheel
+    direction: Literal["fore-aft", "vertical"]  # direction in which the gas pushes the wheel
     frequency_Hz: PositiveNumber
 
     @classmethod

@@ -43,20 +43,26 @@ class StiffnessRow(ResultPart):
     """A design at a pressure and a load, SI. All but the vertical stiffness are at this load: the
     axle's height is free."""
 
-    design: Annotated[str, Column("design", "")]
+    design: Annotated[str, Column("design", "")]  # name of the design: initial, fitted or set
     pressure_kPa: Annotated[float, Column("kPa", ".0f")]
     load_N: Annotated[PositiveNumber, Column("load N", ".0f")]
+    # vertical stiffness, nothing slides
     vertical_N_per_m: Annotated[float, Column("vertical N/mm", ".1f", 1e-3)]
+    # stiffness along the axle
     lateral_N_per_m: Annotated[float, Column("lateral N/mm", ".1f", 1e-3)]
+    # stiffness along the rolling direction
     longitudinal_N_per_m: Annotated[float, Column("longitudinal N/mm", ".1f", 1e-3)]
+    # stiffness about the vertical
     torsional_Nm_per_rad: Annotated[float, Column("torsional Nm/°", ".1f", radians(1))]
-    vertical_sliding_N_per_m: float  # as `footprint` has it: the patch slides by the friction's law
-    loaded_radius_m: float
+    # vertical stiffness as by footprint: the patch slides by the law of friction
+    vertical_sliding_N_per_m: float
+    loaded_radius_m: float  # height of the wheel's centre
     rolling_radius_m: float  # distance over angle as the free wheel begins to roll
-    deflection_m: float
-    length_m: float
-    width_m: float
-    # (6, 6) N, N m per m, rad along and about down, axle, rolling direction at the wheel's centre
+    deflection_m: float  # fall of the wheel's centre
+    length_m: float  # largest extent of the patch along the rolling direction
+    width_m: float  # largest extent of the patch across the rolling direction
+    # (6, 6) N, N m per m, rad along and about down, axle, rolling direction at the wheel's
+    # centre
     rim_stiffness: list[list[float]]
 
 
@@ -72,8 +78,8 @@ PATCH_COLUMNS = {
 class StiffnessFindings(ResultPart):
     """Findings about a design."""
 
-    design: str
-    words: list[str]
+    design: str  # name of the design: initial, fitted or set
+    words: list[str]  # findings in words
 
 
 class StiffnessResult(Result):
@@ -84,10 +90,10 @@ class StiffnessResult(Result):
     follows_fit = True
     is_seldom = True
 
-    designs: dict[str, dict[str, float]] = Field(default={})  # values of the variables
-    rows: list[StiffnessRow]
-    failed: list[Failed]
-    findings: list[StiffnessFindings]
+    designs: dict[str, dict[str, float]] = Field(default={})  # values of the variables by design
+    rows: list[StiffnessRow]  # designs at pressures and loads
+    failed: list[Failed]  # states that were not reached
+    findings: list[StiffnessFindings]  # findings on each design
 
     @classmethod
     def run(

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 class ConstantShift:
     """A constant by its likeliest shift."""
 
-    name: str
-    shift_in_sd: float  # of the standard deviation that is stated or assumed
+    name: str  # name of the uncertainty
+    shift_in_sd: float  # likeliest shift in standard deviations
 
 
 def constants_posterior(diagnosis: Diagnosis) -> list[ConstantShift]:

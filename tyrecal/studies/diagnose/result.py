@@ -45,30 +45,30 @@ MIN_LISTED_PROBABILITY = 1e-6  # of an effect that is listed
 class EffectSize(ResultPart):
     """Mean and 90 % interval of an effect's size, what the case has of it counted in."""
 
-    value: float
-    low: float
-    high: float
-    unit: str
+    value: float  # mean size of the effect, including what the case already contains
+    low: float  # lower end of the 90 % interval
+    high: float  # upper end of the 90 % interval
+    unit: str  # unit of the parameter
 
 
 class EffectEstimate(ResultPart):
     """The size of the effect that a diagnosis names or likes best."""
 
-    effect: str
-    value: float
-    low: float
-    high: float
-    unit: str
-    detectability: float = Field(default=0.0, alias="lambda")
+    effect: str  # ids of the effects, joined by +
+    value: float  # mean size of the effect, including what the case already contains
+    low: float  # lower end of the 90 % interval
+    high: float  # upper end of the 90 % interval
+    unit: str  # unit of the parameter
+    detectability: float = Field(default=0.0, alias="lambda")  # detectability lambda at its size
 
 
 class Residual(ResultPart):
     """A measurement over the calibrated model."""
 
-    row: str
-    run: int
-    percent: float
-    sigma_percent: float
+    row: str  # measured value in words: mode, pressure, rim
+    run: int  # number of the measurement, for repeats
+    percent: float  # measured over calibrated model, less 1
+    sigma_percent: float  # its standard deviation
 
     @property
     def of(self) -> Observable | None:
@@ -84,74 +84,75 @@ class Residual(ResultPart):
 class GroupTest(ResultPart):
     """Whether a group of modes is off by more than chance."""
 
-    kind: str
-    name: str
-    p_value: float
-    holm: float  # corrected for the number of groups
+    kind: str  # what the group has in common
+    name: str  # name of the group
+    p_value: float  # probability of such deviations by chance
+    holm: float  # the same, corrected for the number of groups
 
 
 class ContrastPart(ResultPart):
     """A combination of residuals."""
 
-    name: str
-    percent: float
-    sigma_percent: float
+    name: str  # combination in words
+    percent: float  # its value
+    sigma_percent: float  # its standard deviation
 
 
 class GapPart(ResultPart):
     """Gap that calibration leaves; rms in per cent by group."""
 
-    p_value: float
-    chi2: float
-    freedom: int
-    rms_percent: float
-    by_family: dict[str, float] = Field(default={})
-    by_harmonic: dict[str, float] = Field(default={})
-    by_pressure: dict[str, float] = Field(default={})
-    by_rim: dict[str, float] = Field(default={})  # where it was held in several ways
-    by_load: dict[str, float] = Field(default={})
-    groups: list[GroupTest] = Field(default=[])
-    contrasts: list[ContrastPart] = Field(default=[])
-    residuals: list[Residual]
+    p_value: float  # probability of a gap so large by chance
+    chi2: float  # chi2 of the residuals
+    freedom: int  # degrees of freedom
+    rms_percent: float  # rms of the residuals
+    by_family: dict[str, float] = Field(default={})  # rms in percent by family of modes
+    by_harmonic: dict[str, float] = Field(default={})  # rms in percent by number of waves
+    by_pressure: dict[str, float] = Field(default={})  # rms in percent by pressure
+    # rms in percent by rim, if it was held in several ways
+    by_rim: dict[str, float] = Field(default={})
+    by_load: dict[str, float] = Field(default={})  # rms in percent by load
+    groups: list[GroupTest] = Field(default=[])  # tests of groups of modes
+    contrasts: list[ContrastPart] = Field(default=[])  # combinations of residuals
+    residuals: list[Residual]  # measured values over the calibrated model
 
 
 class LoadedPart(ResultPart):
     """Something measured on the road, and how far the tyres are off."""
 
-    quantity: str
-    mode: str | None
+    quantity: str  # measured quantity
+    mode: str | None  # label of the mode, if it is one
     pressure_kPa: float
     load_N: float
-    measured: float
-    sigma: float
-    calibrated_percent: float | None
-    effect_percent: float | None
+    measured: float  # measured value, in the unit of the quantity
+    sigma: float  # standard deviation of the measured value
+    calibrated_percent: float | None  # deviation of the calibrated tyre
+    effect_percent: float | None  # deviation of the tyre with the effect
 
 
 class UnderLoadPart(ResultPart):
     """The calibrated tyre on the road, and the one with the effect, neither fitted there."""
 
-    effect: str | None
-    rows: list[LoadedPart]
-    calibrated_rms_percent: float | None
-    effect_rms_percent: float | None
-    failed: list[str]
+    effect: str | None  # ids of the effects, joined by +
+    rows: list[LoadedPart]  # measured values on the road
+    calibrated_rms_percent: float | None  # rms deviation of the calibrated tyre
+    effect_rms_percent: float | None  # rms deviation of the tyre with the effect
+    failed: list[str]  # states that were not reached
 
 
 class NextMeasurement(ResultPart):
     """Something worth to be measured."""
 
-    what: str
-    gain: float  # per hour
-    hours: float
+    what: str  # measurement in words
+    gain: float  # gain of information per hour
+    hours: float  # duration
 
 
 class RobustPart(ResultPart):
     """Dependence of the verdict on the assumptions."""
 
-    robust: bool
-    hangs_on: list[str]
-    range: list[float]  # of the probability of what is named, or else said
+    robust: bool  # whether the verdict holds under all assumptions
+    hangs_on: list[str]  # assumptions that change the verdict
+    range: list[float]  # least and largest probability of what the verdict states
 
 
 class DiagnosisResult(Result):
@@ -159,39 +160,44 @@ class DiagnosisResult(Result):
 
     study, stem, heading = "diagnose", "diagnosis", "Diagnosis"
 
-    verdict: VerdictKind
-    words: str
-    effect: str | None
-    parameter: EffectEstimate | None
-    parameters: dict[str, EffectSize] = Field(default={})  # of every effect of several
-    also: list[Further] = Field(default=[])  # perhaps there too
+    verdict: VerdictKind  # verdict; outside: no effect of the catalogue explains the gap
+    words: str  # verdict in words
+    effect: str | None  # ids of the named effects, joined by +
+    parameter: EffectEstimate | None  # size of the named or likeliest effect
+    parameters: dict[str, EffectSize] = Field(default={})  # sizes of several effects by id
+    also: list[Further] = Field(default=[])  # effects that are perhaps present too
+    # uncalibrated numbers, the largest shift first
     constants: list[ConstantShift] = Field(default=[])
-    robust: RobustPart | None = None
-    likeliest: str | None = None
-    calibrated: dict[str, Any] | None = None  # see `calibrated_variables`
+    robust: RobustPart | None = None  # dependence of the verdict on assumptions
+    likeliest: str | None = None  # ids of the likeliest effects
+    # variables with value, standard_error and unit: without, and with the effect
+    calibrated: dict[str, Any] | None = None
+    # probability by effects; none, and outside: an effect that the catalogue lacks
     probabilities: dict[str, float]
-    candidate_set: list[str]
-    fit_p_value: float | None = None
-    groups: list[list[str]]
-    detectability: dict[str, float]  # lambda at the sizes in ``judged_at``
-    judged_at: dict[str, float] = Field(default={})
-    full_size: dict[str, float | None] = Field(default={})  # lambda at the range's far end
+    candidate_set: list[str]  # effects that hold 90 % of the probability together
+    fit_p_value: float | None = None  # p-value of the likeliest explanation's own fit
+    groups: list[list[str]]  # effects that these data do not distinguish
+    detectability: dict[str, float]  # detectability lambda by effect, at the sizes in judged_at
+    judged_at: dict[str, float] = Field(default={})  # size by effect
+    # lambda at the far end of the effect's range
+    full_size: dict[str, float | None] = Field(default={})
     # least change from the case with lambda = 10
     smallest_visible: dict[str, float | None] = Field(default={})
-    gap: GapPart
-    under_load: UnderLoadPart | None = None
-    section_map: list[PartChange]
-    section_fields: list[FieldValue] = Field(default=[])
-    effective_rank: int
-    shrinkage: Shrinkage | None
-    rung: int
-    absorbed: dict[str, float] = Field(default={})
-    # of each variable where an effect has its full size and is ignored
+    gap: GapPart  # gap that calibration leaves
+    under_load: UnderLoadPart | None = None  # prediction of what was measured on the road
+    section_map: list[PartChange]  # parts of the section by falling evidence
+    section_fields: list[FieldValue] = Field(default=[])  # uncertain fields of the section
+    effective_rank: int  # combinations of parts that the data determine
+    shrinkage: Shrinkage | None  # errors on held-out values with and without the effect
+    rung: int  # rung of the ladder of proof, 1 to 4
+    absorbed: dict[str, float] = Field(default={})  # share of an effect that calibration absorbs
+    # bias of each variable if an effect has its full size and is ignored
     bias_percent: dict[str, dict[str, float]] = Field(default={})
-    next_measurements: list[NextMeasurement]
-    exchanged_labels: list[str] = Field(default=[])
-    labels: Labels | None = None  # of frequencies that came without
-    left_out: list[str] = Field(default=[])
+    next_measurements: list[NextMeasurement]  # measurements that would tell most
+    exchanged_labels: list[str] = Field(default=[])  # labels that may be exchanged
+    labels: Labels | None = None  # labels of frequencies that came without one
+    left_out: list[str] = Field(default=[])  # measurements that are not used
+    # effects that could not be evaluated, and why
     not_evaluated: dict[str, str] = Field(default={})
 
     @classmethod

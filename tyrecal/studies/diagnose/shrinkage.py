@@ -31,19 +31,19 @@ LEAST_SQUARES_STEPS = 8  # of Gauss and Newton's method
 class Shrinkage:
     """Errors on the held-out rows, rms, before and after the effect's fit."""
 
-    held_out: str  # in words
-    effect: str  # its key
-    before_percent: float
-    after_percent: float
+    held_out: str  # held-out values in words
+    effect: str  # ids of the effects, joined by +
+    before_percent: float  # rms error before the effect's fit
+    after_percent: float  # rms error after the effect's fit
     fraction: float  # R = 1 - after / before
-    low: float  # 90 % interval of R over the posterior
-    high: float
-    placebo_95: float  # the 95 % quantile of R on tyres without any effect
-    floor_percent: float  # what repeatability alone leaves
-    before_sigma: float  # errors over their own standard deviation
-    after_sigma: float
-    least_squares_before_percent: float  # of calibrations as usual
-    least_squares_after_percent: float
+    low: float  # lower end of the 90 % interval of R
+    high: float  # upper end of the 90 % interval of R
+    placebo_95: float  # 95 % quantile of R on tyres without any effect
+    floor_percent: float  # rms error that repeatability alone leaves
+    before_sigma: float  # rms error before, over its own standard deviation
+    after_sigma: float  # rms error after, over its own standard deviation
+    least_squares_before_percent: float  # rms error before, of a calibration by plain least squares
+    least_squares_after_percent: float  # rms error after, of a calibration by plain least squares
     each: Mapping[str, float] = field(default_factory=dict)  # R of an effect beside the others
 
 

@@ -27,8 +27,8 @@ PERHAPS = 0.1  # probability of a further effect, from which it is mentioned
 class Further:
     """An effect that is perhaps there in addition to those that are named."""
 
-    id: str
-    probability: float
+    id: str  # id of the effect
+    probability: float  # probability that it is present
 
 
 @dataclass(frozen=True)

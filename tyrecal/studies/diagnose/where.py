@@ -20,25 +20,25 @@ class PartChange:
     """A part of the section: the change of its stiffness, or of its mass, that alone fits the gap
     best."""
 
-    region: str
-    stiffness_percent: float
-    stiffness_sigma: float  # standard deviation, per cent
-    mass_percent: float
-    mass_sigma: float
-    evidence: float  # ln, over no change, of the better one
-    same_as: tuple[str, ...]  # parts whose effect looks alike
+    region: str  # region of the section
+    stiffness_percent: float  # change of stiffness that alone fits the gap best
+    stiffness_sigma: float  # its standard deviation, percent
+    mass_percent: float  # change of mass that alone fits the gap best
+    mass_sigma: float  # its standard deviation, percent
+    evidence: float  # ln evidence over no change, of the better one
+    same_as: tuple[str, ...]  # parts whose change looks alike
 
 
 @dataclass(frozen=True)
 class FieldValue:
     """A field at a place of the section, with its standard deviation before and after the data."""
 
-    field: str
-    place: str
-    value: float
-    sigma: float
-    before: float
-    unit: str
+    field: str  # name of the field
+    place: str  # place on the section
+    value: float  # likeliest value
+    sigma: float  # standard deviation after the data
+    before: float  # standard deviation before the data
+    unit: str  # unit of the value
 
 
 def section_map(

@@ -32,7 +32,7 @@ class FitResponse(ResultPart):
     pressure_kPa: float = 0.0
     load_N: float = 0.0
     rim: RimSupport | None = None
-    scatter: float  # relative standard deviation
+    scatter: float  # relative standard deviation of the measured value
     # d x / d ln value by variable; x: ln of the variable, or its share of the bounds' width
     response: dict[str, float]
 

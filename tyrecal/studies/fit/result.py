@@ -88,18 +88,22 @@ class StartReport:
 class FittedVariable(ResultPart):
     """A design variable."""
 
-    initial: float
-    value: float
-    lower: float
-    upper: float
-    standard_error: float | None  # by the scatter of the measurement; None: not determined
-    standard_error_total: float | None = None  # by all that is uncertain; None: not known
-    total_holds: bool = True  # the total is small enough for a linear estimate, no bound is near
-    # share of the variance known before that the data took away, if that enters the fit
+    initial: float  # value before the fit
+    value: float  # fitted value
+    lower: float  # lower bound
+    upper: float  # upper bound
+    # standard error by the scatter of the measurement; null: not determined
+    standard_error: float | None
+    # standard error by all that is uncertain; null: not known
+    standard_error_total: float | None = None
+    # whether the total is small enough for a linear estimate, with no bound near
+    total_holds: bool = True
+    # with a prior: share of the variance known before that the data took away
     explained_by_data: float | None = None
-    variance_by_cause: dict[str, float] = Field(default={})  # shares of the total's, 1 together
-    at_bound: bool
-    unit: str = ""  # of the number that it sets
+    # shares of the total variance by cause, 1 together
+    variance_by_cause: dict[str, float] = Field(default={})
+    at_bound: bool  # whether the value is at a bound
+    unit: str = ""  # unit of the number that it sets
 
     def percent(self, error: float | None) -> str | None:
         """A standard error in per cent of the value: two digits, and never 1.9e+02."""
@@ -112,10 +116,10 @@ class FittedVariable(ResultPart):
 class FreedNumberFit(ResultPart):
     """A number that the fit freed: the knowledge of it, and how far it moved."""
 
-    known: float  # in its own unit, as its standard deviation
-    standard_deviation: float
-    shift_in_sd: float
-    numbers: dict[str, float]  # by path: the number, and others that move with it
+    known: float  # value that was known before
+    standard_deviation: float  # standard deviation of it, in the same unit
+    shift_in_sd: float  # how far the fit moved it, in standard deviations
+    numbers: dict[str, float]  # fitted values by path: the number, and others that move with it
 
 
 class FittedState(ResultPart):
@@ -125,11 +129,13 @@ class FittedState(ResultPart):
     pressure_kPa: float
     load_N: float
     rim: str
-    values: int = 0
-    rms_sigmas: float | None = None
+    values: int = 0  # measured values in this state
+    rms_sigmas: float | None = None  # rms of their deviations, in standard deviations
+    # standard errors of the variables without this state
     standard_errors_without: dict[str, float | None] = Field(default={})
+    # standard errors of the variables with it
     standard_errors_with: dict[str, float | None] = Field(default={})
-    ratio: float | None = None  # of the standard errors with it to those without, their mean
+    ratio: float | None = None  # mean ratio of the standard errors with it to those without
 
     @property
     def display(self) -> str:
@@ -140,14 +146,14 @@ class FittedState(ResultPart):
 class FittedMode(Named):
     """A mode that has a target; in a fit over several states, its own."""
 
-    multiplicity: int
-    initial_Hz: PositiveNumber
-    fitted_Hz: PositiveNumber
-    target_Hz: PositiveNumber
-    deviation_percent: float
+    multiplicity: int  # 2: a pair of modes
+    initial_Hz: PositiveNumber  # frequency before the fit
+    fitted_Hz: PositiveNumber  # frequency after the fit
+    target_Hz: PositiveNumber  # measured frequency
+    deviation_percent: float  # fitted over measured, less 1
     sigma_Hz: float | None = None
-    damping_ratio: float | None = None  # of the fitted tyre, fraction of critical damping
-    target_damping_ratio: float | None = None
+    damping_ratio: float | None = None  # damping of the fitted tyre, fraction of critical damping
+    target_damping_ratio: float | None = None  # measured damping
     pressure_kPa: float | None = None
     load_N: float = 0.0
     rim: str | None = None
@@ -170,6 +176,7 @@ class FittedFootprint(ResultPart):
     """A target on the road that is no mode, or the mass, SI."""
 
     load_N: float = 0.0
+    # measured quantity
     quantity: Literal[
         "contact_area_m2",
         "contact_length_m",
@@ -177,11 +184,11 @@ class FittedFootprint(ResultPart):
         "vertical_stiffness_N_per_m",
         "mass_kg",
     ]
-    initial: float
-    fitted: float
-    target: float
-    sigma: float | None = None
-    deviation_percent: float
+    initial: float  # value before the fit, SI
+    fitted: float  # value after the fit
+    target: float  # measured value
+    sigma: float | None = None  # standard deviation of the measured value
+    deviation_percent: float  # fitted over measured, less 1
     pressure_kPa: float | None = None
     rim: str | None = None
 
@@ -201,42 +208,48 @@ class FitResult(Result):
     fits = True
     study, stem, heading = "fit", "fit", "Fit"
 
-    method: str
+    method: str  # slsqp or gauss-newton
     prior: bool = False  # whether what is known of variables and model entered the fit
     pressure_kPa: float
-    mass_kg: float
-    objective_Hz: float
-    objective_unit: str = "Hz"  # or "sigma"
-    initial_objective_Hz: float
-    evaluations: int
+    mass_kg: float  # mass of the fitted tyre without its rim
+    objective_Hz: float  # objective of the fitted design, in the unit of objective_unit
+    objective_unit: str = "Hz"  # Hz, or sigma: standard deviations
+    initial_objective_Hz: float  # objective of the case's design, in the same unit
+    evaluations: int  # designs that were evaluated
+    # evaluations until the objective was within 0.05 of the end
     evaluations_to_best: int = Field(default=0, alias="evaluations_to_0.05_Hz")
-    gradient_evaluations: int = 0
-    failed_evaluations: int
-    converged: bool
-    moved: bool
-    verdict: FitVerdict = NOT_JUDGED  # as a file of an earlier version is
-    chi2_per_dof: float | None = None  # by all that is uncertain; None: see `verdict`
-    reason: FitReason | None = None  # the likeliest, why values are off
-    message: str
-    projected_gradient_norm: float
+    gradient_evaluations: int = 0  # designs with sensitivities among them
+    failed_evaluations: int  # designs without a solution
+    converged: bool  # whether the optimiser converged
+    moved: bool  # whether the variables moved
+    verdict: FitVerdict = NOT_JUDGED  # whether the model fits the targets
+    # chi2 per degree of freedom, by all that is uncertain; null: see verdict
+    chi2_per_dof: float | None = None
+    reason: FitReason | None = None  # the likeliest reason why values are off
+    message: str  # the optimiser's own words
+    projected_gradient_norm: float  # norm of the gradient within the bounds, 0 at an optimum
     label_margin: float  # least clarity of a label
-    variables: dict[str, FittedVariable]
-    fixed: dict[str, float]
-    freed: dict[str, FreedNumberFit] = Field(default={})  # of ``variables``
-    modes: list[FittedMode]
-    footprint: list[FittedFootprint] = Field(default=[])
-    mass: FittedFootprint | None = None
-    states: list[FittedState] = Field(default=[])  # of a fit over several
-    next_states: list[FittedState] = Field(default=[])  # the most telling first
+    variables: dict[str, FittedVariable]  # fitted variables by name
+    fixed: dict[str, float]  # variables that were held, with their values
+    # uncertain numbers that were fitted too, those among the variables
+    freed: dict[str, FreedNumberFit] = Field(default={})
+    modes: list[FittedMode]  # modes with a target
+    footprint: list[FittedFootprint] = Field(default=[])  # targets on the road that are no modes
+    mass: FittedFootprint | None = None  # the mass, if it is a target
+    states: list[FittedState] = Field(default=[])  # states of a fit over several
+    # states to measure next, the most telling first
+    next_states: list[FittedState] = Field(default=[])
     next_states_error: str = ""  # why they could not be evaluated
-    labels: Labels | None = None  # of frequencies that came without
+    labels: Labels | None = None  # labels of frequencies that came without one
     noise_Hz: float | None = None  # standard deviation of a frequency
     total_error_unknown: str = ""  # why no variable has a total standard error
-    responses: list[FitResponse] = Field(default=[])  # of the variables to what was measured
-    correlations: dict[str, dict[str, float | None]]
-    singular_values: list[float]
+    # change of the variables with each measured value
+    responses: list[FitResponse] = Field(default=[])
+    correlations: dict[str, dict[str, float | None]]  # correlations of the variables
+    singular_values: list[float]  # singular values of the sensitivities of the residuals
+    # starts: initial, objective_Hz, converged, evaluations, message, values
     starts: list[dict[str, Any]]
-    replaced_starts: int = 0
+    replaced_starts: int = 0  # drawn starts without a solution, replaced by others
 
     @classmethod
     def run(

@@ -56,11 +56,13 @@ SAME_VALUE = 0.015  # relative, between a corrected value and the model, besides
 class FitReason(ResultPart):
     """The likeliest reason why a model is off its targets."""
 
-    # mode: one value is off, and an effect on its mode explains it nearly as well
+    # kind of reason; mode: one value is off, and an effect on its mode explains it nearly as
+    # well
     kind: Literal["value", "mode", "exchanged", "pressure", "rim", "wheel", "pattern"]
-    words: str  # a sentence that ends with the question to the user
-    chi2_per_dof: float | None = None  # with the reason removed, by the linear model
-    also: str = ""  # words of a reason that is nearly as likely
+    words: str  # a sentence that ends with a question to the user
+    # chi2 per degree of freedom with the reason removed, by the linear model
+    chi2_per_dof: float | None = None
+    also: str = ""  # a reason that is nearly as likely, in words
 
     @property
     def excludes_effects(self) -> bool:

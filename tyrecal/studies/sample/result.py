@@ -38,20 +38,19 @@ DIGITS = Column("", ".4g")
 class SampledVariable(ResultPart):
     """A design variable, in the unit of the number that it sets."""
 
-    mean: float
-    median: float
-    low: float
-    high: float
-    standard_error: PositiveNumber  # linear, about the best
-    best: float  # where the density is highest
-    lower: float
-    upper: float
-    density: Annotated[
-        list[float], Field(min_length=1)
-    ]  # shares of draws in equal steps of the box
-    box: tuple[float, float]
-    log: bool  # steps are of the logarithm
-    unit: str = ""
+    mean: float  # mean of the draws
+    median: float  # median of the draws
+    low: float  # lower end of the 90 % interval
+    high: float  # upper end of the 90 % interval
+    standard_error: PositiveNumber  # linear standard error about the best
+    best: float  # value where the density is highest
+    lower: float  # lower bound
+    upper: float  # upper bound
+    # shares of draws in equal steps of the box
+    density: Annotated[list[float], Field(min_length=1)]
+    box: tuple[float, float]  # range of values that was sampled
+    log: bool  # whether steps are of the logarithm
+    unit: str = ""  # unit of the number that it sets
 
     @model_validator(mode="after")
     def _within_the_box(self) -> Self:
@@ -69,8 +68,9 @@ class SampledVariable(ResultPart):
 class SampledPair(ResultPart):
     """Two variables together: counts of thinned draws, rows along ``a``, in equal steps."""
 
-    a: str
-    b: str
+    a: str  # name of the first variable
+    b: str  # name of the second variable
+    # counts of thinned draws, rows along a, in equal steps of both boxes
     counts: list[list[Annotated[int, Field(ge=0, lt=2**31)]]]
 
 
@@ -78,49 +78,49 @@ class PredictedRow(Named):
     """A frequency of the tyre at a pressure; ``frequency_Hz`` is its median."""
 
     pressure_kPa: float
-    rim: str | None = None  # where it is not held as the case has it
-    low: float
-    high: float
-    mean: float
-    standard_error: float  # linear
-    measured_Hz: float | None = None
-    sigma_Hz: float | None = None  # of its scatter
+    rim: str | None = None  # how the rim is held, if not as in the case
+    low: float  # lower end of the 90 % interval
+    high: float  # upper end of the 90 % interval
+    mean: float  # mean of the draws
+    standard_error: float  # linear standard error
+    measured_Hz: float | None = None  # measured frequency
+    sigma_Hz: float | None = None  # standard deviation of the measured frequency
 
 
 class Optimum(ResultPart):
     """A design that is likelier than those around it; ``below``: its ln p, below the highest."""
 
-    values: dict[str, float]
-    below: float
+    values: dict[str, float]  # values of the variables
+    below: float  # how far its ln p is below the highest
 
 
 class EmulatorFacts(ResultPart):
     """The emulators of the last box, one a rim; errors are relative, of the worst."""
 
-    evaluations: int
-    failed: int
-    degree: int
-    median_error: float
-    stated_error: float
-    share_of_sigma: float  # that error of a measured row, the worst one's
+    evaluations: int  # evaluations in the last box
+    failed: int  # evaluations without a solution
+    degree: int  # degree of the polynomials
+    median_error: float  # median relative error, of the worst emulator
+    stated_error: float  # relative error that holds for 99 % of designs
+    share_of_sigma: float  # that error over a measured row's standard deviation, the worst one's
     widened: float = 0.0  # share by which it makes that row's standard deviation larger
-    boxes: int
-    evaluations_of_all: int
+    boxes: int  # boxes that were tried
+    evaluations_of_all: int  # evaluations in all boxes
 
 
 class ChainFacts(ResultPart):
     """The walkers' draws."""
 
-    draws: int
-    kept: int  # in sample_draws.csv
-    walkers: int
-    steps: int
-    dropped: int
-    acceptance: float
-    autocorrelation: dict[str, float]  # steps
-    effective: float
-    enough: bool
-    at_edge: float  # share of the draws
+    draws: int  # draws
+    kept: int  # draws in sample_draws.csv
+    walkers: int  # walkers
+    steps: int  # steps of each walker
+    dropped: int  # steps dropped at the beginning
+    acceptance: float  # share of steps that were accepted
+    autocorrelation: dict[str, float]  # autocorrelation time by variable, in steps
+    effective: float  # number of independent draws
+    enough: bool  # whether there are enough draws
+    at_edge: float  # share of the draws at the edge of the box
     stopped: str  # why the box holds no more of them
 
 
@@ -130,16 +130,16 @@ class SampleResult(Result):
     study, stem, heading = "sample", "sample", "Sample"
     figures = "tyrecal.report.sample:figures"
 
-    seed: int
-    variables: dict[str, SampledVariable]
-    correlations: dict[str, dict[str, float]]
-    predicted: list[PredictedRow]
-    emulator: EmulatorFacts
-    chains: ChainFacts
-    pairs: list[SampledPair]
-    optima: list[Optimum]
-    uncertain: list[str]  # what nobody calibrates
-    noise_Hz: float | None = None
+    seed: int  # seed of the draws
+    variables: dict[str, SampledVariable]  # sampled variables by name
+    correlations: dict[str, dict[str, float]]  # correlations of the variables
+    predicted: list[PredictedRow]  # predicted frequencies
+    emulator: EmulatorFacts  # emulators of the last box
+    chains: ChainFacts  # the walkers' draws
+    pairs: list[SampledPair]  # joint histograms of two variables
+    optima: list[Optimum]  # designs that are likelier than those around them
+    uncertain: list[str]  # uncertain numbers that no fit calibrates
+    noise_Hz: float | None = None  # standard deviation of a frequency
 
     @classmethod
     def run(

@@ -27,34 +27,34 @@ MAX_NUMBERS_SHOWN = 20  # numbers in a table, the most influential ones
 class FreedNumber(ResultPart):
     """A number that the selection frees."""
 
-    name: str  # of the uncertainty
-    sets: list[str]  # paths
+    name: str  # name of the uncertainty
+    sets: list[str]  # paths that it sets
     gain: float  # fall of chi2 by freeing it after the others
-    p_value: float  # probability of a gain so large by chance, the choice counted
-    shift_in_sd: float  # likeliest, with the others that are freed
+    p_value: float  # probability of a gain so large by chance, with the choice counted
+    shift_in_sd: float  # likeliest shift in standard deviations, with the others that are freed
     alike: list[str]  # uncertainties that these data do not distinguish from it
 
 
 class UncertainNumber(ResultPart):
     """An uncertain number with all of them free, as ``constants`` of a diagnosis."""
 
-    name: str
-    sets: list[str]
-    shift_in_sd: float
+    name: str  # name of the uncertainty
+    sets: list[str]  # paths that it sets
+    shift_in_sd: float  # likeliest shift in standard deviations
 
 
 class Selection(ResultPart):
     """Which numbers, freed within what is known of them, reduce the deviations most."""
 
-    chi2: float  # of the deviations after the variables are fitted
-    chi2_left: float  # with the numbers that are freed
-    chi2_exact_section: float  # as ``chi2``, if the section were exact
-    freedom: int
-    known_from: str  # what the section is known from
-    steps: list[FreedNumber]
+    chi2: float  # chi2 of the deviations after the variables are fitted
+    chi2_left: float  # chi2 with the numbers that are freed
+    chi2_exact_section: float  # chi2 if the section were exact
+    freedom: int  # degrees of freedom
+    known_from: str  # source of the section
+    steps: list[FreedNumber]  # numbers to free, in this order
     next_name: str | None  # the best number that is not freed
-    next_p_value: float
-    numbers: list[UncertainNumber]
+    next_p_value: float  # probability of its gain by chance
+    numbers: list[UncertainNumber]  # uncertain numbers with all of them free
     left_out: list[str] = Field(default=[])  # measurements that are not used
 
 
@@ -65,13 +65,14 @@ class SensitivitiesResult(Result):
     figures = "tyrecal.report.sensitivities:figures"
     is_seldom = follows_fit = True
 
-    design: str
-    number_values: dict[str, float]  # by name, in their own units
-    quantity_values: dict[str, float]  # of the quantities, in the units of their names
-    rows: list[Sensitivity]
+    design: str  # name of the design: initial, fitted or set
+    number_values: dict[str, float]  # values of the numbers by name, in their own units
+    quantity_values: dict[str, float]  # values of the quantities, in the units of their names
+    rows: list[Sensitivity]  # sensitivities
     unmoved: list[str] = Field(default=[])  # numbers that move nothing
-    without_sensitivity: dict[str, str] = Field(default={})  # numbers, and why
-    selection: Selection | None = None
+    # numbers without a sensitivity, and why
+    without_sensitivity: dict[str, str] = Field(default={})
+    selection: Selection | None = None  # numbers to free
     selection_unknown: str = ""  # why there is none, though the case's targets are in a file
 
     @classmethod

@@ -43,10 +43,10 @@ NOT_OF_A_TYRE = ("format", "mesh", "variables", "targets", "uncertainties", "sol
 class Sensitivity(ResultPart):
     """d ln q / d ln x or, where ``per`` is not empty, d ln q / d x per that unit."""
 
-    quantity: str
-    by: str  # a variable by name, another number by path
-    value: float
-    per: str = ""
+    quantity: str  # quantity that moves
+    by: str  # number that moves it: a variable by name, another number by path
+    value: float  # d ln q / d ln x, or with per: d ln q / d x
+    per: str = ""  # unit of x, if the sensitivity is not to its logarithm
 
 
 @dataclass(frozen=True)

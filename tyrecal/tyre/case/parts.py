@@ -96,9 +96,9 @@ class Part(BaseModel):
 class Prony(Part):
     """A term of the Prony series: shares of the shear and bulk modulus, relaxation time."""
 
-    g: Annotated[float, Field(ge=0, lt=1)]
-    k: Annotated[float, Field(ge=0, lt=1)]
-    tau_s: Annotated[Positive, Field(ge=1e-9, le=1e9)]
+    g: Annotated[float, Field(ge=0, lt=1)]  # share of the shear modulus that relaxes
+    k: Annotated[float, Field(ge=0, lt=1)]  # share of the bulk modulus that relaxes
+    tau_s: Annotated[Positive, Field(ge=1e-9, le=1e9)]  # relaxation time
 
 
 LossRow = Annotated[list[NotNegative], Field(min_length=2, max_length=2)]  # Hz, loss factor
@@ -119,16 +119,21 @@ class Rubber(Part):
     frequency (Hz) and loss factor; None: not known. It changes no frequency.
     """
 
-    kind: Literal["rubber"]
-    C10_Pa: Number
-    C01_Pa: Number
-    D1_per_Pa: Positive
+    kind: Literal["rubber"]  # kind of material
+    C10_Pa: Number  # first constant of Mooney-Rivlin's law
+    C01_Pa: Number  # second constant of Mooney-Rivlin's law
+    D1_per_Pa: Positive  # 2 over the bulk modulus
+    # whether the constants are those of relaxed or of instantaneous rubber
     moduli: Moduli = "long_term"
-    prony: list[Prony] = Field(default_factory=list)
+    prony: list[Prony] = Field(default_factory=list)  # terms of the Prony series
+    # n: in a mode of frequency f the shear modulus is × (f / reference_frequency_Hz)ⁿ
     frequency_exponent: Annotated[float, Field(ge=0, le=0.5)] = 0.0
+    # frequency at which the constants hold, if there is an exponent
     reference_frequency_Hz: Frequency = 60.0
+    # loss over storage modulus in vibrations: a number, or rows [Hz, loss factor]; absent:
+    # unknown
     loss_factor: Loss | None = None
-    density_kg_per_m3: Positive
+    density_kg_per_m3: Positive  # density
 
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
@@ -157,19 +162,20 @@ class Rubber(Part):
 class Cord(Part):
     """A linear elastic cord; one that does not bear compression goes slack."""
 
-    kind: Literal["cord"]
-    youngs_modulus_Pa: Positive
-    poissons_ratio: Annotated[float, Field(ge=0, lt=0.5)]
-    density_kg_per_m3: Positive
-    bears_compression: bool = True
+    kind: Literal["cord"]  # kind of material
+    youngs_modulus_Pa: Positive  # Young's modulus
+    poissons_ratio: Annotated[float, Field(ge=0, lt=0.5)]  # Poisson's ratio
+    density_kg_per_m3: Positive  # density
+    bears_compression: bool = True  # false: the cord is slack if compressed
 
 
 class Gauge(Part):
     """A factor on the thickness between two lines, in some regions or in all."""
 
+    # inner and outer line of the section
     between: Annotated[list[Text], Field(min_length=2, max_length=2)]
-    regions: list[Text] | None = None
-    factor: Annotated[float, Field(ge=0.1, le=10)]
+    regions: list[Text] | None = None  # regions of the section; absent: all
+    factor: Annotated[float, Field(ge=0.1, le=10)]  # factor on the thickness
 
 
 class Outline(Part):
@@ -179,13 +185,13 @@ class Outline(Part):
     ``rim_radius_m``. Depths: inner surface to carcass, to the first belt, to the second.
     """
 
-    file: Text
-    belt_width_m: Positive
-    rim_radius_m: Positive
-    carcass_depth_m: Positive = 1.2e-3
-    belt_depth_m: Positive = 1.2e-3
-    belt_spacing_m: Positive = 1.2e-3
-    belt_step_m: Positive = 0.010
+    file: Text  # outer and inner curve, CSV, relative to the case file
+    belt_width_m: Positive  # width of the wider belt, along the carcass
+    rim_radius_m: Positive  # the rim holds what is within this radius
+    carcass_depth_m: Positive = 1.2e-3  # from the inner surface to the carcass
+    belt_depth_m: Positive = 1.2e-3  # from the carcass to the first belt
+    belt_spacing_m: Positive = 1.2e-3  # from the first belt to the second
+    belt_step_m: Positive = 0.010  # how much narrower the second belt is
 
 
 SectionOrigin = Literal["exact", "measured", "drawing", "size_code"]
@@ -194,10 +200,10 @@ SectionOrigin = Literal["exact", "measured", "drawing", "size_code"]
 class SectionSource(Part):
     """Source of the section: a station table, or an outline of two curves."""
 
-    stations: Text | None = None  # the table, CSV, relative to the case file
-    outline: Outline | None = None
-    gauges: list[Gauge] | None = None  # they scale the section
-    # how well it is known, so how large its errors are; None: taken as a drawing
+    stations: Text | None = None  # station table, CSV, relative to the case file
+    outline: Outline | None = None  # instead of stations: two curves
+    gauges: list[Gauge] | None = None  # factors on thicknesses
+    # how well the section is known, which gives its errors; absent: drawing
     known_from: SectionOrigin | None = None
 
     @property
@@ -217,26 +223,23 @@ DeckPart = Literal["tread", "sidewall", "bead_filler", "belts"]
 class DeckGauges(Part):
     """Factors on the thickness of the deck's parts, from what they lie on to their free surface."""
 
-    tread: Positive = 1.0
-    sidewall: Positive = 1.0
+    tread: Positive = 1.0  # factor on the thickness of the tread
+    sidewall: Positive = 1.0  # factor on the thickness of the sidewall
 
 
 class DeckSource(Part):
     """A user's ABAQUS deck of the section, or decks of the whole tyre in three dimensions."""
 
     file: Text | None = None  # deck of the section, relative to the case file
-    # in three dimensions, in the order in which they are run
+    # instead of file: decks in three dimensions, in the order in which they are run
     decks: Annotated[list[Text], Field(min_length=1, max_length=20)] | None = None
-    units: Literal["m", "mm"]  # of length; m with kg, s, Pa, mm with t, s, MPa
-    # set of nodes of the outer surface over the belt, which ABAQUS gives shapes of; in three
-    # dimensions all round
+    units: Literal["m", "mm"]  # unit of length: m with kg, s, Pa; mm with t, s, MPa
+    # node set of the outer surface over the belt; in three dimensions all round
     crown: Text = "CROWN"
-    # the element sets of its sections that are the tread, the sidewall, the bead filler, the belts,
-    # for effects
+    # element sets that are the tread, the sidewall, the bead filler, the belts, for effects
     parts: dict[DeckPart, list[Text]] = Field(default_factory=dict)
-    gauges: DeckGauges = DeckGauges()  # of the tread and the sidewall
-    # of the marks in its text, by name, and others of its numbers, by path, in its own units; those
-    # not given are as the text has them
+    gauges: DeckGauges = DeckGauges()  # factors on the thickness of parts
+    # numbers of the deck by mark or path, in its own units; absent ones are as in the deck
     numbers: dict[Text, Number] = Field(default_factory=dict)
 
     def sets(self, part: str) -> list[str]:
@@ -268,25 +271,30 @@ class Level(Part):
     ``grading``: thickness of a row over that of the row inside it, per gap.
     """
 
+    # elements along each region of the half section
     elements: dict[Name, Annotated[int, Field(ge=1, le=200)]]
-    rows: list[Annotated[int, Field(ge=1, le=20)]]
+    rows: list[Annotated[int, Field(ge=1, le=20)]]  # rows of elements between each two lines
+    # thickness of a row over that of the row inside it, for each two lines
     grading: list[Annotated[float, Field(ge=0.1, le=10)]] | None = None
 
 
 class Mesh(Part):
     """Element type and the mesh levels by name; ``level`` is the one in use."""
 
-    element: Element
-    level: str
-    levels: Annotated[dict[Name, Level], Field(min_length=1)]
+    element: Element  # type of the solid elements; CGAX4R is the paper's
+    level: str  # the mesh in use; --mesh NAME chooses another
+    levels: Annotated[dict[Name, Level], Field(min_length=1)]  # meshes by name
+    # hourglass stiffness of CGAX4R; absent: 0.005 times the shear modulus
     hourglass_stiffness_Pa: Positive | None = None
 
 
 class Solid(Part):
     """A material in the whole section, or only in ``regions`` and/or ``between`` two lines."""
 
-    material: str
+    material: str  # name of a rubber; later entries override earlier ones
+    # regions of the section; absent: all
     regions: Annotated[list[str], Field(min_length=1)] | None = None
+    # inner and outer line; absent: the whole thickness
     between: Annotated[list[str], Field(min_length=2, max_length=2)] | None = None
 
 
@@ -297,13 +305,16 @@ class RebarLayer(Part):
     layer is as long as its line, or ends with some of its ``regions``.
     """
 
-    line: str
-    material: str
-    area_m2: Positive
+    line: str  # line of the section
+    material: str  # name of a cord
+    area_m2: Positive  # cross-section of one cord
+    # constant spacing, or fanned cords, whose spacing is an angle
     geometry: Literal["constant", "angular"] = "constant"
-    spacing_m: Positive | None = None
+    spacing_m: Positive | None = None  # distance of two cords, with geometry: constant
+    # angle between two cords about the axle, with geometry: angular
     spacing_deg: Annotated[float, Field(gt=0, le=360)] | None = None
-    angle_deg: Degrees
+    angle_deg: Degrees  # angle from the meridian
+    # regions that have the layer; absent: all of its line
     regions: Annotated[list[str], Field(min_length=1)] | None = None
 
     @classmethod
@@ -321,8 +332,8 @@ class RebarLayer(Part):
 class ReferencePoint(Part):
     """A point of the section's plane, m."""
 
-    r: Number
-    z: Number
+    r: Number  # radial, from the axle
+    z: Number  # along the axle
 
 
 def part_values(part: Any) -> Mapping[str, Any]:
@@ -335,10 +346,10 @@ def part_values(part: Any) -> Mapping[str, Any]:
 class Spindle(Part):
     """Compliance of what holds the wheel, at the rim's reference point; 0 = clamped."""
 
-    lateral_m_per_N: NotNegative = 0.0
-    radial_m_per_N: NotNegative = 0.0
-    torsional_rad_per_N_m: NotNegative = 0.0
-    tilt_rad_per_N_m: NotNegative = 0.0
+    lateral_m_per_N: NotNegative = 0.0  # compliance along the axle
+    radial_m_per_N: NotNegative = 0.0  # compliance across the axle
+    torsional_rad_per_N_m: NotNegative = 0.0  # compliance about the axle
+    tilt_rad_per_N_m: NotNegative = 0.0  # compliance about a diameter
 
     @property
     def gives_way(self) -> bool:
@@ -355,13 +366,14 @@ class Rim(Part):
     then those of wheel and hub, by default of steel, 17 inch.
     """
 
-    reference_point_m: ReferencePoint
+    reference_point_m: ReferencePoint  # wheel centre
+    # whole_bead, or its surface: outside and end of the bead
     holds: Literal["whole_bead", "bead_surface"] = WHOLE_BEAD
-    mass_kg: Positive = 15.0
-    polar_inertia_kg_m2: Positive = 0.43
-    diametral_inertia_kg_m2: Positive = 0.27
-    spindle: Spindle = Spindle()
-    free: bool = False
+    mass_kg: Positive = 15.0  # mass of wheel and hub, if the rim moves
+    polar_inertia_kg_m2: Positive = 0.43  # moment of inertia about the axle, if the rim moves
+    diametral_inertia_kg_m2: Positive = 0.27  # moment of inertia about a diameter, if the rim moves
+    spindle: Spindle = Spindle()  # compliances of the wheel's support in vibrations
+    free: bool = False  # true: the wheel is free in vibrations
 
     @property
     def holds_whole_bead(self) -> bool:
@@ -388,26 +400,27 @@ class Cavity(Part):
     """The gas in the tyre as it moves with the walls; ``share`` of its mass and stiffness, 0 =
     a constant pressure only, 1 = the gas as it is."""
 
-    gas: Literal["air", "helium", "sulphur_hexafluoride"] = "air"
-    temperature_C: Annotated[float, Field(gt=-100, lt=300)] = 20.0
+    gas: Literal["air", "helium", "sulphur_hexafluoride"] = "air"  # gas in the tyre
+    temperature_C: Annotated[float, Field(gt=-100, lt=300)] = 20.0  # temperature of the gas
+    # share of the gas that vibrates; 1: all of it
     share: Annotated[NotNegative, Field(le=100)] = 0.0
 
 
 class PointMass(Part):
     """A lumped mass on the tread, at the angle 0 and the height z over the middle."""
 
-    mass_kg: NotNegative = 0.0
-    z_m: Number = 0.0
+    mass_kg: NotNegative = 0.0  # lumped mass on the tread at angle 0
+    z_m: Number = 0.0  # distance from the middle of the tread
 
 
 class RoadSpring(Part):
     """A road that barely touches: springs from the tread to the ground at the angle 0, over
     ``width_m`` about the middle; the deflection by the static load is left out."""
 
-    radial_N_per_m: NotNegative = 0.0
-    lateral_N_per_m: NotNegative = 0.0
-    tangential_N_per_m: NotNegative = 0.0
-    width_m: Positive = 0.08
+    radial_N_per_m: NotNegative = 0.0  # stiffness along the radius
+    lateral_N_per_m: NotNegative = 0.0  # stiffness along the axle
+    tangential_N_per_m: NotNegative = 0.0  # stiffness along the circumference
+    width_m: Positive = 0.08  # width of the tread over which the springs are spread
 
     @property
     def stiffnesses(self) -> dict[str, float]:
@@ -424,8 +437,9 @@ class Splice(Part):
     """A sector about the angle 0 in which numbers of the case are larger by ``share`` of
     themselves: materials, layers and densities, but no geometry."""
 
-    share: Annotated[float, Field(gt=-1, le=10)] = 0.0
-    width_deg: Annotated[float, Field(gt=0, le=180)] = 10.0
+    share: Annotated[float, Field(gt=-1, le=10)] = 0.0  # the numbers are multiplied by 1 + share
+    width_deg: Annotated[float, Field(gt=0, le=180)] = 10.0  # width of the sector about angle 0
+    # paths of materials, layers and densities
     numbers: Annotated[list[Text], Field(min_length=1)] = Field(
         default_factory=lambda: ["materials.rubber.C10_Pa"]
     )

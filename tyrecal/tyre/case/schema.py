@@ -54,26 +54,30 @@ Pressure = Annotated[Number, Field(ge=0, lt=2000)]  # kPa
 class Analysis(Part):
     """Steps of the computation: the inflation, then modes up to ``highest_harmonic``."""
 
-    static_moduli: Moduli = "long_term"
+    static_moduli: Moduli = "long_term"  # moduli of the rubber in the inflation
+    # increments of the inflation in the decks
     static_increments: Annotated[int, Field(ge=1, le=1000)] = 10
+    # frequency of the Prony series in vibrations; absent: no series
     vibration_frequency_Hz: Frequency | None = None
-    sectors: Annotated[int, Field(ge=8, le=1000)] = 60
+    sectors: Annotated[int, Field(ge=8, le=1000)] = 60  # sectors of the revolved tyre in the decks
+    # modes are computed up to this number of waves
     highest_harmonic: Annotated[int, Field(ge=0, le=20)] = 4
-    modes_per_harmonic: Annotated[int, Field(ge=1, le=10)] = 2
+    modes_per_harmonic: Annotated[int, Field(ge=1, le=10)] = 2  # modes for each number of waves
 
 
 class Road(Part):
     """The flat, rigid road that a tyre is pressed on, and the mesh round the tyre for it."""
 
-    friction: NotNegative = 0.5
+    friction: NotNegative = 0.5  # friction coefficient
     stiffness_Pa_per_m: Positive = 1e9  # contact pressure over overclosure
     elastic_slip_m: Annotated[float, Field(ge=1e-6)] = 1e-4  # slip before friction is full
-    # in vibrations its centre is held, or free along the load, with the rim's mass
+    # wheel's centre in vibrations: held, or free along the load with the rim's mass
     wheel: Literal["held", "free_along_load"] = "held"
-    # lengths from the patch's middle to the top
+    # lengths of the elements round half the tyre, from the patch to the top, sum 180
     element_angles_deg: Annotated[list[Positive], Field(min_length=1, max_length=200)] = Field(
         default_factory=lambda: [4.0] * 3 + [5.0, 8.0, 17.0, 45.0, 93.0]
     )
+    # loads on the road, rising
     loads_N: Annotated[list[Load], Field(min_length=1, max_length=100)] = Field(
         default_factory=lambda: [500.0, *(1000.0 * kN for kN in (1, 2, 3, 4, 5, 6, 8))]
     )
@@ -100,9 +104,9 @@ class SolverChoice(Part):
     The bundled solver's limit is processor time; a program's, time by the clock.
     """
 
-    name: Name
-    time_limit_s: Positive
-    options: dict[str, Any] = Field(default_factory=dict)
+    name: Name  # bundled, calculix, abaqus or your own
+    time_limit_s: Positive  # limit of one run, on the road of one load; bundled: processor time
+    options: dict[str, Any] = Field(default_factory=dict)  # the solver's own options
 
 
 def cannot_fit(weights: Sequence[float], free: int) -> str | None:
@@ -123,12 +127,14 @@ class Variable(Part):
     """A design variable: the numbers it sets (dotted paths), its start, its bounds, how far a
     search may go, and how well its start is known, one standard deviation."""
 
+    # paths of the numbers that have the variable's value
     sets: Annotated[list[str], Field(min_length=1)]
-    start: Number
-    lower: Number
-    upper: Number
+    start: Number  # value at the start; it overrides the values at the paths
+    lower: Number  # least value
+    upper: Number  # largest value
+    # standard deviation of the start in percent; absent: 0.5 of its logarithm
     percent: Positive | None = None
-    scale: Literal["log", "linear"] = "log"
+    scale: Literal["log", "linear"] = "log"  # how a fit takes steps
 
     @property
     def sd(self) -> float | None:
@@ -162,16 +168,17 @@ class TargetMode(Part):
     deviation, counts as 1 Hz where it is not known. Its state, by default the case's: pressure,
     rim, load on the road; there ``symmetry`` about the patch tells the two of a doublet apart."""
 
-    c: Annotated[int, Field(ge=0, le=20)]
-    m: Annotated[int, Field(ge=0, le=3)]  # beyond, the belt's motion has no clear order
-    kind: Literal["axial", "torsional"] | None = None
-    frequency_Hz: Frequency
-    weight: Weight = 1.0
-    sigma_Hz: Positive | None = None
-    damping_ratio: Positive | None = None  # fraction of critical; compared, not fitted
-    pressure_kPa: Pressure | None = None
-    rim: RimSupport | None = None
-    load_N: Load | None = None
+    c: Annotated[int, Field(ge=0, le=20)]  # waves round the circumference
+    m: Annotated[int, Field(ge=0, le=3)]  # nodal circles on the belt
+    kind: Literal["axial", "torsional"] | None = None  # only of [0,0]: axial (lateral) or torsional
+    frequency_Hz: Frequency  # frequency
+    weight: Weight = 1.0  # weight in the objective
+    sigma_Hz: Positive | None = None  # standard deviation; absent: counts as 1 Hz
+    damping_ratio: Positive | None = None  # fraction of critical damping; compared, not fitted
+    pressure_kPa: Pressure | None = None  # pressure at which it was measured; absent: the case's
+    rim: RimSupport | None = None  # how the rim was held; absent: as in the case
+    load_N: Load | None = None  # load on the road
+    # symmetry about the patch, of a mode under a load
     symmetry: Literal["symmetric", "antisymmetric"] | None = None
 
     @classmethod
@@ -196,16 +203,18 @@ class TargetFootprint(Part):
     """A measured contact area, length or width, or tangent vertical stiffness, at a load, with its
     sigma; its pressure, by default the case's."""
 
-    load_N: Load
-    pressure_kPa: Pressure | None = None
-    contact_area_m2: Positive | None = None
-    sigma_m2: Positive | None = None
+    load_N: Load  # load on the road
+    pressure_kPa: Pressure | None = None  # pressure at which it was measured; absent: the case's
+    contact_area_m2: Positive | None = None  # area of the patch
+    sigma_m2: Positive | None = None  # standard deviation of the area
+    # largest extent of the patch along the rolling direction
     contact_length_m: Positive | None = None
+    # largest extent of the patch across the rolling direction
     contact_width_m: Positive | None = None
-    sigma_m: Positive | None = None
-    vertical_stiffness_N_per_m: Positive | None = None
-    sigma_N_per_m: Positive | None = None
-    weight: Weight = 1.0
+    sigma_m: Positive | None = None  # standard deviation of length or width
+    vertical_stiffness_N_per_m: Positive | None = None  # tangent at the load
+    sigma_N_per_m: Positive | None = None  # standard deviation of the stiffness
+    weight: Weight = 1.0  # weight in the objective
 
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
@@ -230,19 +239,21 @@ class TargetFootprint(Part):
 class TargetMass(Part):
     """The measured mass of the tyre without its rim, with its sigma."""
 
-    mass_kg: Positive
-    sigma_kg: Positive
-    weight: Weight = 1.0
+    mass_kg: Positive  # mass of the tyre without its rim
+    sigma_kg: Positive  # standard deviation of the mass
+    weight: Weight = 1.0  # weight in the objective
 
 
 class Targets(Part):
     """Measured values and their source; ``file``: a measurements CSV that holds it."""
 
-    source: Text = ""
-    file: Text | None = None
+    source: Text = ""  # where the values are from
+    file: Text | None = None  # instead of the keys below: a measurements CSV in the case's folder
+    # measured modes; pairs once, they count twice
     modes: list[TargetMode] = Field(default_factory=list)
+    # measured quantities on the road
     footprint: list[TargetFootprint] = Field(default_factory=list)
-    mass: TargetMass | None = None
+    mass: TargetMass | None = None  # measured mass
 
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
@@ -271,9 +282,10 @@ class Uncertainty(Part):
     where the others rise.
     """
 
-    sets: Annotated[list[Text], Field(min_length=1)]
-    percent: Positive | None = None
-    absolute: Positive | None = None
+    sets: Annotated[list[Text], Field(min_length=1)]  # paths of numbers that are off together
+    percent: Positive | None = None  # standard deviation in percent of each number
+    absolute: Positive | None = None  # standard deviation in the numbers' unit
+    # -1 for numbers that fall where the others rise
     signs: list[Annotated[int, Field(ge=-1, le=1)]] | None = None
 
     @classmethod
@@ -303,38 +315,41 @@ DECK_LEVEL = "deck"
 class Case(Part):
     """One tyre, its mesh and analysis, what may vary and what was measured."""
 
-    format: Annotated[int, Field(ge=1, le=1)]  # Literal[1] would take true
-    name: Text
-    size: Text
-    pressure_kPa: Pressure
-    deck: DeckSource | None = None
-    section: SectionSource = SectionSource()
+    format: Annotated[int, Field(ge=1, le=1)]  # version of the case file's format
+    name: Text  # name in words
+    size: Text  # size code
+    pressure_kPa: Pressure  # inflation pressure
+    deck: DeckSource | None = None  # instead of section, mesh, materials and solids: your own deck
+    section: SectionSource = SectionSource()  # source of the section
+    # element type and meshes
     mesh: Mesh = Mesh(
         element="CGAX8", level=DECK_LEVEL, levels={DECK_LEVEL: Level(elements={}, rows=[])}
     )
+    # rubbers and cords by name
     materials: dict[Name, Annotated[Rubber | Cord, Field(discriminator="kind")]] = Field(
         default_factory=dict
     )
-    solids: list[Solid] = Field(default_factory=list)
-    rebar_layers: dict[Name, RebarLayer] = Field(default_factory=dict)
-    rim: Rim
-    cavity: Cavity = Cavity()
-    # about the tyre's axle, not touching a road
+    solids: list[Solid] = Field(default_factory=list)  # rubber by place in the section
+    rebar_layers: dict[Name, RebarLayer] = Field(default_factory=dict)  # layers of cords by name
+    rim: Rim  # the rigid rim and its support
+    cavity: Cavity = Cavity()  # gas in the tyre
+    # speed of rotation, off the road; frequencies are for a sensor that does not rotate
     spin_rad_per_s: Annotated[NotNegative, Field(le=1e4)] = 0.0
-    point_mass: PointMass = PointMass()
-    road_spring: RoadSpring = RoadSpring()
-    splice: Splice = Splice()
-    analysis: Analysis
-    road: Road = Road()
-    # parameters of effects that are in the tyre, by id, in the effect's unit
+    point_mass: PointMass = PointMass()  # lumped mass on the tread
+    road_spring: RoadSpring = RoadSpring()  # springs to the ground at angle 0
+    splice: Splice = Splice()  # sector of other stiffness
+    analysis: Analysis  # steps of the computation
+    road: Road = Road()  # road, and the mesh round the tyre for it
+    # sizes of effects by their id, each in its unit; 0: absent
     effects: Annotated[dict[str, Number], AfterValidator(_every_effect)] = Field(
         default_factory=lambda: dict.fromkeys(IDS, 0.0)
     )
-    variables: dict[Name, Variable] = Field(default_factory=dict)
-    targets: Targets = Targets()
+    variables: dict[Name, Variable] = Field(default_factory=dict)  # what a fit may vary, by name
+    targets: Targets = Targets()  # measured values
+    # uncalibrated numbers, for a diagnosis, by name
     uncertainties: dict[Name, Uncertainty] = Field(default_factory=dict)
-    solver: SolverChoice
-    templates: Text | None = None
+    solver: SolverChoice  # solver and its limits
+    templates: Text | None = None  # folder of your own deck templates
 
     @classmethod
     def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
