@@ -109,8 +109,8 @@ def test_every_requirement_states_its_lowest_version() -> None:
 
 def test_developers_have_every_extra() -> None:
     extras = PROJECT["optional-dependencies"]
-    assert {"cluster", "sample", "excel", "dev"} == set(extras)
-    assert {*extras["cluster"], *extras["sample"]} <= set(extras["dev"])
+    assert {"cluster", "sample", "excel", "docs", "dev"} == set(extras)
+    assert all(set(packages) <= set(extras["dev"]) for packages in extras.values())
 
 
 def test_the_core_takes_at_most_350_megabytes() -> None:

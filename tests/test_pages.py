@@ -17,7 +17,7 @@ ROOT = CASES.parent
 BENCHMARKS = ROOT / "tests" / "benchmarks"
 DOCUMENTS = sorted(
     document
-    for folder in (".", ".github", "cases", "solvers", "tests", "tests/benchmarks")
+    for folder in (".", ".github", "cases", "cases/site", "solvers", "tests", "tests/benchmarks")
     for document in (ROOT / folder).glob("*.md")
 ) + sorted((BENCHMARKS / "records").glob("*.md"))
 MAX_PAGE_WORDS = 1500

@@ -15,6 +15,7 @@ from ..errors import InputError, TyrecalError
 from ..files import CHANGED, os_words
 from ..interrupt import SIGNALS, exit_code, pending_interrupt, remember_interrupts
 from ..studies import STUDIES
+from ..version import BUILD_SITE, SITE
 from .terminal import RESUME, coloured, error, say
 
 if TYPE_CHECKING:
@@ -140,6 +141,8 @@ class Commands(click.Group):
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Exit codes"):
             formatter.write_dl([(str(code), words) for code, words in EXIT_CODES.items()])
+        with formatter.section("Documentation"):
+            formatter.write_text(SITE or f"in a clone with pip install -e '.[docs]': {BUILD_SITE}")
 
 
 def _meant(name: str) -> str:

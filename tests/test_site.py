@@ -1,0 +1,97 @@
+"""The documentation site has every guide, and its reference every key, effect and keyword.
+
+`.ci/run` builds it; these tests compare without building.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+
+import pytest
+from pydantic import BaseModel
+from tyrecal_solvers.language.table import RULES
+
+from tyrecal import api
+from tyrecal.studies import result_types
+from tyrecal.studies.effects import EffectResult
+from tyrecal.studies.result import Provenance
+from tyrecal.tyre.case.schema import Case
+from tyrecal.tyre.effects import catalogue
+
+from .conftest import CASES, ROOT
+
+SITE = CASES / "site"
+sys.path.insert(0, str(SITE))
+import reference  # noqa: E402  it is where Sphinx looks for it
+
+
+def properties(model: type[BaseModel]) -> set[str]:
+    """The keys of a file with this content, those of its parts too, by its JSON schema."""
+    schema = model.model_json_schema()
+    parts = [schema, *schema.get("$defs", {}).values()]
+    return {key for part in parts for key in part.get("properties", {})}
+
+
+def last(path: str) -> str:
+    """The last key of a path."""
+    return re.sub(r"^.*\.(?!\d)|\[\]", "", path)
+
+
+def test_every_page_is_in_the_contents() -> None:
+    """And every entry of the contents is a page."""
+    contents = (SITE / "index.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```{toctree}\n(.*?)```", contents, re.S)
+    lines = [line for block in blocks for line in block.splitlines() if line[:1] not in ":"]
+    names = [re.sub(r".*<(.*)>", r"\1", line) for line in lines]
+    folders = (".", ".github", "cases", "cases/site", "solvers", "tests", "tests/benchmarks")
+    pages = {path for folder in folders for path in (ROOT / folder).glob("*.md")}
+    pages |= {*SITE.glob("*.rst")}
+    assert {(SITE / name).resolve() for name in names} == {
+        path.with_suffix("") for path in pages if path != SITE / "index.md"
+    }
+
+
+def test_the_page_of_keys_is_the_codes() -> None:
+    """`python cases/site/reference.py` writes it."""
+    assert reference.CASE_KEYS.read_text(encoding="utf-8") == reference.case_keys()
+
+
+def test_every_key_of_a_case_has_its_entry() -> None:
+    keys = reference.case_entries()
+    assert {last(path) for path in keys} == properties(Case)
+    assert not [path for path, key in keys.items() if not key.meaning]
+    groups = {"keys", "list", "true or false"}
+    rows = map(reference.case_row, keys.values())
+    assert not [row for row in rows if not row[-1] and row[2] not in groups]
+
+
+@pytest.mark.parametrize("study", [*result_types(), "an effect"])
+def test_every_key_of_a_result_has_its_entry(study: str) -> None:
+    model = {**result_types(), "an effect": EffectResult}[study]
+    keys = [*reference.entries(model), *reference.entries(Provenance)]
+    assert properties(model) <= {last(key.path) for key in keys}
+    assert not [key.path for key in keys if not key.meaning]
+
+
+def test_every_effect_has_its_picture() -> None:
+    shown = reference.effects()
+    assert shown.count("<svg ") == len(catalogue())
+    assert all(f"({id})=" in shown for id in catalogue())
+
+
+def test_every_keyword_that_is_honoured_has_its_entry() -> None:
+    shown = reference.keywords()
+    honoured = [name for name, rule in RULES.items() if rule.options_at or rule.is_output]
+    assert not [name for name in honoured if f"`*{name}`" not in shown]
+
+
+def test_every_public_function_has_an_example() -> None:
+    functions = [name for name in api.__all__ if name.islower()]
+    assert len(functions) > 10
+    assert not [name for name in functions if ">>>" not in (getattr(api, name).__doc__ or "")]
+
+
+def test_every_table_is_on_a_page() -> None:
+    texts = "".join(path.read_text(encoding="utf-8") for path in SITE.glob("*.md"))
+    assert {*re.findall(r"\[\[(.*)\]\]", texts)} == {*reference.TABLES}
