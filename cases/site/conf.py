@@ -25,6 +25,11 @@ sys.path.insert(0, str(Path(__file__).parent))
 from reference import TABLES
 
 ROOT = Path(__file__).parents[2]
+# docutils has the index of a letter with a bar below the letter
+BAR_OVER_INDEX = re.compile(
+    r"<munderover>\s*(<mi>.*?</mi>)\s*(<m.>.*?</m.>)"
+    r'\s*(<mo stretchy="false">.*?</mo>)\s*</munderover>'
+)
 NOTES = "tests/benchmarks/records/", "tests/benchmarks/blind/"
 
 project, release, language = "tyrecal", tyrecal.__version__, "en"
@@ -39,7 +44,9 @@ source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4
 smartquotes = False  # or -- of options becomes a dash
+default_role = "literal"
 autodoc_member_order = "bysource"
+html_domain_indices = False
 html_theme = "furo"
 html_title = f"tyrecal {release}"
 html_math_renderer = "mathml"
@@ -47,6 +54,7 @@ html_extra_path = ["index.html"]
 html_static_path = ["site.css"]
 html_css_files = ["site.css"]
 html_show_sphinx = False
+html_show_copyright = False
 html_copy_source = False
 html_show_sourcelink = False
 html_theme_options = {"top_of_page_buttons": []}
@@ -58,7 +66,8 @@ for _name in COMMANDS:  # the functions are all named `command`
 def formula(writer: Any, node: nodes.Element) -> None:
     """A formula as MathML, which browsers show without a script."""
     is_block = isinstance(node, nodes.math_block)
-    writer.body.append(latex2mathml.tex2mathml(node.astext(), as_block=is_block))
+    mathml = latex2mathml.tex2mathml(node.astext(), as_block=is_block)
+    writer.body.append(BAR_OVER_INDEX.sub(r"<msub><mover>\1\3</mover>\2</msub>", mathml))
     raise nodes.SkipNode
 
 
@@ -81,8 +90,8 @@ def help_text(app: Any, context: click.Context, lines: list[str]) -> None:
     """The help of a command: examples as code, no letter with a meaning in RST."""
     text = "\n".join(lines).replace("*", r"\*")
     example = r"(?m)(?:^\| .*\n?)+"
-    code = lambda match: "::\n\n" + re.sub(r"(?m)^\| ", "   ", match[0]) + "\n"
-    lines[:] = re.sub(example, code, text).splitlines()
+    code = lambda match: "::\n\n" + re.sub(r"(?m)^\| ", "   ", match[0]).replace("\\*", "*") + "\n"
+    lines[:] = [*re.sub(example, code, text).splitlines(), ""]
 
 
 def no_text(app: Any, context: click.Context, lines: list[str]) -> None:
@@ -90,10 +99,16 @@ def no_text(app: Any, context: click.Context, lines: list[str]) -> None:
     lines.clear()
 
 
+def no_signature(app: Any, what: str, *rest: Any) -> tuple[str, None] | None:
+    """What a class is made of is no part of the interface."""
+    return ("", None) if what in ("class", "exception") else None
+
+
 def setup(app: Any) -> None:
     """Register what Sphinx does not have."""
     app.add_html_math_renderer("mathml", (formula, None), (formula, None))
     app.connect("source-read", with_tables)
     app.connect("doctree-read", words_alone)
+    app.connect("autodoc-process-signature", no_signature)
     app.connect("sphinx-click-process-description", help_text)
     app.connect("sphinx-click-process-envvars", no_text)

@@ -32,7 +32,7 @@ def picture(id: str) -> str:
     by_mode = changes()[id]
     largest = max(abs(value) for pair in by_mode.values() for value in pair) or 1.0
     step, scale, zero = WIDTH / len(by_mode), (HEIGHT / 2 - 2 * TEXT) / largest, HEIGHT / 2
-    shapes = [f'<line x2="{WIDTH}" y1="{zero}" y2="{zero}" stroke="currentColor"/>']
+    shapes = [f'<line x2="{WIDTH}" y1="{zero}" y2="{zero}"/>']
     for number, (mode, pair) in enumerate(by_mode.items()):
         middle = (number + 0.5) * step
         for k, value in enumerate(pair):
@@ -46,7 +46,8 @@ def picture(id: str) -> str:
             shapes.append(_text(middle, HEIGHT + (k + 1) * (TEXT + 2), word))
     words = f"Change of frequency by {id} at {PRESSURE_kPa} kPa, %; second bars: after a new fit"
     size = f'viewBox="0 0 {WIDTH} {HEIGHT + 40}"'
-    return f'<svg class="effect" role="img" aria-label="{words}" {size}>{"".join(shapes)}</svg>'
+    bars = "".join(shapes)
+    return f'<div class="effect"><svg role="img" aria-label="{words}" {size}>{bars}</svg></div>'
 
 
 def _text(x: float, y: float, words: str) -> str:
