@@ -19,6 +19,7 @@ from tyrecal.studies.result import Provenance
 from tyrecal.tyre.case.schema import Case
 from tyrecal.tyre.effects import catalogue
 
+from .cli.test_conventions import commands
 from .conftest import CASES, ROOT
 
 SITE = CASES / "site"
@@ -90,6 +91,13 @@ def test_every_public_function_has_an_example() -> None:
     functions = [name for name in api.__all__ if name.islower()]
     assert len(functions) > 10
     assert not [name for name in functions if ">>>" not in (getattr(api, name).__doc__ or "")]
+
+
+def test_no_option_is_hidden() -> None:
+    """The page of commands has all others."""
+    options = [each for command in commands().values() for each in command.params]
+    assert len(options) > 100
+    assert not [each.name for each in options if getattr(each, "hidden", False)]
 
 
 def test_every_table_is_on_a_page() -> None:

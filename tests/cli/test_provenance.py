@@ -13,6 +13,7 @@ from tyrecal.simulate.provenance import measured_sha256
 from tyrecal.tyre.case.identity import tyre_sha256
 from tyrecal.tyre.load import load_case
 
+from ..conftest import CASES
 from ..studies.loaded import coarse_case
 from .test_cli import run
 
@@ -64,6 +65,8 @@ def test_every_result_file_carries_it(project: Path) -> None:
     runs = files.pop("run.json")
     assert set(runs) == {"fit", "modes", "sweep-pressure", "effects"}
     assert all(facts["finished"] for facts in runs.values())
+    reference = (CASES / "site/result_keys.md").read_text(encoding="utf-8")
+    assert not [key for facts in runs.values() for key in facts if f"`{key}`" not in reference]
     assert {*files} == {
         "fit.json",
         "fit_shapes.json",

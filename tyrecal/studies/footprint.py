@@ -81,9 +81,9 @@ class FootprintRow(ResultPart):
 class FootprintFindings(ResultPart):
     """Findings from the rows of footprints."""
 
-    # area of the fitted over that of the initial design, by load
+    # area of the fitted over that of the initial design: load_N, ratio
     fitted_over_initial: list[dict[str, float]] = Field(default=[])
-    # mean contact pressure over inflation pressure, by load
+    # mean contact pressure over inflation pressure, by design: load_N, ratio
     mean_over_inflation: dict[str, list[dict[str, float]]] = Field(default={})
     words: list[str]  # findings in words
 

@@ -47,7 +47,8 @@ class LoadFindings(ResultPart):
     """Findings about one design over the loads."""
 
     design: str  # name of the design
-    # splits of the pairs, antisymmetric less symmetric
+    # for each pair its label, split_Hz (load_N, split: antisymmetric less symmetric), grows,
+    # shrinks_from_N
     splits: list[dict[str, Any]] = Field(default=[])
     least_overlap: float = 1.0  # least overlap with the unloaded member
     words: list[str]  # findings in words

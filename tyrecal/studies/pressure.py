@@ -112,11 +112,12 @@ class PressureFindings(ResultPart):
     design: str
     from_kPa: float = 0.0  # lowest pressure
     to_kPa: float = 0.0  # highest pressure
-    modes: list[dict[str, Any]] = Field(default=[])  # rise and curvature of each mode
-    # in-plane and out-of-plane modes: rise of each, exceptions
+    # for each mode its label, rises, rise_Hz, rise_percent, curvature, convex_at_kPa
+    modes: list[dict[str, Any]] = Field(default=[])
+    # in-plane and out-of-plane: family, members, rise_Hz, grows_with_c, exceptions
     families: list[dict[str, Any]] = Field(default=[])
     least_mac: float = 1.0  # least MAC of shapes between neighbouring pressures
-    # pressures between which a label and the shape followed differ
+    # where a label and the shape followed differ: from_kPa, to_kPa, label, followed_to, mac
     disagreements: list[dict[str, Any]] = Field(default=[])
     words: list[str]  # findings in words
 
