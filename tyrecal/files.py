@@ -40,6 +40,7 @@ RESULTS = {  # of a study, by pattern: what a new run of it takes the place of
         "fit_states.csv",
         "fit_labels.csv",
         "fit_shapes.json",
+        "fit_mac_*.png",
         "convergence.png",
         *_tyre("fit", "fit_modes.png"),
     ),

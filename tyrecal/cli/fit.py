@@ -160,7 +160,7 @@ def command(
     result = fit.result
     terminal.result(result)
     tables = fit.found.tables()
-    if fit.found.states or fit.found.labels:  # each as wide as it needs
+    if fit.found.states or fit.found.labels or fit.found.shapes:  # each as wide as it needs
         for table in tables:
             terminal.show(shown(table))
     else:

@@ -153,7 +153,9 @@ def import_files(
     with pressure, labels that look exchanged and single values far from a smooth curve are
     reported. If the sensors do not determine a label, the frequency is written without one;
     'tyrecal fit' and 'tyrecal measured label' label it by the model. Files with a common reference
-    and different channels are parts of one test.
+    and different channels are parts of one test. Shapes are written to OUTPUT_shapes.json: a fit to
+    OUTPUT compares them with the fitted tyre's (MAC, COMAC). AutoMAC shows which modes look alike
+    at the sensors.
 
     \b
     tyrecal measured import modes.csv --pressure-kPa 240 --sigma-percent 0.3
@@ -162,28 +164,42 @@ def import_files(
     tyrecal measured import at_200.csv at_240.csv --output both.csv
     """
     from ..files import write_text
+    from ..measured.correlation import auto_mac, auto_mac_words
     from ..measured.gather import gather, result
     from ..measured.measurement import measurements_csv
+    from ..measured.shapes import read_shapes, shapes_of, shapes_path, shapes_text
 
     if output.resolve() in [path.resolve() for path in files]:
         raise click.UsageError(f"--output {output}: is one of the files to read")
     layout = _layout(axle, centre, directions, highest, band, response or "")
     sigmas = floor / 100, (assumed or 0.0) / 100
     gathered = gather(files, pressure_kPa, layout, *sigmas, leave_out, keep_going)
+    shapes = [each for path in files for each in read_shapes(path)]
+    for run in gathered.runs:
+        assert pressure_kPa is not None
+        shapes += shapes_of(run, pressure_kPa)
     write_text(output, measurements_csv(gathered.rows))
+    shapes_path(output).unlink(missing_ok=True)  # those of other measurements
+    if shapes:
+        write_text(shapes_path(output), shapes_text(shapes))
+    alike = [auto_mac(each) for each in shapes]
     if pictures and gathered.runs:
+        from ..report.correlation import draw_auto_mac
+        from ..report.figure import save
         from ..report.measured import draw_measured
 
         draw_measured(output.with_suffix(f".{figure_format}"), gathered.runs)
+        save(draw_auto_mac(alike[-1]), output.with_name(f"{output.stem}_mac.{figure_format}"))
     for note in gathered.notes:
         terminal.note(note)
     for doubt in gathered.doubts:
         terminal.warn(doubt)
-    terminal.result(result(gathered))
+    terminal.result({**result(gathered), "auto_mac": alike})
     if gathered.runs:
         from ..report.measured import measured_table
 
         terminal.show(measured_table(gathered.runs))
+        terminal.say("\n".join(map(auto_mac_words, alike)))
     terminal.say(f"{len(gathered.rows)} measurements in {output}")
     return 0
 
@@ -321,6 +337,7 @@ def _label_shapes(
     from ..measured.case_modes import evaluate_case_modes
     from ..measured.gather import gather
     from ..measured.measurement import measurements_csv
+    from ..report.correlation import figures
     from ..studies.labelling.result import shape_labels_result
 
     if fitted:
@@ -334,6 +351,7 @@ def _label_shapes(
     for note in gathered.notes:
         study.terminal.note(note)
     labels = run.write(shape_labels_result(gathered.runs[0], case_modes, state))
+    run.write_figures(figures(labels))
     run.write_text("labelled.csv", measurements_csv(gathered.rows))
     _print_labels(labels, run, study)
     return 0

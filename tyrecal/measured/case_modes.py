@@ -19,6 +19,7 @@ from scipy.spatial import KDTree
 from ..errors import InputError
 from ..simulate.evaluate.results import HarmonicShape
 from ..simulate.modes.label import BELT, Label, Mode, labelled
+from .covariance import MIN_SEEN
 from .sensors import Sensors
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ class CaseModes:
         mode = self._by_label.get(label)
         if mode is None:
             return S
-        u = self._signals(mode, sensors)
+        u = self.signals(mode, sensors)
         whole = float(np.sum(u**2)) / len(u)
         return (u @ u.T / whole + SHAPE_OFF * S) / (1 + SHAPE_OFF) if whole else S
 
@@ -79,8 +80,11 @@ class CaseModes:
     def _points(self) -> Array:
         return _shape(self.modes[0]).points
 
-    def _signals(self, mode: Mode, sensors: Sensors) -> Array:
-        """Signals (k, 2) of both modes of a doublet at the sensors; for c = 0 one mode, then 0."""
+    def signals(self, mode: Mode, sensors: Sensors) -> Array:
+        """Signals of both modes of a doublet at the sensors, (k, 2); for c = 0 of one, (k, 1).
+
+        Raises InputError if a sensor is not on the tyre.
+        """
         R, angle, Z = sensors.points.T
         distance, node = KDTree(self._points).query(np.column_stack([R, Z]))
         if distance.max() > MAX_OFF_TYRE:
@@ -93,7 +97,13 @@ class CaseModes:
         shape = _shape(mode)
         turned = shape.amplitude[node] * np.exp(1j * shape.n * angle)[:, None]
         u = np.sum(turned * sensors.directions, axis=1)
-        return np.column_stack([u.real, u.imag if shape.n else 0 * u.real])
+        return np.column_stack([u.real, u.imag] if shape.n else [u.real])
+
+    def is_seen(self, mode: Mode, sensors: Sensors) -> bool:
+        """Whether the mean square of a mode's signals at the sensors is at least `MIN_SEEN` of that
+        of its motion in each direction over the section. Raises InputError as `signals` does."""
+        u, amplitude = self.signals(mode, sensors), _shape(mode).amplitude
+        return bool(np.sum(u**2) / len(u) >= MIN_SEEN * np.mean(np.abs(amplitude) ** 2))
 
 
 def evaluate_case_modes(

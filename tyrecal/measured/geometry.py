@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ..simulate.modes.label import BELT
 from .sensors import Sensors
-from .universal import Place, Signal
+from .universal import Place, Signal, channel_name
 
 Array = np.ndarray
 
@@ -68,7 +68,8 @@ def sensors_of(
         along = sign * (axes or {}).get(node, np.eye(3))[k]
         c, s = np.cos(angle[row]), np.sin(angle[row])
         directions[row] = (c * along[x] + s * along[y], c * along[y] - s * along[x], along[z])
-    return Sensors(np.column_stack([R, angle, X[:, z]]), directions)
+    names = tuple(channel_name(signal) for signal in signals)
+    return Sensors(np.column_stack([R, angle, X[:, z]]), directions, names)
 
 
 def _axle(X: Array) -> str:

@@ -16,6 +16,7 @@ class Sensors:
 
     points: Array  # (k, 3) R (m), Theta (rad), Z (m) about the axle, from the middle plane
     directions: Array  # (k, 3) unit vectors in r, theta, z
+    names: tuple[str, ...] = ()  # (k,) of the channels, as `--leave-out` has them
 
 
 @dataclass(frozen=True)

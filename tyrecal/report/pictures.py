@@ -13,6 +13,7 @@ from ..tyre.case import LoadedCase
 from ..tyre.resolve import resolved
 from ..tyre.values import with_values
 from .convergence import draw_convergence, draw_states
+from .correlation import figures
 from .figure import save
 from .revolve import placed
 from .section import draw_section
@@ -65,6 +66,8 @@ def draw_fit(
     """
     draw_evaluation(folder, "fit", with_values(case, values), evaluation, modes, kind)
     save(draw_convergence(history, fit.objective_unit), folder / f"convergence.{kind}")
+    for name, figure in figures(fit).items():
+        save(figure, folder / f"{name}.{kind}")
     if fit.states and fit.modes:
         save(draw_states(fit), folder / f"fit_states.{kind}")
 

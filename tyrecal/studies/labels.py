@@ -3,7 +3,10 @@ labels.csv, and a part of fit.json."""
 
 from __future__ import annotations
 
+from pydantic import Field
+
 from ..simulate.modes.label import Label
+from .correlation import ShapeCorrelation
 from .result import Column, CsvRow, PositiveNumber, Result, ResultPart, Table, csv_text, state_words
 
 FOREIGN_WORDS = "no mode of the tyre"
@@ -124,17 +127,23 @@ class LabelsResult(Result):
     study, stem, command, heading = "labels", "labels", "measured label", "Labels"
     is_seldom = True
 
+    figures = "tyrecal.report.correlation:figures"
+
     labels: Labels  # labels of frequencies that came without one
+    shapes: list[ShapeCorrelation] = Field(default=[])
 
     def csv(self) -> str:
         keys = ["frequency_Hz", "sigma_Hz", "pressure_kPa", "rim", "c", "m", "kind", "probability"]
         return csv_text([*keys, "expected_Hz", "rivals"], self.labels.csv_rows())
 
     def tables(self) -> list[Table]:
-        return [self.labels.table()]
+        return [self.labels.table(), *(each.table() for each in self.shapes)]
+
+    def numbers(self) -> list[Table]:
+        return [each.sensors_table() for each in self.shapes]
 
     def sentences(self) -> list[str]:
-        return self.labels.sentences()
+        return self.labels.sentences() + [s for each in self.shapes for s in each.sentences()]
 
     def doubts(self) -> list[str]:
         return self.labels.doubts()

@@ -28,6 +28,7 @@ from ...studies.result import Deviation, Named, Result
 from ...tyre.case import as_written
 from ...units import signed
 from ..convergence import draw_convergence, draw_deviations, draw_states
+from ..correlation import MAC_WORDS, figures
 from ..diagnosis_pictures import MAX_SHOWN, MIN_SHOWN_PROBABILITY, draw_residuals
 from ..figure import svg
 from ..footprint import draw_curves, draw_patches
@@ -178,6 +179,9 @@ def _pictures(results: Results, result: Result, draw: Draw) -> Iterator[Markup]:
             words = "The objective and the variables, design point by design point"
             plot = partial(draw_convergence, results.history, result.objective_unit)
             yield draw("convergence", words, "fit_history.csv", plot)
+        matrices = figures(result)
+        for name in matrices:
+            yield draw(name, MAC_WORDS, file, partial(matrices.__getitem__, name))
     elif isinstance(result, PressureSweep):
         targets = fit.over_pressure() if fit else []
         plot = partial(draw_pressure_sweep, result.rows, targets)

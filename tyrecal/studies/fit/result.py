@@ -19,6 +19,7 @@ from ...tyre.state import AS_THE_CASE
 from ...tyre.values import with_values
 from ...units import printed_unit
 from .. import named
+from ..correlation import ShapeCorrelation
 from ..fitted import NOT_CONVERGED
 from ..labels import Labels
 from ..result import (
@@ -241,6 +242,8 @@ class FitResult(Result):
     next_states: list[FittedState] = Field(default=[])
     next_states_error: str = ""  # why they could not be evaluated
     labels: Labels | None = None  # labels of frequencies that came without one
+    # of the fitted tyre to measured shapes, where those were imported with the measurements
+    shapes: list[ShapeCorrelation] = Field(default=[])
     noise_Hz: float | None = None  # standard deviation of a frequency
     total_error_unknown: str = ""  # why no variable has a total standard error
     # change of the variables with each measured value
@@ -359,6 +362,7 @@ class FitResult(Result):
             Table((), [["objective", words, *objective, "", "", ""]]),
             *self._states(),
             *([self.labels.table()] if self.labels else []),
+            *(each.table() for each in self.shapes),
         ]
 
     def sentences(self) -> list[str]:
@@ -366,7 +370,8 @@ class FitResult(Result):
         moved = [f"{name} by {each.shift_in_sd:+.2f}" for name, each in self.freed.items()]
         words = ", ".join(moved)
         freed = [f"Freed, in standard deviations of what is known: {words}."] if moved else []
-        return freed + self._error_words()
+        compared = [f"{words}." for each in self.shapes for words in each.sentences()]
+        return freed + self._error_words() + compared
 
     def _error_words(self) -> list[str]:
         """How far the standard errors hold."""

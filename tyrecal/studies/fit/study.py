@@ -9,13 +9,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ...errors import InputError
+from ...measured.case_modes import evaluate_case_modes
 from ...measured.measurement import Measurement
+from ...measured.shapes import read_shapes
 from ...measured.targets import in_set_state, readings_of, with_measured
 from ...simulate.deck.decks_design import design_of
 from ...simulate.evaluate.evaluator import Evaluator
+from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.provenance import provenance
 from ...tyre.case import LoadedCase, start_values
+from ...tyre.state import TyreState
 from ...tyre.values import with_values
+from ..correlation import correlate
 from ..labelling.label import label
 from ..labelling.result import labels_posterior
 from ..pressing_plan import DESIGNS_OF_FIT, PlannedState, PressingPlan, plan_pressing
@@ -57,6 +63,7 @@ class FitStudy:
         self.evaluator = evaluator.of(design_of(self._plain))
         file = self.measured
         self.readings = readings_of(self._plain, file, labelled=False) if file else []
+        self.shapes = read_shapes(file) if file else []
         self.needs_labels = any(each.is_unlabelled for each in self.readings)
         self.used: Sequence[Measurement] = ()  # readings that are targets
         self.case, self.left_out = self._plain, list[str]()
@@ -145,7 +152,8 @@ class FitStudy:
             )
 
         fit = self._fit_with_labels(calibrated, jobs) if self.needs_labels else calibrated()
-        fit.found, fit.left_out = fit.found.stamped(self.provenance), self.left_out
+        self._compare_shapes(fit)
+        fit.found, fit.left_out = fit.found.stamped(self.provenance), fit.left_out + self.left_out
         fit.found.with_files({"fit_history.csv": history_csv(fit.history)})
         return fit
 
@@ -155,6 +163,26 @@ class FitStudy:
         files = [self.measured] if self.measured else []
         case = without_freed(self.case)
         return provenance(case, self.evaluator.solver, files, **states_of(self.case))
+
+    def _compare_shapes(self, fit: Fit) -> None:
+        """Add to the fit how measured shapes agree with the fitted ones, at its pressures; shapes
+        that cannot be compared are left out with the reason."""
+        compared = []
+        pressures = {state.with_defaults(self.case).pressure_kPa for state in fit.fitted.states}
+        for test in self.shapes:
+            state = TyreState(test.pressure_kPa)
+            if state.of(self.case).with_defaults(self.case).pressure_kPa not in pressures:
+                continue
+            highest = max([c for mode in test.modes if (c := mode.c) is not None], default=0) + 1
+            highest = max(highest, self.case.case.analysis.highest_harmonic)
+            values = state.design(self.case, fit.fitted.values)
+            try:
+                modes = evaluate_case_modes(self.case, self.evaluator, values, highest)
+                compared.append(correlate(test, modes))
+            except (InputError, EvaluationFailed) as error:
+                fit.left_out.append(f"the shapes of {test.file}: {error}")
+        if compared:
+            fit.found = fit.found.model_copy(update={"shapes": compared})
 
     def _fit_with_labels(self, calibrated: Callable[[], Fit], jobs: int) -> Fit:
         """Label and fit in turn until the labels stay the same, at most `MAX_FITS` times."""

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...measured.shapes import shapes_of
 from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase
 from ...tyre.state import TyreState
+from ..correlation import correlate
 from ..labels import (
     FOREIGN_WORDS,
     MAX_RIVALS,
@@ -130,7 +132,9 @@ def shape_labels_result(run: ModalTest, case_modes: CaseModes, state: TyreState)
         expansions=1,
         settled=True,
     )
-    return LabelsResult.model_validate({"format": 1, "labels": labels})
+    tests = shapes_of(run, state.pressure_kPa or 0.0)
+    shapes = [correlate(each, case_modes) for each in tests]
+    return LabelsResult(format=1, labels=labels, shapes=shapes)
 
 
 def _entry(label: Label | None) -> dict[str, Any]:

@@ -1,0 +1,134 @@
+"""Measured shapes in a file next to the measurements that were imported with them.
+
+`measured import` writes it, and a fit to those measurements compares the shapes with the fitted
+ones (`correlation`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import groupby
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from ..errors import InputError
+from ..files import json_text, read_json
+from ..simulate.modes.label import Label
+from .modal import ModalTest
+from .sensors import Sensors
+
+Array = np.ndarray
+Vector = tuple[float, float, float]
+
+
+class ShapeOfMode(BaseModel):
+    """A measured mode: its label, None if it has none, and a value for each signal."""
+
+    model_config = ConfigDict(allow_inf_nan=False, frozen=True)
+
+    c: int | None
+    m: int | None
+    kind: str | None
+    member: str  # 1 or 2 if both modes of a doublet were measured
+    frequency_Hz: float
+    values: list[float]
+
+    @property
+    def name(self) -> str:
+        """Label, or else the frequency."""
+        if self.c is None or self.m is None:
+            return f"{self.frequency_Hz:.2f} Hz"
+        return str(Label(self.c, self.m, self.kind))
+
+
+class SensorShapes(BaseModel):
+    """Modes of one test on one layout of sensors."""
+
+    model_config = ConfigDict(allow_inf_nan=False, frozen=True)
+
+    file: str
+    pressure_kPa: float
+    signals: list[str]  # channels, as `--leave-out` has them
+    points: list[Vector]  # R (m), Theta (rad), Z (m) of each
+    directions: list[Vector]  # in r, theta, z
+    modes: list[ShapeOfMode]
+
+    @property
+    def sensors(self) -> Sensors:
+        """Layout of the sensors."""
+        return Sensors(np.array(self.points), np.array(self.directions), tuple(self.signals))
+
+    def spans(self) -> dict[str, Array]:
+        """Shapes (k, 1) by name, and both of a doublet together, (k, 2)."""
+        columns: dict[str, list[list[float]]] = {}
+        for mode in self.modes:
+            columns.setdefault(mode.name, []).append(mode.values)
+        return {name: np.array(values).T for name, values in columns.items()}
+
+
+class _ShapesFile(BaseModel):
+    format: Literal[1] = 1
+    tests: list[SensorShapes]
+
+
+def shapes_of(run: ModalTest, pressure_kPa: float) -> Iterator[SensorShapes]:
+    """Shapes of a test, apart for each layout of sensors."""
+    own = lambda each: each.sensors.names
+    for names, modes in groupby(sorted(run.modes, key=own), own):
+        members = sorted(modes, key=lambda each: each.mode.frequency_Hz)
+        yield SensorShapes(
+            file=Path(run.name).name,
+            pressure_kPa=pressure_kPa,
+            signals=list(names),
+            points=members[0].sensors.points.tolist(),
+            directions=members[0].sensors.directions.tolist(),
+            modes=[
+                ShapeOfMode(
+                    c=label.c if (label := each.judged.label) else None,
+                    m=label.m if label else None,
+                    kind=label.kind if label else None,
+                    member=each.member,
+                    frequency_Hz=each.mode.frequency_Hz,
+                    values=each.shape.tolist(),
+                )
+                for each in members
+            ],
+        )
+
+
+def shapes_path(measured: Path) -> Path:
+    """Place of the shapes that were imported with a file of measurements."""
+    return measured.with_name(f"{measured.stem}_shapes.json")
+
+
+def shapes_text(tests: list[SensorShapes]) -> str:
+    """Text of a file of shapes."""
+    return json_text(_ShapesFile(tests=tests).model_dump())
+
+
+def read_shapes(measured: Path) -> list[SensorShapes]:
+    """Shapes that were imported with a file of measurements; none where there is no such file.
+
+    Raises InputError, OSError.
+    """
+    path = shapes_path(measured)
+    if not path.is_file():
+        return []
+    try:
+        tests = _ShapesFile.model_validate(read_json(path)).tests
+    except (ValidationError, ValueError):
+        tests = None
+    if tests is None or not all(_is_whole(each) for each in tests):
+        raise InputError(
+            f"{path}: is no file of measured shapes; write it again with 'tyrecal measured import'"
+        )
+    return tests
+
+
+def _is_whole(test: SensorShapes) -> bool:
+    """Whether each signal has a place, a direction and a value of each mode."""
+    counts = {len(test.points), len(test.directions), *(len(each.values) for each in test.modes)}
+    return counts == {len(test.signals)}
