@@ -43,7 +43,7 @@ class CaseModes:
     @property
     def half_width(self) -> float:
         """Half the width of the belt, m: the largest |Z| where R > `BELT` times the largest R."""
-        R, Z = self._points.T
+        R, Z = self.points.T
         return float(np.abs(Z[R / R.max() > BELT]).max())
 
     def covariance(self, label: Label, sensors: Sensors, S: Array) -> Array:
@@ -77,7 +77,8 @@ class CaseModes:
         return {mode.label: mode for mode in self.modes}
 
     @property
-    def _points(self) -> Array:
+    def points(self) -> Array:
+        """Nodes of the section, (n, 2): R, Z, m."""
         return _shape(self.modes[0]).points
 
     def signals(self, mode: Mode, sensors: Sensors) -> Array:
@@ -86,7 +87,7 @@ class CaseModes:
         Raises InputError if a sensor is not on the tyre.
         """
         R, angle, Z = sensors.points.T
-        distance, node = KDTree(self._points).query(np.column_stack([R, Z]))
+        distance, node = KDTree(self.points).query(np.column_stack([R, Z]))
         if distance.max() > MAX_OFF_TYRE:
             k = int(np.argmax(distance))
             raise InputError(

@@ -80,6 +80,7 @@ STUDIES = {  # in the order of a page and of a batch
         runs_by_name=True,
     ),
     "labels": Entry("tyrecal.studies.labels:LabelsResult"),
+    "sensors": Entry("tyrecal.studies.sensors:SensorsResult"),
     "diagnose": Entry(
         "tyrecal.studies.diagnose.result:DiagnosisResult",
         "Find where model and measurements differ, and which effect explains it.",
