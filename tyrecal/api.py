@@ -338,7 +338,7 @@ def run(
 ) -> Result:
     """Run a study by its name, of the tool or from outside. ``values`` are the design's; options
     are the study's own, such as ``pressures_kPa`` of "sweep-pressure", ``loads_N`` of "footprint",
-    and ``measured`` of "fit", "sample" and "diagnose".
+    ``measured`` of "fit", "sample" and "diagnose", and ``ranges`` of "sweep", as C10=8e5:1.2e6:5.
 
     The result has the numbers of its file as attributes, ``texts()`` its files by name and
     ``quantities()`` what a batch compares.
@@ -567,6 +567,9 @@ OPTION_READERS: dict[str, Callable[[LoadedCase, str, Any], Any]] = {
     "free": lambda case, name, value: _names(name, value),
     "by": lambda case, name, value: _names(name, value),
     "of": lambda case, name, value: _names(name, value),
+    "ranges": lambda case, name, value: _names(name, value),
+    "latin_hypercube": lambda case, name, value: _count(name, value, 0),
+    "allow_unusual": lambda case, name, value: _flag(name, value),
     "excite": lambda case, name, value: _text(name, value),
     "respond": lambda case, name, value: _text(name, value),
     "form": lambda case, name, value: _one_of(name, value, get_args(ResponseForm)),

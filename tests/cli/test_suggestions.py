@@ -12,7 +12,7 @@ from .test_cli import CASE, run
 
 SLIPS = {  # what was typed: what is told
     "mode": "no command 'mode'; did you mean 'modes'?",
-    "sweep": "no command 'sweep'; did you mean 'sweep-pressure'?",
+    "sweeep": "no command 'sweeep'; did you mean 'sweep'?",
     "pressure": "no command 'pressure'; did you mean 'sweep-pressure'?",
     "Diagnoze": "no command 'Diagnoze'; did you mean 'diagnose'?",
     "xyzzy": "no command 'xyzzy'; known: init, validate,",

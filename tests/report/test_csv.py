@@ -48,6 +48,9 @@ HEADS = {  # columns with their units, as a user's script reads them
     "total_holds,explained_by_data,at_bound,unit",
     "modes.csv": "c,m,kind,frequency_Hz,multiplicity,symmetry,overlap,spanned",
     "pressure_sweep.csv": "design,pressure_kPa,c,m,kind,multiplicity,frequency_Hz,d_ln_f_d_ln_p",
+    "sweep.csv": "C10,pressure_kPa,mass_kg,c,m,kind,multiplicity,frequency_Hz",
+    "sweep_modes.csv": "c,m,kind,frequency_Hz,lowest_Hz,highest_Hz,change_percent.C10,"
+    "change_percent.pressure_kPa,linear_share",
     "footprint.csv": "design,load_N,deflection_m,area_m2,length_m,width_m,mean_pressure_Pa,"
     "peak_pressure_Pa,vertical_stiffness_N_per_m",
     "stiffness.csv": "design,pressure_kPa,load_N,vertical_N_per_m,lateral_N_per_m,"
@@ -123,6 +126,7 @@ IN_TABLES = {  # key of the JSON content whose every number has to be in some CS
     "modes": ("modes", "cavity"),
     "sweep-pressure": ("rows",),
     "sweep-load": ("rows",),
+    "sweep": ("rows", "modes"),
     "footprint": ("rows",),
     "sensitivities": ("rows",),
     "sample": ("variables", "predicted"),

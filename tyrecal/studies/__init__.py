@@ -50,6 +50,11 @@ STUDIES = {  # in the order of a page and of a batch
         "Follow every mode over the inflation pressure.",
         runs_by_name=True,
     ),
+    "sweep": Entry(
+        "tyrecal.studies.sweep_result:SweepResult",
+        "Sweep numbers of the case over a grid or a Latin hypercube.",
+        True,
+    ),
     "footprint": Entry(
         "tyrecal.studies.footprint:FootprintResult",
         "Press the tyre on a road: contact area and pressure over load.",

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from ..simulate.evaluate.evaluator import Evaluator, Question
-from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed
-from ..simulate.modes.find import LabelledModes, find_modes
+from ..simulate.evaluate.evaluator import Evaluator
+from ..simulate.evaluate.failure import EvaluationFailed
+from ..simulate.modes.find import LabelledModes
 from ..simulate.modes.follow import follow
 from ..simulate.modes.label import FAMILIES, Label, Mode, labelled
 from ..tyre.case import LoadedCase
 from ..tyre.state import pressure_name
-from .fit.targets import target_labels
 from .result import ResultPart
+from .sweep import evaluate_points
 
 BENT = "concave", "convex"
 STRAIGHT = 1e-6  # of a frequency: solvers that print them give seven digits
@@ -65,11 +65,8 @@ def sweep(
     jobs: int = 1,
     notify: Callable[[SweepOutcome], None] = lambda outcome: None,
 ) -> list[SweepOutcome]:
-    """Every design (name to values of the variables) at every pressure, in that order.
-
-    Where a target's mode is not among the modes that the case asks for, more are asked for.
-    Raises DeckRefused and what else ``Evaluator.evaluate`` raises for wrong input; an
-    evaluation that fails is an outcome.
+    """Every design (name to values of the variables) at every pressure, in that order. Raises what
+    `evaluate_points` does; an evaluation that fails is an outcome.
 
     >>> from tyrecal.tyre.case import start_values
     >>> outcomes = sweep(case, evaluator, {"initial": start_values(case)}, [200.0, 240.0])
@@ -77,17 +74,17 @@ def sweep(
     [34.2, 37.0]
     """
     name = pressure_name(case)
-    wanted = target_labels(case)
     gradients = (name,) if evaluator.has_gradients else ()
-    places = [(design, p) for design in designs for p in pressures_kPa]
-    questions = [Question({**designs[design], name: p}, gradients) for design, p in places]
+    points = [{name: p} for p in pressures_kPa]
     outcomes: dict[int, SweepOutcome] = {}
-    for i, answer in find_modes(evaluator, questions, wanted, jobs):
-        if isinstance(answer, DeckRefused):
-            raise answer
-        outcomes[i] = _outcome(*places[i], answer, name)
-        notify(outcomes[i])
-    return [outcomes[i] for i in range(len(places))]
+
+    def use(place: int, design: str, answer: LabelledModes | EvaluationFailed) -> None:
+        pressure = pressures_kPa[place % len(points)]
+        outcomes[place] = _outcome(design, pressure, answer, name)
+        notify(outcomes[place])
+
+    evaluate_points(case, evaluator, designs, points, use, gradients, jobs)
+    return [outcomes[place] for place in sorted(outcomes)]
 
 
 def _outcome(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from ..errors import InputError
 from ..tyre.case import LoadedCase
+from .sweep import SweptRange
 
 # of the case's pressure, to 10 kPa: 100 and 320 of a car's 240 kPa, 350 and 1130 of a truck's 850
 DEFAULT_ENDS = (5 / 12, 4 / 3)
@@ -36,5 +37,4 @@ class PressureRange:
                 f"--from-kPa {low:g} must be less than --to-kPa {high:g} (default:"
                 f" {usual_low:g} to {usual_high:g} for {own:g} kPa)"
             )
-        step = (high - low) / (self.steps - 1)
-        return [round(low + step * i, 9) for i in range(self.steps)]
+        return SweptRange("pressure_kPa", low, high, self.steps).values()

@@ -12,7 +12,6 @@ from ..simulate.evaluate.evaluator import Evaluator
 from ..simulate.evaluate.failure import EvaluationFailed
 from ..simulate.modes.label import Label
 from ..tyre.case import LoadedCase
-from .fit.targets import target_labels
 from .modes import mode_entry
 from .pressure import Failure, PressureFindings, State, SweepOutcome, findings, sweep
 from .pressure_range import PressureRange
@@ -31,6 +30,7 @@ from .result import (
     csv_text,
     silent,
 )
+from .sweep import swept_labels
 
 if TYPE_CHECKING:
     from .fit.prediction import FitResponses
@@ -218,7 +218,7 @@ def sweep_result(
 ) -> PressureSweep:
     """outcomes: of ``sweep``."""
     states = [each for each in outcomes if isinstance(each, State)]
-    labels = _swept_labels(case, states) if states else []
+    labels = swept_labels(case, (s.frequencies for s in states)) if states else []
     by_design = [[s for s in states if s.design == name] for name in designs]
     return PressureSweep(
         format=1,
@@ -237,14 +237,6 @@ def sweep_result(
         ],
         findings=[findings(each, labels) for each in by_design if len(each) > 1],
     )
-
-
-def _swept_labels(case: LoadedCase, states: Sequence[State]) -> list[Label]:
-    """The case's targets and, up to its highest harmonic, whatever else with m <= 1 was found in
-    every state, by label."""
-    everywhere = set.intersection(*(set(state.frequencies) for state in states))
-    more = {x for x in everywhere if x.m <= 1 and x.c <= case.case.analysis.highest_harmonic}
-    return sorted({*target_labels(case), *more}, key=lambda x: (x.c, x.m, x.kind or ""))
 
 
 def slopes(states: Sequence[State], labels: Sequence[Label]) -> dict[Label, list[float | None]]:

@@ -252,14 +252,16 @@ class Failed(ResultPart):
     design: str  # name of the design
     load_N: float | None = None
     pressure_kPa: float | None = None
+    values: dict[str, float] = Field(default={})  # of numbers that are swept
     cause: str = ""  # kind of failure
     words: str = ""  # reason in words
 
     @property
     def place(self) -> str:
-        """Design and load or pressure."""
+        """Design and load, pressure or values."""
         at = [f"{self.load_N:g} N"] if self.load_N is not None else []
         at += [f"{self.pressure_kPa:g} kPa"] if self.pressure_kPa is not None else []
+        at += [f"{name}={value:.6g}" for name, value in self.values.items()]
         return ", ".join([self.design, *at])
 
 

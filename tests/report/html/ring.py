@@ -163,6 +163,40 @@ def parts() -> dict[str, Any]:
     }
 
 
+def sweep() -> dict[str, Any]:
+    mode = {"c": 2, "m": 0, "kind": None}
+    points = [
+        {
+            "values": {"C10": 1e6 * share, "pressure_kPa": 240.0},
+            "mass_kg": 12.8,
+            "modes": [{**mode, "frequency_Hz": 79.5 * share, "multiplicity": 2}],
+        }
+        for share in (0.9, 1.0)
+    ]
+    return {
+        "format": 1,
+        "design": "initial",
+        "sampling": "grid",
+        "numbers_swept": [
+            {"name": "C10", "low": 9e5, "high": 1e6, "steps": 2},
+            {"name": "pressure_kPa", "low": 240.0, "high": 300.0, "steps": 2},
+        ],
+        "rows": points,
+        "failed": [],
+        "modes": [
+            {
+                **mode,
+                "frequency_Hz": 75.5,
+                "lowest_Hz": 71.55,
+                "highest_Hz": 79.5,
+                "change_percent": {"C10": 10.5, "pressure_kPa": 0.0},
+                "linear_share": 1.0,
+            }
+        ],
+        "findings": {"words": ["a grid of 4 points"]},
+    }
+
+
 def pressure_sweep() -> dict[str, Any]:
     rows = [
         {

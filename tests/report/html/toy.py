@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from .ring import fit, parts, pressure_sweep, provenance, shapes
+from .ring import fit, parts, pressure_sweep, provenance, shapes, sweep
 from .ring_inference import diagnosis, effects, sample, sensitivities
 from .ring_under_load import (
     footprint,
@@ -40,6 +40,7 @@ def write(folder: Path, name: str = "Toy & sons", effect: str = "rim_width") -> 
         "modes_shapes.json": loaded_shapes(name),
         "pressure_sweep.json": pressure_sweep(),
         "load_sweep.json": load_sweep(),
+        "sweep.json": sweep(),
         "footprint.json": footprint(),
         "footprint_patches.json": patches(name),
         "stiffness.json": stiffness(),

@@ -1,0 +1,272 @@
+"""Frequencies over any numbers of a case: sweep.json."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from ..simulate.evaluate.failure import EvaluationFailed
+from ..simulate.modes.find import LabelledModes
+from ..simulate.modes.label import Label, labelled
+from .modes import mode_entry
+from .result import (
+    NAME_COLUMNS,
+    Column,
+    CsvRow,
+    Failed,
+    ModeEntry,
+    Named,
+    Notify,
+    Result,
+    ResultPart,
+    StudyInput,
+    Table,
+    csv_text,
+    silent,
+)
+from .sweep import (
+    DEFAULT_POINTS,
+    SweptRange,
+    evaluate_points,
+    grid,
+    latin_hypercube,
+    read_ranges,
+    swept_labels,
+    swept_state,
+)
+
+LOWEST, CHANGE = Column("lowest Hz"), Column("", "+.2f")
+
+
+class SweptNumber(ResultPart):
+    """A number that is swept, in its own unit."""
+
+    name: str
+    low: float
+    high: float
+    steps: int | None = None  # None: sampled
+
+
+class SweptPoint(ResultPart):
+    """The design with the swept numbers at these values."""
+
+    values: dict[str, float]
+    mass_kg: float
+    modes: list[ModeEntry]
+
+
+class SweptMode(Named):
+    """A mode over all points; ``frequency_Hz`` is its mean.
+
+    change_percent: by each number from its low to its high end, of the mean: the plane of least
+    squares through all points. linear_share: share of the variance that this plane explains.
+    """
+
+    lowest_Hz: float
+    highest_Hz: float
+    change_percent: dict[str, float]
+    linear_share: float
+
+
+class SweepFindings(ResultPart):
+    """Findings in words."""
+
+    words: list[str]
+
+
+class SweepResult(Result):
+    """sweep.json"""
+
+    study, stem, heading = "sweep", "sweep", "Frequencies over numbers of the case"
+    figures = "tyrecal.report.sweep:figures"
+    is_seldom = follows_fit = True
+
+    design: str
+    sampling: Literal["grid", "latin_hypercube"]
+    seed: int | None = None  # of a Latin hypercube, whose values are uniform within the ranges
+    discrepancy: float | None = None  # its centred L2 discrepancy
+    numbers_swept: list[SweptNumber]
+    rows: Annotated[list[SweptPoint], Field(min_length=1)]
+    failed: list[Failed]
+    modes: list[SweptMode]
+    findings: SweepFindings
+
+    @classmethod
+    def run(
+        cls,
+        given: StudyInput,
+        *,
+        ranges: Sequence[str] = (),
+        latin_hypercube: int = 0,
+        seed: int = 0,
+        allow_unusual: bool = False,
+    ) -> SweepResult:
+        """The last design over a grid of ``ranges`` NAME=A:B:N or, with as many points as
+        ``latin_hypercube`` states, over ranges NAME=A:B. Without ranges: all variables within 10 %
+        of their values. Raises InputError, DeckRefused; the first failure where every point
+        fails."""
+        sampled = bool(latin_hypercube) or not ranges
+        swept = read_ranges(given.case, ranges, sampled, allow_unusual)
+        return run(given, swept, sampled, latin_hypercube, seed)
+
+    def quantities(self) -> dict[str, float]:
+        return {
+            f"frequency_Hz {_at(row.values)} {mode.label}": mode.frequency_Hz
+            for row in self.rows
+            for mode in row.modes
+        }
+
+    def csv(self) -> str:
+        names = [each.name for each in self.numbers_swept]
+        keys = [*names, "mass_kg", "c", "m", "kind", "multiplicity", "frequency_Hz"]
+        keys += ["damping_ratio"] * any(m.damping_ratio for row in self.rows for m in row.modes)
+        rows = (
+            {**row.values, "mass_kg": row.mass_kg, **mode.model_dump()}
+            for row in self.rows
+            for mode in row.modes
+        )
+        return csv_text(keys, rows)
+
+    def csv_rows(self) -> dict[str, list[CsvRow]]:
+        """Each mode over all points."""
+        return {"modes": [each.model_dump() for each in self.modes]}
+
+    def tables(self) -> list[Table]:
+        names = [each.name for each in self.numbers_swept]
+        share = Column("linear %", ".0f", 100)
+        heads = [*NAME_COLUMNS, LOWEST, Column("highest"), *(Column(f"% by {n}") for n in names)]
+        rows = [
+            [
+                *mode.named(),
+                *map(LOWEST.cell, (mode.lowest_Hz, mode.highest_Hz)),
+                *(CHANGE.cell(mode.change_percent[name]) for name in names),
+                share.cell(mode.linear_share),
+            ]
+            for mode in self.modes
+        ]
+        caption = (
+            f"{self.design}, {len(self.rows)} points; % by a number: change of the frequency from"
+            " its low to its high end, by least squares; linear: share of the variance that these"
+            " changes explain"
+        )
+        return [Table([*heads, share], rows, caption=caption)]
+
+
+def run(
+    given: StudyInput,
+    swept: Sequence[SweptRange],
+    sampled: bool,
+    count: int = 0,
+    seed: int = 0,
+    notify: Notify = silent,
+) -> SweepResult:
+    """The last design over a grid or, if ``sampled``, ``count`` points (0: ten for each number).
+    Raises DeckRefused; the first failure where every point fails."""
+    facts: dict[str, Any] = {}
+    if sampled:
+        points, discrepancy = latin_hypercube(swept, count or DEFAULT_POINTS * len(swept), seed)
+        facts = {"seed": seed, "discrepancy": discrepancy}
+    else:
+        points = grid(swept)
+    name, values = [*given.designs.items()][-1]
+    rows, failures = _evaluated(given, {name: values}, points, notify)
+    if not rows:
+        raise failures[min(failures)]
+    modes = [_mode(each.label, swept, rows) for each in rows[0].modes]
+    result = SweepResult(
+        format=1,
+        design=name,
+        sampling="latin_hypercube" if sampled else "grid",
+        **facts,
+        numbers_swept=[
+            SweptNumber(name=x.name, low=x.low, high=x.high, steps=None if sampled else x.steps)
+            for x in swept
+        ],
+        rows=rows,
+        failed=[
+            Failed(design=name, values=points[i], cause=each.cause, words=each.words)
+            for i, each in sorted(failures.items())
+        ],
+        modes=modes,
+        findings=SweepFindings(words=_words(swept, modes, len(points), facts)),
+    )
+    return given.stamped(result, **swept_state(given.case, swept))
+
+
+def _evaluated(
+    given: StudyInput,
+    design: dict[str, dict[str, float]],
+    points: Sequence[dict[str, float]],
+    notify: Notify,
+) -> tuple[list[SweptPoint], dict[int, EvaluationFailed]]:
+    """Rows in the order of the points, with the modes that all of them have, and failures."""
+    known: dict[int, tuple[float, dict[Label, ModeEntry]]] = {}
+    failures: dict[int, EvaluationFailed] = {}
+
+    def use(place: int, name: str, answer: LabelledModes | EvaluationFailed) -> None:
+        words = f"{name}, {_at(points[place])}"
+        if isinstance(answer, EvaluationFailed):
+            failures[place] = answer
+            notify(words, answer)
+            return
+        own = {mode.label: ModeEntry(**mode_entry(mode)) for mode in labelled(answer.evaluation)}
+        known[place] = answer.evaluation.mass_kg, own
+        notify(f"{words}: {len(own)} modes", None)
+
+    evaluate_points(given.case, given.evaluator, design, points, use, jobs=given.jobs)
+    if not known:
+        return [], failures
+    labels = swept_labels(given.case, (own for _, own in known.values()))
+    rows = [
+        SweptPoint(values=points[i], mass_kg=mass, modes=[own[label] for label in labels])
+        for i, (mass, own) in sorted(known.items())
+    ]
+    return rows, failures
+
+
+def _at(values: dict[str, float]) -> str:
+    """C10=1e+06, pressure_kPa=240"""
+    return ", ".join(f"{name}={value:.6g}" for name, value in values.items())
+
+
+def _mode(label: Label, swept: Sequence[SweptRange], rows: Sequence[SweptPoint]) -> SweptMode:
+    hertz = np.array([next(m.frequency_Hz for m in row.modes if m.label == label) for row in rows])
+    share = np.array(
+        [[(row.values[s.name] - s.low) / (s.high - s.low) for s in swept] for row in rows]
+    )
+    plane = np.column_stack([np.ones(len(rows)), share])
+    change = np.linalg.lstsq(plane, hertz, None)[0]
+    scatter = hertz.var()
+    left = np.mean((hertz - plane @ change) ** 2)
+    return SweptMode(
+        c=label.c,
+        m=label.m,
+        kind=label.kind,
+        frequency_Hz=float(hertz.mean()),
+        lowest_Hz=float(hertz.min()),
+        highest_Hz=float(hertz.max()),
+        change_percent={
+            s.name: float(100 * x / hertz.mean()) for s, x in zip(swept, change[1:], strict=True)
+        },
+        linear_share=float(1 - left / scatter) if scatter > 1e-18 * hertz.mean() ** 2 else 1.0,
+    )
+
+
+def _words(
+    swept: Sequence[SweptRange], modes: Sequence[SweptMode], count: int, facts: dict[str, Any]
+) -> list[str]:
+    spans = ", ".join(f"{each.name} from {each.low:g} to {each.high:g}" for each in swept)
+    how = (
+        f"a Latin hypercube of {count} points, seed {facts['seed']}"
+        if facts
+        else (f"a grid of {count} points")
+    )
+    words = [f"{how}: {spans}"]
+    for each in swept:
+        most = max(modes, key=lambda mode: abs(mode.change_percent[each.name]))
+        change = most.change_percent[each.name]
+        words.append(f"{each.name} moves {most.label.display} most, by {change:+.2g} %")
+    return words
