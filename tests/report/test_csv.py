@@ -68,6 +68,8 @@ HEADS = {  # columns with their units, as a user's script reads them
     "sample.csv": "c,m,kind,pressure_kPa,frequency_Hz,low,high,mean,standard_error,measured_Hz,"
     "sigma_Hz",
     "sample_variables.csv": "variable,mean,median,low,high,standard_error,best,lower,upper,unit",
+    "sample_shares.csv": "c,m,kind,frequency_Hz,deviation_percent,first.A_belt,first.angle,"
+    "total.A_belt,total.angle",
     "diagnosis.csv": "row,run,percent,sigma_percent",
     "diagnosis_probabilities.csv": "explanation,probability",
     "diagnosis_section.csv": "region,stiffness_percent,stiffness_sigma,mass_percent,mass_sigma,"
@@ -129,7 +131,7 @@ IN_TABLES = {  # key of the JSON content whose every number has to be in some CS
     "sweep": ("rows", "modes"),
     "footprint": ("rows",),
     "sensitivities": ("rows",),
-    "sample": ("variables", "predicted"),
+    "sample": ("variables", "predicted", "variance_shares"),
     "diagnose": ("probabilities", "detectability", "section_map"),
 }
 

@@ -58,7 +58,9 @@ def test_a_tyre_on_two_rims_is_sampled_and_predicted_on_both() -> None:
     waves = [at[Label(3, 0), rim] for rim in (None, "free")]
     assert waves[0].frequency_Hz == pytest.approx(waves[1].frequency_Hz, rel=1e-3)
     titles = [table.title for table in summary.tables()[1:]]
-    assert titles == ["Hz at 240 kPa", "Hz at 240 kPa, rim free"]
+    assert titles == ["Hz at 240 kPa", "Hz at 240 kPa, rim free", "Shares of the variance"]
+    shares = summary.variance_shares  # of a single variable
+    assert shares and all(each.first["C10"] == pytest.approx(1.0) for each in shares)
     spindle = {"s": case.case.variables["C10"].model_copy(update={"sets": [SPRINGS[0]]})}
     held = replace(case, case=case.case.model_copy(update={"variables": spindle}))
     with pytest.raises(InputError, match=r"^s sets the rim's compliance"):

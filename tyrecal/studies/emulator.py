@@ -115,7 +115,8 @@ class Emulator:
         return dict(zip(self.labels, hertz.tolist(), strict=True))
 
     @cached_property
-    def _pair(self) -> tuple[int, int] | None:
+    def pair(self) -> tuple[int, int] | None:
+        """`places` of its labels."""
         return places(self.labels)
 
     @property
@@ -158,7 +159,7 @@ class Emulator:
     def ln_f_of(self, terms: Array) -> Array:
         """`ln_f` (p, n) of the p designs that have these ``products``."""
         q = terms @ self.coefficients
-        return unpaired(self._pair, q[:, :-1], q[:, -1])
+        return unpaired(self.pair, q[:, :-1], q[:, -1])
 
     def slopes(self, x: Array) -> Array:
         """d ln f / d x (p, n, v) at designs x (p, v)."""
@@ -166,9 +167,9 @@ class Emulator:
         q = products(self.degrees, t) @ self.coefficients
         rise = [products(self.degrees, t, j) @ self.coefficients for j in range(len(self.half))]
         slopes = np.stack(rise, 2)[:, :-1] / self.half
-        if self._pair is not None:
+        if self.pair is not None:
             # the slope of sqrt(s) is that of s over 2 sqrt(s); none where s is cut at 0
-            a, b = self._pair
+            a, b = self.pair
             root = np.sqrt(np.where(q[:, b] > SEEN**2, q[:, b], np.inf))
             root *= np.where(q[:, -1] < 0, -1.0, 1.0)
             mean, gap = slopes[:, a].copy(), slopes[:, b] / (2 * root[:, None])

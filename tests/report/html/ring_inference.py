@@ -102,6 +102,14 @@ def sample() -> dict[str, Any]:
             "stopped": "the tyre would burst",
         },
         "pairs": [{"a": "angle", "b": "A_belt", "counts": (100 * bell).astype(int).tolist()}],
+        "variance_shares": [
+            {
+                **{key: row[key] for key in ("c", "m", "kind", "frequency_Hz")},
+                "deviation_percent": 4.2,
+                "first": {"A_belt": 0.7, "angle": 0.2},
+                "total": {"A_belt": 0.8, "angle": 0.3},
+            }
+        ],
         "optima": [{"values": {"A_belt": 3.1e-7, "angle": 3.1e-7}, "below": 0.0}],
         "uncertain": ["pressure 1 kPa"],
     }

@@ -23,6 +23,7 @@ from ..result import (
     Table,
     csv_text,
 )
+from ..variance_shares import variance_shares
 from .box import AT_EDGE
 from .chains import ENOUGH, enough_draws
 from .study import MANY_DRAWS, MAX_EMULATOR_ERROR, Sample, measured_readings, run, states_sampled
@@ -87,6 +88,15 @@ class PredictedRow(Named):
     sigma_Hz: float | None = None  # standard deviation of the measured frequency
 
 
+class VarianceShare(Named):
+    """Sobol' shares of the variance of ln f over the box, see `variance_shares`; ``frequency_Hz``
+    is in its middle."""
+
+    deviation_percent: float  # standard deviation
+    first: dict[str, float]  # by variable
+    total: dict[str, float]
+
+
 class Optimum(ResultPart):
     """A design that is likelier than those around it; ``below``: its ln p, below the highest."""
 
@@ -137,6 +147,7 @@ class SampleResult(Result):
     emulator: EmulatorFacts  # emulators of the last box
     chains: ChainFacts  # the walkers' draws
     pairs: list[SampledPair]  # joint histograms of two variables
+    variance_shares: list[VarianceShare] = Field(default=[])  # at the case's pressure, on its rim
     optima: list[Optimum]  # designs that are likelier than those around them
     uncertain: list[str]  # uncertain numbers that no fit calibrates
     noise_Hz: float | None = None  # standard deviation of a frequency
@@ -185,12 +196,13 @@ class SampleResult(Result):
         return csv_text(keys, (row.model_dump() for row in self.predicted))
 
     def csv_rows(self) -> dict[str, list[CsvRow]]:
-        """The variables, without their histograms."""
+        """The variables, without their histograms, and the shares of the variance."""
         apart = {"density", "box", "log"}
         variables: list[CsvRow] = [
             {"variable": name, **v.model_dump(exclude=apart)} for name, v in self.variables.items()
         ]
-        return {"variables": variables}
+        shares: list[CsvRow] = [each.model_dump() for each in self.variance_shares]
+        return {"variables": variables, "shares": shares}
 
     def tables(self) -> list[Table]:
         heads = ("variable", "median", "90 % from", "to", "std. err. %", "linear %", "best", "unit")
@@ -200,7 +212,28 @@ class SampleResult(Result):
             percent = [f"{100 * each / v.median:.2g}" for each in (half, v.standard_error)]
             figures = [*map(DIGITS.cell, (v.median, v.low, v.high)), *percent]
             rows.append([name, *figures, DIGITS.cell(v.best), printed_unit(v.unit)])
-        return [Table([*map(Column, heads)], rows), *self._predicted()]
+        tables = [Table([*map(Column, heads)], rows), *self._predicted()]
+        return [*tables, self._shares()] if self.variance_shares else tables
+
+    def _shares(self) -> Table:
+        """Shares of the variance in percent: of each variable alone, and of interactions."""
+        percent, names = Column("", ".0f", 100), list(self.variables)
+        deviation = Column("std. dev. %", ".2g")
+        rows = [
+            [
+                *each.named(),
+                deviation.cell(each.deviation_percent),
+                *(percent.cell(each.first[name]) for name in names),
+                percent.cell(max(1 - sum(each.first.values()), 0.0)),
+            ]
+            for each in self.variance_shares
+        ]
+        caption = (
+            "percent of the variance of each frequency at the case's pressure, while the variables"
+            " are uniform over the emulator's box (sample.json), on a logarithmic scale if they are"
+        )
+        heads = [*NAME_COLUMNS, deviation, *(Column(name) for name in [*names, "interactions"])]
+        return Table(heads, rows, "Shares of the variance", caption)
 
     def _predicted(self) -> list[Table]:
         hertz = Column("Hz", ".2f")
@@ -325,6 +358,7 @@ def result(sample: Sample, seed: int) -> SampleResult:
             for i in range(len(names))
             for j in range(i)
         ],
+        variance_shares=_shares(sample),
         optima=[
             Optimum(
                 values={
@@ -337,6 +371,28 @@ def result(sample: Sample, seed: int) -> SampleResult:
         uncertain=[source.words for source in sample.sources if source.words],
         noise_Hz=sample.noise_Hz,
     ).with_files({"sample_draws.csv": draws_csv(sample)})
+
+
+def _shares(sample: Sample) -> list[VarianceShare]:
+    """Shares by the last box's emulator of the case's own rim, at the case's pressure."""
+    emulator, names = sample.drawn.posterior.emulators[0], [v.name for v in sample.variables]
+    if others := emulator.variables[len(names) :]:
+        emulator = emulator.restricted(np.array([v.scaled(v.start) for v in others]))
+    first, total, variance = variance_shares(emulator)
+    hertz = np.exp(emulator.ln_f(emulator.centre[None])[0])
+    by_name = lambda shares: dict(zip(names, shares.tolist(), strict=True))
+    return [
+        VarianceShare(
+            c=label.c,
+            m=label.m,
+            kind=label.kind,
+            frequency_Hz=float(hertz[i]),
+            deviation_percent=float(100 * np.sqrt(variance[i])),
+            first=by_name(first[i]),
+            total=by_name(total[i]),
+        )
+        for i, label in enumerate(emulator.labels)
+    ]
 
 
 def draws_csv(sample: Sample) -> str:
