@@ -15,6 +15,7 @@ from tyrecal.errors import InputError
 from tyrecal.measured.arrangement import arrange
 from tyrecal.measured.gather import Gathered, gather
 from tyrecal.measured.modal import Layout
+from tyrecal.measured.tables import read_measurements
 from tyrecal.measured.universal import Function, Universal, read_universal
 
 from ..chance import generator
@@ -275,8 +276,6 @@ def test_repeats_of_a_test_in_parts_stay_repeats(tmp_path: Path) -> None:
         (b"MATLAB 5.0 MAT-file, Platform: GLNXA64" + bytes(200), r"MATLAB file \(.mat\)"),
         (b"MATLAB 7.3 MAT-file" + bytes(493) + b"\x89HDF\r\n\x1a\n", r"MATLAB file \(.mat\)"),
         (b"\x89HDF\r\n\x1a\n" + bytes(100), "HDF5 file"),
-        (b"$ a comment\n[MDI_HEADER]\nFILE_TYPE = 'tir'\n", r"tyre property file \(.tir\)"),
-        (b"**HEADER\nRELEASE 1.3\n", "TYDEX file"),
     ],
 )
 def test_other_formats_are_named(tmp_path: Path, head: bytes, name: str) -> None:
@@ -284,3 +283,11 @@ def test_other_formats_are_named(tmp_path: Path, head: bytes, name: str) -> None
     path.write_bytes(head)
     with pytest.raises(InputError, match=f"this is a {name}; tyrecal reads tables"):
         gather([path], 240.0)
+
+
+@pytest.mark.parametrize("head", [b"$ a comment\n[MDI_HEADER]\n", b"**HEADER\nRELEASE 1.3\n"])
+def test_other_formats_have_to_be_imported(tmp_path: Path, head: bytes) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(head)
+    with pytest.raises(InputError, match="'tyrecal measured import' makes a table of it"):
+        read_measurements(path)

@@ -147,8 +147,10 @@ def import_files(
     """Write the measurements in FILEs to one CSV, for --measured of 'tyrecal fit' and 'diagnose'.
 
     FILE: a modal table (CSV), or a universal file with mode shapes (data sets 55, 2414) or
-    frequency-response functions (58) and their geometry (15, 2411, 18, 2420). Several measurements
-    of one quantity are repeats: the value is their mean, sigma that mean's standard deviation.
+    frequency-response functions (58) and their geometry (15, 2411, 18, 2420), a tyre property file
+    (.tir: frequencies, damping, mass; vertical stiffness and patch at 0.5, 1 and 1.5 FNOMIN), or
+    TYDEX 1.3 (load against deflection: vertical stiffness). Several measurements of one quantity
+    are repeats: the value is their mean, sigma that mean's standard deviation.
     Repeats that differ by more than the file's other repeats stop the import. Frequencies that fall
     with pressure, labels that look exchanged and single values far from a smooth curve are
     reported. If the sensors do not determine a label, the frequency is written without one;
@@ -162,6 +164,7 @@ def import_files(
     tyrecal measured import run1.uff run2.uff --pressure-kPa 240 --directions cylindrical
     tyrecal measured import geometry.uff part*.uff --pressure-kPa 240 --leave-out 12:3
     tyrecal measured import at_200.csv at_240.csv --output both.csv
+    tyrecal measured import tyre.tir vertical.tdx --sigma-percent 2
     """
     from ..files import write_text
     from ..measured.correlation import auto_mac, auto_mac_words

@@ -5,11 +5,15 @@ from __future__ import annotations
 import re
 
 HEAD = 4096  # bytes that tell
+PROPERTY_FILE, TYDEX = "tyre property file (.tir)", "TYDEX file"
 FORMATS = (
     (rb"MATLAB [57]\.\d MAT-file", "MATLAB file (.mat)"),
     (rb"\x89HDF\r\n\x1a\n", "HDF5 file"),
-    (rb"(?i)(?:^|[\r\n])\s*\[MDI_HEADER\]", "tyre property file (.tir)"),
-    (rb"(?i)(?:^|[\r\n])\*\*HEADER", "TYDEX file"),
+    (
+        rb"(?im)^\s*\[(?:MDI_HEADER|UNITS|MODEL|DIMENSION|OPERATING_CONDITIONS|VERTICAL)\]",
+        PROPERTY_FILE,
+    ),
+    (rb"(?im)^\*\*(?:HEADER|CONSTANTS|MEASURCHANNELS)", TYDEX),
 )
 
 

@@ -9,18 +9,23 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..files import open_file
 from ..simulate.modes.label import Label
 from ..tyre.state import TyreState
 from .arrangement import arrange
+from .formats import HEAD, PROPERTY_FILE, TYDEX, other_format
 from .measurement import Measurement
 from .modal import Geometry, LabelledMode, Layout, ModalTest, measurements_of, read_modal_test
 from .repeats import FLOOR, combined, one_for_both
 from .sense import doubts
 from .slips import common_shifts, contradictions
 from .tables import read_table
+from .tir import property_measurements
+from .tydex import tydex_measurements
 from .universal import Place, Universal, is_same_place, is_universal, read_universal
 
 SAME_UNLABELLED = 0.01  # relative, of repeats without a label
+FILE_READERS = {PROPERTY_FILE: property_measurements, TYDEX: tydex_measurements}
 MIN_EXPLAINED = 0.98  # of the functions' mean square; less, and modes are missing
 
 
@@ -58,10 +63,18 @@ def gather(
     axes = {node: each for file in universal for node, each in file.axes.items()}  # of the sensors
     geometry = Geometry(all_nodes(universal), axes)
     tables = [path for path in paths if path not in [file.path for file in universal]]
-    values = [row for path in tables for row in read_table(path, pressure_kPa)]
+    values, notes = list[Measurement](), list[str]()
+    for path in tables:
+        with open_file(path) as file:
+            reader = FILE_READERS.get(other_format(file.read(HEAD)) or "")
+        read, remarks = (
+            reader(path, pressure_kPa) if reader else (read_table(path, pressure_kPa), [])
+        )
+        values += read
+        notes += remarks
     _refuse_unlabelled_repeats(values)
     runs: list[ModalTest] = []
-    notes = [
+    notes += [
         f"{file.path}: not used: {what}" + f" ({count} times)" * (count > 1)
         for file in universal
         for what, count in file.skipped.items()

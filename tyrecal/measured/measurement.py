@@ -20,6 +20,7 @@ PRESSURE_USUAL = Usual(20, 2000, "kPa", PRESSURE)
 DAMPING_RATIO = "damping_ratio"  # a row of its own in a CSV, read as part of its mode's frequency
 OF_A_MODE = ("frequency_Hz", DAMPING_RATIO)
 DAMPING_SIGMA = 0.25  # of a damping ratio, where a CSV is written
+SHARES_OF_NOMINAL = (0.5, 1.0, 1.5)  # of that load, where a curve over the load is read
 MIN_CARRIED, MAX_CARRIED = 0.05, 3.0  # contact area times pressure over the load
 MeasurementKey = tuple[str, Label | None, str, float, float, RimSupport | None]
 

@@ -20,7 +20,7 @@ from ..tyre.number_table import NumberMarks, cells_under, read_text_table
 from ..tyre.usual import MAX_SIGMA
 from ..units import QUANTITIES
 from .columns import NUMBER_MEANINGS, TableColumn, is_unit, meaning_of, read_columns, unit_of
-from .formats import other_format
+from .formats import PROPERTY_FILE, TYDEX, other_format
 from .line import Line
 from .measurement import CSV_COLUMNS, DAMPING_RATIO, RIM_COLUMN, Measurement
 
@@ -155,10 +155,13 @@ def _refuse(mistakes: Iterable[str]) -> None:
 def _lines(path: Path) -> tuple[list[tuple[str, list[str]]], str]:
     """Lines that are not empty, with their places, the headings first; what separates cells."""
     if name := other_format(read_bytes(path)):
-        raise InputError(
-            f"{path}: this is a {name}; tyrecal reads tables (CSV) and universal files with mode"
-            " shapes or frequency-response functions: export one of these"
+        way = (
+            "'tyrecal measured import' makes a table of it"
+            if name in (PROPERTY_FILE, TYDEX)
+            else "tyrecal reads tables (CSV) and universal files with mode shapes or"
+            " frequency-response functions: export one of these"
         )
+        raise InputError(f"{path}: this is a {name}; {way}")
     try:
         table = read_text_table(path)
         lines = _with_one_heading(table.lines)
