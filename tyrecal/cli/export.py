@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from ..errors import InputError
 from . import complete, options
-from .parameters import FileOrFolder, OneOf, option
+from .parameters import FileOrFolder, Number, OneOf, option
 from .terminal import Terminal
+
+if TYPE_CHECKING:
+    from ..tyre.case import LoadedCase
+
+OPTIONS_OF_FORMS = {
+    "--solver": "deck",
+    **dict.fromkeys(("--nominal-load-N", "--nominal-pressure-kPa", "--donor"), "tir"),
+}
 
 
 @click.command()
@@ -17,10 +26,11 @@ from .terminal import Terminal
 @option(
     "--format",
     "form",
-    type=OneOf(["case", "deck"]),
+    type=OneOf(["case", "deck", "tir"]),
     default="case",
     show_default=True,
-    help="Files to write: the case file with what it names, or the decks.",
+    help="Files to write: the case file with what it names; the decks; a tyre property file"
+    " (MF-Swift 6.2).",
 )
 @option(
     "--case",
@@ -28,7 +38,27 @@ from .terminal import Terminal
     type=FileOrFolder(),
     metavar="CASE",
     shell_complete=complete.cases,
-    help="Case of the fit (default: the one in run.json of DIR).",
+    help="Case of the results (default: the one in run.json of DIR).",
+)
+@option(
+    "--nominal-load-N",
+    "nominal_N",
+    type=Number(),
+    metavar="F",
+    help="FNOMIN of a tir, N: one of the loads in DIR (default: the middle one).",
+)
+@option(
+    "--nominal-pressure-kPa",
+    "nominal_kPa",
+    type=Number(),
+    metavar="P",
+    help="NOMPRES of a tir, kPa: one of the pressures in DIR (default: the case's).",
+)
+@option(
+    "--donor",
+    type=FileOrFolder(exists=True, folder=False),
+    metavar="FILE.tir",
+    help="Property file from which a tir takes its coefficients of slip.",
 )
 @option("--force", is_flag=True, help="Write over files that exist.")
 @option(
@@ -43,40 +73,51 @@ def command(
     folder: Path,
     form: str,
     case: Path | None,
+    nominal_N: float | None,
+    nominal_kPa: float | None,
+    donor: Path | None,
     force: bool,
     solver: str,
     output: Path | None,
     terminal: Terminal,
 ) -> int:
-    """Write the tyre that the fit in DIR found, to DIR/export or --output.
+    """Write the tyre of DIR to files, in DIR/export or --output.
 
     A case is written as CASE_fitted.yaml: your text with the fitted values, and the files that it
     names. Decks are those of the case's solver. If the case has your own deck, that is written:
-    your text, units and numbering, only the numbers changed. DIR is a folder of results or a
-    fit.json.
+    your text, units and numbering, only the numbers changed. Both need the fit.json in DIR.
+
+    A tir has the keys that a structure determines, fitted to the stiffness.json in DIR, of the
+    fitted design if it has one. The comment of a key states its misfit. Run 'tyrecal stiffness' at
+    three loads or more, and at several pressures, first.
 
     \b
     tyrecal export p235_75r17
     tyrecal export p235_75r17 --format deck --solver calculix --output decks
     tyrecal modes p235_75r17/export/p235_75r17_fitted.yaml
+    tyrecal export p235_75r17 --format tir --nominal-load-N 4000 --donor slip.tir
     """
-    if form == "case" and "--solver" in options.given():
-        raise click.UsageError("--solver goes with --format deck")
-    from ..files import atomic_write, private_dir, read_json
+    for name in set(options.given()) & OPTIONS_OF_FORMS.keys():
+        if form != OPTIONS_OF_FORMS[name]:
+            raise click.UsageError(f"{name} goes with --format {OPTIONS_OF_FORMS[name]}")
+    from ..files import atomic_write, private_dir
     from ..measured.load import load_case
     from ..studies.export import case_files, deck_files, parts_left_out, settings_left_out
-    from ..studies.fitted import as_fitted, is_good
     from .output import Run
 
-    fit = folder / "fit.json" if folder.is_dir() else folder
-    if not fit.is_file():
-        raise click.UsageError(f"there is no fit.json in the folder '{folder}'")
-    case = case or _case_of(fit)
-    loaded = as_fitted(fit, load_case(case, allow_unusual=True))  # its user knows it from the fit
-    if not is_good(read_json(fit)):
-        terminal.warn(f"the fit in '{fit}' did not converge: its values are not calibrated")
-    files = case_files(loaded) if form == "case" else deck_files(loaded, solver)
-    target = output or fit.parent / "export"
+    study = "stiffness" if form == "tir" else "fit"
+    results = folder / f"{study}.json" if folder.is_dir() else folder
+    if not results.is_file():
+        advice = f": run 'tyrecal {study}' first"
+        raise click.UsageError(f"there is no {study}.json in the folder '{folder}'{advice}")
+    case = case or _case_of(results, study)
+    loaded = load_case(case, allow_unusual=True)  # its user knows it from the results
+    if form == "tir":
+        files = _property_file(loaded, results, nominal_N, nominal_kPa, donor)
+    else:
+        loaded = _as_fitted(results, loaded, terminal)
+        files = case_files(loaded) if form == "case" else deck_files(loaded, solver)
+    target = output or results.parent / "export"
     for name, content in files.items():
         place = target / name
         if place.exists() and not force and place.read_bytes() != content:
@@ -101,12 +142,46 @@ def command(
     return 0
 
 
-def _case_of(fit: Path) -> Path:
-    """The case that run.json next to a fit names. Raises click.UsageError."""
+def _as_fitted(fit: Path, case: LoadedCase, terminal: Terminal) -> LoadedCase:
+    """The case as the fit left it; a fit that did not converge is reported."""
+    from ..files import read_json
+    from ..studies.fitted import as_fitted, is_good
+
+    loaded = as_fitted(fit, case)
+    if not is_good(read_json(fit)):
+        terminal.warn(f"the fit in '{fit}' did not converge: its values are not calibrated")
+    return loaded
+
+
+def _property_file(
+    case: LoadedCase,
+    results: Path,
+    nominal_N: float | None,
+    nominal_kPa: float | None,
+    donor: Path | None,
+) -> dict[str, bytes]:
+    """The .tir of the stiffnesses in ``results`` by its name. Raises InputError."""
+    from ..measured.tir import read_property_file
+    from ..simulate.deck.decks_design import design_of
+    from ..simulate.evaluate.evaluator import Evaluator
+    from ..studies.property_file import property_text, stiffness_of_case, structural_keys
+
+    loaded, stiffness = stiffness_of_case(results, case)
+    of = stiffness.provenance
+    evaluator = Evaluator(design_of(loaded), of.solver if of else "")
+    keys = structural_keys(loaded, stiffness, evaluator, nominal_N, nominal_kPa)
+    text = property_text(loaded, keys, read_property_file(donor) if donor else None)
+    return {f"{case.path.stem}.tir": text.encode("latin-1")}
+
+
+def _case_of(results: Path, study: str) -> Path:
+    """The case that run.json next to results of a study names. Raises click.UsageError."""
     from ..files import read_runs
     from ..simulate.case_folder import named_case
 
-    path = named_case(read_runs(fit.parent).get("fit", {}), fit.parent)
+    path = named_case(read_runs(results.parent).get(study, {}), results.parent)
     if path is None or not path.is_file():
-        raise click.UsageError(f"the case of '{fit}' is not at its place: give it by --case CASE")
+        raise click.UsageError(
+            f"the case of '{results}' is not at its place: give it by --case CASE"
+        )
     return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path

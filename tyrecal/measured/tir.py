@@ -99,7 +99,7 @@ class PropertyFile:
     path: Path
     model: MFSwift  # structural keys, SI
     lines: dict[str, int]  # number of the line of each structural key
-    units: dict[str, str] = field(default_factory=dict)  # as [UNITS] has them
+    is_SI: bool = True  # whether its units are those of SI
     # lines of each section as they are, by its name in capitals, without the section's own line
     sections: dict[str, list[str]] = field(default_factory=dict)
 
@@ -148,7 +148,7 @@ def read_property_file(path: Path) -> PropertyFile:
         for sign, unit in re.findall(r"(^|[*/])([A-Z]+)", dimension):
             keys[key] *= factors.get(unit, 1.0) ** (-1 if sign == "/" else 1)
         lines[key] = entries[0][2]
-    return PropertyFile(path, MFSwift(keys), lines, units, sections)
+    return PropertyFile(path, MFSwift(keys), lines, {*factors.values()} == {1.0}, sections)
 
 
 def _unit(path: Path, name: str, text: str) -> float:

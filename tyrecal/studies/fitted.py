@@ -75,11 +75,17 @@ def as_fitted(path: Path, case: LoadedCase) -> LoadedCase:
         settings, mesh = dict(of.get("overrides", {})), of.get("mesh")
     except (ValueError, TypeError, AttributeError):
         raise InputError(f"'{path}' is not the fit.json that 'tyrecal fit' writes") from None
+    case = as_set(case, settings, mesh)
+    return overridden(case, read_fitted(path, case)[0])
+
+
+def as_set(case: LoadedCase, settings: Mapping[str, Any], mesh: str | None) -> LoadedCase:
+    """The case on a mesh level with what a command set, except for variables. Raises as
+    `overridden` does."""
     if mesh is not None:
         case = with_level(case, mesh)
     starts = start_values(case)
-    case = overridden(case, {name: x for name, x in settings.items() if name not in starts})
-    return overridden(case, read_fitted(path, case)[0])
+    return overridden(case, {name: x for name, x in settings.items() if name not in starts})
 
 
 def _difference(theirs: Mapping[str, Any], case: LoadedCase) -> str:

@@ -160,6 +160,13 @@ def belt_motion(shape: HarmonicShape | RingShape) -> BeltMotion:
     return BeltMotion(c, shares, float(part / (whole or 1.0)))
 
 
+def mean_belt_motion(shape: HarmonicShape) -> tuple[Array, float]:
+    """Amplitudes (3,) r, theta, z, which are the mean over the belt's width, and the belt's mean
+    radius, m."""
+    belt, inverse = _section_fit(np.ascontiguousarray(shape.points, float).tobytes())
+    return (inverse @ shape.amplitude[belt])[0], float(shape.points[belt, 0].mean())
+
+
 def label_modes(evaluation_modes: Sequence[RawMode]) -> list[Mode]:
     """One Mode per raw mode, in their order, no label twice.
 
