@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isclose
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,8 +14,12 @@ from .parameters import FileOrFolder, Number, OneOf, option
 from .terminal import Terminal
 
 if TYPE_CHECKING:
+    from ..simulate.evaluate.evaluator import Evaluator
+    from ..studies.result import Result
     from ..tyre.case import LoadedCase
 
+STUDY_OF_FORMS = {"case": "fit", "deck": "fit", "tir": "stiffness", "uff": "modes"}
+SAME_HZ = 1e-4  # relative
 OPTIONS_OF_FORMS = {
     "--solver": "deck",
     **dict.fromkeys(("--nominal-load-N", "--nominal-pressure-kPa", "--donor"), "tir"),
@@ -26,11 +31,11 @@ OPTIONS_OF_FORMS = {
 @option(
     "--format",
     "form",
-    type=OneOf(["case", "deck", "tir"]),
+    type=OneOf([*STUDY_OF_FORMS]),
     default="case",
     show_default=True,
     help="Files to write: the case file with what it names; the decks; a tyre property file"
-    " (MF-Swift 6.2).",
+    " (MF-Swift 6.2); a universal file of the mode shapes.",
 )
 @option(
     "--case",
@@ -91,6 +96,9 @@ def command(
     fitted design if it has one. The comment of a key states its misfit. Run 'tyrecal stiffness' at
     three loads or more, and at several pressures, first.
 
+    A uff has the modes of the modes.json in DIR: the surface's points and lines, and two shapes for
+    a pair (data sets 151, 164, 2411, 82, 55; SI; x forward, y left, z up).
+
     \b
     tyrecal export p235_75r17
     tyrecal export p235_75r17 --format deck --solver calculix --output decks
@@ -105,7 +113,7 @@ def command(
     from ..studies.export import case_files, deck_files, parts_left_out, settings_left_out
     from .output import Run
 
-    study = "stiffness" if form == "tir" else "fit"
+    study = STUDY_OF_FORMS[form]
     results = folder / f"{study}.json" if folder.is_dir() else folder
     if not results.is_file():
         advice = f": run 'tyrecal {study}' first"
@@ -114,6 +122,8 @@ def command(
     loaded = load_case(case, allow_unusual=True)  # its user knows it from the results
     if form == "tir":
         files = _property_file(loaded, results, nominal_N, nominal_kPa, donor)
+    elif form == "uff":
+        files = _universal_file(loaded, results)
     else:
         loaded = _as_fitted(results, loaded, terminal)
         files = case_files(loaded) if form == "case" else deck_files(loaded, solver)
@@ -162,16 +172,49 @@ def _property_file(
 ) -> dict[str, bytes]:
     """The .tir of the stiffnesses in ``results`` by its name. Raises InputError."""
     from ..measured.tir import read_property_file
-    from ..simulate.deck.decks_design import design_of
-    from ..simulate.evaluate.evaluator import Evaluator
-    from ..studies.property_file import property_text, stiffness_of_case, structural_keys
+    from ..studies.fitted import read_result
+    from ..studies.property_file import property_text, structural_keys
+    from ..studies.stiffness import StiffnessResult
 
-    loaded, stiffness = stiffness_of_case(results, case)
-    of = stiffness.provenance
-    evaluator = Evaluator(design_of(loaded), of.solver if of else "")
+    loaded, stiffness = read_result(results, case, StiffnessResult)
+    evaluator = _evaluator_of(loaded, stiffness, results.parent)
     keys = structural_keys(loaded, stiffness, evaluator, nominal_N, nominal_kPa)
     text = property_text(loaded, keys, read_property_file(donor) if donor else None)
     return {f"{case.path.stem}.tir": text.encode("latin-1")}
+
+
+def _universal_file(case: LoadedCase, results: Path) -> dict[str, bytes]:
+    """The universal file of the modes in ``results`` by its name. Raises InputError."""
+    from ..report.universal_shapes import shapes_text
+    from ..simulate.evaluate.evaluator import Question
+    from ..simulate.modes.label import UNIT_MASS_SOLVERS, labelled
+    from ..studies.fitted import read_result
+    from ..studies.modes import ModesResult
+
+    loaded, modes = read_result(results, case, ModesResult)
+    if modes.load_N:
+        raise InputError(f"'{results}' is under a load: run 'tyrecal modes' without one")
+    evaluator = _evaluator_of(loaded, modes, results.parent)
+    evaluation = evaluator.evaluate(Question(modes.variables))
+    ours = [mode.frequency_Hz for mode in labelled(evaluation)]
+    theirs = [each.frequency_Hz for each in modes.modes if each.member is None]
+    if not all(any(isclose(f, x, rel_tol=SAME_HZ) for x in ours) for f in theirs):
+        raise InputError(f"'{results}' has other frequencies: run 'tyrecal modes' again")
+    unit_mass = evaluator.solver.name in UNIT_MASS_SOLVERS
+    text = shapes_text(loaded, evaluation, labelled(evaluation), unit_mass)
+    return {f"{case.path.stem}.uff": text.encode()}
+
+
+def _evaluator_of(case: LoadedCase, result: Result, folder: Path) -> Evaluator:
+    """The evaluator with the solver of a result; it reads the evaluation store next to it."""
+    from ..simulate.deck.decks_design import design_of
+    from ..simulate.evaluate.evaluator import Evaluator
+    from ..simulate.evaluate.store import Store
+
+    evaluator = Evaluator(design_of(case), result.provenance.solver if result.provenance else "")
+    if (folder / "record").is_dir():
+        evaluator.store = Store((folder / "record").resolve())
+    return evaluator
 
 
 def _case_of(results: Path, study: str) -> Path:

@@ -13,6 +13,7 @@ from ..tyre.case import LoadedCase, as_written, start_values, with_level
 from ..tyre.case.identity import is_of_tyre, tyre_sha256
 from ..tyre.state import pressure_name
 from ..tyre.values import overridden, with_values
+from .result import AnyResult
 
 NOT_CONVERGED: Final = "not_converged"  # folder of a fit that may not take a better one's place
 
@@ -86,6 +87,27 @@ def as_set(case: LoadedCase, settings: Mapping[str, Any], mesh: str | None) -> L
         case = with_level(case, mesh)
     starts = start_values(case)
     return overridden(case, {name: x for name, x in settings.items() if name not in starts})
+
+
+def read_result(
+    path: Path, case: LoadedCase, kind: type[AnyResult]
+) -> tuple[LoadedCase, AnyResult]:
+    """A study's result of a case, and the case as the study evaluated it: with the command's
+    settings, on its mesh. ``case``: as its file has it. Raises InputError for another tyre, or a
+    file that is none; OSError."""
+    try:
+        result = kind.model_validate(read_json(path))
+        of = result.provenance
+    except ValueError:
+        of = None
+    if of is None:
+        raise InputError(f"'{path}' is not the {kind.stem}.json that 'tyrecal {kind.study}' writes")
+    loaded = as_set(case, of.overrides, of.mesh)
+    if of.tyre_sha256 != tyre_sha256(loaded):
+        raise InputError(
+            f"'{path}' is of another tyre than '{case.path}': run 'tyrecal {kind.study}' again"
+        )
+    return loaded, result
 
 
 def _difference(theirs: Mapping[str, Any], case: LoadedCase) -> str:

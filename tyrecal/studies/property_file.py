@@ -10,27 +10,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError
-from ..files import read_json
 from ..measured.mf_swift import MFSwift
 from ..measured.tir import FREQUENCY_LABELS, PropertyFile
 from ..simulate.evaluate.evaluator import Evaluator, Question
 from ..simulate.evaluate.results import HarmonicShape
-from ..simulate.modes.label import Mode, labelled, mean_belt_motion
+from ..simulate.modes.label import UNIT_MASS_SOLVERS, Mode, labelled, mean_belt_motion
 from ..tyre.case import LoadedCase
-from ..tyre.case.identity import tyre_sha256
 from ..tyre.section.size import parse_size
 from ..tyre.state import TyreState
 from ..units import INCH
-from .fitted import as_set
 from .stiffness import StiffnessResult, StiffnessRow
 
 Array = np.ndarray
-UNIT_MASS_SOLVERS = ("bundled", "calculix")  # their shapes have a modal mass of 1 kg
 MIN_FIT_LOADS = 3
 MAX_OTHER_NOMINAL = 0.01  # relative, of a donor's FNOMIN and NOMPRES
 TIR_DIGITS = 6  # of a key
@@ -188,24 +183,6 @@ class StructuralKeys:
         """The formulas at the keys, as a reader of the file has them."""
         pairs = (pair for entries in self.sections.values() for pair in entries.items())
         return MFSwift({key: value for key, (value, _) in pairs})
-
-
-def stiffness_of_case(path: Path, case: LoadedCase) -> tuple[LoadedCase, StiffnessResult]:
-    """The case as 'tyrecal stiffness' evaluated it, and its stiffness.json. ``case``: as its file
-    has it. Raises InputError for another tyre, or a file that is none."""
-    try:
-        result = StiffnessResult.model_validate(read_json(path))
-        of = result.provenance
-    except ValueError:
-        of = None
-    if of is None:
-        raise InputError(f"'{path}' is not the stiffness.json that 'tyrecal stiffness' writes")
-    loaded = as_set(case, of.overrides, of.mesh)
-    if of.tyre_sha256 != tyre_sha256(loaded):
-        raise InputError(
-            f"'{path}' is of another tyre than '{case.path}': run 'tyrecal stiffness' again"
-        )
-    return loaded, result
 
 
 def structural_keys(

@@ -17,7 +17,7 @@ from pydantic import Field
 
 from ..errors import InputError
 from ..measured.coordinates import CYLINDRICAL, CoordinateSystem
-from ..measured.universal_functions import WrittenFunction, universal_text
+from ..measured.universal_text import WrittenFunction, function_set, universal_text
 from ..tyre.case import LoadedCase
 from .result import Column, CsvRow, Result, ResultPart, StudyInput, Table, csv_text
 
@@ -241,9 +241,9 @@ class FrfResult(Result):
             )
             for each, (force, respond) in zip(self.functions, ends, strict=True)
         ]
-        frequencies = np.array(self.frequency_Hz)
-        tread = numbers.values()
-        return universal_text(case.case.name, nodes, TREAD_SYSTEM, tread, frequencies, functions)
+        title, frequencies = case.case.name, np.array(self.frequency_Hz)
+        sets = [function_set(title, each, frequencies) for each in functions]
+        return universal_text(title, nodes, sets, TREAD_SYSTEM, numbers.values())
 
 
 def _evaluated(given: StudyInput, values: Mapping[str, float], request: dict[str, Any]) -> Any:

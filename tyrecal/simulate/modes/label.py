@@ -48,6 +48,7 @@ SUBSTANTIAL = 0.2  # share of the belt's motion below which a mode cannot claim 
 TAKES_PART = 0.1
 # column of z P0 on c = 0; columns 0 to 3 are the orders, 0 on c = 0 being theta P0
 AXIAL_COLUMN = 4
+UNIT_MASS_SOLVERS = ("bundled", "calculix")  # whose harmonic shapes have a modal mass of 1 kg
 PARITY = (0, 1, 0, 1, 1)  # axial motion is the c = 0 member of the out-of-plane family
 
 

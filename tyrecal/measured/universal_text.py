@@ -1,4 +1,5 @@
-"""Frequency-response functions as the text of a universal file: data sets 151, 164, 2411, 2420, 58.
+"""Texts of universal files: header, units and nodes (data sets 151, 164, 2411, 2420), then trace
+lines (82), mode shapes (55) or frequency-response functions (58).
 
 ASCII, in SI units. `universal` reads such files.
 """
@@ -37,36 +38,63 @@ class WrittenFunction:
     values: Array  # (f,) complex
 
 
+@dataclass(frozen=True)
+class WrittenShape:
+    """A real mode shape: displacements (k, 3) of the file's nodes along x, y, z."""
+
+    name: str
+    frequency_Hz: float
+    displacement: Array
+    damping_ratio: float = 0.0  # of critical; 0: not known
+    modal_mass_kg: float = 0.0  # 0: not known
+
+
 def universal_text(
     title: str,
     nodes: Mapping[int, Sequence[float]],
-    system: CoordinateSystem,
-    in_system: Iterable[int],
-    frequency_Hz: Array,
-    functions: Iterable[WrittenFunction],
+    sets: Iterable[str],
+    system: CoordinateSystem | None = None,
+    in_system: Iterable[int] = (),
 ) -> str:
-    """The file's text; nodes: x, y, z in m; in_system: nodes that move along r, theta, z of a
-    cylindrical ``system``."""
+    """The file's text; nodes: x, y, z in m; sets: texts of what follows the nodes; in_system: nodes
+    that move along r, theta, z of a cylindrical ``system``."""
     cylindrical = {*in_system}
     header = [_text(title), "NONE", "tyrecal", *["NONE"] * 4]
     units = (
         f"{1:10d}{'SI: m, N':<20}{2:10d}\n{_double(1)}{_double(1)}{_double(1)}\n{_double(273.15)}"
     )
-    axes = [*system.axes, system.origin]
     head = f"{SYSTEM_NUMBER:10d}{CYLINDRICAL:10d}{SYSTEM_COLOUR:10d}"
     systems = [f"{1:10d}", _text(title), head, "TYRE"]
-    systems += ["".join(map(_double, row)) for row in axes]
+    if system:
+        systems += ["".join(map(_double, row)) for row in [*system.axes, system.origin]]
     places = []
     for number, place in nodes.items():
         moves_in = SYSTEM_NUMBER if number in cylindrical else 0
         systems_and_colour = f"{0:10d}{moves_in:10d}{NODE_COLOUR:10d}"
         places += [f"{number:10d}{systems_and_colour}", "".join(map(_double, place))]
-    sets = [_set(151, header), _set(164, [units]), _set(2420, systems), _set(2411, places)]
-    sets += [_function(title, each, frequency_Hz) for each in functions]
-    return "".join(sets)
+    first = [_set(151, header), _set(164, [units]), *([_set(2420, systems)] if system else [])]
+    return "".join([*first, _set(2411, places), *sets])
 
 
-def _function(title: str, each: WrittenFunction, frequency_Hz: Array) -> str:
+def line_set(number: int, nodes: Sequence[int]) -> str:
+    """A trace line, data set 82, through at most 250 nodes."""
+    rows = ["".join(f"{n:10d}" for n in nodes[k : k + 8]) for k in range(0, len(nodes), 8)]
+    return _set(82, [f"{number:10d}{len(nodes):10d}{0:10d}", "NONE", *rows])
+
+
+def shape_set(title: str, number: int, each: WrittenShape, nodes: Iterable[int]) -> str:
+    """A normal mode, data set 55, with a viscous damping ratio."""
+    lines = [_text(each.name), _text(title), "NONE", "NONE", "NONE"]
+    lines += ["".join(f"{code:10d}" for code in (1, 2, 2, 8, 2, 3))]
+    lines += [f"{2:10d}{4:10d}{1:10d}{number:10d}"]
+    lines += [_singles([each.frequency_Hz, each.modal_mass_kg, each.damping_ratio, 0.0])]
+    for node, motion in zip(nodes, each.displacement, strict=True):
+        lines += [f"{node:10d}", _singles(motion)]
+    return _set(55, lines)
+
+
+def function_set(title: str, each: WrittenFunction, frequency_Hz: Array) -> str:
+    """A frequency-response function, data set 58."""
     ends = "".join(f" {'NONE':<10}{n:10d}{d:4d}" for n, d in (each.response, each.reference))
     step = (frequency_Hz[-1] - frequency_Hz[0]) / (len(frequency_Hz) - 1)
     lines = [_text(each.name), _text(title), "NONE", "NONE", "NONE"]
@@ -87,6 +115,10 @@ def _set(kind: int, lines: Sequence[str]) -> str:
 def _text(words: str) -> str:
     """An identification line, never blank."""
     return words.encode("ascii", "replace").decode()[:80] or "NONE"
+
+
+def _singles(values: Iterable[float]) -> str:
+    return "".join(f"{value:13.5E}" for value in values)
 
 
 def _double(value: float) -> str:
