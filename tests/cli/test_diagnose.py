@@ -145,7 +145,6 @@ def test_an_added_effect_makes_a_case(
         (["--measured", "none.csv"], "none.csv"),
         (["--measured", "M", "--effect", "magic"], "--effect magic: there is no such effect"),
         (["--measured", "M", "--toggled", "M", "magic=0"], "there is no effect 'magic'"),
-        (["--measured", "M", "--solver", "calculix"], "no exact sensitivities"),
         (["--measured", "M", "--toggled", "M", "bead_filler=nan"], "is not a number"),
         (["--measured", "M", "--toggled", "M", "bead_filler*1"], "changes nothing"),
         (["--measured", "M", "--effect", "belt_width", "--without", "belt_width"], "no effect"),

@@ -87,7 +87,6 @@ def test_targets_without_a_sigma_have_that_of_the_fit(
         (["--measured", "no.csv"], "--measured no.csv: there is no such file"),
         (["--measured", "mass.csv"], "no frequency of the unloaded tyre"),
         (["--measured", "high.csv", "--mesh", "coarse", "--no-store"], "is it the right unit"),
-        (["--solver", "calculix"], "gives no exact sensitivities"),
         (["--seed", "-1"], "--seed -1: must be a whole number, 0 to"),
     ],
 )

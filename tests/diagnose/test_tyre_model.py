@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tyrecal_solvers.bundled.adapter import Bundled
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
@@ -18,6 +19,7 @@ from tyrecal.studies.inference.effect_ranges import effect_ranges
 from tyrecal.studies.inference.model import Answer, Query
 from tyrecal.studies.inference.regions import regions
 from tyrecal.studies.inference.tyre_model import TyreModel, _key
+from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.studies.variable import read_variables
 from tyrecal.tyre.case import LoadedCase, start_values
 from tyrecal.tyre.values import with_values
@@ -204,3 +206,29 @@ def test_a_refusal_with_one_effect_is_that_points_answer() -> None:
     with pytest.raises(DeckRefused):
         other = with_values(CASE, {"effects.cavity_air": 1.0, "effects.point_mass": 0.05})
         TyreModel(other, Evaluator(TyreDesign(other)), ROWS, [], {}).answers([Query(X)])
+
+
+def test_sensitivities_by_differences_are_the_exact_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By variables, constants, fields of the section and an effect, of frequencies and mass."""
+    section = CASE.case.section.model_copy(update={"known_from": "drawing"})
+    case = replace(CASE, case=CASE.case.model_copy(update={"section": section}))
+    wanted = {"rubber_density", "belt_1_angle", "section meridian 1", "section gauge 1"}
+    own_sources = [each for each in sources(case)[0] if each.name in wanted]
+    point = Query(X, constants=True, slopes=("pressure_offset",))
+
+    def answered() -> Answer:
+        evaluator = Evaluator(TyreDesign(case))
+        ranges, _ = effect_ranges(case, evaluator, ("pressure_offset",))
+        (answer,) = TyreModel(case, evaluator, ROWS[9:], own_sources, ranges).answers([point])
+        assert isinstance(answer, Answer) and answer.constants is not None
+        return answer
+
+    exact = answered()
+    monkeypatch.setattr(Bundled, "capabilities", Bundled.capabilities - {"gradients"})
+    other = answered()
+    assert abs(other.jacobian - exact.jacobian).max() < 2e-5 < abs(exact.jacobian).max()
+    assert exact.constants is not None and other.constants is not None
+    assert (abs(other.constants - exact.constants).max(0) < 2e-5).all()
+    assert (abs(exact.constants).max(0) > 2e-4).all() and len(wanted) == exact.constants.shape[1]
+    slope, its = (each.slopes["pressure_offset"][:-1] for each in (exact, other))
+    assert its == pytest.approx(slope, abs=1e-6) and abs(slope).max() > 1e-3

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 
+from tyrecal.simulate.deck.decks import steps
 from tyrecal.simulate.evaluate.evaluator import Question
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.simulate.evaluate.results import Evaluation, HarmonicShape, RawMode
 from tyrecal.simulate.modes.label import Label
+from tyrecal.tyre.load import load_case
+
+from ..conftest import CASES
 
 WIDTH = np.linspace(-0.08, 0.08, 9)
 POINTS = np.stack([np.full(9, 0.39), WIDTH], 1)
@@ -45,6 +51,7 @@ class FakeEvaluator:
     """
 
     solver_name, folder, solver, scheduler = "fake", None, None, ""
+    design = SimpleNamespace(steps=partial(steps, load_case(CASES / "p235_75r17.yaml")))
 
     def __init__(
         self,
@@ -58,6 +65,10 @@ class FakeEvaluator:
         self.fails, self.has_gradients = fails, has_gradients
         self.round: Callable[[np.ndarray], np.ndarray] = lambda f: f  # to a solver's digits
         self.calls, self.jobs = 0, []  # questions; at a time, call by call
+
+    @property
+    def difference_step(self) -> float | None:
+        return None if self.has_gradients else getattr(self.solver, "difference_step", 1e-4)
 
     def answer_all(
         self, questions: Iterable[Question], jobs: int = 1
@@ -82,5 +93,6 @@ class FakeEvaluator:
             RawMode(float(x), shape(label), 2 if label.c else 1)
             for x, label in zip(f, LABELS, strict=True)
         )
+        assert self.has_gradients or not question.gradients
         gradients = {n: f * self.powers[n] / values[n] for n in question.gradients}
         return Evaluation(240.0, 12.8, modes, gradients)

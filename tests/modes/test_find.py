@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from tyrecal.simulate.evaluate.evaluator import Question
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.simulate.modes.find import MORE_MODES, LabelledModes, find_modes
-from tyrecal.simulate.modes.label import labelled
+from tyrecal.simulate.modes.label import Label, labelled
 
 from ..fit.fake import LABELS, FakeEvaluator
 from ..fit.known_truth import POWERS, START, TARGETS
@@ -44,6 +45,47 @@ def test_a_lost_label_is_asked_for_with_more_modes(enough: int | None) -> None:
     else:
         assert isinstance(labelled, LabelledModes) and list(labelled.wanted) == [LABELS[-1]]
         assert len(labelled.modes) == len(LABELS) and 0 < labelled.clarity <= 1
+
+
+class AtAnEdge(FakeEvaluator):
+    """Has no mode [4,0] where A_belt is above its start."""
+
+    def evaluate(self, question: Question):
+        evaluation = super().evaluate(question)
+        if question.values["A_belt"] > START["A_belt"]:
+            return replace(evaluation, modes=evaluation.modes[:-1])
+        return evaluation
+
+
+@pytest.mark.parametrize("wanted", [LABELS[:1], LABELS])
+def test_without_exact_sensitivities_they_are_differences(wanted: list[Label]) -> None:
+    """Above or, where that has no solution or lacks a wanted label, below; a mode whose label is
+    not wanted has none where the neighbour lacks it."""
+    fails = lambda values: values["C10"] > START["C10"]
+    question, names = Question(START, tuple(START)), list(START)
+    exact, differing = (
+        dict(find_modes(AtAnEdge(TARGETS, POWERS, START, f, has), [question], wanted))[0]
+        for f, has in ((lambda values: False, True), (fails, False))
+    )
+    assert isinstance(exact, LabelledModes) and isinstance(differing, LabelledModes)
+    own, other = (
+        np.array([each.evaluation.gradients[n] * START[n] for n in names])
+        for each in (exact, differing)
+    )
+    known = np.isfinite(other)
+    assert list(zip(*np.where(~known), strict=True)) == ([(0, 8)] if len(wanted) == 1 else [])
+    assert other[known] == pytest.approx(own[known], abs=2e-3)  # Hz per logarithm
+    assert differing.evaluation.mass_gradients == dict.fromkeys(START, 0.0)
+
+
+def test_what_has_no_neighbour_fails_and_nothing_else() -> None:
+    """All neighbours of a side are asked for together; a denied licence is asked for once."""
+    fails = lambda values: START["C10"] != values["C10"] < 2 * START["C10"]
+    tyre = FakeEvaluator(TARGETS, POWERS, START, fails, has_gradients=False)
+    questions = [Question({**START, "C10": c}, ("C10",)) for c in (START["C10"], 4e6)]
+    answers = dict(find_modes(tyre, questions, LABELS, jobs=8))
+    assert isinstance(answers[0], EvaluationFailed) and isinstance(answers[1], LabelledModes)
+    assert tyre.jobs == [2, 2, 1] and tyre.calls == 5
 
 
 def test_each_has_its_place_those_that_wait_the_last_ones() -> None:

@@ -293,7 +293,6 @@ def test_modes_on_abaqus_are_the_twins(tmp_path: Path, capsys: pytest.CaptureFix
         (("footprint",), "cannot press a tyre on a road"),
         (("footprint", "--solver", "bundled"), "cannot express decks in three dimensions"),
         (("modes", "--load-N", "3000"), "cannot find modes of a tyre on a road"),
-        (("sample",), "gives no exact sensitivities"),
         (("diagnose", "--measured"), "is given by decks in three dimensions"),
         (("modes", "--set", "rim.free=true"), "must be held"),
     ],

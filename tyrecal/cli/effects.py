@@ -91,10 +91,6 @@ def command(
         arguments.refuse_unusual(loaded, f"--value {value:g}", path, value, study.allow_unusual)
     evaluator = study.evaluator(loaded)
     adapter = evaluator.solver
-    if not evaluator.has_gradients:
-        raise click.UsageError(
-            f"solver '{adapter.name}' gives no sensitivities, which a re-fit needs"
-        )
     kPa = [round(loaded.case.pressure_kPa * share / 3, 6) for share in (2, 3, 4)]
     if pressures is not None:
         kPa = arguments.parse_pressure_list(

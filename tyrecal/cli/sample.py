@@ -92,7 +92,7 @@ def command(
     measured = measured or loaded.measured
     readings = measured_readings(loaded, measured)
     evaluator = study.evaluator(loaded)
-    check(loaded, evaluator, readings)
+    check(loaded, readings)
     files = [measured] if measured else []
     states = states_sampled(loaded, readings)
     output = study.run(loaded, "sample", evaluator, measured=files, **states)

@@ -225,7 +225,7 @@ def run(
     size: of all, None: each at the end of its range (`stated_size`). Raises what
     ``Evaluator.evaluate`` does for the plain tyre.
     """
-    plain = Plain(case, evaluator, values, pressures_kPa)
+    plain = Plain(case, evaluator, values, pressures_kPa, jobs)
     sizes = {each.id: stated_size(each.id, case) if size is None else size for each in entries}
     rows, failed, signatures = [], [], []
     for entry, signature in zip(entries, plain.signatures(sizes, jobs), strict=True):

@@ -190,10 +190,9 @@ def emulator(
 
     wanted: labels that every design must have; others with m <= 1 are taken where all have them;
     before: of the same box or a part of it; its designs stand for as many as would lie there.
-    Raises InputError where the solver has no slopes, or of too small a count; EvaluationFailed
-    where too few designs could be evaluated; DeckRefused.
+    Raises InputError of too small a count; EvaluationFailed where too few designs could be
+    evaluated; DeckRefused.
     """
-    needs_slopes(evaluator)
     if count < MIN_DESIGNS:
         raise InputError(f"an emulator needs {MIN_DESIGNS} evaluations at least, got {count}")
     centre, half = np.mean(box, 1), np.ptp(box, axis=1) / 2
@@ -229,21 +228,13 @@ def _evaluated(x: Array, answer: LabelledModes, variables: Sequence[DesignVariab
     per_x = [v.slope(v.value(float(xi))) for v, xi in zip(variables, x, strict=True)]
     by_name = np.array([gradients[v.name] for v in variables])  # (v, modes)
     rise = {label: by_name[:, m.position] * per_x / m.frequency_Hz for label, m in modes.items()}
+    modes = {label: m for label, m in modes.items() if np.isfinite(rise[label]).all()}
     apart = 0.0
     if set(PAIR) <= set(modes):
         axial, torsional = (modes[label] for label in PAIR)
         clear = min(axial.clarity, torsional.clarity)
         apart = log(axial.frequency_Hz / torsional.frequency_Hz) * clear
     return Evaluated(x, {label: log(m.frequency_Hz) for label, m in modes.items()}, rise, apart)
-
-
-def needs_slopes(evaluator: Evaluator) -> None:
-    """Raises InputError where the solver gives no exact slopes."""
-    if not evaluator.has_gradients:
-        raise InputError(
-            f"solver '{evaluator.solver.name}' gives no exact sensitivities of this case, which an"
-            " emulator needs: 'tyrecal solvers' shows which one does (gradients)"
-        )
 
 
 def fitted(

@@ -11,6 +11,7 @@ import numpy as np
 from ..simulate.evaluate.evaluator import Evaluator, Question
 from ..simulate.evaluate.failure import EvaluationFailed
 from ..simulate.evaluate.results import Evaluation
+from ..simulate.modes.find import LabelledModes, modes_in_order
 from ..simulate.modes.label import Label, Mode, paired_labels
 from ..tyre.case import LoadedCase
 from ..tyre.effects import catalogue
@@ -41,7 +42,8 @@ class Signature:
 class Plain:
     """The tyre without the effect at each pressure, with slopes by the case's variables.
 
-    values: of the variables, in their own units. Raises what ``Evaluator.evaluate`` does.
+    values: of the variables, in their own units; jobs: designs at a time. Raises what
+    ``Evaluator.evaluate`` does.
 
     >>> from tyrecal.tyre.case import start_values
     >>> plain = Plain(case, evaluator, start_values(case), [240.0])
@@ -56,6 +58,7 @@ class Plain:
         evaluator: Evaluator,
         values: Mapping[str, float],
         pressures_kPa: Sequence[float],
+        jobs: int = 1,
     ):
         self.case, self.evaluator, self.pressures_kPa = case, evaluator, tuple(pressures_kPa)
         pressure = pressure_name(case)
@@ -63,7 +66,12 @@ class Plain:
         self.names = tuple(name for name in values if name != pressure)
         self.values = dict(values)
         self.states = [{**values, pressure: p} for p in pressures_kPa]
-        evaluations = [evaluator.evaluate(Question(state, self.names)) for state in self.states]
+        designs = [(state, self.names) for state in self.states]
+        evaluations = []
+        for each in modes_in_order(evaluator, designs, [], jobs):
+            if not isinstance(each, LabelledModes):
+                raise each
+            evaluations.append(each.evaluation)
         self.mass_kg = evaluations[0].mass_kg
         modes = [_modes(evaluation) for evaluation in evaluations]
         wanted = target_labels(case) or [m for m in modes[0] if m.m < 2]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from math import inf
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,6 +16,8 @@ import numpy as np
 from ...tyre.case import LoadedCase
 from ...tyre.case.identity import tyre_sha256
 from ...tyre.case.schema import SolverChoice
+from ...tyre.effects import catalogue
+from ...tyre.number_units import EFFECT_PATH, unit_of
 from ...tyre.templates import TemplateFailed
 
 MAX_NAME_LENGTH = 200  # of a case, as a line of a deck has at most 256 characters
@@ -88,6 +91,9 @@ class Design(Protocol):
 
     def neighbour(self, name: str, side: int) -> tuple[Design, float]:
         """The design a small step to one side (1, -1) of a variable, and its value there."""
+
+    def steps(self, name: str, value: float, step: float) -> list[float]:
+        """Values of a number for differences, see `steps`."""
 
     @property
     def section_nodes(self) -> int:
@@ -244,6 +250,29 @@ def _slopes(file: str, above: str, below: str, width: float) -> list[tuple[int, 
                 " of a data line: it has no exact derivative"
             ) from None
     return rows
+
+
+def steps(case: LoadedCase, name: str, value: float, step: float) -> list[float]:
+    """Values of a number a ``step`` above and below ``value``, for differences of results.
+
+    The step is a share of the value; of a linear variable or an effect, of its range; of an angle
+    of 0, of 90 degrees. A value is left out if its sign differs, or if it lies beyond the bounds of
+    a variable that is within them.
+    """
+    variable, width = case.case.variables.get(name), abs(value) or 1.0
+    low, high = -inf, inf
+    if variable:
+        linear = variable.scale != "log"
+        width = variable.upper - variable.lower if linear else width
+        if variable.lower <= value <= variable.upper:
+            low, high = variable.lower, variable.upper
+    elif name.startswith(EFFECT_PATH):
+        effect = catalogue()[name.removeprefix(EFFECT_PATH)]
+        width = effect.high - effect.low
+    elif not value and unit_of(name) == "degrees":
+        width = 90.0
+    both = [value + side * step * width for side in (1, -1)]
+    return [each for each in both if low <= each <= high and each * value >= 0]
 
 
 def header(case: LoadedCase) -> str:

@@ -15,7 +15,7 @@ from ...tyre.own_deck.text import OwnDeckError, Place, named
 from ...tyre.resolve import resolved
 from ...tyre.templates import TemplateFailed
 from ...tyre.values import set_values
-from .decks import Design, DesignEvaluator, header, refuse_outside
+from .decks import Design, DesignEvaluator, header, refuse_outside, steps
 from .tyre_design import TyreDesign
 
 Added = dict[Place, list[str]]  # lines that are written before these places
@@ -77,9 +77,13 @@ class DecksDesign:
         return self.case.case.solver
 
     def neighbour(self, name: str, side: int) -> tuple[Design, float]:
-        """Raises TemplateFailed: these decks have no neighbours, a fit takes differences of
+        """Raises TemplateFailed: these decks have no neighbours, sensitivities are differences of
         frequencies."""
         raise TemplateFailed(f"{name}: decks in three dimensions have no exact sensitivities")
+
+    def steps(self, name: str, value: float, step: float) -> list[float]:
+        """Values of a number for differences."""
+        return steps(self.case, name, value, step)
 
     def check(self, evaluator: DesignEvaluator) -> None:
         """Raises OwnDeckError if they ask for shapes that name no modes, DeckRefused if the solver

@@ -20,7 +20,7 @@ from ...tyre.templates import TemplateFailed, environment, render
 from ...tyre.values import set_values
 from .abaqus import aside, context
 from .calculix import calculix_context
-from .decks import HEADER_LINES, DesignEvaluator, header, refuse_outside
+from .decks import HEADER_LINES, DesignEvaluator, header, refuse_outside, steps
 from .own import explained, own_jobs
 from .template_process import TemplateProcess
 
@@ -137,6 +137,10 @@ class TyreDesign:
         except InputError:
             return self.at({name: value}), value
         return (other if self.tyre.case.splice.share else other._all_round()), moved
+
+    def steps(self, name: str, value: float, step: float) -> list[float]:
+        """Values of a number for differences."""
+        return steps(self.case, name, value, step)
 
     def _all_round(self) -> TyreDesign:
         """The design with its splice's change all round in place of it, less by the share of the

@@ -26,6 +26,7 @@ from .solver import Solver, find_solver, refuse_missing_program
 from .store import Store, key_of
 
 SETTLED = ("no_equilibrium", "unstable")  # the deck's own doing: another run would say the same
+DIFFERENCE_STEP = 1e-4  # of a logarithm: best between truncation and most solvers' digits
 MODES_ON_TOP = 3  # times the time limit of a load, where modes are sought there too
 T = TypeVar("T")
 Array = np.ndarray
@@ -108,6 +109,13 @@ class Evaluator:
     def has_gradients(self) -> bool:
         """Whether the solver gives exact slopes of the design."""
         return self.design.has_slopes and "gradients" in self.solver.capabilities
+
+    @property
+    def difference_step(self) -> float | None:
+        """Step of a logarithm for sensitivities by differences, which suits the solver's digits;
+        None where it gives exact ones."""
+        exact = self.has_gradients
+        return None if exact else getattr(self.solver, "difference_step", DIFFERENCE_STEP)
 
     def has_gradients_at(self, values: Mapping[str, float]) -> bool:
         """`has_gradients` of the design with values of variables or effects."""

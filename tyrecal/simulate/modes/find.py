@@ -1,9 +1,14 @@
-"""Labelled modes of designs; more modes are computed if a wanted label is not among the first."""
+"""Labelled modes of designs; more modes are computed if a wanted label is not among the first.
+
+Where the solver gives no exact sensitivities, they are differences to neighbouring designs.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from ..evaluate.evaluator import Evaluator, Question
 from ..evaluate.failure import DeckRefused, EvaluationFailed
@@ -11,6 +16,7 @@ from ..evaluate.results import Evaluation
 from .label import Label, Mode, paired_labels
 from .match import margin, match
 
+Array = np.ndarray
 MORE_MODES = (4, 8)  # per harmonic, if a label is not among the modes first computed
 # labels that are wanted of a question, from its index and its modes
 Wanted = Callable[[int, Sequence[Mode]], Sequence[Label]]
@@ -39,15 +45,89 @@ def find_modes(
     wanted: Sequence[Label] | Wanted,
     jobs: int = 1,
 ) -> Iterator[tuple[int, ModesAnswer]]:
-    """Index and answer of each question as they are ready; those that lack a wanted label are
-    evaluated again with more modes, and come last.
+    """Index and answer of each question, those that lack a wanted label evaluated again with more
+    modes; with exact sensitivities as they are ready, else with differences, see `_with_rates`.
 
     wanted: labels, or a function that gives them.
     """
+    step = evaluator.difference_step if any(q.gradients for q in questions) else None
+    if step is None:
+        yield from _find(evaluator, questions, wanted, jobs)
+    else:
+        bare = [replace(question, gradients=()) for question in questions]
+        answers = dict(_find(evaluator, bare, wanted, jobs))
+        yield from _with_rates(evaluator, questions, answers, wanted, jobs, step).items()
+
+
+def _with_rates(
+    evaluator: Evaluator,
+    questions: Sequence[Question],
+    answers: dict[int, ModesAnswer],
+    wanted: Sequence[Label] | Wanted,
+    jobs: int,
+    step: float,
+) -> dict[int, ModesAnswer]:
+    """The answers with the sensitivities that the questions name, by one neighbour for each number:
+    above, or below where that has no solution; all neighbours of a side at once. NaN for modes
+    whose label the neighbour lacks. If both have no solution, the failure is the answer."""
+    designs = {place: each for place, each in answers.items() if isinstance(each, LabelledModes)}
+    pending = {
+        (place, name): evaluator.design.steps(name, questions[place].values[name], step)
+        for place in designs
+        for name in questions[place].gradients
+    }
+    rates: dict[int, tuple[dict[str, Array], dict[str, float]]] = {p: ({}, {}) for p in designs}
+    while pending:
+        keys = list(pending)
+        values = [pending[key].pop(0) for key in keys]
+        neighbours = [
+            replace(questions[place], values={**questions[place].values, name: value}, gradients=())
+            for (place, name), value in zip(keys, values, strict=True)
+        ]
+        of_neighbour: Wanted = lambda i, modes, keys=keys: _labels(wanted, keys[i][0], modes)  # type: ignore[misc]
+        for i, other in _find(evaluator, neighbours, of_neighbour, jobs):
+            place, name = keys[i]
+            centre, width = designs[place], values[i] - questions[place].values[name]
+            if isinstance(other, LabelledModes):
+                hertz = {mode.label: mode.frequency_Hz for mode in other.modes}
+                rate = np.full(len(centre.evaluation.modes), np.nan)
+                for mode in centre.modes:
+                    rise = hertz.get(mode.label, np.nan) - mode.frequency_Hz
+                    rate[mode.position] = rise / width
+                rates[place][0][name] = rate
+                rise = other.evaluation.mass_kg - centre.evaluation.mass_kg
+                rates[place][1][name] = rise / width
+            elif pending[keys[i]] and not getattr(other, "denied", False):
+                continue
+            else:
+                answers[place] = other
+            del pending[keys[i]]
+    for place, (of_modes, of_mass) in rates.items():
+        answer = answers[place]
+        if isinstance(answer, LabelledModes):
+            own = replace(answer.evaluation, gradients=of_modes, mass_gradients=of_mass)
+            answers[place] = replace(answer, evaluation=own)
+    return answers
+
+
+def _labels(wanted: Sequence[Label] | Wanted, place: int, modes: Sequence[Mode]) -> Sequence[Label]:
+    """The labels wanted of a question."""
+    return wanted(place, modes) if callable(wanted) else wanted
+
+
+def _find(
+    evaluator: Evaluator, questions: Sequence[Question], wanted: Sequence[Label] | Wanted, jobs: int
+) -> Iterator[tuple[int, ModesAnswer]]:
+    """`find_modes` without differences."""
     lost = dict.fromkeys(range(len(questions)), EvaluationFailed("lost_label", ""))
     for count in (None, *MORE_MODES):
         places, lost = list(lost), {}
-        repeats = [replace(questions[place], modes_per_harmonic=count) for place in places]
+        repeats = [
+            replace(
+                questions[place], modes_per_harmonic=count or questions[place].modes_per_harmonic
+            )
+            for place in places
+        ]
         answers = evaluator.answer_all(repeats, min(jobs, len(repeats)))
         for place, answer in zip(places, answers, strict=True):
             if not isinstance(answer, Evaluation):
@@ -55,7 +135,7 @@ def find_modes(
                 continue
             modes = paired_labels(answer.modes)  # the two modes of each pair as one
             try:
-                labels = wanted(place, modes) if callable(wanted) else wanted
+                labels = _labels(wanted, place, modes)
                 yield place, LabelledModes(answer, modes, match(modes, labels))
             except EvaluationFailed as error:
                 lost[place] = error

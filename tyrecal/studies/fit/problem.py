@@ -16,7 +16,7 @@ some, F is a number of standard deviations. What is known of a freed number coun
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +28,7 @@ from ...simulate.modes.label import Label, Mode
 from ...tyre.case import LoadedCase
 from ...tyre.state import AS_THE_CASE, TyreState, without
 from ..variable import read_variable
-from .differences import STEP, differences
+from .differences import differences
 from .freed import freed_variables
 from .least_squares import fit_covariance, fit_response
 from .road import PRESS_STEP, press, press_with_slopes
@@ -142,9 +142,7 @@ class Problem:
             self.labels[AS_THE_CASE] = []
         self.lower = np.array([v.scaled(v.lower) for v in self.variables])
         self.upper = np.array([v.scaled(v.upper) for v in self.variables])
-        self.difference_step = (
-            None if evaluator.has_gradients else getattr(evaluator.solver, "difference_step", STEP)
-        )
+        self.difference_step = evaluator.difference_step
         # how many of the road's targets, the first, have exact slopes: all but modes
         exact = self.road and self.difference_step is None
         exact = exact and "footprint_gradients" in evaluator.solver.capabilities
@@ -226,18 +224,11 @@ class Problem:
     def _evaluate(self, values: dict[str, float]) -> Point:
         """Residuals and Jacobian at values of the variables. Raises EvaluationFailed."""
         names = tuple(v.name for v in self.variables)
-        exact = self.difference_step is None
-        (by_state,) = self._in_states([values], names if exact else ())
-        if isinstance(by_state, EvaluationFailed):
-            raise by_state
+        by_state = self._in_states(values, names)
         measured = self._measured(by_state)
-        if exact:
-            slopes = self.slopes(by_state, self.targets, values)
-            if self.mass:
-                slopes = np.vstack([slopes, self._mass_slopes(by_state, values)])
-        else:
-            step, ask = self.difference_step or STEP, self._neighbours
-            slopes = differences(self.variables, values, step, ask, measured)[1]
+        slopes = self.slopes(by_state, self.targets, values)
+        if self.mass:
+            slopes = np.vstack([slopes, self._mass_slopes(by_state, values)])
         modal = len(self.targets)
         pressed, rises = self._pressed(values)
         known, shifts = self._known(values)
@@ -297,8 +288,7 @@ class Problem:
         targets: Sequence[Target],
         values: Mapping[str, float],
     ) -> Array:
-        """d f / d x (targets, variables), Hz, exact; a state's own numbers depend on no
-        variable."""
+        """d f / d x (targets, variables), Hz; a state's own numbers depend on no variable."""
         modes = [(by_state[t.state], by_state[t.state].wanted[t.label].position) for t in targets]
         rows = [[_slope(each, v.name, place) for v in self.variables] for each, place in modes]
         slopes = np.array(rows, float).reshape(len(rows), len(self.variables))
@@ -321,32 +311,18 @@ class Problem:
         slopes = [known.get(v.name, 0.0) * v.slope(values[v.name]) for v in self.variables]
         return np.array(slopes)
 
-    def _neighbours(
-        self, designs: Sequence[Mapping[str, float]]
-    ) -> Iterator[Array | EvaluationFailed]:
-        """`_measured` of each design, or its failure."""
-        for answer in self._in_states(designs):
-            yield answer if isinstance(answer, EvaluationFailed) else self._measured(answer)
-
     def _in_states(
-        self, designs: Sequence[Mapping[str, float]], names: tuple[str, ...] = ()
-    ) -> list[dict[TyreState, LabelledModes] | EvaluationFailed]:
-        """For each design its target modes in every state, or its first failure; all are requested
-        at once. Raises DeckRefused."""
-        wanted = [
-            self.question(design, state, names) for design in designs for state in self.labels
-        ]
-        answers = iter(self.modes_of(wanted, [*self.labels.values()] * len(designs)))
-        results: list[dict[TyreState, LabelledModes] | EvaluationFailed] = []
-        for _ in designs:
-            here = {state: next(answers) for state in self.labels}
-            for answer in here.values():
-                if isinstance(answer, DeckRefused):
-                    raise answer
-            failed = (each for each in here.values() if isinstance(each, EvaluationFailed))
-            modes = {state: each for state, each in here.items() if isinstance(each, LabelledModes)}
-            results.append(next(failed, modes))
-        return results
+        self, values: Mapping[str, float], names: tuple[str, ...]
+    ) -> dict[TyreState, LabelledModes]:
+        """The design's target modes in every state, with sensitivities by ``names``; all are
+        requested at once. Raises DeckRefused before EvaluationFailed."""
+        wanted = [self.question(values, state, names) for state in self.labels]
+        answers = self.modes_of(wanted, [*self.labels.values()])
+        failures = [each for each in answers if not isinstance(each, LabelledModes)]
+        for failure in sorted(failures, key=lambda each: isinstance(each, EvaluationFailed)):
+            raise failure
+        modes = (each for each in answers if isinstance(each, LabelledModes))
+        return dict(zip(self.labels, modes, strict=True))
 
     def question(
         self, values: Mapping[str, float], state: TyreState, names: tuple[str, ...]

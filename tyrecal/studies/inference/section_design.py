@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ...simulate.deck.tyre_design import TyreDesign
+from ...simulate.deck.tyre_design import DECK_STEP, TyreDesign
 from ...tyre.case import LoadedCase
 from .section_fields import SectionField, moved
 
@@ -13,8 +13,8 @@ FIELD_STEP = 0.01  # standard deviations to either side, to see how nodes move w
 
 
 class SectionDesign(TyreDesign):
-    """A case at values of its numbers and, each 0, of fields of its meridian and its gauges by
-    name: they are asked for slopes alone, which are those of the nodes that they move."""
+    """A case at values of its numbers and of fields of its meridian and its gauges, by name, in
+    standard deviations. Sensitivities by a field are those by the nodes that it moves."""
 
     def __init__(
         self,
@@ -24,8 +24,16 @@ class SectionDesign(TyreDesign):
         plain: LoadedCase | None = None,
     ):
         given = dict(values or {})
+        self.amounts = {k: v for k, v in given.items() if k in fields and v}
+        for name, amount in self.amounts.items():
+            case = moved(case, fields[name], amount)
         super().__init__(case, {k: v for k, v in given.items() if k not in fields}, plain)
         self.fields, self.values = fields, given
+
+    @property
+    def is_nominal(self) -> bool:
+        """Whether nothing is set, and no field is off."""
+        return not self.amounts and super().is_nominal
 
     def at(self, values: Mapping[str, float]) -> SectionDesign:
         """The case with these values. Raises ValueError."""
@@ -37,3 +45,10 @@ class SectionDesign(TyreDesign):
             return super().neighbour(name, side)
         amount = side * FIELD_STEP
         return TyreDesign(moved(self.case, self.fields[name], amount), {}, self.plain), amount
+
+    def steps(self, name: str, value: float, step: float) -> list[float]:
+        """Values for differences; a field's step is `FIELD_STEP` where that of others is
+        `DECK_STEP`."""
+        if name not in self.fields:
+            return super().steps(name, value, step)
+        return [value + side * step * FIELD_STEP / DECK_STEP for side in (1, -1)]

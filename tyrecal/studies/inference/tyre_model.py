@@ -46,7 +46,7 @@ class TyreModel:
     """ln f of the modes ``rows`` (label, where), and ln mass where the label is None.
 
     case: its variables are x; found: sources of error; ranges: effects that may be evaluated;
-    jobs: evaluations at a time. Raises DeckRefused where the solver has no exact slopes.
+    jobs: evaluations at a time. Where the solver gives no exact slopes, they are differences.
     """
 
     def __init__(
@@ -58,18 +58,6 @@ class TyreModel:
         ranges: Mapping[str, EffectRange],
         jobs: int = 1,
     ):
-        if not evaluator.has_gradients and "gradients" in evaluator.solver.capabilities:
-            raise DeckRefused(
-                "the solver gives no exact sensitivities of a case with a splice, and a diagnosis"
-                " needs them: take the splice out of the case, the diagnosis considers it as an"
-                " effect"
-            )
-        if not evaluator.has_gradients:
-            raise DeckRefused(
-                f"solver '{evaluator.solver.name}' gives no exact sensitivities, which a diagnosis"
-                " needs:"
-                " 'tyrecal solvers' shows which one does (gradients)"
-            )
         self.rows, self.found, self.jobs = list(rows), own_sources, jobs
         self.ranges: Mapping[str, EffectRange] = ranges
         self._present = case.case.effects
@@ -174,7 +162,8 @@ class TyreModel:
         known: dict[QueryKey, Answer | Exception] = {}
         for key, p in queries.items():
             before = None if p.effects or key[2] else self._plain_answers.get(key[0])
-            if before and (before.constants is not None or not p.constants):
+            has_constants = before and (before.constants is not None or not p.constants)
+            if before and has_constants and {*p.slopes} <= {*before.slopes}:
                 known[key] = before
         fresh = {key: p for key, p in queries.items() if key not in known}
         for (key, p), answer in zip(fresh.items(), self._evaluated([*fresh.values()]), strict=True):
@@ -188,7 +177,7 @@ class TyreModel:
         has."""
         constants = any(map(_needs_constants, (one, other)))
         slopes = {*one.slopes, *other.slopes}
-        if not one.effects:
+        if not one.effects and self.evaluator.has_gradients:  # they cost next to nothing
             slopes |= {*self.sloped_at_0} if constants or slopes else set()
             constants = constants or bool(slopes)
         slopes = {id for id in slopes if self._moves(id, one.effects.get(id, 0.0))}
@@ -296,6 +285,8 @@ class TyreModel:
 
     def _has_slopes(self, id: str, span: EffectRange) -> bool:
         """Whether the solver gives slopes with an effect."""
+        if not self.evaluator.has_gradients:
+            return True  # by differences
         try:
             far = span.base + span.high or span.base + span.low
             return self.evaluator.has_gradients_at({EFFECT_PATH + id: far})
@@ -368,7 +359,10 @@ class TyreModel:
     ) -> list[ModesAnswer]:
         """Labelled modes of designs, each with the names of which sensitivities are wanted. Raises
         SolverUnavailable."""
-        jobs = self.jobs if len(wanted) >= WORTH_A_POOL else 1
+        runs = len(wanted)
+        if not self.evaluator.has_gradients:
+            runs += sum(len(names) for _, names in wanted)
+        jobs = self.jobs if runs >= WORTH_A_POOL else 1
         # the longest first, so that the last ones end together
         order = sorted(range(len(wanted)), key=lambda i: -self._effort(wanted[i][0]))
         ordered = [wanted[i] for i in order]

@@ -9,12 +9,11 @@ from math import ceil
 
 import numpy as np
 
-from ...errors import InputError
 from ...measured.measurement import Measurement
 from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator, Question
-from ...simulate.evaluate.failure import DeckRefused, EvaluationFailed
-from ...simulate.modes.label import Label, Mode, paired_labels
+from ...simulate.modes.find import LabelledModes, find_modes
+from ...simulate.modes.label import Label, Mode
 from ...tyre.case import LoadedCase
 from ...tyre.state import TyreState
 from ..fit.problem import Problem
@@ -112,14 +111,9 @@ def label(
     together.
 
     prior: of the variables that are not ``fixed``, by default `start_prior`; about: the design at
-    which the model is expanded first, by default the prior's mean. Raises InputError where the
-    solver gives no slopes; EvaluationFailed; DeckRefused.
+    which the model is expanded first, by default the prior's mean. Raises EvaluationFailed,
+    DeckRefused.
     """
-    if not evaluator.has_gradients:
-        raise InputError(
-            f"solver '{evaluator.solver.name}' gives no exact sensitivities of this case, which"
-            " labels need: 'tyrecal solvers' shows which one does (gradients)"
-        )
     problem = Problem(case, evaluator, fixed)
     prior = prior or start_prior(problem.variables)
     frequencies = _of_unloaded(case, readings)
@@ -185,7 +179,7 @@ class LabelledModel:
             (i, mode, row)
             for i, (modes, rows) in enumerate(by_state)
             for mode, row in zip(modes, rows, strict=True)
-            if mode.label.family
+            if mode.label.family and np.isfinite(row).all()
         ]
         hertz = np.array([mode.frequency_Hz for _, mode, _ in every])
         slopes = np.array([row for *_, row in every]) / hertz[:, None]
@@ -206,14 +200,16 @@ class LabelledModel:
             Question(*problem.question(values, state, names), count) for state in self.states
         ]
         result = []
-        for answer in evaluator.answer_all(questions, self.jobs):
-            if isinstance(answer, EvaluationFailed | DeckRefused):
+        answers = dict(find_modes(evaluator, questions, [], self.jobs))
+        for place in range(len(questions)):
+            answer = answers[place]
+            if not isinstance(answer, LabelledModes):
                 raise answer
-            modes = paired_labels(answer.modes)
+            modes, gradients = answer.modes, answer.evaluation.gradients
             rows = np.zeros((len(modes), len(names)))
             for j, v in enumerate(problem.variables):
-                if v.name in answer.gradients:
-                    own = np.asarray(answer.gradients[v.name])[[m.position for m in modes]]
+                if v.name in gradients:
+                    own = np.asarray(gradients[v.name])[[m.position for m in modes]]
                     rows[:, j] = own * v.slope(values[v.name])
             result.append((modes, rows))
         return result

@@ -18,7 +18,7 @@ from ...tyre.case import LoadedCase
 from ...tyre.case.parts import RimSupport
 from ...tyre.state import AS_THE_CASE, SPRINGS, WHEEL_FREE, TyreState
 from ...tyre.values import set_values
-from ..emulator import Emulator, emulator, needs_slopes
+from ..emulator import Emulator, emulator
 from ..fit.calibrate import noise_Hz
 from ..fit.targets import read_targets, rims_of
 from ..inference.check_units import check_units
@@ -84,7 +84,7 @@ def run(
     below and above the case's; on every rim that the case or a reading has. Raises InputError;
     EvaluationFailed where the start or the first box cannot be evaluated.
     """
-    check(case, evaluator, readings)
+    check(case, readings)
     stage(SAMPLE_STAGES[0])
     noise = None if readings is not None else noise_Hz(case, evaluator)
     if readings is None:
@@ -185,10 +185,9 @@ def whitening(sigma: Array) -> Array:
     return np.asarray(np.linalg.inv(np.linalg.cholesky(sigma)))
 
 
-def check(case: LoadedCase, evaluator: Evaluator, readings: Sequence[Measurement] | None) -> None:
+def check(case: LoadedCase, readings: Sequence[Measurement] | None) -> None:
     """Raises InputError where nothing can be sampled, before anything is evaluated."""
     needs_emcee()
-    needs_slopes(evaluator)
     if not read_variables(case):
         raise InputError("the case has no variables: there is nothing to sample")
     if PRESSURE_NAME in calibrated(case):
