@@ -178,9 +178,8 @@ class Evaluator:
         """
         self.needs_road(bool(modes), rim_stiffness)
         design, loads = self._with(values), tuple(loads_N)
-        start = None
-        if base and not (modes or rim_stiffness) and _key(self._with(base)) != _key(design):
-            start = self._pressed(base, loads, gradients)
+        at_rings = not (modes or rim_stiffness)
+        start = self._start_on_road(design, base, loads, gradients) if at_rings else None
         decks = Decks(
             design,
             gradients,
@@ -201,15 +200,34 @@ class Evaluator:
             self._remember(design, answer)
         return answer
 
+    def _start_on_road(
+        self,
+        design: Design,
+        base: Mapping[str, float] | None,
+        loads: tuple[float, ...],
+        gradients: tuple[str, ...],
+    ) -> PressedTyre | None:
+        """The tyre whose state on the road begins a design's first load: the design ``base`` or,
+        for that itself and where there is none, the design on its coarser mesh. It is pressed
+        before, so that the answer depends on no other question. None: the inflated tyre."""
+        if "pressed_start" not in self.solver.capabilities:
+            return None
+        start = None
+        if base and _key(self._with(base)) != _key(design):
+            start = self._pressed(base, loads, gradients)
+        if start or not (coarser := design.coarser):
+            return start
+        other = replace(self.of(coarser), folder=None, keep=False)
+        try:
+            return other._pressed(coarser.values, loads[:1], ())
+        except DeckRefused:  # of this mesh; that of the design may be right
+            return None
+
     def _pressed(
         self, base: Mapping[str, float], loads: tuple[float, ...], gradients: tuple[str, ...]
     ) -> PressedTyre | None:
-        """The design ``base`` on the road, from which others begin at the first load. It is pressed
-        before them, so that their answers depend on no other question; with their ``gradients``, so
-        that its own answer is recorded only once. None where it cannot bear the load, or the solver
-        cannot begin from it."""
-        if "pressed_start" not in self.solver.capabilities:
-            return None
+        """The design ``base`` on the road; with the ``gradients`` of those that begin from it, so
+        that its own answer is recorded only once. None where it cannot bear the load."""
         design = self._with(base)
         key = _key(design), loads[0]
         if key not in self.pressed_tyres:
