@@ -23,13 +23,13 @@ NO_PAIR = "undecided"
 class ShapePair(ResultPart):
     """A measured shape and the mode of the design that it is most like."""
 
-    measured: str
-    member: str
-    frequency_Hz: float
+    measured: str  # label of the measured shape
+    member: str  # of a doublet: a or b
+    frequency_Hz: float  # measured
     computed: str | None  # None if the sensors see no mode
-    mac: float
+    mac: float  # of the shape with that mode, 0 to 1
     rival: str | None  # the mode that it is like next
-    rival_mac: float
+    rival_mac: float  # of the shape with that one
     decided: bool  # whether the first leads by more than the chance level
     plane_mac: float | None  # smallest of the measured doublet's plane with the mode's
 
@@ -37,26 +37,26 @@ class ShapePair(ResultPart):
 class SensorAgreement(ResultPart):
     """Agreement of a signal over all decided pairs."""
 
-    signal: Annotated[str, Column("sensor", "")]
-    comac: Annotated[float, Column("COMAC", ".3f")]
-    ecomac: Annotated[float, Column("ECOMAC", ".3f")]
+    signal: Annotated[str, Column("sensor", "")]  # sensor and its direction
+    comac: Annotated[float, Column("COMAC", ".3f")]  # 1: measured and computed are proportional
+    ecomac: Annotated[float, Column("ECOMAC", ".3f")]  # 0: they are equal
 
 
 class ShapeCorrelation(ResultPart):
     """Shapes of a test against those of a design at the test's pressure."""
 
-    file: str
+    file: str  # the file with the shapes
     pressure_kPa: float
-    signals: int
-    chance_level: float
+    signals: int  # number of measured signals
+    chance_level: float  # lead of the best MAC over the next that chance reaches
     measured: list[str]  # rows of ``auto_mac``: doublets are planes
-    auto_mac: list[list[float]]
+    auto_mac: list[list[float]]  # MAC of the measured shapes with each other
     computed: list[str]  # columns of ``mac``: doublets are planes
     unseen: list[str]  # modes of the design that hardly move the sensors: not compared
-    auto_mac_computed: list[list[float]]
+    auto_mac_computed: list[list[float]]  # MAC of the computed modes with each other
     mac: list[list[float]]  # a row for each of ``pairs``
-    pairs: list[ShapePair]
-    sensors: list[SensorAgreement]
+    pairs: list[ShapePair]  # each measured shape with its mode
+    sensors: list[SensorAgreement]  # agreement by signal
 
     def table(self) -> Table:
         """The pairs."""

@@ -130,7 +130,7 @@ class LabelsResult(Result):
     figures = "tyrecal.report.correlation:figures"
 
     labels: Labels  # labels of frequencies that came without one
-    shapes: list[ShapeCorrelation] = Field(default=[])
+    shapes: list[ShapeCorrelation] = Field(default=[])  # measured shapes with modes of the case
 
     def csv(self) -> str:
         keys = ["frequency_Hz", "sigma_Hz", "pressure_kPa", "rim", "c", "m", "kind", "probability"]

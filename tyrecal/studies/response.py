@@ -115,7 +115,7 @@ class ResponseFunctionEntry(ResultPart):
 
     excite: Annotated[str, Column("force at", "")]  # where the force acts, and its direction
     respond: Annotated[str, Column("response at", "")]  # where the response is, and its direction
-    quantity: Annotated[str, Column("quantity", "")]  # receptance or accelerance
+    quantity: Annotated[str, Column("quantity", "")]  # receptance, accelerance, blocked force or moment
     unit: Annotated[str, Column("unit", "")]  # unit of the function
     # magnitude at the lowest frequency
     at_lowest: Annotated[float, Column("at the lowest Hz", ".4g")]

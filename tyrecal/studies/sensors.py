@@ -19,9 +19,9 @@ Array = np.ndarray
 class SensorPlace(ResultPart):
     """A sensor's place on the tread."""
 
-    sensor: Annotated[int, Column("sensor", ".0f")]
-    radius_m: Annotated[float, Column("R mm", ".1f", 1e3)]
-    angle_deg: Annotated[float, Column("angle °", ".1f")]
+    sensor: Annotated[int, Column("sensor", ".0f")]  # number
+    radius_m: Annotated[float, Column("R mm", ".1f", 1e3)]  # distance from the axle
+    angle_deg: Annotated[float, Column("angle °", ".1f")]  # along the circumference
     z_m: Annotated[float, Column("Z mm", ".1f", 1e3)]  # along the axle, from the middle plane
 
 
@@ -30,7 +30,7 @@ class SensedMode(Named):
 
     labelled: Annotated[float, Column("labelled %", ".0f", 100)]  # share of drawn tests
     shift_percent: Annotated[float, Column("mass shift %", "+.2f")]  # mean of both of a doublet
-    split_percent: Annotated[float, Column("split %", ".2f")]
+    split_percent: Annotated[float, Column("split %", ".2f")]  # of a doublet by the mass
 
 
 class SensorsResult(Result):
@@ -40,13 +40,13 @@ class SensorsResult(Result):
     is_seldom = True
 
     axes: str  # directions that each sensor measures: r, t, z
-    sensor_mass_kg: float
+    sensor_mass_kg: float  # mass of each sensor
     labelled: float  # share of the modes of all drawn tests
     labelled_error: float  # standard error of that by the number of tests
-    chance_level: float
-    largest_auto_mac: float
-    places: list[SensorPlace]
-    modes: list[SensedMode]
+    chance_level: float  # lead of the best MAC over the next that chance reaches
+    largest_auto_mac: float  # largest MAC of two modes at these sensors
+    places: list[SensorPlace]  # places of the sensors
+    modes: list[SensedMode]  # modes that they are to distinguish
 
     def csv(self) -> str:
         return csv_text([*SensorPlace.model_fields], (each.model_dump() for each in self.places))

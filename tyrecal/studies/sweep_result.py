@@ -44,37 +44,34 @@ LOWEST, CHANGE = Column("lowest Hz"), Column("", "+.2f")
 class SweptNumber(ResultPart):
     """A number that is swept, in its own unit."""
 
-    name: str
-    low: float
-    high: float
+    name: str  # variable or path
+    low: float  # low end of its range
+    high: float  # high end of its range
     steps: int | None = None  # None: sampled
 
 
 class SweptPoint(ResultPart):
     """The design with the swept numbers at these values."""
 
-    values: dict[str, float]
-    mass_kg: float
-    modes: list[ModeEntry]
+    values: dict[str, float]  # by the names of the swept numbers
+    mass_kg: float  # mass of the tyre without its rim
+    modes: list[ModeEntry]  # those that all points have
 
 
 class SweptMode(Named):
-    """A mode over all points; ``frequency_Hz`` is its mean.
+    """A mode over all points, and the plane of least squares through them; ``frequency_Hz`` is its
+    mean."""
 
-    change_percent: by each number from its low to its high end, of the mean: the plane of least
-    squares through all points. linear_share: share of the variance that this plane explains.
-    """
-
-    lowest_Hz: float
-    highest_Hz: float
-    change_percent: dict[str, float]
-    linear_share: float
+    lowest_Hz: float  # lowest frequency over all points
+    highest_Hz: float  # highest frequency over all points
+    change_percent: dict[str, float]  # change of the mean by each number, from low to high end
+    linear_share: float  # share of the variance that these changes explain
 
 
 class SweepFindings(ResultPart):
     """Findings in words."""
 
-    words: list[str]
+    words: list[str]  # findings in words
 
 
 class SweepResult(Result):
@@ -85,14 +82,14 @@ class SweepResult(Result):
     is_seldom = follows_fit = True
 
     design: str
-    sampling: Literal["grid", "latin_hypercube"]
+    sampling: Literal["grid", "latin_hypercube"]  # how the points were chosen
     seed: int | None = None  # of a Latin hypercube, whose values are uniform within the ranges
     discrepancy: float | None = None  # its centred L2 discrepancy
-    numbers_swept: list[SweptNumber]
-    rows: Annotated[list[SweptPoint], Field(min_length=1)]
-    failed: list[Failed]
-    modes: list[SweptMode]
-    findings: SweepFindings
+    numbers_swept: list[SweptNumber]  # swept numbers with their ranges
+    rows: Annotated[list[SweptPoint], Field(min_length=1)]  # points that were computed
+    failed: list[Failed]  # points that were not
+    modes: list[SweptMode]  # modes over all points
+    findings: SweepFindings  # findings on all points
 
     @classmethod
     def run(

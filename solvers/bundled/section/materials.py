@@ -139,7 +139,7 @@ def read_materials(keywords: list[Block]) -> dict[str, Material]:
             if name in blocks:
                 raise DeckError(k.place, f"material {name} is defined twice")
             own = blocks[name] = [k]
-        elif k.name in MATERIAL_OPTIONS:
+        elif k.name in MATERIAL_READERS:
             if not own:
                 raise DeckError(k.place, f"*{k.name} must follow a *MATERIAL")
             own.append(k)
@@ -152,7 +152,7 @@ def _material(blocks: tuple[Block, ...]) -> Material:
     those are that carry no tangent. Raises DeckError."""
     material = Material(blocks[0].need("NAME"), blocks[0].place)
     for k in blocks[1:]:
-        MATERIAL_OPTIONS[k.name](material, k)
+        MATERIAL_READERS[k.name](material, k)
         if material.rubber is not None and material.youngs_modulus is not None:
             raise DeckError(material.place, f"material {material.name} has two laws")
     return material
@@ -240,7 +240,7 @@ def _acoustic(m: Material, k: Block) -> None:
     m.bulk_modulus = _positive(k, 0, "bulk modulus")
 
 
-MATERIAL_OPTIONS = {
+MATERIAL_READERS = {
     "ACOUSTIC MEDIUM": _acoustic,
     "DAMPING": _damping,
     "DENSITY": _density,

@@ -77,12 +77,12 @@ class DeckMesh:
 
 
 _MESHES: OrderedDict[tuple[object, ...], DeckMesh] = OrderedDict()
-TOPOLOGY = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "RIGID BODY", "EMBEDDED ELEMENT"}
+MESH_KEYWORDS = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "RIGID BODY", "EMBEDDED ELEMENT"}
 
 
 def read_mesh(keywords: list[Block]) -> DeckMesh:
     """The mesh of a section job, remembered while its blocks stay the same. Raises DeckError."""
-    topology = [k for k in keywords if k.name in TOPOLOGY]
+    topology = [k for k in keywords if k.name in MESH_KEYWORDS]
     seeded = [k for k in topology if k.is_seeded]
     if any(k.name != "NODE" for k in seeded):
         return _mesh(topology)

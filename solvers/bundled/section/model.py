@@ -9,14 +9,14 @@ from dataclasses import dataclass, field, replace
 from ...language.text import Block
 from .half_mesh import half_mesh
 from .laws.energy_law import EnergyLaw
-from .materials import MATERIAL_OPTIONS, Material, ModulusTable, read_materials
-from .mesh import TOPOLOGY, DeckMesh, read_mesh
+from .materials import MATERIAL_READERS, Material, ModulusTable, read_materials
+from .mesh import MESH_KEYWORDS, DeckMesh, read_mesh
 from .parts import cords, membrane, rubber
 from .parts.elastic import Elastic
 from .parts.part import SectionJob, TyrePart
 
 READERS = (rubber.read, membrane.read, cords.read)  # take materials by `SectionJob.material`
-NO_SECTIONS = {*TOPOLOGY, "MATERIAL", *MATERIAL_OPTIONS}
+NO_SECTIONS = {*MESH_KEYWORDS, "MATERIAL", *MATERIAL_READERS}
 
 
 @dataclass

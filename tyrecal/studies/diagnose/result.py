@@ -66,8 +66,8 @@ class Residual(ResultPart):
     """A measurement over the calibrated model."""
 
     row: str  # measured value in words: mode, pressure, rim
-    run: int  # number of the measurement, for repeats
-    percent: float  # measured over calibrated model, less 1
+    run: int  # 0: the tyre as it is; 1, 2, ...: with something added, in the order of the files
+    percent: float  # 100 ln(measured over calibrated model)
     sigma_percent: float  # its standard deviation
 
     @property

@@ -93,8 +93,8 @@ class VarianceShare(Named):
     is in its middle."""
 
     deviation_percent: float  # standard deviation
-    first: dict[str, float]  # by variable
-    total: dict[str, float]
+    first: dict[str, float]  # by variable alone
+    total: dict[str, float]  # by variable, together with others
 
 
 class Optimum(ResultPart):
