@@ -77,12 +77,12 @@ class DeckMesh:
 
 
 _MESHES: OrderedDict[tuple[object, ...], DeckMesh] = OrderedDict()
-MESH_KEYWORDS = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "RIGID BODY", "EMBEDDED ELEMENT"}
+OF_THE_MESH = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "RIGID BODY", "EMBEDDED ELEMENT"}
 
 
 def read_mesh(keywords: list[Block]) -> DeckMesh:
     """The mesh of a section job, remembered while its blocks stay the same. Raises DeckError."""
-    topology = [k for k in keywords if k.name in MESH_KEYWORDS]
+    topology = [k for k in keywords if k.name in OF_THE_MESH]
     seeded = [k for k in topology if k.is_seeded]
     if any(k.name != "NODE" for k in seeded):
         return _mesh(topology)

@@ -10,13 +10,13 @@ from ...language.text import Block
 from .half_mesh import half_mesh
 from .laws.energy_law import EnergyLaw
 from .materials import MATERIAL_READERS, Material, ModulusTable, read_materials
-from .mesh import MESH_KEYWORDS, DeckMesh, read_mesh
+from .mesh import OF_THE_MESH, DeckMesh, read_mesh
 from .parts import cords, membrane, rubber
 from .parts.elastic import Elastic
 from .parts.part import SectionJob, TyrePart
 
 READERS = (rubber.read, membrane.read, cords.read)  # take materials by `SectionJob.material`
-NO_SECTIONS = {*MESH_KEYWORDS, "MATERIAL", *MATERIAL_READERS}
+NO_SECTIONS = {*OF_THE_MESH, "MATERIAL", *MATERIAL_READERS}
 
 
 @dataclass
