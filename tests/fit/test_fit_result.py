@@ -102,7 +102,7 @@ def test_a_variable_is_at_a_bound_to_a_millionth(gap: float, at_bound: bool, sid
     point = problem.evaluate(x)
     report = StartReport({}, point, "", True, [])
     history = [{"objective_Hz": point.objective, "values": {}}]
-    variables = fit_result(problem, point, report, [report], history, 0, "slsqp").variables
+    variables = fit_result(problem, point, [report], history, 0, "slsqp").variables
     assert [one.at_bound for one in variables.values()] == [False, False, at_bound]
 
 
@@ -112,4 +112,4 @@ def test_a_fit_has_moved_by_more_than_a_millionth(change: float, moved: bool) ->
     first, last = problem.evaluate(START_X), problem.evaluate(START_X + change * np.eye(3)[1])
     report = StartReport({}, last, "", True, [])
     history = [{"objective_Hz": last.objective, "values": {}}]
-    assert fit_result(problem, first, report, [report], history, 0, "slsqp").moved == moved
+    assert fit_result(problem, first, [report], history, 0, "slsqp").moved == moved

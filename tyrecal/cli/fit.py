@@ -209,13 +209,14 @@ def _write_shapes(
     values = state.design(loaded, fit.fitted.values)
     modes = sorted(fit.fitted.modes.values(), key=lambda mode: mode.frequency_Hz)
     evaluation = evaluator.evaluate(Question(values))
-    shapes = tyre_data(with_values(loaded, values), evaluation, modes)
+    design = with_values(loaded, values)
+    shapes = tyre_data(design, evaluation, modes)
     run.write_json("fit_shapes.json", shapes)
     if pictures:
         from ..report.pictures import draw_fit
 
         kind = run.figure_format
-        draw_fit(run.new, loaded, values, evaluation, modes, fit.history, fit.found, kind)
+        draw_fit(run.new, design, evaluation, modes, fit.history, fit.found, kind)
 
 
 class _Points:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -155,14 +156,14 @@ def command(
         if len(deck_files) > 1 or stands_in_space(read):
             decks = read_own_decks(deck_files, read.units, crown_set or "CROWN")
             numbers = _numbers_of_marks(decks, assigned)
-            _from_decks(decks, numbers, words, pressure_kPa, output, force, terminal)
+            new = NewFiles(output, "", force)
+            _from_decks(decks, numbers, words, pressure_kPa, new, terminal)
         elif crown_set:
             raise click.UsageError("--crown-set is for decks in three dimensions")
         else:
             numbers = _numbers_of_marks(read, assigned)
-            _from_deck(
-                read, numbers, words, pressure_kPa, output, suffix, force, allow_unusual, terminal
-            )
+            new = NewFiles(output, suffix, force)
+            _from_deck(read, numbers, words, pressure_kPa, new, allow_unusual, terminal)
         return 0
     given = {"crown": crown_mm, "sidewall": sidewall_mm, "bead": bead_mm, "belt": belt_width_mm}
     lengths = {key: 1e-3 * value for key, value in given.items() if value is not None}
@@ -262,19 +263,37 @@ def _numbers_of_marks(deck: OwnDeck | OwnDecks, assigned: tuple[str, ...]) -> di
     return given
 
 
+@dataclass(frozen=True)
+class NewFiles:
+    """Where the case of a deck and its picture go: --output, the picture's suffix ("": none), and
+    whether over files that exist."""
+
+    output: Path | None
+    suffix: str
+    force: bool
+
+    def of_deck(self, file: Path) -> tuple[Path, Path | None]:
+        """Paths of the case of a deck, and of its picture. Raises InputError, UsageError."""
+        target = self.output or file.with_suffix(".yaml")
+        if target.resolve().parent != file.resolve().parent:
+            raise click.UsageError(f"--output '{target}': the case must be in its deck's folder")
+        picture = target.with_suffix(self.suffix) if self.suffix else None
+        for path in [target, *([picture] if picture else [])]:
+            if path.exists() and not self.force:
+                raise InputError(f"'{path}' exists already; give --force to write over it")
+        return target, picture
+
+
 def _from_deck(
     deck: OwnDeck,
     numbers: dict[str, float],
     size: str,
     pressure_kPa: float | None,
-    output: Path | None,
-    suffix: str,
-    force: bool,
+    new: NewFiles,
     allow_unusual: bool,
     terminal: Terminal,
 ) -> None:
-    """Write the case of a deck next to it, print what is in the deck, and draw it; ``suffix``: of
-    the picture, "" for none."""
+    """Write the case of a deck next to it, print what is in the deck, and draw it."""
     from ..files import atomic_write
     from ..tyre.case.kinds.section_deck import trial
     from ..tyre.case.own_case import own_case
@@ -286,7 +305,7 @@ def _from_deck(
     if not allow_unusual and (slips := list(deck_slips(deck, {**deck.numbers, **numbers}))):
         raise InputError("\n".join(map(str, slips)))
     text = own_case(deck, flat, size, pressure_kPa, numbers)
-    target, picture = _in_deck_folder(deck.path, output, suffix, force)
+    target, picture = new.of_deck(deck.path)
     mass_kg = trial(flat)
     with atomic_write(target) as partial:
         partial.write_text(text, encoding="utf-8")
@@ -305,8 +324,7 @@ def _from_decks(
     numbers: dict[str, float],
     size: str,
     pressure_kPa: float | None,
-    output: Path | None,
-    force: bool,
+    new: NewFiles,
     terminal: Terminal,
 ) -> None:
     """Write the case of decks in three dimensions next to them, and print what is known of them."""
@@ -316,23 +334,9 @@ def _from_decks(
     from .deck import known_of_decks
 
     text = own_decks_case(decks, size, pressure_kPa, numbers)
-    target, _ = _in_deck_folder(decks.path, output, "", force)
+    target, _ = new.of_deck(decks.path)
     with atomic_write(target) as partial:
         partial.write_text(text, encoding="utf-8")
     loaded = load_case(target, allow_unusual=True)
     terminal.result({"case": str(target), **known_of_decks(loaded, decks, terminal)})
     terminal.say(f"next: {_modes(target)} --solver abaqus")
-
-
-def _in_deck_folder(
-    file: Path, output: Path | None, suffix: str, force: bool
-) -> tuple[Path, Path | None]:
-    """Where the case of a deck goes, and its picture. Raises InputError, UsageError."""
-    target = output or file.with_suffix(".yaml")
-    if target.resolve().parent != file.resolve().parent:
-        raise click.UsageError(f"--output '{target}': the case must be in its deck's folder")
-    picture = target.with_suffix(suffix) if suffix else None
-    for path in [target, *([picture] if picture else [])]:
-        if path.exists() and not force:
-            raise InputError(f"'{path}' exists already; give --force to write over it")
-    return target, picture

@@ -11,7 +11,6 @@ from ..simulate.modes.label import Label, Mode
 from ..studies.fit.result import FitResult
 from ..tyre.case import LoadedCase
 from ..tyre.resolve import resolved
-from ..tyre.values import with_values
 from .convergence import draw_convergence, draw_states
 from .correlation import figures
 from .figure import save
@@ -53,18 +52,17 @@ def draw_evaluation(
 def draw_fit(
     folder: Path,
     case: LoadedCase,
-    values: Mapping[str, float],
     evaluation: Evaluation,
     modes: Sequence[Mode],
     history: Sequence[Mapping[str, Any]],
     fit: FitResult,
     kind: str = "png",
 ) -> None:
-    """Draw the fitted design, the convergence and, for a fit to several states, fit_states.
+    """Draw the fitted design ``case``, the convergence and, for several states, fit_states.
 
     kind: one of `files.PICTURE_FORMATS`.
     """
-    draw_evaluation(folder, "fit", with_values(case, values), evaluation, modes, kind)
+    draw_evaluation(folder, "fit", case, evaluation, modes, kind)
     save(draw_convergence(history, fit.objective_unit), folder / f"convergence.{kind}")
     for name, figure in figures(fit).items():
         save(figure, folder / f"{name}.{kind}")

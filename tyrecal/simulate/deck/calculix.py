@@ -13,7 +13,7 @@ from ...tyre.resolve import Tyre
 from ...tyre.section.section import SectionError
 from ...tyre.templates import TemplateFailed
 from .abaqus import claimed, deck_name, solid_claims
-from .sector import INNER_FACE, PlyStrip, Sector, build_sector
+from .sector import INNER_FACE, Division, PlyStrip, Sector, build_sector
 
 ELEMENT_TYPES = ("C3D20R", "C3D20", "C3D8")
 PLY_THICKNESS_M = 2e-4
@@ -54,9 +54,11 @@ def calculix_context(tyre: Tyre) -> dict[str, Any]:
     try:
         sector = build_sector(
             tyre.gauged,
-            tuple(level.elements[name] for name, _ in tyre.section.regions),
-            tuple(level.rows),
-            tuple(level.grading) if level.grading else None,
+            Division(
+                tuple(level.elements[name] for name, _ in tyre.section.regions),
+                tuple(level.rows),
+                tuple(level.grading) if level.grading else None,
+            ),
             element != "C3D8",
             sectors,
             thickness,

@@ -136,38 +136,33 @@ class PressedTyre:
     deflection_m: float
 
 
+@dataclass(eq=False)
 class Decks:
     """Texts of a design's decks, written on request: the input of a solver's adapter."""
 
-    def __init__(
-        self,
-        design: Design,
-        gradients: tuple[str, ...] = (),
-        modes_per_harmonic: int | None = None,
-        loads_N: tuple[float, ...] = (),
-        loaded_modes: int = 0,
-        start: np.ndarray | None = None,
-        pressed_start: PressedTyre | None = None,
-        response: Mapping[str, Any] | None = None,
-        rim_stiffness: bool = False,
-    ):
-        """gradients: variables whose places in the deck are wanted; modes_per_harmonic: the
-        design's, or a larger number for a second look; loads_N: press the tyre on the road with
-        these instead of finding modes; loaded_modes: how many to find there; start (n, 4): node
-        numbers and displacements, m, of a shape near the inflated one, for solvers that can use
-        it (``start``); pressed_start: a tyre on the road near this one (``pressed_start``);
-        response: responses that are wanted (``response``); rim_stiffness: that of the rim is wanted
-        at each load."""
-        self.design, self.gradients = design, gradients
-        self.loads_N, self.loaded_modes, self.start = loads_N, loaded_modes, start
-        self.pressed_start = pressed_start
-        self.request = {**design.request, "loads_N": loads_N, "loaded_modes": loaded_modes}
-        if response:
-            self.request["response"] = response
-        self.request["rim_stiffness"] = rim_stiffness
-        if modes_per_harmonic:
-            self.request["modes_per_harmonic"] = modes_per_harmonic
-        self._header = design.header  # of all its texts: slopes come of their data
+    design: Design
+    gradients: tuple[str, ...] = ()  # variables whose places in the deck are wanted
+    modes_per_harmonic: int | None = None  # the design's, or a larger number for a second look
+    loads_N: tuple[float, ...] = ()  # press the tyre on the road with these, and find no modes
+    loaded_modes: int = 0  # how many to find on the road
+    # (n, 4) node numbers and displacements, m, of a shape near the inflated one, for solvers that
+    # can use it (``start``)
+    start: np.ndarray | None = None
+    pressed_start: PressedTyre | None = None  # a tyre on the road near this one
+    response: Mapping[str, Any] | None = None  # responses that are wanted
+    rim_stiffness: bool = False  # that of the rim is wanted at each load
+
+    def __post_init__(self) -> None:
+        self.request = {
+            **self.design.request,
+            "loads_N": self.loads_N,
+            "loaded_modes": self.loaded_modes,
+            **({"response": self.response} if self.response else {}),
+            "rim_stiffness": self.rim_stiffness,
+        }
+        if self.modes_per_harmonic:
+            self.request["modes_per_harmonic"] = self.modes_per_harmonic
+        self._header = self.design.header  # of all its texts: slopes come of their data
 
     @property
     def values(self) -> Mapping[str, float]:

@@ -53,12 +53,19 @@ class Sector:
     inner: list[int]  # section elements at the inner surface, on which the pressure acts
 
 
+@dataclass(frozen=True)
+class Division:
+    """Division of a section into elements."""
+
+    elements: tuple[int, ...]  # along each region
+    rows: tuple[int, ...]  # between neighbouring lines
+    grading: tuple[float, ...] | None  # as in `build_mesh`
+
+
 @lru_cache(maxsize=4)
 def build_sector(
     section: Section,
-    elements: tuple[int, ...],
-    rows: tuple[int, ...],
-    grading: tuple[float, ...] | None,
+    division: Division,
     quadratic: bool,
     sectors: int,
     thickness: float,
@@ -66,15 +73,15 @@ def build_sector(
 ) -> Sector:
     """A sector of 360/``sectors`` degrees, one element long, with plies of ``thickness`` (m).
 
-    elements: numbers along each region; rows: numbers between neighbouring lines; grading: as in
-    `build_mesh`; quadratic: bricks of 20 nodes, else 8; whole_bead: the mesh goes round the bead.
-    Raises SectionError where rows fold over, as they do when plies overlap.
+    quadratic: bricks of 20 nodes, else 8; whole_bead: the mesh goes round the bead. Raises
+    SectionError where rows fold over, as they do when plies overlap.
     """
     split = with_plies(section, thickness)
+    rows = division.rows
     thin = [1] * len(rows[1:])
     counts = interleaved(list(rows), thin)
-    grades = interleaved(list(grading or (1.0,) * len(rows)), [1.0] * len(thin))
-    mesh = build_mesh(split, list(elements), counts, False, grades, whole_bead)
+    grades = interleaved(list(division.grading or (1.0,) * len(rows)), [1.0] * len(thin))
+    mesh = build_mesh(split, list(division.elements), counts, False, grades, whole_bead)
     plies = np.cumsum(counts)[0:-1:2]  # the thin row over each line
     row_of = {}
     for number, (_, row) in mesh.cells.items():

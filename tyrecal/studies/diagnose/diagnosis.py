@@ -136,15 +136,17 @@ def diagnose(
     stage(STAGES[0])
     bares, first, labels = list[InverseProblem](), list[list[Hypothesis]](), None
     for reading in readings:
-        bare = _calibrated(
-            model, rows, reading.observations, changes, assumed, expansion, known, begin
-        )
+        seen = reading.observations
+        if expansion is None:
+            bare = _calibrated(model, rows, seen, changes, assumed, known, begin)
+        else:
+            bare = _about(expansion, model, rows, seen, changes, assumed)
         hypotheses = weigh_hypotheses(bare)
         enough = labelled and len(bare.places) > len(model.start)
         labels = exchanged(bare, hypotheses, rows) if enough else None
         if labels:
             there = with_exchanged(bare.observations, *labels)
-            bare = _calibrated(model, rows, there, changes, assumed, None, known, begin)
+            bare = _calibrated(model, rows, there, changes, assumed, known, begin)
             hypotheses = weigh_hypotheses(bare)
         bares.append(bare)
         first.append(hypotheses)
@@ -208,9 +210,8 @@ def _calibrated(
     observations: Observations,
     changes: tuple[Toggle, ...],
     assumed: Assumed,
-    expansion: Expansion | None,
     known: Expansion | None,
-    begin: Array | None = None,
+    begin: Array | None,
 ) -> InverseProblem:
     """Observations and the model, expanded about the plain tyre that fits them.
 
@@ -218,15 +219,10 @@ def _calibrated(
     tyre that fits them if any of these may have moved them.
     """
     where = places(observations, rows)
-    given = expansion
-    if given is None:
-        x0 = plain_fit(model, observations, where, assumed.form, known, begin=begin)
-        expansion = carried(known, model, x0) if known else expand(model, x0)
-    assert expansion is not None
-    problem = InverseProblem(
-        observations, expansion, model.ranges, where, model.start, model.spread, changes, assumed
-    )
-    if given is not None or _fits(problem):
+    x0 = plain_fit(model, observations, where, assumed.form, known, begin=begin)
+    expansion = carried(known, model, x0) if known else expand(model, x0)
+    problem = _about(expansion, model, rows, observations, changes, assumed)
+    if _fits(problem):
         return problem
     shifts = (known or expansion).range_shifts(where)
     moved = np.hstack([shifts, exchange_shifts(observations)])
@@ -237,6 +233,21 @@ def _calibrated(
     except (EvaluationFailed, InputError):  # there is no such tyre
         return problem
     return replace(problem, expansion=there)
+
+
+def _about(
+    expansion: Expansion,
+    model: ResponseModel,
+    rows: Sequence[ModelRow],
+    observations: Observations,
+    changes: tuple[Toggle, ...],
+    assumed: Assumed,
+) -> InverseProblem:
+    """Observations and the model in an expansion."""
+    where, start, spread = places(observations, rows), model.start, model.spread
+    return InverseProblem(
+        observations, expansion, model.ranges, where, start, spread, changes, assumed
+    )
 
 
 def _fits(problem: InverseProblem) -> bool:

@@ -103,14 +103,10 @@ def calibrate(
     if starts > 1:
         more, replaced = _more_starts(problem, starts - 1, seed, jobs, method, finished)
         reports += more
-    best = min(reports, key=lambda r: r.point.objective)
     history = _joined([r.history for r in reports])
-    return Fit(
-        fit_result(problem, initial, best, reports, history, replaced, method, readings),
-        history,
-        initial,
-        best.point,
-    )
+    result = fit_result(problem, initial, reports, history, replaced, method, readings)
+    fitted = min((report.point for report in reports), key=lambda point: point.objective)
+    return Fit(result, history, initial, fitted)
 
 
 def noise_Hz(

@@ -523,15 +523,15 @@ class FitResult(Result):
 def fit_result(
     problem: Problem,
     initial: Point,
-    best: StartReport,
     reports: Sequence[StartReport],
     history: Sequence[dict[str, Any]],
     replaced: int,
     method: str,
     readings: Sequence[Measurement] = (),
 ) -> FitResult:
-    """The result of a fit whose ``best`` start is one of ``reports``; ``replaced``: drawn starts
-    that could not be evaluated; ``readings``: lines of the file that the targets are from."""
+    """The result of a fit, that of its best start; ``replaced``: drawn starts that could not be
+    evaluated; ``readings``: lines of the file that the targets are from."""
+    best = min(reports, key=lambda report: report.point.objective)
     point = best.point.plain
     objectives = [row["objective_Hz"] for row in history]
     known = uncertainty(problem, point)

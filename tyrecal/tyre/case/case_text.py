@@ -6,6 +6,7 @@ import json
 import re
 import textwrap
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from ruamel.yaml import YAML
@@ -21,40 +22,32 @@ LETTERS_A_LINE = 118  # letters on a line
 OUTER_ROWS = {"coarse": 1, "default": 3, "refined": 4}  # between the outermost line and the surface
 
 
-def new_case(
-    section: Section,
-    made: ConstructionParts,
-    file: str,
-    name: str,
-    size: str,
-    pressure_kPa: float,
-    known_from: SectionOrigin,
-    origin: str = "",
-    outline: Mapping[str, float] | None = None,
-    loads_N: Sequence[float] = (),
-) -> str:
-    """YAML of a case whose section is ``section``, from ``file`` in the case's folder.
+@dataclass(frozen=True)
+class NewCase:
+    """A case whose section is ``section``, from ``file`` in the case's folder."""
 
-    origin: a sentence for the heading; outline: the keys of ``section.outline`` but its file;
-    loads_N: of the road, none: as usual for passenger cars.
-    """
-    env = environment("case", None)
-    env.filters["text"], env.filters["flow"] = plain_text, flow
-    names: dict[str, Any] = {
-        "made": made,
-        "file": file,
-        "name": name,
-        "size": size,
-        "pressure_kPa": pressure_kPa,
-        "known_from": known_from,
-        "origin": origin,
-        "outline": outline,
-        "loads_N": loads_N,
-        "lines": section.names,
-        "regions": [r for r, _ in section.regions],
-        "levels": {level: _level(section, level) for level in ELEMENTS_BY_LEVEL},
-    }
-    return render(env, "case.yaml.j2", names)
+    section: Section
+    made: ConstructionParts
+    file: str
+    name: str
+    size: str
+    pressure_kPa: float
+    known_from: SectionOrigin
+    origin: str = ""  # a sentence for the heading
+    outline: Mapping[str, float] | None = None  # the keys of ``section.outline`` but its file
+    loads_N: Sequence[float] = ()  # of the road, none: as usual for passenger cars
+
+    def text(self) -> str:
+        """The case as YAML with comments."""
+        env = environment("case", None)
+        env.filters["text"], env.filters["flow"] = plain_text, flow
+        names = {
+            **vars(self),
+            "lines": self.section.names,
+            "regions": [r for r, _ in self.section.regions],
+            "levels": {level: _level(self.section, level) for level in ELEMENTS_BY_LEVEL},
+        }
+        return render(env, "case.yaml.j2", names)
 
 
 def plain_text(words: str) -> str:

@@ -18,7 +18,7 @@ from ..section.construction import PASSENGER, TRUCK
 from ..section.from_size import BELOW, build, construction, usual
 from ..section.section import Section, SectionError
 from ..section.size import TyreSize
-from .case_text import new_case
+from .case_text import NewCase
 from .made_of import ConstructionParts, constructed, one_rubber
 from .parts import Outline, SectionSource
 from .stations import read_section_of
@@ -61,7 +61,7 @@ def from_size(
     mm = {k: f"{1e3 * getattr(gauges, k):.1f}" for k in ("crown", "sidewall", "bead", "belt")}
     made = construction(size)
     section = table.section()
-    text = new_case(
+    case = NewCase(
         section,
         constructed(made, section),
         f"{stem}.csv",
@@ -74,7 +74,7 @@ def from_size(
         f" {mm['belt']} mm wide. An estimate to start from.",
         loads_N=[_rounded(min(share * size.load_N, MAX_USUAL_LOAD_N)) for share in LOAD_SHARES],
     )
-    return Draft(text, f"{stem}.csv", table.csv().encode())
+    return Draft(case.text(), f"{stem}.csv", table.csv().encode())
 
 
 def _rounded(load_N: float) -> float:
@@ -100,7 +100,7 @@ def from_file(
         source = SectionSource.model_validate(given)
         usual_kPa = size.pressure_kPa if size else PRESSURE_KPA
         section = read_section_of(source, file.parent)
-        text = new_case(
+        case = NewCase(
             section,
             _made_of(section, size),
             file.name,
@@ -110,7 +110,7 @@ def from_file(
             "drawing",
             outline=keys,
         )
-    return Draft(text, file.name, content)
+    return Draft(case.text(), file.name, content)
 
 
 @contextmanager
