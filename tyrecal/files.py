@@ -23,6 +23,7 @@ from .errors import TyrecalError
 
 MAX_FILE_BYTES = 50_000_000  # bytes of a file that is read whole; ours are a hundredth of it
 NOFOLLOW = getattr(os, "O_NOFOLLOW", 0)  # Windows has none: there `refuse_link` is all
+Json = dict[str, Any]  # an object of a JSON file, or of a part of it
 PICTURE_FORMATS = ("png", "svg", "pdf")
 
 

@@ -28,6 +28,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..files import (
+    Json,
     json_text,
     os_words,
     private_dir,
@@ -55,7 +56,7 @@ from .studies import Asked, Studied, StudyOutcome, study
 FINISHED = "finished.json"  # in a case's folder: what was asked, and the answer
 ENDED = ("good", "failed")
 AGAIN = {"crashed", "timed_out", "no_results", "licence", "unavailable", "disc", "internal"}
-Report = dict[str, Any]
+Report = Json
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ class CaseTask:
 
 def run_case(task: CaseTask) -> Report:
     """All studies of a case, or its report of an earlier run with the same question."""
-    facts: dict[str, Any] = {
+    facts: Json = {
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
         "host": platform.node() or "localhost",
     }
@@ -117,15 +118,15 @@ def lost(task: CaseTask, words: str) -> Report:
 
 
 def _studied(
-    task: CaseTask, loaded: LoadedCase, evaluator: Evaluator, facts: dict[str, Any]
-) -> tuple[dict[str, Any], list[str]]:
+    task: CaseTask, loaded: LoadedCase, evaluator: Evaluator, facts: Json
+) -> tuple[Json, list[str]]:
     """Every study's entry in the report, and the names of the result files."""
     private_dir(task.folder)
     _write_runs(task, loaded, facts, (), {})
     evaluator.store = Store(task.record) if task.record else None
     given = StudyInput(loaded, evaluator, {"initial": start_values(loaded)})
     state = Studied(given, task.asked)
-    entries: dict[str, Any] = {}
+    entries: Json = {}
     files: list[str] = []
     aside: dict[str, str] = {}
     facts["seconds"], used = {}, time.process_time()
@@ -158,7 +159,7 @@ def _studied(
 def _write_runs(
     task: CaseTask,
     loaded: LoadedCase | None,
-    facts: dict[str, Any],
+    facts: Json,
     ended: Collection[str],
     aside: Mapping[str, str],
 ) -> None:
@@ -166,7 +167,7 @@ def _write_runs(
     loaded: the case, None where it could not be read;
     aside: folders of results that did not take the place of earlier ones, by study."""
     entry = {**owner(task.folder, task.path, loaded), "command": "batch", **facts}
-    new: dict[str, Any] = {name: {**entry, "finished": name in ended} for name in task.studies}
+    new: Json = {name: {**entry, "finished": name in ended} for name in task.studies}
     for name, place in aside.items():
         new[name]["results"] = place
     write_runs(task.folder, new, many_writers=True)
@@ -201,7 +202,7 @@ def _failed(error: Exception) -> StudyOutcome:
     return StudyOutcome("error", "internal", f"{type(error).__name__}: {error} ({place})")
 
 
-def _entry(outcome: StudyOutcome, task: CaseTask) -> dict[str, Any]:
+def _entry(outcome: StudyOutcome, task: CaseTask) -> Json:
     """A study as the report has it; its words do not depend on where the case lies."""
     words = outcome.words and outcome.words.replace(f"{task.path.parent}{os.sep}", "")
     return {
@@ -221,7 +222,7 @@ def _question(task: CaseTask, loaded: LoadedCase, evaluator: Evaluator) -> str:
     return sha256(json.dumps(parts).encode()).hexdigest()
 
 
-def _finished(folder: Path, question: str) -> dict[str, Any] | None:
+def _finished(folder: Path, question: str) -> Json | None:
     """The entries of an earlier run that had the same question and whose files are as it left
     them."""
     try:
@@ -230,7 +231,7 @@ def _finished(folder: Path, question: str) -> dict[str, Any] | None:
             return None
         if any(_digest(folder / file) != digest for file, digest in finished["files"].items()):
             return None
-        entries: dict[str, Any] = finished["studies"]
+        entries: Json = finished["studies"]
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
     return entries

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..files import read_json
+from ..files import Json, read_json
 from ..tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from .case import Report
 
@@ -70,7 +70,7 @@ def numbers_of(reports: Sequence[Report]) -> Figures:
     return {name: studies for name, studies in kept.items() if studies}
 
 
-def baseline_of(reports: Sequence[Report], before: Mapping[str, Any] | None) -> dict[str, Any]:
+def baseline_of(reports: Sequence[Report], before: Mapping[str, Any] | None) -> Json:
     """A new baseline, with the tolerances of the one ``before``, and of what that did not have."""
     cases = numbers_of(reports)
     tolerances = dict(before["tolerances"] if before else DEFAULTS)
@@ -83,7 +83,7 @@ def baseline_of(reports: Sequence[Report], before: Mapping[str, Any] | None) -> 
     return {"format": 1, "tolerances": tolerances, "cases": cases}
 
 
-def read_baseline(path: Path) -> dict[str, Any]:
+def read_baseline(path: Path) -> Json:
     """A baseline from its file. Raises InputError, in one sentence; OSError."""
     try:
         content = read_json(path)
@@ -112,7 +112,7 @@ def read_baseline(path: Path) -> dict[str, Any]:
     return content
 
 
-def compare(reports: Sequence[Report], baseline: Mapping[str, Any]) -> dict[str, Any]:
+def compare(reports: Sequence[Report], baseline: Mapping[str, Any]) -> Json:
     """Drift of reports from a baseline: ``compared`` numbers; ``drifted``, the worst first, each
     with case, study, quantity, ``baseline``, ``value`` (None where it is gone), ``allowed``
     (absolute); ``missing_cases``, ``new_cases``; ``missing_studies``, ``new_studies`` [case/study];

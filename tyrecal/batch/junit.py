@@ -13,9 +13,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+from ..files import Json
 from .case import Report
 
-SKIPPED: dict[str, Any] = {"status": "skipped", "cause": None, "words": None, "quantities": {}}
+SKIPPED: Json = {"status": "skipped", "cause": None, "words": None, "quantities": {}}
 OUTCOMES = {"error": "error", "failed": "failure", "skipped": "skipped"}
 UNPRINTABLE = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # in XML 1.0
 

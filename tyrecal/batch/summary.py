@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..files import Json
 from .case import Report
 
 VERDICTS = ("error", "failed", "drifted", "good")  # the worst first
@@ -13,7 +14,7 @@ VERDICTS = ("error", "failed", "drifted", "good")  # the worst first
 
 def summary(
     studies: Sequence[str], reports: Sequence[Report], drift: Mapping[str, Any] | None
-) -> dict[str, Any]:
+) -> Json:
     """Results only: ``studies``; ``counts`` of cases by verdict; ``cases``, each with its
     ``verdict``, provenance and studies; ``baseline``, as `drift.compare` says, or None."""
     drifted = {each["case"] for each in drift["drifted"]} if drift else set()

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from ..files import Json
 from . import arguments, complete, options
 from .parameters import FileOrFolder, NumberWithin, WholeNumber, option
 from .terminal import Progress, Terminal, resume
@@ -190,7 +191,7 @@ def make(
     protocol = Protocol(maker.about, case.path.name, counts).about(case.case.pressure_kPa)
     evaluator = Evaluator(TyreDesign(case), "bundled", store=store)
 
-    def ruler() -> dict[str, Any]:
+    def ruler() -> Json:
         model = tyre_model(case, evaluator, protocol, jobs)
         content = measure(model, rows_of(case, protocol))
         known = ruler_of(content, labels_of(case))

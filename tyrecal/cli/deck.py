@@ -6,11 +6,12 @@ import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from ..errors import InputError
+from ..files import Json
 from . import arguments, options
 from .main import EXIT_INPUT
 from .parameters import option
@@ -146,7 +147,7 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
         deck = read_own_deck(path)
     blocks = deck.with_numbers(numbers)
     report, lacking = asked_by_abaqus(blocks), lacking_in_calculix(blocks)
-    result: dict[str, Any] = {"abaqus": report, "calculix": lacking, "refused": None}
+    result: Json = {"abaqus": report, "calculix": lacking, "refused": None}
     try:
         flat = deck.flat(numbers, gauges)
         mass_kg = trial(flat)
@@ -181,7 +182,7 @@ def _say_what_solvers_take(
         terminal.say(f"CalculiX does not honour: {sentence}")
 
 
-def known_of_decks(loaded: LoadedCase, decks: OwnDecks, terminal: Terminal) -> dict[str, Any]:
+def known_of_decks(loaded: LoadedCase, decks: OwnDecks, terminal: Terminal) -> Json:
     """Print what is known of decks in three dimensions, what is added to them, what ABAQUS refuses
     of them by its manual, and what CalculiX lacks; returns the same as data."""
     from ..simulate.deck.decks_design import OUTPUT, added_words

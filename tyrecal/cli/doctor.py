@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import click
 
+from ..files import Json
 from . import complete, options
 from .main import EXIT_SOLVER
 from .parameters import FileOrFolder, option
@@ -54,7 +54,7 @@ def command(solver: str, store: Path | None, terminal: Terminal) -> int:
 
     with terminal.progress("known tyre"):
         check = self_check(solver)
-    report: dict[str, Any] = {
+    report: Json = {
         "format": 1,
         "tyrecal": __version__,
         "installed_in": str(Path(__file__).parents[1]),
@@ -82,7 +82,7 @@ def command(solver: str, store: Path | None, terminal: Terminal) -> int:
     return 0 if report["ok"] else EXIT_SOLVER
 
 
-def _words(report: dict[str, Any]) -> list[str]:
+def _words(report: Json) -> list[str]:
     """Lines of the report for people."""
     from ..simulate.modes.label import in_words
 

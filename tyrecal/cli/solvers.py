@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import click
 
+from ..files import Json
 from . import options
 from .parameters import FileOrFolder, OneOf, option
 from .terminal import Terminal
@@ -51,7 +51,7 @@ def command(selftest: str | None, output: Path | None, terminal: Terminal) -> in
     return 0
 
 
-def settings_file() -> dict[str, Any]:
+def settings_file() -> Json:
     """``file`` of the user's settings, or None; ``there``: whether it is; ``problem``, or None."""
     from ..errors import InputError
     from ..simulate.settings import place, settings
@@ -65,14 +65,14 @@ def settings_file() -> dict[str, Any]:
     return {"file": str(path) if path else None, "there": there, "problem": problem}
 
 
-def settings_words(entry: dict[str, Any]) -> str:
+def settings_words(entry: Json) -> str:
     """The settings file, and its problem if it has one, in words."""
     if entry["file"] is None:
         return "none (TYRECAL_SETTINGS is empty)"
     return entry["problem"] or entry["file"] + ("" if entry["there"] else " (not there)")
 
 
-def command_words(solver: dict[str, Any]) -> str:
+def command_words(solver: Json) -> str:
     """The program that a solver of `installed` starts, and where it was set."""
     from ..simulate.program import join_command
 

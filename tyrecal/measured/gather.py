@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from math import isfinite
 from pathlib import Path
-from typing import Any
 
 from ..errors import InputError
-from ..files import open_file
+from ..files import Json, open_file
 from ..simulate.modes.label import Label
 from ..tyre.state import TyreState
 from .arrangement import arrange
@@ -167,7 +166,7 @@ def all_nodes(files: Sequence[Universal]) -> dict[int, Place]:
     return nodes
 
 
-def result(gathered: Gathered) -> dict[str, Any]:
+def result(gathered: Gathered) -> Json:
     """The JSON that ``tyrecal measured import --json`` prints."""
     return {
         "format": 1,
@@ -189,12 +188,12 @@ def result(gathered: Gathered) -> dict[str, Any]:
     }
 
 
-def label_entry(label: Label | None) -> dict[str, Any]:
+def label_entry(label: Label | None) -> Json:
     """c, m and kind, None where there is no label."""
     return asdict(label) if label else dict.fromkeys(("c", "m", "kind"))
 
 
-def _entry(run: ModalTest, labelled: LabelledMode) -> dict[str, Any]:
+def _entry(run: ModalTest, labelled: LabelledMode) -> Json:
     """A labelled mode of a run as an entry of the result file."""
     finite = lambda x: x if isfinite(x) else None
     return {

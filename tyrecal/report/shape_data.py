@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from ..files import Json
 from ..simulate.deck.abaqus import claimed, solid_claims
 from ..simulate.evaluate.pressed import Pressed
 from ..simulate.evaluate.results import Evaluation, HarmonicShape
@@ -117,7 +118,7 @@ class DiagnosisSection(Result):
     cords: dict[str, list[Flat]]
 
 
-def tyre_data(case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode]) -> dict[str, Any]:
+def tyre_data(case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode]) -> Json:
     """The content of `Shapes`: the section, and the modes on its outer surface from bead to bead.
     Both are left out for a tyre without a section.
 
@@ -256,7 +257,7 @@ def rubber_parts(
     return parts
 
 
-def loaded_data(tyre: LoadedTyre, case: LoadedCase) -> dict[str, Any]:
+def loaded_data(tyre: LoadedTyre, case: LoadedCase) -> Json:
     """The content of `Shapes` for the tyre on the road at its last load: points of the deformed
     outer surface, and the displacement of the modes there."""
     last = tyre.loads[-1]
@@ -314,7 +315,7 @@ def _grown(touches: Array) -> tuple[slice, slice]:
     return rings, nodes
 
 
-def _amplitude(mode: Mode, nodes: Array) -> dict[str, Any]:
+def _amplitude(mode: Mode, nodes: Array) -> Json:
     """The fields of `Shape` for an unloaded mode."""
     shape = mode.raw.shape
     assert isinstance(shape, HarmonicShape)
@@ -327,7 +328,7 @@ def _amplitude(mode: Mode, nodes: Array) -> dict[str, Any]:
     return {"n": shape.n, "real": _scaled(A.real, A), "imaginary": _scaled(A.imag, A)}
 
 
-def _name(mode: Mode) -> dict[str, Any]:
+def _name(mode: Mode) -> Json:
     label = mode.label
     return {"c": label.c, "m": label.m, "kind": label.kind, "frequency_Hz": mode.frequency_Hz}
 

@@ -7,6 +7,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..files import Json
 from ..tyre.case import LoadedCase
 from ..tyre.case.identity import tyre_sha256
 from ..tyre.resolve import resolved
@@ -26,7 +27,7 @@ def provenance(
     pressure_kPa: OneOrMore | None = None,
     load_N: OneOrMore = 0.0,
     rim: Sequence[str] = (),
-) -> dict[str, Any]:
+) -> Json:
     """The block ``provenance`` of a result file.
 
     pressure_kPa, rim (default: the case's), load_N: of the study, several where it has several;
@@ -53,7 +54,7 @@ def provenance(
     }
 
 
-def stamped(content: Any, block: dict[str, Any]) -> Any:
+def stamped(content: Any, block: Json) -> Any:
     """A result with its provenance, behind its format; each entry of a list has it."""
     if isinstance(content, list):
         return [stamped(each, block) for each in content]

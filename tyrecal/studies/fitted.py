@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from ..errors import InputError
-from ..files import read_json
+from ..files import Json, read_json
 from ..tyre.case import LoadedCase, as_written, start_values, with_level
 from ..tyre.case.identity import is_of_tyre, tyre_sha256
 from ..tyre.state import pressure_name
@@ -29,7 +29,7 @@ def read_fitted(path: Path, case: LoadedCase) -> tuple[dict[str, float], list[st
     try:
         fit = read_json(path)
         fitted_values = {name: v["value"] for name, v in fit["variables"].items()} | fit["fixed"]
-        freed: dict[str, Any] = {}
+        freed: Json = {}
         for name, each in fit.get("freed", {}).items():
             freed |= each["numbers"]
             del fitted_values[name]

@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import Field
 
+from ..files import Json
 from ..simulate.evaluate.evaluator import Evaluator
 from ..simulate.modes.label import Label
 from ..simulate.modes.loaded import SYMMETRIES
@@ -49,7 +50,7 @@ class LoadFindings(ResultPart):
     design: str  # name of the design
     # for each pair its label, split_Hz (load_N, split: antisymmetric less symmetric), grows,
     # shrinks_from_N
-    splits: list[dict[str, Any]] = Field(default=[])
+    splits: list[Json] = Field(default=[])
     least_overlap: float = 1.0  # least overlap with the unloaded member
     words: list[str]  # findings in words
 
@@ -105,7 +106,7 @@ def _hertz_cell(column: Column, mode: ModeEntry | None) -> str | None:
     return f"({cell})" if mode and mode.has_lost_name else cell
 
 
-def _csv_modes(row: LoadRow) -> list[dict[str, Any]]:
+def _csv_modes(row: LoadRow) -> list[Json]:
     """The tyre's modes, and the cavity's, of the kinds "cavity fore-aft" and "cavity vertical"."""
     cavity = [
         {"c": 1, "kind": f"cavity {each.direction}", "frequency_Hz": each.frequency_Hz}
@@ -197,7 +198,7 @@ def _entry(mode: LoadedMode) -> ModeEntry:
     ).model_copy(update={key: hertz for key, hertz in with_friction.items() if hertz is not None})
 
 
-def _cavity(loaded: Loaded) -> dict[str, Any]:
+def _cavity(loaded: Loaded) -> Json:
     """The field of a result, where there is a gas."""
     return {"cavity": CavityMode.pair(loaded.cavity_Hz)} if loaded.cavity_Hz else {}
 
@@ -243,7 +244,7 @@ def _load_of(loads: Sequence[Loaded], mode: LoadedMode) -> float:
     return next(each.load_N for each in loads if any(m is mode for m in each.modes))
 
 
-def _split(label: Label, tables: Mapping[float, Mapping[Any, float]]) -> dict[str, Any]:
+def _split(label: Label, tables: Mapping[float, Mapping[Any, float]]) -> Json:
     """A doublet's split at each load where both members are known, and whether it only grows."""
     both = {
         load: table[label, SYMMETRIES[1]] - table[label, SYMMETRIES[0]]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
+from ..files import Json
 from ..simulate.evaluate.results import Evaluation
 from ..simulate.modes.label import Mode, labelled
 from ..tyre.case import LoadedCase
@@ -144,7 +145,7 @@ def _entries(mode: Mode) -> list[ModeEntry]:
     ]
 
 
-def mode_entry(mode: Mode) -> dict[str, Any]:
+def mode_entry(mode: Mode) -> Json:
     """A mode as result files hold it; a doublet that is split at its mean."""
     return {
         "c": mode.label.c,

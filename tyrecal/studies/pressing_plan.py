@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
+from ..files import Json
 from ..simulate.deck.decks_design import design_of
 from ..simulate.evaluate.evaluator import Evaluator
 from ..tyre.case import LoadedCase
@@ -98,7 +98,7 @@ class PressingPlan:
     def _entries(self) -> float:
         return float(self.unknowns) * self.section_unknowns
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Json:
         """The JSON that --dry-run --json prints."""
         return {
             "format": 1,

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from ..files import Json
 from ..simulate.evaluate.evaluator import Evaluator
 from ..simulate.evaluate.failure import EvaluationFailed
 from ..simulate.modes.find import LabelledModes
@@ -110,12 +111,12 @@ class PressureFindings(ResultPart):
     from_kPa: float = 0.0  # lowest pressure
     to_kPa: float = 0.0  # highest pressure
     # for each mode its label, rises, rise_Hz, rise_percent, curvature, convex_at_kPa
-    modes: list[dict[str, Any]] = Field(default=[])
+    modes: list[Json] = Field(default=[])
     # in-plane and out-of-plane: family, members, rise_Hz, grows_with_c, exceptions
-    families: list[dict[str, Any]] = Field(default=[])
+    families: list[Json] = Field(default=[])
     least_mac: float = 1.0  # least MAC of shapes between neighbouring pressures
     # where a label and the shape followed differ: from_kPa, to_kPa, label, followed_to, mac
-    disagreements: list[dict[str, Any]] = Field(default=[])
+    disagreements: list[Json] = Field(default=[])
     words: list[str]  # findings in words
 
 
@@ -132,7 +133,7 @@ def findings(states: Sequence[State], labels: Sequence[Label]) -> PressureFindin
         for step in follow(before.modes, after.modes)
         if step.before in table
     ]
-    result: dict[str, Any] = {
+    result: Json = {
         "design": states[0].design,
         "from_kPa": states[0].pressure_kPa,
         "to_kPa": states[-1].pressure_kPa,
@@ -154,7 +155,7 @@ def findings(states: Sequence[State], labels: Sequence[Label]) -> PressureFindin
     return PressureFindings(**result, words=_words(result, labels))
 
 
-def _curve(p: np.ndarray, f: np.ndarray) -> dict[str, Any]:
+def _curve(p: np.ndarray, f: np.ndarray) -> Json:
     """Curve of one mode: its rise, whether it rises at every step, and how it bends, which two
     pressures cannot show."""
     weight = (p[2:] - p[1:-1]) / (p[2:] - p[:-2])
@@ -172,7 +173,7 @@ def _curve(p: np.ndarray, f: np.ndarray) -> dict[str, Any]:
     }
 
 
-def _family(name: str, rises: Mapping[Label, float]) -> dict[str, Any]:
+def _family(name: str, rises: Mapping[Label, float]) -> Json:
     """Whether the rise grows with c; exceptions: members that rise no more than the one before."""
     members = [label for label in sorted(rises) if label.family == name]
     hertz = [rises[label] for label in members]

@@ -16,6 +16,7 @@ import numpy as np
 from pydantic import Field
 
 from ..errors import InputError
+from ..files import Json
 from ..measured.coordinates import CYLINDRICAL, CoordinateSystem
 from ..measured.universal_text import WrittenFunction, function_set, universal_text
 from ..tyre.case import LoadedCase
@@ -80,7 +81,7 @@ def read_points(text: str, hub: bool = True) -> list[ResponsePoint]:
 
 def response_request(
     excite: str, respond: str, from_Hz: float, to_Hz: float, step_Hz: float, patch_mm: float
-) -> dict[str, Any]:
+) -> Json:
     """The request to a solver. Raises InputError."""
     lines = (to_Hz - from_Hz) / step_Hz if step_Hz > 0 else 0.0
     if not 0 <= from_Hz < to_Hz <= MAX_BAND_HZ or lines < 1 or abs(lines - round(lines)) > 1e-6:
@@ -115,7 +116,9 @@ class ResponseFunctionEntry(ResultPart):
 
     excite: Annotated[str, Column("force at", "")]  # where the force acts, and its direction
     respond: Annotated[str, Column("response at", "")]  # where the response is, and its direction
-    quantity: Annotated[str, Column("quantity", "")]  # receptance, accelerance, blocked force or moment
+    quantity: Annotated[
+        str, Column("quantity", "")
+    ]  # receptance, accelerance, blocked force or moment
     unit: Annotated[str, Column("unit", "")]  # unit of the function
     # magnitude at the lowest frequency
     at_lowest: Annotated[float, Column("at the lowest Hz", ".4g")]
@@ -246,7 +249,7 @@ class FrfResult(Result):
         return universal_text(title, nodes, sets, TREAD_SYSTEM, numbers.values())
 
 
-def _evaluated(given: StudyInput, values: Mapping[str, float], request: dict[str, Any]) -> Any:
+def _evaluated(given: StudyInput, values: Mapping[str, float], request: Json) -> Any:
     from ..simulate.evaluate.evaluator import Question  # late: not for those who read results
 
     return given.evaluator.evaluate(Question(values, response=request))

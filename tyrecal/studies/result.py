@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeV
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr
 
 from ..errors import InputError
-from ..files import json_text
+from ..files import Json, json_text
 from ..simulate.evaluate.failure import EvaluationFailed
 from ..simulate.modes.label import Label
 from ..tyre.case import as_written
@@ -190,7 +190,7 @@ class Result(ResultPart):
         self._files.update(files)
         return self
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Json:
         """Content of the JSON file."""
         return self.model_dump(exclude_unset=True, by_alias=True)
 
@@ -373,8 +373,8 @@ def rows_csv(rows: Sequence[CsvRow]) -> str:
     return csv_text(list(dict.fromkeys(key for row in flat for key in row)), flat)
 
 
-def _flat(row: CsvRow) -> dict[str, Any]:
-    flat: dict[str, Any] = {}
+def _flat(row: CsvRow) -> Json:
+    flat: Json = {}
     for key, value in row.items():
         if isinstance(value, Mapping):
             flat |= {f"{key}.{name}": each for name, each in _flat(value).items()}

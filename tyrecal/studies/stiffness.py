@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import radians
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
 from ..errors import InputError
+from ..files import Json
 from ..simulate.deck.tyre_design import TyreDesign
 from ..simulate.evaluate.evaluator import Evaluator, PressQuestion
 from ..simulate.evaluate.pressed import Footprint, Pressed
@@ -193,7 +194,7 @@ def _row(
     assert footprint.rim_reactions is not None
     C = footprint.rim_reactions
     held = at_constant_load(C)
-    patch: dict[str, Any] = footprint_row(pressed, footprint, mesh)
+    patch: Json = footprint_row(pressed, footprint, mesh)
     return StiffnessRow(
         design=design,
         pressure_kPa=kPa,

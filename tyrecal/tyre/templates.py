@@ -14,6 +14,8 @@ from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from ..errors import InputError
 
+TemplateNames = dict[str, Any]  # names that a template knows, and what they hold
+
 
 class TemplateFailed(InputError):
     """A deck template is wrong or does what templates may not; one sentence with its place."""
@@ -63,11 +65,11 @@ def environment(dialect: str, own_folder: Path | None) -> Environment:
 class Templates(Protocol):
     """Templates that are rendered elsewhere, see `simulate.deck.template_process`."""
 
-    def render(self, template: str, names: dict[str, Any]) -> str:
+    def render(self, template: str, names: TemplateNames) -> str:
         """The text of a template. Raises TemplateFailed."""
 
 
-def render(env: Environment | Templates, template: str, names: dict[str, Any]) -> str:
+def render(env: Environment | Templates, template: str, names: TemplateNames) -> str:
     """The text of a template. Raises TemplateFailed."""
     if not isinstance(env, Environment):
         return env.render(template, names)

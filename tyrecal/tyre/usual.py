@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..units import INCH, LENGTH, LOAD, PRESSURE, QUANTITIES, printed_unit
 from .case.checks import Problems, at, find
-from .case.mistakes import Keys
+from .case.mistakes import CaseData, Keys
 from .case.parts import number
 from .case.shape import entries, table
 from .effects import catalogue
@@ -239,7 +239,7 @@ GAUGES = {
 _PATTERNS = [(tuple(path.split(".")), usual) for path, usual in USUAL.items()]
 
 
-def unusual(data: Mapping[str, Any], section: Section | None) -> Problems:
+def unusual(data: CaseData, section: Section | None) -> Problems:
     """Every stated number of ``data`` that is outside its usual range, and what is usual."""
     refused: set[Keys] = set()
     for keys, value in _numbers(data, ()):
@@ -354,7 +354,7 @@ def one_side(angles: Iterable[float]) -> str | None:
     )
 
 
-def belts_on_one_side(data: Mapping[str, Any], section: Section | None) -> Problems:
+def belts_on_one_side(data: CaseData, section: Section | None) -> Problems:
     """The last belt of the case where all lie on one side of the circumference."""
     belts = {}
     layers = table(data, "rebar_layers")
@@ -367,7 +367,7 @@ def belts_on_one_side(data: Mapping[str, Any], section: Section | None) -> Probl
         yield ("rebar_layers", [*belts][-1], "angle_deg"), message + ALL_THE_SAME
 
 
-def _start(data: Mapping[str, Any], path: str) -> dict[str, Any]:
+def _start(data: CaseData, path: str) -> dict[str, Any]:
     """The start of the variable that sets the number at ``path``, by the number's key; empty
     without one."""
     key = path.rpartition(".")[2]
@@ -377,9 +377,7 @@ def _start(data: Mapping[str, Any], path: str) -> dict[str, Any]:
     )
 
 
-def refusal(
-    data: Mapping[str, Any], section: Section | None, keys: Keys, value: float
-) -> str | None:
+def refusal(data: CaseData, section: Section | None, keys: Keys, value: float) -> str | None:
     """Why ``value`` is not usual at ``keys`` of the case that ``data`` and ``section`` are of."""
     for usual, of in () if isinstance(value, bool) else _ranges(data, section, keys, value):
         if keys[-1] == "C01_Pa" and value == 0:  # C10 is judged
@@ -390,7 +388,7 @@ def refusal(
 
 
 def _ranges(
-    data: Mapping[str, Any], section: Section | None, keys: Keys, value: float
+    data: CaseData, section: Section | None, keys: Keys, value: float
 ) -> Iterator[tuple[Usual, str]]:
     """Usual ranges of ``value`` at ``keys``, each with words that go before."""
     here, last = keys[0], str(keys[-1])
@@ -434,7 +432,7 @@ def _ranges(
                 yield _of_material(usual, data, section, keys), ""
 
 
-def _of_series(usual: Usual, data: Mapping[str, Any], keys: Keys, value: float) -> Usual:
+def _of_series(usual: Usual, data: CaseData, keys: Keys, value: float) -> Usual:
     """The range of a Prony term's number beside the other terms; of any other number, ``usual``."""
     if keys[0] != "materials" or keys[2] != "prony" or len(keys) != 5:
         return usual
@@ -445,7 +443,7 @@ def _of_series(usual: Usual, data: Mapping[str, Any], keys: Keys, value: float) 
     return in_series(usual, str(keys[4]), value, [x for x in others if x is not None])
 
 
-def _layer(layer: Mapping[str, Any], section: Section | None) -> CordLayer | None:
+def _layer(layer: CaseData, section: Section | None) -> CordLayer | None:
     """A layer of the case; None where its cords are not stated, or at an angle to each other."""
     area, spacing = number(layer, "area_m2"), number(layer, "spacing_m")
     if section is None or not area or not spacing:
@@ -453,9 +451,7 @@ def _layer(layer: Mapping[str, Any], section: Section | None) -> CordLayer | Non
     return CordLayer(area, spacing, number(layer, "angle_deg") or 0.0, _angle(layer, section))
 
 
-def _of_material(
-    usual: Usual, data: Mapping[str, Any], section: Section | None, keys: Keys
-) -> Usual:
+def _of_material(usual: Usual, data: CaseData, section: Section | None, keys: Keys) -> Usual:
     """The range of a material's number as its other numbers leave it; of any other, ``usual``."""
     if keys[0] != "materials" or len(keys) != 3:
         return usual
@@ -475,7 +471,7 @@ def _of_material(
     return usual
 
 
-def _up_to_the_rim(usual: Usual, data: Mapping[str, Any], section: Section) -> Usual:
+def _up_to_the_rim(usual: Usual, data: CaseData, section: Section) -> Usual:
     """A load's range, up to what flattens the tyre to its rim: a patch as wide as the tyre and as
     long as the chord there, under the inflation pressure."""
     outer = section.points[-1]
@@ -490,7 +486,7 @@ def _up_to_the_rim(usual: Usual, data: Mapping[str, Any], section: Section) -> U
     return replace(usual, high=most, reason=", the load at which this tyre bottoms on its rim")
 
 
-def _angle(layer: Mapping[str, Any], section: Section) -> Usual | None:
+def _angle(layer: CaseData, section: Section) -> Usual | None:
     """A layer's usual angle: of a carcass, from crown to bead, or of a belt, at the crown."""
     line = layer.get("line")
     if line not in section.names or layer.get("regions") is not None:
@@ -511,7 +507,7 @@ def _numbers(part: Any, keys: Keys) -> Iterator[tuple[Keys, float]]:
         yield keys, part
 
 
-def _value(data: Mapping[str, Any], keys: Keys) -> Any:
+def _value(data: CaseData, keys: Keys) -> Any:
     """The value at ``keys``, which may be left to its default, or in what is wrong."""
     try:
         return at(data, keys)
@@ -519,7 +515,7 @@ def _value(data: Mapping[str, Any], keys: Keys) -> Any:
         return None
 
 
-def _keys(data: Mapping[str, Any], path: str) -> Keys:
+def _keys(data: CaseData, path: str) -> Keys:
     """Keys to which a path leads; none where it is wrong, which is reported elsewhere."""
     effects = {**dict.fromkeys(IDS, 0.0), **table(data, "effects")}
     try:

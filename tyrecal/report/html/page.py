@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from jinja2 import FileSystemLoader, StrictUndefined
@@ -17,7 +16,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from ...errors import InputError
-from ...files import atomic_write, open_file
+from ...files import Json, atomic_write, open_file
 from ...studies import named, result_types
 from ...studies.fit.result import FitResult
 from ...studies.footprint import FootprintResult
@@ -114,7 +113,7 @@ def page(results: Sequence[Results], author: str = "") -> str:
     )
 
 
-def chapter(results: Results, prefix: str) -> dict[str, Any]:
+def chapter(results: Results, prefix: str) -> Json:
     """Values of the templates for one folder's results."""
     draw = partial(_picture, results, prefix)
     shapes = [
@@ -147,7 +146,7 @@ def chapter(results: Results, prefix: str) -> dict[str, Any]:
     }
 
 
-def _study(results: Results, result: Result, draw: Draw) -> dict[str, Any]:
+def _study(results: Results, result: Result, draw: Draw) -> Json:
     """Words, pictures and tables that every study has."""
     doubts = fit_doubts(result.content()) if isinstance(result, FitResult) else result.doubts()
     pictures = list(_pictures(results, result, draw))
@@ -215,9 +214,7 @@ def _picture(
         return svg(draw(), words, f"{prefix}{name}")
 
 
-def _shapes(
-    results: Results, what: str, shapes: Shapes | None, table: Sequence[Named]
-) -> dict[str, Any]:
+def _shapes(results: Results, what: str, shapes: Shapes | None, table: Sequence[Named]) -> Json:
     """The viewer's data, or why there are none."""
     why = ""
     if shapes is None:
@@ -268,7 +265,7 @@ def _section(results: Results, draw: Draw) -> Markup | None:
     return None
 
 
-def _diagnosis(results: Results, draw: Draw) -> dict[str, Any]:
+def _diagnosis(results: Results, draw: Draw) -> Json:
     d = results.diagnosis
     assert d
     place, drawn = results.diagnosis_section, None

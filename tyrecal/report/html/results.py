@@ -7,12 +7,12 @@ import csv
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from pydantic import Field, ValidationError
 
 from ...errors import InputError
-from ...files import NotAFile, read_runs, read_text
+from ...files import Json, NotAFile, read_runs, read_text
 from ...simulate.program import join_command
 from ...studies import STUDIES, result_types
 from ...studies.diagnose.result import DiagnosisResult
@@ -53,7 +53,7 @@ class Results:
     folder: Path
     studies: dict[str, Result]  # by name, in the order of a page
     fit_shapes: Shapes | None = None
-    history: list[dict[str, Any]] = field(default_factory=list)
+    history: list[Json] = field(default_factory=list)
     modes_shapes: Shapes | None = None
     patches: Patches | None = None
     diagnosis_section: DiagnosisSection | None = None
@@ -163,12 +163,12 @@ def _text(path: Path) -> str | None:
         raise InputError(f"'{path}' is damaged: it is no text") from None
 
 
-def _history(path: Path) -> list[dict[str, Any]]:
+def _history(path: Path) -> list[Json]:
     """Design points of fit_history.csv; empty if there is none. Raises InputError."""
     text = _text(path)
     if text is None:
         return []
-    points: list[dict[str, Any]] = []
+    points: list[Json] = []
     try:
         for row in csv.DictReader(text.splitlines()):
             objective, start = row.pop("objective_Hz"), int(row.pop("start"))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from typing import Any
 
 import numpy as np
 
+from ...files import Json
 from ...simulate.modes.label import Label
 from ..shape_data import Shape, Shapes
 
@@ -14,7 +14,7 @@ INT16_MAX = 32767
 PAGE_ANGLES = 60  # round the circumference, in the page
 
 
-def packed(shapes: Shapes) -> dict[str, Any]:
+def packed(shapes: Shapes) -> Json:
     """Data that `viewer.js` reads: points and modes; a surface round the section's outside that the
     script sweeps, or the loaded tyre's as it is.
 
@@ -24,7 +24,7 @@ def packed(shapes: Shapes) -> dict[str, Any]:
     return _loaded(shapes) if shapes.load_N else _swept(shapes)
 
 
-def _swept(shapes: Shapes) -> dict[str, Any]:
+def _swept(shapes: Shapes) -> Json:
     """Shapes of unloaded modes for the viewer, to be swept round the axle. Raises ValueError."""
     R, Z = np.array(shapes.R_m, float), np.array(shapes.Z_m, float)
     if len(R) != len(Z) or len(R) < 2:
@@ -45,7 +45,7 @@ def _swept(shapes: Shapes) -> dict[str, Any]:
     }
 
 
-def _loaded(shapes: Shapes) -> dict[str, Any]:
+def _loaded(shapes: Shapes) -> Json:
     """Shapes of modes under load for the viewer, node by node. Raises ValueError."""
     angles, place = np.array(shapes.angles, float), np.array(shapes.surface_m, float)
     if place.ndim != 3 or place.shape[::2] != (len(angles), 3):

@@ -16,6 +16,7 @@ from ...tyre.case.schema import Analysis
 from ...tyre.own_deck.solver_mesh import REFERENCE_NODE
 from ...tyre.resolve import Tyre
 from ...tyre.section.mesh import SectionMesh
+from ...tyre.templates import TemplateNames
 
 FIRST_WHEEL_ELEMENT = 999_000_001  # beyond all that a revolve makes
 MIN_MODE_HZ, SHIFT = 1.0, -100.0  # of a free wheel's modes: above its rigid motions; 1/s2
@@ -34,7 +35,7 @@ WELL_ELEMENT = 900001
 CLEARANCE = 0.05  # m from the section, not inflated, to the road
 
 
-def context(tyre: Tyre) -> dict[str, Any]:
+def context(tyre: Tyre) -> TemplateNames:
     """Names for the templates; the guide to own templates lists them."""
     c, mesh = tyre.case, tyre.mesh
     gas = gas_material(c)
@@ -64,14 +65,14 @@ def context(tyre: Tyre) -> dict[str, Any]:
     }
 
 
-def _section(tyre: Tyre) -> dict[str, Any]:
+def _section(tyre: Tyre) -> TemplateNames:
     """Mesh, rubbers, layers and materials of a section of stations."""
     c, mesh = tyre.case, tyre.mesh
     materials = [
         {"name": deck_name(name), **_material(material, c.analysis)}
         for name, material in c.materials.items()
     ]
-    layers: dict[tuple[Any, ...], dict[str, Any]] = {}
+    layers: dict[tuple[Any, ...], TemplateNames] = {}
     sets: list[tuple[str, str, tuple[str, ...]]] = []
     for name, layer in c.rebar_layers.items():
         angular = layer.geometry == "angular"
@@ -115,13 +116,13 @@ def deck_name(text: str) -> str:
     return text.upper().replace("-", "_").replace(" ", "_")
 
 
-def _well(mesh: SectionMesh) -> dict[str, Any]:
+def _well(mesh: SectionMesh) -> TemplateNames:
     """A surface element over the rim's well, which closes the cavity: its left side is inside."""
     left, right = mesh.inner_ends
     return {"element": WELL_ELEMENT, "nodes": (right, left)}
 
 
-def _material(material: Any, analysis: Analysis) -> dict[str, Any]:
+def _material(material: Any, analysis: Analysis) -> TemplateNames:
     """A material's numbers for a template, in SI."""
     if material.kind == "cord":
         return {
@@ -186,7 +187,7 @@ def _tables(
     sets: tuple[tuple[str, str, tuple[str, ...]], ...],
     reference: tuple[float, float],
     element: str,
-) -> dict[str, Any]:
+) -> TemplateNames:
     """Node and element tables; elements go to the last entry of ``solids`` that claims them.
 
     sets: of surface elements, each with its line and the regions it is in (none: all).
@@ -222,7 +223,7 @@ def _tables(
     }
 
 
-def aside(tyre: Tyre) -> dict[str, Any]:
+def aside(tyre: Tyre) -> TemplateNames:
     """Requests that no deck of keywords holds: which surfaces hold the gas, whose frequency
     counts."""
     request = tyre.written.kind.request()
@@ -235,7 +236,7 @@ def aside(tyre: Tyre) -> dict[str, Any]:
     return request
 
 
-def wheel(rim: Rim) -> dict[str, Any]:
+def wheel(rim: Rim) -> TemplateNames:
     """The rim's point elements, which degrees of freedom stay held, and how to look for modes.
 
     The axle is the second axis of the revolved tyre.
@@ -270,7 +271,7 @@ def wheel(rim: Rim) -> dict[str, Any]:
     }
 
 
-def gas_material(case: Case) -> dict[str, Any] | None:
+def gas_material(case: Case) -> TemplateNames | None:
     """The share of an ideal gas: density p / (R T), adiabatic bulk modulus gamma p; p absolute."""
     cavity = case.cavity
     if not cavity.share:
@@ -284,7 +285,7 @@ def gas_material(case: Case) -> dict[str, Any] | None:
     }
 
 
-def frequency_rubber(m: Rubber, analysis: Analysis) -> dict[str, Any]:
+def frequency_rubber(m: Rubber, analysis: Analysis) -> TemplateNames:
     """Constants of the inflated state as long-term ones, and the shear modulus over frequency:
     G(f)/G0 = (f / f_ref)^beta times the Prony series' at the vibration frequency; with the losses
     of a table of loss factors."""
@@ -325,7 +326,7 @@ def frequency_rubber(m: Rubber, analysis: Analysis) -> dict[str, Any]:
     }
 
 
-def attached(c: Case, mesh: SectionMesh) -> list[dict[str, Any]]:
+def attached(c: Case, mesh: SectionMesh) -> list[TemplateNames]:
     """Mass and spring elements on nodes of the tread: name, keyword, elements, lines of data."""
     groups: list[tuple[str, str, list[int], tuple[int, float] | None]] = []
     number = FIRST_ATTACHED_ELEMENT
@@ -350,7 +351,7 @@ def attached(c: Case, mesh: SectionMesh) -> list[dict[str, Any]]:
     return result
 
 
-def turning(c: Case, sets: list[str]) -> dict[str, Any] | None:
+def turning(c: Case, sets: list[str]) -> TemplateNames | None:
     """Speed of a tyre that turns, rad/s, and the element sets that hold its mass."""
     if not c.spin_rad_per_s:
         return None

@@ -11,7 +11,7 @@ from ...tyre.case import Case
 from ...tyre.case.parts import RebarLayer
 from ...tyre.resolve import Tyre
 from ...tyre.section.section import SectionError
-from ...tyre.templates import TemplateFailed
+from ...tyre.templates import TemplateFailed, TemplateNames
 from .abaqus import claimed, deck_name, solid_claims
 from .sector import INNER_FACE, Division, PlyStrip, Sector, build_sector
 
@@ -24,7 +24,7 @@ FILLER = 1e-6  # of a ply's stiffness, isotropic, so that its tensor is not sing
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # CalculiX's order of components
 
 
-def calculix_context(tyre: Tyre) -> dict[str, Any]:
+def calculix_context(tyre: Tyre) -> TemplateNames:
     """Names for the templates, the same for every nodal diameter. Raises TemplateFailed."""
     c = tyre.case
     if c.analysis.vibration_frequency_Hz is not None:
@@ -87,7 +87,7 @@ def calculix_context(tyre: Tyre) -> dict[str, Any]:
     }
 
 
-def _solids(tyre: Tyre, sector: Sector, numbers: dict[int, int]) -> list[dict[str, Any]]:
+def _solids(tyre: Tyre, sector: Sector, numbers: dict[int, int]) -> list[TemplateNames]:
     """Bricks by compound: name of the set, of the material, and rows of element and node
     numbers."""
     case = tyre.case
@@ -108,7 +108,7 @@ def _solids(tyre: Tyre, sector: Sector, numbers: dict[int, int]) -> list[dict[st
     ]
 
 
-def _rubbers(case: Case) -> list[dict[str, Any]]:
+def _rubbers(case: Case) -> list[TemplateNames]:
     """Constants in the static state: CalculiX has no viscoelasticity for hyperelastic rubber."""
     rubbers = []
     for name, m in case.materials.items():
@@ -131,7 +131,7 @@ def _rubbers(case: Case) -> list[dict[str, Any]]:
     return rubbers
 
 
-def _plies(case: Case, sector: Sector) -> list[dict[str, Any]]:
+def _plies(case: Case, sector: Sector) -> list[TemplateNames]:
     """One material a layer and strip: stiffness E A / (s t) along the cords, their mass,
     t being the strip's own."""
     plies, number = [], len(sector.bricks)

@@ -17,9 +17,9 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
-from ...tyre.templates import TemplateFailed, environment, render
+from ...tyre.templates import TemplateFailed, TemplateNames, environment, render
 
 CPU_S, WALL_S = 5, 60.0  # of one template; shipped ones take a tenth of a second
 MEMORY = 2_000_000_000  # bytes of address space, where the system limits it
@@ -41,7 +41,7 @@ class TemplateProcess:
     def __init__(self, dialect: str, folder: Path):
         self.dialect, self.folder = dialect, folder.absolute()
 
-    def render(self, template: str, names: dict[str, Any]) -> str:
+    def render(self, template: str, names: TemplateNames) -> str:
         """The deck by a template, given the values of its ``names``. Raises TemplateFailed."""
         request = pickle.dumps((self.dialect, self.folder, template, names))
         process = _process()

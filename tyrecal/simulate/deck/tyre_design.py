@@ -16,7 +16,7 @@ from ...tyre.case.schema import SolverChoice
 from ...tyre.case.slack_hint import slack_cord_hint
 from ...tyre.effects import catalogue
 from ...tyre.resolve import Tyre, resolved
-from ...tyre.templates import TemplateFailed, environment, render
+from ...tyre.templates import TemplateFailed, TemplateNames, environment, render
 from ...tyre.values import set_values
 from .abaqus import aside, context
 from .calculix import calculix_context
@@ -228,7 +228,7 @@ def _abaqus(tyre: Tyre, env: Any, request: DeckRequest) -> dict[str, str]:
     return texts
 
 
-def _with_mesh(tyre: Tyre, env: Any) -> dict[str, Any]:
+def _with_mesh(tyre: Tyre, env: Any) -> TemplateNames:
     names = context(tyre)
     if "mesh_block" not in names:  # of a deck the block is the user's
         names["mesh_block"] = _mesh_block(env, names["mesh"])
@@ -287,7 +287,7 @@ DIALECTS: dict[str, Callable[[Tyre, Any, DeckRequest], dict[str, str]]] = {
 _BLOCKS: dict[tuple[int, int], tuple[Any, Any, str]] = {}
 
 
-def _mesh_block(env: Any, mesh: dict[str, Any]) -> str:
+def _mesh_block(env: Any, mesh: TemplateNames) -> str:
     """The mesh's text, which stays the same from one evaluation of a fit to the next."""
     key = id(env), id(mesh)
     if key not in _BLOCKS or env.auto_reload:

@@ -9,21 +9,22 @@ import shutil
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
-from typing import Any
 
 from packaging.requirements import Requirement
+
+from ...files import Json
 
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
 GB = 1e9
 
 
-def packages() -> list[dict[str, Any]]:
+def packages() -> list[Json]:
     """Packages that tyrecal needs: ``name``, ``needed`` (version specifier such as ">=1.26"),
     ``version`` that is installed (None: missing), ``ok``: whether that is a version needed."""
     return [_status(each) for each in _requirements("")]
 
 
-def extras() -> list[dict[str, Any]]:
+def extras() -> list[Json]:
     """Extras that can be installed: ``name``, ``missing`` packages, and ``install``, a command to
     run in a clone of tyrecal, because no package index has tyrecal."""
     texts = requires("tyrecal") or []
@@ -36,7 +37,7 @@ def extras() -> list[dict[str, Any]]:
     return entries
 
 
-def machine() -> dict[str, Any]:
+def machine() -> Json:
     """The machine: ``python``, ``system``, ``cores`` that this process may use, ``memory_GB`` and
     ``free_memory_GB`` (None if the system does not report them), ``free_disc_GB`` of the current
     folder, ``threads``: values of the environment variables `THREADS`, None if not set."""
@@ -52,7 +53,7 @@ def machine() -> dict[str, Any]:
     }
 
 
-def records(shared: Path | None) -> list[dict[str, Any]]:
+def records(shared: Path | None) -> list[Json]:
     """The evaluation store ``shared`` between cases, or else those in the results folders of the
     current folder: ``folder``, ``records`` (number of finished evaluations), ``MB``."""
     from ..evaluate.store import Store
@@ -75,7 +76,7 @@ def _requirements(extra: str) -> Iterator[Requirement]:
             yield requirement
 
 
-def _status(requirement: Requirement) -> dict[str, Any]:
+def _status(requirement: Requirement) -> Json:
     """An entry of `packages`."""
     try:
         installed: str | None = version(requirement.name)

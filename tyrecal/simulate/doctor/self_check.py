@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Any
+
+from ...files import Json
 
 CASE = Path(__file__).with_name("check.yaml")
 # Results of the bundled solver on the coarse mesh of check.yaml. CalculiX 2.20, an independent
@@ -26,7 +27,7 @@ TOLERANCE_PERCENT = {"bundled": 0.1}  # far above the differences by rounding be
 OTHERS_PERCENT = 2.5  # tolerance for solvers with other elements and other laws of the cords
 
 
-def self_check(solver: str = "bundled") -> dict[str, Any]:
+def self_check(solver: str = "bundled") -> Json:
     """Mass and modes of the known tyre by a solver, compared with the recorded ones.
 
     Keys: ``solver``, ``ok``, ``seconds``, ``tolerance_percent``, ``mass_kg``, ``modes`` [{label,
@@ -41,7 +42,7 @@ def self_check(solver: str = "bundled") -> dict[str, Any]:
 
     started = time.monotonic()
     tolerance = TOLERANCE_PERCENT.get(solver, OTHERS_PERCENT)
-    result: dict[str, Any] = {
+    result: Json = {
         "solver": solver,
         "ok": False,
         "tolerance_percent": tolerance,

@@ -6,9 +6,8 @@ from __future__ import annotations
 from dataclasses import replace
 from math import degrees
 from pathlib import Path
-from typing import Any
 
-from ...files import atomic_write, make_folder
+from ...files import Json, atomic_write, make_folder
 from ...tyre.case import LoadedCase
 from ...tyre.load import load_case
 from ..deck.decks import Decks
@@ -21,7 +20,7 @@ from .self_check import CASE
 # between the carcass cords of the second pair, 1 mm apart at a radius of 0.3 m; in degrees, says
 # the manual, times the distance from the axle
 FANNED_DEG = 0.19
-READINGS: dict[str, dict[str, Any]] = {  # of *REBAR LAYER, GEOMETRY=ANGULAR, by what it would mean
+READINGS: dict[str, Json] = {  # of *REBAR LAYER, GEOMETRY=ANGULAR, by what it would mean
     "manual": {"geometry": "angular", "spacing_m": None, "spacing_deg": FANNED_DEG},
     "one spacing": {"spacing_m": 1e-3},
     "radians": {"geometry": "angular", "spacing_m": None, "spacing_deg": degrees(FANNED_DEG)},
@@ -117,7 +116,7 @@ def _table(answers: dict[str, Evaluation]) -> str:
     return "\n".join(line.rstrip() for line in lines) + "\n"
 
 
-def _with_carcass(case: LoadedCase, update: dict[str, Any]) -> LoadedCase:
+def _with_carcass(case: LoadedCase, update: Json) -> LoadedCase:
     """The tyre with other numbers of its carcass."""
     layers = dict(case.case.rebar_layers)
     layers["carcass"] = layers["carcass"].model_copy(update=update)

@@ -19,6 +19,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 from threadpoolctl import threadpool_limits
 
+from ...files import Json
 from ..settings import typed
 from .failure import EvaluationFailed, SolverUnavailable
 from .sources import sources
@@ -138,7 +139,7 @@ def jobs_of(settings: QueueSettings) -> Any:
         raise SolverUnavailable(NO_DASK) from None
     for each, handler in handlers.items():  # dask-jobqueue makes Ctrl-C an exit with code 0
         signal.signal(each, handler)
-    given: dict[str, Any] = {
+    given: Json = {
         "cores": settings.cores,
         "processes": settings.cores,
         "memory": settings.memory,

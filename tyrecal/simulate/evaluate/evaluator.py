@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from ...errors import InputError
-from ...files import NotWritten, printable
+from ...files import Json, NotWritten, printable
 from ...interrupt import defer_interrupts, raise_interrupt
 from ..deck.decks import Decks, Design, DesignKey, PressedTyre
 from . import folders
@@ -22,7 +22,7 @@ from .pressed import Pressed, pressed
 from .record import Damaged
 from .recorded import check, contradiction
 from .results import Evaluation, evaluation
-from .solver import Solver, find_solver, refuse_missing_program
+from .solver import Solver, SolverAnswer, find_solver, refuse_missing_program
 from .store import Store, key_of
 
 SETTLED = ("no_equilibrium", "unstable")  # the deck's own doing: another run would say the same
@@ -292,7 +292,7 @@ class Evaluator:
         self.refuse_lacking(design)
         return design
 
-    def _ask(self, decks: Decks, typed: Callable[[dict[str, Any], Path | None], T]) -> T:
+    def _ask(self, decks: Decks, typed: Callable[[SolverAnswer, Path | None], T]) -> T:
         """The solver's answer, or the record's, ``typed``, which is told where a run that ended
         early is kept."""
         raise_interrupt()
@@ -307,7 +307,7 @@ class Evaluator:
             raise
 
     def _ask_in(
-        self, folder: Path, decks: Decks, typed: Callable[[dict[str, Any], Path | None], T]
+        self, folder: Path, decks: Decks, typed: Callable[[SolverAnswer, Path | None], T]
     ) -> T:
         """`_ask` in a fresh ``folder``, which is dropped where the run went well."""
         solver, key = self.solver, ""
@@ -457,14 +457,14 @@ class Evaluator:
             words = f"the result of solver '{self.solver.name}' is not used: {wrong}"
             raise EvaluationFailed("no_results", words)
 
-    def _recall(self, key: str, decks: Decks, folder: Path) -> dict[str, Any] | None:
+    def _recall(self, key: str, decks: Decks, folder: Path) -> SolverAnswer | None:
         """The stored answer of a question; None if there is none. Raises EvaluationFailed if it is
         a failure."""
         content = self.store.read(key) if self.store else None
         if not self.store or content is None:
             return None
         if "answer" in content:
-            answer: dict[str, Any] = content["answer"]
+            answer: SolverAnswer = content["answer"]
             if wrong := contradiction(answer, decks, folder):
                 self.store.set_aside(self.store.path(key), wrong)
                 return None
@@ -484,13 +484,13 @@ class Evaluator:
             path if path.resolve().parent == parent and (path / folders.OUTCOME).is_file() else None
         )
 
-    def _run(self, folder: Path, time_limit_s: float) -> dict[str, Any]:
+    def _run(self, folder: Path, time_limit_s: float) -> SolverAnswer:
         refuse_missing_program(self.solver)
         self.counts.runs += 1
         self.solver.run(folder, time_limit_s)
         return self.solver.read(folder)
 
-    def _record(self, key: str, about: dict[str, str], content: dict[str, Any]) -> None:
+    def _record(self, key: str, about: dict[str, str], content: Json) -> None:
         if self.store and key:
             names = {"solver": self.solver.name, "version": self.solver.version}
             self.store.write(key, {**names, **about}, content)

@@ -12,6 +12,7 @@ from pydantic import ConfigDict
 
 from . import answer_fields as of
 from .failure import EvaluationFailed
+from .solver import SolverAnswer
 
 Array = np.ndarray
 BALANCE = 0.01  # of the load, by which the road's force may differ from it
@@ -77,7 +78,7 @@ class Pressed:
 
 
 def pressed(
-    answer: dict[str, Any],
+    answer: SolverAnswer,
     loads_N: Sequence[float],
     kept: Path | None,
     modes: int = 0,

@@ -17,6 +17,7 @@ from zipfile import ZIP_STORED, ZipFile
 import numpy as np
 
 from ...errors import InputError
+from ...files import Json
 
 ARRAY = "__array__"
 MAX_JSON_BYTES = 2_000_000  # a hundred times the longest line of an answer
@@ -28,7 +29,7 @@ class Damaged(InputError):
     """The bytes of a record are not those that tyrecal wrote."""
 
 
-def pack(key: str, about: dict[str, Any], content: Any) -> bytes:
+def pack(key: str, about: Json, content: Any) -> bytes:
     """Bytes of a record: ``content``, the answer to the question with the hash ``key``.
 
     content: dicts with text keys, lists, text, finite numbers, None and arrays, kept to the last
@@ -51,7 +52,7 @@ def pack(key: str, about: dict[str, Any], content: Any) -> bytes:
     return sha256(body).hexdigest().encode() + b"\n" + body
 
 
-def unpack(data: bytes, key: str) -> tuple[dict[str, Any], Any]:
+def unpack(data: bytes, key: str) -> tuple[Json, Any]:
     """``about`` and ``content`` of the bytes that `pack` made. Raises Damaged, also if they have
     another key."""
     digest, body = data[: DIGEST - 1], data[DIGEST:]

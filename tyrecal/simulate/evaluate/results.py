@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
+
+from .solver import SolverAnswer
 
 Array = np.ndarray
 
@@ -58,10 +59,10 @@ class Evaluation:
     displacement: Array = field(default_factory=lambda: np.empty((0, 3)))
     # variable name to d mass, kg per unit
     mass_gradients: dict[str, float] = field(default_factory=dict)
-    response: dict[str, Any] = field(default_factory=dict)  # as `Solver.read` has it
+    response: SolverAnswer = field(default_factory=dict)  # as `Solver.read` has it
 
 
-def evaluation(answer: dict[str, Any]) -> Evaluation:
+def evaluation(answer: SolverAnswer) -> Evaluation:
     """The typed form of what `Solver.read` gave and `recorded.check` has passed."""
     nodes, points, displacement = (  # laid out alike, so that sums are too, recorded or not
         np.ascontiguousarray(answer[name]) for name in ("nodes", "points", "displacement")

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from ...errors import InputError
+from ...files import Json
 from ...tyre.case.mistakes import suggestion
 from ...tyre.plugins import load_plugin
 from ..program import resolve_program, why_missing
@@ -15,6 +16,7 @@ from ..settings import command_of
 from .failure import SolverUnavailable
 
 GROUP = "tyrecal.solvers"
+SolverAnswer = dict[str, Any]  # plain data and arrays, see `Solver.read`
 
 
 class Solver(Protocol):
@@ -49,7 +51,7 @@ class Solver(Protocol):
     def run(self, folder: Path, time_limit_s: float) -> None:
         """Run to the end or raise."""
 
-    def read(self, folder: Path) -> dict[str, Any]:
+    def read(self, folder: Path) -> SolverAnswer:
         """pressure_Pa, mass_kg, modes [{frequency_Hz, multiplicity, n, amplitude}], gradients
         {variable: [Hz per unit]}, nodes, points, displacement and,
         for fits to the mass, mass_gradients {variable: kg per unit}. A doublet that is split is one
@@ -83,7 +85,7 @@ def find_solver(name: str, command: Sequence[str] = ()) -> Solver:
     return solver
 
 
-def solver_facts(solver: Solver | None) -> dict[str, Any]:
+def solver_facts(solver: Solver | None) -> Json:
     """The entries of run.json about a solver: ``solver``, its name and version; ``solver_command``,
     the words that start it, None if it starts no program."""
     return {
@@ -106,16 +108,16 @@ def _missing(solver: Any) -> str:
     return why_missing(command) if command else ""
 
 
-def installed() -> list[dict[str, Any]]:
+def installed() -> list[Json]:
     """Every registered solver: ``name``, ``version``, ``dialect``, ``capabilities``, ``problem``:
     why it cannot be used, or None; ``command`` that it starts, or None, and ``command_from``: where
     that is set. Raises nothing."""
     return [_described(entry) for entry in sorted(entry_points(group=GROUP))]
 
 
-def _described(entry: EntryPoint) -> dict[str, Any]:
+def _described(entry: EntryPoint) -> Json:
     """Facts on an installed solver for lists; ``problem`` is the reason if it cannot be loaded."""
-    facts: dict[str, Any] = {
+    facts: Json = {
         "name": entry.name,
         "version": None,
         "dialect": None,

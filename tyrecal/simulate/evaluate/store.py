@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from ...files import (
+    Json,
     NotAFile,
     atomic_write,
     make_folder,
@@ -119,7 +120,7 @@ class Store:
             os.utime(path)  # the time of last use, for `prune`
         return content
 
-    def write(self, key: str, about: dict[str, Any], content: Any) -> None:
+    def write(self, key: str, about: Json, content: Any) -> None:
         """Record ``content`` (see `pack`) whole or not at all; warns once if it cannot.
 
         about: facts on the evaluation for people, such as case and solver.
@@ -158,7 +159,7 @@ class Store:
             size, removed = size - each, removed + 1
         return removed
 
-    def summary(self, verify: bool = False) -> dict[str, Any]:
+    def summary(self, verify: bool = False) -> Json:
         """``records``, ``bytes``, ``solvers`` {name and version: records}, ``failures`` recorded,
         ``damaged``; ``verify`` checks every checksum, else only what was set aside counts."""
         records = size = damaged = failures = 0
@@ -208,15 +209,15 @@ def _remove(path: Path) -> None:
         path.unlink()
 
 
-def _about(path: Path) -> dict[str, Any]:
+def _about(path: Path) -> Json:
     """The record's first facts, without its arrays."""
     with open_file(path, follow=False) as file:
         file.seek(DIGEST)
-        about: dict[str, Any] = json.loads(file.readline(MAX_RECORD_BYTES))["about"]
+        about: Json = json.loads(file.readline(MAX_RECORD_BYTES))["about"]
         return about
 
 
-def _read(path: Path) -> tuple[dict[str, Any], Any]:
+def _read(path: Path) -> tuple[Json, Any]:
     """Read a record whole: the question that it is named by, and an answer that passes the checks.
 
     Raises Damaged; OSError where there is none, or it may not be read.

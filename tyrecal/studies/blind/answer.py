@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...files import private_dir
+from ...files import Json, private_dir
 from ...measured.load import load_case
 from ...measured.tables import read_measurements
 from ...simulate.evaluate.evaluator import Evaluator
@@ -96,7 +96,7 @@ def one_answer(
     known: Expansion,
     further: float,
     trial: Path,
-) -> dict[str, Any]:
+) -> Json:
     """The diagnosis of one file of measurements, and its prediction at the held-out pressure.
 
     known: the model's expansion about its start, which serves all trials.
@@ -151,7 +151,7 @@ def places_at(rows: Sequence[ModelRow], pressure_kPa: float) -> np.ndarray:
 
 def _by_label(
     diagnosis: Diagnosis, rows: Sequence[ModelRow], places: np.ndarray, each: Sequence[Any]
-) -> dict[str, Any]:
+) -> Json:
     """Values by the laboratory's own labels."""
     by_label = {str(rows[i][0]): value for i, value in zip(places, each, strict=True)}
     if diagnosis.exchanged:

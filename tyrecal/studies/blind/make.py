@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...files import atomic_write, make_folder, refuse_link
+from ...files import Json, atomic_write, make_folder, refuse_link
 from ...measured.measurement import CSV_COLUMNS
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.evaluate.pool import process_pool
@@ -219,7 +219,7 @@ def write_trials(folder: Path, protocol: Protocol, trials: list[Trial]) -> None:
         os.utime(path, (0, 0))
 
 
-def plain_trial(trial: Trial) -> dict[str, Any]:
+def plain_trial(trial: Trial) -> Json:
     """One trial without noise, for JSON."""
     tables = {}
     for key, computed in (("with_effect", trial.with_effect), ("without", trial.without)):
@@ -234,7 +234,7 @@ def plain_trial(trial: Trial) -> dict[str, Any]:
     return {**asdict(trial.truth), "tries": trial.tries, **tables}
 
 
-def read_trial(content: dict[str, Any], labels: list[Label]) -> Trial:
+def read_trial(content: Json, labels: list[Label]) -> Trial:
     """The trial that `plain_trial` wrote."""
     tables: dict[str, dict[float, Computed]] = {"with_effect": {}, "without": {}}
     for key, table in tables.items():
@@ -245,7 +245,7 @@ def read_trial(content: dict[str, Any], labels: list[Label]) -> Trial:
     return Trial(Truth(**content), tries, **tables)
 
 
-def sealed_trial(trial: Trial, protocol: Protocol) -> dict[str, Any]:
+def sealed_trial(trial: Trial, protocol: Protocol) -> Json:
     """One trial of the truth, with what was held out as it was measured."""
     read = values(trial, protocol)[protocol.held_out_kPa]
     held_out = {

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
+from ...files import Json
 from ...simulate.modes.label import Label
 from ..inference.form_error import LAWS_LENGTH, form_error
 from ..inference.model import Answer, ModelRow, Query, ResponseModel, state_of
@@ -164,7 +165,7 @@ def difficulty(
     return Difficulty(lam, min(distances.values(), default=np.inf), (law, *near), equivalent)
 
 
-def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> dict[str, Any]:
+def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> Json:
     """The ruler as plain data. Raises the model's failure where the plain tyre has no solution."""
     x0 = np.asarray(model.start, float)
     count = len(x0)

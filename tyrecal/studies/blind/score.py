@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ...files import Json
 from ...measured.measurement import Measurement
 from ...measured.tables import read_measurements
 from ...simulate.modes.label import Label
@@ -67,7 +68,7 @@ class Scored:
         """Reduction of the held-out error, 1 - after / before."""
         return 1 - self.after / self.before
 
-    def plain(self) -> dict[str, Any]:
+    def plain(self) -> Json:
         """The trial as plain data for JSON."""
         kept = {k: v for k, v in asdict(self).items() if k not in ("probabilities", "ranked")}
         kept["top"] = list(self.ranked[:3])

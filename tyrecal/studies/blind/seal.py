@@ -11,16 +11,15 @@ import json
 import secrets
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
 from ...errors import InputError
-from ...files import atomic_write, read_bytes
+from ...files import Json, atomic_write, read_bytes
 from .protocol import read_json, write_json
 
 SEAL, TRUTH, ANSWERS = "seal.json", "truth.json", "answers.json"
 
 
-def seal(folder: Path, sealed: Path, content: dict[str, Any]) -> str:
+def seal(folder: Path, sealed: Path, content: Json) -> str:
     """Write the truth to ``sealed`` and its sha256 to ``folder``; returns the sha256."""
     text = json.dumps({"nonce": secrets.token_hex(32), **content}, indent=1, allow_nan=False)
     with atomic_write(sealed / TRUTH) as partial:
@@ -30,7 +29,7 @@ def seal(folder: Path, sealed: Path, content: dict[str, Any]) -> str:
     return mark
 
 
-def open_truth(folder: Path, sealed: Path) -> dict[str, Any]:
+def open_truth(folder: Path, sealed: Path) -> Json:
     """Content of truth.json. Raises InputError if it is not the sealed one, or an answer is missing
     or was changed."""
     check_answers(folder)

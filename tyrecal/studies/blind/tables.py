@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
 
+from ...files import Json
 from .score import Scored
 from .statistics import brier, calibration_error, calibration_quantile, clopper_pearson
 
@@ -15,7 +15,7 @@ DIFFICULTY_BANDS = ((0.0, 4.0), (4.0, 10.0), (10.0, 25.0), (25.0, float("inf")))
 DETECTED = 10.0  # band from which an effect counts as detectable
 
 
-def summary(trials: Sequence[Scored]) -> dict[str, Any]:
+def summary(trials: Sequence[Scored]) -> Json:
     """All figures, as plain data; a rate is {"right", "count", "share", "low", "high"}."""
     effects = [t for t in trials if t.kind == "effect"]
     none = [t for t in trials if t.kind == "none"]
@@ -73,7 +73,7 @@ def summary(trials: Sequence[Scored]) -> dict[str, Any]:
     }
 
 
-def rate(hits: Sequence[bool]) -> dict[str, Any]:
+def rate(hits: Sequence[bool]) -> Json:
     """A share with its exact 95 % bounds."""
     right, count = sum(hits), len(hits)
     low, high = clopper_pearson(right, count)
@@ -86,12 +86,12 @@ def rate(hits: Sequence[bool]) -> dict[str, Any]:
     }
 
 
-def page(figures: dict[str, Any], maker: str) -> str:
+def page(figures: Json, maker: str) -> str:
     """The figures as a page of Markdown."""
     return "\n".join(_lines(figures, maker)) + "\n"
 
 
-def _band(effects: Sequence[Scored], low: float, high: float) -> dict[str, Any]:
+def _band(effects: Sequence[Scored], low: float, high: float) -> Json:
     """Rates of right first and second answers among the effects of one band of difficulty."""
     here = [t for t in effects if low <= t.band < high]
     return {
@@ -101,12 +101,12 @@ def _band(effects: Sequence[Scored], low: float, high: float) -> dict[str, Any]:
     }
 
 
-def _baselines(trials: Sequence[Scored]) -> dict[str, Any]:
+def _baselines(trials: Sequence[Scored]) -> Json:
     """Right by group over all trials: the diagnosis, chance, the commonest answer, and others."""
     keys = [t.truth for t in trials]
     commonest = max(sorted(set(keys)), key=keys.count) if keys else ""
     known = sorted(set(keys))
-    result: dict[str, Any] = {"diagnosis": rate([t.right for t in trials])}
+    result: Json = {"diagnosis": rate([t.right for t in trials])}
     result["random"] = {
         "share": _mean([len(set(t.group) & set(known)) / len(known) for t in trials])
     }
@@ -126,7 +126,7 @@ def _confusion(trials: Sequence[Scored]) -> dict[str, dict[str, int]]:
     return {key: dict(row.most_common()) for key, row in sorted(table.items())}
 
 
-def _lines(f: dict[str, Any], maker: str) -> Iterator[str]:
+def _lines(f: Json, maker: str) -> Iterator[str]:
     kinds = ", ".join(f"{count} {kind}" for kind, count in f["trials"].items())
     yield f"Maker: {maker}.\nTrials: {kinds}; labels swapped in {f['swapped']}.\n"
     yield "| min(lambda, delta^2) | trials | top 1, group | top 1 | top 2, group |"
@@ -184,7 +184,7 @@ def _lines(f: dict[str, Any], maker: str) -> Iterator[str]:
         )
 
 
-def _rate(each: dict[str, Any]) -> str:
+def _rate(each: Json) -> str:
     """A rate in words: right of count, share and its 95 % interval."""
     if not each["count"]:
         return "none"

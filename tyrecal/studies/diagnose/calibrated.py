@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from ...files import Json
 from ..inference.tyre_model import TyreModel
 from .diagnosis import Diagnosis
 from .evidence import NONE
@@ -13,7 +12,7 @@ from .evidence import NONE
 SLOPE_STEP = 1e-6  # of x, for the slope of a variable in its own unit
 
 
-def calibrated_variables(diagnosis: Diagnosis, model: TyreModel) -> dict[str, Any]:
+def calibrated_variables(diagnosis: Diagnosis, model: TyreModel) -> Json:
     """``without`` and ``with`` (None where there is no gap): {variable: value, standard_error, both
     in ``unit``}.
 
@@ -26,7 +25,7 @@ def calibrated_variables(diagnosis: Diagnosis, model: TyreModel) -> dict[str, An
     }
 
 
-def _calibrated(diagnosis: Diagnosis, model: TyreModel, key: str) -> dict[str, dict[str, Any]]:
+def _calibrated(diagnosis: Diagnosis, model: TyreModel, key: str) -> dict[str, Json]:
     """Value, standard error and unit of each variable under the hypothesis ``key``."""
     hypothesis = diagnosis.hypothesis(key)
     p, d = hypothesis.posterior, hypothesis.fitted.d

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
 from ...errors import InputError
+from ...files import Json
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.modes.label import Label
 from ..inference.expansion import MIDDLE, Expansion, anchored, carried, expand, refined
@@ -87,7 +87,7 @@ class Diagnosis:
         all; else None."""
         return self.verdict.best if self.verdict.kind != NO_GAP else None
 
-    def parameter(self, key: str, id: str = "") -> dict[str, Any]:
+    def parameter(self, key: str, id: str = "") -> Json:
         """Mean and 90 % interval of the effect ``id`` of ``key``, the first by default, with its
         unit, alone or with others; what the case has of it is counted in."""
         id = id or key.split("+")[0]

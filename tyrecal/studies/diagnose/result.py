@@ -10,12 +10,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydantic import Field
 
 from ...errors import InputError
+from ...files import Json
 from ...simulate.modes.label import Label
 from .. import named
 from ..inference.observations import Observable
@@ -171,7 +172,7 @@ class DiagnosisResult(Result):
     robust: RobustPart | None = None  # dependence of the verdict on assumptions
     likeliest: str | None = None  # ids of the likeliest effects
     # variables with value, standard_error and unit: without, and with the effect
-    calibrated: dict[str, Any] | None = None
+    calibrated: Json | None = None
     # probability by effects; none, and outside: an effect that the catalogue lacks
     probabilities: dict[str, float]
     candidate_set: list[str]  # effects that hold 90 % of the probability together
@@ -274,7 +275,7 @@ class DiagnosisResult(Result):
 def diagnosis_result(
     diagnosis: Diagnosis,
     under_load: UnderLoad | None = None,
-    calibrated: dict[str, Any] | None = None,
+    calibrated: Json | None = None,
     section: Sequence[FieldValue] = (),
     labels: Labels | None = None,
 ) -> DiagnosisResult:

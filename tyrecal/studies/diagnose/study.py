@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, nan
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ...errors import InputError
+from ...files import Json
 from ...measured.measurement import Measurement
 from ...measured.targets import in_states, readings_of
 from ...simulate.evaluate.evaluator import Evaluator
@@ -56,7 +56,7 @@ class DiagnosedCase:
     labels: Labels | None = None  # of frequencies that came without
 
     @property
-    def variables(self) -> dict[str, Any]:
+    def variables(self) -> Json:
         """See `calibrated_variables`."""
         return calibrated_variables(self.diagnosis, self.model)
 
@@ -175,9 +175,7 @@ def study(
     )
 
 
-def states_measured(
-    case: LoadedCase, measured: Path, others: Sequence[Path] = ()
-) -> dict[str, Any]:
+def states_measured(case: LoadedCase, measured: Path, others: Sequence[Path] = ()) -> Json:
     """The states of all that is ``measured``, and in ``others`` too, as `provenance` takes them.
     Raises InputError where the case cannot be in one of them; OSError."""
     readings = in_states(case, readings_of(case, measured, labelled=False))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from ...errors import InputError
+from ...files import Json
 from ...measured.measurement import Measurement
 from ...simulate.evaluate.evaluator import Counts, Evaluator
 from ...simulate.evaluate.executor import executor, in_order
@@ -42,7 +42,7 @@ class Fit:
     """A finished fit."""
 
     found: FitResult  # what fit.json holds: `result` is its content
-    history: list[dict[str, Any]]  # design points in order, rows of fit_history.csv
+    history: list[Json]  # design points in order, rows of fit_history.csv
     initial: Point  # at the case's start values
     fitted: Point  # at the least objective of all starts
     left_out: list[str] = field(default_factory=list)  # sentences on measurements without a target
@@ -54,7 +54,7 @@ class Fit:
         return f"Fit({ended}, {before:.4g} to {after:.4g} {result.objective_unit}: {values})"
 
     @property
-    def result(self) -> dict[str, Any]:
+    def result(self) -> Json:
         """The content of fit.json."""
         return self.found.content()
 
@@ -258,7 +258,7 @@ def _start_alone(task: tuple[Problem, Array, str]) -> tuple[StartReport | Evalua
     return _start_here(problem, start, method), problem.evaluator.counts
 
 
-def _history(problem: Problem) -> list[dict[str, Any]]:
+def _history(problem: Problem) -> list[Json]:
     """Entries of fit_history.csv: objective, or failure, and values of each design point."""
     names = list(problem.fixed) + [v.name for v in problem.variables]
     return [
@@ -271,16 +271,16 @@ def _history(problem: Problem) -> list[dict[str, Any]]:
     ]
 
 
-def _joined(histories: list[list[dict[str, Any]]]) -> list[dict[str, Any]]:
+def _joined(histories: list[list[Json]]) -> list[Json]:
     """Histories of all starts in one list, with number of point and start."""
-    rows: list[dict[str, Any]] = []
+    rows: list[Json] = []
     for start, history in enumerate(histories, start=1):
         for row in history:
             rows.append({"point": len(rows) + 1, "start": start, **row})
     return rows
 
 
-def history_csv(history: list[dict[str, Any]]) -> str:
+def history_csv(history: list[Json]) -> str:
     """All design points as CSV: point, start, variables, objective_Hz, failure."""
     names = list(history[0]["values"])
     keys = ["point", "start", *names, "objective_Hz", "failure"]

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 from ...errors import InputError
+from ...files import Json
 from ...tyre.case import LoadedCase, number_at
 from ...tyre.case.mistakes import suggestion
 from ...tyre.number_units import EFFECT_PATH, unit_of
@@ -25,7 +25,7 @@ FREED_WITHIN = 3.0  # standard deviations of what is known
 def with_freed(case: LoadedCase, names: Sequence[str]) -> LoadedCase:
     """The case with uncertain numbers, by the name of their uncertainty or by path, as further
     variables. Raises InputError."""
-    variables: dict[str, Any] = dict(case.case.variables)
+    variables: Json = dict(case.case.variables)
     known = [source for source in sources(case)[0] if not source.field]
     for name in dict.fromkeys(names):
         source = _uncertainty(case, name, known)

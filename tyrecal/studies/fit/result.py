@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
+from ...files import Json
 from ...measured.measurement import Measurement
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.modes.label import Label
@@ -83,7 +84,7 @@ class StartReport:
     point: Point
     message: str  # the optimiser's own words
     converged: bool
-    history: list[dict[str, Any]]  # one entry an evaluation
+    history: list[Json]  # one entry an evaluation
 
 
 class FittedVariable(ResultPart):
@@ -251,7 +252,7 @@ class FitResult(Result):
     correlations: dict[str, dict[str, float | None]]  # correlations of the variables
     singular_values: list[float]  # singular values of the sensitivities of the residuals
     # starts: initial, objective_Hz, converged, evaluations, message, values
-    starts: list[dict[str, Any]]
+    starts: list[Json]
     replaced_starts: int = 0  # drawn starts without a solution, replaced by others
 
     @classmethod
@@ -524,7 +525,7 @@ def fit_result(
     problem: Problem,
     initial: Point,
     reports: Sequence[StartReport],
-    history: Sequence[dict[str, Any]],
+    history: Sequence[Json],
     replaced: int,
     method: str,
     readings: Sequence[Measurement] = (),
@@ -678,7 +679,7 @@ def _modes(problem: Problem, initial: Point, point: Point, several: bool) -> lis
     return result
 
 
-def _mode(label: Label, multiplicity: int, hertz: tuple[float, float, float]) -> dict[str, Any]:
+def _mode(label: Label, multiplicity: int, hertz: tuple[float, float, float]) -> Json:
     """Entry of a mode; hertz: initial, fitted, target."""
     initial, fitted, target = hertz
     return {
@@ -716,7 +717,7 @@ def _others(problem: Problem, initial: Point, point: Point, several: bool) -> li
     return result
 
 
-def _states(problem: Problem, point: Point, known: FitUncertainty) -> dict[str, Any]:
+def _states(problem: Problem, point: Point, known: FitUncertainty) -> Json:
     """Entries of what each state adds, and of the states that would add most next."""
     measured = [
         {

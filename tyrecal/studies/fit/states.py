@@ -13,11 +13,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ...errors import InputError
+from ...files import Json
 from ...simulate.modes.find import LabelledModes
 from ...simulate.modes.label import Label
 from ...tyre.state import RIMS, TyreState
@@ -171,7 +171,7 @@ def _named(problem: Problem, errors: Sequence[float | None]) -> Errors:
     return {v.name: error for v, error in zip(problem.variables, errors, strict=True)}
 
 
-def plain(problem: Problem, state: TyreState) -> dict[str, Any]:
+def plain(problem: Problem, state: TyreState) -> Json:
     """A state for result files: pressure, load and rim are stated, none is left to the case."""
     complete = state.with_defaults(problem.case)
     return {"pressure_kPa": complete.pressure_kPa, "load_N": complete.load_N, "rim": complete.rim}

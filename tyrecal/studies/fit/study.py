@@ -7,9 +7,9 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from ...errors import InputError
+from ...files import Json
 from ...measured.case_modes import evaluate_case_modes
 from ...measured.measurement import Measurement
 from ...measured.shapes import read_shapes
@@ -158,7 +158,7 @@ class FitStudy:
         return fit
 
     @property
-    def provenance(self) -> dict[str, Any]:
+    def provenance(self) -> Json:
         """The block ``provenance`` of the result."""
         files = [self.measured] if self.measured else []
         case = without_freed(self.case)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
+from ...files import Json
 from ...simulate.modes.label import Label
 from ...simulate.modes.loaded import Member
 from ...tyre.case import LoadedCase
@@ -146,12 +146,12 @@ def read_known(case: LoadedCase) -> list[ValueTarget]:
     return [ValueTarget(KNOWLEDGE, 1.0, KNOWLEDGE_SIGMA) for _ in freed_variables(case)]
 
 
-def states_of(case: LoadedCase) -> dict[str, Any]:
+def states_of(case: LoadedCase) -> Json:
     """The states of all targets, as `provenance` takes them."""
     others = read_road_targets(case) + read_mass_targets(case)
     every = [t.state for t in read_targets(case)] + [t.state for t in others]
     states = dict.fromkeys(state.unloaded for state in every)
-    loads: dict[str, Any] = {"load_N": case.case.targets.loads_N or 0.0}
+    loads: Json = {"load_N": case.case.targets.loads_N or 0.0}
     if not states.keys() - {AS_THE_CASE}:
         return loads
     pressures = {state.with_defaults(case).pressure_kPa for state in states}

@@ -11,10 +11,10 @@ ratio; not with a prior, where cov x is the posterior, as in `sample`.
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Any
 
 import numpy as np
 
+from ...files import Json
 from .model_errors import ModelErrors, model_errors
 from .prior import PriorProblem
 from .problem import Point, Problem
@@ -41,7 +41,7 @@ class TotalError:
 
     def by_variable(
         self, problem: Problem, point: Point, chi2_per_dof: float | None
-    ) -> dict[str, dict[str, Any]]:
+    ) -> dict[str, Json]:
         """Entries of fit.json about the total by variable; standard errors in each one's unit."""
         has_prior = problem.spread is not None
         spread = self.of_coordinates * (1.0 if has_prior else max(1.0, chi2_per_dof or 0.0))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...files import Json
 from ...measured.shapes import shapes_of
 from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase
@@ -137,6 +138,6 @@ def shape_labels_result(run: ModalTest, case_modes: CaseModes, state: TyreState)
     return LabelsResult(format=1, labels=labels, shapes=shapes)
 
 
-def _entry(label: Label | None) -> dict[str, Any]:
+def _entry(label: Label | None) -> Json:
     """c, m and kind, None of what is no mode."""
     return asdict(label) if label else dict.fromkeys(("c", "m", "kind"))

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ...errors import InputError
+from ...files import Json
 from ...measured.measurement import Measurement
 from ...measured.targets import in_states, readings_of
 from ...simulate.deck.tyre_design import TyreDesign
@@ -213,7 +213,7 @@ def measured_readings(case: LoadedCase, measured: Path | None = None) -> list[Me
     return in_states(case, readings_of(case, path)) if path else None
 
 
-def states_sampled(case: LoadedCase, readings: Sequence[Measurement] | None) -> dict[str, Any]:
+def states_sampled(case: LoadedCase, readings: Sequence[Measurement] | None) -> Json:
     """The states of the readings, or of the case's targets, as `provenance` takes them."""
     rows = targets_as_readings(case, None) if readings is None else modal(readings)
     states = [each.state for each in rows]

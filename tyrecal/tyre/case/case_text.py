@@ -15,6 +15,7 @@ from ..section.curve import length_along
 from ..section.section import Section
 from ..templates import environment, render
 from .made_of import ConstructionParts
+from .mistakes import CaseData
 from .parts import SectionOrigin
 
 ELEMENTS_BY_LEVEL = {"coarse": 14, "default": 28, "refined": 56}  # along the half section, by level
@@ -89,7 +90,7 @@ def _short(value: float) -> str:
     return f"{digits}{'0' if digits.endswith('.') else ''}e{int(power):+d}"
 
 
-def flow_lines(data: Mapping[str, Any]) -> str:
+def flow_lines(data: CaseData) -> str:
     """Keys with their values, texts, numbers or tables, as lines of YAML."""
 
     def flow(value: Any) -> str:

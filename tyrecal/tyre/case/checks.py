@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 from ..footprint_quantities import FOOTPRINT_QUANTITIES
 from ..own_deck.numbers import canonical
 from ..plugins import IDS
-from .mistakes import Keys, dotted, suggestion
+from .mistakes import CaseData, Keys, dotted, suggestion
 from .parts import WHOLE_BEAD, WRONG, number
 from .schema import Analysis
 from .shape import KINDS, entries, explain, table, type_at, with_defaults
@@ -29,7 +29,7 @@ MAX_ELEMENTS = 20_000
 FIXED = ("format", "variables", "targets", "uncertainties", "solver")
 
 
-def problems(data: Mapping[str, Any], section: Section | None) -> Problems:
+def problems(data: CaseData, section: Section | None) -> Problems:
     """Every disagreement in ``data``; those with the section only where there is one."""
     yield from _effects(data)
     yield from _programs(data)
@@ -47,13 +47,13 @@ def problems(data: Mapping[str, Any], section: Section | None) -> Problems:
         yield from levels(data, section)
 
 
-def _effects(data: Mapping[str, Any]) -> Problems:
+def _effects(data: CaseData) -> Problems:
     for id in table(data, "effects"):
         if id not in IDS:
             yield ("effects", id), f"is not one of the effects{suggestion(id, IDS)}"
 
 
-def _programs(data: Mapping[str, Any]) -> Problems:
+def _programs(data: CaseData) -> Problems:
     """A case may come from anybody, so it does not say which program runs."""
     for key in table(table(data, "solver"), "options"):
         if key == "command":
@@ -65,7 +65,7 @@ def _programs(data: Mapping[str, Any]) -> Problems:
             )
 
 
-def _names(data: Mapping[str, Any]) -> Problems:
+def _names(data: CaseData) -> Problems:
     """Materials exist and have the right kind; names differ by more than upper and lower case."""
     if str(data.get("name")).lstrip().startswith("*"):
         yield ("name",), "must not begin with *, which starts a keyword in the decks"
@@ -95,7 +95,7 @@ def _names(data: Mapping[str, Any]) -> Problems:
                 yield (*keys, "material"), f"must be a {kind}, '{wanted}' is a {actual}"
 
 
-def _targets(data: Mapping[str, Any]) -> Problems:
+def _targets(data: CaseData) -> Problems:
     """Disagreements of targets with each other and with the analysis."""
     seen: dict[tuple[Any, ...], int] = {}
     default = Analysis.model_fields["highest_harmonic"].default
@@ -125,7 +125,7 @@ def _targets(data: Mapping[str, Any]) -> Problems:
                 yield ("targets", "footprint", i), f"{quantity} at {load:g} N is a target already"
 
 
-def _variables(data: Mapping[str, Any]) -> Problems:
+def _variables(data: CaseData) -> Problems:
     """Variables set numbers that exist, are not whole, allow the bounds, and are set once."""
     owners: dict[Keys, str] = {}
     data = {**data, "effects": {**dict.fromkeys(IDS, 0.0), **table(data, "effects")}}
@@ -152,7 +152,7 @@ def _variables(data: Mapping[str, Any]) -> Problems:
                     yield ("variables", name, bound), f"{path} {message}"
 
 
-def _uncertainties(data: Mapping[str, Any]) -> Problems:
+def _uncertainties(data: CaseData) -> Problems:
     """Sources of error name numbers that exist, and make a difference to them."""
     data = {**data, "effects": {**dict.fromkeys(IDS, 0.0), **table(data, "effects")}}
     for name, here, path, keys, nowhere in _paths(data, "uncertainties"):
@@ -167,7 +167,7 @@ def _uncertainties(data: Mapping[str, Any]) -> Problems:
             yield here, "is 0, and a share of 0 is 0: state 'absolute'"
 
 
-def _paths(data: Mapping[str, Any], part: str) -> Iterator[tuple[str, Keys, str, Keys, str]]:
+def _paths(data: CaseData, part: str) -> Iterator[tuple[str, Keys, str, Keys, str]]:
     """All paths that the entries of ``part`` set: name of the entry, place of the path, the path,
     the keys that it leads to, or why there are none (empty: a WRONG value is in the way)."""
     for name, entry in table(data, part).items():
@@ -183,7 +183,7 @@ def _paths(data: Mapping[str, Any], part: str) -> Iterator[tuple[str, Keys, str,
             yield name, (part, name, "sets", i), path, keys, nowhere
 
 
-def _refusal(data: Mapping[str, Any], keys: Keys, value: float) -> str | None:
+def _refusal(data: CaseData, keys: Keys, value: float) -> str | None:
     """Why the schema would not have ``value`` at ``keys``, judged in the part that holds it."""
     parent = keys[:-1]
     part, model = at(data, parent), type_at(parent)
@@ -202,7 +202,7 @@ def _refusal(data: Mapping[str, Any], keys: Keys, value: float) -> str | None:
     return None
 
 
-def find(data: Mapping[str, Any] | BaseModel, path: str) -> Keys:
+def find(data: CaseData | BaseModel, path: str) -> Keys:
     """Keys of the dotted ``path``; none when a WRONG value stands in the way.
 
     KeyError, with what would be right, where there is no such path.
@@ -227,7 +227,7 @@ def find(data: Mapping[str, Any] | BaseModel, path: str) -> Keys:
     return keys
 
 
-def _words(data: Mapping[str, Any] | BaseModel, path: str) -> list[str]:
+def _words(data: CaseData | BaseModel, path: str) -> list[str]:
     """The keys that a path names; of a number of the deck, as in `material RUBBER / DENSITY /
     density`, those under which it is known."""
     if "/" not in path:
@@ -249,7 +249,7 @@ def _is_number(value: Any) -> bool:
     return value is WRONG or (isinstance(value, int | float) and not isinstance(value, bool))
 
 
-def places(data: Mapping[str, Any], section: Section) -> Problems:
+def places(data: CaseData, section: Section) -> Problems:
     """Lines and regions exist, and every part of the section has a material."""
     lines = list(section.names)
     regions = [name for name, _ in section.regions]
@@ -303,7 +303,7 @@ def places(data: Mapping[str, Any], section: Section) -> Problems:
         )
 
 
-def levels(data: Mapping[str, Any], section: Section) -> Problems:
+def levels(data: CaseData, section: Section) -> Problems:
     """Every mesh level fits the section."""
     gaps = len(section.names) - 1
     regions = [name for name, _ in section.regions]
@@ -328,7 +328,7 @@ def levels(data: Mapping[str, Any], section: Section) -> Problems:
             yield here, f"must have at most {MAX_ELEMENTS} elements, elements x rows is {count}"
 
 
-def folds(data: Mapping[str, Any], section: Section) -> str | None:
+def folds(data: CaseData, section: Section) -> str | None:
     """Why the section cannot be meshed at the chosen level of ``data``, which is right so far."""
     import numpy as np
 

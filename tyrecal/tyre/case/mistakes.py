@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 from ...errors import InputError
 from ...files import printable
@@ -19,6 +20,8 @@ MIN_SIMILARITY = {
 }  # how much of two names must be, beside a file and a folder down
 Keys = tuple[str | int, ...]
 """Keys and list indices that lead to a value of the case."""
+CaseData = Mapping[str, Any]
+"""Content of a case file, or of a part of it, as it is written."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from ...errors import InputError
 from ..own_deck.own_deck import OwnDeck
 from ..own_deck.own_decks import OwnDecks
 from ..own_deck.solver_deck import SolverDeck
-from ..templates import environment, render
+from ..templates import TemplateNames, environment, render
 from .case_text import plain_text
 
 NO_NUMBERS: Mapping[str, float] = MappingProxyType({})
@@ -87,7 +87,7 @@ def _text(
     env.filters["text"] = plain_text
     all_numbers = {**numbers, **{f"deck.numbers.{name}": x for name, x in marked.items()}}
     of_marks = {name: [f"deck.numbers.{name}"] for name, x in marked.items() if x > 0}
-    names: dict[str, Any] = {
+    names: TemplateNames = {
         "files": [deck.path.name for deck in decks],
         "decks": "crown" in more,
         "units": decks[0].units,

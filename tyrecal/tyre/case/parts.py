@@ -20,6 +20,8 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from .mistakes import CaseData
+
 LEAST, LARGEST = 1e-30, 1e15  # beyond, products of numbers leave what a computer holds
 Moduli = Literal["long_term", "instantaneous"]
 MAX_RELAXED = 0.999  # of a modulus: what is left must be a tyre's
@@ -60,13 +62,13 @@ def as_written(value: Setting) -> str:
     return str(value).lower() if isinstance(value, bool) else f"{value:g}"
 
 
-def number(values: Mapping[str, Any], key: str) -> float | None:
+def number(values: CaseData, key: str) -> float | None:
     """The number at ``key``; None where there is none, or a wrong one."""
     value = values.get(key)
     return value if isinstance(value, int | float) else None
 
 
-def one_of(values: Mapping[str, Any], first: str, second: str) -> Iterator[Disagreement]:
+def one_of(values: CaseData, first: str, second: str) -> Iterator[Disagreement]:
     """Disagreement where not exactly one of two keys is given."""
     if values.get(first) is None and values.get(second) is None:
         yield first, f"must be given, or {second}"
@@ -82,7 +84,7 @@ class Part(BaseModel):
     )
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+    def problems(cls, values: CaseData) -> Iterator[Disagreement]:
         """Disagreements between the keys of ``values``; those that are WRONG are not judged."""
         yield from ()
 
@@ -136,7 +138,7 @@ class Rubber(Part):
     density_kg_per_m3: Positive  # density
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+    def problems(cls, values: CaseData) -> Iterator[Disagreement]:
         c10, c01 = number(values, "C10_Pa"), number(values, "C01_Pa")
         if c10 is not None and c01 is not None and not c10 + c01 > 0:
             yield "C10_Pa", f"must be greater than -C01_Pa, C10_Pa + C01_Pa is {c10 + c01:g}"
@@ -212,7 +214,7 @@ class SectionSource(Part):
         return self.outline.file if self.outline else self.stations or ""
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+    def problems(cls, values: CaseData) -> Iterator[Disagreement]:
         if any(values.get(key) is not None for key in cls.model_fields):  # else there is a deck
             yield from one_of(values, "stations", "outline")
 
@@ -253,7 +255,7 @@ class DeckSource(Part):
         return tuple((tuple(self.sets(part)), f) for part, f in factors.items() if f != 1)
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+    def problems(cls, values: CaseData) -> Iterator[Disagreement]:
         yield from one_of(values, "file", "decks")
         gauges, parts = values.get("gauges"), values.get("parts")
         for key, given in (("parts", parts), ("gauges", gauges)):
@@ -318,7 +320,7 @@ class RebarLayer(Part):
     regions: Annotated[list[str], Field(min_length=1)] | None = None
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+    def problems(cls, values: CaseData) -> Iterator[Disagreement]:
         geometry = values.get("geometry", "constant")
         pair = {"constant": ("spacing_m", "spacing_deg"), "angular": ("spacing_deg", "spacing_m")}
         if geometry in pair:
@@ -336,7 +338,7 @@ class ReferencePoint(Part):
     z: Number  # along the axle
 
 
-def part_values(part: Any) -> Mapping[str, Any]:
+def part_values(part: Any) -> CaseData:
     """The values of a part, checked or as in the file; none where it is wrong."""
     if isinstance(part, Part):
         return part.__dict__
@@ -386,7 +388,7 @@ class Rim(Part):
         return self.free or self.spindle.gives_way
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+    def problems(cls, values: CaseData) -> Iterator[Disagreement]:
         spindle, point = (part_values(values.get(key)) for key in ("spindle", "reference_point_m"))
         soft, free = any(number(spindle, key) for key in spindle), values.get("free") is True
         if soft and free:

@@ -6,7 +6,7 @@ measured, and the whole.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
@@ -14,6 +14,7 @@ from pydantic import AfterValidator, Field
 
 from ..footprint_quantities import FOOTPRINT_QUANTITIES
 from ..plugins import IDS
+from .mistakes import CaseData
 from .parts import (
     WHOLE_BEAD,
     WRONG,
@@ -83,7 +84,7 @@ class Road(Part):
     )
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+    def problems(cls, values: CaseData) -> Iterator[Disagreement]:
         angles, loads = _numbers(values, "element_angles_deg"), _numbers(values, "loads_N")
         if angles and abs(sum(angles) - 180) > 1e-6:
             yield "element_angles_deg", f"must have the sum 180, got {sum(angles):g}"
@@ -91,7 +92,7 @@ class Road(Part):
             yield "loads_N", "must rise from one to the next"
 
 
-def _numbers(values: Mapping[str, Any], key: str) -> list[float]:
+def _numbers(values: CaseData, key: str) -> list[float]:
     """The list at ``key``; empty where there is none, or one with a wrong entry."""
     value = values.get(key)
     right = isinstance(value, list) and all(isinstance(x, int | float) for x in value)
@@ -151,7 +152,7 @@ class Variable(Part):
         return self.model_copy(update={"sets": sets})
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+    def problems(cls, values: CaseData) -> Iterator[Disagreement]:
         start, lower, upper = (number(values, key) for key in ("start", "lower", "upper"))
         if lower is not None and upper is not None and not lower < upper:
             yield "upper", f"must be greater than lower, {lower:g}"
@@ -182,7 +183,7 @@ class TargetMode(Part):
     symmetry: Literal["symmetric", "antisymmetric"] | None = None
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+    def problems(cls, values: CaseData) -> Iterator[Disagreement]:
         c, m, kind = number(values, "c"), number(values, "m"), values.get("kind")
         if c is None or m is None:
             return
@@ -217,7 +218,7 @@ class TargetFootprint(Part):
     weight: Weight = 1.0  # weight in the objective
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+    def problems(cls, values: CaseData) -> Iterator[Disagreement]:
         given = [key for key in FOOTPRINT_QUANTITIES if values.get(key) is not None]
         if not given and WRONG in values.values():  # a misspelt key, which is reported
             return
@@ -256,7 +257,7 @@ class Targets(Part):
     mass: TargetMass | None = None  # measured mass
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+    def problems(cls, values: CaseData) -> Iterator[Disagreement]:
         if values.get("file") is not None:
             for key in ("modes", "footprint", "mass"):
                 if values.get(key):
@@ -289,7 +290,7 @@ class Uncertainty(Part):
     signs: list[Annotated[int, Field(ge=-1, le=1)]] | None = None
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+    def problems(cls, values: CaseData) -> Iterator[Disagreement]:
         yield from one_of(values, "percent", "absolute")
         sets, signs = values.get("sets"), values.get("signs")
         if isinstance(sets, list) and isinstance(signs, list) and len(signs) != len(sets):
@@ -352,7 +353,7 @@ class Case(Part):
     templates: Text | None = None  # folder of your own deck templates
 
     @classmethod
-    def problems(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+    def problems(cls, values: CaseData) -> Iterator[Disagreement]:
         given = {key for key in (*OF_A_SECTION, *IN_A_DECK) if cls._is_given(key, values.get(key))}
         if values.get("deck") is None:
             for key in OF_A_SECTION:
@@ -367,7 +368,7 @@ class Case(Part):
             yield from cls._beside_decks(values)
 
     @classmethod
-    def _beside_decks(cls, values: Mapping[str, Any]) -> Iterator[Disagreement]:
+    def _beside_decks(cls, values: CaseData) -> Iterator[Disagreement]:
         """Disagreements with decks in three dimensions: keys that belong in the decks, not in the
         case."""
         for key in IN_DECKS:

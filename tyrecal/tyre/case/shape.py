@@ -6,13 +6,13 @@ it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from .mistakes import Keys, suggestion
+from .mistakes import CaseData, Keys, suggestion
 from .parts import (
     NUMBER_OR_TABLE,
     WRONG,
@@ -141,7 +141,7 @@ def with_defaults(data: Any, kind: Any = Case) -> Any:
     return full
 
 
-def disagreements(data: Mapping[str, Any]) -> Iterator[tuple[Keys, str]]:
+def disagreements(data: CaseData) -> Iterator[tuple[Keys, str]]:
     """Keys and messages of values that contradict other values of the same part; WRONG ones are
     skipped."""
     parts: list[tuple[Keys, Any, type[Any]]] = []

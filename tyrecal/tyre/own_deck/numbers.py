@@ -20,6 +20,7 @@ PARAMETER = re.compile(r"<\s*(\w+)\s*>")
 GIVEN = re.compile(r"{{|<")  # in a text whose numbers are given elsewhere
 IN_PATHS = {*table.MATERIAL_OPTIONS, "REBAR LAYER", "REBAR"}  # blocks whose numbers have paths
 Numbers = Mapping[str, float]
+Parameters = dict[str, int | float | str]  # of *PARAMETER, by their names in upper case
 
 
 def paths(blocks: Sequence[Block]) -> dict[str, tuple[int, int, int]]:
@@ -153,7 +154,7 @@ def is_marked(block: Block) -> bool:
     return in_data or any("<" in value for value in block.parameters.values())
 
 
-def filled(block: Block, numbers: Numbers, parameters: Mapping[str, Any]) -> Block:
+def filled(block: Block, numbers: Numbers, parameters: Parameters) -> Block:
     """A block with the numbers of its marks and parameters."""
 
     def text(field: str) -> str:
@@ -170,7 +171,7 @@ def filled(block: Block, numbers: Numbers, parameters: Mapping[str, Any]) -> Blo
     return Block(block.name, block.place, values, rows)
 
 
-def _parameter(block: Block, parameters: Mapping[str, Any], name: str) -> str:
+def _parameter(block: Block, parameters: Parameters, name: str) -> str:
     if name.upper() not in parameters:
         raise block.refused(f"the parameter <{name}> is not defined above")
     value = parameters[name.upper()]
@@ -194,7 +195,7 @@ EXPRESSION_FUNCTIONS = {
 } | {"abs": abs, "float": float, "min": min, "max": max, "int": int}
 
 
-def parameters(block: Block, known: dict[str, Any]) -> None:
+def parameters(block: Block, known: Parameters) -> None:
     """Add the parameters that a *PARAMETER defines, NAME = expression, of those above too, by their
     names in upper case."""
     for row in block.rows:
@@ -215,7 +216,7 @@ def parameters(block: Block, known: dict[str, Any]) -> None:
         known[name.upper()] = value
 
 
-def _evaluate(node: ast.AST, known: Mapping[str, Any]) -> Any:
+def _evaluate(node: ast.AST, known: Parameters) -> Any:
     if isinstance(node, ast.Constant) and type(node.value) in (int, float, str):
         return node.value
     if isinstance(node, ast.Name):

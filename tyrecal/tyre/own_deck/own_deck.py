@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from . import numbers as numbers_of
 from .classify import ClassifiedDeck, classify
@@ -106,7 +106,7 @@ class OwnDeck:
             if path in self.places and value != self.numbers[path]:
                 place, i, j = self.places[path]
                 changes.setdefault(place, {})[i, j] = value
-        known: dict[str, Any] = {}
+        known: numbers_of.Parameters = {}
         result = []
         for place, block in enumerate(self.blocks):
             if place in changes:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
+from ...files import Json
 from .own_deck import OwnDeck
 from .solver_deck import SolverDeck
 from .text import Block, names_of
 
 
-def contents(deck: OwnDeck, flat: SolverDeck) -> dict[str, Any]:
+def contents(deck: OwnDeck, flat: SolverDeck) -> Json:
     """The data."""
     mesh, model = flat.mesh, flat.model
     crown = np.array([mesh.nodes[n] for n in mesh.crown])
@@ -76,7 +76,7 @@ def step_name(name: str) -> str:
     return name or "without a name"
 
 
-def words(content: dict[str, Any], mass_kg: float) -> Iterator[str]:
+def words(content: Json, mass_kg: float) -> Iterator[str]:
     """Contents of a deck in sentences."""
     how = {"m": "m, kg, s, Pa", "mm": "mm, t, s, MPa"}[content["units"]]
     kinds = ", ".join(f"{count} {kind}" for kind, count in content["elements"].items())

@@ -10,9 +10,9 @@ from ....errors import InputError
 from ...own_deck.own_deck import Units
 from ...own_deck.own_decks import OwnDecks
 from ..document import Document
-from ..mistakes import suggestion
+from ..mistakes import CaseData, suggestion
 from ..schema import Case
-from .kind import Change, Data
+from .kind import Change
 from .user_decks import UserDecks, lines_of_a_deck
 
 
@@ -45,7 +45,7 @@ class DecksIn3D(UserDecks):
         else:
             self.own.check(numbers)
 
-    def usual_lines(self, source: Data) -> dict[str, Any]:
+    def usual_lines(self, source: CaseData) -> dict[str, Any]:
         """The decks contain how the rim is held, and what is computed."""
         pressure_kPa = self.own.pressure_Pa / 1e3 if self.own.pressures else None
         return lines_of_a_deck(source, pressure_kPa, name=self.own.path.stem, solver="abaqus")

@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ....errors import InputError
+from ...templates import TemplateNames
+from ..mistakes import CaseData
 from ..parts import DeckSource, SectionOrigin
 from ..schema import Case
 
@@ -25,7 +27,6 @@ if TYPE_CHECKING:
     from ..document import Document
     from ..mistakes import Mistake
 
-Data = Mapping[str, Any]  # of a case file
 Change = Callable[[Any, float], Any]  # of a LoadedCase by the parameter of an effect
 
 
@@ -65,7 +66,7 @@ class TyreKind:
         source = self.source(case)
         return self.deck.flat(source.numbers, source.thickened)
 
-    def usual_lines(self, source: Data) -> dict[str, Any]:
+    def usual_lines(self, source: CaseData) -> dict[str, Any]:
         """Keys that a case may leave out, with values; ``source``: its key ``deck``."""
         return {}
 
@@ -73,11 +74,11 @@ class TyreKind:
         """The `Section` as drawn; None without one, or if it is wrong, with mistakes added."""
         return None
 
-    def folds(self, data: Data, section: Section) -> str | None:
+    def folds(self, data: CaseData, section: Section) -> str | None:
         """Why the section cannot be meshed, None if it can; a deck has its own mesh."""
         return None
 
-    def slips(self, data: Data) -> Iterable[Mistake]:
+    def slips(self, data: CaseData) -> Iterable[Mistake]:
         """Numbers of its deck's text that no tyre has, each at its line."""
         return ()
 
@@ -119,7 +120,7 @@ class TyreKind:
         """The user's line behind a line (from 0) of the flat deck; None if there is none."""
         return None
 
-    def template_names(self, tyre: Any) -> dict[str, Any]:
+    def template_names(self, tyre: Any) -> TemplateNames:
         """Names for deck templates of a resolved tyre whose mesh is a text; {}: tyrecal writes the
         mesh."""
         return {}

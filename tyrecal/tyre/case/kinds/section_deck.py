@@ -19,11 +19,12 @@ from ...own_deck.solver_deck import SolverDeck
 from ...own_deck.solver_mesh import REFERENCE_NODE
 from ...own_deck.text import OwnDeckError, Place
 from ...section.section import Section
+from ...templates import TemplateNames
 from ...usual_deck import deck_slips, unusual_numbers
 from ..document import Document
-from ..mistakes import Mistake
+from ..mistakes import CaseData, Mistake
 from ..schema import Case
-from .kind import Change, Data
+from .kind import Change
 from .user_decks import UserDecks, lines_of_a_deck
 
 
@@ -52,7 +53,7 @@ class SectionDeck(UserDecks):
         """Raises OwnDeckError for a deck that is no section with these numbers."""
         self.own.flat(numbers)
 
-    def usual_lines(self, source: Data) -> dict[str, Any]:
+    def usual_lines(self, source: CaseData) -> dict[str, Any]:
         """Pressure, reference node and moduli of the deck."""
         flat = self.own.flat(source["numbers"])
         reference = flat.mesh.reference
@@ -62,7 +63,7 @@ class SectionDeck(UserDecks):
         """The half of positive z of the deck's surfaces."""
         return section(self.own.flat(data["deck"]["numbers"]))
 
-    def slips(self, data: Data) -> Iterator[Mistake]:
+    def slips(self, data: CaseData) -> Iterator[Mistake]:
         """Radius and numbers of the deck that no tyre has."""
         return deck_slips(self.own, data["deck"]["numbers"])
 
@@ -86,7 +87,7 @@ class SectionDeck(UserDecks):
         """The line of the deck that a line of the flat mesh and materials comes from."""
         return _origin(tyre.flat, line)
 
-    def template_names(self, tyre: Any) -> dict[str, Any]:
+    def template_names(self, tyre: Any) -> TemplateNames:
         """All text of the deck stands in the place of the mesh."""
         flat, point = tyre.flat, tyre.case.rim.reference_point_m
         return {

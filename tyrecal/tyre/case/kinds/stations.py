@@ -10,9 +10,10 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..mistakes import CaseData
 from ..parts import Rubber, SectionOrigin, Solid
 from ..schema import Case
-from .kind import Change, Data, TyreKind
+from .kind import Change, TyreKind
 
 if TYPE_CHECKING:
     from ...section.mesh import SectionMesh
@@ -41,7 +42,7 @@ class Stations(TyreKind):
 
         return read_stations(document, data, folder)
 
-    def folds(self, data: Data, section: Section) -> str | None:
+    def folds(self, data: CaseData, section: Section) -> str | None:
         """Why no mesh fits at the chosen level."""
         from ..checks import folds
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..mistakes import CaseData
 from ..schema import Case
-from .kind import Data, TyreKind
+from .kind import TyreKind
 
 if TYPE_CHECKING:
     from ...own_deck.own_deck import OwnDeck
@@ -45,7 +46,7 @@ class UserDecks(TyreKind):
 
 
 def lines_of_a_deck(
-    source: Data,
+    source: CaseData,
     pressure_kPa: float | None = 200.0,
     reference: tuple[float, float] = (0.0, 0.0),
     static_moduli: str = "",
