@@ -145,9 +145,7 @@ def _step(step: list[Block], deck: ClassifiedDeck, is_inflation: bool) -> None:
         elif block.name in table.CONTACT_KEYWORDS:
             deck.contact.append(block)
         else:
-            if (
-                is_inflation or block.name != "STATIC"
-            ):  # how a step before it got there is no matter
+            if is_inflation or block.name != "STATIC":  # how earlier steps go is no matter
                 check_honoured(block, "deck step")
             kept.append(block)
     held = [block for block in kept if block.name == "BOUNDARY"]

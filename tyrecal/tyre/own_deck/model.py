@@ -50,8 +50,7 @@ class DeckModel:
 
 def build(deck: ClassifiedDeck) -> DeckModel:
     """The section. Raises OwnDeckError."""
-    made = collect(deck.model)
-    return _Builder(made, deck).model()
+    return _Builder(collect(deck.model), deck).model()
 
 
 class _Builder:
@@ -68,9 +67,8 @@ class _Builder:
         node_sets = self._all_sets()
         pressed, name, places = self._pressure()
         self.tied = Constraints(self.made, self.blocks)
-        left_out = (
-            DeckContact(self.made, self.blocks, self.tied).left_out() if self.blocks.contact else ()
-        )
+        contact = self.blocks.contact and DeckContact(self.made, self.blocks, self.tied)
+        left_out = contact.left_out() if contact else ()
         if not self.tied.rim:
             raise self.blocks.model[-1].refused(
                 "is the last, but no *RIGID BODY or *BOUNDARY holds the bead on a rim"
@@ -81,9 +79,8 @@ class _Builder:
                 self.root.elements[number] = replace(element, nodes=nodes)
         if self.made.reflect:
             solids, plies, pressed = self._reflect(solids, plies, pressed)
-        used = {
-            n for e in self.root.elements.values() if not e.kind.startswith("RAX") for n in e.nodes
-        }
+        elements = {k: e for k, e in self.root.elements.items() if not e.is_rigid}
+        used = {n for e in elements.values() for n in e.nodes}
         boundary = boundary_of(self.root)
         self._check_areas(used)
         if not self.made.reflect:
@@ -92,9 +89,8 @@ class _Builder:
         reference = self.tied.reference or (0, (0.0, 0.0))
         rubber = self.root.rubber_nodes()
         if loose := used - rubber - self.tied.guests:
-            number, element = next(
-                (k, e) for k, e in self.root.elements.items() if e.is_ply and loose & set(e.nodes)
-            )
+            plies_of = ((k, e) for k, e in elements.items() if e.is_ply)
+            number, element = next((k, e) for k, e in plies_of if loose & set(e.nodes))
             raise element.block.refused(
                 f"element {number}: node {min(loose & set(element.nodes))} is of no rubber element:"
                 " a ply shares its nodes with the rubber, or is an *EMBEDDED ELEMENT",
@@ -102,7 +98,7 @@ class _Builder:
             )
         return DeckModel(
             {n: p for n, p in self.root.nodes.items() if n in used},
-            {k: e for k, e in self.root.elements.items() if not e.kind.startswith("RAX")},
+            elements,
             solids,
             plies,
             tuple(self.tied.embedded),
@@ -132,14 +128,11 @@ class _Builder:
                 if element_types.NODES_AND_SECTION[element.kind][1] != block.name:
                     raise block.refused(f"element {n} of {name} is a {element.kind}")
                 if n in owner:
-                    before = owner[n].place
-                    raise block.refused(
-                        f"element {n} has a section already, at {before.file}, line {before.line}"
-                    )
+                    raise block.refused(f"element {n} has a section already, at {owner[n].place}")
                 owner[n] = block
             (solids if solid else plies).append(Assigned(block, name, tuple(elements)))
         for n, element in self.root.elements.items():
-            if n not in owner and not element.kind.startswith("RAX"):
+            if n not in owner and not element.is_rigid:
                 need = element_types.NODES_AND_SECTION[element.kind][1]
                 raise element.block.refused(f"element {n} has no *{need}", element.row)
         return tuple(solids), tuple(self._with_rebars(plies))
@@ -189,9 +182,8 @@ class _Builder:
         solid = self.root.rubber_nodes()
         crown = max(points[n][0] for n in solid)
         for z in (min(points[n][1] for n in solid), max(points[n][1] for n in solid)):
-            cut = [
-                f for f in boundary if all(abs(points[n][1] - z) <= self.tied.near for n in f[2])
-            ]
+            at_z = {n for n in solid if abs(points[n][1] - z) <= self.tied.near}
+            cut = [face for face in boundary if at_z.issuperset(face[2])]
             if cut and max(points[n][0] for _, _, nodes in cut for n in nodes) > AT_CROWN * crown:
                 element = self.root.elements[cut[0][0]]
                 raise element.block.refused(
@@ -204,7 +196,6 @@ class _Builder:
         """Faces under the step's pressure, and where its value stands."""
         faces: list[Face] = []
         places: list[tuple[Block, Row, int]] = []
-        names: list[str] = []
         loads = [b for b in self.blocks.inflation if b.name in LOADS]
         for block, row in [(load, row) for load in loads for row in load.rows]:
             kind = row.name(1)
@@ -223,7 +214,6 @@ class _Builder:
                     faces.append((n, f"S{kind[1]}", own[f"S{kind[1]}"]))
             if any(row.fields[3:]):
                 raise block.refused(f"data '{row.fields[3]}' is not honoured", row)
-            names.append(row.name(0))
             places.append((block, row, 2))
         if not places:
             raise self.blocks.inflation[0].refused("has no pressure: *DSLOAD needs a data line")
@@ -232,7 +222,8 @@ class _Builder:
             raise places[1][0].refused("one pressure is honoured, the same on all", places[1][1])
         if not values.pop() > 0:
             raise places[0][0].refused("the pressure must be positive", places[0][1])
-        return faces, " and ".join(dict.fromkeys(names)), tuple(places)
+        names = dict.fromkeys(row.name(0) for _, row, _ in places)
+        return faces, " and ".join(names), tuple(places)
 
     def _on_solids(self, pressed: list[Face], boundary: Sequence[Face]) -> tuple[Face, ...]:
         """The free faces of solids that a pressure acts on, those under plies among them."""
@@ -282,19 +273,14 @@ class _Builder:
         for number, element in list(root.elements.items()):
             nodes = tuple(image[n] for n in element.nodes)
             root.elements[number + further] = replace(element, nodes=reflected(element, nodes))
-        both = lambda each: replace(
-            each, elements=each.elements + tuple(n + further for n in each.elements)
-        )
+        doubled = lambda numbers: (*numbers, *(n + further for n in numbers))
+        both = lambda each: replace(each, elements=doubled(each.elements))
         for n, face, nodes in pressed:
             turned = tuple(image[self.tied.same.get(m, m)] for m in nodes)[::-1]
             both_faces.append((n + further, face, turned))
         self.tied.rim |= dict.fromkeys(image[n] for n in list(self.tied.rim) if n in image)
         self.tied.guests |= {image[n] for n in self.tied.guests}
-        doubled = lambda numbers: (*numbers, *(n + further for n in numbers))
-        self.tied.embedded = [
-            EmbeddedElements(
-                e.block, doubled(e.hosts), tuple((row, doubled(own)) for row, own in e.lines)
-            )
-            for e in self.tied.embedded
-        ]
+        for k, e in enumerate(self.tied.embedded):
+            lines = tuple((row, doubled(own)) for row, own in e.lines)
+            self.tied.embedded[k] = EmbeddedElements(e.block, doubled(e.hosts), lines)
         return tuple(map(both, solids)), tuple(map(both, plies)), both_faces

@@ -39,6 +39,11 @@ class Element:
         """Whether it holds cords."""
         return self.kind.startswith(PLIES)
 
+    @property
+    def is_rigid(self) -> bool:
+        """Whether it is a line of a rim."""
+        return self.kind.startswith(RIGID)
+
 
 class MeshTable(dict[int, Content]):
     """Nodes, or elements, by number, and the sets of them by name, in pieces. what: node or
