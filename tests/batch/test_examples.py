@@ -12,10 +12,12 @@ import pytest
 from ruamel.yaml import YAML
 
 from tyrecal.simulate.evaluate.cluster import jobs_of, read_settings
+from tyrecal.version import BUILD_SITE
 
 from ..conftest import CASES, ROOT
 
 WORKFLOW = CASES / "ci/tyres.yml"
+OWN = ROOT / ".github/workflows/checks.yml"
 BIN = Path(sys.executable).parent
 RULES = (
     "{extends: default, rules: {document-start: disable, line-length: {max: 120},"
@@ -31,12 +33,29 @@ def steps() -> list[dict]:
     "command",
     [
         ["yamllint", "--strict", "-d", RULES, str(CASES / "ci"), str(CASES / "cluster")],
-        ["check-jsonschema", "--builtin-schema", "vendor.github-workflows", str(WORKFLOW)],
+        ["yamllint", "--strict", "-d", RULES, str(OWN)],
+        [
+            "check-jsonschema",
+            "--builtin-schema",
+            "vendor.github-workflows",
+            *map(str, (WORKFLOW, OWN)),
+        ],
     ],
 )
 def test_linted(command: list[str]) -> None:
     done = subprocess.run([BIN / command[0], *command[1:]], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_own_workflow_runs_what_ci_runs() -> None:
+    commands = [
+        step["run"]
+        for job in YAML(typ="safe").load(OWN.read_text())["jobs"].values()
+        for step in job["steps"]
+        if "run" in step
+    ]
+    assert "bash .ci/run" in commands
+    assert BUILD_SITE.replace(" -c", " -W --keep-going -c") in commands
 
 
 @pytest.mark.slow
