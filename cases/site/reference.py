@@ -3,17 +3,14 @@
     python cases/site/reference.py
 
 writes `cases/case_keys.md`, for readers of the repository. The other tables are made when the site
-is built: `conf.py` puts them where a page has `[[NAME]]` (`TABLES`). The comment of a field, above
-or behind it, is its meaning. `tests/test_site.py` compares.
+is built: `conf.py` puts them where a page has `[[NAME]]` (`TABLES`). `tests/test_site.py` compares.
 """
 
 from __future__ import annotations
 
-import ast
 import inspect
 import json
 import re
-import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
@@ -31,6 +28,7 @@ from tyrecal.cli.main import EXIT_CODES
 from tyrecal.studies import result_types
 from tyrecal.studies.effects import CatalogueEntry, EffectResult
 from tyrecal.studies.result import Provenance
+from tyrecal.tyre.case.meanings import meanings
 from tyrecal.tyre.case.schema import Case
 from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.number_units import UNIT_BY_ENDING
@@ -106,40 +104,13 @@ class Entry(NamedTuple):
         return printed_unit(next((UNITS[e] for e in ends if key.endswith(f"_{e}")), ""))
 
 
-@cache
-def _source(module: str) -> tuple[list[str], dict[str, ast.ClassDef]]:
-    """The lines of a module, and its classes by name."""
-    text = Path(sys.modules[module].__file__ or "").read_text(encoding="utf-8")
-    classes = (node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.ClassDef))
-    return text.splitlines(), {node.name: node for node in classes}
-
-
-@cache
-def comments(model: type) -> dict[str, str]:
-    """The comment of each field of a class, those of its bases too."""
-    meanings = {}
-    for base in (b for b in model.__bases__[::-1] if b.__module__.startswith("tyrecal")):
-        meanings |= comments(base)
-    lines, classes = _source(model.__module__)
-    for node in classes[model.__name__].body:
-        if isinstance(node, ast.AnnAssign):
-            first = node.lineno - 1
-            while lines[first - 1].lstrip().startswith("#"):
-                first -= 1
-            behind = lines[(node.end_lineno or 1) - 1].encode()[node.end_col_offset :].decode()
-            text = [line.strip(" #") for line in (*lines[first : node.lineno - 1], behind)]
-            if any(text):
-                meanings[ast.unparse(node.target)] = " ".join(filter(None, text))
-    return meanings
-
-
 def entries(model: type, prefix: str = "") -> Iterator[Entry]:
     """All keys of a file with this content, in its order."""
     for key, annotation, default in _fields(model):
         path = f"{prefix}{key.alias or key.name}"
         is_shown = default not in (..., None, "", []) and not isinstance(default, BaseModel | dict)
         shown = written(default) if is_shown else ""
-        meaning = comments(model).get(key.name) or SHARED.get(key.name, "")
+        meaning = meanings(model).get(key.name) or SHARED.get(key.name, "")
         yield Entry(path, meaning, kind(annotation), shown, default is ...)
         for step, part in _parts(annotation):
             if part is not Provenance:

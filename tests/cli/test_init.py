@@ -31,7 +31,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_case_from_a_size(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("init", "205/60r15 91V") == 0
     assert "outer diameter 627.0 mm, section width 208.6 mm" in capsys.readouterr().out
-    assert {p.name for p in here.iterdir()} == {f"205_60r15.{e}" for e in ("yaml", "csv", "png")}
+    names = {f"205_60r15.{e}" for e in ("yaml", "csv", "png")}
+    assert {p.name for p in here.iterdir()} == names | {"case.schema.json"}
     assert (here / "205_60r15.png").read_bytes().startswith(b"\x89PNG")
     assert run("validate", "205_60r15.yaml") == 0
     text = (here / "205_60r15.yaml").read_text()

@@ -184,7 +184,7 @@ def test_pictures_are_drawn_unless_they_are_not_wanted() -> None:
 def test_a_picture_in_another_format(tmp_path: Path) -> None:
     target = tmp_path / "t.yaml"
     assert run("init", "205/60R15", "--output", str(target), "--figure-format", "svg") == 0
-    assert {path.suffix for path in tmp_path.iterdir()} == {".yaml", ".csv", ".svg"}
+    assert {path.suffix for path in tmp_path.iterdir()} == {".yaml", ".csv", ".json", ".svg"}
     assert "carcass" in target.with_suffix(".svg").read_text()
 
 

@@ -113,9 +113,9 @@ def command(
 ) -> int:
     """Write the case of a tyre: from its SIZE code, your section or your deck.
 
-    Writes CASE.yaml with comments, its section as CSV and a picture of it. Values that the size
-    code does not give are usual ones for the type of tyre. The section is an estimate to start
-    from.
+    Writes CASE.yaml with comments, its section as CSV and a picture of it. With case.schema.json
+    next to them, editors complete and explain the keys. Values that the size code does not give
+    are usual ones for the type of tyre. The section is an estimate to start from.
 
     \b
     tyrecal init 205/60R15
@@ -195,6 +195,7 @@ def _write(
 ) -> None:
     """Write case, section and picture, none over an existing file and only what is right."""
     from ..files import atomic_write, make_folder
+    from ..tyre.case.editor import SCHEMA_FILE, case_schema
     from ..tyre.load import load_case
 
     table = target.with_name(draft.file)
@@ -204,6 +205,7 @@ def _write(
         if path.exists() and not force:
             raise InputError(f"'{path}' exists already; give --force to write over it")
     make_folder(target.parent)
+    contents[target.with_name(SCHEMA_FILE)] = case_schema().encode()
     for path, content in contents.items():
         with atomic_write(path) as partial:
             partial.write_bytes(content)
@@ -294,7 +296,8 @@ def _from_deck(
     terminal: Terminal,
 ) -> None:
     """Write the case of a deck next to it, print what is in the deck, and draw it."""
-    from ..files import atomic_write
+    from ..files import write_text
+    from ..tyre.case.editor import SCHEMA_FILE, case_schema
     from ..tyre.case.kinds.section_deck import trial
     from ..tyre.case.own_case import own_case
     from ..tyre.load import load_case
@@ -307,8 +310,8 @@ def _from_deck(
     text = own_case(deck, flat, size, pressure_kPa, numbers)
     target, picture = new.of_deck(deck.path)
     mass_kg = trial(flat)
-    with atomic_write(target) as partial:
-        partial.write_text(text, encoding="utf-8")
+    write_text(target, text)
+    write_text(target.with_name(SCHEMA_FILE), case_schema())
     content = contents(deck, flat)
     terminal.result({"case": str(target), "mass_kg": mass_kg, **content})
     for sentence in words(content, mass_kg):
@@ -328,15 +331,16 @@ def _from_decks(
     terminal: Terminal,
 ) -> None:
     """Write the case of decks in three dimensions next to them, and print what is known of them."""
-    from ..files import atomic_write
+    from ..files import write_text
+    from ..tyre.case.editor import SCHEMA_FILE, case_schema
     from ..tyre.case.own_case import own_decks_case
     from ..tyre.load import load_case
     from .deck import known_of_decks
 
     text = own_decks_case(decks, size, pressure_kPa, numbers)
     target, _ = new.of_deck(decks.path)
-    with atomic_write(target) as partial:
-        partial.write_text(text, encoding="utf-8")
+    write_text(target, text)
+    write_text(target.with_name(SCHEMA_FILE), case_schema())
     loaded = load_case(target, allow_unusual=True)
     terminal.result({"case": str(target), **known_of_decks(loaded, decks, terminal)})
     terminal.say(f"next: {_modes(target)} --solver abaqus")

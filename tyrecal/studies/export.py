@@ -19,6 +19,7 @@ from ..simulate.evaluate.failure import DeckRefused
 from ..tyre.case import LoadedCase, as_written, start_values
 from ..tyre.case.checks import at, find
 from ..tyre.case.edit_text import is_stated, set_in_text
+from ..tyre.case.editor import SCHEMA_FILE, case_schema, with_editor_line
 from ..tyre.case.identity import is_of_tyre
 from ..tyre.case.mistakes import Keys
 from ..tyre.resolve import resolved
@@ -33,7 +34,8 @@ def case_files(case: LoadedCase) -> Files:
     everything else is as in the user's file. Raises InputError, OSError.
     """
     text = _text_of(read_bytes(case.path))[0]
-    files = {f"{case.path.stem}_fitted{case.path.suffix}": set_in_text(text, _values(case, text))}
+    fitted = with_editor_line(set_in_text(text, _values(case, text)))
+    files = {f"{case.path.stem}_fitted{case.path.suffix}": fitted, SCHEMA_FILE: case_schema()}
     named = [*case.files, *case.template_files]
     copies = {path.relative_to(case.folder).as_posix(): read_bytes(path) for path in named}
     return {**copies, **{name: text.encode() for name, text in files.items()}}

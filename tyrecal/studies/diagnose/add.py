@@ -8,6 +8,7 @@ from pathlib import Path
 from ...errors import InputError
 from ...files import write_text
 from ...tyre.case.edit_text import set_in_text
+from ...tyre.case.editor import SCHEMA_FILE, case_schema, with_editor_line
 from ...tyre.case.mistakes import Keys
 from ...tyre.load import load_case
 from ...tyre.values import with_values
@@ -30,6 +31,8 @@ def add(path: Path, effects: Mapping[str, float], folder: Path | None = None) ->
     if target.exists():
         raise InputError(f"'{target}' exists already; move it away first")
     values: dict[Keys, float] = {("effects", id): value for id, value in effects.items()}
-    write_text(target, set_in_text(path.read_text(encoding="utf-8-sig"), values))
+    text = with_editor_line(set_in_text(path.read_text(encoding="utf-8-sig"), values))
+    write_text(target, text)
+    write_text(target.with_name(SCHEMA_FILE), case_schema())
     load_case(target, allow_unusual=True)
     return target
