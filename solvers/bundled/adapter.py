@@ -15,6 +15,10 @@ from .deck.start import PressedStart, write_pressed_start, write_start
 
 JOB, PRESS, OLDJOB = "modes", "press", "inflate"
 # of the tool's request, as in `request.Request`
+RESPONSE_ARRAYS = (
+    *("frequency_Hz", "receptance", "hub"),
+    *("stiffness", "mass", "loss", "tread"),  # where matrices were requested
+)
 REQUEST_KEYS = ("own_frequency", "cavity", "sector", "response")
 
 
@@ -105,7 +109,7 @@ class Bundled:
             shapes = arrays[f"shapes_{step['step']}"] if step["modes"] else []
             response = {
                 name: arrays[f"response_{name}_{step['step']}"]
-                for name in ("frequency_Hz", "receptance", "hub")
+                for name in RESPONSE_ARRAYS
                 if f"response_{name}_{step['step']}" in arrays
             }
         # modes of the file by place; the two that a doublet has split into count as one

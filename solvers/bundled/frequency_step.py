@@ -21,6 +21,7 @@ from .modes.frequency_dependent import SelfConsistent
 from .modes.harmonics import HarmonicModes, HasModes, SeededTyre, Vibration, lowest_of_all
 from .modes.response import Response, ResponseResult, tread_patch
 from .modes.sensitivity import ModeShapes, RimAndAir, eigenvalue_rates, state_rate
+from .modes.superelement import superelement
 from .modes.wheel import Wheel, read_wheel
 from .nonuniform.coupled import attached_modes
 from .nonuniform.rotation import waves
@@ -179,7 +180,10 @@ class FrequencyStep:
         ]
         counts = len(response.harmonics), response.wanted
         receptance, hub = response.at(frequencies, *points)
-        return ResponseResult(frequencies, receptance, hub, patch.radius, *counts)
+        matrices = {}
+        if "modes" in wanted:
+            matrices = vars(superelement(response, wanted["modes"], points[1]))
+        return ResponseResult(frequencies, receptance, hub, patch.radius, *counts, matrices)
 
     def _static_factor(self) -> Factor:
         """Factor of the static tangent at U, for dU / d variable; the vibration's if it is the same

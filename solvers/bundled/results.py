@@ -92,6 +92,8 @@ def write(stem: Path, model: Model, results: list[StepResult]) -> None:
             steps[-1]["response"] = {name: getattr(result.response, name) for name in known}
             for name in ("frequency_Hz", "receptance", "hub"):
                 arrays[f"response_{name}_{result.step}"] = getattr(result.response, name)
+            for name, matrix in result.response.matrices.items():
+                arrays[f"response_{name}_{result.step}"] = matrix
         if order:
             whole = [  # from unit mass per radian to the whole circle's 2 pi, or pi for a wave
                 result.modes[i].shapes[j] / np.sqrt(np.pi * (1 if result.modes[i].n else 2))

@@ -77,7 +77,7 @@ def main(tests: int = 200, seed: int = 1) -> None:
             with TemporaryDirectory() as folder:
                 own = (case, modes, placed, random, Path(folder))
                 shares = [imported_share(*own) for _ in range(tests)]
-            error = np.hypot(np.std(shares) / tests**0.5, placed.labelled_error) or 1.0
+            error = max(np.hypot(np.std(shares) / tests**0.5, placed.labelled_error), 1e-6)
             apart = (np.mean(shares) - placed.labelled) / error
             name = tyre.removesuffix(".yaml")
             print(

@@ -10,7 +10,7 @@ import click
 
 from ..errors import InputError
 from . import complete, options
-from .parameters import FileOrFolder, Number, OneOf, option
+from .parameters import FileOrFolder, Number, OneOf, WholeNumber, option
 from .terminal import Terminal
 
 if TYPE_CHECKING:
@@ -18,11 +18,16 @@ if TYPE_CHECKING:
     from ..studies.result import Result
     from ..tyre.case import LoadedCase
 
-STUDY_OF_FORMS = {"case": "fit", "deck": "fit", "tir": "stiffness", "uff": "modes"}
+STUDY_OF_FORMS = {
+    **dict.fromkeys(("case", "deck", "matrices"), "fit"),
+    "tir": "stiffness",
+    "uff": "modes",
+}
 SAME_HZ = 1e-4  # relative
 OPTIONS_OF_FORMS = {
-    "--solver": "deck",
-    **dict.fromkeys(("--nominal-load-N", "--nominal-pressure-kPa", "--donor"), "tir"),
+    "--solver": ("deck", "matrices"),
+    **dict.fromkeys(("--modes", "--points", "--pressure-kPa"), ("matrices",)),
+    **dict.fromkeys(("--nominal-load-N", "--nominal-pressure-kPa", "--donor"), ("tir",)),
 }
 
 
@@ -35,8 +40,23 @@ OPTIONS_OF_FORMS = {
     default="case",
     show_default=True,
     help="Files to write: the case file with what it names; the decks; a tyre property file"
-    " (MF-Swift 6.2); a universal file of the mode shapes.",
+    " (MF-Swift 6.2); a universal file of the mode shapes; reduced matrices.",
 )
+@option(
+    "--modes",
+    type=WholeNumber(1, 900),
+    default=194,
+    show_default=True,
+    metavar="N",
+    help="With --format matrices: largest number of coordinates in addition to the hub's six.",
+)
+@option(
+    "--points",
+    metavar="P,...",
+    help="With --format matrices: points and directions of the tread, such as tread:0deg:radial"
+    " (default: five angles, radial and lateral).",
+)
+@options.pressure
 @option(
     "--case",
     "case",
@@ -77,6 +97,9 @@ OPTIONS_OF_FORMS = {
 def command(
     folder: Path,
     form: str,
+    modes: int,
+    points: str | None,
+    pressure_kPa: float | None,
     case: Path | None,
     nominal_N: float | None,
     nominal_kPa: float | None,
@@ -90,7 +113,7 @@ def command(
 
     A case is written as CASE_fitted.yaml: your text with the fitted values, and the files that it
     names. Decks are those of the case's solver. If the case has your own deck, that is written:
-    your text, units and numbering, only the numbers changed. Both need the fit.json in DIR.
+    your text, units and numbering, only the numbers changed.
 
     A tir has the keys that a structure determines, fitted to the stiffness.json in DIR, of the
     fitted design if it has one. The comment of a key states its misfit. Run 'tyrecal stiffness' at
@@ -99,18 +122,26 @@ def command(
     A uff has the modes of the modes.json in DIR: the surface's points and lines, and two shapes for
     a pair (data sets 151, 164, 2411, 82, 55; SI; x forward, y left, z up).
 
+    Matrices are those of the unloaded tyre at a pressure: stiffness, mass and loss on the six
+    motions of the hub and its modes (Craig and Bampton), as Matrix Market and for ABAQUS, with a
+    README of coordinates and units. These three need the fit.json in DIR.
+
     \b
     tyrecal export p235_75r17
     tyrecal export p235_75r17 --format deck --solver calculix --output decks
     tyrecal modes p235_75r17/export/p235_75r17_fitted.yaml
     tyrecal export p235_75r17 --format tir --nominal-load-N 4000 --donor slip.tir
+    tyrecal export p235_75r17 --format matrices --pressure-kPa 200 --output matrices
     """
     for name in set(options.given()) & OPTIONS_OF_FORMS.keys():
-        if form != OPTIONS_OF_FORMS[name]:
-            raise click.UsageError(f"{name} goes with --format {OPTIONS_OF_FORMS[name]}")
+        if form not in OPTIONS_OF_FORMS[name]:
+            raise click.UsageError(
+                f"{name} goes with --format {' or '.join(OPTIONS_OF_FORMS[name])}"
+            )
     from ..files import atomic_write, private_dir
     from ..measured.load import load_case
     from ..studies.export import case_files, deck_files, parts_left_out, settings_left_out
+    from ..studies.matrices import MATRIX_POINTS, matrix_files
     from .output import Run
 
     study = STUDY_OF_FORMS[form]
@@ -126,7 +157,10 @@ def command(
         files = _universal_file(loaded, results)
     else:
         loaded = _as_fitted(results, loaded, terminal)
-        files = case_files(loaded) if form == "case" else deck_files(loaded, solver)
+        if form == "matrices":
+            files = matrix_files(loaded, solver, pressure_kPa, modes, points or MATRIX_POINTS)
+        else:
+            files = case_files(loaded) if form == "case" else deck_files(loaded, solver)
     target = output or results.parent / "export"
     for name, content in files.items():
         place = target / name

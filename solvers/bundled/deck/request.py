@@ -35,7 +35,8 @@ class Request:
     # job, of the same mesh
     sector: dict[str, Any] | None = None
     # {"lowest_Hz", "highest_Hz", "lines", "patch_m", "excite", "respond"} of responses to a force
-    # on a patch of the tread: points are lists [angle in degrees, direction]
+    # on a patch of the tread: points are lists [angle in degrees, direction]; with "modes": N also
+    # matrices of the rim's motions and N coordinates of modes
     response: dict[str, Any] | None = None
 
 
@@ -152,7 +153,11 @@ def _sector(key: str, value: Any) -> None:
 def _response(key: str, value: Any) -> None:
     points = "excite", "respond"
     limits = {"lowest_Hz": (0, 1e4), "highest_Hz": (1, 1e4), "patch_m": (1e-3, 0.5)}
-    _object(key, value, [*limits, "lines", *points], all_of_them=True)
+    _object(key, value)
+    if "modes" in value:
+        _whole(1, MAX_MODES)(f"{key}.modes", value["modes"])
+    rest = {name: each for name, each in value.items() if name != "modes"}
+    _object(key, rest, [*limits, "lines", *points], all_of_them=True)
     for name, (least, most) in limits.items():
         _finite(f"{key}.{name}", value[name])
         right = f"must be from {least:g} to {most:g}"

@@ -19,7 +19,7 @@ because K T = 0 and K_k T = 0 on all that is free. Harmonics from 2 on exert non
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -47,6 +47,7 @@ class ResponseResult:
     radius_m: float  # of the inflated tread
     harmonics: int  # that were summed
     harmonics_wanted: int  # more than that where cords buckle in the shorter waves
+    matrices: dict[str, Array] = field(default_factory=dict)  # as `superelement` has them
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,7 @@ class Response:
         for i in range(3):
             patch[self.patch.nodes, i, i] = self.patch.weights
         forces = _coordinates(numbering, patch, n)
-        rigid, moved = self._rigid(n)
+        rigid, moved, rigid_mass = self._rigid(n)
         basis = ResponseBasis(self._vibration, n, np.hstack([forces.real, forces.imag, moved]))
         static = basis.V
         basis.settle(limit)
@@ -142,6 +143,7 @@ class Response:
             V.conj().T @ forces,
             moved.conj().T @ V,
             rigid,
+            rigid_mass,
         )
 
     def _times(self, part: PartOfStiffness, V: Array, n: int) -> Array:
@@ -156,12 +158,23 @@ class Response:
                 losses = losses * [np.real(material.table.ratio(f)) for f in frequencies_Hz]
             yield losses, part
 
-    def _rigid(self, n: int) -> tuple[Array, Array]:
-        """T^H of the patch's forces (motions, 3), and M T in coordinates (size, motions)."""
+    def at_middle(self, reduced: _Reduced) -> tuple[Array, Array]:
+        """Real and imaginary part (basis, basis) of a reduced stiffness in the middle of the
+        band."""
+        stiffness, loss = reduced.K, np.zeros_like(reduced.K)
+        for table, part in zip(self._model.tables, reduced.tables, strict=True):
+            stiffness = stiffness + (np.real(table.ratio(self._middle[0])) - 1) * part
+        for (eta, _), part in zip(self._losses(self._middle), reduced.lossy, strict=True):
+            loss = loss + eta[0] * part
+        return stiffness, loss
+
+    def _rigid(self, n: int) -> tuple[Array, Array, Array]:
+        """T^H of the patch's forces (motions, 3), M T in coordinates (size, motions), and T^H M T
+        (motions, motions), per radian."""
         vibration, symmetry = self._vibration, self._model.mesh.symmetry
         X, U = self._model.mesh.X.real, self._U
         if n > 1:
-            return np.zeros((0, 3)), np.zeros((vibration.numbering.size, 0))
+            return np.zeros((0, 3)), np.zeros((vibration.numbering.size, 0)), np.zeros((0, 0))
         r, t, z = X[:, 0] + U[:, 0], U[:, 1], X[:, 1] + U[:, 2]
         o, one = np.zeros(len(X)), np.ones(len(X))
         motions = [[o, o, one], [-t, r, o]]
@@ -169,9 +182,14 @@ class Response:
             motions = [[one, 1j * one, o], [1j * z, -z, t - 1j * r]]
         fields = np.moveaxis(np.array(motions), (0, 1), (2, 1))
         forces = np.einsum("k,kim->mi", self.patch.weights, fields[self.patch.nodes].conj())
+        flat = fields.reshape(len(X), 3, -1)
+        images = np.stack([vibration.mass @ flat[:, i] for i in range(3)], 1)
+        # what half of the section couples the other half uncouples
+        mass = symmetry.copies * np.einsum("kim,kij->mj", flat.conj(), images)
+        mass = mass if symmetry.copies == 1 else np.diag(np.diag(mass))
         fields = symmetry.kept(fields)
         inertia = (vibration.mass @ fields.reshape(len(X), -1)).reshape(fields.shape)
-        return forces, vibration.numbering.gather(symmetry.force(inertia))
+        return forces, vibration.numbering.gather(symmetry.force(inertia)), mass
 
     def at(
         self, frequencies_Hz: Array, excited: list[tuple[float, int]], seen: list[tuple[float, int]]
@@ -218,6 +236,7 @@ class _Reduced:
     forces: Array  # of the patch in each direction (basis, 3)
     moved: Array  # T^H M (motions, basis)
     rigid: Array  # T^H of the patch's forces (motions, 3)
+    rigid_mass: Array  # T^H M T (motions, motions)
 
     def at(self, omega: Array, losses: list[Array], tables: list[Array]) -> tuple[Array, Array]:
         """Two pairs (2, f, 3, 3) and (2, f, motions, 3): motion of the patch, force on the hub."""

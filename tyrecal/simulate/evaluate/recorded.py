@@ -91,6 +91,10 @@ class _Response(_Part):
     radius_m: of.PositiveFinite
     harmonics: Annotated[Any, of.shaped("iu", least=0)]
     harmonics_wanted: Annotated[Any, of.shaped("iu", least=0)]
+    stiffness: Annotated[Any, of.shaped("f", None, None)] = None
+    mass: Annotated[Any, of.shaped("f", None, None)] = None
+    loss: Annotated[Any, of.shaped("f", None, None)] = None
+    tread: Annotated[Any, of.shaped("f", None, None)] = None
 
 
 class _Modes(_Tyre):
@@ -195,6 +199,9 @@ def contradiction(answer: Mapping[str, Any], decks: Decks, folder: Path) -> str:
         shape = len(wanted["respond"]), len(wanted["excite"]), wanted["lines"]
         if _shape(answer.get("response", {}).get("receptance", 0)) != shape:
             return "it has not the responses that were requested"
+        matrices = [answer["response"].get(name) for name in ("stiffness", "mass", "loss")]
+        if "modes" in wanted and len({*map(_shape, matrices)} - {()}) != 1:
+            return "it has not the matrices that were requested"
     return _other_nodes(answer, folder)
 
 

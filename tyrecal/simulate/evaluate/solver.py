@@ -60,7 +60,9 @@ class Solver(Protocol):
         ``decks.request`` has a response {lowest_Hz, highest_Hz, lines, patch_m, excite, respond}
         of points [degrees, direction] of the tread: response {frequency_Hz (f,), receptance
         (respond, excite, f), hub (6, excite, f), radius_m, harmonics, harmonics_wanted}. Of the
-        hub: force along Theta = 0, along 90 degrees, along the axle, and moments about them.
+        hub: force along Theta = 0, along 90 degrees, along the axle, and moments about them. With
+        ``modes`` N in it also stiffness, mass and loss (d, d) on these six motions of the rim and
+        at most N coordinates of modes with the rim held, and tread (respond, d).
 
         A solver in three dimensions gives each mode {frequency_Hz, multiplicity 1, displacement
         (k, 3)} at ``points`` (k, 3), as in `RingShape`; pairs are joined by the tool.
