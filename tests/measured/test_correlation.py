@@ -123,5 +123,5 @@ def test_shapes_come_back_from_their_file(tmp_path: Path) -> None:
     content = json.loads(shapes_text([test]))
     content["tests"][0]["modes"][0]["values"].pop()
     shapes_path(measured).write_text(json.dumps(content))
-    with pytest.raises(InputError, match=r"measured_shapes\.json: is no file of measured shapes"):
+    with pytest.raises(InputError, match=r"at_sensors\.json: is no file of measured shapes"):
         read_shapes(measured)

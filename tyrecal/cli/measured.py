@@ -155,9 +155,9 @@ def import_files(
     with pressure, labels that look exchanged and single values far from a smooth curve are
     reported. If the sensors do not determine a label, the frequency is written without one;
     'tyrecal fit' and 'tyrecal measured label' label it by the model. Files with a common reference
-    and different channels are parts of one test. Shapes are written to OUTPUT_shapes.json: a fit to
-    OUTPUT compares them with the fitted tyre's (MAC, COMAC). AutoMAC shows which modes look alike
-    at the sensors.
+    and different channels are parts of one test. Shapes are kept next to OUTPUT, in a file
+    NAME_at_sensors.json: a fit to OUTPUT compares them with the fitted tyre's (MAC, COMAC). AutoMAC
+    shows which modes look alike at the sensors.
 
     \b
     tyrecal measured import modes.csv --pressure-kPa 240 --sigma-percent 0.3

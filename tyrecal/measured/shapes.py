@@ -101,7 +101,7 @@ def shapes_of(run: ModalTest, pressure_kPa: float) -> Iterator[SensorShapes]:
 
 def shapes_path(measured: Path) -> Path:
     """Place of the shapes that were imported with a file of measurements."""
-    return measured.with_name(f"{measured.stem}_shapes.json")
+    return measured.with_name(f"{measured.stem}_at_sensors.json")
 
 
 def shapes_text(tests: list[SensorShapes]) -> str:
