@@ -32,6 +32,7 @@ def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
     from ..measured.load import judged
     from ..tyre.case import overruled
     from ..tyre.case.case_text import flow_lines
+    from ..tyre.case.loss_hint import lossless_hint, prony_hints
     from ..tyre.case.slack_hint import slack_cord_hint
 
     loaded, mistakes = judged(case, allow_unusual)
@@ -60,6 +61,8 @@ def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
         terminal.note(f"lines that are left out:\n{flow_lines(loaded.assumed)}")
     if not (loaded.case.targets.weights or loaded.measured):
         terminal.note("it has no targets: 'tyrecal fit' needs some, or --measured FILE")
+    for sentence in (*lossless_hint(loaded), *prony_hints(loaded)):
+        terminal.note(sentence)
     if "road" in loaded.file_data and (hint := slack_cord_hint(loaded)):
         terminal.note(hint)
     return 0

@@ -19,7 +19,7 @@ AS_CASE = "case"
 PRESSURE_USUAL = Usual(20, 2000, "kPa", PRESSURE)
 DAMPING_RATIO = "damping_ratio"  # a row of its own in a CSV, read as part of its mode's frequency
 OF_A_MODE = ("frequency_Hz", DAMPING_RATIO)
-DAMPING_SIGMA = 0.25  # of a damping ratio, where a CSV is written
+DAMPING_SIGMA = 0.25  # of a damping ratio that states none
 SHARES_OF_NOMINAL = (0.5, 1.0, 1.5)  # of that load, where a curve over the load is read
 MIN_CARRIED, MAX_CARRIED = 0.05, 3.0  # contact area times pressure over the load
 MeasurementKey = tuple[str, Label | None, str, float, float, RimSupport | None]
@@ -40,6 +40,7 @@ class Measurement:
     place: str = ""  # file and line
     rim: RimSupport | None = None  # None: as the case has it
     damping_ratio: float = nan  # of the mode of a frequency, fraction of critical; NaN: not stated
+    damping_sigma: float = nan  # its standard deviation; NaN: not stated
 
     @property
     def key(self) -> MeasurementKey:
@@ -107,8 +108,7 @@ def measurements_csv(measurements: Sequence[Measurement]) -> str:
         rim = f",{each.rim or AS_CASE}" * on_rims
         lines.append(f"{each.quantity},{mode},{state},{each.value:.6g},{each.sigma:.3g}{rim}")
         if label and isfinite(each.damping_ratio):
-            ratio = each.damping_ratio
-            lines.append(
-                f"{DAMPING_RATIO},{mode},{state},{ratio:.4g},{DAMPING_SIGMA * ratio:.3g}{rim}"
-            )
+            ratio, sigma = each.damping_ratio, each.damping_sigma
+            sigma = sigma if isfinite(sigma) else DAMPING_SIGMA * ratio
+            lines.append(f"{DAMPING_RATIO},{mode},{state},{ratio:.4g},{sigma:.3g}{rim}")
     return "\n".join(lines) + "\n"

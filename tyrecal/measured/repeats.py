@@ -14,7 +14,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import isnan, nan
+from math import hypot, isnan, nan
+from typing import Any
 
 import numpy as np
 
@@ -64,14 +65,21 @@ def combined(
                 f" {100 * MAX_SIGMA:.0f} % of the value {mean:.4g}: is it a mistake, or another"
                 " mode?"
             )
-        rows.append(replace(runs[0], value=mean, sigma=sigma, damping_ratio=mean_damping(runs)))
+        rows.append(replace(runs[0], value=mean, sigma=sigma, **mean_damping(runs)))
     return sorted(rows, key=_order)
 
 
-def mean_damping(values: Sequence[Measurement]) -> float:
-    """The mean of the damping ratios that are stated; NaN where none is."""
-    stated = [each.damping_ratio for each in values if not isnan(each.damping_ratio)]
-    return sum(stated) / len(stated) if stated else nan
+def mean_damping(values: Sequence[Measurement]) -> dict[str, Any]:
+    """``damping_ratio``, the mean of those that are stated, and its ``damping_sigma``; NaN where
+    none is stated."""
+    stated = [each for each in values if not isnan(each.damping_ratio)]
+    if not stated:
+        return {"damping_ratio": nan, "damping_sigma": nan}
+    mean = sum(each.damping_ratio for each in stated) / len(stated)
+    return {
+        "damping_ratio": mean,
+        "damping_sigma": hypot(*(each.damping_sigma for each in stated)) / len(stated),
+    }
 
 
 def _pooled(groups: dict[object, list[Measurement]], quantity: str) -> float | None:
@@ -101,8 +109,7 @@ def one_for_both(values: Sequence[Measurement]) -> list[Measurement]:
                 result += run
             elif {each.member for each in run} == {"1", "2"}:
                 mean = sum(each.value for each in run) / len(run)
-                damping = mean_damping(run)
-                result.append(replace(run[0], value=mean, member="", damping_ratio=damping))
+                result.append(replace(run[0], value=mean, member="", **mean_damping(run)))
             else:
                 result += [replace(each, member="") for each in run]
     return result

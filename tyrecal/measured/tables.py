@@ -135,8 +135,8 @@ def _with_damping(measurements: list[Measurement]) -> list[Measurement]:
         if mode not in known
     )
     return [
-        replace(each, damping_ratio=ratios[_of_mode(each)].value)
-        if each.quantity == "frequency_Hz" and _of_mode(each) in ratios
+        replace(each, damping_ratio=ratio.value, damping_sigma=ratio.sigma)
+        if each.quantity == "frequency_Hz" and (ratio := ratios.get(_of_mode(each)))
         else each
         for each in others
     ]
@@ -217,7 +217,7 @@ def is_gap(cell: str) -> bool:
 
 def _sigma_mistake(each: Measurement) -> str | None:
     """Why a measurement's standard deviation cannot be right, or None."""
-    if isnan(each.sigma):
+    if isnan(each.sigma) and each.quantity != DAMPING_RATIO:  # has a default
         return "sigma is '', must be the standard deviation, greater than 0"
     if each.sigma > (1.0 if each.quantity == DAMPING_RATIO else MAX_SIGMA) * each.value:
         most = f"{100 * MAX_SIGMA:.0f} %"

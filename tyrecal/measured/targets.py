@@ -209,7 +209,7 @@ def _modes(case: LoadedCase, readings: Sequence[Measurement]) -> list[TargetMode
             kind=label.kind,  # type: ignore[arg-type]
             frequency_Hz=sum(each.value for each in group) / len(group),
             sigma_Hz=hypot(*(each.sigma for each in group)) / len(group),
-            damping_ratio=None if isnan(damping := mean_damping(group)) else damping,
+            **{key: x for key, x in mean_damping(group).items() if not isnan(x)},
             pressure_kPa=state.pressure_kPa,
             rim=state.rim,
             load_N=state.load_N or None,

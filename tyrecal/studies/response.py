@@ -297,7 +297,7 @@ def _words(answer: Mapping[str, Any], damping: float | None) -> list[str]:
     if damping is None:
         words.append(
             "no compound has a loss factor, so peaks are as high as the frequency steps happen to"
-            " meet them: add materials.NAME.loss_factor to the case"
+            " meet them: add materials.NAME.loss_factor to the case (a Prony series adds no loss)"
         )
     if answer["harmonics"] < answer["harmonics_wanted"]:
         words.append(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
@@ -12,6 +12,7 @@ from typing import Any
 
 from ...errors import InputError
 from ...tyre.case import LoadedCase, number_at, start_values, with_level
+from ...tyre.case.loss_hint import lossless_hint
 from ...tyre.case.schema import SolverChoice
 from ...tyre.case.slack_hint import slack_cord_hint
 from ...tyre.effects import catalogue
@@ -179,9 +180,9 @@ class TyreDesign:
         if self.solver.name == "bundled":
             self.case.kind.check_with_solver(self.tyre)
 
-    def remarks(self, evaluator: DesignEvaluator) -> tuple[()]:
-        """None: its texts are tyrecal's own."""
-        return ()
+    def remarks(self, evaluator: DesignEvaluator) -> Iterator[str]:
+        """Compounds whose losses are not stated, where others are."""
+        return lossless_hint(self.case)
 
     def explained(self, refusal: str) -> str:
         """A solver's refusal of a line, in the lines of the user's own deck."""

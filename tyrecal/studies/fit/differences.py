@@ -12,7 +12,6 @@ from ..variable import DesignVariable
 Array = np.ndarray
 DesignValues = Mapping[str, float]
 Ask = Callable[[Sequence[DesignValues]], Iterable[Array | EvaluationFailed]]
-STEP = 1e-4  # of a logarithm: best between truncation and the solver's digits
 
 
 def differences(

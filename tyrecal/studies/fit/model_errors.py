@@ -15,7 +15,7 @@ from ..inference.uncertainties import Source, sources
 from .problem import Point, Problem
 from .responses import linear_answer
 from .road_errors import road_changes, road_form
-from .targets import KNOWLEDGE, Target, ValueTarget
+from .targets import WITHOUT_MODEL_ERROR, Target, ValueTarget
 
 Array = np.ndarray
 
@@ -60,7 +60,7 @@ def model_errors(problem: Problem, point: Point) -> ModelErrors:
         raise ValueError("for targets on the road it is computed with --prior alone")
     case, counted = problem.case, problem.counted
     on_road = np.array([bool(each.state.load_N) for each in counted])
-    unloaded = ~on_road & np.array([each.quantity != KNOWLEDGE for each in counted])
+    unloaded = ~on_road & np.array([each.quantity not in WITHOUT_MODEL_ERROR for each in counted])
     rows = tuple(_observable(case, each) for each in counted)
     known, _ = sources(case)
     by_constants = np.zeros((len(rows), len(known)))

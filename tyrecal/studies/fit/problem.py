@@ -3,7 +3,7 @@
 F = sqrt( sum over modes, doublets twice, of w (f_num - f_ref)^2 )
 
 With standard deviations sigma, and other targets q (on the road contact areas, lengths,
-widths, vertical stiffnesses and modes, and the mass):
+widths, vertical stiffnesses and modes, the mass, and damping ratios):
 
 F = sqrt( sum over modes, doublets twice, of w ((f_num - f_ref) / sigma)^2
           + sum over other targets of w ((q_num - q_ref) / sigma)^2 )
@@ -16,12 +16,12 @@ some, F is a number of standard deviations. What is known of a freed number coun
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ...simulate.evaluate.evaluator import Evaluator
+from ...simulate.evaluate.evaluator import DIFFERENCE_STEP, Evaluator
 from ...simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
 from ...simulate.modes.find import LabelledModes, ModesAnswer, modes_in_order
 from ...simulate.modes.label import Label, Mode
@@ -36,6 +36,7 @@ from .targets import (
     KNOWLEDGE_SIGMA,
     Target,
     ValueTarget,
+    read_damping_targets,
     read_known,
     read_mass_targets,
     read_road_targets,
@@ -108,8 +109,8 @@ class Problem:
     notify: called with (number of the point, its values, Point or failure) as they come; jobs: how
     many states of a point are evaluated at a time, and how many neighbours, where the solver gives
     no slopes. measured: all targets, as their residuals stand: ``targets``, the unloaded
-    tyre's modes, then ``others``, on the ``road``, the ``mass`` and what is ``known``; labels: of
-    modes by state.
+    tyre's modes, then ``others``, on the ``road``, the ``mass``, its ``damping`` and what is
+    ``known``; labels: of modes by state.
 
     >>> problem = Problem(case, evaluator, fixed={"A_belt": 2e-7})
     >>> [v.name for v in problem.variables]
@@ -130,9 +131,9 @@ class Problem:
             read_variable(case, name) for name in case.case.variables if name not in self.fixed
         ]
         self.targets, self.road = read_targets(case), read_road_targets(case)
-        self.mass = read_mass_targets(case)
+        self.mass, self.damping = read_mass_targets(case), read_damping_targets(case)
         self.freed, self.known = freed_variables(case), read_known(case)
-        self.others = [*self.road, *self.mass, *self.known]
+        self.others = [*self.road, *self.mass, *self.damping, *self.known]
         self.measured: list[Target | ValueTarget] = [*self.targets, *self.others]
         self.scale = np.array([each.scale for each in self.measured])
         self.labels: dict[TyreState, list[Label]] = {}
@@ -229,6 +230,10 @@ class Problem:
         slopes = self.slopes(by_state, self.targets, values)
         if self.mass:
             slopes = np.vstack([slopes, self._mass_slopes(by_state, values)])
+        if self.damping:  # no solver gives their sensitivities
+            step = self.difference_step or DIFFERENCE_STEP
+            rises = differences(self.variables, values, step, self._neighbours, measured)[1]
+            slopes = np.vstack([slopes, rises[-len(self.damping) :]])
         modal = len(self.targets)
         pressed, rises = self._pressed(values)
         known, shifts = self._known(values)
@@ -278,9 +283,28 @@ class Problem:
         return np.array(quantities, float), np.array(slopes, float).reshape(shape)
 
     def _measured(self, by_state: Mapping[TyreState, LabelledModes]) -> Array:
-        """Frequencies (targets,) of a design, Hz, and behind them its mass where it is a target."""
-        hertz = [by_state[t.state].wanted[t.label].frequency_Hz for t in self.targets]
-        return np.array(hertz + [_mass_kg(by_state) for _ in self.mass])
+        """Frequencies (targets,) of a design, Hz, and behind them its mass and its damping ratios
+        where they are targets. Raises DeckRefused where the solver gives no damping."""
+        values = [by_state[t.state].wanted[t.label].frequency_Hz for t in self.targets]
+        values += [_mass_kg(by_state) for _ in self.mass]
+        for t in self.damping:
+            assert t.member
+            ratio = by_state[t.state].wanted[t.member.label].raw.damping_ratio
+            if ratio is None:
+                name = self.evaluator.solver.name
+                raise DeckRefused(f"solver '{name}' computes no damping, which is a target")
+            values.append(ratio)
+        return np.array(values)
+
+    def _neighbours(
+        self, designs: Sequence[Mapping[str, float]]
+    ) -> Iterator[Array | EvaluationFailed]:
+        """`_measured` of each design, or its failure."""
+        for values in designs:
+            try:
+                yield self._measured(self._in_states(values, ()))
+            except EvaluationFailed as failure:
+                yield failure
 
     def slopes(
         self,

@@ -587,7 +587,7 @@ def fit_result(
         **(
             {"total_error_unknown": total}
             if isinstance(total, str)
-            else {"responses": [] if problem.freed else total.responses}
+            else {"responses": [] if problem.freed or problem.damping else total.responses}
         ),
         "correlations": {
             a: {b: _finite(correlations[i, j]) for j, b in enumerate(names)}

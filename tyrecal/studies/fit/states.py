@@ -18,6 +18,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...files import Json
+from ...measured.measurement import DAMPING_RATIO
 from ...simulate.modes.find import LabelledModes
 from ...simulate.modes.label import Label
 from ...tyre.state import RIMS, TyreState
@@ -116,7 +117,7 @@ def _best_measured(problem: Problem, known: FitUncertainty) -> list[tuple[Target
     rows: dict[TyreState, dict[Label, tuple[Target, float]]] = {}
     for each, sigma in zip(problem.measured, known.sigma, strict=True):
         if isinstance(each, ValueTarget):
-            if not each.member:
+            if not each.member or each.quantity == DAMPING_RATIO:
                 continue
             each = Target(each.member.label, each.value, state=each.state)
         if np.isfinite(sigma):

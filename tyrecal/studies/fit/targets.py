@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ...files import Json
+from ...measured.measurement import DAMPING_RATIO, DAMPING_SIGMA
 from ...simulate.modes.label import Label
 from ...simulate.modes.loaded import Member
 from ...tyre.case import LoadedCase
@@ -16,6 +17,7 @@ from .freed import freed_variables
 
 KNOWLEDGE = "knowledge"  # of a number that the fit frees, see `free`
 KNOWLEDGE_SIGMA = 0.01  # of 1 + 0.01 z: a freed number has z = (value - known) / sd
+WITHOUT_MODEL_ERROR = KNOWLEDGE, DAMPING_RATIO  # quantities of which no error of the model is known
 RIM_WORDS = {"springs": "spindle"}  # of provenance
 
 
@@ -35,7 +37,8 @@ class Target:
     weight: float = 1.0
     sigma_Hz: float | None = None
     state: TyreState = AS_THE_CASE
-    damping_ratio: float | None = None  # compared with the fitted tyre's, not fitted
+    damping_ratio: float | None = None  # compared, and fitted by loss factors alone
+    damping_sigma: float | None = None
 
     quantity = "frequency_Hz"
 
@@ -63,7 +66,8 @@ class Target:
 @dataclass(frozen=True)
 class ValueTarget:
     """Anything else, with its standard deviation in the same unit: on the road one of
-    `FOOTPRINT_QUANTITIES`, or the frequency of the mode ``member``; the mass; ``KNOWLEDGE``."""
+    `FOOTPRINT_QUANTITIES`, or the frequency of the mode ``member``; the mass; the damping ratio of
+    an unloaded mode, ``member``; ``KNOWLEDGE``."""
 
     quantity: str
     value: float
@@ -93,6 +97,7 @@ def read_targets(case: LoadedCase) -> list[Target]:
             t.sigma_Hz,
             TyreState(t.pressure_kPa, 0.0, t.rim).of(case),
             t.damping_ratio,
+            t.damping_sigma,
         )
         for t in case.case.targets.modes
         if not t.load_N
@@ -141,6 +146,26 @@ def read_mass_targets(case: LoadedCase) -> list[ValueTarget]:
     return [ValueTarget("mass_kg", mass.mass_kg, mass.sigma_kg, mass.weight)] if mass else []
 
 
+def read_damping_targets(case: LoadedCase) -> list[ValueTarget]:
+    """Damping ratios of the unloaded tyre, where a variable sets a loss factor: no other number
+    is fitted to them."""
+    paths = [path for variable in case.case.variables.values() for path in variable.sets]
+    if not any(path.startswith("materials.") and ".loss_factor" in path for path in paths):
+        return []
+    return [
+        ValueTarget(
+            DAMPING_RATIO,
+            t.damping_ratio,
+            t.damping_sigma or DAMPING_SIGMA * t.damping_ratio,
+            t.weight,
+            t.state,
+            Member(t.label, ""),
+        )
+        for t in read_targets(case)
+        if t.damping_ratio
+    ]
+
+
 def read_known(case: LoadedCase) -> list[ValueTarget]:
     """Knowledge of each of the numbers that the fit frees, as a target."""
     return [ValueTarget(KNOWLEDGE, 1.0, KNOWLEDGE_SIGMA) for _ in freed_variables(case)]
@@ -166,6 +191,7 @@ def rims_of(case: LoadedCase, states: Iterable[TyreState]) -> list[str]:
 
 def objective_unit(case: LoadedCase) -> str:
     """``Hz``, or ``sigma`` where a target has a standard deviation: the objective counts them."""
-    others = read_road_targets(case) + read_mass_targets(case) + read_known(case)
+    others = read_road_targets(case) + read_mass_targets(case)
+    others += read_damping_targets(case) + read_known(case)
     modal = any(target.sigma_Hz for target in read_targets(case))
     return "sigma" if modal or others else "Hz"

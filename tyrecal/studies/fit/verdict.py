@@ -30,7 +30,7 @@ from ...measured.measurement import Measurement
 from ...measured.sense import doubts, likeliest_exchange
 from ..fitted import NOT_CONVERGED
 from ..result import ResultPart
-from .targets import KNOWLEDGE
+from .targets import WITHOUT_MODEL_ERROR
 
 Array = np.ndarray
 FitVerdict = Literal["fits", "does_not_fit", "not_judged", "not_converged"]
@@ -187,7 +187,7 @@ def _values(left: Remainder) -> Iterator[_Suspicion]:
     """Each value left out."""
     weighted, own = left.weight @ left.deviation, np.diag(left.weight)
     for i, row in enumerate(left.rows):
-        if row.quantity == KNOWLEDGE:
+        if row.quantity in WITHOUT_MODEL_ERROR:
             continue
         if own[i] < MIN_CHECKED / left.covariance[i, i]:
             continue

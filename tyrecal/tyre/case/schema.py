@@ -175,7 +175,8 @@ class TargetMode(Part):
     frequency_Hz: Frequency  # frequency
     weight: Weight = 1.0  # weight in the objective
     sigma_Hz: Positive | None = None  # standard deviation; absent: counts as 1 Hz
-    damping_ratio: Positive | None = None  # fraction of critical damping; compared, not fitted
+    damping_ratio: Positive | None = None  # fraction of critical; fitted by loss factors alone
+    damping_sigma: Positive | None = None  # standard deviation of damping_ratio; absent: 25 %
     pressure_kPa: Pressure | None = None  # pressure at which it was measured; absent: the case's
     rim: RimSupport | None = None  # how the rim was held; absent: as in the case
     load_N: Load | None = None  # load on the road
@@ -196,6 +197,8 @@ class TargetMode(Part):
             yield "symmetry", "must be symmetric or antisymmetric (about the patch) under load_N"
         elif loaded == ["symmetry"]:
             yield "symmetry", "must be absent without load_N"
+        if values.get("damping_sigma") is not None and values.get("damping_ratio") is None:
+            yield "damping_sigma", "must be absent without damping_ratio"
         if "load_N" in loaded and values.get("sigma_Hz") is None:
             yield "sigma_Hz", "must be given for a mode under load_N"
 
