@@ -134,6 +134,22 @@ def test_a_whole_number_may_be_written_with_an_exponent() -> None:
     assert context.params["draws"] == 240_000
 
 
+@pytest.mark.parametrize(
+    ("command", "flag", "name"),
+    [
+        ("sensitivities", "--by", "by"),
+        ("sensitivities", "--of", "kinds"),
+        ("fit", "--fix", "fix"),
+        ("diagnose", "--effect", "effects"),
+        ("diagnose", "--without", "without"),
+    ],
+)
+def test_names_may_be_in_a_list_with_commas(command: str, flag: str, name: str) -> None:
+    """Commas separate no part of a name; the option may be repeated, too."""
+    words = [CASE, flag, "a.b.0,c", flag, " d ,"]
+    assert COMMANDS[command].make_context(command, words).params[name] == ("a.b.0", "c", "d")
+
+
 def test_settings_and_environment_are_not_the_second_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TYRECAL_STORE", "there")
     given = [CASE, "--jobs", "3", "--store", "here"]

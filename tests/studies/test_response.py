@@ -16,7 +16,8 @@ from tyrecal.measured.universal import read_universal
 from tyrecal.report.response import draw_responses
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
-from tyrecal.studies.response import FrfResult, read_points, response_request
+from tyrecal.studies.response import FrfResult, response_request
+from tyrecal.studies.response_points import read_points
 from tyrecal.studies.result import StudyInput
 from tyrecal.tyre.case import LoadedCase, start_values
 
@@ -101,6 +102,25 @@ def test_the_universal_file_reads_back(
     np.testing.assert_allclose(first.values, written, rtol=1e-11)
     lines = path.read_text().splitlines()
     assert lines[0] == "    -1" and max(map(len, lines)) <= 80
+
+
+@pytest.mark.slow
+def test_its_own_file_as_the_measured_one(
+    responses: FrfResult, case: LoadedCase, tmp_path: Path
+) -> None:
+    """The same functions at the same frequencies above 0; those that are 0 have no FRAC."""
+    path = tmp_path / "frf.uff"
+    path.write_text(responses.texts()["frf.uff"])
+    given = StudyInput(case, Evaluator(TyreDesign(case)), {"initial": start_values(case)})
+    result = FrfResult.run(given, measured=path, to_Hz=90.0, patch_mm=PATCH_MM)
+    assert len(result.functions) == 40 and result.frequency_Hz == responses.frequency_Hz[1:46]
+    known = [each for each in result.functions if each.frac is not None]
+    assert 10 < len(known) < 40
+    for each in known:
+        assert (each.frac, each.level_dB) == pytest.approx((1.0, 0.0), abs=1e-4)
+    assert "functions were measured: FRAC 1.000" in result.sentences()[-1]
+    assert result.provenance and result.provenance.measured_sha256
+    assert len(draw_responses(result)["frf"].axes) == 6
 
 
 def test_tables_and_pictures(responses: FrfResult) -> None:

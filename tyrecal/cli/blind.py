@@ -10,7 +10,7 @@ import click
 
 from ..files import Json
 from . import arguments, complete, options
-from .parameters import FileOrFolder, NumberWithin, WholeNumber, option
+from .parameters import FileOrFolder, NumberWithin, WholeNumber, names_option, option
 from .terminal import Progress, Terminal, resume
 
 folder = click.argument("folder", type=FileOrFolder(file=False), metavar="DIR")
@@ -123,10 +123,9 @@ def power(
 @trials("--effects", "effects", 300, "with an effect of the catalogue")
 @trials("--none", "plain", 200, "without any")
 @trials("--outside", "outside", 80, "with an error that the catalogue does not list")
-@option(
+@names_option(
     "--effect",
     "drawn",
-    multiple=True,
     metavar="EFFECT",
     shell_complete=complete.effects,
     help="Effect to draw; repeatable (default: all that the case allows).",
@@ -215,10 +214,9 @@ def make(
     show_default=True,
     help="Surrogate model for all trials, or runs of the model for each trial.",
 )
-@option(
+@names_option(
     "--effect",
     "effects",
-    multiple=True,
     metavar="EFFECT",
     shell_complete=complete.effects,
     help="Effect to consider; repeatable (default: all).",

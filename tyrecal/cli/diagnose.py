@@ -8,7 +8,7 @@ import click
 
 from ..errors import InputError
 from . import arguments, complete, options
-from .parameters import FileOrFolder, NumberWithin, option
+from .parameters import FileOrFolder, NumberWithin, names_option, option
 
 file = FileOrFolder(exists=True, folder=False)
 
@@ -37,17 +37,15 @@ file = FileOrFolder(exists=True, folder=False)
     help="Measurements (CSV) of the same tyre with one thing changed: EFFECT=VALUE (0: absent) or"
     " EFFECT*FACTOR; repeatable.",
 )
-@option(
+@names_option(
     "--effect",
     "effects",
-    multiple=True,
     metavar="EFFECT",
     shell_complete=complete.effects,
     help="Effect to consider; repeatable (default: all).",
 )
-@option(
+@names_option(
     "--without",
-    multiple=True,
     metavar="EFFECT",
     shell_complete=complete.effects,
     help="Effect to leave out, because it is ruled out; repeatable.",

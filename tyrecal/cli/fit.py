@@ -11,7 +11,7 @@ import click
 
 from . import arguments, complete, options
 from .main import EXIT_FIT
-from .parameters import FileOrFolder, OneOf, WholeNumber, option
+from .parameters import FileOrFolder, OneOf, WholeNumber, names_option, option
 from .terminal import Progress, Terminal
 
 if TYPE_CHECKING:
@@ -39,9 +39,8 @@ if TYPE_CHECKING:
     " rim); with --pressure-kPa, only those at that pressure. Frequencies without c and m get"
     " the likeliest labels.",
 )
-@option(
+@names_option(
     "--fix",
-    multiple=True,
     metavar="NAME",
     shell_complete=complete.variables,
     help="Variable to hold at its start value; repeatable.",

@@ -7,25 +7,24 @@ from pathlib import Path
 import click
 
 from . import arguments, options
-from .parameters import Number, OneOf, option
+from .parameters import FileOrFolder, Number, OneOf, option
 
 
 @click.command()
 @options.every(options.case_argument, options.assignments, options.pressure)
 @option(
     "--excite",
-    default="tread:0deg:radial",
-    show_default=True,
+    default="",
     metavar="POINT,...",
     help="Points of the tread where a force of 1 N acts: tread:ANGLEdeg:DIRECTION, radial,"
-    " tangential or lateral.",
+    " tangential or lateral (default: tread:0deg:radial, or those of --measured).",
 )
 @option(
     "--respond",
-    default="hub:fz,tread:0deg:radial",
-    show_default=True,
+    default="",
     metavar="POINT,...",
-    help="Points of the response: of the tread, or of the hub fx, fy, fz, mx, my, mz.",
+    help="Points of the response: of the tread, or of the hub fx, fy, fz, mx, my, mz (default:"
+    " hub:fz,tread:0deg:radial, or those of --measured).",
 )
 @option(
     "--from-Hz",
@@ -67,6 +66,13 @@ from .parameters import Number, OneOf, option
     show_default=True,
     help="Motion of the tread per force: displacement or acceleration.",
 )
+@option(
+    "--measured",
+    type=FileOrFolder(exists=True, folder=False),
+    metavar="FILE",
+    help="Measured functions to compare with: a universal file (data set 58, axes as below, origin"
+    " at the wheel's centre), or a CSV with the columns of frf.csv. Its frequencies are used.",
+)
 @options.fitted()
 @option("--pictures/--no-pictures", default=True, help="Draw magnitude and phase.")
 @options.figure_format
@@ -82,6 +88,7 @@ def command(
     step_Hz: float,
     patch_mm: float,
     form: str,
+    measured: Path | None,
     fitted: Path | None,
     pictures: bool,
     study: options.Study,
@@ -95,18 +102,24 @@ def command(
     \b
     tyrecal frf cases/p235_75r17.yaml --excite tread:0deg:radial --respond hub:fz,hub:fx
     tyrecal frf cases/p235_75r17.yaml --respond tread:0deg:radial,tread:90deg:radial --to-Hz 200
+    tyrecal frf my.yaml --measured hammer.uff --to-Hz 250
     """
-    from ..studies.response import FrfResult, response_request
+    from ..studies.measured_response import read_measured_responses
+    from ..studies.response import EXCITE, RESPOND, FrfResult, response_request
     from ..studies.result import StudyInput
 
     options.say_idle(study.terminal, study.jobs, "only one design is evaluated")
-    response_request(excite, respond, from_Hz, to_Hz, step_Hz, patch_mm)
+    if measured and "--step-Hz" in options.given():
+        raise click.UsageError("--step-Hz: the frequencies are those of --measured")
+    if measured:
+        read_measured_responses(measured, form, from_Hz, to_Hz)
+    response_request(excite or EXCITE, respond or RESPOND, from_Hz, to_Hz, step_Hz, patch_mm)
     loaded, _ = study.load(case, assignments, pressure_kPa)
     loaded, values = arguments.one_design(fitted, loaded, assignments, study.terminal)
     evaluator = study.evaluator(loaded)
     evaluator.needs_response()
     designs = {"fitted" if fitted else "initial": values}
-    output = study.run(loaded, "frf", evaluator)
+    output = study.run(loaded, "frf", evaluator, measured=[measured] if measured else [])
     given = StudyInput(loaded, evaluator, designs)
     result = FrfResult.run(
         given,
@@ -117,6 +130,7 @@ def command(
         step_Hz=step_Hz,
         patch_mm=patch_mm,
         form=form,  # type: ignore[arg-type]
+        measured=measured,
     )
     figures = {}
     if pictures:

@@ -61,7 +61,13 @@ class Option(click.Option):
         raise click.UsageError(f"{name} is given twice, as {one} and {other}", ctx)
 
 
+def split_names(ctx: click.Context, param: click.Parameter, values: Any) -> tuple[str, ...]:
+    """The names of a repeatable option, each of whose values may be a list with commas."""
+    return tuple(filter(None, (name.strip() for value in values for name in value.split(","))))
+
+
 option = partial(click.option, cls=Option)
+names_option = partial(option, multiple=True, callback=split_names)
 
 
 class _Answering(click.ParamType):

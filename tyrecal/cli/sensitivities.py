@@ -7,23 +7,21 @@ from pathlib import Path
 import click
 
 from . import arguments, complete, options
-from .parameters import FileOrFolder, option
+from .parameters import FileOrFolder, names_option, option
 
 
 @click.command()
 @options.every(options.case_argument, options.assignments, options.pressure)
-@option(
+@names_option(
     "--by",
-    multiple=True,
     metavar="NAME|PATH",
     shell_complete=complete.numbers,
-    help="Variable, or path of a number of the case; repeatable (default: all that are not 0)."
-    " Example: rebar_layers.belt_1.angle_deg.",
+    help="Variable, or path of a number of the case; several with commas, or repeatable (default:"
+    " all that are not 0). Example: C10,rebar_layers.belt_1.angle_deg.",
 )
-@option(
+@names_option(
     "--of",
     "kinds",
-    multiple=True,
     metavar="QUANTITY",
     help="frequency (default), mass, contact_area, contact_length, contact_width or"
     " vertical_stiffness; repeatable.",

@@ -12,7 +12,7 @@ import contextlib
 import io
 import re
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite, pi
 from pathlib import Path
@@ -56,6 +56,8 @@ FUNCTIONS = {
 RESPONSE_FUNCTION, TIME = 4, 17  # codes of a function's type, and of what it stands over
 NOT_STATED, FORCE = (0, 1), 13
 MOTION_FORMS = {8: "receptance", 11: "mobility", 12: "accelerance"}
+BLOCKED_FORCE = "blocked force"  # or moment, at the hub
+FORCE_FORMS = {9: BLOCKED_FORCE, FORCE: BLOCKED_FORCE}
 QUANTITY_NAMES = {
     2: "stress",
     3: "strain",
@@ -87,7 +89,7 @@ class Function:
 
     frequency_Hz: Array  # (n,)
     values: Array  # (n,) complex, in ``unit``
-    form: str | None  # receptance, mobility or accelerance; None where not stated
+    form: str | None  # receptance, mobility, accelerance, blocked force; None where not stated
     response: Signal  # node and direction where the motion was measured
     reference: Signal  # node and direction of the force
     place: str  # file and line, for messages
@@ -110,6 +112,7 @@ class Universal:
     # (3, 3) unit vectors of the directions 1, 2, 3 in the global system, a row each, of nodes with
     # a coordinate system of their own; all others measure along the global x, y, z
     axes: dict[int, Array] = field(default_factory=dict)
+    forms: Mapping[int, str] = field(default_factory=lambda: MOTION_FORMS)  # that are read, by code
 
 
 def is_universal(path: Path) -> bool:
@@ -118,12 +121,14 @@ def is_universal(path: Path) -> bool:
         return file.read(200).lstrip(b"\r\n").startswith(b"    -1")
 
 
-def read_universal(path: Path) -> Universal:
-    """Raises InputError naming the set and its line; OSError."""
+def read_universal(path: Path, forces: bool = False) -> Universal:
+    """Contents of a file; ``forces``: with functions of a force over a force. Raises InputError
+    naming the set and its line; OSError."""
     if not is_universal(path):
         raise InputError(f"{path}: no universal file; one begins with a line '    -1'")
     text = read_bytes(path, MAX_BYTES)
-    result = Universal(path, {}, [], [])
+    forms = MOTION_FORMS | (FORCE_FORMS if forces else {})
+    result = Universal(path, {}, [], [], forms=forms)
     sets = [each for each in _sets(path, text) if each.kind not in UNHEEDED]
     for each in sets:
         if each.kind not in READ_TYPES:
@@ -343,7 +348,7 @@ def _add_function(result: Universal, each: _Set) -> None:
         raise InputError(f"{each.place}: the function is over time, must be over frequency")
     above, below = (content[f"{name}_spec_data_type"] for name in ("ordinate", "orddenom"))
     response = int(content["rsp_node"]), int(content["rsp_dir"])
-    if above not in (*NOT_STATED, *MOTION_FORMS) or below not in (*NOT_STATED, FORCE):
+    if above not in (*NOT_STATED, *result.forms) or below not in (*NOT_STATED, FORCE):
         words = [QUANTITY_NAMES.get(code, f"quantity {code}") for code in (above, below)]
         over = "" if below in NOT_STATED else f" over {words[1]}"
         result.skipped[f"{words[0]}{over}, channel {channel_name(response)}"] += 1
@@ -372,7 +377,7 @@ def _add_function(result: Universal, each: _Set) -> None:
         Function(
             f,
             values,
-            MOTION_FORMS.get(above),
+            result.forms.get(above),
             response,
             (int(content["ref_node"]), int(content["ref_dir"])),
             each.place,

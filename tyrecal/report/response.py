@@ -1,4 +1,4 @@
-"""Response functions: magnitude and phase over frequency."""
+"""Response functions: magnitude and phase over frequency, measured ones dotted."""
 
 from __future__ import annotations
 
@@ -20,8 +20,13 @@ def draw_responses(result: FrfResult) -> dict[str, Figure]:
             values, colour = each.values, COLOURS[i % len(COLOURS)]
             size = np.where(np.abs(values) > 0, np.abs(values), np.nan)
             label = f"{each.respond} over {each.excite}"
+            label += "" if each.frac is None else f" (measured: dotted, FRAC {each.frac:.2f})"
             upper.semilogy(result.frequency_Hz, size, color=colour, lw=1.2, label=label)
             lower.plot(result.frequency_Hz, np.degrees(np.angle(values)), color=colour, lw=1.0)
+            if len(each.measured):
+                style = {"color": colour, "lw": 1.0, "ls": ":"}
+                upper.semilogy(result.frequency_Hz, np.abs(each.measured), **style)
+                lower.plot(result.frequency_Hz, np.degrees(np.angle(each.measured)), **style)
         upper.set_ylabel(f"{each.quantity}, {unit}")
         upper.legend(frameon=False, fontsize=7)
         lower.set(xlabel="frequency, Hz", ylabel="phase, degrees", ylim=(-185, 185))

@@ -1,15 +1,10 @@
-"""Response functions: the force of the tyre on the hub, and motions of the tread, per force on it.
-
-Directions at the hub are those of ISO 8855: x forward, y to the left along the axle, z upwards. The
-angle 0 of the tread is below the hub, where it would touch the road. Angles grow as the wheel
-turns when it rolls forward: 90 degrees is behind the hub.
-"""
+"""Response functions: the force of the tyre on the hub, and motions of the tread, per force on it,
+next to measured ones. Points and directions are those of `response_points`."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -17,9 +12,10 @@ from pydantic import Field
 
 from ..errors import InputError
 from ..files import Json
-from ..measured.coordinates import CYLINDRICAL, CoordinateSystem
 from ..measured.universal_text import WrittenFunction, function_set, universal_text
 from ..tyre.case import LoadedCase
+from .measured_response import MeasuredResponse, agreement, points_of, read_measured_responses
+from .response_points import HUB_CHANNELS, TREAD_MOTIONS, TREAD_SYSTEM, ResponsePoint, read_points
 from .result import Column, CsvRow, Result, ResultPart, StudyInput, Table, csv_text
 
 Array = np.ndarray
@@ -28,55 +24,7 @@ EXCITE, RESPOND = "tread:0deg:radial", "hub:fz,tread:0deg:radial"
 TO_HZ, STEP_HZ, PATCH_MM = 300.0, 0.5, 20.0  # defaults of the options
 ZERO_BY_SYMMETRY = 1e-10  # of the largest response of its kind
 MAX_BAND_HZ, MAX_RESPONSE_STEPS = 1000.0, 5000
-TREAD_POINT = re.compile(r"tread:([+-]?\d+(?:\.\d+)?)deg:(radial|tangential|lateral)")
-TREAD_MOTIONS = "radial", "tangential", "lateral"
-HUB_CHANNELS = {  # place among the solver's forces and moments, and the sign of it
-    **{"fx": (1, -1), "fy": (2, 1), "fz": (0, -1)},
-    **{"mx": (4, -1), "my": (5, 1), "mz": (3, -1)},
-}
 HUB_NODE, FIRST_TREAD_NODE = 1, 101  # numbers in universal files
-EXAMPLES = "such as tread:0deg:radial, tread:90deg:lateral"
-# axes of the tread's r, theta, z at the angle 0: down, backwards, along the axle
-TREAD_SYSTEM = CoordinateSystem(
-    CYLINDRICAL, np.array([[0, 0, -1], [-1, 0, 0], [0, 1, 0]]), np.zeros(3)
-)
-
-
-@dataclass(frozen=True)
-class ResponsePoint:
-    """A place and direction of the tread, or a channel of the hub.
-
-    >>> print(*read_points("tread:90deg:radial,hub:fz"))
-    tread:90deg:radial hub:fz
-    """
-
-    channel: str  # direction of the tread, or fx to mz of the hub
-    angle_deg: float | None = None  # None: the hub
-
-    def __str__(self) -> str:
-        if self.angle_deg is None:
-            return f"hub:{self.channel}"
-        return f"tread:{self.angle_deg:g}deg:{self.channel}"
-
-
-def read_points(text: str, hub: bool = True) -> list[ResponsePoint]:
-    """Points of a list with commas; ``hub``: whether it may have the hub's. Raises InputError."""
-    points = []
-    for word in text.replace(" ", "").split(","):
-        place, _, channel = word.partition(":")
-        if match := TREAD_POINT.fullmatch(word):
-            points.append(ResponsePoint(match[2], float(match[1])))
-        elif hub and place == "hub" and channel in HUB_CHANNELS:
-            points.append(ResponsePoint(channel))
-        else:
-            of_hub = f", or hub:fz with one of {', '.join(HUB_CHANNELS)}" if hub else ""
-            raise InputError(
-                f"'{word}' is no point: give tread:ANGLEdeg:DIRECTION, {EXAMPLES}{of_hub};"
-                f" directions are {', '.join(TREAD_MOTIONS)}"
-            )
-    if len(set(points)) < len(points):
-        raise InputError(f"'{text}' has a point twice")
-    return points
 
 
 def response_request(
@@ -116,9 +64,8 @@ class ResponseFunctionEntry(ResultPart):
 
     excite: Annotated[str, Column("force at", "")]  # where the force acts, and its direction
     respond: Annotated[str, Column("response at", "")]  # where the response is, and its direction
-    quantity: Annotated[
-        str, Column("quantity", "")
-    ]  # receptance, accelerance, blocked force or moment
+    # receptance, accelerance, blocked force or blocked moment
+    quantity: Annotated[str, Column("quantity", "")]
     unit: Annotated[str, Column("unit", "")]  # unit of the function
     # magnitude at the lowest frequency
     at_lowest: Annotated[float, Column("at the lowest Hz", ".4g")]
@@ -126,11 +73,31 @@ class ResponseFunctionEntry(ResultPart):
     peak: Annotated[float, Column("peak", ".4g")]  # magnitude of the highest peak
     real: list[float]  # real part by frequency
     imag: list[float]  # imaginary part by frequency
+    frac: float | None = None  # with the measured function, 0 to 1
+    level_dB: float | None = None  # of the measured over the computed one, by mean squares
+    measured_real: list[float] = Field(default=[])  # real part of the measured function
+    measured_imag: list[float] = Field(default=[])  # imaginary part of the measured function
 
     @property
     def values(self) -> Array:
         """The function (f,), complex."""
         return np.array(self.real) + 1j * np.array(self.imag)
+
+    @property
+    def measured(self) -> Array:
+        """The measured function (f,), complex; empty where there is none."""
+        return np.array(self.measured_real) + 1j * np.array(self.measured_imag)
+
+    def compared(self, measured: MeasuredResponse | None) -> ResponseFunctionEntry:
+        """The function with a measured one, if there is one."""
+        if measured is None:
+            return self
+        values = measured.as_form(self.quantity)
+        parts = {"measured_real": values.real.tolist(), "measured_imag": values.imag.tolist()}
+        return self.model_copy(update={**parts, **agreement(values, self.values)})
+
+
+COMPARED = {"frac": Column("FRAC", ".3f"), "level_dB": Column("measured/computed dB", "+.1f")}
 
 
 class ResponseFindings(ResultPart):
@@ -161,15 +128,24 @@ class FrfResult(Result):
         cls,
         given: StudyInput,
         *,
-        excite: str = EXCITE,
-        respond: str = RESPOND,
+        excite: str = "",
+        respond: str = "",
         from_Hz: float = 0.0,
         to_Hz: float = TO_HZ,
         step_Hz: float = STEP_HZ,
         patch_mm: float = PATCH_MM,
         form: ResponseForm = "receptance",
+        measured: Path | None = None,
     ) -> FrfResult:
-        """The last design, rim held, unloaded. Raises InputError, EvaluationFailed."""
+        """The last design, rim held, unloaded. With a measured file, at its points, unless they are
+        given, and at its frequencies from ``from_Hz`` to ``to_Hz``. Raises InputError,
+        EvaluationFailed."""
+        known = read_measured_responses(measured, form, from_Hz, to_Hz) if measured else []
+        places = points_of(known) if known else {"excite": EXCITE, "respond": RESPOND}
+        excite, respond = excite or places["excite"], respond or places["respond"]
+        if known:
+            f = known[0].frequency_Hz
+            from_Hz, to_Hz, step_Hz = float(f[0]), float(f[-1]), float(np.ptp(f) / (len(f) - 1))
         request = response_request(excite, respond, from_Hz, to_Hz, step_Hz, patch_mm)
         given.evaluator.needs_response()
         name, values = [*given.designs.items()][-1]
@@ -177,8 +153,9 @@ class FrfResult(Result):
         tread = _of_tread(seen, forces)
         result = _evaluated(given, values, request)
         answer = result.response
+        by_points = {(each.excite, each.respond): each for each in known}
         functions = [
-            _entry(answer, force, e, point, tread, form)
+            _entry(answer, force, e, point, tread, form).compared(by_points.get((force, point)))
             for e, force in enumerate(forces)
             for point in seen
         ]
@@ -191,10 +168,13 @@ class FrfResult(Result):
             harmonics=int(answer["harmonics"]),
             frequency_Hz=[float(f) for f in answer["frequency_Hz"]],
             functions=functions,
-            findings=ResponseFindings(words=_words(answer, result.modes[0].damping_ratio)),
+            findings=ResponseFindings(
+                words=_words(answer, result.modes[0].damping_ratio) + _compared_words(functions)
+            ),
         )
         text = functions_of_tyre.universal(given.case)
-        return given.stamped(functions_of_tyre.with_files({"frf.uff": text}))
+        files = [measured] if measured else []
+        return given.stamped(functions_of_tyre.with_files({"frf.uff": text}), measured=files)
 
     def quantities(self) -> dict[str, float]:
         numbers = {}
@@ -202,23 +182,37 @@ class FrfResult(Result):
             where = f"{each.respond} {each.excite}"
             numbers[f"peak_Hz {where}"] = each.peak_Hz
             numbers[f"peak {where}"] = each.peak
+            if each.frac is not None:
+                numbers[f"frac {where}"] = each.frac
         return numbers
 
     def csv(self) -> str:
         keys = ["excite", "respond", "quantity", "unit", "frequency_Hz", "real", "imag"]
+        keys += ["measured_real", "measured_imag"] * self._is_compared
         return csv_text(keys, self._csv_lines())
 
     def _csv_lines(self) -> list[CsvRow]:
+        parts = ("real", "imag", "measured_real", "measured_imag")
         return [
-            {**each.model_dump(), "frequency_Hz": f, "real": real, "imag": imag}
+            {**each.model_dump(exclude={*parts}), "frequency_Hz": f}
+            | {key: getattr(each, key)[i] for key in parts if getattr(each, key)}
             for each in self.functions
-            for f, real, imag in zip(self.frequency_Hz, each.real, each.imag, strict=True)
+            for i, f in enumerate(self.frequency_Hz)
         ]
 
+    @property
+    def _is_compared(self) -> bool:
+        return any(each.measured_real for each in self.functions)
+
     def tables(self) -> list[Table]:
-        columns = list(ResponseFunctionEntry.columns().values())
+        more = COMPARED if self._is_compared else {}
+        columns = [*ResponseFunctionEntry.columns().values(), *more.values()]
         title = f"{self.design}, {self.pressure_kPa:g} kPa, rim held, patch {self.patch_mm:g} mm"
-        return [Table(columns, [each.cells() for each in self.functions], title)]
+        rows = [
+            [*each.cells(), *(column.cell(getattr(each, key)) for key, column in more.items())]
+            for each in self.functions
+        ]
+        return [Table(columns, rows, title)]
 
     def universal(self, case: LoadedCase) -> str:
         """Text of the universal file: the hub is node 1, points of the tread are from 101 on."""
@@ -290,6 +284,15 @@ def _entry(
         real=[float(x) + 0.0 for x in values.real],
         imag=[float(x) + 0.0 for x in values.imag],
     )
+
+
+def _compared_words(functions: Sequence[ResponseFunctionEntry]) -> list[str]:
+    """A sentence on how well computed and measured functions agree."""
+    known = [each.frac for each in functions if each.frac is not None]
+    if not known:
+        return []
+    span = " to ".join(dict.fromkeys(f"{x:.3f}" for x in (min(known), max(known))))
+    return [f"{len(known)} functions were measured: FRAC {span} (1: the same but for a factor)"]
 
 
 def _words(answer: Mapping[str, Any], damping: float | None) -> list[str]:
