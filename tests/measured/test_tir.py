@@ -198,6 +198,21 @@ def test_defaults_of_a_template_are_left_out(tmp_path: Path) -> None:
     assert all(isnan(row.damping_ratio) for row in rows) and "DAMP_LONG" in notes[0]
 
 
+def test_what_lacks_a_key_or_is_replaced_is_left_out(tmp_path: Path) -> None:
+    """The other quantities stay; a unit's word in another section is no number."""
+    text = PUBLIC.replace("WIDTH = 0.205", "MASS = 'kg'")
+    rows, notes = property_measurements(written(tmp_path, text))
+    assert {row.quantity for row in rows if row.load_N} == {
+        "vertical_stiffness_N_per_m",
+        "contact_length_m",
+    }
+    assert [row.value for row in rows if row.quantity == "mass_kg"] == [9.3]
+    assert "Q_RB1: left out, as it needs WIDTH too" in notes[0]
+    rows, notes = property_measurements(written(tmp_path, PUBLIC + "[DEFLECTION_LOAD_CURVE]\n"))
+    assert not [row for row in rows if row.load_N]
+    assert "[DEFLECTION_LOAD_CURVE] replaces it" in notes[0]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -207,7 +222,6 @@ def test_defaults_of_a_template_are_left_out(tmp_path: Path) -> None:
         ("MASS = 9.3", "MASS = 9.3\nMASS = 9.4", r"line 24: MASS is 9.4, and 9.3 in line 23"),
         ("NOMPRES = 220000", "NOMPRES = 2.2", r"NOMPRES is 0.0022 kPa: usual is 20 to 2000 kPa"),
         ("FREQ_LAT = 42.41", "FREQ_LAT = 42410", r"FREQ_LAT: frequency_Hz is 42410: no tyre has"),
-        ("WIDTH = 0.205", "", r"Q_RB1 needs WIDTH too"),
         (PUBLIC, "[UNITS]\nMASS = 'kg'\n[OPERATING_CONDITIONS]\nNOMPRES = 2e5\n", r"no key states"),
     ],
 )

@@ -224,7 +224,7 @@ def test_slip_comes_from_a_named_donor(tmp_path: Path) -> None:
     file = read_property_file(written(tmp_path, donor, "slip.tir"))
     keys = keys_of(rows_of(public(tmp_path), LOADS, PRESSURES))
     text = property_text(CASE, keys, file)
-    assert text.endswith("[LATERAL_COEFFICIENTS]\n$ from slip.tir\nPCY1 = 1.3\n")
+    assert text.endswith("[LATERAL_COEFFICIENTS]\n$ from slip.tir, FITTYP 61\nPCY1 = 1.3\n")
     assert "slip" not in text.split("[LATERAL")[0]
     assert "left out: coefficients of slip" in property_text(CASE, keys)
     other = keys_of(rows_of(public(tmp_path), LOADS, PRESSURES), nominal_N=5000.0)
@@ -233,6 +233,8 @@ def test_slip_comes_from_a_named_donor(tmp_path: Path) -> None:
     file = read_property_file(written(tmp_path, donor.replace("'meter'", "'mm'"), "slip.tir"))
     with pytest.raises(InputError, match=r"\[UNITS\] must be meter"):
         property_text(CASE, keys, file)
+    with pytest.raises(InputError, match="no coefficients of slip in it"):
+        property_text(CASE, keys, read_property_file(tmp_path / "public.tir"))
 
 
 def test_refused(tmp_path: Path) -> None:

@@ -137,7 +137,11 @@ def read_property_file(path: Path) -> PropertyFile:
     keys, lines = dict[str, float](), dict[str, int]()
     for key, entries in texts.items():
         own, dimension = SECTION_OF[key]
-        entries = [each for each in entries if each[0] == own] or entries
+        entries = [each for each in entries if each[0] == own] or [
+            each for each in entries if each[1][:1] in "+-.0123456789"
+        ]
+        if not entries:
+            continue  # a word in another section, as a unit of mass
         values = [_number(path, key, text, line) for _, text, line in entries]
         if len(set(values)) > 1:
             raise InputError(
@@ -188,6 +192,8 @@ def property_measurements(
                 " those of a tyre"
             )
             keys = {key: value for key, value in keys.items() if key not in template}
+    if "DEFLECTION_LOAD_CURVE" in file.sections and keys.pop("VERTICAL_STIFFNESS", 0):
+        notes.append(f"{path}: left out VERTICAL_STIFFNESS: [DEFLECTION_LOAD_CURVE] replaces it")
     pressure = _pressure(file, pressure_kPa)
 
     def measured(key: str, quantity: str, value: float, load: float = 0.0) -> Measurement:
@@ -211,7 +217,8 @@ def property_measurements(
             try:
                 rows.append(measured(key, quantity, float(curve(tyre, load)), load))
             except KeyError as error:
-                raise InputError(f"{file.place(key)} needs {error.args[0]} too") from None
+                notes.append(f"{file.place(key)}: left out, as it needs {error.args[0]} too")
+                break
             except ValueError as error:
                 raise InputError(f"{path}: {error}") from None
     if "MASS" in keys:

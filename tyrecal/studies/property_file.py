@@ -347,17 +347,24 @@ def property_text(case: LoadedCase, keys: StructuralKeys, donor: PropertyFile | 
         lines += [f"[{section}]"]
         lines += [f"{k:<24}= {x:<14.{TIR_DIGITS}g}$ {words}" for k, (x, words) in own.items()]
     if donor:
-        _refuse_other_nominal(keys.tyre, donor)
-        for section in DONOR_SECTIONS:
-            if section in donor.sections:
-                lines += [f"[{section}]", f"$ from {donor.path.name}", *donor.sections[section]]
+        _refuse_donor(keys.tyre, donor)
+        version = f", FITTYP {donor.model.keys['FITTYP']:g}" if "FITTYP" in donor.lines else ""
+        for section in (each for each in DONOR_SECTIONS if each in donor.sections):
+            lines += [f"[{section}]", f"$ from {donor.path.name}{version}"]
+            lines += donor.sections[section]
     return "\n".join([*lines, ""]).encode("latin-1", "replace").decode("latin-1")
 
 
-def _refuse_other_nominal(tyre: MFSwift, donor: PropertyFile) -> None:
+def _refuse_donor(tyre: MFSwift, donor: PropertyFile) -> None:
     """Raises InputError: coefficients of slip count from FNOMIN and NOMPRES, in SI units."""
+    if not {"LONGITUDINAL_COEFFICIENTS", "LATERAL_COEFFICIENTS"} & donor.sections.keys():
+        raise InputError(
+            f"{donor.path}: no coefficients of slip in it, such as [LATERAL_COEFFICIENTS]"
+        )
     if not donor.is_SI:
         raise InputError(f"{donor.path}: the donor's [UNITS] must be meter, newton, radians, kg")
+    if "FNOMIN" not in donor.model.keys:
+        raise InputError(f"{donor.path}: no FNOMIN, from which its coefficients of slip count")
     for key, option in {"FNOMIN": "load-N", "NOMPRES": "pressure-kPa"}.items():
         theirs, ours = donor.model.keys.get(key), tyre.keys[key]
         if theirs is not None and abs(theirs / ours - 1) > MAX_OTHER_NOMINAL:
