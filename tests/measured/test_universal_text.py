@@ -15,7 +15,7 @@ from tyrecal.measured.universal import read_universal
 from tyrecal.measured.universal_text import WrittenShape, line_set, shape_set, universal_text
 from tyrecal.report.universal_shapes import shapes_text
 from tyrecal.simulate.evaluate.evaluator import Evaluator
-from tyrecal.simulate.evaluate.results import Evaluation, HarmonicShape, RawMode
+from tyrecal.simulate.evaluate.results import Evaluation, HarmonicShape, RawMode, RingShape
 from tyrecal.simulate.modes.label import labelled
 from tyrecal.simulate.provenance import provenance
 from tyrecal.studies.modes import modes_result
@@ -201,6 +201,23 @@ def test_shapes_of_a_tyre(tmp_path: Path) -> None:
         assert np.allclose(motion, direction, atol=1e-5)
     assert [shape.frequency_Hz for shape in file.shapes] == [40, 41, 41]
     assert {shape.damping for shape in file.shapes} == {0.03}
+
+
+def test_shapes_of_a_solver_in_three_dimensions(tmp_path: Path) -> None:
+    """Its own points and modes; what it does not give is 0; lines join points of one circle."""
+    angles = 2 * np.pi * np.arange(12) / 12
+    points = np.array([[0.3, theta, z] for z in (-0.08, -0.03, 0.03, 0.08) for theta in angles])
+    theta = points[:, 1]
+    down = np.column_stack([np.cos(theta), -np.sin(theta), np.full(48, np.nan)])
+    forward = np.column_stack([-np.sin(theta), -np.cos(theta), 0 * theta])
+    raw = tuple(RawMode(66.0 + k, RingShape(points, u), 1) for k, u in enumerate((down, forward)))
+    evaluation = Evaluation(220.0, 9.3, raw)
+    text = shapes_text(CASE, evaluation, labelled(evaluation), False)
+    file = read_universal(written(tmp_path, text))
+    assert len(file.nodes) == 48 and file.lines[0] == (*range(1, 13), 1) and len(file.lines) == 16
+    assert file.nodes[4] == pytest.approx((-0.3, -0.08, 0), abs=1e-12)
+    first, second = (np.nan_to_num(shape.values.real) for shape in file.shapes)
+    assert np.allclose(first, [0, 0, -1], atol=1e-5) and np.allclose(second, [1, 0, 0], atol=1e-5)
 
 
 def test_the_command(

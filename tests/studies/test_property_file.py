@@ -219,6 +219,14 @@ def test_one_pressure_and_another_solver(tmp_path: Path) -> None:
     assert sum("shapes have no known modal mass" in note for note in keys.notes) == 1
 
 
+def test_a_key_that_the_loads_do_not_determine_is_reported(tmp_path: Path) -> None:
+    """The arc tangent of BREFF is flat at all loads."""
+    tyre = MFSwift({**public(tmp_path).keys, "BREFF": 500.0})
+    entries = keys_of(rows_of(tyre, LOADS, [220.0])).sections["VERTICAL"]
+    assert "BREFF at the end of its range, not determined" in entries["BREFF"][1]
+    assert "not determined" not in entries["VERTICAL_STIFFNESS"][1]
+
+
 def test_slip_comes_from_a_named_donor(tmp_path: Path) -> None:
     donor = PUBLIC + "[LATERAL_COEFFICIENTS]\nPCY1 = 1.3\n[VENDOR]\nA = 1\n"
     file = read_property_file(written(tmp_path, donor, "slip.tir"))

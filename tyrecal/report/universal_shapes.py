@@ -1,11 +1,13 @@
 """Mode shapes of the unloaded tyre as a universal file: `tyrecal export --format uff`.
 
-The points are on the tyre's inflated outer surface. x is forward, y to the left along the axle, z
-up, from the wheel's centre; points go round from the bottom, backwards. A pair has two shapes.
+x is forward, y to the left along the axle, z up, from the wheel's centre; angles go round from the
+bottom, backwards. A pair has two shapes. Shapes on the section are on points of the tyre's inflated
+outer surface, those of solvers in three dimensions on the solver's points.
 """
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from math import pi
 
@@ -22,55 +24,79 @@ from ..tyre.resolve import resolved
 from .revolve import placed
 
 Array = np.ndarray
+NamedShape = tuple[str, float, float | None, RingShape]  # name, Hz, damping ratio, shape
 POINTS_AROUND, POINTS_PER_WAVE, POINTS_ACROSS = (
     36,
     4,
     17,
-)  # points round the tyre, at least, and along its surface
-NODES_OF_A_RING = 1000  # node 2003 is the third one of the second ring
+)  # round the tyre, at least; along its skin
+MAX_LINE_NODES = 250  # of a data set 82
+LINE_DIGITS = 5  # of the places, m and rad, by which points are on one line
 
 
 def shapes_text(
     case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode], unit_mass: bool
 ) -> str:
     """Text of the file; unit_mass: whether the solver's shapes have a modal mass of 1 kg, else they
-    have none. Raises InputError where a shape is not known on the tyre's surface."""
-    if any(isinstance(mode.raw.shape, RingShape) for mode in modes):
-        raise InputError("a universal file needs shapes on the section: take another solver")
+    have none. Raises InputError where a shape is not known on the section's nodes."""
+    first = modes[0].raw.shape
+    if isinstance(first, RingShape):
+        shapes, points = _on_solvers_points(evaluation), first.points
+    else:
+        shapes, points = _on_surface(case, evaluation, modes)
+    numbers = range(1, len(points) + 1)
+    cos, sin = np.cos(points[:, 1]), np.sin(points[:, 1])
+    places = np.column_stack([points[:, 0] * cos, points[:, 0] * sin, points[:, 2]])
+    title = case.case.name
+    sets = [line_set(k, line) for k, line in enumerate(_lines(points), start=1)]
+    for k, (name, hertz, damping, shape) in enumerate(shapes, start=1):
+        r, theta, z = np.nan_to_num(shape.displacement).T
+        vectors = np.column_stack([r * cos - theta * sin, r * sin + theta * cos, z])
+        moved = vectors @ TREAD_SYSTEM.axes
+        written = WrittenShape(name, hertz, moved, damping or 0.0, float(unit_mass))
+        sets.append(shape_set(title, k, written, numbers))
+    nodes = dict(zip(numbers, (places @ TREAD_SYSTEM.axes).tolist(), strict=True))
+    return universal_text(title, nodes, sets)
+
+
+def _on_solvers_points(evaluation: Evaluation) -> list[NamedShape]:
+    """All modes of a solver in three dimensions, each of a pair on its own."""
+    return [
+        (f"mode {k}", mode.frequency_Hz, mode.damping_ratio, mode.shape)
+        for k, mode in enumerate(evaluation.modes, start=1)
+        if isinstance(mode.shape, RingShape)
+    ]
+
+
+def _on_surface(
+    case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode]
+) -> tuple[list[NamedShape], Array]:
+    """All modes at points (p, 3) R, Theta, Z of the inflated surface. Raises InputError."""
     mesh = resolved(case).mesh
     moved, modes = placed(evaluation, modes, mesh)
     if not moved:
         raise InputError("the solver gives no shapes on the section's nodes")
     skin = mesh.skin()
-    rows = skin[np.linspace(0, len(skin) - 1, min(POINTS_ACROSS, len(skin))).round().astype(int)]
-    waves = max(mode.label.c for mode in modes)
-    around = max(POINTS_AROUND, POINTS_PER_WAVE * waves)
+    nodes = skin[np.linspace(0, len(skin) - 1, min(POINTS_ACROSS, len(skin))).round().astype(int)]
+    around = max(POINTS_AROUND, POINTS_PER_WAVE * max(mode.label.c for mode in modes))
     angles = 2 * pi * np.arange(around) / around
-    numbers = [[NODES_OF_A_RING * (k + 1) + i + 1 for i in range(len(rows))] for k in range(around)]
-    places, shapes = {}, []
-    for node, own in zip(rows, np.transpose(numbers), strict=True):
-        r, z = np.array(mesh.nodes[int(node)]) + moved[int(node)][[0, 2]]
-        for number, angle in zip(own, angles, strict=True):
-            places[int(number)] = TREAD_SYSTEM.place([r, np.degrees(angle), z]).tolist()
-    lines = [[*own, own[0]] for own in np.transpose(numbers).tolist()] + numbers
+    shapes: list[NamedShape] = []
     for mode in modes:
-        shape = mode.raw.shape
-        assert isinstance(shape, HarmonicShape)
+        assert isinstance(mode.raw.shape, HarmonicShape)
         hertz = mode.raw.members or (mode.frequency_Hz,) * mode.multiplicity
         for member, own_Hz in enumerate(hertz):
-            motion = on_rings(shape, rows, angles, member * pi / 2).displacement
             name = str(mode.label) + f" {member + 1}" * (len(hertz) > 1)
-            damping = mode.raw.damping_ratio or 0.0
-            vectors = _cartesian(motion.reshape(len(rows), around, 3), angles).reshape(-1, 3)
-            shapes.append(WrittenShape(name, own_Hz, vectors, damping, float(unit_mass)))
-    title = case.case.name
-    sets = [line_set(k, nodes) for k, nodes in enumerate(lines, start=1)]
-    sets += [shape_set(title, k, each, places) for k, each in enumerate(shapes, start=1)]
-    return universal_text(title, places, sets)
+            shape = on_rings(mode.raw.shape, nodes, angles, member * pi / 2)
+            shapes.append((name, own_Hz, mode.raw.damping_ratio, shape))
+    inflation = np.array([moved[int(node)] * [1, 0, 1] for node in nodes])
+    return shapes, shapes[0][3].points + np.repeat(inflation, around, axis=0)
 
 
-def _cartesian(vectors: Array, angles: Array) -> Array:
-    """Vectors (node, angle, 3) along r, theta, z at the angles, along x, y, z."""
-    cos, sin, zero = np.cos(angles), np.sin(angles), 0 * angles
-    turned = np.array([[cos, sin, zero], [-sin, cos, zero], [zero, zero, 1 + zero]])
-    return np.einsum("nak,kja,jx->nax", vectors, turned, TREAD_SYSTEM.axes)
+def _lines(points: Array) -> list[list[int]]:
+    """Numbers of the points R, Theta, Z (p, 3) on circles, closed, and on meridians."""
+    circles, meridians = defaultdict(list), defaultdict(list)
+    for number, (r, theta, z) in enumerate(np.round(points, LINE_DIGITS), start=1):
+        circles[r, z].append(number)
+        meridians[theta].append(number)
+    closed = [[*line, line[0]] for line in circles.values()]
+    return [x for x in (*closed, *meridians.values()) if 2 < len(x) <= MAX_LINE_NODES]

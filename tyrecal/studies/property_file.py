@@ -29,6 +29,7 @@ Array = np.ndarray
 MIN_FIT_LOADS = 3
 MAX_OTHER_NOMINAL = 0.01  # relative, of a donor's FNOMIN and NOMPRES
 TIR_DIGITS = 6  # of a key
+AT_END = 1e-3  # relative distance from a limit at which a key is not determined
 TIR_HEAD = """[MDI_HEADER]
 FILE_TYPE = 'tir'
 FILE_VERSION = 3.0
@@ -273,6 +274,9 @@ def _add_fitted(result: StructuralKeys, each: CurveFit, rows: RowsOfDesign) -> N
     result.add(each.section, "", dict(zip(names, solution.x, strict=True)))
     written = np.array([result.tyre.keys[name] for name in names])
     words = f"{each.words} within {_percent(off(written))}"
+    ends = np.isclose(solution.x, limits, rtol=AT_END, atol=AT_END).any(0)
+    if loose := [name for name, end in zip(names, ends, strict=True) if end]:
+        words += f"; {', '.join(loose)} at the end of its range, not determined"
     if at is not rows:
         words += f" at FNOMIN, {_percent(off(written, rows))} over all loads"
     result.add(each.section, words, dict(zip(names, written, strict=True)))
