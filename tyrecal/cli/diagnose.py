@@ -170,6 +170,7 @@ def command(
             considered,
             stage=bar.begin,
             first_guess=first_guess,
+            say=terminal.note,
         )
     written = run.write(diagnosed_case.result)
     parts = parts_data(loaded, [part.region for part in written.section_map])

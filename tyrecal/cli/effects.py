@@ -62,6 +62,7 @@ def command(
     from ..report.effects import effect_text, effects_table
     from ..report.table import shown
     from ..simulate.evaluate.solver import installed
+    from ..studies.difference_runs import runs_in_words
     from ..studies.effects import CatalogueEntry, run
     from ..tyre.effects import IDS, catalogue
 
@@ -105,6 +106,9 @@ def command(
         if each not in able:
             terminal.say(f"{each.id}: solver '{adapter.name}' cannot express it")
     terminal.detail(f"each at {', '.join(f'{p:g}' for p in kPa)} kPa")
+    if not evaluator.has_gradients:
+        runs = len(kPa) * (1 + len(values) + len(able))
+        terminal.note(runs_in_words(evaluator, values, runs, study.jobs))
     with terminal.progress("effects") as bar:
         evaluator.on_progress = bar.at
         result, signatures = run(

@@ -98,7 +98,8 @@ def command(
     output = study.run(loaded, "sample", evaluator, measured=files, **states)
     with terminal.progress("sample", SAMPLE_STAGES) as bar:
         evaluator.on_progress = bar.at
-        sample = run(loaded, evaluator, readings, draws, seed, at_kPa, study.jobs, bar.begin)
+        run_options = study.jobs, bar.begin, terminal.note
+        sample = run(loaded, evaluator, readings, draws, seed, at_kPa, *run_options)
     summary = output.write(result(sample, seed))
     if pictures:
         from ..report.sample import figures

@@ -127,7 +127,10 @@ class PressingPlan:
         )
         words = [size, counts]
         if self.seconds is not None and self.memory_bytes is not None:
-            words += [f"about {_time(self.seconds)}", f"{self.memory_bytes / 1e9:.1f} GB of memory"]
+            words += [
+                f"about {time_in_words(self.seconds)}",
+                f"{self.memory_bytes / 1e9:.1f} GB of memory",
+            ]
         return "; ".join(words)
 
 
@@ -137,7 +140,7 @@ def _count(number: int, noun: str, more: Sequence[int] = ()) -> str:
     return f"{numbers} {noun}{'s' * (number != 1)}"
 
 
-def _time(seconds: float) -> str:
+def time_in_words(seconds: float) -> str:
     """A time in its largest unit, to two digits."""
     for unit, size in (("h", 3600.0), ("min", 60.0)):
         if seconds >= 1.5 * size:

@@ -18,9 +18,11 @@ from ...tyre.case import LoadedCase
 from ...tyre.case.mistakes import suggestion
 from ...tyre.effects import catalogue
 from ...tyre.number_units import EFFECT_PATH
+from ..difference_runs import runs_in_words
 from ..fit.targets import rims_of
 from ..inference.check_units import check_units
 from ..inference.effect_ranges import effect_ranges
+from ..inference.expansion import first_points
 from ..inference.inverse_problem import Assumed, Toggle
 from ..inference.model import EffectRange, Query
 from ..inference.observations import Observations, observe
@@ -40,6 +42,8 @@ from .result import DiagnosisResult, diagnosis_result
 from .section_posterior import section_posterior
 from .under_load import UnderLoad, Values, compare
 from .where import FieldValue
+
+LIKELIEST = 3  # effects that are evaluated again, as a rule
 
 
 @dataclass(frozen=True)
@@ -92,13 +96,16 @@ def study(
     section_map: bool = True,
     stage: Callable[[str], None] = lambda stage: None,
     first_guess: Mapping[str, float] | None = None,
+    say: Callable[[str], None] = lambda words: None,
 ) -> DiagnosedCase:
     """Read the files and diagnose the case with them.
 
     effects: ids to consider, None = the whole catalogue; one that a variable of the case sets is
     none; stage: hears of each of ``diagnosis.STAGES``; first_guess: values of the
-    variables at which the calibration begins, None: their starts. Raises InputError,
-    EvaluationFailed, and what ``Evaluator.evaluate`` raises.
+    variables at which the calibration begins, None: their starts; say: hears how long it takes
+    where the solver gives no exact sensitivities. Then a section map, and other pressures and modes
+    to measure next, which take many runs, are left out. Raises InputError, EvaluationFailed, and
+    what ``Evaluator.evaluate`` raises.
     """
     switched = [path for path, _ in toggled]
     paths = [measured, *repeats, *switched]
@@ -145,6 +152,8 @@ def study(
     begin = None
     if first_guess:
         begin = np.array([v.scaled(first_guess[v.name]) for v in variables])
+    if not (is_exact := evaluator.has_gradients):
+        say(runs_in_words(evaluator, model.first_design, _runs(model), jobs))
     check_units(model, readings[0].observations, [str(measured), *map(str, switched)], changes)
     diagnosis = diagnose(
         model,
@@ -152,11 +161,13 @@ def study(
         readings if labelled else readings[0].observations,
         changes,
         assumed,
-        parts=model.parts if section_map else None,
+        parts=model.parts if section_map and (is_exact or model.has_uncertain_compounds) else None,
         further=OtherStates(
             lambda more: TyreModel(case, evaluator, more, own_sources, ranges, jobs),
             case.case.pressure_kPa,
-        ),
+        )
+        if is_exact
+        else None,
         stage=stage,
         begin=begin,
     )
@@ -173,6 +184,15 @@ def study(
         if labelled
         else None,
     )
+
+
+def _runs(model: TyreModel) -> int:
+    """About how many runs a diagnosis by differences takes: the calibration, the expansion about
+    it, and the likeliest effects again at one more size and at their re-fits."""
+    x = model.start
+    likely = [Query(x, {id: span.high or span.low}) for id, span in model.ranges.items()]
+    again = 2 * model.runs([replace(each, near=x) for each in likely[:LIKELIEST]])
+    return model.runs_of_calibration + model.runs(first_points(model, x)) + again
 
 
 def states_measured(case: LoadedCase, measured: Path, others: Sequence[Path] = ()) -> Json:

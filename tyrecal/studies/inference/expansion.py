@@ -157,16 +157,9 @@ def expand(model: ResponseModel, x0: Array) -> Expansion:
     An effect that matters is evaluated at more sizes later, see `refined` and `anchored`.
     Raises what the model answered where it has no solution at x0 itself.
     """
-    ids, count = list(model.ranges), len(x0)
-    steps = CURVATURE_STEP * np.eye(count)
-    at_0 = tuple(id for id in ids if id in model.sloped_at_0)
-    slopes = {id: (id in model.sloped_at_0) + (id in model.sloped) for id in ids}
-    values = {id: node_values(model.ranges[id], slopes[id]) for id in ids}
-    points = [Query(x0, constants=True, slopes=at_0, coupled=True)]
-    points += [Query(x0 + step, near=x0) for step in steps]
+    ids, count, values = list(model.ranges), len(x0), first_sizes(model)
     pairs = [(id, float(e)) for id in ids for e in values[id]]
-    points += [_with_effect(model, x0, id, e) for id, e in pairs]
-    answers = model.answers(points)
+    answers = model.answers(first_points(model, x0))
     first = answers[0]
     if isinstance(first, Exception):
         raise first
@@ -210,6 +203,21 @@ def expand(model: ResponseModel, x0: Array) -> Expansion:
         else:
             nodes[id] = made
     return replace(plain, nodes=nodes, failed=failed, coupling=first.coupling)
+
+
+def first_sizes(model: ResponseModel) -> dict[str, Array]:
+    """Sizes at which each effect is evaluated first."""
+    slopes = {id: (id in model.sloped_at_0) + (id in model.sloped) for id in model.ranges}
+    return {id: node_values(span, slopes[id]) for id, span in model.ranges.items()}
+
+
+def first_points(model: ResponseModel, x0: Array) -> list[Query]:
+    """The points that `expand` evaluates first: the plain tyre, each x a step on, each effect."""
+    at_0 = tuple(id for id in model.ranges if id in model.sloped_at_0)
+    points = [Query(x0, constants=True, slopes=at_0, coupled=True)]
+    points += [Query(x0 + step, near=x0) for step in CURVATURE_STEP * np.eye(len(x0))]
+    sizes = first_sizes(model)
+    return points + [_with_effect(model, x0, id, float(e)) for id in sizes for e in sizes[id]]
 
 
 def carried(known: Expansion, model: ResponseModel, x0: Array) -> Expansion:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -55,9 +55,7 @@ def regions(model: Parted, x: Array) -> list[SectionPart]:
     EvaluationFailed.
     """
     case, parts = split_by_region(model.case)
-    # 1 or -1 by path: whether a constant grows or falls with the stiffness
-    signs = {material: case.kind.moduli(case.case, material) for material in parts}
-    density = {material: case.kind.density(material) for material in parts}
+    signs, density = _paths(case, parts)
     paths = (path for material in parts for path in (*signs[material], density[material]))
     numbers = {path: float(number_at(case, path)) for path in paths}
     evaluator = model.evaluator.of(TyreDesign(case))
@@ -94,6 +92,20 @@ def regions(model: Parted, x: Array) -> list[SectionPart]:
         rubber = len(signs[material]) > 1
         result.append(SectionPart(name, columns[0], columns[1], material, rubber))
     return result
+
+
+def count_numbers(case: LoadedCase) -> int:
+    """How many numbers sensitivities are taken by in each state."""
+    signs, density = _paths(*split_by_region(case))
+    return sum(map(len, signs.values())) + len(density)
+
+
+def _paths(
+    case: LoadedCase, parts: Iterable[str]
+) -> tuple[dict[str, dict[str, int]], dict[str, str]]:
+    """Moduli, with their signs, and density of the materials of a split case."""
+    moduli = {material: case.kind.moduli(case.case, material) for material in parts}
+    return moduli, {material: case.kind.density(material) for material in parts}
 
 
 def split_by_region(case: LoadedCase) -> tuple[LoadedCase, Mapping[str, str]]:

@@ -26,7 +26,7 @@ from .between import Between
 from .expansion import node_values
 from .form_error import MATERIAL_LAWS
 from .model import Answer, Coupling, EffectRange, ModelRow, Query, state_of
-from .regions import SectionPart, regions
+from .regions import SectionPart, count_numbers, regions
 from .section_design import SectionDesign
 from .section_fields import OF_COMPOUNDS, known_from
 from .uncertainties import Source, values_of
@@ -36,6 +36,8 @@ Array = np.ndarray
 WORTH_A_POOL = 10  # evaluations, for processes to be started
 
 MAY_VEER = 0.15  # of ln f at some pressure, from which modes of one harmonic may veer
+
+FIT_STEPS = 4  # of a calibration, as a rule
 
 SAME_PARTS = 0.1  # of x, within which sensitivities by the section's parts are not evaluated again
 
@@ -149,16 +151,7 @@ class TyreModel:
         effects without exact ones: one step of each, one way. The plain tyre is evaluated once at
         each x.
         """
-        saves = bool(self._between.inner.any())
-        points = [p if saves and _is_smooth(p) else replace(p, near=None) for p in points]
-        more = [Query(p.x) for p in points if self._is_bare(p)]
-        more += [Query(p.near) for p in points if p.near is not None]
-        more += [
-            Query(p.x, {id: e}) for p in points if _needs_constants(p) for _, id, e in self._steps
-        ]
-        queries: dict[QueryKey, Query] = {}
-        for p in (*points, *more):
-            queries[_key(p)] = self._joined(p, queries.get(_key(p), p))
+        points, queries = self._queries(points)
         known: dict[QueryKey, Answer | Exception] = {}
         for key, p in queries.items():
             before = None if p.effects or key[2] else self._plain_answers.get(key[0])
@@ -171,6 +164,41 @@ class TyreModel:
             if isinstance(answer, Answer) and not p.effects and not key[2]:
                 self._plain_answers[key[0]] = answer
         return [self._completed(point, known) for point in points]
+
+    def runs(self, points: Sequence[Query]) -> int:
+        """How many runs of the solver the points take by differences, if none is recorded; without
+        those of coupled modes."""
+        wanted = [each for p in self._queries(points)[1].values() for each in self._wanted(p)]
+        runs = sum(1 + len(names) for _, names in wanted)
+        if self.has_uncertain_compounds and any(map(_needs_constants, points)):
+            runs += len(self.states) * (1 + count_numbers(self.case))
+        return runs
+
+    @property
+    def first_design(self) -> dict[str, float]:
+        """The start in the first state."""
+        return self.in_state(self.states[0], self.values(self.start))[0]
+
+    @property
+    def runs_of_calibration(self) -> int:
+        """About how many runs a plain fit takes by differences: steps, and the constants twice."""
+        x = self.start
+        steps = FIT_STEPS * self.runs([Query(x)])
+        return 2 * self.runs([Query(x, constants=True)]) + steps
+
+    def _queries(self, points: Sequence[Query]) -> tuple[list[Query], dict[QueryKey, Query]]:
+        """The points, and by key all that has to be evaluated for them."""
+        saves = bool(self._between.inner.any())
+        points = [p if saves and _is_smooth(p) else replace(p, near=None) for p in points]
+        more = [Query(p.x) for p in points if self._is_bare(p)]
+        more += [Query(p.near) for p in points if p.near is not None]
+        more += [
+            Query(p.x, {id: e}) for p in points if _needs_constants(p) for _, id, e in self._steps
+        ]
+        queries: dict[QueryKey, Query] = {}
+        for p in (*points, *more):
+            queries[_key(p)] = self._joined(p, queries.get(_key(p), p))
+        return points, queries
 
     def _joined(self, one: Query, other: Query) -> Query:
         """Both queries of one tyre in one; with the constants, all slopes that the plain tyre
@@ -275,6 +303,11 @@ class TyreModel:
             slopes = [p.stiffness if field.kind == "stiffness" else p.mass for p in parts]
             constants[: len(self.rows), k] = np.array(slopes).T @ field.values
 
+    @property
+    def has_uncertain_compounds(self) -> bool:
+        """Whether stiffness or density of the section's parts are sources of error."""
+        return any(each.field and each.field.kind in OF_COMPOUNDS for each in self.found)
+
     def parts(self, x: Array) -> list[SectionPart]:
         """The parts of the section at x, or where they are known next to it."""
         for there, parts in self._known_parts:
@@ -318,20 +351,8 @@ class TyreModel:
     def _evaluated(self, points: Sequence[Query]) -> list[Answer | Exception]:
         """Distinct points, slopes with those that have them."""
         wanted, first = [], [0]
-        constants = {**self._plain, **dict.fromkeys(self._moved, 0.0)}
         for point in points:
-            ids = {*point.slopes, *(self._sloped_sources if point.constants else ())}
-            known = constants if point.constants else {}
-            slopes = [EFFECT_PATH + id for id in sorted(ids)]
-            names = dict.fromkeys((*self.variables, *known, *slopes))
-            if self._between.inner.any():
-                names["pressure_kPa"] = None
-            if self._is_bare(point):
-                names = {}
-            at_0 = {EFFECT_PATH + id: self._present.get(id, 0.0) for id in ids}
-            for state in self._states_of(point):
-                design = {**known, **at_0, **self.design(point)}
-                wanted.append(self.in_state(state, design, list(names)))
+            wanted += self._wanted(point)
             first.append(len(wanted))
         modes = self._modes(wanted)
         results = []
@@ -339,6 +360,20 @@ class TyreModel:
             here = slice(first[i], first[i + 1])
             results.append(self._answer(point, [design for design, _ in wanted[here]], modes[here]))
         return results
+
+    def _wanted(self, point: Query) -> list[tuple[dict[str, float], tuple[str, ...]]]:
+        """The point's design in each state, and the names of the slopes that are wanted there."""
+        ids = {*point.slopes, *(self._sloped_sources if point.constants else ())}
+        constants = {**self._plain, **dict.fromkeys(self._moved, 0.0)} if point.constants else {}
+        slopes = [EFFECT_PATH + id for id in sorted(ids)]
+        names = dict.fromkeys((*self.variables, *constants, *slopes))
+        if self._between.inner.any():
+            names["pressure_kPa"] = None
+        if self._is_bare(point):
+            names = {}
+        at_0 = {EFFECT_PATH + id: self._present.get(id, 0.0) for id in ids}
+        design = {**constants, **at_0, **self.design(point)}
+        return [self.in_state(state, design, list(names)) for state in self._states_of(point)]
 
     def _states_of(self, point: Query) -> Sequence[TyreState]:
         return self.states if point.near is None else self._between.ends

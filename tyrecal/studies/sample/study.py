@@ -18,6 +18,7 @@ from ...tyre.case import LoadedCase
 from ...tyre.case.parts import RimSupport
 from ...tyre.state import AS_THE_CASE, SPRINGS, WHEEL_FREE, TyreState
 from ...tyre.values import set_values
+from ..difference_runs import runs_in_words
 from ..emulator import Emulator, emulator
 from ..fit.calibrate import noise_Hz
 from ..fit.targets import read_targets, rims_of
@@ -77,12 +78,14 @@ def run(
     at_kPa: Sequence[float] = (),
     jobs: int = 1,
     stage: Callable[[str], None] = lambda stage: None,
+    say: Callable[[str], None] = lambda words: None,
 ) -> Sample:
     """Sample the case's variables under ``readings``; None: under its targets.
 
     at_kPa: pressures to predict at beside those of the case and of the readings, ``()``: a fifth
-    below and above the case's; on every rim that the case or a reading has. Raises InputError;
-    EvaluationFailed where the start or the first box cannot be evaluated.
+    below and above the case's; on every rim that the case or a reading has; say: hears how long it
+    takes where the solver gives no exact sensitivities. Raises InputError; EvaluationFailed where
+    the start or the first box cannot be evaluated.
     """
     check(case, readings)
     stage(SAMPLE_STAGES[0])
@@ -93,6 +96,13 @@ def run(
     known = list(dict.fromkeys(row.row for row in observations.rows))
     own_sources, _ = sources(case)
     model = TyreModel(case, evaluator, known, own_sources, {}, jobs)
+    pressures = _pressures(case, {row.pressure_kPa for row in observations.rows}, at_kPa)
+    rims = list(dict.fromkeys([None, *(row.rim for row in observations.rows)]))
+    if not evaluator.has_gradients:
+        count = len(model.start) + (len(pressures) > 1)
+        boxes = len(rims) * EACH[0] * count * (1 + count)
+        runs = model.runs_of_calibration + boxes + model.runs([Query(model.start, constants=True)])
+        say(runs_in_words(evaluator, model.first_design, runs, jobs))
     check_units(model, observations, ["what was measured"])
     where = places(observations, known)
     x = plain_fit(model, observations, where)
@@ -102,8 +112,6 @@ def run(
     sigma = covariance(observations, constants, model.material_laws)
     spread, white = np.sqrt(np.diag(sigma)), whitening(sigma)
 
-    pressures = _pressures(case, {row.pressure_kPa for row in observations.rows}, at_kPa)
-    rims = list(dict.fromkeys([None, *(row.rim for row in observations.rows)]))
     tyres = [_held(model, rim) for rim in rims]
     variables = tuple(read_variables(model.case))
     bounds = np.array([[v.scaled(v.lower), v.scaled(v.upper)] for v in variables])
