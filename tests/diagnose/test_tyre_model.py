@@ -208,6 +208,7 @@ def test_a_refusal_with_one_effect_is_that_points_answer() -> None:
         TyreModel(other, Evaluator(TyreDesign(other)), ROWS, [], {}).answers([Query(X)])
 
 
+@pytest.mark.slow
 def test_sensitivities_by_differences_are_the_exact_ones(monkeypatch: pytest.MonkeyPatch) -> None:
     """By variables, constants, fields of the section and an effect, of frequencies and mass."""
     section = CASE.case.section.model_copy(update={"known_from": "drawing"})

@@ -6,6 +6,7 @@ Commands print it where the solver gives no exact sensitivities.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from time import monotonic
 
 from ..simulate.evaluate.evaluator import Evaluator, Question
@@ -16,16 +17,19 @@ def runs_in_words(
     evaluator: Evaluator, values: Mapping[str, float], runs: int, jobs: int = 1
 ) -> str:
     """A sentence on about so many ``runs``, ``jobs`` at a time; "" for exact sensitivities. The
-    design ``values`` is run to measure the time; its time is not known if it is recorded. Raises
-    what ``Evaluator.evaluate`` does."""
+    design ``values`` is run to measure the time, again if it is recorded. Raises what
+    ``Evaluator.evaluate`` does."""
     if evaluator.has_gradients:
         return ""
-    name = evaluator.solver.name
-    words = f"sensitivities are differences: about {runs} runs of solver '{name}'"
-    before, began = evaluator.counts.runs, monotonic()
-    evaluator.evaluate(Question(values))
-    seconds = monotonic() - began
-    if evaluator.counts.runs == before:
-        return f"{words}, without those that are recorded"
-    total = time_in_words(runs * seconds / jobs)
-    return f"{words}, {time_in_words(seconds)} each: about {total} with {jobs} at a time"
+    before = evaluator.counts.runs
+    for each in (evaluator, replace(evaluator, store=None)):
+        began = monotonic()
+        each.evaluate(Question(values))
+        seconds = monotonic() - began
+        if evaluator.counts.runs > before:
+            break
+    return (
+        f"sensitivities are differences: about {runs} runs of solver '{evaluator.solver.name}',"
+        f" {time_in_words(seconds)} each: about {time_in_words(runs * seconds / jobs)} with {jobs}"
+        " at a time, less where runs are recorded"
+    )

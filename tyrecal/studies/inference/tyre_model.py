@@ -11,6 +11,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...simulate.deck.decks import Decks
+from ...simulate.deck.decks_design import design_of
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
 from ...simulate.modes.find import LabelledModes, ModesAnswer, modes_in_order
@@ -73,7 +74,9 @@ class TyreModel:
         self._moved = {
             each.name: each.field for each in own_sources if each.field and each.field.moves
         }
-        self.evaluator = evaluator = evaluator.of(SectionDesign(case, self._moved))
+        self.evaluator = evaluator = evaluator.of(
+            SectionDesign(case, self._moved) if self._moved else design_of(case)
+        )
         self._labels = labels
         self._variables = case.case.variables
         self.variables: Sequence[str] = list(self._variables)

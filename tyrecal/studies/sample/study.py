@@ -12,7 +12,7 @@ from ...errors import InputError
 from ...files import Json
 from ...measured.measurement import Measurement
 from ...measured.targets import in_states, readings_of
-from ...simulate.deck.tyre_design import TyreDesign
+from ...simulate.deck.decks_design import design_of
 from ...simulate.evaluate.evaluator import Evaluator
 from ...tyre.case import LoadedCase
 from ...tyre.case.parts import RimSupport
@@ -275,7 +275,7 @@ def rows_of(
 def _held(model: TyreModel, rim: RimSupport | None) -> Evaluator:
     """The evaluator of the tyre with its rim so; None: as the case has it."""
     held = TyreState(rim=rim).numbers(model.case)
-    return model.evaluator.of(TyreDesign(set_values(model.case, held))) if held else model.evaluator
+    return model.evaluator.of(design_of(set_values(model.case, held))) if held else model.evaluator
 
 
 def _answer(model: TyreModel, x: Array) -> Answer:
