@@ -268,6 +268,12 @@ class ContactNewton:
         for part, each in zip(self.tyre.cords, taut, strict=True):
             part.taut = each
         try:
+            contact = self._state(parts, height, load, None)[2]
+            try:
+                self._form(contact)
+            except Indefinite:  # of small strains between the nodes: the inflated tyre has none
+                self.tyre.residual(self._inflated)
+                self._form(contact)
             return self._iterate(parts, height, load, None, COULOMB_RTOL)[:2]
         finally:
             for part in self.tyre.cords:

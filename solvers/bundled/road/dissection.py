@@ -58,8 +58,10 @@ class Dissection:
         self.symmetry = symmetry
         self.columns, self.along, self._nodes = _columns(connectivities, symmetry)
         mask = symmetry.mask
-        self._mask = mask[:, :, self.along]  # of free components, in the order of the columns
-        self._flat = np.arange(mask.size).reshape(mask.shape)[:, :, self.along]
+        # of free components, in the order of the columns
+        self._mask = np.ascontiguousarray(mask[:, :, self.along])
+        flat = np.arange(mask.size).reshape(mask.shape)[:, :, self.along]
+        self._flat = np.ascontiguousarray(flat)
         pieces = [np.arange(p.functions.start, p.functions.stop) for p in symmetry.around.pieces]
         self._functions = _ranges(pieces, symmetry.mask.shape[1])
 
@@ -118,8 +120,10 @@ class Dissection:
 
     def _unknowns(self, parts: tuple[int, ...], chosen: Array) -> Array:
         """Flat indices of the free components of some (function, node)."""
+        rows = np.flatnonzero(chosen)
+        by_row = lambda values, part: values[part].reshape(-1, 3)[rows]
         return np.concatenate(
-            [self._flat[part][self._mask[part] & chosen[..., None]] for part in parts]
+            [by_row(self._flat, part)[by_row(self._mask, part)] for part in parts]
         )
 
 

@@ -22,6 +22,7 @@ Array = np.ndarray
 Tangents = list[tuple[Array, Array, Array, Array]]
 # of what couples the parts over what does not, above which a column takes both as one
 MIN_COUPLING = 2e-3
+MAX_RUN = 256  # rows that are added at once: of squares on the diagonal half is added in vain
 
 
 class Elimination:
@@ -125,22 +126,27 @@ class Factor:
             own, left = slice(start, start + len(front.own)), np.sort(place[front.left])
             start, n = own.stop, len(front.own)
             here = np.concatenate([np.arange(own.start, own.stop), left])
+            m = len(left)
             if front.cells:
                 unknowns = place[order.unknowns(front.parts, *front.cells)]
                 free = np.argsort(unknowns)[-len(here) :]  # place is -1 where nothing is free
                 whole = order.box(tangents, front.parts, *front.cells)[free][:, free]
+                first, onward, rest = whole[:n, :n].copy("F"), whole[n:, :n].copy(), whole[n:, n:]
+                rest = rest.copy()
             else:
-                whole = np.zeros((len(here), len(here)), np.float32)
+                first = np.zeros((n, n), np.float32, "F")
+                onward, rest = np.zeros((m, n), np.float32), np.zeros((m, m), np.float32)
             for inside in front.inner:
-                _add(whole, here, *rests.pop(inside))
+                _add((first, onward, rest), here, *rests.pop(inside))
             held = touching[own].tocoo()
             later = held.col >= own.start
             row, col = held.row[later], np.searchsorted(here, held.col[later])
-            whole[col, row] += held.data[later]
-            first, onward = whole[:n, :n].copy("F"), whole[n:, :n].T.copy("F")
+            for block, which, from_row in ((first, col < n, 0), (onward, col >= n, n)):
+                block[col[which] - from_row, row[which]] += held.data[later][which]
+            onward = onward.T
             cholesky(first)
             divide(first, onward)
-            rests[i] = left, less_square(whole[n:, n:].copy(), onward)
+            rests[i] = left, less_square(rest, onward)
             self._steps.append((own, left, first, onward))
 
     def solve(self, right: Array) -> Array:
@@ -189,19 +195,23 @@ def _within_parts(contact: csr_matrix, fronts: list[Front]) -> csr_matrix:
     return csr_matrix((entries.data[keep], (row[keep], col[keep])), shape=contact.shape)
 
 
-def _add(whole: Array, here: Array, some: Array, block: Array) -> None:
-    """Add the lower triangle of a block between ``some`` of the unknowns ``here`` to that of the
-    whole, run by run."""
+def _add(blocks: tuple[Array, Array, Array], here: Array, some: Array, block: Array) -> None:
+    """Add the lower triangle of a block between ``some`` of the unknowns ``here`` to that of a
+    front, run by run. Its ``blocks``: between its own unknowns, from them to the rest, and between
+    the rest."""
+    own = len(blocks[0])
     at = np.searchsorted(here, some)
-    cuts = np.flatnonzero(np.diff(at) != 1) + 1
-    runs = [
-        (slice(a, b), slice(at[a], at[a] + b - a))
-        for a, b in pairwise([0, *cuts.tolist(), len(at)])
-        if a < b
-    ]
-    for i, (source, target) in enumerate(runs):
-        for across, beyond in runs[: i + 1]:
-            whole[target, beyond] += block[source, across]
+    is_cut = (np.diff(at) != 1) | (at[1:] == own)
+    is_cut[MAX_RUN - 1 :: MAX_RUN] = True
+    runs = []
+    for a, b in pairwise([0, *(np.flatnonzero(is_cut) + 1).tolist(), len(at)]):
+        if a < b:
+            beyond = int(at[a] >= own)
+            start = at[a] - own * beyond
+            runs.append((slice(a, b), slice(start, start + b - a), beyond))
+    for i, (row, to_row, below) in enumerate(runs):
+        for col, to_col, beyond in runs[: i + 1]:
+            blocks[below + beyond][to_row, to_col] += block[row, col]
 
 
 def _fold(column: ElementColumn, kind: Kind, g: int, h: int) -> csr_matrix:

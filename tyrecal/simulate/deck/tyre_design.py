@@ -68,10 +68,10 @@ class TyreDesign:
 
     @cached_property
     def coarser(self) -> TyreDesign | None:
-        """The design on the coarsest of the case's meshes, if it has at most half as many elements
-        along the section."""
+        """The design on the coarsest of the case's meshes, if it has at most half as many
+        elements."""
         mesh = self.case.case.mesh
-        size = {name: sum(each.elements.values()) for name, each in mesh.levels.items()}
+        size = {k: sum(each.elements.values()) * sum(each.rows) for k, each in mesh.levels.items()}
         level = min(size, key=lambda name: size[name], default="")
         if 2 * size.get(level, 1) > size.get(mesh.level, 0):
             return None
