@@ -113,13 +113,8 @@ Loss = Annotated[
 
 
 class Rubber(Part):
-    """Mooney-Rivlin: C10 (I1 - 3) + C01 (I2 - 3) + (J - 1)^2 / D1, with a Prony series.
-
-    ``moduli`` says whether the constants are those of relaxed or of instantaneous rubber. In a
-    mode of frequency f the shear modulus is (f / reference_frequency_Hz)^frequency_exponent times
-    as large. ``loss_factor``: loss over storage modulus in a vibration, or a table of it, rows of
-    frequency (Hz) and loss factor; None: not known. It changes no frequency.
-    """
+    """Mooney-Rivlin: C10 (I1 - 3) + C01 (I2 - 3) + (J - 1)^2 / D1, with a Prony series; its loss
+    factor changes no frequency."""
 
     kind: Literal["rubber"]  # kind of material
     C10_Pa: Number  # first constant of Mooney-Rivlin's law
@@ -181,11 +176,7 @@ class Gauge(Part):
 
 
 class Outline(Part):
-    """The outer and the inner curve (CSV), and what they do not show.
-
-    ``belt_width_m``: of the wider belt, along the carcass; the rim holds what lies within
-    ``rim_radius_m``. Depths: inner surface to carcass, to the first belt, to the second.
-    """
+    """The outer and the inner curve (CSV), and what they do not show."""
 
     file: Text  # outer and inner curve, CSV, relative to the case file
     belt_width_m: Positive  # width of the wider belt, along the carcass
@@ -268,10 +259,7 @@ class DeckSource(Part):
 
 
 class Level(Part):
-    """A mesh: elements per region of the half section, rows per gap between two lines.
-
-    ``grading``: thickness of a row over that of the row inside it, per gap.
-    """
+    """A mesh: elements per region of the half section, rows per gap between two lines."""
 
     # elements along each region of the half section
     elements: dict[Name, Annotated[int, Field(ge=1, le=200)]]
@@ -301,11 +289,7 @@ class Solid(Part):
 
 
 class RebarLayer(Part):
-    """Cords on a line of the section; ``angle_deg`` from the meridian, ``area_m2`` of one cord.
-
-    Cords stand ``spacing_m`` apart or, with ``geometry: angular``, ``spacing_deg`` apart. The
-    layer is as long as its line, or ends with some of its ``regions``.
-    """
+    """Cords on a line of the section, as long as the line, or in some of its ``regions``."""
 
     line: str  # line of the section
     material: str  # name of a cord

@@ -100,10 +100,7 @@ def _numbers(values: CaseData, key: str) -> list[float]:
 
 
 class SolverChoice(Part):
-    """The solver to run, how long one run (of footprints: a load) may take, its own options.
-
-    The bundled solver's limit is processor time; a program's, time by the clock.
-    """
+    """The solver to run, how long one run may take, its own options."""
 
     name: Name  # bundled, calculix, abaqus or your own
     time_limit_s: Positive  # limit of one run, on the road of one load; bundled: processor time
@@ -125,8 +122,7 @@ def cannot_fit(weights: Sequence[float], free: int) -> str | None:
 
 
 class Variable(Part):
-    """A design variable: the numbers it sets (dotted paths), its start, its bounds, how far a
-    search may go, and how well its start is known, one standard deviation."""
+    """A design variable: the numbers that it sets, its start and how well that is known, bounds."""
 
     # paths of the numbers that have the variable's value
     sets: Annotated[list[str], Field(min_length=1)]
@@ -165,9 +161,7 @@ class Variable(Part):
 
 
 class TargetMode(Part):
-    """A measured mode [c, m]; ``kind`` tells the two [0, 0] apart; ``sigma_Hz``, its standard
-    deviation, counts as 1 Hz where it is not known. Its state, by default the case's: pressure,
-    rim, load on the road; there ``symmetry`` about the patch tells the two of a doublet apart."""
+    """A measured mode [c, m] in its state, by default the case's: pressure, rim, load."""
 
     c: Annotated[int, Field(ge=0, le=20)]  # waves round the circumference
     m: Annotated[int, Field(ge=0, le=3)]  # nodal circles on the belt
@@ -280,11 +274,7 @@ class Targets(Part):
 
 
 class Uncertainty(Part):
-    """A source of error: uncalibrated numbers, all off together by a standard deviation.
-
-    ``percent`` of each number or ``absolute``, in its unit; ``signs``: -1 for those that fall
-    where the others rise.
-    """
+    """A source of error: uncalibrated numbers, all off together by a standard deviation."""
 
     sets: Annotated[list[Text], Field(min_length=1)]  # paths of numbers that are off together
     percent: Positive | None = None  # standard deviation in percent of each number
