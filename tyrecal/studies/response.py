@@ -292,7 +292,7 @@ def _compared_words(functions: Sequence[ResponseFunctionEntry]) -> list[str]:
     if not known:
         return []
     span = " to ".join(dict.fromkeys(f"{x:.3f}" for x in (min(known), max(known))))
-    return [f"{len(known)} functions were measured: FRAC {span} (1: the same but for a factor)"]
+    return [f"{len(known)} functions were measured: FRAC {span} (1: equal up to a factor)"]
 
 
 def _words(answer: Mapping[str, Any], damping: float | None) -> list[str]:
