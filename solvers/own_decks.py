@@ -15,8 +15,7 @@ OWN_DECKS_FILE = "own_decks.json"
 class DecksOfRun:
     """The decks of a run, in the order in which the solver runs them."""
 
-    # name of each job, and of the one that it continues (restart) or ""
-    jobs: list[tuple[str, str]]
+    jobs: list[tuple[str, str]]  # each job, and the one that it continues (restart) or ""
     modes: int | None  # number requested of the last job, None if a range of frequencies decides
     pressure_Pa: float  # inflation pressure
     length_m: float  # metres per unit of length of the decks, 0.001 if they are in mm

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -121,6 +122,18 @@ def _end_tree(process: subprocess.Popen[bytes]) -> None:
         subprocess.run(command, capture_output=True, check=False)
     process.kill()
     process.wait()
+
+
+def program_version(command: Sequence[str], pattern: str, time_limit_s: float) -> str:
+    """The version that a program prints, by a pattern; "unknown" where there is none."""
+    try:
+        given = subprocess.run(
+            command, capture_output=True, text=True, timeout=time_limit_s, stdin=subprocess.DEVNULL
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return "unknown"
+    match = re.search(pattern, given.stdout, re.IGNORECASE)
+    return match[1] if match else "unknown"
 
 
 def last_words(log: Path, lines: int = 3) -> str:

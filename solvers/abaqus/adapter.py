@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import subprocess
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -13,6 +11,7 @@ import numpy as np
 from .. import own_decks
 from ..decks import WrittenDecks, save_texts
 from ..errors import Refused, RunFailed
+from ..process import program_version
 from ..rings import about_axle, ring_modes
 from .dat import DatTable, read_dat
 from .evidence import checked_modes
@@ -39,18 +38,8 @@ class Abaqus:
     @cached_property
     def version(self) -> str:
         """Release of the program, "unknown" where there is none."""
-        try:
-            output = subprocess.run(
-                [*self.command, "information=release"],
-                capture_output=True,
-                text=True,
-                timeout=60,
-                stdin=subprocess.DEVNULL,
-            ).stdout
-        except (OSError, subprocess.TimeoutExpired):
-            return "unknown"
-        release = re.search(r"abaqus\D*(\d[\w.\-]*)", output, re.IGNORECASE)
-        return release[1] if release else "unknown"
+        command = [*self.command, "information=release"]
+        return program_version(command, r"abaqus\D*(\d[\w.\-]*)", 60.0)
 
     def write(self, decks: WrittenDecks, folder: Path) -> list[Path]:
         """Write the decks and, next to them, the case's options. Raises ``refusals``."""

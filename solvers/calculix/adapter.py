@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shutil
-import subprocess
 import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -18,7 +17,7 @@ import numpy as np
 from .. import own_decks
 from ..decks import WrittenDecks, save_texts
 from ..errors import Refused, RunFailed
-from ..process import end_commands
+from ..process import end_commands, program_version
 from ..rings import about_axle, ring_modes
 from .results import Fields, pairs, read_eigenvalues, read_fields, read_mass
 from .runner import clear, run_job
@@ -202,12 +201,7 @@ def _inflated(path: Path) -> tuple[Fields, Array]:
 
 @lru_cache
 def _version(command: tuple[str, ...]) -> str:
-    try:
-        output = subprocess.run([*command, "-v"], capture_output=True, text=True, timeout=20).stdout
-    except (OSError, subprocess.TimeoutExpired):
-        return "unknown"
-    match = re.search(r"Version (\S+)", output)
-    return match[1] if match else "unknown"
+    return program_version([*command, "-v"], r"Version (\S+)", 20.0)
 
 
 def _shapes(fields: Fields, count: int, n: int, sectors: int, job: str) -> list[Array]:

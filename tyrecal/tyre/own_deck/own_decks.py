@@ -156,16 +156,18 @@ class OwnDecks:
 
     def with_numbers(self, numbers: Mapping[str, float], pressure_Pa: float) -> list[list[Block]]:
         """The blocks of each deck with marks and numbers set. Raises OwnDeckError."""
-        known = {**numbers, PRESSURE_MARK: self._in_own_units(pressure_Pa)}
+        known = self._known(numbers, pressure_Pa)
         return [deck.with_numbers(known) for deck in self.decks]
 
-    def _in_own_units(self, pressure_Pa: float) -> float:
-        return pressure_Pa * UNIT_LENGTH[self.units] / UNIT_MASS[self.units]
+    def _known(self, numbers: Mapping[str, float], pressure_Pa: float) -> dict[str, float]:
+        """Numbers, and the pressure in the decks' own units."""
+        own = pressure_Pa * UNIT_LENGTH[self.units] / UNIT_MASS[self.units]
+        return {**numbers, PRESSURE_MARK: own}
 
     def filled(self, numbers: Mapping[str, float], pressure_Pa: float) -> dict[str, str]:
         """The texts with marks, numbers and the pressure set. Raises OwnDeckError."""
-        pressure = self._in_own_units(pressure_Pa)
-        known = {**numbers, PRESSURE_MARK: pressure}
+        known = self._known(numbers, pressure_Pa)
+        pressure = known[PRESSURE_MARK]
         files: dict[str, str] = {}
         for deck in self.decks:
             for name, block in deck.marks.items():
