@@ -90,6 +90,10 @@ def test_a_fit_to_them_finds_the_true_design(
     fit = json.loads(capsys.readouterr().out)
     assert code == 0 and fit["objective_unit"] == "sigma" and fit["objective_Hz"] < 4
     assert {Label(m["c"], m["m"], m["kind"]) for m in fit["modes"]} == set(truth(240.0))
+    assert len(fit["shapes"]) == 3  # repeats, compared with the fitted tyre
+    for each in fit["shapes"]:
+        assert all(p["computed"] == p["measured"] for p in each["pairs"] if p["decided"])
+        assert sum(p["decided"] for p in each["pairs"]) >= len(each["pairs"]) - 1
     for name, value in TRUTH.items():
         variable = fit["variables"][name]
         assert abs(variable["value"] - value) < 2.5 * variable["standard_error"]

@@ -10,6 +10,7 @@ import pytest
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.evaluate.failure import DeckRefused
 from tyrecal.studies import matrices as exported
 from tyrecal.studies.matrices import POINT_ANGLES, matrix_files
 from tyrecal.studies.response import HUB_CHANNELS, response_request
@@ -139,3 +140,12 @@ def test_options_of_matrices_are_refused_elsewhere(
 ) -> None:
     assert run("export", str(tmp_path), "--modes", "20") == 2
     assert "--modes goes with --format matrices" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_too_few_coordinates_are_refused(case: LoadedCase) -> None:
+    """The sentence states how many the hub needs."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(exported, "MATRIX_PATCH_mm", PATCH_MM)
+        with pytest.raises(DeckRefused, match=r"matrices need at least \d\d coordinates of modes"):
+            matrix_files(case, "", 200.0, 20, POINTS)

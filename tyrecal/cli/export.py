@@ -44,7 +44,7 @@ OPTIONS_OF_FORMS = {
 )
 @option(
     "--modes",
-    type=WholeNumber(1, 900),
+    type=WholeNumber(9, 900),
     default=194,
     show_default=True,
     metavar="N",
@@ -124,7 +124,7 @@ def command(
 
     Matrices are those of the unloaded tyre at a pressure: stiffness, mass and loss on the six
     motions of the hub and its modes (Craig and Bampton), as Matrix Market and for ABAQUS, with a
-    README of coordinates and units. These three need the fit.json in DIR.
+    README of coordinates and units. For these DIR may be a case file, too.
 
     \b
     tyrecal export p235_75r17
@@ -140,6 +140,7 @@ def command(
             )
     from ..files import atomic_write, private_dir
     from ..measured.load import load_case
+    from ..simulate.settings import root
     from ..studies.export import case_files, deck_files, parts_left_out, settings_left_out
     from ..studies.matrices import MATRIX_POINTS, matrix_files
     from .output import Run
@@ -149,19 +150,21 @@ def command(
     if not results.is_file():
         advice = f": run 'tyrecal {study}' first"
         raise click.UsageError(f"there is no {study}.json in the folder '{folder}'{advice}")
-    case = case or _case_of(results, study)
-    loaded = load_case(case, allow_unusual=True)  # its user knows it from the results
+    of_case = form == "matrices" and results.suffix in (".yaml", ".yml")
+    case = results if of_case else case or _case_of(results, study)
+    loaded = load_case(case, allow_unusual=not of_case)  # its user knows it from the results
     if form == "tir":
         files = _property_file(loaded, results, nominal_N, nominal_kPa, donor)
     elif form == "uff":
         files = _universal_file(loaded, results)
     else:
-        loaded = _as_fitted(results, loaded, terminal)
+        if not of_case:
+            loaded = _as_fitted(results, loaded, terminal)
         if form == "matrices":
             files = matrix_files(loaded, solver, pressure_kPa, modes, points or MATRIX_POINTS)
         else:
             files = case_files(loaded) if form == "case" else deck_files(loaded, solver)
-    target = output or results.parent / "export"
+    target = output or (root() / results.stem if of_case else results.parent) / "export"
     for name, content in files.items():
         place = target / name
         if place.exists() and not force and place.read_bytes() != content:

@@ -107,7 +107,7 @@ class Response:
             if (parts := model.material_parts(k, modulus))
         ]
         self._tables = [part(each) for each in model.frequency_dependent_models()]
-        self._middle = np.array([highest_Hz / 2])
+        self.highest_Hz, self._middle = highest_Hz, np.array([highest_Hz / 2])
         limit = (2 * np.pi * SETTLES_UP_TO * highest_Hz) ** 2
         self.harmonics: list[_Reduced] = []
         self.wanted = int(LAST_HARMONIC * np.pi / patch.half_angle) + 1

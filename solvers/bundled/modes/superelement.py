@@ -5,10 +5,10 @@ fixed-interface reduction after Craig and Bampton.
                                            [V^H M T     1   ]       [0  Lambda]
 
 T: rigid motions of rim and tyre, which are the static shapes as K T = 0; V: modes of the reduced
-problems of `response`, above the highest frequency what is left there of the static response. A
-harmonic n >= 1 has two real coordinates for each mode, of cos and sin. ``loss`` is the imaginary
-part of K. The rim's coordinates are motions along Theta = 0, along 90 degrees and along the axle,
-and turns about them, at the middle of the wheel.
+problems of `response`, and of harmonics that move the rim also what holds the static response of
+the modes that are left out. A harmonic n >= 1 has two real coordinates for each shape, of cos and
+sin. ``loss`` is the imaginary part of K. The rim's coordinates are motions along Theta = 0, along
+90 degrees and along the axle, and turns about them, at the middle of the wheel.
 """
 
 from __future__ import annotations
@@ -18,10 +18,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...errors import Refused
 from .response import Response
 
 Array = np.ndarray
-MOVE_RIM_UP_TO = 4.0
+MOVE_RIM_UP_TO = 2.5
+ADDS_NOTHING = 1e-3  # singular value, over the largest, below which a static response adds nothing
 RIM_AXES = 0.0, np.pi / 2  # angles of the axes across the axle
 RIM_PLACES = {0: (2, 5), 1: (0, 3)}  # places of the first coordinate of each motion of a harmonic
 
@@ -39,23 +41,22 @@ class Superelement:
 def superelement(
     response: Response, count: int, points: Sequence[tuple[float, int]]
 ) -> Superelement:
-    """Matrices with at most ``count`` coordinates of modes: the lowest, of the harmonics 0 and 1,
-    which alone move the rim, up to `MOVE_RIM_UP_TO` times the frequency. points: angle (rad) and
-    component of each."""
+    """Matrices with at most ``count`` coordinates of modes: of the harmonics 0 and 1, which alone
+    move the rim, up to `MOVE_RIM_UP_TO` times the highest frequency with the static response of the
+    rest, then the lowest of the others. points: angle (rad) and component of each. Raises Refused
+    if the rim needs more."""
+    limit = (2 * np.pi * response.highest_Hz) ** 2
     blocks = [_Block(response, k, points) for k in range(len(response.harmonics))]
-    lowest = sorted(
-        (value / (1.0 if block.n > 1 else MOVE_RIM_UP_TO**2), block.n, k)
-        for block in blocks
-        for k, value in enumerate(block.eigenvalues)
-    )
-    kept: dict[int, list[int]] = {block.n: [] for block in blocks}
-    left = count
-    for _, n, k in lowest:
-        left -= 2 if n else 1
-        if left < 0:
-            break
-        kept[n].append(k)
-    parts = [block.of(sorted(kept[block.n])) for block in blocks if kept[block.n]]
+    parts = [block.with_static_shapes(limit) for block in blocks[:2]]
+    left = count - sum(len(part.stiffness) for part in parts)
+    if left < 0:
+        raise Refused(f"matrices need at least {count - left} coordinates of modes, got {count}")
+    values = [(value, block) for block in blocks[2:] for value in block.eigenvalues]
+    lowest = sorted(values, key=lambda each: each[0])[: left // 2]
+    for block in blocks[2:]:
+        if kept := sum(each is block for _, each in lowest):
+            shapes = np.eye(len(block.eigenvalues))[:, :kept]
+            parts.append(block.of(block.eigenvalues[:kept], shapes))
     size = 6 + sum(len(part.stiffness) for part in parts)
     K, M, loss = (np.zeros((size, size)) for _ in range(3))
     tread = np.zeros((len(points), size))
@@ -91,9 +92,9 @@ class _Block:
         self.eigenvalues, turn = np.linalg.eigh(stiffness)
         self._loss = turn.conj().T @ loss @ turn
         self._moved, share = reduced.moved @ turn, response.patch.share(reduced.n)
-        motion = reduced.forces.conj().T @ turn  # of the patch (3, m)
+        self._motion = reduced.forces.conj().T @ turn  # of the patch (3, m), m modes
         self._tread = np.array(
-            [share * np.exp(1j * self.n * angle) * motion[way] for angle, way in points]
+            [share * np.exp(1j * self.n * angle) * self._motion[way] for angle, way in points]
         )
         # rim: amplitude exp(-i angle of the axis) of each motion, by its coordinates
         self._turns = np.zeros((6, len(reduced.moved)), complex)
@@ -107,16 +108,35 @@ class _Block:
         ]
         self.rim_tread = (np.array(rigid) @ self._turns.T).real
 
-    def of(self, chosen: list[int]) -> _ModeMatrices:
-        """Matrices of some of the modes, in coordinates of unit modal mass."""
-        root, pick = np.sqrt(self._circle), np.ix_(chosen, chosen)
-        loss, values = self._loss[pick], self.eigenvalues[chosen]
-        coupling = root * self._turns @ self._moved[:, chosen]
-        tread = self._tread[:, chosen] / root
+    def of(self, values: Array, shapes: Array) -> _ModeMatrices:
+        """Matrices of shapes (m, s), s shapes of unit modal mass, and their eigenvalues (s,)."""
+        loss = shapes.conj().T @ self._loss @ shapes
+        root = np.sqrt(self._circle)
+        coupling, tread = root * self._turns @ self._moved @ shapes, self._tread @ shapes / root
         if not self.n:
             return _ModeMatrices(np.diag(values), loss.real, coupling.real, tread.real)
         real = np.block([[loss.real, -loss.imag], [loss.imag, loss.real]])
         return _ModeMatrices(np.diag(np.tile(values, 2)), real, _pair(coupling), _pair(tread))
+
+    def with_static_shapes(self, limit: float) -> _ModeMatrices:
+        """Matrices of the modes up to `MOVE_RIM_UP_TO` times the frequency of an eigenvalue, and of
+        what holds the static response of the rest to forces on the patch and to losses of the modes
+        up to ``limit``."""
+        every = self.eigenvalues
+        chosen, rest = np.split(np.arange(len(every)), [(every < MOVE_RIM_UP_TO**2 * limit).sum()])
+        shapes = np.eye(len(every), dtype=complex)[:, chosen]
+        if not len(rest):
+            return self.of(every, shapes)
+        band = np.flatnonzero(every < limit)
+        forces = np.hstack([self._motion[:, rest].conj().T, self._loss[np.ix_(rest, band)]])
+        static = forces / every[rest, None]
+        size = np.linalg.norm(static, axis=0)
+        basis, singular, _ = np.linalg.svd(static[:, size > 0] / size[size > 0], False)
+        basis = basis[:, singular > ADDS_NOTHING * singular.max(initial=0.0)]
+        own, turn = np.linalg.eigh(basis.conj().T @ (every[rest, None] * basis))
+        more = np.zeros((len(every), len(own)), complex)
+        more[rest] = basis @ turn
+        return self.of(np.concatenate([every[chosen], own]), np.hstack([shapes, more]))
 
 
 def _pair(rows: Array) -> Array:
