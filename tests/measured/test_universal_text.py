@@ -190,7 +190,7 @@ def rigid() -> Evaluation:
 def test_shapes_of_a_tyre(tmp_path: Path) -> None:
     """x forward, y along the axle, z up: a pair moves down, then forward; points are inflated."""
     file = read_universal(written(tmp_path, shapes_text(CASE, rigid(), labelled(rigid()), True)))
-    assert len(file.nodes) == 17 * 36 and len(file.lines) == 17 + 36
+    assert len(file.nodes) == 11 * 24 and len(file.lines) == 11 + 24
     assert {node for line in file.lines for node in line} == set(file.nodes)
     lowest = min(file.nodes.values(), key=lambda place: place[2])
     mesh = resolved(CASE).mesh

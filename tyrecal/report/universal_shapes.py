@@ -25,11 +25,8 @@ from .revolve import placed
 
 Array = np.ndarray
 NamedShape = tuple[str, float, float | None, RingShape]  # name, Hz, damping ratio, shape
-POINTS_AROUND, POINTS_PER_WAVE, POINTS_ACROSS = (
-    36,
-    4,
-    17,
-)  # round the tyre, at least; along its skin
+POINTS_AROUND, POINTS_PER_WAVE = 24, 6  # round the tyre, at least
+POINTS_ACROSS = 11  # along the section's outer surface
 MAX_LINE_NODES = 250  # of a data set 82
 LINE_DIGITS = 5  # of the places, m and rad, by which points are on one line
 
