@@ -189,7 +189,9 @@ def rigid() -> Evaluation:
 
 def test_shapes_of_a_tyre(tmp_path: Path) -> None:
     """x forward, y along the axle, z up: a pair moves down, then forward; points are inflated."""
-    file = read_universal(written(tmp_path, shapes_text(CASE, rigid(), labelled(rigid()), True)))
+    text = shapes_text(CASE, rigid(), labelled(rigid()), True)
+    assert "4.00000E+01  1.00000E+00  3.00000E-02" in text
+    file = read_universal(written(tmp_path, text))
     assert len(file.nodes) == 11 * 24 and len(file.lines) == 11 + 24
     assert {node for line in file.lines for node in line} == set(file.nodes)
     lowest = min(file.nodes.values(), key=lambda place: place[2])
@@ -212,7 +214,8 @@ def test_shapes_of_a_solver_in_three_dimensions(tmp_path: Path) -> None:
     forward = np.column_stack([-np.sin(theta), -np.cos(theta), 0 * theta])
     raw = tuple(RawMode(66.0 + k, RingShape(points, u), 1) for k, u in enumerate((down, forward)))
     evaluation = Evaluation(220.0, 9.3, raw)
-    text = shapes_text(CASE, evaluation, labelled(evaluation), False)
+    text = shapes_text(CASE, evaluation, labelled(evaluation), True)
+    assert "6.60000E+01  0.00000E+00" in text  # a modal mass that is not known
     file = read_universal(written(tmp_path, text))
     assert len(file.nodes) == 48 and file.lines[0] == (*range(1, 13), 1) and len(file.lines) == 16
     assert file.nodes[4] == pytest.approx((-0.3, -0.08, 0), abs=1e-12)

@@ -34,11 +34,11 @@ LINE_DIGITS = 5  # of the places, m and rad, by which points are on one line
 def shapes_text(
     case: LoadedCase, evaluation: Evaluation, modes: Sequence[Mode], unit_mass: bool
 ) -> str:
-    """Text of the file; unit_mass: whether the solver's shapes have a modal mass of 1 kg, else they
-    have none. Raises InputError where a shape is not known on the section's nodes."""
+    """Text of the file; unit_mass: whether the solver's harmonic shapes have a modal mass of 1 kg;
+    others have 0, not known. Raises InputError where a shape is not on the section's nodes."""
     first = modes[0].raw.shape
     if isinstance(first, RingShape):
-        shapes, points = _on_solvers_points(evaluation), first.points
+        shapes, points, unit_mass = _on_solvers_points(evaluation), first.points, False
     else:
         shapes, points = _on_surface(case, evaluation, modes)
     numbers = range(1, len(points) + 1)
