@@ -104,7 +104,8 @@ def command(
     """Find where CASE and measurements differ, and which effect explains it.
 
     Writes diagnosis.json, diagnosis.md (one page in words) and pictures. The model is calibrated
-    to the measurements first; targets in the case file are not used.
+    to the measurements first; targets in the case file are not used. With a solver without exact
+    sensitivities the number of runs and their time are printed first; --effect reduces them.
 
     \b
     tyrecal diagnose cases/p235_75r17.yaml --measured cases/p235_75r17_wheeler.csv

@@ -62,8 +62,9 @@ def command(
     intervals. Sigmas and the case's uncertainties are the assumptions.
 
     Writes sample.json, sample.csv (frequencies), sample_draws.csv and a corner picture. An
-    emulator, usually of 60 to 100 evaluations, replaces the model; its error is reported. Needs the
-    package emcee: run pip install '.[sample]' in a clone of tyrecal.
+    emulator, usually of 60 to 100 evaluations, replaces the model; its error is reported. With a
+    solver without exact sensitivities there are several times as many, which is printed first.
+    Needs the package emcee: run pip install '.[sample]' in a clone of tyrecal.
 
     \b
     tyrecal sample cases/p235_75r17.yaml --measured cases/p235_75r17_wheeler.csv

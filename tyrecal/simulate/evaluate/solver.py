@@ -28,6 +28,8 @@ class Solver(Protocol):
     what effects need (`Effect.needs`): ``vibration_modulus``, a modulus in the frequency step other
     than in the static one, and those of `resolve.CAPABILITIES`; ``own_decks``: it runs a user's in
     three dimensions;
+    A solver without ``gradients`` may have ``difference_step``, the step of a logarithm that suits
+    its digits, for sensitivities by differences.
     A solver that starts a program has ``command`` too, a list of its words, which is the user's to
     set (`tyrecal.simulate.settings`), never the case's; the tool makes its program a whole path;
     refusals, failures: exceptions of `write`, `run` and `read` for a deck it cannot honour and
