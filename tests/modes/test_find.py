@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tyrecal.simulate.deck.decks import steps
 from tyrecal.simulate.evaluate.evaluator import Question
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.simulate.modes.find import MORE_MODES, LabelledModes, find_modes
 from tyrecal.simulate.modes.label import Label, labelled
 
 from ..fit.fake import LABELS, FakeEvaluator
-from ..fit.known_truth import POWERS, START, TARGETS
+from ..fit.known_truth import CASE, POWERS, START, TARGETS
 
 
 class FewModes(FakeEvaluator):
@@ -76,6 +77,30 @@ def test_without_exact_sensitivities_they_are_differences(wanted: list[Label]) -
     assert list(zip(*np.where(~known), strict=True)) == ([(0, 8)] if len(wanted) == 1 else [])
     assert other[known] == pytest.approx(own[known], abs=2e-3)  # Hz per logarithm
     assert differing.evaluation.mass_gradients == dict.fromkeys(START, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "wanted"),
+    [
+        ("C10", 1e6, [1.1e6, 0.9e6]),  # a share of the value
+        ("C10", 1e7, [9e6]),  # within the bounds, where it is there itself
+        ("C10", 2e7, [2.2e7, 1.8e7]),
+        ("linear", 2.0, [2.4, 1.6]),  # a share of the bounds' distance
+        ("linear", 0.1, [0.5]),  # of its sign
+        ("narrow", 0.1, [0.1 + 1e-3 / 3]),
+        ("effects.bead_filler", 0.0, [0.3, -0.3]),  # of the range
+        ("rebar_layers.carcass.angle_deg", 0.0, [9.0, -9.0]),  # of a quarter turn
+        ("pressure_kPa", 200.0, [220.0, 180.0]),
+    ],
+)
+def test_steps_of_numbers(name: str, value: float, wanted: list[float]) -> None:
+    variables = {**CASE.case.variables}
+    changes = {"scale": "linear", "lower": -1.0, "upper": 3.0}
+    variables["linear"] = variables["C10"].model_copy(update=changes)
+    changes = {"lower": 0.1, "upper": 0.101}
+    variables["narrow"] = variables["C10"].model_copy(update=changes)
+    case = replace(CASE, case=CASE.case.model_copy(update={"variables": variables}))
+    assert sorted(steps(case, name, value, 0.1)) == pytest.approx(sorted(wanted))
 
 
 def test_what_has_no_neighbour_fails_and_nothing_else() -> None:

@@ -257,15 +257,15 @@ def steps(case: LoadedCase, name: str, value: float, step: float) -> list[float]
 
     The step is a share of the value; of a linear variable or an effect, of its range; of an angle
     of 0, of 90 degrees. A value is left out if its sign differs, or if it lies beyond the bounds of
-    a variable that is within them.
+    a variable that is within them; the step is a third of their distance at most.
     """
     variable, width = case.case.variables.get(name), abs(value) or 1.0
     low, high = -inf, inf
     if variable:
-        linear = variable.scale != "log"
-        width = variable.upper - variable.lower if linear else width
+        span = variable.upper - variable.lower
+        width = width if variable.scale == "log" else span
         if variable.lower <= value <= variable.upper:
-            low, high = variable.lower, variable.upper
+            low, high, width = variable.lower, variable.upper, min(width, span / (3 * step))
     elif name.startswith(EFFECT_PATH):
         effect = catalogue()[name.removeprefix(EFFECT_PATH)]
         width = effect.high - effect.low
