@@ -1,13 +1,15 @@
 """A diagnosis on CalculiX from end to end, against the bundled solver's on the same data.
 
-    python -m tests.studies.diagnose_calculix FOLDER [EFFECT ...]   # goes on where it stopped
+    python -m tests.studies.diagnose_calculix FOLDER                         # goes on
+    python -m tests.studies.diagnose_calculix FOLDER bead_filler [OTHER ...] # with few candidates
     python -m tests.studies.diagnose_calculix table > table.md
 
 The bundled solver makes data of a tyre with an effect, or with none ("sound"), with scatter; both
 solvers diagnose them. FOLDER keeps the evaluations. One line of JSON a diagnosis in RECORD: its
-verdict, probabilities, what was said of runs and time before it began, and what it took. The mesh
-is the case's coarse one, so that CalculiX is 2 % off the tyre that it judges; harmonics up to 2,
-two variables, three constants and three effects keep the runs few.
+verdict, probabilities, the runs and time that it announced, and what it took. The mesh is the
+case's coarse one, so that CalculiX is 2 % off the tyre that it judges; harmonics up to 2, two
+variables, three constants and three effects keep the runs few. With effects named, the first is
+planted, and they alone are candidates.
 """
 
 from __future__ import annotations
@@ -76,7 +78,7 @@ def measured(case: LoadedCase, path: Path, effects: dict[str, float], seed: int)
     return path
 
 
-def run(folder: Path, name: str, solver: str) -> dict[str, object]:
+def run(folder: Path, name: str, solver: str, candidates: list[str]) -> dict[str, object]:
     """One diagnosis, for the record."""
     case = tyre()
     planted = {name: PLANTED[name]} if name in PLANTED else {}
@@ -85,14 +87,13 @@ def run(folder: Path, name: str, solver: str) -> dict[str, object]:
     words, began = list[str](), monotonic()
     stages = lambda stage: print(stage, evaluator.counts, round(monotonic() - began), flush=True)
     say = lambda text: words.append(text) or print(text, flush=True)
-    result = study(case, evaluator, file, effects=list(PLANTED), stage=stages, say=say).diagnosis
-    leading = result.best
+    result = study(case, evaluator, file, effects=candidates, stage=stages, say=say).diagnosis
     return {
         "planted": name,
+        "candidates": candidates,
         "solver": solver,
         "verdict": result.verdict.kind,
         "effect": result.verdict.key,
-        "leading": leading,
         "probabilities": {key: round(p, 4) for key, p in result.probabilities.items()},
         "said": words,
         "seconds": round(monotonic() - began),
@@ -123,10 +124,13 @@ def main() -> None:
         return
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
-    for name in sys.argv[2:] or [*PLANTED, "sound"]:
+    named = sys.argv[2:]
+    for name in named[:1] or [*PLANTED, "sound"]:
         for solver in ("bundled", "calculix"):
-            if (name, solver) not in {(e["planted"], e["solver"]) for e in known()}:
-                entry = run(folder, name, solver)
+            candidates = named or list(PLANTED)
+            done = [(e["planted"], e["candidates"], e["solver"]) for e in known()]
+            if (name, candidates, solver) not in done:
+                entry = run(folder, name, solver, candidates)
                 with RECORD.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(entry) + "\n")
                 print(entry, flush=True)
