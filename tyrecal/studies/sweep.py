@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from math import isfinite, prod
 from typing import Any
@@ -67,6 +67,7 @@ def read_ranges(
         if known.count(name) > 1:
             raise InputError(f"{name} has two ranges: give one")
     numbers_of(case, known)
+    ranges = [replace(each, name=name) for each, name in zip(ranges, known, strict=True)]
     count = prod(each.steps for each in ranges)
     if not sampled and count > MAX_POINTS:
         raise InputError(
