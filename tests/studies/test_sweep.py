@@ -131,6 +131,8 @@ def test_a_number_has_one_range_and_unusual_ends_may_be_allowed() -> None:
         read_ranges(CASE, ["C10=8e5:1.2e6:2", "C10=8e5:1.3e6:2"], False)
     (swept,) = read_ranges(CASE, ["C10=8e5:1e9:2"], False, allow_unusual=True)
     assert grid([swept]) == [{"C10": 8e5}, {"C10": 1e9}]
+    (spaced,) = read_ranges(CASE, ["C10 = 8e5 : 1.2e6"], True)  # names of a deck have blanks, too
+    assert (spaced.name, spaced.high) == ("C10", 1.2e6)
 
 
 @pytest.mark.slow

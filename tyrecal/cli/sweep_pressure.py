@@ -19,6 +19,7 @@ from .parameters import option
 @options.pressures
 @options.fitted(" and the initial one")
 @option("--pictures/--no-pictures", default=True, help="Draw frequencies over pressure.")
+@options.scheduler
 @options.figure_format
 @options.study
 def command(
@@ -29,6 +30,7 @@ def command(
     steps: int,
     fitted: Path | None,
     pictures: bool,
+    scheduler: str,
     study: options.Study,
 ) -> int:
     """Follow every mode of CASE over the inflation pressure, by default from 5/12 to 4/3 times the
@@ -45,12 +47,14 @@ def command(
     tyrecal sweep-pressure cases/p235_75r17.yaml --fitted p235_75r17/fit.json --jobs 2
     tyrecal sweep-pressure cases/p235_75r17.yaml --from-kPa 180 --to-kPa 260 --steps 5 --json
     """
+    from ..simulate.evaluate.cluster import reached
     from ..studies.fit.prediction import read_responses
     from ..studies.fit.targets import read_targets
     from ..studies.pressure_result import FITTED, run
     from ..tyre.state import rim_of
 
     terminal = study.terminal
+    options.not_both(study.jobs, scheduler)
     case, fitted, study = default_case(case, fitted, study)
     loaded, values = study.load(case, assignments)
     pressures = _pressures(loaded, assignments, from_kPa, to_kPa, steps, study.allow_unusual)
@@ -60,7 +64,7 @@ def command(
         designs[FITTED] = arguments.fitted_values(fitted, loaded, terminal)
         fit = read_responses(fitted)
     output = study.run(loaded, "sweep-pressure", evaluator, pressure_kPa=pressures)
-    with terminal.progress("sweep") as bar:
+    with terminal.progress("sweep") as bar, reached(scheduler) as evaluator.scheduler:
         evaluator.on_progress = bar.at
         result = run(loaded, evaluator, designs, pressures, study.jobs, study.notify, fit)
     if not result.rows:

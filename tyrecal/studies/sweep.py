@@ -85,7 +85,7 @@ def read_ranges(
 
 def _read_range(text: str, sampled: bool) -> SweptRange:
     form, example = ("NAME=A:B", "such as C10=8e5:1.2e6") if sampled else ("NAME=A:B:N", EXAMPLE)
-    match = RANGE_TEXT.fullmatch(text.replace(" ", ""))
+    match = RANGE_TEXT.fullmatch(text)
     if not match or (match[4] is None) != sampled:
         with_samples = " with a Latin hypercube" if sampled else ""
         raise InputError(f"'{text}' is no range{with_samples}: must be {form}, {example}")
@@ -95,7 +95,7 @@ def _read_range(text: str, sampled: bool) -> SweptRange:
         raise InputError(f"'{text}': must be {form} with numbers, {example}") from None
     if not (isfinite(low) and isfinite(high) and low < high and steps > 1):
         raise InputError(f"'{text}': A must be less than B, and N at least 2, {example}")
-    return SweptRange(match[1], low, high, steps)
+    return SweptRange(match[1].strip(), low, high, steps)
 
 
 def _about_variables(case: LoadedCase) -> list[SweptRange]:
