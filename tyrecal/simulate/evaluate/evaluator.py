@@ -171,8 +171,8 @@ class Evaluator:
     ) -> Pressed:
         """One design on the road at rising loads, as far as the solver gets, with so many ``modes``
         at each; gradients: names of variables whose slopes are wanted (`Footprint.slopes`); base:
-        values of the design whose state on the road begins the first load (None: the inflated
-        tyre); rim_stiffness: that of the rim is wanted at each load, too.
+        values of the design whose state on the road begins the first load (None: this design on
+        its coarser mesh); rim_stiffness: that of the rim is wanted at each load, too.
 
         Raises what `evaluate` does; DeckRefused too where the solver has no road.
         """
