@@ -41,7 +41,8 @@ def run_batch(
     scheduler: str = "",
     notify: Callable[[Report], None] = lambda report: None,
 ) -> list[Report]:
-    """Reports in the order of the tasks; ``notify`` gets each as it comes.
+    """Reports in the order of the tasks; ``notify`` gets each as it comes. scheduler: address of a
+    Dask scheduler; without one, ``jobs`` processes of this machine work.
 
     Raises SolverUnavailable. Interrupted, it leaves whatever has finished on record.
     """

@@ -9,7 +9,9 @@ from typing import Any
 from ..files import Json
 from .case import Report
 
-VERDICTS = ("error", "failed", "drifted", "good")  # the worst first
+# the worst first. error: a study gave no result; failed: it has one that is no good, as a fit that
+# did not converge; drifted: a quantity is off the baseline
+VERDICTS = ("error", "failed", "drifted", "good")
 
 
 def summary(

@@ -100,7 +100,7 @@ class Line:
 
     def _quantities(self) -> list[str]:
         """Quantities that the line states: the one named, or each that has a column. Raises
-        ValueError."""
+        InputError."""
         if not self.cell("value"):
             if quantities := [quantity for quantity in QUANTITIES if self.cell(quantity)]:
                 return quantities

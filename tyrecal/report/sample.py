@@ -26,7 +26,7 @@ def draw_corner(result: SampleResult) -> Figure:
     """Corner picture: on the diagonal the shares of the draws with median, 90 % and, dashed, the
     linear standard errors; below it each pair, darker where more draws lie."""
     names, n = list(result.variables), len(result.variables)
-    figure = new_figure(1.2 + 2.4 * n, 1.0 + 2.2 * n)
+    figure = new_figure(1.2 + 2.4 * n, 1.0 + 2.2 * n)  # inches
     grid = figure.subplots(n, n, squeeze=False)
     pairs = {(pair.a, pair.b): pair.counts for pair in result.pairs}
     for i, row in enumerate(names):

@@ -68,6 +68,7 @@ class Plain:
         self.states = [{**values, pressure: p} for p in pressures_kPa]
         designs = [(state, self.names) for state in self.states]
         evaluations = []
+        # no label is wanted: one that is not among the first modes at a pressure is left out
         for each in modes_in_order(evaluator, designs, [], jobs):
             if not isinstance(each, LabelledModes):
                 raise each
@@ -173,4 +174,5 @@ def rms(percent: Array) -> float:
 
 
 def _modes(evaluation: Evaluation) -> dict[Label, Mode]:
+    """Modes by label, one for each pair."""
     return {mode.label: mode for mode in paired_labels(evaluation.modes)}

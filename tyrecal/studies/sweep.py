@@ -28,7 +28,7 @@ from .variable import read_variables
 
 MAX_POINTS = 100_000
 DEFAULT_REACH = 0.1  # of a variable's value, to either side, where no range is given
-DEFAULT_POINTS = 10  # for each variable, where no range is given
+DEFAULT_POINTS = 10  # of a Latin hypercube, for each range, where their number is not given
 RANGE_TEXT = re.compile(r"([^=]+)=([^:=]+):([^:=]+)(?::([^:=]+))?")
 EXAMPLE = "such as C10=8e5:1.2e6:5"
 
@@ -66,7 +66,7 @@ def read_ranges(
     for name in known:
         if known.count(name) > 1:
             raise InputError(f"{name} has two ranges: give one")
-    numbers_of(case, known)
+    numbers_of(case, known)  # refuses a name that is none, or a number that a variable sets
     ranges = [replace(each, name=name) for each, name in zip(ranges, known, strict=True)]
     count = prod(each.steps for each in ranges)
     if not sampled and count > MAX_POINTS:

@@ -101,7 +101,7 @@ def overridden(loaded: LoadedCase, values: Mapping[str, Setting]) -> LoadedCase:
     """The case with the values that its user gives for one run, listed in ``overrides``.
 
     The value of a variable is its start (`start_values`). Targets keep the states in which they
-    were measured. Raises what `with_values` does, and ValueError for the path of a number that a
+    were measured. Raises what `with_values` does, and InputError for the path of a number that a
     variable sets.
     """
     values = {as_known(name, loaded.deck_numbers): value for name, value in values.items()}

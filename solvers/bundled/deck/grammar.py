@@ -8,7 +8,8 @@ from ...language.text import Block, DeckError
 
 
 def check(keywords: list[Block], revolve: bool) -> tuple[list[Block], list[list[Block]]]:
-    """Split a job into its model and its steps, refusing what is not honoured.
+    """Split a job into its model and its steps, refusing what is not honoured. revolve: the job
+    revolves a section job, else it is one.
 
     Raises DeckError naming the keyword or parameter and its line.
     """

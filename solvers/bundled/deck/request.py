@@ -35,8 +35,9 @@ class Request:
     # job, of the same mesh
     sector: dict[str, Any] | None = None
     # {"lowest_Hz", "highest_Hz", "lines", "patch_m", "excite", "respond"} of responses to a force
-    # on a patch of the tread: points are lists [angle in degrees, direction]; with "modes": N also
-    # matrices of the rim's motions and N coordinates of modes
+    # on a square patch of the tread, patch_m wide, at "lines" frequencies of equal steps: points
+    # are lists [Theta in degrees, direction]; with "modes": N also matrices of the rim's motions
+    # and N coordinates of modes
     response: dict[str, Any] | None = None
 
 
@@ -76,7 +77,8 @@ def _request(content: Any, folder: Path, jobs: Sequence[str]) -> Request:
 
 
 def read_sector(folder: Path, sector: dict[str, Any]) -> list[Block]:
-    """The model blocks of the sector's section job. Raises DeckError, OSError."""
+    """The model blocks of the sector's section job, which by `grammar.check` may have only what is
+    honoured in a section. Raises DeckError, OSError."""
     job = sector["job"]
     text = read_deck(folder / f"{job}.inp")
     return grammar.check(read_keywords(text, job), revolve=False)[0]

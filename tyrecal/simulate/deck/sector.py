@@ -59,7 +59,8 @@ class Division:
 
     elements: tuple[int, ...]  # along each region
     rows: tuple[int, ...]  # between neighbouring lines
-    grading: tuple[float, ...] | None  # as in `build_mesh`
+    # thickness of a row over that of the row inside it, between neighbouring lines; None: 1
+    grading: tuple[float, ...] | None
 
 
 @lru_cache(maxsize=4)
@@ -81,7 +82,10 @@ def build_sector(
     thin = [1] * len(rows[1:])
     counts = interleaved(list(rows), thin)
     grades = interleaved(list(division.grading or (1.0,) * len(rows)), [1.0] * len(thin))
-    mesh = build_mesh(split, list(division.elements), counts, False, grades, whole_bead)
+    # elements of 4 nodes: `_extruded` adds midside nodes, straight ones, if quadratic
+    mesh = build_mesh(
+        split, list(division.elements), counts, False, grading=grades, whole_bead=whole_bead
+    )
     plies = np.cumsum(counts)[0:-1:2]  # the thin row over each line
     row_of = {}
     for number, (_, row) in mesh.cells.items():

@@ -151,7 +151,8 @@ def _tell_to_end(worker: BaseProcess) -> None:
 
 
 def _work(function: Callable[..., Any], *task: Any) -> Any:
-    """A task in a worker, which, told to end, ends when the task has cleared what it had begun."""
+    """A task in a worker. SIGTERM raises KeyboardInterrupt in the task, which clears up what it
+    had begun; then the worker ends, even if the task turned it into another error."""
     with remember_interrupts():
         try:
             return function(*task)

@@ -118,7 +118,7 @@ def fields(case: LoadedCase) -> dict[str, SectionField]:
 
 
 def sizes(case: LoadedCase) -> tuple[float, ...]:
-    """Standard deviations, of the section's own size. Raises ValueError without a carcass."""
+    """Standard deviations, of the section's own size. Raises InputError without a carcass."""
     known = known_from(case)
     meridian, filler, *others = SECTION_SIZES[known]
     carcass = case.section.points[case.section.names.index(carcass_line(case))]
@@ -149,7 +149,7 @@ def words(case: LoadedCase) -> str:
 
 def filler_tip(case: LoadedCase) -> int | None:
     """Station at which the bead filler ends, a rubber of its own between the carcass and its
-    turn-up; None where there is none. Raises ValueError without a carcass."""
+    turn-up; None where there is none. Raises InputError without a carcass."""
     line = (turned_up(case) or ("",))[0]
     for solid in case.case.solids:
         if solid.between == [carcass_line(case), line] and solid.regions:
@@ -189,7 +189,7 @@ def higher_hold(case: LoadedCase) -> Array:
 
 
 def arc_length(case: LoadedCase) -> Array:
-    """s (stations,) of the carcass, 1 where the rim begins. Raises ValueError without a carcass."""
+    """s (stations,) of the carcass, 1 where the rim begins. Raises InputError without a carcass."""
     line = case.section.points[case.section.names.index(carcass_line(case))]
     length = length_along(line)
     return length / length[rim_edge(case.section)]

@@ -20,7 +20,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 def to_the_edge(case: LoadedCase, value: float) -> LoadedCase:
     """The same on the widest belt's line, so that it holds the edges of all belts. Raises
-    ValueError where none is wider than the outer one."""
+    InputError where none is wider than the outer one."""
     lines = belt_lines(case)
     length = dict(zip(case.section.names, present(case.section).sum(1), strict=True))
     widest = max(lines, key=lambda line: int(length[line]))

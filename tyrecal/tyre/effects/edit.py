@@ -76,7 +76,8 @@ def with_rubbers_at(
 def with_gauge(
     loaded: LoadedCase, between: tuple[str, str], regions: list[str], factor: float
 ) -> LoadedCase:
-    """The case with one more factor on the thickness between two lines."""
+    """The case with one more factor on the thickness between two lines, inner and outer, of some
+    regions. The drawn section stays: the factor acts on it when the case is resolved."""
     section = loaded.case.section
     gauge = Gauge(between=list(between), regions=regions, factor=factor)
     return changed(loaded, section=with_part(section, gauges=[*(section.gauges or []), gauge]))

@@ -59,7 +59,7 @@ def belt_lines(case: LoadedCase) -> list[str]:
 
 def belts(case: LoadedCase) -> list[str]:
     """Names of the cord layers on the belts' lines at the crown, from inside to outside. Raises
-    ValueError.
+    InputError.
 
     Left out are layers round the tyre (90 degrees), such as cap plies, and turn-ups, which are on
     the same line but not at the crown.
@@ -132,7 +132,7 @@ def sidewall(case: LoadedCase) -> list[str]:
 
 def lower_sidewall(case: LoadedCase) -> list[str]:
     """Names of the regions of the sidewall below the widest point of the carcass. Raises
-    ValueError."""
+    InputError."""
     line = case.section.points[case.section.names.index(carcass_line(case))]
     widest = int(np.argmax(line[:, 1]))
     middle = {name: (first + last) / 2 for name, first, last in _regions(case.section)}

@@ -35,6 +35,8 @@ def at_shoulders(case: LoadedCase, value: float) -> LoadedCase:
     """The same wear on average, distributed by a parabola: 1.4 times at the tread's edges and 0.8
     in its middle."""
     section, worn = case.section, add(case, value)
+    # the drawn section is not worn: its gauge factor 1 - value acts on it afterwards, so that
+    # (1 - value) times ``left`` is 1 - value (1 + UNEVEN across)
     last = max(stations(section, name)[1] for name in crown(case))
     inner = section.names.index(tread(case)[0])
     base = fill_lines(section)[inner, : last + 1]
@@ -66,7 +68,7 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add_to_deck,
     part="tread",
-    # heel and toe, blocks; the profile across is integrated over
+    # not in it: heel and toe, blocks; the profile across is `shape_uncertainty`
     response_error=0.06,
     shape_uncertainty=at_shoulders,
 )

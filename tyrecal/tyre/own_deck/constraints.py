@@ -38,11 +38,12 @@ class RigidBody:
 
 
 class Constraints:
-    """Constraints of a deck.
+    """Constraints of a deck, in its own unit of length.
 
     rim: nodes that it holds; reference: its node; same: node to the node that it is one with;
-    guests: embedded nodes where the rubber has none; bodies: rigid ones; motions: of reference
-    nodes of those that only touch, by degree of freedom. Raises OwnDeckError.
+    guests: embedded nodes where the rubber has none; bodies: rigid ones; motions: displacements of
+    reference nodes of those that only touch, by degree of freedom, 1: r, 2: z; near: distance up to
+    which nodes are in one place. Raises OwnDeckError.
     """
 
     def __init__(self, made: Assembly, deck: ClassifiedDeck):

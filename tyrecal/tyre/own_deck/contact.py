@@ -2,6 +2,7 @@
 
 No contact of the section is computed. Where the bead is held, its contact with a rim is left out;
 else the deck is refused with the lines that hold the bead where the rim is after its last motion.
+A bead is held if at least half of its nodes at the rim are. Lengths are in the deck's own unit.
 """
 
 from __future__ import annotations
@@ -98,11 +99,11 @@ class DeckContact:
         """A pair, the rigid surface where it is at the end of the step that inflates."""
         body = next(body for body in self.tied.bodies if master in body.surfaces)
         pieces = rigid_pieces(self.made, *self.made.surfaces[master])
-        motion = self.tied.motions.get(body.reference, {})
+        motion = self.tied.motions.get(body.reference, {})  # 1: in r, 2: in z
         moved = pieces + np.array([motion.get(1, 0.0), motion.get(2, 0.0)])
         if not (len(moved) and np.abs(moved).max() < FARTHEST):
             raise block.refused(f"{master} has no length, or is where no tyre is", row)
-        own = tuple(dict.fromkeys(self.tied.same.get(n, n) for n in nodes))
+        own = tuple(dict.fromkeys(self.tied.same.get(n, n) for n in nodes))  # one of each place
         if len(own) * len(moved) > MAX_DISTANCES:
             raise block.refused(f"{slave} and {master} have too many nodes and segments", row)
         return Pair(block, row, f"{slave} and {master}", own, moved, body.reference)
@@ -110,11 +111,12 @@ class DeckContact:
     def _touching(self, pair: Pair) -> tuple[Array, Array]:
         """Nodes that lie on the rigid surface or beyond it, and how far from it they are."""
         X = np.array([self.root.nodes[n] for n in pair.nodes])
-        away, normal = nearest(X, pair.pieces[:, ::-1])
+        away, normal = nearest(X, pair.pieces[:, ::-1])  # reversed: normals point to the tyre
         points, count = np.unique(pair.pieces.reshape(-1, 2), axis=0, return_counts=True)
         ends = points[count == 1]
         to_end = np.hypot(*(X[:, None] - ends).T).min(0, initial=np.inf)
         past_an_end = to_end <= away * (1 + 1e-9)
+        # a step towards the tyre brings a node nearer to the surface only from beyond it
         further, _ = nearest(X + 1e-6 * self.size * normal, pair.pieces)
         beyond = (further < away) & ~past_an_end & (away < PUSHED * self.size)
         touching = (away <= TOUCHING * self.size) | beyond

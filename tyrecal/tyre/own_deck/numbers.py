@@ -266,7 +266,8 @@ def replaced(block: Block, changes: Mapping[tuple[int, int], float]) -> Block:
 
 
 def as_known(path: Any, known: Iterable[str]) -> Any:
-    """A path of the deck as it is known; any other, or what is none, as it stands."""
+    """A path in a user's deck as ``known`` spells it: case, blanks and the prefix deck.numbers.
+    do not matter; anything else, such as a variable's name, unchanged."""
     if not isinstance(path, str) or "/" not in path:
         return path
     return canonical(path.removeprefix("deck.numbers."), known) or path

@@ -10,7 +10,7 @@ import numpy as np
 
 from .text import Block, Row, is_label, language
 
-Point = tuple[float, float]
+Point = tuple[float, float]  # r, z in the deck's unit of length
 Members = Callable[[], list[int]]
 Content = TypeVar("Content")
 CORNERS_OF = {3: 3, 4: 4, 6: 3, 8: 4}  # of solids by their number of nodes
@@ -178,8 +178,9 @@ def along_arc(a: np.ndarray, b: np.ndarray, centre: np.ndarray, share: float) ->
 
 
 def nearest(X: np.ndarray, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Distance (n,) of points to the nearest piece, and outward normal (n, 2) there: of an end that
-    pieces share, their normals' mean."""
+    """Distance (n,) of points X (n, 2) to the nearest piece (k, 2, 2), from start to end, and unit
+    normal (n, 2) there, to the right of the piece; of an end that pieces share, their normals'
+    mean."""
     start, along = pieces[:, 0], pieces[:, 1] - pieces[:, 0]
     share = ((X[:, None] - start) * along).sum(-1) / (along**2).sum(-1)
     foot = start + np.clip(share, 0, 1)[..., None] * along

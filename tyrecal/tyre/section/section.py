@@ -145,7 +145,7 @@ def from_gauges(line: Array, gauges: Array) -> Array:
 
 @lru_cache(maxsize=32)
 def fill_lines(section: Section) -> Array:
-    """Lines (line, station, 2) made whole for a mesh; read-only, since they are kept.
+    """Lines (line, station, 2), r and z in m, without NaN, for a mesh; read-only: they are kept.
 
     Where a line is absent it keeps the fraction of the thickness, between the nearest lines
     that exist, of the station where it ends, so that element rows run on without a step. Between

@@ -85,7 +85,8 @@ class Hyperelastic(EnergyLaw):
         return not any(np.any(getattr(self, name)) for name in self.bulk_moduli)
 
     def nearly_incompressible(self) -> Self:
-        """The law with the bulk modulus 2 / D1 that stands for none."""
+        """A law without U (`incompressible`) with the bulk modulus 2 / D1 of `INCOMPRESSIBLE`:
+        the equations need a finite one, in hybrid elements and across a membrane."""
         own: dict[str, Any] = {self.bulk_moduli[0]: INCOMPRESSIBLE / 2 * self.shear_modulus}
         return replace(self, **own)
 

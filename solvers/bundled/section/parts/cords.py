@@ -153,8 +153,10 @@ def stretch(q: Array) -> Array:
 
 
 def cord_rows(lines: Lines, cos: Array | float, sin: Array | float) -> Rows:
-    """q = a + B0 u + B1 du/dTheta of cords at an angle from the meridian, given by its ``cos`` and
-    ``sin``, per element (e,) or one for all. Along the cord, d/ds and sin/R d/dTheta add up."""
+    """Rows q = a + B0 u + B1 du/dTheta: the vector along a deformed cord, per unit of its length.
+
+    cos, sin: of the cord's angle from the meridian, per element (e,) or one for all. Along the
+    cord, cos d/ds along the meridian and sin/R d/dTheta add up."""
     cos, sin = (np.broadcast_to(np.asarray(x).reshape(-1, 1), lines.R.shape) for x in (cos, sin))
     direction = np.stack([cos * lines.tangent[..., 0], sin, cos * lines.tangent[..., 1]], -1)
     along = cos[..., None] * lines.slope
@@ -162,7 +164,7 @@ def cord_rows(lines: Lines, cos: Array | float, sin: Array | float) -> Rows:
     B0 = on_diagonals(along.astype(np.result_type(along, hoop)))
     B0[:, :, 0, 1::3] = -hoop
     B0[:, :, 1, 0::3] = hoop
-    return Rows(B0, hoop, slice(0, 3), direction, lines.weights * lines.R)
+    return Rows(B0, hoop, around=slice(0, 3), rest=direction, weights=lines.weights * lines.R)
 
 
 def read(job: SectionJob) -> list[TyrePart]:
@@ -227,11 +229,11 @@ def _cords(layers: list[_Layer]) -> Cords:
     """All layers as one part: what is added up once is added up in one order."""
     join = lambda pick: np.concatenate([pick(layer) for layer in layers])
     rows = Rows(
-        join(lambda layer: layer.rows.B0),
-        join(lambda layer: layer.rows.hoop),
-        layers[0].rows.around,
-        join(lambda layer: layer.rows.rest),
-        join(lambda layer: layer.rows.weights),
+        B0=join(lambda layer: layer.rows.B0),
+        hoop=join(lambda layer: layer.rows.hoop),
+        around=layers[0].rows.around,
+        rest=join(lambda layer: layer.rows.rest),
+        weights=join(lambda layer: layer.rows.weights),
     )
     one_N = layers[0].lines.N.ndim == 2  # shape functions (g, a) of all elements
     per_radian = join(lambda layer: layer.mass * layer.lines.R * layer.lines.weights)

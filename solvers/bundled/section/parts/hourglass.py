@@ -44,5 +44,7 @@ def control(solids: Solids, stiffness: Array) -> Elastic:
     assert solids.hourglass is not None
     gamma = solids.hourglass[:, None]
     ones = np.ones(gamma.shape[:2])
-    rows = Rows(on_diagonals(gamma), 0 * gamma.real, slice(0, 3), np.zeros(3), ones)
+    rows = Rows(
+        on_diagonals(gamma), 0 * gamma.real, around=slice(0, 3), rest=np.zeros(3), weights=ones
+    )
     return Elastic(solids.connectivity, rows, Hourglass(stiffness))

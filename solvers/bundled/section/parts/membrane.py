@@ -74,14 +74,14 @@ def _part(job: SectionJob, kind: str, sections: list[tuple[np.ndarray, list]]) -
     if np.any(shear != 1) or np.any(bulk != 1):
         ratios = {"shear_ratio": np.repeat(shear, points), "bulk_ratio": np.repeat(bulk, points)}
         law = type(law)(**{**vars(law), **ratios})
-    along, around = cord_rows(lines, 1.0, 0.0), cord_rows(lines, 0.0, 1.0)
-    volume = thickness[:, None] * along.weights
+    along, around = cord_rows(lines, cos=1.0, sin=0.0), cord_rows(lines, cos=0.0, sin=1.0)
+    volume = thickness[:, None] * along.weights  # m3 per radian
     rows = Rows(
-        np.concatenate([along.B0, around.B0], 2),
-        around.hoop,
-        slice(3, 6),
-        np.concatenate([along.rest, around.rest], 2),
-        volume,
+        B0=np.concatenate([along.B0, around.B0], 2),
+        hoop=around.hoop,
+        around=slice(3, 6),  # du/dTheta changes the column around alone
+        rest=np.concatenate([along.rest, around.rest], 2),
+        weights=volume,
     )
     mass = consistent_mass(lines.N, density[:, None] * volume)
     return Elastic(lines.connectivity, rows, PlaneStress(law), mass)

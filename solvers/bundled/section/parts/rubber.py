@@ -128,7 +128,13 @@ def _of_one_law(
         compound=point(compound.real.astype(int)) if job.lossy else None,
     )
     # z = F row by row; du/dTheta changes the rows 1, 4, 7: F_rTheta, F_thetaTheta, F_zTheta
-    rows = Rows(solids.B0, solids.hoop, slice(1, None, 3), np.eye(3).ravel(), solids.weights)
+    rows = Rows(
+        solids.B0,
+        solids.hoop,
+        around=slice(1, None, 3),  # F row by row: its column along the circumference
+        rest=np.eye(3).ravel(),
+        weights=solids.weights,
+    )
     mass = consistent_mass(solids.mass_N, density[:, None] * solids.mass_weights)
     rubber = Elastic(solids.connectivity, rows, law, mass)
     if solids.projection is not None:

@@ -58,7 +58,7 @@ class Stations(TyreKind):
         return _sha256(section)
 
     def mesh(self, tyre: Any) -> SectionMesh:
-        """The mesh at the case's level, its gauges applied. Raises ValueError where it folds."""
+        """The mesh at the case's level, its gauges applied. Raises SectionError where it folds."""
         return mesh_at_level(tyre.case, tyre.gauged)
 
     def section_origin(self, case: Case) -> SectionOrigin | None:
@@ -139,7 +139,7 @@ def with_gauges_of(case: Case, section: Section) -> Section:
 
 
 def mesh_at_level(case: Case, gauged: Section) -> SectionMesh:
-    """The mesh of a gauged section at the case's level. Raises ValueError where it folds over."""
+    """The mesh of a gauged section at the case's level. Raises SectionError where it folds."""
     from ...section.mesh import kept_mesh
 
     level = case.mesh.levels[case.mesh.level]
