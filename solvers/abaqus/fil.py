@@ -24,13 +24,13 @@ SIM = (
 
 @dataclass(frozen=True)
 class ResultModes:
-    """Modes of a results file, in global x, y, z."""
+    """Modes of a results file, in global x, y, z and in the units of the decks."""
 
     eigenvalues: Array  # (m,): omega^2 in 1/s2
-    masses: Array  # (m,): generalised, kg
-    nodes: Array  # (k,)
-    coordinates: Array  # (k, 3): m, undeformed
-    displacement: Array  # (m, k, 3)
+    masses: Array  # (m,): generalised, of the shapes in `displacement`
+    nodes: Array  # (k,): numbers
+    coordinates: Array  # (k, 3): undeformed, of *NODE; else COORD
+    displacement: Array  # (m, k, 3): any scale
 
 
 def read_fil(path: Path) -> ResultModes:

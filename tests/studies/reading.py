@@ -32,6 +32,14 @@ it read no pages of `solvers/bundled/road` and `solvers/language`:
 | 20261309 | 2 | 0 | 0 | 1 | 0 | 2 |
 | 20261310 | 0 | 0 | 1 | 1 | 0 | 1 |
 | 20261311 to 26, at most | 1 | 0 | 1 | 1 | 0 | 2 |
+
+By another one, who counted also what is needed to change a page safely, and who had seen two files
+of the second lot:
+
+| seed | tyre | simulate | measured | studies | report, batch, cli | solvers |
+|---|---|---|---|---|---|---|
+| 20261501 | 9 | 3 | 1 | 5 | 3 | 5 |
+| 20261502 | 1 | 0 | 1 | 3 | 1 | 5 |
 """
 
 from __future__ import annotations

@@ -25,7 +25,8 @@ Vector = tuple[float, float, float]
 
 
 class ShapeOfMode(BaseModel):
-    """A measured mode: its label, None if it has none, and a value for each signal."""
+    """A measured mode: its label, None if it has none, and a real value for each signal, the
+    largest 1."""
 
     model_config = ConfigDict(allow_inf_nan=False, frozen=True)
 

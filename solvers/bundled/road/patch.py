@@ -25,7 +25,7 @@ class HalfPatch:
     whole patch."""
 
     area: Array  # (k, n): of the deformed tread, m2
-    force: Array  # (k, n, 3): down, along, across, N
+    force: Array  # (k, n, 3): on the road, down, along, across, N
     length: float  # m
     width: float  # m
 
@@ -38,6 +38,7 @@ def patch(contact: Contact, X: Array, rings: Array) -> HalfPatch:
     local = np.concatenate([contact.normal[..., None], contact.traction], -1)
     before = np.searchsorted(rings, points.angle, "right") - 1
     beyond = (points.angle - rings[before]) / (rings[before + 1] - rings[before])
+    # the lines lie at Gauss points of the line elements
     across = _hats(gauss(len(tread.M), 1)[0], tread.nodes.shape[1])[:, None]  # (j, 1, a)
     nodes = tread.nodes[points.e][:, None, None]
     area, force = np.zeros((len(rings), len(X))), np.zeros((len(rings), len(X), 3))

@@ -46,6 +46,7 @@ class Guest:
     def weights(self, X: Array) -> Array:
         """Weights of the nodes in `rows`; X (n, 2) of all nodes, with tangents or without."""
         xi = self.xi
+        # Newton's steps: xi is real and nearly exact; the second one rids its tangent of that error
         for _ in range(2 if np.iscomplexobj(X) or np.iscomplexobj(self.X) else 0):
             xi = xi + mapping_step(self.kind, X[self.nodes][None], self.X[None], xi[None])[0]
         N: Array = self.kind.at(xi[None])[0][0][self.kept]

@@ -34,6 +34,7 @@ def summary(result: Result) -> list[str]:
 def fit_words(fit: FitResult) -> list[str]:
     """How the fit went, how near it came, where the variables went."""
     unit = fit.objective_unit if fit.objective_unit == "Hz" else "(deviations in sigmas)"
+    # of the paper: cases/paper.md
     equation = "equation (1), " if fit.objective_unit == "Hz" else ""
     moves = ", ".join(
         f"{name} from {v.initial:.4g} to {v.value:.4g}"

@@ -2,7 +2,8 @@
 
 Each is bounded by three of its standard deviations. What is known of it stays a value like those
 that were measured, so that the fit weighs both: q = 1 + 0.01 (x - x0) / s, known to be 1 with a
-standard deviation of 0.01.
+standard deviation of 0.01. Its residual is (x - x0) / s, the number's shift from what is known, x0,
+over the standard deviation s of that; 1 and 0.01 make it a target above 0 in any unit.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ def with_freed(case: LoadedCase, names: Sequence[str]) -> LoadedCase:
     """The case with uncertain numbers, by the name of their uncertainty or by path, as further
     variables. Raises InputError."""
     variables: Json = dict(case.case.variables)
+    # uncertain fields of the section set no number
     known = [source for source in sources(case)[0] if not source.field]
     for name in dict.fromkeys(names):
         source = _uncertainty(case, name, known)

@@ -216,6 +216,7 @@ class InverseProblem:
 
     @cached_property
     def _alike(self) -> Array:
+        """Correlation (n, n) of errors of one mode at several states; 0 between modes."""
         return alike(self.observations.rows)
 
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ...section.section import Section
     from ..document import Document
 
+# by default: the bundled solver computes section decks, ABAQUS those in three dimensions
 TIME_LIMITS_S = {"bundled": 300.0, "abaqus": 3600.0}
 
 
