@@ -94,12 +94,9 @@ class Constraints:
         if elements := block.get("ELSET"):
             members = self.root.elements.members(prefix + elements, block)
             nodes |= dict.fromkeys(n for each in members for n in self.root.elements[each].nodes)
-            surfaces += [
-                each
-                for each, surface in self.made.surfaces.items()
-                if is_rigid(self.made, *surface)
-                and nodes.keys() >= rigid_nodes(self.made, *surface)
-            ]
+            for each, place in self.made.surfaces.items():
+                if is_rigid(self.made, *place) and nodes.keys() >= rigid_nodes(self.made, *place):
+                    surfaces.append(each)
         if profile := block.get("ANALYTICAL SURFACE"):
             surface, _ = self.made.surfaces.get(prefix + profile, (block, ""))
             if surface.get("TYPE") != "SEGMENTS":
@@ -119,9 +116,8 @@ class Constraints:
                 self._seat(slaves, surface, block, row)
                 self.seats.add(name)
                 continue
-            for n, distance in self._merge(
-                slaves, surface_nodes(self.made, name, block, row)
-            ).items():
+            masters = surface_nodes(self.made, name, block, row)
+            for n, distance in self._merge(slaves, masters).items():
                 raise block.refused(
                     f"node {n} is {distance:.3g} from the nearest node that it could be tied to:"
                     " only nodes in the same place are, mesh both alike",

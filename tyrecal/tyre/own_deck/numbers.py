@@ -48,17 +48,14 @@ def paths(blocks: Sequence[Block]) -> dict[str, tuple[int, int, int]]:
                 continue
             if block.name == "REBAR LAYER":
                 own = row.name(0)
-                path = f"rebar {own} / {name}"
-                path = section + path if layers.count(own) > 1 else path
+                path = f"{section * (layers.count(own) > 1)}rebar {own} / {name}"
             elif block.name == "REBAR":
-                own, many = block.get("NAME"), rebars.count(block.get("NAME")) > 1
-                path = f"rebar {own} {row.name(0)} / {name}" if many else f"rebar {own} / {name}"
+                own = block.get("NAME")
+                own += f" {row.name(0)}" * (rebars.count(own) > 1)
+                path = f"rebar {own} / {name}"
             else:
-                line = (
-                    f"row {i + 1} / "
-                    if len(block.rows) > 1 and block.name != "HYPERELASTIC"
-                    else ""
-                )
+                is_table = len(block.rows) > 1 and block.name != "HYPERELASTIC"
+                line = f"row {i + 1} / " if is_table else ""
                 path = f"{material} / {block.name} / {line}{name}"
             if path not in places:
                 places[path] = place, i, j
@@ -106,10 +103,9 @@ def assigned(row: Row) -> tuple[str, str]:
 def plain_number(text: str) -> bool:
     """Whether a field is a finite number as it stands."""
     try:
-        value = number_from(text)
+        return math.isfinite(number_from(text))
     except ValueError:
         return False
-    return math.isfinite(value)
 
 
 def marks(blocks: Sequence[Block]) -> dict[str, Block]:

@@ -20,10 +20,8 @@ from .text import Block, OwnDeckError, Place, number_from, read_blocks, table
 Units = Literal["m", "mm"]
 UNIT_LENGTH = {"m": 1.0, "mm": 1e-3}  # of a unit of length, m
 UNIT_MASS = {"m": 1.0, "mm": 1e3}  # of a unit of mass, kg: mm, t, s, MPa
-DENSITIES: dict[Units, tuple[float, float]] = {
-    "m": (300.0, 2e4),
-    "mm": (3e-10, 2e-8),
-}  # of tyres' materials
+# of tyres' materials
+DENSITIES: dict[Units, tuple[float, float]] = {"m": (300.0, 2e4), "mm": (3e-10, 2e-8)}
 TOPOLOGY = {"PART", "ASSEMBLY", "SYMMETRIC MODEL GENERATION", "BOUNDARY", "DSLOAD", "DLOAD"}
 TOPOLOGY |= {
     name for name, rule in table.RULES.items() if rule.is_judged and "part" in rule.level.split()
@@ -60,24 +58,19 @@ class OwnDeck:
     @cached_property
     def numbers(self) -> dict[str, float]:
         """Plain numbers of the deck by path, as the text has them."""
-        values = {}
-        for path, (place, i, j) in self.places.items():
-            row = self.blocks[place].rows[i]
-            text = numbers_of.assigned(row)[1] if j < 0 else row.text(j)
-            values[path] = number_from(text)
-        return values
+        rows = {path: (self.blocks[k].rows[i], j) for path, (k, i, j) in self.places.items()}
+        return {
+            path: number_from(numbers_of.assigned(row)[1] if j < 0 else row.text(j))
+            for path, (row, j) in rows.items()
+        }
 
     @cached_property
     def idle(self) -> dict[str, str]:
         """Paths of parameters that are no numbers of a case whose deck this is, and why."""
-        acting = numbers_of.acting_parameters(self.blocks)
-        why = "sets only the pressure, or nothing: use pressure_kPa"
-        names = {path: path.removeprefix("parameter / ").upper() for path in self.numbers}
-        return {
-            path: why
-            for path, name in names.items()
-            if path.startswith("parameter / ") and name not in acting
-        }
+        acting = {f"PARAMETER / {name}" for name in numbers_of.acting_parameters(self.blocks)}
+        given = [path for path in self.numbers if path.startswith("parameter / ")]
+        idle = [path for path in given if path.upper() not in acting]
+        return dict.fromkeys(idle, "sets only the pressure, or nothing: use pressure_kPa")
 
     @cached_property
     def section_numbers(self) -> dict[str, float]:

@@ -19,7 +19,7 @@ from .text import Block, OwnDeckError, Place, Row, named
 JOB_FILE = re.compile(r"[A-Za-z0-9_\-]{1,60}\.inp", re.IGNORECASE)  # a file that names a job
 PRESSURE_MARK = "pressure"  # filled with the case's pressure
 MARK_IT = f"write {{{{ {PRESSURE_MARK} }}}} in its place"
-PRESSURE_DOF = 8  # of a fluid cavity's reference node
+PRESSURE_DOF = "8"  # of a fluid cavity's reference node
 NAMES_OF_SETS = ("NSET", "NEW SET")
 NO_PRESSURE = "HP", "NU"  # in the names of loads that differ from place to place
 OF_VOLUMES = re.compile(r"C3D|CCL|DC3D|(SF)?M(3D|CL)|S\d")  # types of elements in 3-D
@@ -195,9 +195,8 @@ class OwnDecks:
 
 def stands_in_space(deck: OwnDeck) -> bool:
     """Whether a deck is of a tyre in three dimensions."""
-    return any(
-        OF_VOLUMES.match(block.get("TYPE")) for block in deck.blocks if block.name == "ELEMENT"
-    )
+    types = (block.get("TYPE") for block in deck.blocks if block.name == "ELEMENT")
+    return any(map(OF_VOLUMES.match, types))
 
 
 def _restarts(block: Block) -> bool:
@@ -221,8 +220,9 @@ def _pressures(
             kind = row.name(1)
             if block.name in ("DSLOAD", "DLOAD") and re.fullmatch(r"H?P\d?(NU)?", kind):
                 place = 2
-            elif block.name == "BOUNDARY" and row.text(1) == row.text(2, row.text(1)) == str(
-                PRESSURE_DOF
+            elif (
+                block.name == "BOUNDARY"
+                and row.text(1) == row.text(2, PRESSURE_DOF) == PRESSURE_DOF
             ):
                 place = 3
             else:

@@ -87,11 +87,10 @@ def words(content: Json, mass_kg: float) -> Iterator[str]:
         laws = "; ".join(content["compounds"][section["material"]])
         yield f"section {section['set']}: {section['material']} ({laws})"
     for ply in content["plies"]:
-        spacing = (
-            f"{ply['spacing_deg']:g} degrees"
-            if "spacing_deg" in ply
-            else f"{1e3 * ply['spacing_m']:.4g} mm"
-        )
+        if "spacing_deg" in ply:
+            spacing = f"{ply['spacing_deg']:g} degrees"
+        else:
+            spacing = f"{1e3 * ply['spacing_m']:.4g} mm"
         yield (
             f"ply {ply['name']} on {ply['set']}: {ply['material']}, {1e6 * ply['area_m2']:.4g} mm²"
             f" every {spacing}, {ply['angle_deg']:g} degrees from the meridian"
