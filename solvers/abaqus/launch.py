@@ -12,7 +12,7 @@ from .licence import denial, is_queueing
 from .options import Options
 
 SUCCESS = "THE ANALYSIS HAS COMPLETED SUCCESSFULLY"  # last line of the .sta file
-NO_EQUILIBRIUM = (  # of the .sta and .msg files, as recalled
+NO_EQUILIBRIUM = (  # of the .sta and .msg files, from memory, not compared with such files
     "TOO MANY ATTEMPTS MADE FOR THIS INCREMENT",
     "TIME INCREMENT REQUIRED IS LESS THAN THE MINIMUM",
     "FIXED TIME INCREMENT IS TOO LARGE",

@@ -33,13 +33,14 @@ it read no pages of `solvers/bundled/road` and `solvers/language`:
 | 20261310 | 0 | 0 | 1 | 1 | 0 | 1 |
 | 20261311 to 26, at most | 1 | 0 | 1 | 1 | 0 | 2 |
 
-By another one, who counted also what is needed to change a page safely, and who had seen two files
-of the second lot:
+By another one, who counted also what is needed to change a page safely, and who had seen a few
+files of the later lots before:
 
 | seed | tyre | simulate | measured | studies | report, batch, cli | solvers |
 |---|---|---|---|---|---|---|
 | 20261501 | 9 | 3 | 1 | 5 | 3 | 5 |
 | 20261502 | 1 | 0 | 1 | 3 | 1 | 5 |
+| 20261503 | 1 | 0 | 2 | 4 | 0 | 3 |
 """
 
 from __future__ import annotations

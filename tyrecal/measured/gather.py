@@ -50,8 +50,9 @@ def gather(
     """Measurements of several files; those of the same thing are repeats.
 
     pressure_kPa: of files that do not state theirs; layout: axle, centre, directions and band of
-    the universal files; floor, assumed: relative, see ``combined``; leave_out: names of channels,
-    see ``arrange``; keep_going: leave out repeats that contradict each other.
+    the universal files; floor: of the value, the least sigma of a mean; assumed: of the value, the
+    standard deviation of one run that states none; leave_out: names of channels, see ``arrange``;
+    keep_going: leave out repeats that contradict each other.
     Frequencies without labels come last. Raises InputError, where repeats contradict each other
     too; OSError.
     """
@@ -101,6 +102,7 @@ def gather(
             if mistake := each.mistake:
                 raise InputError(f"{each.place}: {mistake}")
         values += measured_here
+    # a doublet's mean in place of its members, where not all runs have the same ones
     labelled = one_for_both([each for each in values if not each.is_unlabelled])
     slips = contradictions(labelled)
     if slips and not keep_going:

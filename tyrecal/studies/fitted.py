@@ -138,12 +138,13 @@ def _made_otherwise(of: Mapping[str, Any], case: LoadedCase) -> list[str]:
 
 
 def is_good(fit: Mapping[str, Any]) -> bool:
-    """Whether a fit, the content of fit.json, converged and moved."""
+    """Whether a fit, the content of fit.json, converged, and its variables left their starts."""
     return bool(fit["converged"] and fit["moved"])
 
 
 def has_good(path: Path) -> bool:
-    """Whether the file is a fit.json that `is_good`."""
+    """Whether the file is a fit.json that `is_good`; a link in a folder of results is not followed
+    (`files`)."""
     try:
         return is_good(read_json(path, follow=False))
     except (OSError, ValueError, KeyError, TypeError):

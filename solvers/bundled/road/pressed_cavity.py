@@ -41,7 +41,7 @@ def cavity_modes(air: GasCavity, X: Array, displacement: Array, angles: Array) -
     r, z = np.hypot(x[..., 0], x[..., 1]), x[..., 2]
     phi = theta[:, None] + np.arctan2(x[..., 1], x[..., 0])
     outwards = (normal * x)[..., :2].sum(-1) / r  # e_r . n dA
-    box = [middle([r]), middle([z])]
+    box = [middle([r]), middle([z])]  # (middle, half width) in r and z
     # int f dV = closed integral of (int f rho drho) e_r . n dA / r, from the box's middle outwards
     rho = box[0][0] + (r - box[0][0])[..., None] * ACROSS
     weights = (2 * np.pi / STATIONS_ROUND * outwards * (r - box[0][0]) / r)[..., None]

@@ -17,7 +17,8 @@ class Numbering:
     """Numbers of the equations of the free displacement components.
 
     Nodes have the deck's order or that of reverse Cuthill and McKee, whichever gives the narrower
-    band; it is reversed if that brings the nodes of the mask ``end`` (n,) nearer to its end.
+    band; it is reversed if that brings the nodes of the mask ``end`` (n,) nearer to its end:
+    `kept_fields` couples the last equations with the middle plane.
     ``equation`` (n, 3): equation of each component; a held one has ``size``, a spare equation that
     is dropped. ``bandwidth``: sub-diagonals; ``order``: flat component of each equation.
     """

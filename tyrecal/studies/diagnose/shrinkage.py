@@ -82,7 +82,7 @@ def shrink(problem: InverseProblem, key: str | None = None, seed: int = 0) -> Sh
     plain = refit(fitted, {}, 1)
     none = Hypothesis(NONE, 1.0, float(plain.ln_evidence[0]), {}, np.zeros(1), plain)
     candidates = [key.split("+")] if key else [[id] for id in problem.expansion.nodes]
-    hypotheses = [explain(fitted, ids, 1.0) for ids in candidates]
+    hypotheses = [explain(fitted, ids, prior=1.0) for ids in candidates]
     chosen = max(hypotheses, key=lambda h: h.ln_evidence)
     out = problem.only(hold)
     likeliest = lambda h: _errors(out, h, [int(np.argmax(h.posterior))])[0]
@@ -97,7 +97,7 @@ def shrink(problem: InverseProblem, key: str | None = None, seed: int = 0) -> Sh
     several = list(chosen.values) if len(chosen.values) > 1 else []
     others = {id: [each for each in several if each != id] for id in several}
     each = {
-        id: float(1 - rms(after) / rms(likeliest(explain(fitted, rest, 1.0))))
+        id: float(1 - rms(after) / rms(likeliest(explain(fitted, rest, prior=1.0))))
         for id, rest in others.items()
     }
     ratios = 1 - rms(samples) / rms(before)

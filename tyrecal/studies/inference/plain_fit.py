@@ -93,5 +93,6 @@ def plain_fit(
         inverse, before = weights(answer.constants), x
         x = descended(x, answer_at, answer)
         if abs(x - before).max() < SAME_COVARIANCE:
+            # at ``before`` constants are known, and the step from there is small
             return before if again else x
     return x
