@@ -31,6 +31,7 @@ def test_the_chance_level_is_exceeded_by_one_random_shape_in_twenty(chance: Chan
     chance.often(mac > chance_level(8), 0.05, 0.05)
 
 
+@pytest.mark.slow
 def test_pairs_are_right_or_undecided(chance: Chance) -> None:
     """At 8 to 200 signals with 5 % noise no pair is wrong, and of random shapes at most one in 20
     has a pair; 50 signals or more at any places decide all. False failures: 3e-7."""

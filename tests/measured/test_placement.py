@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tyrecal.measured import placement
 from tyrecal.measured.case_modes import CaseModes
 from tyrecal.measured.correlation import mac_matrix
 from tyrecal.measured.placement import at_places, mass_shifts, place_sensors, tread_places
@@ -29,12 +30,16 @@ GRAM = 1e-3
 
 
 @pytest.mark.slow
-def test_an_import_labels_as_often_as_stated(tmp_path: Path, chance: Chance) -> None:
-    """Tests of four sensors each, by universal files. False failures: 1e-7."""
+def test_an_import_labels_as_often_as_stated(
+    tmp_path: Path, chance: Chance, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Tests of four sensors each, by universal files: within half a mode of ten, and six standard
+    errors of the stated share. False failures: 1e-7."""
+    monkeypatch.setattr(placement, "DRAWN_TESTS", 40)
     case, own = CaseModes(modes()), list(modes())
     placed = place(case, own, 4, "rtz", 0.005, 1)
     shares = [imported_share(case, own, placed, chance.random, tmp_path) for _ in range(8)]
-    off = 6 * placed.labelled_error
+    off = 0.05 + 6 * placed.labelled_error
     chance.mean(shares, placed.labelled - off, placed.labelled + off)
 
 
@@ -48,12 +53,13 @@ def test_placed_sensors_separate_modes_better_than_random_ones() -> None:
 
     every = tread_places(case.points)
     random = np.random.default_rng(1)
-    others = [largest(every[random.choice(len(every), 8, replace=False)]) for _ in range(15)]
+    others = [largest(every[random.choice(len(every), 8, replace=False)]) for _ in range(7)]
     sensors = place_sensors(case, modes(), 8, "rtz")
     assert len(sensors.points) == 24 and len(np.unique(sensors.points, axis=0)) == 8
     assert largest(sensors.points[::3]) < 0.85 * np.median(others)
 
 
+@pytest.mark.slow
 def test_a_sensors_mass_shifts_what_the_solver_finds() -> None:
     """A gram on the middle of the tread, with the masses coupled to all harmonics: both members of
     each doublet, to the second order of the mass."""
@@ -78,8 +84,11 @@ def test_a_sensors_mass_shifts_what_the_solver_finds() -> None:
         assert exact == pytest.approx(shifts, abs=0.03 * abs(shifts).max())
 
 
-def test_the_command_places_sensors(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_places_sensors(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """It writes places and shares; options of one use are refused in the other."""
+    monkeypatch.setattr(placement, "DRAWN_TESTS", 4)
     given = ["measured", "sensors", CASE, "--place", "4", "--mesh", "coarse"]
     given += ["--highest-harmonic", "3", "--output", str(tmp_path)]
     assert run(*given, "--json") == 0

@@ -22,7 +22,7 @@ from ..cli.test_cli import run
 from ..conftest import CASES
 
 pytestmark = pytest.mark.numbers
-PATCH_MM, TO_HZ = 120.0, 300.0  # of which few harmonics are enough
+PATCH_MM, TO_HZ = 180.0, 300.0  # of which few harmonics are enough
 WAYS = ("radial", "lateral", "tangential", "radial", "lateral")
 POINTS = ",".join(f"tread:{a}deg:{way}" for a, way in zip(POINT_ANGLES, WAYS, strict=True))
 
