@@ -13,7 +13,7 @@ from ...files import Json
 from ...measured.case_modes import evaluate_case_modes
 from ...measured.measurement import Measurement
 from ...measured.shapes import read_shapes
-from ...measured.targets import in_set_state, readings_of, with_measured
+from ...measured.targets import SAME_PRESSURE_kPa, in_set_state, readings_of, with_measured
 from ...simulate.deck.decks_design import design_of
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.failure import EvaluationFailed
@@ -168,14 +168,15 @@ class FitStudy:
         """Add to the fit how measured shapes agree with the fitted ones, at its pressures; shapes
         that cannot be compared are left out with the reason."""
         compared = []
-        pressures = {state.with_defaults(self.case).pressure_kPa for state in fit.fitted.states}
+        states = [state.with_defaults(self.case) for state in fit.fitted.states]
         for test in self.shapes:
-            state = TyreState(test.pressure_kPa)
-            if state.of(self.case).with_defaults(self.case).pressure_kPa not in pressures:
+            off = lambda state, own=test.pressure_kPa: abs((state.pressure_kPa or 0.0) - own)
+            nearest = min(states, key=off)
+            if off(nearest) > SAME_PRESSURE_kPa:
                 continue
             highest = max([c for mode in test.modes if (c := mode.c) is not None], default=0) + 1
             highest = max(highest, self.case.case.analysis.highest_harmonic)
-            values = state.design(self.case, fit.fitted.values)
+            values = TyreState(nearest.pressure_kPa).design(self.case, fit.fitted.values)
             try:
                 modes = evaluate_case_modes(self.case, self.evaluator, values, highest)
                 compared.append(correlate(test, modes))
