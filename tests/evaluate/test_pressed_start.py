@@ -11,7 +11,7 @@ import pytest
 from tyrecal_solvers.bundled.adapter import JOB, OLDJOB, PRESS
 from tyrecal_solvers.bundled.job import run
 from tyrecal_solvers.bundled.road import footprint_job, pressed_start
-from tyrecal_solvers.bundled.road.contact_newton import ContactNewton, FirstGuess
+from tyrecal_solvers.bundled.road.contact_newton import FirstGuess
 from tyrecal_solvers.errors import Indefinite, Refused
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
@@ -22,8 +22,6 @@ from tyrecal.simulate.evaluate.store import Store
 from tyrecal.studies.fit.road import press_with_slopes
 from tyrecal.studies.fit.targets import ValueTarget
 from tyrecal.tyre.case import LoadedCase, start_values
-from tyrecal.tyre.case.parts import Cord
-from tyrecal.tyre.effects.edit import changed, with_part
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.state import TyreState
 
@@ -99,42 +97,6 @@ def test_a_bad_start_is_given_up(
     monkeypatch.setattr(pressed_start, "_factor", factor)
     monkeypatch.setattr(pressed_start, "FirstGuess", guess)
     assert numbers(Evaluator(TyreDesign(case)).press(values, LOADS, base=base)) == cold
-
-
-@pytest.mark.slow
-def test_a_fine_mesh_begins_at_the_coarse_one(
-    case: LoadedCase, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The answer is that from nothing, although some cords are slack."""
-    mesh = case.case.mesh
-    own_level = mesh.levels[mesh.level]
-    levels = {
-        name: with_part(own_level, elements=dict(zip(own_level.elements, counts, strict=True)))
-        for name, counts in {"few": (3, 2, 2, 1), "many": (6, 4, 4, 2)}.items()
-    }
-    cords = {
-        name: with_part(each, bears_compression=False)
-        for name, each in case.case.materials.items()
-        if isinstance(each, Cord)
-    }
-    materials = {**case.case.materials, **cords}
-    case = changed(case, mesh=with_part(mesh, levels=levels, level="many"), materials=materials)
-    from_guess, reached = ContactNewton._from_first_guess, []
-
-    def follow(work: ContactNewton, load: float) -> Any:
-        reached.append(from_guess(work, load))
-        return reached[-1]
-
-    monkeypatch.setattr(ContactNewton, "_from_first_guess", follow)
-    evaluator = Evaluator(TyreDesign(case))
-    begun = evaluator.press({}, LOADS)
-    assert evaluator.counts.runs == 2
-    assert [each is not None for each in reached] == [False, True]
-    monkeypatch.setattr(TyreDesign, "coarser", None)
-    cold = Evaluator(TyreDesign(case)).press({}, LOADS)
-    for name in ("deflection_m", "stiffness_N_per_m", "contact_area_m2"):
-        one, other = (getattr(each.footprints[0], name) for each in (begun, cold))
-        assert one == pytest.approx(other, rel=1e-7), name
 
 
 @pytest.mark.slow

@@ -50,7 +50,7 @@ class NotReached(RuntimeError):
 class Hertz(Bundled):
     """The bundled solver for modes; footprints by the formula."""
 
-    capabilities = Bundled.capabilities - {"footprint_gradients", "pressed_start"}
+    capabilities = Bundled.capabilities - {"footprint_gradients"}
     failures = (*Bundled.failures, NotReached)
     reach = 20e3
 

@@ -25,9 +25,9 @@ COMMENT = re.compile(r"^\*\* Newton's method starts from (\S+), SHA-256 ([0-9a-f
 
 @dataclass(frozen=True)
 class PressedStart:
-    """State of another tyre on the road, or of the same one on a coarser mesh, which is a good
-    start: its decks by file, deck numbers (n,), displacements (n, 3) before any load and
-    (ring, n, 3) on the road, of rings all round, m."""
+    """State of another tyre of the same mesh on the road, which is a good start: its decks by file,
+    deck numbers (n,), displacements (n, 3) before any load and (ring, n, 3) on the road, of rings
+    all round, m."""
 
     texts: Mapping[str, str]  # its decks, file name to text
     nodes: Array  # (n,) deck numbers

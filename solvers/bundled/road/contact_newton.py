@@ -5,7 +5,7 @@ height at a given load, preconditioned GMRES inside, loads one after the other.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import attrgetter
@@ -15,7 +15,7 @@ from scipy.sparse import csr_matrix
 
 from ...errors import Indefinite, Inverted, NoEquilibrium
 from ..section.inflation import BUCKLING_STRAIN
-from ..section.parts.cords import NOT_COMPRESSED
+from ..section.parts.cords import NOT_COMPRESSED, CordsAtStations
 from ..solid3d.gmres import gmres
 from ..solid3d.revolved import Revolved
 from .contact import Bound, Contact, FlatRoad
@@ -73,9 +73,8 @@ class FirstGuess:
     load: float  # N
     moved: Array  # (2, k, q, 3): what the load adds to the inflated tyre's parts, m
     deflection: float  # m
-    factor: ContactUpdate | None = None  # preconditioner; None: that of the guess itself
+    factor: ContactUpdate
     share: float = 1.0  # of the load, at which this tyre has about this deflection
-    taut: Sequence[Array] = ()  # of each part of cords (e, s): those that are so at first
 
 
 class ContactNewton:
@@ -163,8 +162,9 @@ class ContactNewton:
 
     def _buckling(self) -> str:
         """The cords that are compressed most at the last state, in words; "": none by much."""
+        parts = [part for part in self.tyre.parts if isinstance(part, CordsAtStations)]
         lowest = min(
-            (part.most_compressed() for part in self.tyre.cords),
+            (part.most_compressed() for part in parts),
             key=attrgetter("strain"),
             default=NOT_COMPRESSED,
         )
@@ -245,8 +245,6 @@ class ContactNewton:
         self._factor, self._formed_at = guess.factor, load
         try:
             parts, height = self.parts + guess.moved, self.free_radius - guess.deflection
-            if guess.taut:
-                parts, height = self._with_taut(parts, height, load, guess.taut)
             if abs(guess.share - 1) > SAME_SHARE:
                 near = guess.share * load
                 parts, height, contact = self._iterate(parts, height, near, None, COULOMB_RTOL)
@@ -259,25 +257,6 @@ class ContactNewton:
             log.info("%g N: the start was too far away, loaded from nothing", load)
             self._factor, self._used, self._formed_at = None, 0, 0.0
             return None
-
-    def _with_taut(
-        self, parts: Array, height: float, load: float, taut: Sequence[Array]
-    ) -> tuple[Array, float]:
-        """Near the equilibrium of cords that also bear compression where they are ``taut``, which
-        Newton's method reaches in a few steps: it has no cords that go slack and taut by turns."""
-        for part, each in zip(self.tyre.cords, taut, strict=True):
-            part.taut = each
-        try:
-            contact = self._state(parts, height, load, None)[2]
-            try:
-                self._form(contact)
-            except Indefinite:  # of small strains between the nodes: the inflated tyre has none
-                self.tyre.residual(self._inflated)
-                self._form(contact)
-            return self._iterate(parts, height, load, None, COULOMB_RTOL)[:2]
-        finally:
-            for part in self.tyre.cords:
-                part.taut = None
 
     def _by_coulomb(
         self, parts: Array, height: float, load: float

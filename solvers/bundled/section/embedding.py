@@ -16,12 +16,15 @@ import numpy as np
 
 from ...language.spelling import named
 from ...language.text import Block, DeckError, Row
-from .locate import hosts_of, mapping_step
 from .shapes import TYPES, ElementType
 
 Array = np.ndarray
 EXTERIOR = 0.05  # of the hosts' size that a node may lie outside them (ABAQUS' default)
 ROUNDOFF = 1e-6  # weights below it are zero (likewise)
+MAX_MAPPING_STEPS, XI_SETTLED = (
+    20,
+    1e-9,
+)  # of Newton's method for xi, whose error is the square of a step
 
 
 @dataclass(frozen=True)
@@ -48,7 +51,7 @@ class Guest:
         xi = self.xi
         # Newton's steps: xi is real and nearly exact; the second one rids its tangent of that error
         for _ in range(2 if np.iscomplexobj(X) or np.iscomplexobj(self.X) else 0):
-            xi = xi + mapping_step(self.kind, X[self.nodes][None], self.X[None], xi[None])[0]
+            xi = xi + _step(self.kind, X[self.nodes], self.X, xi)
         N: Array = self.kind.at(xi[None])[0][0][self.kept]
         return N / N.sum()
 
@@ -197,19 +200,59 @@ def _guest(
     row: Row, X: Array, hosts: Mapping[str, Array], node: int, tolerance: float, roundoff: float
 ) -> Guest:
     """The node in the host that it is in or, within the tolerance, nearest to. Raises DeckError."""
-    place = X[node].real
-    (host,) = hosts_of(place[None], X.real, hosts, tolerance)
-    if host is None or host.distance > tolerance:
-        far = "in no host element" if host is None else f"{host.distance:.3g} m outside its hosts"
+    place, all_X = X[node].real, X.real
+    best, nearest = None, np.inf
+    for kind, elements in hosts.items():
+        corners = all_X[elements]
+        beyond = np.maximum(corners.min(1) - place, place - corners.max(1)).max(1)
+        slack = tolerance + 0.2 * np.ptp(corners, axis=1).max(1)  # curved sides bulge
+        for nodes in elements[beyond < slack]:
+            xi = _inverse(TYPES[kind], all_X[nodes], place)
+            if xi is None:
+                continue
+            inside = TYPES[kind].clipped(xi)
+            away = float(np.hypot(*(TYPES[kind].at(inside[None])[0][0] @ all_X[nodes] - place)))
+            if away < nearest - 1e-12:
+                best, nearest = (TYPES[kind], nodes, xi), away
+    if best is None or nearest > tolerance:
+        far = "in no host element" if best is None else f"{nearest:.3g} m outside its hosts"
         raise DeckError(
             row.place,
             f"the node at r, z = {place[0]:.6g}, {place[1]:.6g} m is {far}, more than the exterior"
             f" tolerance {tolerance:.3g} m",
         )
-    kept = abs(host.kind.at(host.xi[None])[0][0]) > roundoff
+    host, nodes, xi = best
+    kept = abs(host.at(xi[None])[0][0]) > roundoff
     if not kept.any():
         words = (
             f"a ROUNDOFF TOLERANCE of {roundoff:g} leaves a node without a host: it is below 0.2"
         )
         raise DeckError(row.place, words)
-    return Guest(X[node], host.kind, host.nodes, host.xi, kept)
+    return Guest(X[node], host, nodes, xi, kept)
+
+
+def _inverse(kind: ElementType, corners: Array, place: Array) -> Array | None:
+    """xi of a point of the isoparametric map, by Newton's method; None where it does not settle."""
+    xi = kind.clipped(np.full(2, 0.25 if len(kind.faces) == 3 else 0.0))
+    for _ in range(MAX_MAPPING_STEPS):
+        step = _step(kind, corners, place, xi)
+        if not np.isfinite(step).all() or abs(xi).max() > 10:
+            return None
+        xi = xi + step
+        if abs(step).max() < XI_SETTLED:
+            return xi
+    return None
+
+
+def _step(kind: ElementType, corners: Array, place: Array, xi: Array) -> Array:
+    """Newton step of the natural coordinates xi (2,) of ``place`` (2,) in an element with nodes
+    ``corners`` (a, 2)."""
+    N, dN = (each[0] for each in kind.at(xi[None]))
+    tangent = corners.T @ dN  # dX_j / dxi_k
+    off = place - N @ corners
+    det = tangent[0, 0] * tangent[1, 1] - tangent[0, 1] * tangent[1, 0]
+    if abs(det) < 1e-300:
+        return np.full(2, np.nan)
+    first = tangent[1, 1] * off[0] - tangent[0, 1] * off[1]
+    second = tangent[0, 0] * off[1] - tangent[1, 0] * off[0]
+    return np.array([first, second]) / det

@@ -128,11 +128,11 @@ class ElementType:
         return _triangle_at(self.nodes, np.column_stack([1 - xi.sum(1), xi]))
 
     def clipped(self, xi: np.ndarray) -> np.ndarray:
-        """Points xi (p, 2), those beyond a solid's sides moved to one of them."""
+        """The point xi (2,), or one of a solid's sides where it lies beyond."""
         if len(self.faces) == 4:
             return np.clip(xi, -1, 1)
-        areal = np.maximum(np.column_stack([1 - xi.sum(1), xi]), 0.0)
-        return np.asarray(areal[:, 1:] / areal.sum(1, keepdims=True))
+        areal = np.maximum([1 - xi.sum(), *xi], 0.0)
+        return np.asarray(areal[1:] / areal.sum())
 
 
 TYPES = {

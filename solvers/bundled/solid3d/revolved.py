@@ -17,7 +17,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..section.model import Model
-from ..section.parts.cords import CordsAtStations
 from ..section.parts.part import Precision, TyrePart
 from .circumference import Circumference
 
@@ -32,7 +31,6 @@ class Revolved:
         self.model, self.loads, self.around = model, loads, around
         nodes = len(model.mesh.X)
         self.parts = [part.at_stations(nodes) for part in (*model.parts, *loads)]
-        self.cords = [part for part in self.parts if isinstance(part, CordsAtStations)]
 
     def _stations(self, U: Array) -> tuple[Array, Array]:
         """Displacements (3n, s) at the stations, and their derivatives by the angle."""

@@ -78,11 +78,6 @@ class Design(Protocol):
         """The solver that the case names, its options and time limit."""
 
     @property
-    def coarser(self) -> Design | None:
-        """The same tyre on a coarser mesh, which is pressed on the road in a fraction of the time;
-        None where it has none."""
-
-    @property
     def nominal(self) -> Design | None:
         """The tyre before anything was set, whose inflated shape is a good start for all others;
         None where none is known."""

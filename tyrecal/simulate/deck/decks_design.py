@@ -26,7 +26,6 @@ class DecksDesign:
 
     section_nodes = 0
     nominal = None  # no solver of such decks can use a shape to start from
-    coarser = None
     is_nominal = False
     has_slopes = False
 

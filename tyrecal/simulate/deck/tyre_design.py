@@ -11,7 +11,7 @@ from math import ceil
 from typing import Any
 
 from ...errors import InputError
-from ...tyre.case import LoadedCase, number_at, start_values, with_level
+from ...tyre.case import LoadedCase, number_at, start_values
 from ...tyre.case.loss_hint import lossless_hint
 from ...tyre.case.schema import SolverChoice
 from ...tyre.case.slack_hint import slack_cord_hint
@@ -64,22 +64,6 @@ class TyreDesign:
         try:
             return TyreDesign(case, start_values(read))
         except InputError:  # only with what was set is it a tyre
-            return None
-
-    @cached_property
-    def coarser(self) -> TyreDesign | None:
-        """The design on the coarsest of the case's meshes, if it has at most half as many
-        elements."""
-        mesh = self.case.case.mesh
-        size = {k: sum(each.elements.values()) * sum(each.rows) for k, each in mesh.levels.items()}
-        level = min(size, key=lambda name: size[name], default="")
-        if 2 * size.get(level, 1) > size.get(mesh.level, 0):
-            return None
-        try:
-            return TyreDesign(
-                with_level(self.case, level), self.values, with_level(self.plain, level)
-            )
-        except ValueError:  # the section is too curved for it
             return None
 
     @property

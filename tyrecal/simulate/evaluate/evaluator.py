@@ -171,15 +171,16 @@ class Evaluator:
     ) -> Pressed:
         """One design on the road at rising loads, as far as the solver gets, with so many ``modes``
         at each; gradients: names of variables whose slopes are wanted (`Footprint.slopes`); base:
-        values of the design whose state on the road begins the first load (None: this design on
-        its coarser mesh); rim_stiffness: that of the rim is wanted at each load, too.
+        values of the design whose state on the road begins the first load (None: the inflated
+        tyre); rim_stiffness: that of the rim is wanted at each load, too.
 
         Raises what `evaluate` does; DeckRefused too where the solver has no road.
         """
         self.needs_road(bool(modes), rim_stiffness)
         design, loads = self._with(values), tuple(loads_N)
-        at_rings = not (modes or rim_stiffness)
-        start = self._start_on_road(design, base, loads, gradients) if at_rings else None
+        start = None
+        if base and not (modes or rim_stiffness) and _key(self._with(base)) != _key(design):
+            start = self._pressed(base, loads, gradients)
         decks = Decks(
             design,
             gradients,
@@ -200,34 +201,15 @@ class Evaluator:
             self._remember(design, answer)
         return answer
 
-    def _start_on_road(
-        self,
-        design: Design,
-        base: Mapping[str, float] | None,
-        loads: tuple[float, ...],
-        gradients: tuple[str, ...],
-    ) -> PressedTyre | None:
-        """The tyre whose state on the road begins a design's first load: the design ``base`` or,
-        for that itself and where there is none, the design on its coarser mesh. It is pressed
-        before, so that the answer depends on no other question. None: the inflated tyre."""
-        if "pressed_start" not in self.solver.capabilities:
-            return None
-        start = None
-        if base and _key(self._with(base)) != _key(design):
-            start = self._pressed(base, loads, gradients)
-        if start or not (coarser := design.coarser):
-            return start
-        other = replace(self.of(coarser), folder=None, keep=False)
-        try:
-            return other._pressed(coarser.values, loads[:1], ())
-        except DeckRefused:  # of this mesh; that of the design may be right
-            return None
-
     def _pressed(
         self, base: Mapping[str, float], loads: tuple[float, ...], gradients: tuple[str, ...]
     ) -> PressedTyre | None:
-        """The design ``base`` on the road; with the ``gradients`` of those that begin from it, so
-        that its own answer is recorded only once. None where it cannot bear the load."""
+        """The design ``base`` on the road, from which others begin at the first load. It is pressed
+        before them, so that their answers depend on no other question; with their ``gradients``, so
+        that its own answer is recorded only once. None where it cannot bear the load, or the solver
+        cannot begin from it."""
+        if "pressed_start" not in self.solver.capabilities:
+            return None
         design = self._with(base)
         key = _key(design), loads[0]
         if key not in self.pressed_tyres:

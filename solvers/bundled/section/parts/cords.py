@@ -38,7 +38,6 @@ class LogarithmicCord(EnergyLaw):
     stiffness: Array  # E A / s, N/m
     tension: float = 0.0  # artificial, N/m, of slack cords at the start: in the tangent only
     compressed: Array | float = 1.0  # share of the stiffness that it has in compression: 1 or 0
-    steady: bool = False  # its tangent is without what makes compressed cords buckle
 
     def _borne(self, strain: Array, order: int) -> Array:
         """W / (E A / s) (p,), or its first or second derivative by the logarithmic strain (p,):
@@ -65,8 +64,6 @@ class LogarithmicCord(EnergyLaw):
         length = stretch(z)
         strain = np.log(length)
         borne, slope = self._borne(strain, 1), self._borne(strain, 2)
-        if self.steady:
-            borne = np.maximum(borne, 0.0)
         along = self.stiffness * (slope - 2 * borne) / length**4
         D = along[:, None, None] * z[:, :, None] * z[:, None, :]
         D += (self.stiffness * borne / length**2)[:, None, None] * np.eye(3)
@@ -97,23 +94,11 @@ class CordsAtStations(ElasticAtStations):
 
     def __init__(self, part: Cords, nodes: int):
         super().__init__(part, nodes)
-        self.layers = part.layers
-        self.taut: Array | None = None  # (e, s): those that bear compression, whatever their law
-
-    def law_at(self, law: EnergyLaw) -> EnergyLaw:
-        if self.taut is None:
-            return law
-        assert isinstance(law, LogarithmicCord)
-        taut = np.repeat(self.taut, self.g, 0).ravel()
-        return replace(law, compressed=np.maximum(law.compressed, taut), steady=True)
+        self._layers = part.layers
 
     def most_compressed(self) -> CompressedCords:
         """The lowest strain of cords that bear compression."""
-        return _most_compressed(self.law, self.z, self.layers, self.connectivity)
-
-    def are_taut(self) -> Array:
-        """Whether an element's cords are longer than at rest on the whole (e, s)."""
-        return np.asarray(np.log(stretch(self.z)).reshape(self.e, self.g, -1).mean(1) > 0)
+        return _most_compressed(self.law, self.z, self._layers, self.connectivity)
 
 
 class CompressedCords(NamedTuple):
