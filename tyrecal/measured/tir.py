@@ -88,6 +88,7 @@ ON_ROAD = {  # a key, and the measured quantity that it and others give over the
     "Q_A1": ("contact_length_m", MFSwift.patch_length),
     "Q_RB1": ("contact_width_m", MFSwift.patch_width),
 }
+ABOVE_ZERO = ("UNLOADED_RADIUS", "WIDTH", "FNOMIN", "VERTICAL_STIFFNESS", "Q_RE0")
 OTHER_STIFFNESSES = ("LONGITUDINAL_STIFFNESS", "LATERAL_STIFFNESS", "YAW_STIFFNESS")
 KEY_AND_VALUE = re.compile(r"(\w+)\s*=\s*('[^']*'|\"[^\"]*\"|[^$!]*)")
 
@@ -194,6 +195,8 @@ def property_measurements(
             keys = {key: value for key, value in keys.items() if key not in template}
     if "DEFLECTION_LOAD_CURVE" in file.sections and keys.pop("VERTICAL_STIFFNESS", 0):
         notes.append(f"{path}: left out VERTICAL_STIFFNESS: [DEFLECTION_LOAD_CURVE] replaces it")
+    for key in (each for each in ABOVE_ZERO if not keys.get(each, 1.0) > 0):
+        raise InputError(f"{file.place(key)} is {keys[key]:g}, must be greater than 0")
     pressure = _pressure(file, pressure_kPa)
 
     def measured(key: str, quantity: str, value: float, load: float = 0.0) -> Measurement:
