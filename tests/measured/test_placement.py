@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tyrecal.measured import placement
+from tyrecal.errors import InputError
 from tyrecal.measured.case_modes import CaseModes
 from tyrecal.measured.correlation import mac_matrix
 from tyrecal.measured.placement import at_places, mass_shifts, place_sensors, tread_places
@@ -57,6 +58,16 @@ def test_placed_sensors_separate_modes_better_than_random_ones() -> None:
     sensors = place_sensors(case, modes(), 8, "rtz")
     assert len(sensors.points) == 24 and len(np.unique(sensors.points, axis=0)) == 8
     assert largest(sensors.points[::3]) < 0.85 * np.median(others)
+
+
+def test_refused_without_a_mode_or_a_place_for_each_sensor() -> None:
+    """Radial sensors see no mode without waves; two sensors have no place in common."""
+    case, still = CaseModes(modes()), [mode for mode in modes() if not mode.label.c]
+    with pytest.raises(InputError, match=r"along r see none of \[0,0\].*give --axes rtz"):
+        place_sensors(case, still, 3, "r")
+    count = len(tread_places(case.points))
+    with pytest.raises(InputError, match=f"has {count} places, {count + 1} are too many"):
+        place_sensors(case, modes(), count + 1, "rtz")
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..errors import InputError
 from ..simulate.modes.label import BELT, Mode
 from .case_modes import CaseModes
 from .labels import Labeller
@@ -28,11 +29,21 @@ DRAWN_NOISE_SHARE, DRAWN_OFF_m = 0.05, 0.002  # of a mode's root mean square sig
 
 
 def place_sensors(case: CaseModes, modes: Sequence[Mode], count: int, axes: str) -> Sensors:
-    """``count`` sensors that distinguish modes of a case; axes: directions of each, such as rtz."""
+    """``count`` sensors that distinguish modes of a case; axes: directions of each, such as rtz.
+
+    Raises InputError for more sensors than places, and where no mode moves them.
+    """
     places = tread_places(case.points)
+    if count > len(places):
+        raise InputError(f"the tread of this mesh has {len(places)} places, {count} are too many")
     sensors = at_places(places, axes)
     seen = [mode for mode in modes if case.is_seen(mode, sensors)]
-    Phi = np.hstack([case.signals(mode, sensors) for mode in seen or modes])
+    if not seen:
+        names = ", ".join(str(mode.label) for mode in modes)
+        raise InputError(
+            f"sensors along {axes} see none of {names}: give --axes rtz, or more modes"
+        )
+    Phi = np.hstack([case.signals(mode, sensors) for mode in seen])
     Phi /= np.sqrt(np.mean(Phi**2, axis=0))
     blocks = Phi.reshape(len(places), len(axes), -1)
     inverse, chosen = np.eye(Phi.shape[1]), list[int]()
