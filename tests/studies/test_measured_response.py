@@ -130,6 +130,12 @@ def test_functions_that_are_refused(tmp_path: Path, function: WrittenFunction, w
         read_measured_responses(written(tmp_path / "m.uff", function), "receptance", 0.0, 100.0)
 
 
+def test_a_file_that_is_empty_is_named(tmp_path: Path) -> None:
+    (tmp_path / "m.csv").touch()
+    with pytest.raises(InputError, match=r"m\.csv: the file is empty"):
+        read_measured_responses(tmp_path / "m.csv", "receptance", 0.0, 100.0)
+
+
 def test_what_is_there_twice_is_refused(tmp_path: Path) -> None:
     path = written(tmp_path / "m.uff", motion(7, 1), motion(7, 1))
     with pytest.raises(InputError, match="tread:0deg:radial over tread:0deg:radial is in the file"):

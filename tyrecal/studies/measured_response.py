@@ -122,7 +122,10 @@ def _point(file: Universal, signal: tuple[int, int], place: str) -> tuple[Respon
 
 
 def _read_table(path: Path, form: str) -> list[tuple[str, MeasuredResponse]]:
-    table = read_text_table(path)
+    try:
+        table = read_text_table(path)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
     (_, headings), *lines = table.lines or [(0, [])]
     if missing := [name for name in FRF_COLUMNS if name not in headings]:
         raise InputError(
