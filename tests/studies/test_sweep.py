@@ -119,6 +119,8 @@ def test_without_ranges_all_variables_are_sampled_within_10_percent() -> None:
         ("C10=8e5:1.2e6:100001", False, "more than 100000"),
         ("rebar_layers.belt_1.area_m2=1e-7:2e-7:2", False, "set by the variable 'A_belt'"),
         ("mesh.level=1:2:2", False, "no number of the tyre"),
+        ("analysis.static_increments=2:5:3", False, "=3.5: .*must be a whole number, got 3.5"),
+        ("analysis.static_increments=2:5", True, "must be a whole number"),
     ],
 )
 def test_ranges_that_are_refused(text: str, sampled: bool, words: str) -> None:
@@ -151,3 +153,18 @@ def test_a_sweep_that_was_cut_off_runs_no_point_twice(tmp_path: Path) -> None:
     again = replace(start, evaluator=Evaluator(TyreDesign(CASE), store=Store(tmp_path)))
     result = run(again, swept, False)
     assert again.evaluator.counts.runs == 1 and len(result.rows) == 2
+
+
+def test_a_variable_named_as_a_column_of_modes_has_a_column_of_its_own() -> None:
+    result = run(given(), [C10, PRESSURE], sampled=False)
+    swept = [
+        x.model_copy(update={"name": x.name.replace("C10", "c")}) for x in result.numbers_swept
+    ]
+    rows = [
+        x.model_copy(update={"values": {"c": x.values["C10"], "pressure_kPa": 1.0}})
+        for x in result.rows
+    ]
+    text = result.model_copy(update={"numbers_swept": swept, "rows": rows}).csv()
+    heads, *lines = (line.split(",") for line in text.splitlines())
+    assert heads[:4] == ["variables.c", "pressure_kPa", "mass_kg", "c"]
+    assert {float(line[0]) for line in lines} == {8e5, 1e6, 1.2e6}

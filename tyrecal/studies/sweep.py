@@ -73,7 +73,9 @@ def read_ranges(
         raise InputError(
             f"the grid has {count} points, more than {MAX_POINTS}: give fewer, or a Latin hypercube"
         )
-    for name, value in ((each.name, end) for each in ranges for end in (each.low, each.high)):
+    # a point between the ends too: a key may take whole numbers alone
+    tried = [(x, [x.low, x.high, x.at(0.5**0.5 if sampled else 1 / (x.steps - 1))]) for x in ranges]
+    for name, value in ((each.name, value) for each, values in tried for value in values):
         try:
             with_values(case, {name: value})
         except InputError as error:

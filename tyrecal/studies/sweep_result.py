@@ -117,11 +117,15 @@ class SweepResult(Result):
         }
 
     def csv(self) -> str:
-        names = [each.name for each in self.numbers_swept]
-        keys = [*names, "mass_kg", "c", "m", "kind", "multiplicity", "frequency_Hz"]
+        keys = ["mass_kg", "c", "m", "kind", "multiplicity", "frequency_Hz"]
         keys += ["damping_ratio"] * any(m.damping_ratio for row in self.rows for m in row.modes)
+        names = [each.name for each in self.numbers_swept]
+        # a variable may have the name of a column of modes
+        columns = {name: f"variables.{name}" if name in keys else name for name in names}
+        keys = [*columns.values(), *keys]
         rows = (
-            {**row.values, "mass_kg": row.mass_kg, **mode.model_dump()}
+            {columns[k]: x for k, x in row.values.items()}
+            | {"mass_kg": row.mass_kg, **mode.model_dump()}
             for row in self.rows
             for mode in row.modes
         )
