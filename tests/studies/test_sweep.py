@@ -96,6 +96,16 @@ def test_points_that_fail_are_listed_and_the_others_kept() -> None:
         run(given(fails=lambda values: True), [C10], False)
 
 
+def test_too_few_points_state_no_change_by_a_number() -> None:
+    """One value of C10 that is left of a grid, and two points of a sample of two numbers."""
+    alone = run(given(fails=lambda values: values["C10"] < 1.1e6), [C10, PRESSURE], False)
+    for result in (alone, run(given(), [C10, PRESSURE], True, 2)):
+        assert {*map(str, (mode.change_percent for mode in result.modes))} == {"{}"}
+        assert {mode.linear_share for mode in result.modes} == {None}
+        assert result.sentences()[1] == "too few points to tell what each number changes"
+        assert result.tables()[0].rows[0][-1] is None
+
+
 def test_without_ranges_all_variables_are_sampled_within_10_percent() -> None:
     ranges = read_ranges(CASE, [], True)
     assert [each.name for each in ranges] == list(start_values(CASE))

@@ -64,8 +64,9 @@ class SweptMode(Named):
 
     lowest_Hz: float  # lowest frequency over all points
     highest_Hz: float  # highest frequency over all points
-    change_percent: dict[str, float]  # change of the mean by each number, from low to high end
-    linear_share: float  # share of the variance that these changes explain
+    # change of the mean by each number, from low to high end; empty where the points are too few
+    change_percent: dict[str, float]
+    linear_share: float | None  # share of the variance that these changes explain
 
 
 class SweepFindings(ResultPart):
@@ -136,7 +137,7 @@ class SweepResult(Result):
         return {"modes": [each.model_dump() for each in self.modes]}
 
     def tables(self) -> list[Table]:
-        names = [each.name for each in self.numbers_swept]
+        names = [*self.modes[0].change_percent]
         share = Column("linear %", ".0f", 100)
         heads = [*NAME_COLUMNS, LOWEST, Column("highest"), *(Column(f"% by {n}") for n in names)]
         rows = [
@@ -239,9 +240,11 @@ def _mode(label: Label, swept: Sequence[SweptRange], rows: Sequence[SweptPoint])
         [[(row.values[s.name] - s.low) / (s.high - s.low) for s in swept] for row in rows]
     )
     plane = np.column_stack([np.ones(len(rows)), share])
-    change = np.linalg.lstsq(plane, hertz, None)[0]
+    change, _, rank, _ = np.linalg.lstsq(plane, hertz, None)
+    is_determined = rank == plane.shape[1]
     scatter = hertz.var()
     left = np.mean((hertz - plane @ change) ** 2)
+    share_explained = float(1 - left / scatter) if scatter > 1e-18 * hertz.mean() ** 2 else 1.0
     return SweptMode(
         c=label.c,
         m=label.m,
@@ -250,9 +253,11 @@ def _mode(label: Label, swept: Sequence[SweptRange], rows: Sequence[SweptPoint])
         lowest_Hz=float(hertz.min()),
         highest_Hz=float(hertz.max()),
         change_percent={
-            s.name: float(100 * x / hertz.mean()) for s, x in zip(swept, change[1:], strict=True)
+            s.name: float(100 * x / hertz.mean())
+            for s, x in zip(swept, change[1:], strict=True)
+            if is_determined
         },
-        linear_share=float(1 - left / scatter) if scatter > 1e-18 * hertz.mean() ** 2 else 1.0,
+        linear_share=share_explained if is_determined else None,
     )
 
 
@@ -266,6 +271,8 @@ def _words(
         else (f"a grid of {count} points")
     )
     words = [f"{how}: {spans}"]
+    if not modes[0].change_percent:
+        return [*words, "too few points to tell what each number changes"]
     for each in swept:
         most = max(modes, key=lambda mode: abs(mode.change_percent[each.name]))
         change = most.change_percent[each.name]
