@@ -219,6 +219,12 @@ def test_what_lacks_a_key_or_is_replaced_is_left_out(tmp_path: Path) -> None:
         ("Q_FZ2 = 15.4", "Q_FZ2 = 1.5.4", r"tyre.tir, line 31: Q_FZ2 is '1.5.4', must be a number"),
         ("Q_FZ2 = 15.4", "Q_FZ2 = 154", r"Q_FZ2 is 154, must be at most 67.49"),
         ("FNOMIN = 4000", "FNOMIN = 0", r"tyre.tir, line 28: FNOMIN is 0, must be greater than 0"),
+        (
+            "DAMP_LONG = 0.056",
+            "DAMP_LONG = 5.6",
+            r"line \d+: DAMP_LONG is 5.6: usual is 0.0001 to 0.5",
+        ),
+        ("DAMP_LONG = 0.056", "DAMP_LONG = -0.056", r"line \d+: DAMP_LONG is -0.056: usual is"),
         ("'newton'", "'stone'", r"FORCE in \[UNITS\] is 'stone', must be one of n, kn"),
         ("MASS = 9.3", "MASS = 9.3\nMASS = 9.4", r"line 24: MASS is 9.4, and 9.3 in line 23"),
         ("NOMPRES = 220000", "NOMPRES = 2.2", r"NOMPRES is 0.0022 kPa: usual is 20 to 2000 kPa"),

@@ -19,8 +19,9 @@ from pathlib import Path
 from ..errors import InputError
 from ..files import read_bytes
 from ..simulate.modes.label import Label
+from ..tyre.usual import USUAL_MEASUREMENTS
 from ..units import INCH, POUND, POUND_FORCE
-from .measurement import PRESSURE_USUAL, SHARES_OF_NOMINAL, Measurement
+from .measurement import DAMPING_RATIO, PRESSURE_USUAL, SHARES_OF_NOMINAL, Measurement
 from .mf_swift import FREQUENCIES, MFSwift
 
 TIR_UNITS = {  # by the keys of [UNITS]: a word, and the SI unit's number of it
@@ -197,6 +198,9 @@ def property_measurements(
         notes.append(f"{path}: left out VERTICAL_STIFFNESS: [DEFLECTION_LOAD_CURVE] replaces it")
     for key in (each for each in ABOVE_ZERO if not keys.get(each, 1.0) > 0):
         raise InputError(f"{file.place(key)} is {keys[key]:g}, must be greater than 0")
+    for key in (each.replace("FREQ", "DAMP") for each in FREQUENCY_LABELS):
+        if refusal := keys.get(key) and USUAL_MEASUREMENTS[DAMPING_RATIO].refusal(keys[key]):
+            raise InputError(f"{file.place(key)} is {keys[key]:g}: {refusal}")
     pressure = _pressure(file, pressure_kPa)
 
     def measured(key: str, quantity: str, value: float, load: float = 0.0) -> Measurement:
