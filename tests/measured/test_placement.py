@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tyrecal.measured import placement
 from tyrecal.errors import InputError
+from tyrecal.measured import placement
 from tyrecal.measured.case_modes import CaseModes
 from tyrecal.measured.correlation import mac_matrix
 from tyrecal.measured.placement import at_places, mass_shifts, place_sensors, tread_places

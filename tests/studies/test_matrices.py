@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tyrecal.errors import InputError
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import DeckRefused
@@ -149,3 +150,10 @@ def test_too_few_coordinates_are_refused(case: LoadedCase) -> None:
         patched.setattr(exported, "MATRIX_PATCH_mm", PATCH_MM)
         with pytest.raises(DeckRefused, match=r"matrices need at least \d\d coordinates of modes"):
             matrix_files(case, "", 200.0, 20, POINTS)
+
+
+@pytest.mark.parametrize("bar", [2.4, -5, 2400])
+def test_a_pressure_that_no_tyre_has_is_refused(case: LoadedCase, bar: float) -> None:
+    """So one in bar is not taken as one in kPa."""
+    with pytest.raises(InputError, match=f"the pressure is {bar:g} kPa: usual is 50 to 1200 kPa"):
+        matrix_files(case, "", bar)

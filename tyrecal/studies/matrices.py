@@ -12,10 +12,12 @@ from io import BytesIO
 
 import numpy as np
 
+from ..errors import InputError
 from ..simulate.deck.decks_design import design_of
 from ..simulate.evaluate.evaluator import Evaluator, Question
 from ..tyre.case import LoadedCase, start_values
 from ..tyre.state import TyreState
+from ..tyre.usual import USUAL
 from .response import (
     FIRST_TREAD_NODE,
     HUB_CHANNELS,
@@ -83,6 +85,8 @@ def matrix_files(
     evaluator = Evaluator(design_of(case), solver)
     evaluator.needs_response()
     values = TyreState(pressure_kPa).design(case, start_values(case))
+    if refusal := pressure_kPa is not None and USUAL["pressure_kPa"].refusal(pressure_kPa):
+        raise InputError(f"the pressure is {pressure_kPa:g} kPa: {refusal}")
     answer = evaluator.evaluate(Question(values, response={**request, "modes": modes}))
     matrices = _on_iso_axes({k: np.asarray(answer.response[k]) for k in MATRIX_NAMES})
     matrices = {name: _without_noise(matrix) for name, matrix in matrices.items()}
