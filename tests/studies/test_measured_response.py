@@ -18,7 +18,7 @@ HERTZ = np.linspace(0.0, 100.0, 51)
 OMEGA = 2 * np.pi * HERTZ
 RECEPTANCE = 1 / (4e3 * (2 * np.pi) ** 2 * (1 + 0.1j) - OMEGA**2)
 FORCE = 4e3 * (2 * np.pi) ** 2 * RECEPTANCE
-PLACES = {1: (0, 0.05, 0), 7: (0, 0, -0.3), 8: (-0.3, 0.02, 0.0), 9: (0.3, 0, 0)}
+PLACES = {1: (0, 0.05, 0), 7: (0, 0, -0.3), 8: (-0.3, 0.02, 0.0), 9: (0.3, 0, 0), 10: (0.3, 0.1, 0)}
 HEADER = "excite,respond,quantity,frequency_Hz,real,imag\n"
 
 
@@ -122,6 +122,7 @@ def test_tables_that_are_refused(tmp_path: Path, rows: str, words: str) -> None:
         (motion(7, 1, FORCE, "force"), "tread:0deg:radial must be a motion"),
         (motion(7, 1, to=1), "the force must be on the tread, it is at hub:fx"),
         (motion(7, 4), "direction 4 of node 7 is along none of radial, tangential, lateral"),
+        (motion(10, 1), "node 10 is 100 mm beside the tyre's middle plane, y must be at most 30"),
         (motion(5, 1), "node 5, direction 1 has no place in the file"),
     ],
 )

@@ -2,8 +2,8 @@
 
 A universal file (data set 58) says by nodes and directions where it was measured. Its axes have to
 be those of tyrecal: the origin at the wheel's centre, x forward, y along the axle to the left, z
-up. A node within 5 cm of the axle is the hub; others are on the tread. A CSV has the columns of
-frf.csv.
+up. A node within 5 cm of the axle is the hub; others must be on the tread's
+middle line. A CSV has the columns of frf.csv.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from .response_points import HUB_CHANNELS, TREAD_MOTIONS, TREAD_SYSTEM, Response
 
 Array = np.ndarray
 HUB_RADIUS_m = 0.05  # about the axle, within which a node is the hub
+MAX_OFF_MIDDLE_m = 0.03  # of a node on the tread, along the axle
 EVEN = 0.02  # of the step between frequencies, by which steps may differ
 ALONG = 0.99  # cosine to an axis above which a direction is along it
 ORDERS = {"receptance": 0, "mobility": 1, "accelerance": 2}  # times i omega over the displacement
@@ -117,6 +118,11 @@ def _point(file: Universal, signal: tuple[int, int], place: str) -> tuple[Respon
     sign *= 1 if cosines[channel] > 0 else -1
     if is_hub:
         return ResponsePoint([*HUB_CHANNELS][turn + channel]), sign
+    if abs(at[1]) > MAX_OFF_MIDDLE_m:
+        raise InputError(
+            f"{place}: node {node} is {1e3 * abs(at[1]):.0f} mm beside the tyre's middle plane,"
+            f" y must be at most {1e3 * MAX_OFF_MIDDLE_m:.0f} mm: responses are computed there"
+        )
     angle = round(float(np.degrees(np.arctan2(-x, -z))), 3) % 360
     return ResponsePoint(TREAD_MOTIONS[channel], angle), sign
 
