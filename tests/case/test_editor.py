@@ -66,3 +66,5 @@ def test_a_written_case_names_the_schema_next_to_it(
 
 def test_the_line_comes_once() -> None:
     assert with_editor_line(with_editor_line("format: 1\n")) == EDITOR_LINE + "format: 1\n"
+    dos = (EDITOR_LINE + "format: 1\n").replace("\n", "\r\n")
+    assert with_editor_line(dos) == dos

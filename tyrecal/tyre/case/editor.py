@@ -17,7 +17,7 @@ EDITOR_LINE = f"# yaml-language-server: $schema={SCHEMA_FILE}\n"
 
 def with_editor_line(text: str) -> str:
     """The text of a case whose editor finds the schema next to it."""
-    return text if EDITOR_LINE in text else EDITOR_LINE + text
+    return text if EDITOR_LINE.strip() in text else EDITOR_LINE + text
 
 
 def case_schema() -> str:
