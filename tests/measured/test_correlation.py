@@ -115,7 +115,7 @@ def test_both_of_a_doublet_are_a_plane() -> None:
 
 
 def test_shapes_come_back_from_their_file(tmp_path: Path) -> None:
-    """Only whole ones: a signal without a value is refused."""
+    """Only whole ones: a signal without a value is refused, and a test without modes."""
     test, _ = drawn_test(generator("file"))
     measured = tmp_path / "measured.csv"
     assert read_shapes(measured) == []
@@ -123,6 +123,7 @@ def test_shapes_come_back_from_their_file(tmp_path: Path) -> None:
     assert read_shapes(measured) == [test]
     content = json.loads(shapes_text([test]))
     content["tests"][0]["modes"][0]["values"].pop()
-    shapes_path(measured).write_text(json.dumps(content))
-    with pytest.raises(InputError, match=r"at_sensors\.json: is no file of measured shapes"):
-        read_shapes(measured)
+    for tests in (content["tests"], [test.model_dump() | {"modes": []}]):
+        shapes_path(measured).write_text(json.dumps({"format": 1, "tests": tests}))
+        with pytest.raises(InputError, match=r"at_sensors\.json: is no file of measured shapes"):
+            read_shapes(measured)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from tyrecal.errors import InputError
 from tyrecal.simulate.deck.tyre_design import TyreDesign
@@ -19,7 +20,7 @@ from tyrecal.studies.pressure import State
 from tyrecal.studies.pressure import sweep as sweep_pressure
 from tyrecal.studies.result import StudyInput
 from tyrecal.studies.sweep import SweptRange, grid, latin_hypercube, read_ranges
-from tyrecal.studies.sweep_result import run
+from tyrecal.studies.sweep_result import SweepResult, run
 from tyrecal.tyre.case import start_values
 
 from ..effects.support import coarse
@@ -178,3 +179,10 @@ def test_a_variable_named_as_a_column_of_modes_has_a_column_of_its_own() -> None
     heads, *lines = (line.split(",") for line in text.splitlines())
     assert heads[:4] == ["variables.c", "pressure_kPa", "mass_kg", "c"]
     assert {float(line[0]) for line in lines} == {8e5, 1e6, 1.2e6}
+
+
+def test_a_result_without_modes_is_refused() -> None:
+    """So a damaged sweep.json is named by `tyrecal report`."""
+    result = run(given(), [C10, PRESSURE], sampled=False)
+    with pytest.raises(ValidationError, match="modes"):
+        SweepResult.model_validate(result.model_dump() | {"modes": []})

@@ -130,6 +130,6 @@ def read_shapes(measured: Path) -> list[SensorShapes]:
 
 
 def _is_whole(test: SensorShapes) -> bool:
-    """Whether each signal has a place, a direction and a value of each mode."""
+    """Whether there are modes, and each signal has a place, a direction and a value of each."""
     counts = {len(test.points), len(test.directions), *(len(each.values) for each in test.modes)}
-    return counts == {len(test.signals)}
+    return bool(test.modes) and counts == {len(test.signals)}

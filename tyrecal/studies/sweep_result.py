@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
+from ..errors import InputError
 from ..simulate.evaluate.failure import EvaluationFailed
 from ..simulate.modes.find import LabelledModes
 from ..simulate.modes.label import Label, labelled
@@ -89,7 +90,7 @@ class SweepResult(Result):
     numbers_swept: list[SweptNumber]  # swept numbers with their ranges
     rows: Annotated[list[SweptPoint], Field(min_length=1)]  # points that were computed
     failed: list[Failed]  # points that were not
-    modes: list[SweptMode]  # modes over all points
+    modes: Annotated[list[SweptMode], Field(min_length=1)]  # modes over all points
     findings: SweepFindings  # findings on all points
 
     @classmethod
@@ -178,6 +179,8 @@ def run(
     if not rows:
         raise failures[min(failures)]
     modes = [_mode(each.label, swept, rows) for each in rows[0].modes]
+    if not modes:
+        raise InputError("no mode is at every point of the sweep: give narrower ranges")
     result = SweepResult(
         format=1,
         design=name,
