@@ -133,6 +133,13 @@ def test_records_of_several_lines(tmp_path: Path) -> None:
         (SI, channel("FZW", "N", 1, 0, 0), channel("FZW", "N", 1, 5, 0), "FZW has an offset"),
         (SI, channel("FZW", "N", 1, 0, 0), channel("FZW", "t", 1, 0, 0), "unit of FZW is 't'"),
         (SI, channel("FZW", "N", 1, 0, 0), channel("FZX", "N", 1, 0, 0), "no channel FZW or FZH"),
+        (SI, channel("FZW", "N", 1, 0, 0), channel("FZW", "N", 0, 0, 0), "from 0 to 0 N; a curve"),
+        (
+            SI,
+            channel("TYREDEFW", "m", 1, 0, 0),
+            channel("TYREDEFW", "m", 0, 0, 0),
+            "all values of TYREDEFW are 0 m",
+        ),
         (SI, constant("RFREE", "m", f"{R0}"), constant("RFREE", "m", "x"), "RFREE is 'x'"),
         (SI, SI[-2], SI[-2][:20], "14 complete lines of data; it is cut off"),
         (SI, SI[-2], f"{SI[-2]} 3.0", r"line 31: 4 numbers, the channels are 3"),

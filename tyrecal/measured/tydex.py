@@ -189,10 +189,14 @@ def tydex_measurements(
     load = load if not len(load) or np.median(load) >= 0 else -load
     pressing = load >= MIN_PRESSED * load.max(initial=0.0)
     load, deflection = load[pressing], deflection[pressing]
-    if len(load) < MIN_RECORDS or np.ptp(load) < load.max() / 2:
+    if len(load) < MIN_RECORDS or not np.ptp(load) >= load.max() / 2 > 0:
         raise InputError(
             f"{path}: {len(load)} records of load and deflection from {load.min(initial=0.0):g} to"
             f" {load.max(initial=0.0):g} N; a curve needs {MIN_RECORDS}, from half the load or less"
+        )
+    if not np.ptp(deflection):
+        raise InputError(
+            f"{path}: all values of {name} are {deflection[0]:g} m; a curve needs others"
         )
     _refuse_tilt(file)
     pressure, notes = _pressure(file, pressure_kPa)
