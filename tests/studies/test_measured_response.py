@@ -122,7 +122,7 @@ def test_tables_that_are_refused(tmp_path: Path, rows: str, words: str) -> None:
         (motion(7, 1, FORCE, "force"), "tread:0deg:radial must be a motion"),
         (motion(7, 1, to=1), "the force must be on the tread, it is at hub:fx"),
         (motion(7, 4), "direction 4 of node 7 is along none of radial, tangential, lateral"),
-        (motion(10, 1), "node 10 is 100 mm beside the tyre's middle plane, y must be at most 30"),
+        (motion(10, 1), "node 10 is 100 mm off the tyre's middle plane, y must be at most 30"),
         (motion(5, 1), "node 5, direction 1 has no place in the file"),
     ],
 )

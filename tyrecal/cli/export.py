@@ -124,7 +124,8 @@ def command(
 
     Matrices are those of the unloaded tyre at a pressure: stiffness, mass and loss on the six
     motions of the hub and its modes (Craig and Bampton), as Matrix Market and for ABAQUS, with a
-    README of coordinates and units. For these DIR may be a case file, too.
+    README of coordinates and units. A case, decks and matrices need the fit.json in DIR; for
+    matrices DIR may also be a case file.
 
     \b
     tyrecal export p235_75r17

@@ -120,7 +120,7 @@ def _point(file: Universal, signal: tuple[int, int], place: str) -> tuple[Respon
         return ResponsePoint([*HUB_CHANNELS][turn + channel]), sign
     if abs(at[1]) > MAX_OFF_MIDDLE_m:
         raise InputError(
-            f"{place}: node {node} is {1e3 * abs(at[1]):.0f} mm beside the tyre's middle plane,"
+            f"{place}: node {node} is {1e3 * abs(at[1]):.0f} mm off the tyre's middle plane,"
             f" y must be at most {1e3 * MAX_OFF_MIDDLE_m:.0f} mm: responses are computed there"
         )
     angle = round(float(np.degrees(np.arctan2(-x, -z))), 3) % 360
