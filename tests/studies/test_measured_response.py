@@ -93,12 +93,30 @@ def test_a_table_has_the_columns_of_frf_csv(tmp_path: Path) -> None:
     np.testing.assert_allclose(mobility.as_form("receptance") * 1j * OMEGA[1:], RECEPTANCE[1:])
 
 
+def test_a_column_of_units_counts(tmp_path: Path) -> None:
+    """Receptances in mm/N are 1000 times as many as in m/N; a column is given once."""
+    path = tmp_path / "m.csv"
+    ends = "tread:0deg:radial,tread:0deg:radial,receptance"
+    rows = "".join(f"{ends},{{}},{f:g},2,-1\n" for f in (10, 20))
+    for unit, factor in (("mm/N", 1e-3), ("m/N", 1.0)):
+        path.write_text(HEADER.replace("quantity", "quantity,unit") + rows.replace("{}", unit))
+        (each,) = read_measured_responses(path, "receptance", 0.0, 100.0)
+        np.testing.assert_allclose(each.values, factor * (2 - 1j))
+    path.write_text(HEADER.replace("quantity", "quantity,unit") + rows.replace("{}", "in/lbf"))
+    with pytest.raises(InputError, match="line 2: the unit 'in/lbf' is not one of m/N, mm/N"):
+        read_measured_responses(path, "receptance", 0.0, 100.0)
+    path.write_text(HEADER.replace("quantity", "real") + rows.replace("{},", ""))
+    with pytest.raises(InputError, match="has the column real twice"):
+        read_measured_responses(path, "receptance", 0.0, 100.0)
+
+
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
         ("tread:0deg:up,hub:fz,,10,1,0\n", "line 2: 'tread:0deg:up' is no point"),
         ("tread:0deg:radial,hub:fz,,10,1,x\n", "line 2: must be a number"),
         ("tread:0deg:radial,tread:0deg:radial,speed,10,1,0\n", "quantity is 'speed', must be one"),
+        ("tread:0deg:radial,hub:fz,,10,1\n", "line 2: 5 cells, the headings are 6"),
         ("tread:0deg:radial,hub:fz,,10,1,0\n", "two frequencies or more"),
         (
             "".join(f"tread:0deg:radial,hub:fz,,{f},1,0\n" for f in (10, 12, 17)),

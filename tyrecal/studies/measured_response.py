@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..measured.universal import BLOCKED_FORCE, Function, Universal, is_universal, read_universal
-from ..tyre.number_table import NumberMarks, read_text_table
+from ..tyre.number_table import NumberMarks, cells_under, read_text_table
 from .response_points import HUB_CHANNELS, TREAD_MOTIONS, TREAD_SYSTEM, ResponsePoint, read_points
 
 Array = np.ndarray
@@ -26,6 +26,7 @@ EVEN = 0.02  # of the step between frequencies, by which steps may differ
 ALONG = 0.99  # cosine to an axis above which a direction is along it
 ORDERS = {"receptance": 0, "mobility": 1, "accelerance": 2}  # times i omega over the displacement
 FRF_COLUMNS = ("excite", "respond", "frequency_Hz", "real", "imag")
+UNITS = "m/N, mm/N, m/s2/N, g/N, N/N"  # the usual ones, for messages
 SI_PER_UNIT = {  # of a response's unit per newton, to SI; without a unit a response is in SI
     **dict.fromkeys(("", "m/n", "m/s/n", "m/s2/n", "m/s^2/n", "m/s²/n", "n/n", "nm/n"), 1.0),
     **dict.fromkeys(("mm/n", "mm/s/n", "mm/s2/n", "mm/s^2/n"), 1e-3),
@@ -89,9 +90,7 @@ def _read_universal(path: Path, form: str) -> list[tuple[str, MeasuredResponse]]
 
 def _of_function(file: Universal, each: Function, form: str) -> MeasuredResponse:
     if each.unit not in SI_PER_UNIT:
-        raise InputError(
-            f"{each.place}: the unit '{each.unit}' is not one of m/N, m/s2/N, g/N, N/N"
-        )
+        raise InputError(f"{each.place}: the unit '{each.unit}' is not one of {UNITS}")
     respond, sign = _point(file, each.response, each.place)
     excite, other = _point(file, each.reference, each.place)
     if excite.angle_deg is None:
@@ -138,21 +137,29 @@ def _read_table(path: Path, form: str) -> list[tuple[str, MeasuredResponse]]:
             f"{path}: has no column {missing[0]}; give a universal file, or a CSV with the columns"
             f" {', '.join(FRF_COLUMNS)}"
         )
-    places = [headings.index(name) for name in FRF_COLUMNS]
-    marks = NumberMarks.of((cells[i] for _, cells in lines for i in places[2:]), table.separator)
-    quantity = headings.index("quantity") if "quantity" in headings else None
-    by_pair: dict[tuple[str, str, str], list[list[float]]] = {}
-    first: dict[tuple[str, str, str], int] = {}
+    if twice := [name for name in headings if name and headings.count(name) > 1]:
+        raise InputError(f"{path}: has the column {twice[0]} twice")
+    by_line: dict[int, dict[str, str]] = {}
     for number, cells in lines:
         try:
-            excite, respond, *numbers = (cells[i] for i in places)
-            own = "" if quantity is None else cells[quantity]
-            by_pair.setdefault((excite, respond, own), []).append(
-                [marks.number(x) for x in numbers]
-            )
-        except (ValueError, IndexError) as error:
+            by_line[number] = dict(zip(headings, cells_under(headings, cells), strict=True))
+        except InputError as error:
             raise InputError(f"{path}, line {number}: {error}") from None
-        first.setdefault((excite, respond, own), number)
+    texts = (row[name] for row in by_line.values() for name in FRF_COLUMNS[2:])
+    marks = NumberMarks.of(texts, table.separator)
+    by_pair: dict[tuple[str, str, str], list[list[float]]] = {}
+    first: dict[tuple[str, str, str], int] = {}
+    for number, row in by_line.items():
+        unit = row.get("unit", "")
+        if (scale := SI_PER_UNIT.get(unit.replace(" ", "").lower())) is None:
+            raise InputError(f"{path}, line {number}: the unit '{unit}' is not one of {UNITS}")
+        try:
+            hertz, *parts = (marks.number(row[name]) for name in FRF_COLUMNS[2:])
+        except ValueError as error:
+            raise InputError(f"{path}, line {number}: {error}") from None
+        pair = row["excite"], row["respond"], row.get("quantity", "")
+        by_pair.setdefault(pair, []).append([hertz, *(scale * part for part in parts)])
+        first.setdefault(pair, number)
     result = []
     for (excite, respond, own), rows in by_pair.items():
         place = f"{path}, line {first[excite, respond, own]}"
