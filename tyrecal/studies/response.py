@@ -151,9 +151,14 @@ class FrfResult(Result):
         name, values = [*given.designs.items()][-1]
         forces, seen = read_points(excite, hub=False), read_points(respond)
         tread = _of_tread(seen, forces)
+        by_points = {(each.excite, each.respond): each for each in known}
+        if known and not by_points.keys() & {(force, point) for force in forces for point in seen}:
+            raise InputError(
+                f"{measured}: no function in it is of {excite} and {respond}; the first is of"
+                f" {known[0].excite} and {known[0].respond}"
+            )
         result = _evaluated(given, values, request)
         answer = result.response
-        by_points = {(each.excite, each.respond): each for each in known}
         functions = [
             _entry(answer, force, e, point, tread, form).compared(by_points.get((force, point)))
             for e, force in enumerate(forces)
