@@ -123,6 +123,16 @@ def test_its_own_file_as_the_measured_one(
     assert len(draw_responses(result)["frf"].axes) == 6
 
 
+def test_points_that_no_measured_function_has_are_refused(
+    responses: FrfResult, case: LoadedCase, tmp_path: Path
+) -> None:
+    path = tmp_path / "frf.uff"
+    path.write_text(responses.texts()["frf.uff"])
+    given = StudyInput(case, Evaluator(TyreDesign(case)), {"initial": start_values(case)})
+    with pytest.raises(InputError, match="no function in it is of tread:45deg:radial and hub:fx"):
+        FrfResult.run(given, measured=path, excite="tread:45deg:radial", respond="hub:fx")
+
+
 def test_tables_and_pictures(responses: FrfResult) -> None:
     (table,) = responses.tables()
     assert len(table.rows) == len(responses.functions) == 40
@@ -152,6 +162,20 @@ def test_the_command_and_accelerance(tmp_path: Path, capsys: pytest.CaptureFixtu
     scaled = -(omega**2) * functions["receptance"]["real"]
     assert functions["accelerance"]["real"] == pytest.approx(scaled)
     assert functions["accelerance"]["unit"] == "m/s²/N"
+    before = (out / "frf.csv").read_bytes()
+    with pytest.raises(SystemExit) as ended:
+        main(
+            [
+                "frf",
+                str(CASE_FILE),
+                *words.split()[:4],
+                *words.split()[6:],
+                "--measured",
+                f"{out}/frf.csv",
+            ]
+        )
+    assert ended.value.code == 2 and (out / "frf.csv").read_bytes() == before
+    assert "frf.csv' is read, a result would replace it" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

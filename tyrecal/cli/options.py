@@ -309,7 +309,7 @@ class Study:
 
         block = provenance(loaded, evaluator.solver, measured, **state)
         run = Run(loaded.path, self.output, command, evaluator.solver, study, block, loaded)
-        run.figure_format = self.figure_format
+        run.figure_format, run.measured = self.figure_format, measured
         evaluator.folder, evaluator.keep = run.runs, self.terminal.verbose
         evaluator.store = run.open_store(self.store, self.no_store)
         run.counts = counts = evaluator.counts

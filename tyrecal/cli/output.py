@@ -11,7 +11,7 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -143,6 +143,7 @@ class Run:
         self._clock, self._finished = time.monotonic(), False
         self.store: Store | None = None
         self.counts: Counts | None = None
+        self.measured: Sequence[Path] = ()  # files that are read, which no result may replace
         resume("nothing was computed; the same command starts from the beginning")
         if self.folder.exists() and not self.folder.is_dir():
             raise InputError(f"'{self.folder}' is a file; give a folder with --output")
@@ -203,7 +204,10 @@ class Run:
         return content
 
     def write_text(self, name: str, text: str) -> None:
-        """Write a result file."""
+        """Write a result file. Raises InputError where it would replace a file that is read."""
+        place = self.folder / name
+        if place.resolve() in [each.resolve() for each in self.measured]:
+            raise InputError(f"'{place}' is read, a result would replace it: give another --output")
         write_text(self.new / name, text)
 
     @property
