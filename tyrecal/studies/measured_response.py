@@ -26,7 +26,7 @@ EVEN = 0.02  # of the step between frequencies, by which steps may differ
 ALONG = 0.99  # cosine to an axis above which a direction is along it
 ORDERS = {"receptance": 0, "mobility": 1, "accelerance": 2}  # times i omega over the displacement
 FRF_COLUMNS = ("excite", "respond", "frequency_Hz", "real", "imag")
-UNITS = "m/N, mm/N, m/s2/N, g/N, N/N"  # the usual ones, for messages
+SHOWN_RESPONSE_UNITS = "m/N, mm/N, m/s2/N, g/N, N/N"  # the usual ones, for messages
 SI_PER_UNIT = {  # of a response's unit per newton, to SI; without a unit a response is in SI
     **dict.fromkeys(("", "m/n", "m/s/n", "m/s2/n", "m/s^2/n", "m/s²/n", "n/n", "nm/n"), 1.0),
     **dict.fromkeys(("mm/n", "mm/s/n", "mm/s2/n", "mm/s^2/n"), 1e-3),
@@ -90,7 +90,9 @@ def _read_universal(path: Path, form: str) -> list[tuple[str, MeasuredResponse]]
 
 def _of_function(file: Universal, each: Function, form: str) -> MeasuredResponse:
     if each.unit not in SI_PER_UNIT:
-        raise InputError(f"{each.place}: the unit '{each.unit}' is not one of {UNITS}")
+        raise InputError(
+            f"{each.place}: the unit '{each.unit}' is not one of {SHOWN_RESPONSE_UNITS}"
+        )
     respond, sign = _point(file, each.response, each.place)
     excite, other = _point(file, each.reference, each.place)
     if excite.angle_deg is None:
@@ -152,7 +154,9 @@ def _read_table(path: Path, form: str) -> list[tuple[str, MeasuredResponse]]:
     for number, row in by_line.items():
         unit = row.get("unit", "")
         if (scale := SI_PER_UNIT.get(unit.replace(" ", "").lower())) is None:
-            raise InputError(f"{path}, line {number}: the unit '{unit}' is not one of {UNITS}")
+            raise InputError(
+                f"{path}, line {number}: the unit '{unit}' is not one of {SHOWN_RESPONSE_UNITS}"
+            )
         try:
             hertz, *parts = (marks.number(row[name]) for name in FRF_COLUMNS[2:])
         except ValueError as error:
