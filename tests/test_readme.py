@@ -208,7 +208,8 @@ def test_ci_runs_the_readmes_test_command_then_what_it_leaves_out() -> None:
         "(",
         ") & programs=$!",
         f"{test_command} || failed=1",
-        f".venv-test/bin/{BUILD_SITE.replace(' -c', ' -W --keep-going -q -c')} || failed=1",
+        ".venv-test/bin/pip install -q -e '.[docs]' &&"
+        f" .venv-test/bin/{BUILD_SITE.replace(' -c', ' -W --keep-going -q -c')} || failed=1",
         ".venv-test/bin/python -m tests.versions & versions=$!",
         ".venv-test/bin/python -m tests.kernels || failed=1",
         "wait $versions || failed=1",
