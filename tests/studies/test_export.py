@@ -15,6 +15,7 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.studies.fitted import as_fitted
 from tyrecal.tyre.case import start_values
 from tyrecal.tyre.case.edit_text import set_in_text
+from tyrecal.tyre.case.editor import SCHEMA_FILE
 from tyrecal.tyre.case.identity import tyre_sha256
 from tyrecal.tyre.case.mistakes import Keys
 from tyrecal.tyre.case.own_case import own_case
@@ -79,6 +80,7 @@ def test_a_case_as_fitted(name: str, tmp_path: Path) -> None:
     old_lines, lines = (numbers_apart(path.read_text()) for path in (case, new))
     added = [line for line in lines if line not in old_lines]
     added = [words for line in added if (words := line.partition("  # ")[0].strip())]
+    assert added.pop(0) == f"# yaml-language-server: $schema={SCHEMA_FILE}"
     assert {*added} - {"effects:"} == {"level: coarse", "mass_kg: #", "bead_filler: #"}
     gone = [line.partition("  # ")[0].strip() for line in old_lines if line not in lines]
     assert gone == ["level: default"]

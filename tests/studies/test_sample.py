@@ -64,7 +64,7 @@ def test_a_tyre_on_two_rims_is_sampled_and_predicted_on_both() -> None:
     spindle = {"s": case.case.variables["C10"].model_copy(update={"sets": [SPRINGS[0]]})}
     held = replace(case, case=case.case.model_copy(update={"variables": spindle}))
     with pytest.raises(InputError, match=r"^s sets the rim's compliance"):
-        check(held, evaluator, readings)
+        check(held, readings)
 
 
 def rows(pressures: tuple[float, ...]) -> tuple[Observable, ...]:

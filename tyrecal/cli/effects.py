@@ -62,7 +62,6 @@ def command(
     from ..report.effects import effect_text, effects_table
     from ..report.table import shown
     from ..simulate.evaluate.solver import installed
-    from ..studies.difference_runs import runs_in_words
     from ..studies.effects import CatalogueEntry, run
     from ..tyre.effects import IDS, catalogue
 
@@ -107,6 +106,8 @@ def command(
             terminal.say(f"{each.id}: solver '{adapter.name}' cannot express it")
     terminal.detail(f"each at {', '.join(f'{p:g}' for p in kPa)} kPa")
     if not evaluator.has_gradients:
+        from ..studies.difference_runs import runs_in_words
+
         runs = len(kPa) * (1 + len(values) + len(able))
         terminal.note(runs_in_words(evaluator, values, runs, study.jobs))
     with terminal.progress("effects") as bar:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import groupby
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -17,8 +17,10 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from ..errors import InputError
 from ..files import json_text, read_json
 from ..simulate.modes.label import Label
-from .modal import ModalTest
 from .sensors import Sensors
+
+if TYPE_CHECKING:  # readers of shapes identify no modes
+    from .modal import ModalTest
 
 Array = np.ndarray
 Vector = tuple[float, float, float]

@@ -3,16 +3,17 @@ the sensors separate the modes, and which sensors agree least."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from ..measured.case_modes import CaseModes
-from ..measured.correlation import chance_level, closest_shape, mac_matrix, sensor_agreement
-from ..measured.shapes import SensorShapes
 from ..simulate.modes.label import in_words
 from ..simulate.modes.subspace import squared_cosines
 from .result import Column, ResultPart, Table
+
+if TYPE_CHECKING:  # those who read results need no SciPy
+    from ..measured.case_modes import CaseModes
+    from ..measured.shapes import SensorShapes
 
 Array = np.ndarray
 COMPARED_UP_TO = 1.5  # times the highest measured frequency, of a mode of the design
@@ -111,6 +112,8 @@ def correlate(test: SensorShapes, case: CaseModes) -> ShapeCorrelation:
 
     Raises InputError if a sensor is not on the tyre.
     """
+    from ..measured.correlation import chance_level, mac_matrix
+
     sensors, level = test.sensors, chance_level(len(test.signals))
     limit = COMPARED_UP_TO * max(mode.frequency_Hz for mode in test.modes)
     possible = [mode for mode in case.modes if mode.frequency_Hz <= limit]
@@ -160,6 +163,8 @@ def _sensors(
     test: SensorShapes, pairs: list[ShapePair], planes: dict[str, Array]
 ) -> list[SensorAgreement]:
     """Agreement of the signals over the decided pairs; none without a pair."""
+    from ..measured.correlation import closest_shape, sensor_agreement
+
     shapes = [
         (np.array(mode.values), planes[pair.computed])
         for mode, pair in zip(test.modes, pairs, strict=True)

@@ -3,15 +3,15 @@ sensors.json."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from ..measured.case_modes import CaseModes
-from ..measured.correlation import chance_level, mac_matrix
-from ..measured.placement import labelled_in_tests, mass_shifts, place_sensors
 from ..simulate.modes.label import Mode
 from .result import NAME_COLUMNS, Column, Named, Result, ResultPart, Table, csv_text
+
+if TYPE_CHECKING:  # those who read results need no SciPy
+    from ..measured.case_modes import CaseModes
 
 Array = np.ndarray
 
@@ -73,6 +73,9 @@ def place(
 ) -> SensorsResult:
     """``count`` sensors for modes of a case. Labels are those of an import that allows one wave
     more than the modes have; seed: of the drawn tests."""
+    from ..measured.correlation import chance_level, mac_matrix
+    from ..measured.placement import labelled_in_tests, mass_shifts, place_sensors
+
     sensors = place_sensors(case, modes, count, axes)
     places = sensors.points[:: len(axes)]
     highest, random = 1 + max(mode.label.c for mode in modes), np.random.default_rng(seed)

@@ -56,6 +56,9 @@ def model_errors(problem: Problem, point: Point) -> ModelErrors:
     targets on the road, see `road_changes`, and those of a fit without prior, which does not press
     the tyre for it.
     """
+    if not problem.evaluator.has_gradients:  # by differences, each constant would be another run
+        name = problem.evaluator.solver.name
+        raise DeckRefused(f"solver '{name}' gives no exact sensitivities of this case")
     if problem.road and problem.spread is None:
         raise ValueError("for targets on the road it is computed with --prior alone")
     case, counted = problem.case, problem.counted
