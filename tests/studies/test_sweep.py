@@ -64,7 +64,7 @@ def test_a_grid_has_every_combination_with_its_frequencies() -> None:
     for name, ratio in spans.items():  # a span of the mean: (f_high - f_low) / f_mean
         assert mode.change_percent[name] == pytest.approx(200 * ratio / (2 + ratio), rel=0.01)
     assert 0.99 < mode.linear_share < 1
-    assert "pressure_kPa moves" in result.sentences()[2]
+    assert "most by pressure_kPa: " in result.sentences()[2]
     assert len(result.csv().splitlines()) == 1 + 6 * len(LABELS)
 
 

@@ -279,5 +279,5 @@ def _words(
     for each in swept:
         most = max(modes, key=lambda mode: abs(mode.change_percent[each.name]))
         change = most.change_percent[each.name]
-        words.append(f"{each.name} moves {most.label.display} most, by {change:+.2g} %")
+        words.append(f"most by {each.name}: {most.label.display}, {change:+.2g} %")
     return words
