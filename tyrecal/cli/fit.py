@@ -66,14 +66,7 @@ if TYPE_CHECKING:
     show_default=True,
     help="Number of starts: the case's, and others drawn within the bounds.",
 )
-@option(
-    "--seed",
-    type=WholeNumber(0),
-    default=0,
-    metavar="S",
-    show_default=True,
-    help="Seed of the drawn starts.",
-)
+@options.seed("the drawn starts")
 @option("--pictures/--no-pictures", default=True, help="Draw convergence, section, modes.")
 @options.dry_run
 @options.scheduler

@@ -395,6 +395,18 @@ def _terminal_of(values: dict[str, Any]) -> Terminal:
     return terminal
 
 
+def seed(of: str, highest: int | None = None) -> Callable[[Any], Any]:
+    """The option of a study that draws by chance; ``of``: its draws in words."""
+    return option(
+        "--seed",
+        type=WholeNumber(0, highest),
+        default=0,
+        metavar="S",
+        show_default=True,
+        help=f"Seed of {of}.",
+    )
+
+
 def fitted(compares: str = "") -> Callable[[Any], Any]:
     """A finished fit, whose design is studied; ``compares``: the words that the initial one is
     studied too."""

@@ -27,14 +27,7 @@ from .parameters import FileOrFolder, Number, WholeNumber, option
     help="Number of draws; up to 20 times as many are made, until the chains are 20"
     " autocorrelation times long.",
 )
-@option(
-    "--seed",
-    type=WholeNumber(0, 2**32 - 1),
-    default=0,
-    metavar="S",
-    show_default=True,
-    help="Seed of the draws.",
-)
+@options.seed("the draws", 2**32 - 1)
 @option(
     "--at-kPa",
     "at_kPa",

@@ -21,14 +21,7 @@ from .parameters import WholeNumber, option
     help="Number of points of a Latin hypercube within ranges NAME=A:B (default: a grid; without"
     " ranges 10 points for each variable).",
 )
-@option(
-    "--seed",
-    type=WholeNumber(0, 2**32 - 1),
-    default=0,
-    metavar="S",
-    show_default=True,
-    help="Seed of the Latin hypercube.",
-)
+@options.seed("the Latin hypercube", 2**32 - 1)
 @options.fitted()
 @option("--pictures/--no-pictures", default=True, help="Draw frequencies over each number.")
 @options.scheduler
