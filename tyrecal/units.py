@@ -54,6 +54,7 @@ LOAD = {
     "lb": POUND_FORCE,
     "lbs": POUND_FORCE,
 }
+DAMPING_UNITS = {"%": 0.01, "1": 1.0, "-": 1.0}  # to fractions of critical
 SAID = {  # SI unit: what people say, and how many of it one is
     "m": ("mm", 1e3),
     "m2": ("mm²", 1e6),

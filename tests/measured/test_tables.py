@@ -55,6 +55,51 @@ def test_one_table_in_many_spellings(tmp_path: Path, text: str | bytes) -> None:
     assert [v.pressure_kPa for v in values] == pytest.approx([240, 240])
 
 
+@pytest.mark.parametrize(
+    ("heading", "cell"),
+    [
+        ("Damping [%]", "2.5"),
+        ("damping_percent", "2.5"),
+        ("Dämpfung [%]", "2.5"),
+        ("damping_ratio", "0.025"),
+        ("zeta [-]", "0.025"),
+        ("loss factor", "0.05"),
+        ("eta [%]", "5"),
+    ],
+)
+def test_damping_in_many_spellings(tmp_path: Path, heading: str, cell: str) -> None:
+    (value,) = read(tmp_path, f"label;pressure [bar];f;{heading}\n[2,1];2.4;66.1;{cell}\n")
+    assert (value.value, value.damping_ratio) == (66.1, pytest.approx(0.025))
+
+
+@pytest.mark.parametrize(
+    ("heading", "cell", "words"),
+    [
+        ("damping", "2.5", "has no unit; write it as 'damping \\[%\\]'"),
+        ("damping_ratio", "2.5", "line 2: .* write percent as in 'damping \\[%\\]'"),
+        ("damping [Hz]", "2.5", "the unit must be one of %, 1, -"),
+    ],
+)
+def test_damping_of_which_nothing_states_the_unit(
+    tmp_path: Path, heading: str, cell: str, words: str
+) -> None:
+    with pytest.raises(InputError, match=words):
+        read(tmp_path, f"label;pressure [bar];f;{heading}\n[2,1];2.4;66.1;{cell}\n")
+
+
+@pytest.mark.parametrize("form", ["{}", "Mode {}", "{}.", "#{}"])
+def test_running_numbers_are_no_labels(tmp_path: Path, form: str) -> None:
+    """In each state from 1; numbers in any other order may mean modes, and are refused."""
+    state = lambda bar, numbers: "".join(f"{form.format(n)};{40 + n};{bar}\n" for n in numbers)
+    head = "Mode;f [Hz];p [bar]\n"
+    values = read(tmp_path, head + state(2.0, (1, 2, 3)) + state(2.4, (1, 2)))
+    assert [(each.label, each.value) for each in values] == [
+        (None, 40 + n) for n in (1, 2, 3, 1, 2)
+    ]
+    with pytest.raises(InputError, match="label is"):
+        read(tmp_path, head + state(2.0, (1, 3)))
+
+
 def test_own_measurements_come_back(tmp_path: Path) -> None:
     text = (Path(__file__).parents[2] / "cases/p235_75r17_wheeler.csv").read_text()
     first = combined(read(tmp_path, text))

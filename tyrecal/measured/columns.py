@@ -20,6 +20,9 @@ HEADINGS = {
     "vertical_stiffness_N_per_m": "vertical_stiffness radial_stiffness stiffness kz"
     " vertikalsteifigkeit federrate",
     "mass_kg": "mass tyre_mass tire_mass weight masse gewicht",
+    "damping_ratio": "damping damping_ratio modal_damping modal_damping_ratio zeta \u03b6 xi \u03be"
+    " dampfung modale_dampfung dampfungsgrad dampfungsmass amortissement smorzamento",
+    "loss_factor": "loss_factor eta \u03b7 verlustfaktor",
     "label": "label mode mode_shape mode_name modus modo moda shape form eigenform modenform"
     " bezeichnung",
     "c": "c n circumferential circumferential_order circumferential_harmonic waves harmonic"
@@ -43,7 +46,10 @@ ENDING = re.compile(
     r"^(.+?)(?:\s*/\s*|\s+in\s+|[\s_]|(?=%))(%|hz|kpa|bar|psi|n|m2|n[\s_]per[\s_]m|kg|kn|lbf|kgf|dan|percent)$"
 )
 LENGTH_ENDING = re.compile(r"^(.+)[\s_](m|mm|cm|in|inch)$")  # 'mode m' ends in no unit
+DAMPINGS = {"damping_ratio": 1.0, "loss_factor": 0.5}  # damping ratio per unit of each
+FRACTIONS = {"damping_ratio", "modal_damping_ratio", *HEADINGS["loss_factor"].split()}
 TABLES = {"pressure": units.PRESSURE, "load": units.LOAD, **units.QUANTITIES}
+TABLES |= dict.fromkeys(DAMPINGS, units.DAMPING_UNITS)
 NUMBER_MEANINGS = {*TABLES, "sigma", "value"}  # what numbers with a decimal mark stand in
 LENGTHS = {name for name, table in units.QUANTITIES.items() if table is units.LENGTH}
 
@@ -62,7 +68,7 @@ class TableColumn:
 
 
 def meaning_of(heading: str) -> str | None:
-    """Meaning of a column by its heading; None for damping, remarks and the like."""
+    """Meaning of a column by its heading; None for remarks and the like."""
     return MEANING.get(_heading(heading)[0])
 
 
@@ -90,7 +96,7 @@ def read_columns(
         meaning = MEANING.get(name)
         if meaning is None:
             _refuse_state(heading, unit, place)
-            continue  # damping, remarks and the like
+            continue  # remarks and the like
         if meaning in columns:
             raise InputError(f"{place}: two columns are the {meaning}; rename one")
         try:
@@ -122,7 +128,7 @@ def _refuse_state(heading: str, unit: str, place: str) -> None:
 def _column(index: int, heading: str, meaning: str, unit: str) -> TableColumn:
     """Raises InputError with what is wrong with the unit."""
     if table := TABLES.get(meaning):
-        if not unit and meaning != "frequency_Hz":
+        if not unit and meaning != "frequency_Hz" and _heading(heading)[0] not in FRACTIONS:
             raise InputError(f" has no unit; write it as '{heading} [{next(iter(table))}]'")
         factor = units.factor(table, unit) if unit else 1.0
         if factor is None:

@@ -122,6 +122,8 @@ def gather(
             f" without a label{f' ({why})' * bool(why)}; 'tyrecal fit' and 'tyrecal measured label'"
             " label them by the model"
         )
+        if any(isfinite(each.damping_ratio) for each in without_label):
+            notes.append("damping of frequencies without a label is left out: it belongs to a mode")
     return Gathered(rows + without_label, runs, notes, [*common_shifts(kept), *doubts(rows)])
 
 

@@ -12,8 +12,9 @@ from ..simulate.settings import settings
 from ..tyre.case.parts import RimSupport
 from ..tyre.number_table import NumberMarks
 from ..tyre.state import RIMS
+from ..tyre.usual import USUAL_MEASUREMENTS
 from ..units import QUANTITIES
-from .columns import TableColumn
+from .columns import DAMPINGS, TableColumn
 from .measurement import AS_CASE, DAMPING_RATIO, OF_A_MODE, Measurement
 from .mode_names import label_parts
 
@@ -84,6 +85,7 @@ class Line:
             elif sigma and not sigma.of:  # without a unit: in that of the value
                 deviation *= self.columns["value" if self.cell("value") else quantity].factor
             rim = self._rim()
+            is_modal = quantity == "frequency_Hz"
             is_mass = quantity == "mass_kg"  # which neither the pressure nor the rim changes
             yield Measurement(
                 quantity=quantity,
@@ -96,7 +98,21 @@ class Line:
                 run=f"{run} {self.cell('run')}".rstrip(),
                 place=self.place,
                 rim=None if is_mass else rim,
+                damping_ratio=self._damping_ratio() if is_modal else nan,
             )
+
+    def _damping_ratio(self) -> float:
+        """Damping ratio of the line's mode, NaN where none is given. Raises InputError."""
+        given = [meaning for meaning in DAMPINGS if self.cell(meaning)]
+        if not given:
+            return nan
+        ratio = DAMPINGS[given[0]] * self.number(given[0])
+        if refusal := USUAL_MEASUREMENTS[DAMPING_RATIO].refusal(ratio):
+            raise InputError(
+                f"{given[0]} is '{self.cell(given[0])}', a damping ratio of {ratio:g}: {refusal};"
+                " write percent as in 'damping [%]'"
+            )
+        return ratio
 
     def _quantities(self) -> list[str]:
         """Quantities that the line states: the one named, or each that has a column. Raises

@@ -28,6 +28,7 @@ MAX_LINES = 10_000  # of a file
 MAX_TITLES = 20  # lines in which the headings are looked for
 WITH_UNIT = re.compile(r"([+-]?[\d.,' ]*\d[.,]?(?:[eE][+-]?\d+)?)\s*([^\d\s.,].*)")
 GAPS = {"n.a.", "na", "n/a", "n. a.", "#n/a", "#nv", "k.a.", "n.d.", "nd", "-", "--", "\u2013"}
+RUNNING_NUMBER = re.compile(r"(?:mode|nr|no|#)?[\s._-]*(\d+)\.?", re.IGNORECASE)
 OPENED = re.compile(r"^[\[(]\s*\d+$")  # a label that its comma has parted
 
 
@@ -96,6 +97,13 @@ def _measurements(
     measurements: list[Measurement] = []
     mistakes: list[str] = []
     headings = lines[0][1]
+    label = columns.get("label")
+    if (
+        label
+        and "c" not in columns
+        and _counts([cells[label.index] for _, cells in lines[1:] if label.index < len(cells)])
+    ):
+        columns = {meaning: each for meaning, each in columns.items() if meaning != "label"}
     numbers = [column.index for meaning, column in columns.items() if meaning in NUMBER_MEANINGS]
     written = [cells[i] for _, cells in lines[1:] for i in numbers if i < len(cells)]
     marks = NumberMarks.of(written, separator)
@@ -121,6 +129,15 @@ def _measurements(
             mistakes.append(f"{place}: {error}")
     _refuse(mistakes)
     return _with_damping(measurements)
+
+
+def _counts(labels: list[str]) -> bool:
+    """Whether labels are running numbers, which name no mode: each one more than the one above, or
+    1 again, as in another state."""
+    matches = [RUNNING_NUMBER.fullmatch(label) for label in labels if label]
+    numbers = [int(match[1]) for match in matches if match]
+    counted = all(n in (1, before + 1) for n, before in zip(numbers, [0, *numbers], strict=False))
+    return bool(numbers) and len(numbers) == len(matches) and counted
 
 
 def _with_damping(measurements: list[Measurement]) -> list[Measurement]:
