@@ -123,5 +123,5 @@ def test_runs_that_all_differ_by_the_same_share_are_reported() -> None:
     one label alone differs."""
     pairs = [(f * 1.034 * (1 + e), f) for f, e in ((84.8, 1e-3), (101.7, -1e-3), (41.3, 5e-4))]
     (words,) = common_shifts(repeated(*pairs))
-    assert "all 3 frequencies are 3.4% above those of" in words and "pressure" in words
+    assert "all 3 frequencies are 3.4 % above those of" in words and "pressure" in words
     assert common_shifts(repeated((84.8, 84.9), (101.7, 101.5), (41.3, 43.0))) == []

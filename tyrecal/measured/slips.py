@@ -101,7 +101,7 @@ def common_shifts(values: Sequence[Measurement]) -> list[str]:
             first, second = one[common[0]], other[common[0]]
             sentences.append(
                 f"{first.place}{_run(first)}: all {len(common)} frequencies are"
-                f" {abs(np.expm1(mean)):.1%} {'above' if mean > 0 else 'below'} those of"
+                f" {100 * abs(np.expm1(mean)):.1f} % {'above' if mean > 0 else 'below'} those of"
                 f" {second.place}{_run(second)}: was the pressure the same?"
             )
     return sentences

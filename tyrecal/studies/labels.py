@@ -104,10 +104,10 @@ class Labels(ResultPart):
     def sentences(self) -> list[str]:
         """Sentences on the probability of the labels."""
         best = self.labelings[0]
-        sentences = [f"all these labels together are {best.probability:.1%} probable"]
+        sentences = [f"all these labels together are {100 * best.probability:.1f} % probable"]
         if len(self.labelings) > 1:
             other = self.labelings[1]
-            sentences.append(f"next are {', '.join(other.labels)}, {other.probability:.1%}")
+            sentences.append(f"next are {', '.join(other.labels)}, {100 * other.probability:.1f} %")
         return sentences
 
     def doubts(self) -> list[str]:

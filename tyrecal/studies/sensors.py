@@ -61,7 +61,7 @@ class SensorsResult(Result):
         rare = [mode.label.display for mode in self.modes if mode.labelled < 0.9]
         return [
             f"{len(self.places)} sensors, each {self.axes}, {1e3 * self.sensor_mass_kg:g} g: a mode"
-            f" gets its label in {self.labelled:.0%} of drawn tests"
+            f" gets its label in {100 * self.labelled:.0f} % of drawn tests"
             + (f", less than 90 % for {', '.join(rare)}" if rare else ""),
             f"largest AutoMAC of two modes {self.largest_auto_mac:.2f} (chance level"
             f" {self.chance_level:.2f})",

@@ -189,8 +189,8 @@ def _rate(each: Json) -> str:
     if not each["count"]:
         return "none"
     return (
-        f"{each['right']} of {each['count']}, {each['share']:.0%}"
-        f" ({each['low']:.0%} to {each['high']:.0%})"
+        f"{each['right']} of {each['count']}, {100 * each['share']:.0f} %"
+        f" ({100 * each['low']:.0f} to {100 * each['high']:.0f} %)"
     )
 
 

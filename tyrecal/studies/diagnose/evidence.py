@@ -283,13 +283,13 @@ def families(problem: InverseProblem) -> list[Family]:
         of_one_mode(rows) * between * between_runs(rows) * [row.label is not None for row in rows]
     )
     result = [
-        Family(f"modes are off by {size:.1%} in a way of their own", size**2 * same)
+        Family(f"modes are off by {100 * size:.1f} % in a way of their own", size**2 * same)
         for size in UNKNOWN
     ]
     for over, together in _smooth(rows, problem.observations.y):
         words = f"smoothly over {over}"
         result += [
-            Family(f"modes are off by {size:.1%}, {words}", size**2 * between * together)
+            Family(f"modes are off by {100 * size:.1f} %, {words}", size**2 * between * together)
             for size in UNKNOWN
         ]
     result += [

@@ -241,7 +241,7 @@ def selection_words(selection: Selection) -> list[str]:
         words = f"Free {', '.join(names)}: {chi2} falls to {selection.chi2_left:.4g}."
         words += f" Run 'tyrecal fit' with --free {','.join(names)}."
     else:
-        words = f"Free no number: no gain is better than chance at {CHANCE:.0%} ({chi2})."
+        words = f"Free no number: no gain is better than chance at {100 * CHANCE:.0f} % ({chi2})."
     sentences = [words]
     if selection.chi2_exact_section > 1.5 * selection.chi2:
         sentences.append(
