@@ -14,10 +14,10 @@ _MASS = re.compile(rf"TOTAL MASS OF MODEL[\s=:]*({_NUMBER})")
 
 @dataclass(frozen=True)
 class DatTable:
-    """frequencies_Hz: by number of the mode, of the last table; mass: None where unsaid."""
+    """Frequencies and mass that a job prints; a deck's unit of time is the second."""
 
-    frequencies_Hz: dict[int, float]
-    mass: float | None
+    frequencies_Hz: dict[int, float]  # of the last table, by number of the mode
+    mass: float | None  # of all the elements, in the deck's unit; None if it is not printed
 
 
 def read_dat(path: Path) -> DatTable:

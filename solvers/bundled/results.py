@@ -7,8 +7,9 @@ sensitivities {variable: [d f / d variable, Hz per unit]},
 mass_sensitivities {variable: kg per unit}}].
 JOB.npz: ``nodes`` (k,), ``points`` (k, 2) R, Z in m, and per step S ``displacement_S`` (k, 3) and
 ``shapes_S`` (modes, k, 3): complex amplitudes of u = Re[U exp(i n Theta)] in r, theta, z, scaled
-to a modal mass of 1 kg of the whole tyre. Displacements are in m. Of a response its frequencies,
-receptances and forces on the hub (`modes.response`).
+to a modal mass of 1 kg of the whole tyre. Displacements are in m. Of a response (`ResponseResult`)
+its frequencies, Hz, receptances, m/N or rad/N, and forces on the hub per unit force; in JOB.json
+the radius of the tread and the number of harmonics that were summed and that were wanted.
 """
 
 from __future__ import annotations

@@ -136,7 +136,7 @@ def middle(values: list[Array]) -> tuple[float, float]:
 
 def monomials(r: Array, z: Array, box: list[tuple[float, float]]) -> tuple[Array, Array]:
     """Values (..., k) and slopes (..., k, 2) of x^i y^j, the constant first; x and y from -1 to 1
-    over the section's box."""
+    over the section's ``box``, middle and half width in r and in z."""
     x, y = ((p - middle) / half for p, (middle, half) in zip((r, z), box, strict=True))
     powers = [(d - j, j) for d in range(MONOMIAL_DEGREE + 1) for j in range(d + 1)]
     values = np.stack([x**i * y**j for i, j in powers], -1)

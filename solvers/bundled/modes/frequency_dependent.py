@@ -2,8 +2,9 @@
 
     K(f) = K + sum_l (rho_l(f) - 1) dK_l,    K(f_j) phi_j = lambda_j M phi_j,  lambda = (2 pi f)^2
 
-rho_l: storage over static shear modulus of law l, from the deck's table, linear between its rows
-in the logarithms of both. The j-th mode of a harmonic is the fixed point of the j-th eigenvalue.
+dK_l: the part of K that grows with the shear modulus of law l; rho_l: its storage over its static
+shear modulus, from the deck's table, linear between its rows in the logarithms of both. The j-th
+mode of a harmonic is the fixed point of the j-th eigenvalue.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Response of the inflated tyre, its rim held, to a force on a patch of its tread.
 
-A patch of half angle b that is loaded evenly by a force F in all has the harmonics
+A patch of half angle b about Theta_0 that is loaded evenly by a force F in all has the harmonics
 
     f_0 = F / (2 pi),   f_n = F / pi  sin(n b) / (n b)  exp(-i n Theta_0)   (N per radian)
 
@@ -231,8 +231,8 @@ class _Reduced:
 
     n: int  # harmonic
     K: Array  # (basis, basis), rad2/s2
-    lossy: list[Array]
-    tables: list[Array]
+    lossy: list[Array]  # of each part with losses: its share of K (basis, basis)
+    tables: list[Array]  # of each law of frequency: its share of K (basis, basis)
     forces: Array  # of the patch in each direction (basis, 3)
     moved: Array  # T^H M (motions, basis)
     rigid: Array  # T^H of the patch's forces (motions, 3)

@@ -22,7 +22,7 @@ from ...errors import Refused
 from .response import Response
 
 Array = np.ndarray
-MOVE_RIM_UP_TO = 2.5
+MOVE_RIM_UP_TO = 2.5  # times the highest frequency: modes that are kept of harmonics 0 and 1
 ADDS_NOTHING = 1e-3  # singular value, over the largest, below which a static response adds nothing
 RIM_AXES = 0.0, np.pi / 2  # angles of the axes across the axle
 RIM_PLACES = {0: (2, 5), 1: (0, 3)}  # places of the first coordinate of each motion of a harmonic
@@ -76,10 +76,12 @@ def superelement(
 
 @dataclass(frozen=True)
 class _ModeMatrices:
-    stiffness: Array
-    loss: Array
-    coupling: Array
-    tread: Array
+    """A harmonic's blocks of the matrices, in c real coordinates of unit modal mass."""
+
+    stiffness: Array  # Lambda (c, c), 1/s2
+    loss: Array  # (c, c), 1/s2
+    coupling: Array  # T^H M V (6, c)
+    tread: Array  # motions (p, c) of the points of tread
 
 
 class _Block:

@@ -178,7 +178,8 @@ class Contact:
 
     @property
     def energy(self) -> float:
-        """J, stored and dissipated: the potential where the friction is bounded."""
+        """Energy of half the tyre's contact, J, stored and dissipated; with a bound of the
+        friction, the potential of the forces."""
         over = np.maximum(self.positions[..., 0] - self.height, 0.0)
         e, (length, _, sticking) = self.road.elastic_slip, self._slip
         path = np.where(sticking, length**2 / (2 * e), length - e / 2)

@@ -2,13 +2,15 @@
 
     K = tangent of the tyre + hold,   M = kron(N^T w N, M_section)
 
-N (s, k) and w (s,): functions of the angle and weights at Gauss stations (`Circumference`). Fields
-(k, n, 3) have k functions of the angle, n nodes of the section and the components r, theta, z in
-the frame of the reference angle, so the mass does not depend on the angle.
+N (s, k) and w (s,), rad: functions of the angle and weights at Gauss stations (`Circumference`);
+M_section: mass per radian. Fields (k, n, 3) have k functions of the angle, n nodes of the section
+and the components r, theta, z in the frame of the reference angle, so the mass does not depend on
+the angle. ``around.turn(j)`` is exp(i j theta) in these functions, (k,).
 
 The pressed tyre is unchanged by a half turn about the vertical. So each mode is unchanged (parity
-1) or changes its sign (parity -1), and the two kinds are computed apart (`HalfTurn`). A wheel that
-is free along the load adds one unknown, its shift down, to modes of parity 1.
+1) or changes its sign (parity -1), and the two kinds are computed apart (`HalfTurn`, which states
+its masks and images of nodes). A wheel that is free along the load adds one unknown, its shift down
+(to theta = 0), to modes of parity 1.
 """
 
 from __future__ import annotations
@@ -65,7 +67,7 @@ def loaded_modes(
     the stiffness near U on fields of parity 1, None: one is formed. Raises RunFailed, and what
     ``check`` raises to stop.
     """
-    tyre.residual(U)
+    tyre.residual(U)  # sets the state of the tangents
 
     def lowest(parity: int, wanted: int) -> list[tuple[Array, Array]]:
         symmetry = HalfTurn(tyre.model.mesh, pressed.free, pressed.around, parity)

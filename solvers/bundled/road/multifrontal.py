@@ -85,7 +85,8 @@ class Elimination:
         return stiff.reshape(int(np.prod(size)), -1)
 
     def _cell(self, tangents: Tangents, parts: tuple[int, ...], column: int, piece: int) -> Array:
-        """Stiffness of the elements of one cell (g, f, m, g, f, m)."""
+        """Stiffness of the elements of one cell (g, f, m, g, f, m): g parts, f functions, m
+        components at the column's nodes."""
         its, around = self.dissection.columns[column], self.symmetry.around.pieces[piece]
         f = around.functions.stop - around.functions.start
         m = 3 * (its.nodes.stop - its.nodes.start)
@@ -107,8 +108,8 @@ class Elimination:
 class Factor:
     """Approximate inverse of the tangent stiffness on the two parts.
 
-    tangents: at the stations (`Revolved.tangents`); contact: stiffness of the parts (2 k q 3,
-    2 k q 3), N/m. Raises Indefinite.
+    tangents: at the stations (`Revolved.tangents`); contact: stiffness of the parts (2 f q 3,
+    2 f q 3), N/m. Below, v is the number of right sides. Raises Indefinite.
     """
 
     def __init__(self, order: Elimination, tangents: Tangents, contact: csr_matrix):
@@ -150,12 +151,12 @@ class Factor:
             self._steps.append((own, left, first, onward))
 
     def solve(self, right: Array) -> Array:
-        """K^-1 right for parts (..., 2, k, q, 3)."""
+        """K^-1 right for parts (..., 2, f, q, 3)."""
         rows = right.reshape(-1, *right.shape[-4:])
         return self.backward(self.forward(rows)).reshape(right.shape)
 
     def forward(self, right: Array) -> list[Array]:
-        """L^-1 right for parts (v, 2, k, q, 3): by front, (rows, v), without rows where it is 0."""
+        """L^-1 right for parts (v, 2, f, q, 3): by front, (rows, v), without rows where it is 0."""
         b = right.reshape(len(right), -1)[:, self._unknowns].T.astype(np.float32, order="C")
         pieces = []
         for own, left, L, X in self._steps:
@@ -168,7 +169,7 @@ class Factor:
         return pieces
 
     def backward(self, pieces: list[Array]) -> Array:
-        """L^-T of what `forward` gave, as parts (v, 2, k, q, 3)."""
+        """L^-T of what `forward` gave, as parts (v, 2, f, q, 3)."""
         x = np.zeros((len(self._unknowns), pieces[-1].shape[1]), np.float32)
         for (own, left, L, X), y in zip(self._steps[::-1], pieces[::-1], strict=True):
             x[own] = y if len(y) else 0.0

@@ -92,7 +92,8 @@ def _interaction(model: list[Block], pair: Block) -> dict[str, Block]:
 
 
 def _check_flat(surface: Block) -> None:
-    """A line along the axle, swept along the rolling direction, at one distance from the axle."""
+    """Check that the road is a line along the axle, swept along the rolling direction, at one
+    distance from the axle. Raises DeckError."""
     rows = surface.rows
     if surface.get("TYPE") != "CYLINDER" or len(rows) != 4:
         raise DeckError(surface.place, "the road is an analytical surface of TYPE=CYLINDER")

@@ -85,7 +85,8 @@ class _Path:
         self.free_radius = self.height = float(self.dX[crown, 0] + own.U[crown, 0])
         self.U = np.multiply.outer(around.turn(0).real, own.U)
         self.elastic = 0 * road.elastic
-        self.since: dict[str, Array | float] = {}  # of the road: the state before
+        # by name of a field of the road: its derivative; the road has the state of the load before
+        self.since: dict[str, Array | float] = {}
 
     def follow(self, work: ContactNewton, state: PressedState, tangent: Tangent) -> None:
         """Follow the path from the state before to this one."""
@@ -109,7 +110,7 @@ class _Path:
         W, lift = unit
         S, rise = work.symmetry.spread(state.unit[0]), state.unit[1]
         step, contacts = self._beside(state.contact)
-        sizes = []
+        sizes = []  # the last: w . K s, whose derivative is that of -rise
         for sign, each in zip((1, -1), contacts, strict=True):
             half = patch(each, self.X + sign * step * self.dX, rings)
             forces = (each.matrix() @ S.ravel()).reshape(S.shape) + rise * each.by_height()

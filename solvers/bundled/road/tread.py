@@ -145,7 +145,7 @@ class Points:
 
     @property
     def N(self) -> Array:
-        """(i, j, p, l)."""
+        """Functions round the tyre at the points (i, j, p, l)."""
         return self._functions[0]
 
     @cached_property
@@ -156,7 +156,8 @@ class Points:
 
     @cached_property
     def frame(self) -> Array:
-        """(i, j, p, 3, 3): to the road's down, along, across."""
+        """Rotation (i, j, p, 3, 3) from r, theta, z at the angle to the road's down, along,
+        across."""
         frame = np.zeros((*self.angle.shape, 3, 3))
         frame[..., 0, 0] = frame[..., 1, 1] = np.cos(self.angle)
         frame[..., 1, 0] = np.sin(self.angle)
@@ -177,7 +178,7 @@ class Points:
         return np.asarray((self.frame @ u[..., None])[..., 0])
 
     def rates(self, U: Array) -> Array:
-        """Their derivatives by the angle, m."""
+        """Derivatives of `positions` by the angle (i, j, p, 3), m/rad."""
         N, dN = self._functions
         lines = self._lines(U, self.tread.M)
         u, du = N @ lines, dN @ lines

@@ -17,7 +17,7 @@ FILLED = ("SOLID SECTION", "SURFACE SECTION", "MEMBRANE SECTION")
 Array = np.ndarray
 SECTION_DOFS = {1: 0, 2: 2, 5: 1}  # ABAQUS's r, z, twist to our components r, theta, z
 REVOLVED_DOF = {2: 2}  # the axle is the revolved model's second axis
-REVOLVED_DOFS = {1: 0, 2: 1, 3: 2}
+REVOLVED_DOFS = {1: 0, 2: 1, 3: 2}  # of a row that holds all three, whatever their order
 
 
 def numbering(model: Model, step: DeckStep) -> Numbering:

@@ -36,11 +36,11 @@ class TyrePart(ABC):
 
     @abstractmethod
     def energy(self, U: Array) -> Any:
-        """Share of the part in the potential, J."""
+        """Share of the part in the potential, J per radian."""
 
     @abstractmethod
     def force(self, U: Array) -> Array:
-        """Gradient of the energy by the elements' displacements (e, 3a), N."""
+        """Gradient of the energy by the elements' displacements (e, 3a), N per radian."""
 
     @abstractmethod
     def tangents(self, U: Array, harmonics: bool) -> Tangents:

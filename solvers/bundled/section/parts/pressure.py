@@ -98,11 +98,10 @@ def first(x: Array, dx: Array) -> tuple[Array, Array]:
 
 
 def second(x: Array, dx: Array) -> tuple[Array, Array, Array]:
-    """Second variation for a perturbation u exp(i n Theta): blocks over (u, u'), (p, 3, 3).
+    """Second derivative u^H Q u of V's integrand along u exp(i n Theta), in blocks (p, 3, 3).
 
-    u^H Q u with Q = xx (u, u) + xd (u, u') + n-linear terms. Returns
-    (xx, xd, dx_n): xx and xd at n = 0 with the whole Q not yet symmetrised, and the pair
-    (n-linear u-u block, n-linear u'-u block) stacked in ``dx_n`` (..., 2, 3, 3), times i n.
+    Q, not yet symmetrised, has xx (u, u), xd (u, u') and i n times two blocks, (u, u) and (u', u).
+    Returns xx, xd and those two as (p, 2, 3, 3).
     """
     y, d = x @ IN_PLANE, x @ SPIN_AXIS.T
     along = IN_PLANE @ _cross(dx)
