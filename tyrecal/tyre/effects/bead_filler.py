@@ -86,7 +86,8 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add_to_deck,
     part="bead_filler",
-    # large, because a filler gets softer towards its tip; a diagnosis integrates over its height
+    # error of its shifts, relative: large, because a filler gets softer towards its tip; a
+    # diagnosis integrates over its height
     response_error=0.08,
     shape_uncertainty=higher,
 )

@@ -110,6 +110,6 @@ EFFECT = Effect(
     " and check that the moulded line runs level with the flange all round",
     aliases=("rim_width",),
     add=add,
-    # how far a bead rolls about its wires
+    # error of its shifts, relative: how far a bead rolls about its wires
     response_error=0.08,
 )

@@ -55,6 +55,7 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add_to_deck,
     part="belts",
-    # cords turn as a pantograph from crown to edge, where this turns all alike
+    # error of its shifts, relative: cords turn as a pantograph from crown to edge, where this turns
+    # all alike
     response_error=0.06,
 )

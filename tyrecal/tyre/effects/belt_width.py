@@ -71,6 +71,6 @@ EFFECT = Effect(
     toggle="section a tyre of the same build, or X-ray it, and measure the belts",
     aliases=("cap_ply", "belt_angle", "bead_filler"),
     add=add,
-    # belts end in steps, which move by their own amounts
+    # error of its shifts, relative: belts end in steps, which move by their own amounts
     response_error=0.06,
 )

@@ -62,7 +62,8 @@ EFFECT = Effect(
     toggle="section a tyre of the same build, or read the construction on its sidewall",
     aliases=("belt_width", "bead_filler", "belt_angle"),
     add=add,
-    # one layer or more at the edges; wound at 0 to 5 degrees; its width is integrated over
+    # error of its shifts, relative: one layer or more at the edges; wound at 0 to 5 degrees; its
+    # width is integrated over
     response_error=0.10,
     shape_uncertainty=to_the_edge,
 )

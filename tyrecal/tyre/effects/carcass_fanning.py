@@ -58,6 +58,6 @@ EFFECT = Effect(
     toggle="count the cords per length at the crown and at the bead of a tyre that is cut open",
     aliases=("temperature_drift",),
     add=add,
-    # cords fan as the lift of the drum was, not quite as the radius
+    # error of its shifts, relative: cords fan as the lift of the drum was, not quite as the radius
     response_error=0.06,
 )

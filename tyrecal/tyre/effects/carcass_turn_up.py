@@ -79,6 +79,6 @@ EFFECT = Effect(
     toggle="section a tyre of the same build and measure the height at which the turn-up ends",
     aliases=("rim_width",),
     add=add,
-    # it ends anywhere from the filler's tip to the shoulder
+    # error of its shifts, relative: it ends anywhere from the filler's tip to the shoulder
     response_error=0.10,
 )

@@ -33,6 +33,6 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add,
     needs="cavity",
-    # a gas in a hollow ring: both laws are known
+    # error of its shifts, relative: a gas in a hollow ring: both laws are known
     response_error=0.04,
 )

@@ -90,6 +90,6 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add_to_deck,
     needs="vibration_modulus",
-    # compounds differ in it by a third, and so do parts
+    # error of its shifts, relative: compounds differ in it by a third, and so do parts
     response_error=0.08,
 )

@@ -35,6 +35,6 @@ EFFECT = Effect(
     aliases=("belt_width", "cap_ply", "bead_filler", "spindle_torsional"),
     add=add,
     needs="frequency_modulus",
-    # compounds differ in it by a third, and so do parts
+    # error of its shifts, relative: compounds differ in it by a third, and so do parts
     response_error=0.08,
 )

@@ -34,6 +34,6 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add,
     needs="coupled",
-    # a mass is a mass; it may sit beside the middle
+    # error of its shifts, relative: a mass is a mass; it may sit beside the middle
     response_error=0.04,
 )

@@ -35,6 +35,7 @@ EFFECT = Effect(
     aliases=("tread_density", "sidewall_gauge"),
     add=add,
     add_to_deck=add,
-    # the same pressure everywhere; a gauge may be off by a share, too
+    # error of its shifts, relative: the same pressure everywhere; a gauge may be off by a share,
+    # too
     response_error=0.04,
 )

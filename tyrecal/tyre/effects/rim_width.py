@@ -94,6 +94,6 @@ EFFECT = Effect(
     toggle="measure the rim between its flanges; mount the tyre on the next wider rim",
     aliases=("carcass_turn_up", "bead_seat"),
     add=add,
-    # how the sidewall bends where the flange holds it
+    # error of its shifts, relative: how the sidewall bends where the flange holds it
     response_error=0.05,
 )

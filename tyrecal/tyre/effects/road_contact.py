@@ -43,6 +43,6 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add,
     needs="coupled",
-    # the patch is no point, and sticks in part
+    # error of its shifts, relative: the patch is no point, and sticks in part
     response_error=0.10,
 )

@@ -33,6 +33,6 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add,
     needs="rotation",
-    # Coriolis' forces are exact; the tread's heating is not in them
+    # error of its shifts, relative: Coriolis' forces are exact; the tread's heating is not in them
     response_error=0.04,
 )

@@ -46,6 +46,7 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add_to_deck,
     part="sidewall",
-    # thicker in its upper or its lower half, inside or outside the ply
+    # error of its shifts, relative: thicker in its upper or its lower half, inside or outside the
+    # ply
     response_error=0.06,
 )

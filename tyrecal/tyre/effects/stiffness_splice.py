@@ -54,6 +54,6 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add_to_deck,
     needs="coupled",
-    # plies and tread overlap by widths of their own
+    # error of its shifts, relative: plies and tread overlap by widths of their own
     response_error=0.10,
 )

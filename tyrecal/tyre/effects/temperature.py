@@ -50,6 +50,6 @@ EFFECT = Effect(
     aliases=("dynamic_stiffening", "sidewall_gauge"),
     add=add,
     add_to_deck=add_to_deck,
-    # the tread is warmer than the sidewall, or colder
+    # error of its shifts, relative: the tread is warmer than the sidewall, or colder
     response_error=0.08,
 )

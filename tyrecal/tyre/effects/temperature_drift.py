@@ -39,6 +39,6 @@ EFFECT = Effect(
     aliases=("carcass_fanning",),
     add=add,
     add_to_deck=add,
-    # the tread is warmer than the sidewall, and warming levels off
+    # error of its shifts, relative: the tread is warmer than the sidewall, and warming levels off
     response_error=0.08,
 )

@@ -64,7 +64,8 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add_to_deck,
     part="tread",
-    # voids lie in the middle or at the shoulders; what stiffness they take is integrated over
+    # error of its shifts, relative: voids lie in the middle or at the shoulders; what stiffness
+    # they take is integrated over
     response_error=0.08,
     shape_uncertainty=as_voids,
 )

@@ -68,7 +68,8 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add_to_deck,
     part="tread",
-    # not in it: heel and toe, blocks; the profile across is `shape_uncertainty`
+    # error of its shifts, relative: not in it: heel and toe, blocks; the profile across is
+    # `shape_uncertainty`
     response_error=0.06,
     shape_uncertainty=at_shoulders,
 )

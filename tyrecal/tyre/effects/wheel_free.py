@@ -48,7 +48,7 @@ EFFECT = Effect(
     aliases=("bead_filler",),
     add=add,
     add_to_deck=add,
-    needs="spindle",
-    # a rigid mass; cords give it no more than 1 to 2 Hz
+    needs="spindle",  # solvers that can move the rim
+    # error of its shifts, relative: the wheel is a rigid mass; cords add at most 1 to 2 Hz
     response_error=0.04,
 )
