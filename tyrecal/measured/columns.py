@@ -1,4 +1,8 @@
-"""Contents of the columns of a table, derived from their headings and the units in them."""
+"""Contents of the columns of a table, derived from their headings and the units in them.
+
+A table has a column for each quantity, or the name of a row's quantity in the column ``quantity``
+and its number in ``value``.
+"""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ do where the order is higher than the data have modes.
 
 No formula states how far such a frequency is off. The delete-one-group jackknife over the
 sensors tells what noise does, and the spread s over the orders (1.48 times the median deviation)
-what the model's order does: with theta_j from all groups of points but j,
+what the model's order does: with the frequency theta_j from all of g groups of points but j,
 
     sigma^2 = (g - 1) / g sum_j (theta_j - mean theta)^2 + s^2
 """

@@ -4,8 +4,8 @@ The signals u (k,) of a mode are normal about 0,
 
     u ~ N(0, s^2 (S + nu I)),
 
-S (k, k): the covariance of a label (``covariance``), nu: variance of the noise, over a grid; s: any
-size, p(s) ~ 1/s:
+S (k, k): the covariance of a label with a mean diagonal of 1 (``covariance``), nu: variance of the
+noise, over a grid; s: any size, p(s) ~ 1/s:
 
     ln p(u | label, nu) = -1/2 ln|S + nu I| - k/2 ln(u^T (S + nu I)^-1 u) + constant
 
@@ -15,7 +15,9 @@ about tyres: [c,m+2] is above [c,m], so a file in which [c,m] was not found belo
 alone: how clean a shape looks says nothing about its order there. Where a case is given, its shapes
 are in the covariances and its frequencies in the prior (``case_modes``). A label whose own motions
 have less than `MIN_SEEN` of the mean square of all motions on these sensors is not seen, and never
-given. A column is the index of an order m among those of a harmonic (``covariance``).
+given. A column is the index of an order m among those of a harmonic (``covariance``): m itself from
+0 to 3, on c = 0 also AXIAL_COLUMN, 4, of [0,0] axial. BELT is the radius, over the largest one,
+from which a sensor is on the belt; HALF_WIDTHS are half widths of narrow and wide belts over it.
 
 ``modal`` judges the shapes of a file with it, lowest frequency first. `Labeller.looks_like` draws
 shapes and judges them the same way, so it says what an import will do.

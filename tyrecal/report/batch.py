@@ -1,4 +1,7 @@
-"""Tables of a batch: what is not as it should be, and what drifted."""
+"""Tables of a batch: what is not as it should be, and what drifted.
+
+They show a result of `batch.run` and a drift of `batch.drift`, as batch.json holds them.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +38,7 @@ def drift_table(drift: Mapping[str, Any]) -> Table | None:
     """Numbers that drifted, the worst first; None where there are none."""
     table = _table("case", "study", "quantity", *FIGURES)
     for each in drift["drifted"][:MAX_ROWS]:
-        old, new, allowed = each["baseline"], each["value"], each["allowed"]
+        old, new, allowed = each["baseline"], each["value"], each["allowed"]  # in one unit
         table.add_row(
             Text(each["case"]),
             each["study"],

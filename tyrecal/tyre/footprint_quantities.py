@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class FootprintQuantity:
-    """A quantity of the tyre at a load."""
+    """A quantity of the tyre at a load: area of the patch without grooves in the tread, its largest
+    extent along or across the rolling direction, or tangent stiffness."""
 
     sigma: str  # key of its standard deviation in a case, in the same unit
     words: str  # its name in tables

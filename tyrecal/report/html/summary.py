@@ -78,7 +78,7 @@ def diagnosis_words(result: DiagnosisResult) -> list[str]:
     if result.effect:
         words[0] += f" Probability {present(result.probabilities, result.effect.split('+')):.2f}."
     if result.robust:
-        least, most = result.robust.range
+        least, most = result.robust.range  # probability of the verdict
         words.append(
             "It depends on labels that were exchanged: correct the file first."
             if result.exchanged_labels
@@ -92,7 +92,7 @@ def diagnosis_words(result: DiagnosisResult) -> list[str]:
         value, low, high = (f"{factor * x:.3g}" for x in (p.value, p.low, p.high))
         words.append(f"Its size is {value} {unit}".rstrip() + f", 90 % between {low} and {high}.")
     if result.shrinkage and gap:
-        s = result.shrinkage
+        s = result.shrinkage  # of the rms error of frequencies
         words.append(
             f"On held-out data the error goes from {s.before_percent:.2f} to"
             f" {s.after_percent:.2f} % with {s.effect}: it shrinks by {100 * s.fraction:.0f} %,"
@@ -111,7 +111,7 @@ def verdict_words(result: DiagnosisResult) -> str:
 
 
 def effect_words(effect: EffectResult) -> str:
-    """How large, and how much of it calibration hides."""
+    """Rms change of the frequencies by an effect, before and after calibration."""
     words = f"{effect.title}, {effect.symbol} = {effect.value:g} {effect.unit}".rstrip()
     if effect.before_percent is None:
         return f"{words}: no mode is known with it."

@@ -77,6 +77,7 @@ def write_selftest(folder: Path) -> list[Path]:
     answer = _answer(plain)
     answers = {each: _answer(_with_carcass(plain, how)) for each, how in READINGS.items()}
     last_label = str(labelled(answer)[-1].label)
+    # as many as the deck requests, whose modes come in pairs; modes of n = 0 leave some to spare
     count = 2 * plain.case.analysis.modes_per_harmonic * (plain.case.analysis.highest_harmonic + 1)
     page = PAGE.format(
         modes=count,

@@ -94,7 +94,7 @@ def warm_up() -> None:
     """Start the process that workers are forked from, if there is none; waits for nothing.
 
     It imports what they need while its parent does the same for itself, so that a worker begins
-    at once: two seconds of a core less for two of them.
+    at once. Two workers then use two seconds of processor time less in all.
     """
     if _method() != "forkserver":
         return

@@ -69,7 +69,9 @@ def _with_rates(
 ) -> dict[int, ModesAnswer]:
     """The answers with the sensitivities that the questions name, by one neighbour for each number:
     above, or below where that has no solution; all neighbours of a side at once. NaN for modes
-    whose label the neighbour lacks. If both have no solution, the failure is the answer."""
+    whose label the neighbour lacks. If both have no solution, the failure is the answer.
+
+    step: a share of the value, of a linear variable or an effect of its range (`decks.steps`)."""
     designs = {place: each for place, each in answers.items() if isinstance(each, LabelledModes)}
     pending = {
         (place, name): evaluator.design.steps(name, questions[place].values[name], step)
@@ -90,6 +92,7 @@ def _with_rates(
             centre, width = designs[place], values[i] - questions[place].values[name]
             if isinstance(other, LabelledModes):
                 hertz = {mode.label: mode.frequency_Hz for mode in other.modes}
+                # Hz per unit at each mode's `position`; the rest of it is not read
                 rate = np.full(len(centre.evaluation.modes), np.nan)
                 for mode in centre.modes:
                     rise = hertz.get(mode.label, np.nan) - mode.frequency_Hz
@@ -98,7 +101,7 @@ def _with_rates(
                 rise = other.evaluation.mass_kg - centre.evaluation.mass_kg
                 rates[place][1][name] = rise / width
             elif pending[keys[i]] and not getattr(other, "denied", False):
-                continue
+                continue  # on the other side; without a licence that would fail, too
             else:
                 answers[place] = other
             del pending[keys[i]]

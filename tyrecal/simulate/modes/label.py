@@ -102,7 +102,8 @@ def in_words(text: str) -> str:
 @dataclass(frozen=True)
 class Mode:
     """A label on a solver's mode. ``clarity``: how far the label's share of the motion leads
-    the next label's, 0 (a tie) to 1; ``position``: index in the evaluation's modes."""
+    the next label's, 0 (a tie) to 1; ``position``: index in the labelled modes, which are the
+    evaluation's, or their `pair_rings`, and in its gradients."""
 
     label: Label
     frequency_Hz: float

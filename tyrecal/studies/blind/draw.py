@@ -29,8 +29,8 @@ class Truth:
     size: float  # its parameter
     variables: dict[str, float]  # by name, in their own units
     constants: dict[str, float]  # in standard deviations
-    scatter: int  # seed of noise, missing values and members
-    swapped: bool  # two labels
+    scatter: int  # seed of noise, missing values, splits of pairs and order of their modes
+    swapped: bool  # whether two labels are exchanged in its data
 
 
 def draw(
@@ -44,7 +44,8 @@ def draw(
     """All trials, in the order of their ids, which reveals nothing.
 
     Effects and families have equal chances, sizes are uniform over ``smallest`` to 1 of the range,
-    on either side where it has two.
+    on either side where it has two. Variables are log-uniform within a factor 1 + ``spread`` of
+    their starts; ``swapped`` is the probability that labels are exchanged.
     """
     random = np.random.default_rng(seed)
     kinds = [kind for kind, count in protocol.counts.items() for _ in range(count)]

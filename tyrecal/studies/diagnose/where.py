@@ -31,9 +31,10 @@ class PartChange:
 
 @dataclass(frozen=True)
 class FieldValue:
-    """A field at a place of the section, with its standard deviation before and after the data."""
+    """How far the section is off at one place, with the standard deviation before and after the
+    data."""
 
-    field: str  # name of the field
+    field: str  # what is off: meridian, gauges, stiffness or density of compounds, or the bead
     place: str  # place on the section
     value: float  # likeliest value
     sigma: float  # standard deviation after the data
@@ -46,11 +47,13 @@ def section_map(
 ) -> tuple[list[PartChange], int]:
     """Parts by falling evidence, and how many combinations of them the data see.
 
-    One number k with prior N(0, s^2): with a = g^T P g and b = g^T P r it is b / (a + 1/s^2), and
-    ln Z / Z0 = b^2 / (a + 1/s^2) / 2 - ln(1 + s^2 a) / 2.
+    A part's relative change has the prior N(0, s^2). With residuals r and g = d eta by it,
+    a = g^T P g and b = g^T P r, it is b / (a + 1/s^2), and over no change (Z0)
+    ln Z / Z0 = b^2 / (a + 1/s^2) / 2 - ln(1 + s^2 a) / 2. Below, g is times s.
     """
     if not parts:
         return [], 0
+    # of a part d eta by ln of its stiffness or density, for all rows of the model
     columns = [(part.stiffness, STIFFNESS_PRIOR, part) for part in parts]
     columns += [(part.mass, MASS_PRIOR, part) for part in parts]
     G = np.array([g[problem.places] * s for g, s, _ in columns])

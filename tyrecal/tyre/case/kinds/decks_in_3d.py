@@ -46,12 +46,14 @@ class DecksIn3D(UserDecks):
             self.own.check(numbers)
 
     def usual_lines(self, source: CaseData) -> dict[str, Any]:
-        """The decks contain how the rim is held, and what is computed."""
+        """Keys that the case may leave out, with values. The decks contain how the rim is held, and
+        what is computed."""
         pressure_kPa = self.own.pressure_Pa / 1e3 if self.own.pressures else None
         return lines_of_a_deck(source, pressure_kPa, name=self.own.path.stem, solver="abaqus")
 
     def own_texts(self, tyre: Any) -> dict[str, str]:
-        """The decks and what they include."""
+        """Texts of the decks and of what they include. `filled` gets the pressure in Pa and writes
+        it in the decks' units."""
         return self.own.filled(self.numbers(tyre.case), 1e3 * tyre.case.pressure_kPa)
 
     def require_section(self, refusal: str) -> None:
