@@ -19,8 +19,8 @@ class Options:
 
     licence_wait_s: float = 600.0  # longest time spent waiting for a licence, 0 = none
     licence_first_wait_s: float = 5.0  # the first wait, each later one twice as long
-    length_m: float = 1.0  # unit of the decks
-    mass_kg: float = 1.0  # unit of the decks
+    length_m: float = 1.0  # metres per unit of length of the decks
+    mass_kg: float = 1.0  # kilograms per unit of mass of the decks
 
     def save(self, folder: Path) -> Path:
         """Write them into a run folder."""

@@ -25,7 +25,9 @@ from .slack import read_strips, refuse_slack
 
 Array = np.ndarray
 SECTOR, SETTINGS, INFLATE = "sector.inp", "calculix.json", "inflate"
-REVOLVED = 1e-3  # of the largest displacement; 2e-4 moves no frequency by 0.001 %, 9e-3 one by 5 %
+# deviation from a body of revolution, over the largest displacement, up to which a state is right:
+# 2e-4 moves no frequency by 0.001 %, 9e-3 one by 5 %
+REVOLVED = 1e-3
 OPTIONS: dict[str, Any] = {"parallel": 1, "element": "C3D20R", "ply_thickness_m": 2e-4}
 
 

@@ -18,10 +18,10 @@ MASS = r"total mass for set {} and time\s+\S+\s+(\S+)"
 
 @dataclass
 class Fields:
-    """Contents of a .frd file."""
+    """Contents of a .frd file, in the deck's units."""
 
     nodes: Array  # (k,) numbers
-    points: Array  # (k, 3) x, y, z, m
+    points: Array  # (k, 3) x, y, z
     # in the file's order: mode number (0 of a static step), name (DISP, or DISPI for an imaginary
     # part), values (k, 3) on the nodes
     blocks: list[tuple[int, str, Array]]

@@ -2,7 +2,7 @@
 
 Ritz's method on fields sum over n of Re[c_n U_n(R, Z) exp(i n Theta)]: the axisymmetric tyre's
 own modes, and its static response to what breaks the symmetry. What was a doublet splits into two
-modes of different frequency; each is told by the doublet that it holds most of.
+modes of different frequency; each is named by the doublet that it holds most of.
 """
 
 from __future__ import annotations
@@ -59,7 +59,8 @@ class HarmonicBasis:
         return own[:count] + 1j * own[count:] if family.n else own
 
     def energy(self, vectors: Array) -> Array:
-        """Stiffness energy (families, m), 2 J, of fields given by vectors (fields, m)."""
+        """Twice the strain energy (families, m), J, of each family's part of fields given by
+        vectors (fields, m)."""
         return np.array([self.eigenvalues[rows] @ vectors[rows] ** 2 for rows in self._rows])
 
     def part(self, f: int, vectors: Array) -> Array:
@@ -117,7 +118,8 @@ def _reduced(eigenvalues: Array, p: Array, looked: int) -> tuple[Array, Array, A
     """Places of the low fields and of the high ones, and orthonormal combinations (high, k) of
     these, that together hold the ``looked`` lowest coupled modes.
 
-    The low fields themselves; of the many high ones D^-1 p^T, D^-2 p^T, ...: Lanczos' vectors of
+    The low fields themselves; of the many high ones, with eigenvalues D and displacements p at the
+    attached components, D^-1 p^T, D^-2 p^T, ...: Lanczos' vectors of
     the forces that attached masses and springs exert on them.
     """
     limit = STATIC_FROM * np.sort(eigenvalues)[: looked + 1][-1]

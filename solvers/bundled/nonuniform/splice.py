@@ -14,7 +14,8 @@ one of each doublet in either, vibrate apart, and the elements of z >= 0 tell al
 
 The state under pressure is found again, because a stiffer sector also takes up other forces; then
 Ritz's method on the axisymmetric tyre's modes and on the responses K^-1 r to what is left of each,
-r = (K~ - lambda M~) u, the axisymmetric K per harmonic (Davidson, J. Comp. Physics 17, 1975).
+r = (K~ - lambda M~) u, K~ and M~ with the sector, K axisymmetric, per harmonic (Davidson, J. Comp.
+Physics 17, 1975).
 """
 
 from __future__ import annotations
