@@ -19,7 +19,8 @@ from ...tyre.section.mesh import SectionMesh
 from ...tyre.templates import TemplateNames
 
 FIRST_WHEEL_ELEMENT = 999_000_001  # beyond all that a revolve makes
-MIN_MODE_HZ, SHIFT = 1.0, -100.0  # of a free wheel's modes: above its rigid motions; 1/s2
+# of a free wheel's modes: above its rigid motions; the shift in Hz squared, as *FREQUENCY has it
+MIN_MODE_HZ, SHIFT = 1.0, -100.0
 GAS = "CAVITY_GAS"
 ATMOSPHERE = 101_325.0  # Pa
 GASES = {  # specific gas constant (J/kg/K) and ratio of specific heats at 20 C
@@ -27,7 +28,7 @@ GASES = {  # specific gas constant (J/kg/K) and ratio of specific heats at 20 C
     "helium": (2077.1, 1.667),
     "sulphur_hexafluoride": (56.93, 1.094),
 }
-TABLE_HZ = np.geomspace(1.0, 1000.0, 13)
+TABLE_HZ = np.geomspace(1.0, 1000.0, 13)  # of tables of moduli over frequency
 FIRST_ATTACHED_ELEMENT = 999_100_001  # beyond all that a revolve makes
 AXES = {"radial": 1, "lateral": 2, "tangential": 3}  # of the revolved tyre in the plane Theta = 0
 ROAD_NODE = 900002

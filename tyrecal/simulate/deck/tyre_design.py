@@ -145,8 +145,8 @@ class TyreDesign:
 
     def _all_round(self) -> TyreDesign:
         """The design with its splice's change all round in place of it, less by the share of the
-        circumference that the splice takes up: chi's mean, which is all that the means of
-        frequencies depend on to first order."""
+        circumference that the splice takes up: the mean of its change, which is all that the means
+        of frequencies depend on to first order."""
         splice = self.tyre.case.splice
         if not splice.share:
             return self
@@ -194,6 +194,7 @@ class TyreDesign:
 def _abaqus(tyre: Tyre, env: Any, request: DeckRequest) -> dict[str, str]:
     """Texts of the ABAQUS decks by file name. Raises TemplateFailed."""
     names = _with_mesh(tyre, env)
+    # modes of harmonics from 1 on come in pairs; those of harmonic 0 leave some to spare
     names["modes"] = 2 * request["modes_per_harmonic"] * (request["highest_harmonic"] + 1)
     names["loads"], names["loaded_modes"] = request["loads_N"], request["loaded_modes"]
     names["rim_motions"] = range(1, 7) if request["rim_stiffness"] else ()

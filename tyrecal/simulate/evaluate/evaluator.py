@@ -140,7 +140,7 @@ class Evaluator:
         return result
 
     def _start_of(self, design: Design) -> Array | None:
-        """Inflated shape (n, 3) from which a design's inflation starts: that of its nominal design,
+        """Inflated shape (n, 4) from which a design's inflation starts: that of its nominal design,
         which is evaluated first, so that the answer depends on no other question. None: at rest, as
         for the nominal design itself, and for all where it does not inflate."""
         nominal = None if design.is_nominal else design.nominal

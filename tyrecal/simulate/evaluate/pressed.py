@@ -36,7 +36,7 @@ class Footprint:
     across_m: of.RealArray  # (p,) in the road's plane
     pressure_Pa: of.RealArray  # (p,)
     area_m2: of.RealArray  # (p,) that the node stands for
-    traction_Pa: Annotated[Array, of.shaped(of.REAL, None, 2)]  # (p, 2)
+    traction_Pa: Annotated[Array, of.shaped(of.REAL, None, 2)]  # (p, 2) along and across
     displacement: of.Field3D  # (ring, node, 3): r, theta, z at the reference angle, m
     # this and the next two: of a solver that places the patch's edge between nodes, else None;
     # nodes next to the patch then have a share of it, too

@@ -43,7 +43,7 @@ class Gauges:
     liner: float  # inner surface to carcass
     ply: float  # carcass to first belt, or to its turn-up above the filler
     belts: float  # from each belt to the next
-    step: float  # in widths, of which other belts are narrower
+    step: float  # by which other belts are narrower than the widest, in width
     cap: float  # last belt to cap ply
     under_tread: float  # last layer to the tread
 

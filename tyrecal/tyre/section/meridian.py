@@ -30,7 +30,7 @@ from .spline import CubicSpline
 
 Array = np.ndarray
 STEPS_A_PART = 200  # under the belt, and above and below the widest point
-EXPONENTS = np.log([1.0, 40.0])  # of the belt's share: from a roof to nearly a step
+EXPONENTS = np.log([1.0, 40.0])  # ln n of the belt's share: from a roof to nearly a step
 MAX_RIM_SLOPE = np.tan(np.radians(75))  # of the carcass at the rim, from the wheel's plane
 SHARPEST_TURN = 0.6  # of the carcass at the seat: its curvature times the gauge outside it
 

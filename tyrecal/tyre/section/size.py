@@ -80,12 +80,12 @@ class TyreSize:
     """A size code read."""
 
     text: str
-    kind: str
+    kind: str  # key of `PRESSURES_KPA`
     width: float  # nominal section width S1, m
     overall_diameter: float  # D, m
     rim_code: float  # diameter, inch
     theoretical: float  # x
-    measuring: float  # widest usual share of S1 in the rim
+    measuring: float  # width of the measuring rim over S1, before it is rounded to a rim's width
     pressure_kPa: float
     load_index: int | None = None  # of a single tyre, None where it is not stated
 
