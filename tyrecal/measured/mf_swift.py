@@ -120,10 +120,10 @@ class MFSwift:
         and NOMPRES: ``x``, ``y``, ``z`` in N/m, ``yaw`` in N m/rad. One that is negative means that
         the belt's springs alone are too soft."""
         k, belt = self.keys, self.springs()
-        lever = (self.free_radius - float(self.deflection(k["FNOMIN"]))) ** 2
+        square = (self.free_radius - float(self.deflection(k["FNOMIN"]))) ** 2  # of the lever, m2
         left = {
-            "x": 1 / k["LONGITUDINAL_STIFFNESS"] - 1 / belt["x"] - lever / belt["windup"],
-            "y": 1 / k["LATERAL_STIFFNESS"] - 1 / belt["y"] - lever / belt["yaw"],
+            "x": 1 / k["LONGITUDINAL_STIFFNESS"] - 1 / belt["x"] - square / belt["windup"],
+            "y": 1 / k["LATERAL_STIFFNESS"] - 1 / belt["y"] - square / belt["yaw"],
             "z": 1 / k["VERTICAL_STIFFNESS"] - 1 / belt["x"],
             "yaw": 1 / k["YAW_STIFFNESS"] - 1 / belt["yaw"],
         }

@@ -116,6 +116,7 @@ def draw_test(
 
 def mass_shifts(case: CaseModes, mode: Mode, places: Array, mass_kg: float) -> Array:
     """Relative changes of a mode's frequency by a mass at each place (p, 3), to first order: of
-    both members of a doublet (2,), the larger fall first, or of one mode (1,)."""
+    both members of a doublet (2,), the larger fall first, or of one mode (1,). The case's shapes
+    have a modal mass of 1 kg."""
     u = case.signals(mode, at_places(places, "rtz"))
     return np.asarray(-np.linalg.eigvalsh(mass_kg * u.T @ u)[::-1] / 2)

@@ -41,9 +41,9 @@ STAGES = (
     "parts of the section",
     "the next measurements",
 )
-KNOWN_WITHIN = (
-    0.05  # of a range, and of ln x: an effect asked as near as that is known; at 0 all is
-)
+# of an effect's range, and of x: no effect is evaluated again as near as that to where it was, and
+# at 0, without effects, all is known
+KNOWN_WITHIN = 0.05
 
 
 @dataclass(frozen=True)

@@ -76,9 +76,10 @@ HELD_BY = {  # effects that a rigid clamp is without
 CAVITY_GAS, HELIUM = "cavity_air", 0.14  # a seventh of the mass
 READING = 0.1  # of an effect's range, by which such a reading may be off
 CHECKED = 0.25  # of a constant's standard deviation, likewise
-OFFERED = (0.4, 2 / 3, 5 / 6, 1.0)  # of the tyre's inflation pressure
-MIN_OFFERED_STEP = 0.25  # of it, from every pressure measured so far, for a new one to be offered
-ABOVE_kPa = (40.0, 80.0)  # it, offered too: as much as any tyre bears
+OFFERED = (0.4, 2 / 3, 5 / 6, 1.0)  # pressures over the tyre's inflation pressure
+ABOVE_kPa = (40.0, 80.0)  # more than the inflation pressure, offered too: any tyre bears that
+# distance of an offered pressure from all that were measured, over the inflation pressure
+MIN_OFFERED_STEP = 0.25
 MASS_PERCENT = 0.5  # standard deviation of weighing a tyre
 
 

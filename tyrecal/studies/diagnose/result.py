@@ -144,7 +144,7 @@ class NextMeasurement(ResultPart):
     """Something worth to be measured."""
 
     what: str  # measurement in words
-    gain: float  # gain of information per hour
+    gain: float  # gain of information, nats per hour of work
     hours: float  # duration
 
 

@@ -29,7 +29,7 @@ LEAST_SQUARES_STEPS = 8  # of Gauss and Newton's method
 
 @dataclass(frozen=True)
 class Shrinkage:
-    """Errors on the held-out rows, rms, before and after the effect's fit."""
+    """Errors of ln f on the held-out rows, rms, before and after the effect's fit."""
 
     held_out: str  # held-out values in words
     effect: str  # ids of the effects, joined by +
