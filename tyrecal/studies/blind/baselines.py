@@ -18,7 +18,7 @@ Array = np.ndarray
 MAX_RULE_STEPS = 8  # of Gauss and Newton's method
 MAX_LN_STEP = 0.5  # of ln x, a step
 NONE = "none"
-PRIOR_NONE = 0.25
+PRIOR_NONE = 0.25  # probability of no effect, before the data
 
 
 def guesses(ruler: Ruler, y: Array, places: Array, sigma: Array) -> dict[str, str]:

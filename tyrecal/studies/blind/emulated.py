@@ -142,9 +142,9 @@ def emulate(model: ResponseModel, reach: float = REACH) -> Emulated:
     """
     start = np.asarray(model.start, float)
     count = len(start)
-    signs = 2 * qmc.Halton(count, seed=SEED).random(PLAIN_DESIGNS) - 1
-    signs[0] = 0.0
-    designs = [start + reach * t for t in signs]
+    boxed = 2 * qmc.Halton(count, seed=SEED).random(PLAIN_DESIGNS) - 1  # t of each design
+    boxed[0] = 0.0
+    designs = [start + reach * t for t in boxed]
     queries = [
         Query(x, constants=i < SOURCE_DESIGNS, coupled=i < SOURCE_DESIGNS)
         for i, x in enumerate(designs)
@@ -154,19 +154,19 @@ def emulate(model: ResponseModel, reach: float = REACH) -> Emulated:
     powers = up_to(count, PLAIN_DEGREE)
     if len(good) * (1 + count) < len(powers):
         raise next(a for a in plain if isinstance(a, Exception))
-    fitted = _fit(powers, signs[good], [plain[i] for i in good], reach)  # type: ignore[misc]
+    fitted = _fit(powers, boxed[good], [plain[i] for i in good], reach)  # type: ignore[misc]
     sources = [i for i in good if i < SOURCE_DESIGNS]
     constants = _values(
         up_to(count, SOURCE_DEGREE),
-        signs[sources],
+        boxed[sources],
         [plain[i].constants.ravel() for i in sources],  # type: ignore[union-attr]
     )
     effects = {}
     for id, span in model.ranges.items():
-        emulated = _effect(model, id, span, signs, designs, plain, reach)
+        emulated = _effect(model, id, span, boxed, designs, plain, reach)
         if emulated is not None:
             effects[id] = emulated
-    couplings = [(signs[i], plain[i].coupling) for i in sources]  # type: ignore[union-attr]
+    couplings = [(boxed[i], plain[i].coupling) for i in sources]  # type: ignore[union-attr]
     return Emulated(model, reach, fitted, constants, effects, couplings)
 
 
@@ -185,29 +185,29 @@ def _effect(
     model: ResponseModel,
     id: str,
     span: EffectRange,
-    signs: Array,
+    boxed: Array,  # (designs, v) t of each design
     designs: Sequence[Array],
     plain: Sequence[Answer | Exception],
     reach: float,
 ) -> EmulatedEffect | None:
     """The emulated effect; None if so few designs have an answer that no polynomial is
     determined."""
-    powers = up_to(len(signs[0]), EFFECT_DEGREE)
+    powers = up_to(len(boxed[0]), EFFECT_DEGREE)
     chosen = [i for i in range(EFFECT_DESIGNS) if isinstance(plain[i], Answer)]
     nodes, added, split = [], [], []
     for e in _node_values(span):
         answers = model.answers([Query(designs[i], {id: float(e)}) for i in chosen])
         both = [(i, a) for i, a in zip(chosen, answers, strict=True) if isinstance(a, Answer)]
-        if len(both) * (1 + len(signs[0])) < len(powers):
+        if len(both) * (1 + len(boxed[0])) < len(powers):
             continue
         differences = [
             Answer(a.eta - plain[i].eta, a.jacobian - plain[i].jacobian, a.split)  # type: ignore[union-attr]
             for i, a in both
         ]
-        where = signs[[i for i, _ in both]]
+        where = boxed[[i for i, _ in both]]
         nodes.append(float(e))
         added.append(_fit(powers, where, differences, reach))
-        split.append(_values(up_to(len(signs[0]), 1), where, [a.split for _, a in both]))
+        split.append(_values(up_to(len(boxed[0]), 1), where, [a.split for _, a in both]))
     if not nodes:
         return None
     ends = [e for e in nodes if span.has_shape_uncertainty and e in (span.low, span.high)]

@@ -1,13 +1,15 @@
 """How hard a trial is, by a ruler made before the study: sensitivities, covariance, signatures.
 
-    P = S^-1 - S^-1 J (J^T S^-1 J + Sx^-1)^-1 J^T S^-1        S: noise + form + constants
+    P = S^-1 - S^-1 J (J^T S^-1 J + Sx^-1)^-1 J^T S^-1        S: noise + form + constants,
+                                                              Sx: prior covariance of ln x
     lambda = g^T P g + splits                                  g: the true effect, noise-free
     delta_j^2 = min over e_j of (g - g_j)^T P (g - g_j) + splits
 
 S, J and the catalogue's g_j come from the plain case at its start, J and g_j moved to the trial's
-own design to first order; g from the maker's runs with and without. Splits of pairs add
-((s - s_j) / tau)^2, tau^2 = 2 noise^2 + (the tyre's own split)^2. Covariance and projection are
-written here again, not the diagnosis' own: a mistake of its would be one of its judge's.
+own design to first order; g from the maker's runs with and without. Splits of pairs, s of the true
+effect and s_j of effect j, add ((s - s_j) / tau)^2, tau^2 = 2 noise^2 + (the tyre's own split)^2.
+Covariance and projection are written here again, not the diagnosis' own: a mistake of its would be
+one of its judge's.
 """
 
 from __future__ import annotations
@@ -33,7 +35,7 @@ RULER_FILE = "ruler.json"
 CURVATURE_STEP = 0.05  # of ln x, for the curvature
 SHARES = (0.15, 0.5, 1.0)  # of each side of a range
 SIZE_POINTS = 61  # of the grid over the sizes of an effect
-BETWEEN_PRESSURES = 0.9  # of form errors: as all studies on record were scored
+BETWEEN_PRESSURES = 0.9  # correlation of form errors: as all studies on record were scored
 EARLIER_LAWS_LENGTH = 0.5  # of ln p, over which laws were alike in rulers that do not say it
 NUMBERS = ("x0", "spread", "eta", "jacobian", "hessian", "constants")
 SIGNATURE = ("sizes", "shift", "tilt", "split")
@@ -44,9 +46,9 @@ class EffectShifts:
     """An effect on all rows."""
 
     sizes: Array  # (k,) with 0
-    shift: Array  # (k, n)
-    tilt: Array  # (k, n, v)
-    split: Array  # (k, n)
+    shift: Array  # (k, n) of eta
+    tilt: Array  # (k, n, v) shift of J
+    split: Array  # (k, n) between a pair's two modes, in ln f
 
     @cached_property
     def _weights(self) -> tuple[Array, Array]:
@@ -70,9 +72,9 @@ class Ruler:
     rows: tuple[ModelRow, ...]
     x0: Array  # (v,)
     spread: Array  # (v,) prior of ln x
-    eta: Array  # (n,)
-    jacobian: Array  # (n, v)
-    hessian: Array  # (n, v, v)
+    eta: Array  # (n,) ln f, Hz, and ln mass, kg
+    jacobian: Array  # (n, v) d eta / d ln x
+    hessian: Array  # (n, v, v) by ln x twice
     constants: Array  # (n, k) change by one standard deviation of each
     signatures: Mapping[str, EffectShifts]
     material_laws: float = 0.0  # standard deviation of each part

@@ -31,8 +31,8 @@ from .verdict import FIT_VERDICT_WORDS
 Array = np.ndarray
 METHODS: dict[str, Descend] = {"slsqp": slsqp.descend, "gauss-newton": gauss_newton.descend}
 TOLERANCE = 1e-3  # projected gradient, Hz per unit of a logarithm: 1e-5 Hz for a change of 1 %
-SLOPE_NOISE_HZ = 50.0  # differences of a step that suits the digits: this times the step
-SLOPE_ERROR = 1e-4  # of d ln q / d x of patches and stiffnesses, by the curvature within a step
+SLOPE_NOISE_HZ = 50.0  # error of d f / d x by differences, over a step that suits the digits
+SLOPE_ERROR = 1e-4  # error of d ln q / d x of patches and stiffnesses: curvature within a step
 MAX_WEIGHINGS = 4  # times that a fit takes the weights anew, of the design where it ended
 MAX_REPLACED = 20  # replaced starts per start asked for
 

@@ -4,7 +4,7 @@ Two modes that are coupled, however weakly, avoid each other. With d the differe
 frequencies that they would have alone and 2 delta their coupling, the gap between them and the
 clearness of their labels, a difference of shares (Landau and Lifshitz, Quantum Mechanics, sec. 79):
 
-    g = +- sqrt(d^2 + 4 delta^2),    c = cos 2 phi = |d / g|
+    g = +- sqrt(d^2 + 4 delta^2),    c = cos^2 phi - sin^2 phi = |d / g|,    tan 2 phi = 2 delta / d
 
 So g is least where labels change places and its slope vanishes there, but d = g c goes through 0
 as straight as any frequency, with the slope (dg/dx) / c. Of a fit over several states, each has its

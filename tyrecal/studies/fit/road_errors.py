@@ -87,7 +87,7 @@ def _by_part(
     """d q / d ln stiffness and density (r, parts) of each part of rubber."""
     split, parts = split_by_region(case)
     signs = {m: case.kind.moduli(split.case, m) for m in parts}
-    rubbers = [m for m in parts if len(signs[m]) > 1]
+    rubbers = [m for m in parts if len(signs[m]) > 1]  # C10, C01, D1; a cord has E alone
     paths = [path for m in rubbers for path in signs[m]]
     numbers = {path: float(number_at(split, path)) for path in paths}
     taken = {p: values[n] for n, v in split.case.variables.items() for p in v.sets if n in values}

@@ -25,7 +25,7 @@ from .uncertainty import FitUncertainty, standard_errors
 Array = np.ndarray
 BY_MEASUREMENT, BY_MODEL, BY_SECTION = "measurement", "material laws and mesh", "section"
 BY_START = "what was known of the variables before"
-MAX_LINEAR_ERROR = 0.2  # of a coordinate: beyond, or next to a bound, no linear error holds
+MAX_LINEAR_ERROR = 0.2  # sd of a coordinate: beyond, or next to a bound, no linear error holds
 MIN_VARIANCE_SHARE = 0.01  # of the variance, below which a cause is not listed
 
 

@@ -50,7 +50,7 @@ MIN_DEGREES_LEFT = 3  # degrees of freedom that tell such a scatter
 MIN_CHECKED = 1e-6  # of a value's own weight: below, nothing else checks the value
 KINDS_OF_SLIP = ("value", "mode", "exchanged")  # kinds of reason after which the rest has to fit
 NEXT_REASON = 6.0  # chi2 between a reason and the next, 20 times less likely: below, both are named
-SAME_VALUE = 0.015  # relative, between a corrected value and the model, besides 3 sd
+SAME_VALUE = 0.015  # relative, between a corrected value and the model, if 3 sd are less
 
 
 class FitReason(ResultPart):
@@ -89,7 +89,7 @@ class Shift:
     columns: Array  # E (n, k): k shifts of unknown amounts; k = 0: the known shift alone
     known: Array  # s (n,): known shift
     words: Callable[[Array], str]  # the sentence, given the likeliest amounts (k,)
-    spread: float = 0.2  # t: standard deviation of the amounts
+    spread: float = 0.2  # t: standard deviation of the amounts, ln of a number's factor
 
 
 @dataclass(frozen=True)
@@ -172,6 +172,7 @@ def likeliest_reason(left: Remainder, shifts: Sequence[Shift] = ()) -> FitReason
         scale, marked = (
             (max(1.0, per_dof), MARKED) if left.is_stated else (per_dof, MARKED_UNSTATED)
         )
+        # as Schwarz's criterion: each number that is freed has to gain ln n
         score = taken - each.parameters * np.log(len(left.rows)) * scale
         if taken > marked * scale:
             known = per_dof if left.is_stated else None
