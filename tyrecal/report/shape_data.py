@@ -89,7 +89,8 @@ class Shapes(Result):
     # unloaded: nodes (node,) of `Shape.real`
     R_m: list[float] = Field(default=[])
     Z_m: list[float] = Field(default=[])
-    # loaded: angles (ring,) from the middle of the patch, rad; points (ring, node, 3): r, theta, z
+    # loaded: angles (ring,) from the middle of the patch, rad; points (ring, node, 3): r, way along
+    # theta from the angle, z
     angles: list[float] = Field(default=[])
     surface_m: list[list[list[float]]] = Field(default=[])
     modes: list[Shape]

@@ -32,7 +32,8 @@ class ShapePair(ResultPart):
     rival: str | None  # the mode that it is like next
     rival_mac: float  # of the shape with that one
     decided: bool  # whether the first leads by more than the chance level
-    plane_mac: float | None  # smallest of the measured doublet's plane with the mode's
+    # least squared cosine between the planes of the measured doublet and the mode
+    plane_mac: float | None
 
 
 class SensorAgreement(ResultPart):

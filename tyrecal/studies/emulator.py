@@ -15,7 +15,8 @@ and so is the difference without their coupling, d = (ln f_axial - ln f_torsiona
 clearness of their names; its sign says which of m +- sqrt(s) / 2 is the axial one.
 
 The error: each design is left out in turn, and what the others say there is compared with it. With
-M = Q R, rows i of one design, H = Q Q^T (Cook and Weisberg, Residuals and Influence, sec. 2.2):
+the equations M a = q, M = Q R, rows i of one design, H = Q Q^T (Cook and Weisberg, Residuals and
+Influence, sec. 2.2):
 
     residual of the design left out = (1 - H_ii)^-1 (q - M a)_i
 
@@ -301,7 +302,9 @@ def bound(errors: Array) -> float:
     log-normal errors (n,) (NIST/SEMATECH e-Handbook, sec. 7.2.6.3), and no less than any seen.
 
         ln bound = mean + K sd,  K = (z_p + sqrt(z_p^2 - a b)) / a,
-        a = 1 - z_g^2 / (2 (n - 1)),  b = z_p^2 - z_g^2 / n
+        a = 1 - z_g^2 / (2 (n - 1)),  b = z_p^2 - z_g^2 / n,
+
+    z_p and z_g the normal quantiles of the share, 99 %, and of the confidence.
     """
     ln, n = np.log(errors + SEEN), len(errors)
     a, b = 1 - SURE_Z**2 / (2 * (n - 1)), SHARE_Z**2 - SURE_Z**2 / n

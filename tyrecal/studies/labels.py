@@ -65,7 +65,7 @@ class Labels(ResultPart):
 
     frequencies: list[LabelledFrequency]  # measured frequencies without a label
     labelings: list[Labeling]  # all labels together, the likeliest first
-    model_off_percent: float  # how far the model is off the tyre, by these frequencies
+    model_off_percent: float  # likely rms error of the model's frequencies
     expansions: int  # expansions of the model that were needed
     settled: bool  # whether the labels are those of the design that they lead to
 

@@ -49,7 +49,8 @@ class Loaded:
     unnamed: tuple[Member, ...] = ()  # members for which no shape was found
     # members that have another name where they are followed from the unloaded tyre in one stride
     disputed: tuple[Member, ...] = ()
-    # (ring, node, 3) where the shapes' points stand, r, theta, z in m at their angles, deformed
+    # (ring, node, 3) where the shapes' points stand, deformed: r, way along theta from the ring's
+    # angle, z, in m
     surface: np.ndarray | None = field(default=None, compare=False, repr=False)
     # of the first wave in the cavity's gas, fore and aft, and up and down; none: there is no gas
     cavity_Hz: tuple[float, ...] = ()

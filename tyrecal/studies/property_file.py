@@ -98,6 +98,7 @@ def _curves(rows: RowsOfDesign) -> list[CurveFit]:
     """All curves in the order in which they need each other."""
     row = rows.nominal
     radius = row.loaded_radius_m + row.deflection_m
+    # 4 Q_FZ2 is at most (VERTICAL_STIFFNESS UNLOADED_RADIUS / FNOMIN)^2, at the lower limit too
     steep = (row.vertical_sliding_N_per_m * radius / row.load_N) ** 2
     over_load = lambda formula: lambda tyre, at: formula(tyre, at.column("load_N"), at.dp)
     lateral, longitudinal = row.lateral_N_per_m, row.longitudinal_N_per_m

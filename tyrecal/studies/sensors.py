@@ -29,7 +29,8 @@ class SensedMode(Named):
     """A mode of the case at the sensors."""
 
     labelled: Annotated[float, Column("labelled %", ".0f", 100)]  # share of drawn tests
-    shift_percent: Annotated[float, Column("mass shift %", "+.2f")]  # mean of both of a doublet
+    # shift of the frequency by the sensors' mass, mean of both of a doublet
+    shift_percent: Annotated[float, Column("mass shift %", "+.2f")]
     split_percent: Annotated[float, Column("split %", ".2f")]  # of a doublet by the mass
 
 

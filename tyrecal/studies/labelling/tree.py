@@ -77,7 +77,7 @@ class Labelings:
     # except for a constant
     ln_prior: Array
     z: Array  # (v,) the variables' mean under the first
-    discrepancy: float  # the model's, its mean over all
+    discrepancy: float  # the model's, of ln f, its mean over all
 
     def with_probabilities(self, shares: Array) -> Labelings:
         """The first ones sharing otherwise, ``shares`` (first,), what they have together."""

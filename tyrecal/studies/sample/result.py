@@ -76,7 +76,7 @@ class SampledPair(ResultPart):
 
 
 class PredictedRow(Named):
-    """A frequency of the tyre at a pressure; ``frequency_Hz`` is its median."""
+    """A frequency of the tyre at a pressure, Hz; ``frequency_Hz`` is its median."""
 
     pressure_kPa: float
     rim: str | None = None  # how the rim is held, if not as in the case
@@ -92,7 +92,7 @@ class VarianceShare(Named):
     """Sobol' shares of the variance of ln f over the box, see `variance_shares`; ``frequency_Hz``
     is in its middle."""
 
-    deviation_percent: float  # standard deviation
+    deviation_percent: float  # standard deviation of the frequency
     first: dict[str, float]  # by variable alone
     total: dict[str, float]  # by variable, together with others
 

@@ -30,7 +30,7 @@ class Deviations:
     """n deviations, linear about the tyre that fits them."""
 
     r: Array  # (n,) of ln q, at the variables' start values
-    covariance: Array  # (n, n) with the variables' spread: S + J Sx J^T
+    covariance: Array  # (n, n) S + J Sx J^T: of the rows, and by the variables' prior
     numbers: tuple[Source, ...]  # k numbers that may be off
     G: Array  # (n, k) change of ln q by one standard deviation of each
     chi2_exact_section: float  # of r, if the section's fields were known

@@ -20,7 +20,7 @@ from .text import Block, OwnDeckError, Place, number_from, read_blocks, table
 Units = Literal["m", "mm"]
 UNIT_LENGTH = {"m": 1.0, "mm": 1e-3}  # of a unit of length, m
 UNIT_MASS = {"m": 1.0, "mm": 1e3}  # of a unit of mass, kg: mm, t, s, MPa
-# of tyres' materials
+# of tyres' materials: kg/m3, or t/mm3
 DENSITIES: dict[Units, tuple[float, float]] = {"m": (300.0, 2e4), "mm": (3e-10, 2e-8)}
 TOPOLOGY = {"PART", "ASSEMBLY", "SYMMETRIC MODEL GENERATION", "BOUNDARY", "DSLOAD", "DLOAD"}
 TOPOLOGY |= {

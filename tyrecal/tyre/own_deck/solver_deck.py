@@ -41,7 +41,7 @@ class SolverDeck:
     sections: tuple[str, ...]  # their sets, likewise
     plies: tuple[RebarPly, ...]
     pressure_Pa: float
-    long_term: bool
+    long_term: bool  # whether the moduli of the step that inflates are
     blocks: ClassifiedDeck
     model: DeckModel
 
