@@ -23,7 +23,7 @@ STUDY_OF_FORMS = {
     "tir": "stiffness",
     "uff": "modes",
 }
-SAME_HZ = 1e-4  # relative
+SAME_HZ = 1e-4  # relative, between frequencies of results and of this run
 OPTIONS_OF_FORMS = {
     "--solver": ("deck", "matrices"),
     **dict.fromkeys(("--modes", "--points", "--pressure-kPa"), ("matrices",)),

@@ -33,7 +33,7 @@ class ResidualGroup:
 
     kind: str  # family, harmonic, pressure, rim or mass
     name: str  # of the group among its kind, such as "in-plane" or "240" (kPa)
-    rms_percent: float
+    rms_percent: float  # of residuals, 100 (ln measured - ln model)
     chi2: float
     freedom: int  # degrees of freedom of chi2
     p_value: float

@@ -154,8 +154,9 @@ def discrepancy(labels: Sequence[Label], tau: float) -> Array:
 
 
 def _tree(measured: Frequencies, modes: Modes, tau: float) -> tuple[Array, Array, Array, Array]:
-    """Labelings (k, m), ln of prior times evidence (k,), ln of the evidence of their labelled
-    frequencies (k,) and the means of z (k, v + l)."""
+    """Labelings (b, m) of the branches, ln of prior times evidence (b,), ln of the evidence of
+    their labelled frequencies (b,) and the means of z (b, k): k = v + l variables and discrepancies
+    of labels."""
     different = list(dict.fromkeys(modes.labels))
     own = np.array([different.index(label) for label in modes.labels])
     root = np.linalg.cholesky(discrepancy(different, tau))

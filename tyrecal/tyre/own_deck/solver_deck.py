@@ -107,7 +107,7 @@ def translate(deck: ClassifiedDeck, model: DeckModel, length: float, mass: float
         tuple(rubbers),
         tuple(section.name for section in model.solids),
         tuple(plies),
-        row.number(i) * mass / length,
+        row.number(i) * mass / length,  # units of mass / (length s^2) to Pa
         "LONG TERM" in static.parameters,
         deck,
         model,
