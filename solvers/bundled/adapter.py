@@ -73,7 +73,7 @@ class Bundled:
         request = {k: decks.request[k] for k in REQUEST_KEYS if k in decks.request}
         if decks.loads_N:
             loaded, slopes = bool(decks.request.get("loaded_modes")), decks.tangents(self.dialect)
-            request = {k: v for k, v in request.items() if loaded and k == "cavity"}
+            request = {k: request[k] for k in ("cavity", "response") if loaded and k in request}
             if slopes:
                 request["sensitivities"] = slopes
             if not request:

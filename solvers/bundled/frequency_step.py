@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from ..language.text import COMPLEX_STEP, Block, DeckError, Row
-from .deck.request import TREAD_DIRECTIONS, Request
+from .deck.request import Request, response_points
 from .deck.steps import Deck, DeckStep, Tangent
 from .modes.bordered import Bordered
 from .modes.cavity import GasCavity, read_cavity
@@ -174,10 +174,7 @@ class FrequencyStep:
         lowest, highest = wanted["lowest_Hz"], wanted["highest_Hz"]
         frequencies = np.linspace(lowest, highest, wanted["lines"])
         response = Response(self.vibration, model, U, patch, highest, self.tyre.check)
-        points = [
-            [(np.radians(angle), TREAD_DIRECTIONS.index(way)) for angle, way in wanted[which]]
-            for which in ("excite", "respond")
-        ]
+        points = response_points(wanted)
         counts = len(response.harmonics), response.wanted
         receptance, hub = response.at(frequencies, *points)
         matrices = {}

@@ -270,7 +270,10 @@ class Job:
         dynamic_Hz = step.procedure.number("PROPERTY EVALUATION")
         model = self.tyre.models(dynamic_Hz, step.long_term, False)
         wheel_kg = free_along_load(self.tyre.revolve, self.model.mesh, step)
-        return ModeRequest(model, row.integer(0), nodes, wheel_kg)
+        response = self.tyre.request.response
+        if response and wheel_kg is not None:
+            raise DeckError(place, "a response on the road needs a rim that is held")
+        return ModeRequest(model, row.integer(0), nodes, wheel_kg, response)
 
     def _rim_motion(self, step: DeckStep) -> list[float]:
         """Motion (6,) of the rim in a linear step of a tyre on a road: m and rad, along and about

@@ -53,6 +53,7 @@ class Rubber:
     C01: float = 0.0
     D1: float = 5.085e-8
     density: float = 1100.0
+    loss: float = 0.0  # loss factor
 
     @property
     def shear(self) -> float:
@@ -132,6 +133,7 @@ def deck(
     if kind:
         out += ["*MATERIAL, NAME=RUBBER", "*HYPERELASTIC, MOONEY-RIVLIN"]
         out += [f"{rubber.C10!r}, {rubber.C01!r}, {rubber.D1!r}", "*DENSITY", f"{rubber.density!r}"]
+        out += [f"*DAMPING, STRUCTURAL={rubber.loss!r}"] if rubber.loss else []
     for k, layer in enumerate(layers, 1):
         out += [f"*MATERIAL, NAME=CORD{k}", "*ELASTIC", f"{layer.modulus!r}, 0.3"]
         out += ["*NO COMPRESSION"] if layer.tension_only else []

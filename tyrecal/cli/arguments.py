@@ -101,6 +101,15 @@ def refuse_unusual_loads(loaded: Any, option: str, loads: Sequence[float], allow
             refuse_unusual(loaded, f"{option} {load:g}", "road.loads_N.0", load, allowed)
 
 
+def one_load(loaded: Any, load_N: float | None, allowed: bool) -> float:
+    """The load of --load-N, N; 0: none was given. Raises click.UsageError."""
+    if load_N is None:
+        return 0.0
+    loads = parse_loads(repr(load_N), "--load-N")
+    refuse_unusual_loads(loaded, "--load-N", loads, allowed)
+    return loads[0]
+
+
 def parse_pressures(
     low: float | None, high: float | None, steps: int, allowed: bool
 ) -> PressureRange:

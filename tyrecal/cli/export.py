@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..errors import InputError
-from . import complete, options
+from . import arguments, complete, options
 from .parameters import FileOrFolder, Number, OneOf, WholeNumber, option
 from .terminal import Terminal
 
@@ -26,7 +26,7 @@ STUDY_OF_FORMS = {
 SAME_HZ = 1e-4  # relative, between frequencies of results and of this run
 OPTIONS_OF_FORMS = {
     "--solver": ("deck", "matrices"),
-    **dict.fromkeys(("--modes", "--points", "--pressure-kPa"), ("matrices",)),
+    **dict.fromkeys(("--modes", "--points", "--pressure-kPa", "--load-N"), ("matrices",)),
     **dict.fromkeys(("--nominal-load-N", "--nominal-pressure-kPa", "--donor"), ("tir",)),
 }
 
@@ -57,6 +57,7 @@ OPTIONS_OF_FORMS = {
     " (default: five angles, radial and lateral).",
 )
 @options.pressure
+@options.one_load
 @option(
     "--case",
     "case",
@@ -100,6 +101,7 @@ def command(
     modes: int,
     points: str | None,
     pressure_kPa: float | None,
+    load_N: float | None,
     case: Path | None,
     nominal_N: float | None,
     nominal_kPa: float | None,
@@ -122,17 +124,17 @@ def command(
     A uff has the modes of the modes.json in DIR: the surface's points and lines, and two shapes for
     a pair (data sets 151, 164, 2411, 82, 55; SI; x forward, y left, z up).
 
-    Matrices are those of the unloaded tyre at a pressure: stiffness, mass and loss on the six
-    motions of the hub and its modes (Craig and Bampton), as Matrix Market and for ABAQUS, with a
-    README of coordinates and units. A case, decks and matrices need the fit.json in DIR; for
-    matrices DIR may also be a case file.
+    Matrices are those of the tyre at a pressure, and at a load with its contact held: stiffness,
+    mass and loss on the six motions of the hub and its modes (Craig and Bampton), as Matrix Market
+    and for ABAQUS, with a README of coordinates and units. A case, decks and matrices need the
+    fit.json in DIR; for matrices DIR may also be a case file.
 
     \b
     tyrecal export p235_75r17
     tyrecal export p235_75r17 --format deck --solver calculix --output decks
     tyrecal modes p235_75r17/export/p235_75r17_fitted.yaml
     tyrecal export p235_75r17 --format tir --nominal-load-N 4000 --donor slip.tir
-    tyrecal export p235_75r17 --format matrices --pressure-kPa 200 --output matrices
+    tyrecal export p235_75r17 --format matrices --pressure-kPa 200 --load-N 4000
     """
     for name in set(options.given()) & OPTIONS_OF_FORMS.keys():
         if form not in OPTIONS_OF_FORMS[name]:
@@ -162,7 +164,9 @@ def command(
         if not of_case:
             loaded = _as_fitted(results, loaded, terminal)
         if form == "matrices":
-            files = matrix_files(loaded, solver, pressure_kPa, modes, points or MATRIX_POINTS)
+            load = arguments.one_load(loaded, load_N, not of_case)
+            wanted = points or MATRIX_POINTS
+            files = matrix_files(loaded, solver, pressure_kPa, modes, wanted, load)
         else:
             files = case_files(loaded) if form == "case" else deck_files(loaded, solver)
     target = output or (root() / results.stem if of_case else results.parent) / "export"

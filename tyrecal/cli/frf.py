@@ -11,7 +11,7 @@ from .parameters import FileOrFolder, Number, OneOf, option
 
 
 @click.command()
-@options.every(options.case_argument, options.assignments, options.pressure)
+@options.every(options.case_argument, options.assignments, options.pressure, options.one_load)
 @option(
     "--excite",
     default="",
@@ -81,6 +81,7 @@ def command(
     case: Path,
     assignments: tuple[str, ...],
     pressure_kPa: float | None,
+    load_N: float | None,
     excite: str,
     respond: str,
     from_Hz: float,
@@ -93,15 +94,17 @@ def command(
     pictures: bool,
     study: options.Study,
 ) -> int:
-    """Compute response functions of the unloaded tyre of CASE, its rim held.
+    """Compute response functions of the tyre of CASE, its rim held, unloaded or on the road.
 
     Writes frf.json, .csv, .uff (universal file, data set 58) and .png: forces of the tyre on the
     hub, and motions of the tread, per newton on its tread. Hub: x forward, y left, z up. The angle
-    0 is below the hub, 90 behind it. Losses are the compounds' loss_factor.
+    0 is below the hub, 90 behind it. Losses are the compounds' loss_factor. With --load-N the
+    contact patch sticks to the road, which bears its part of a force.
 
     \b
     tyrecal frf cases/p235_75r17.yaml --excite tread:0deg:radial --respond hub:fz,hub:fx
     tyrecal frf cases/p235_75r17.yaml --respond tread:0deg:radial,tread:90deg:radial --to-Hz 200
+    tyrecal frf cases/p235_75r17.yaml --load-N 4000 --excite tread:90deg:radial
     tyrecal frf my.yaml --measured hammer.uff --to-Hz 250
     """
     from ..studies.measured_response import read_measured_responses
@@ -116,10 +119,14 @@ def command(
     response_request(excite or EXCITE, respond or RESPOND, from_Hz, to_Hz, step_Hz, patch_mm)
     loaded, _ = study.load(case, assignments, pressure_kPa)
     loaded, values = arguments.one_design(fitted, loaded, assignments, study.terminal)
+    load = arguments.one_load(loaded, load_N, study.allow_unusual)
     evaluator = study.evaluator(loaded)
     evaluator.needs_response()
+    if load:
+        evaluator.needs_road(modes=True)
     designs = {"fitted" if fitted else "initial": values}
-    output = study.run(loaded, "frf", evaluator, measured=[measured] if measured else [])
+    files = [measured] if measured else []
+    output = study.run(loaded, "frf", evaluator, measured=files, load_N=load)
     given = StudyInput(loaded, evaluator, designs)
     result = FrfResult.run(
         given,
@@ -131,6 +138,7 @@ def command(
         patch_mm=patch_mm,
         form=form,  # type: ignore[arg-type]
         measured=measured,
+        load_N=load,
     )
     figures = {}
     if pictures:

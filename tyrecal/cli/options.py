@@ -132,7 +132,7 @@ one_load = option(
     "load_N",
     type=Number(),
     metavar="F",
-    help="Vertical load on a flat road, N: modes about the deflected state (default: no load).",
+    help="Vertical load on a flat road, N: vibrations about the deflected state (default: none).",
 )
 sweep_load = option(
     "--sweep-load",

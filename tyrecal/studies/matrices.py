@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..simulate.deck.decks_design import design_of
-from ..simulate.evaluate.evaluator import Evaluator, Question
+from ..simulate.evaluate.evaluator import Evaluator
 from ..tyre.case import LoadedCase, start_values
 from ..tyre.state import TyreState
 from ..tyre.usual import USUAL
@@ -40,7 +40,7 @@ MATRIX_NAMES = ("stiffness", "mass", "loss", "tread")
 NEAR_NOTHING = 1e-13  # of the largest entry of a row, below which an entry is round-off
 
 README = """\
-Matrices of the tyre '{name}' at {pressure:g} kPa, unloaded, by {solver}: {size} coordinates
+Matrices of the tyre '{name}' at {pressure:g} kPa, {state}, by {solver}: {size} coordinates
 
 Fixed-interface reduction (Craig and Bampton): the six motions of the hub, and {modes} modes with
 the hub held, the highest at {highest:.0f} Hz. Units: m, rad, N, kg, s.
@@ -53,8 +53,8 @@ coordinates  1 to 3  motions of the wheel's centre (on the axle, in the tyre's m
              4 to 6  turns about x, y, z, rad
              7 ...   modes with the hub held, of unit modal mass: m kg^0.5
 
-stiffness    symmetric. The hub's rows are zero: the unloaded tyre follows its rim.
-mass         symmetric, with the mass and the moments of inertia of the tyre without the rim
+stiffness    symmetric. The hub's rows are {hub_rows}
+mass         symmetric, {mass}
 loss         imaginary part of the stiffness (structural damping) at {middle:g} Hz{no_loss}
 tread        motions of patches of {patch:g} mm at these points, a row each. The angle 0 is below
              the hub, 90 degrees behind it.
@@ -77,17 +77,18 @@ def matrix_files(
     pressure_kPa: float | None = None,
     modes: int = MODE_COORDINATES,
     points: str = MATRIX_POINTS,
+    load_N: float = 0.0,
 ) -> dict[str, bytes]:
-    """Files by name: of the unloaded case at a pressure (None: the case's), at most ``modes``
-    coordinates of modes. Raises InputError, DeckRefused, EvaluationFailed, ValueError."""
+    """Files by name: of the case at a pressure (None: the case's) and a load, the patch held, at
+    most ``modes`` coordinates of modes. Raises InputError, DeckRefused, EvaluationFailed,
+    ValueError."""
     chosen = read_points(points)
     request = response_request(points, points, 0.0, MATRIX_BAND_Hz, MATRIX_BAND_Hz, MATRIX_PATCH_mm)
     evaluator = Evaluator(design_of(case), solver)
-    evaluator.needs_response()
     values = TyreState(pressure_kPa).design(case, start_values(case))
     if refusal := pressure_kPa is not None and USUAL["pressure_kPa"].refusal(pressure_kPa):
         raise InputError(f"the pressure is {pressure_kPa:g} kPa: {refusal}")
-    answer = evaluator.evaluate(Question(values, response={**request, "modes": modes}))
+    answer = evaluator.respond(values, {**request, "modes": modes}, load_N)
     matrices = _on_iso_axes({k: np.asarray(answer.response[k]) for k in MATRIX_NAMES})
     matrices = {name: _without_noise(matrix) for name, matrix in matrices.items()}
     hertz = np.sqrt(np.linalg.eigvalsh(matrices["stiffness"][6:, 6:])) / (2 * np.pi)
@@ -95,6 +96,7 @@ def matrix_files(
     text = README.format(
         name=case.case.name,
         pressure=answer.pressure_kPa,
+        **_words(load_N, answer.deflection_m),
         solver=f"{evaluator.solver.name} {evaluator.solver.version}",
         size=6 + len(hertz),
         modes=len(hertz),
@@ -108,6 +110,21 @@ def matrix_files(
     files = {f"{name}.mtx": _matrix_market(name, matrix) for name, matrix in matrices.items()}
     abaqus = _abaqus(matrices, chosen, has_loss)
     return {"README.txt": text.encode(), **files, **{k: v.encode() for k, v in abaqus.items()}}
+
+
+def _words(load_N: float, deflection_m: float) -> dict[str, str]:
+    """Words of the README on the state."""
+    if not load_N:
+        return {
+            "state": "unloaded",
+            "hub_rows": "zero: the unloaded tyre follows its rim.",
+            "mass": "with the mass and the moments of inertia of the tyre without the rim",
+        }
+    return {
+        "state": f"{load_N:g} N on a flat road ({deflection_m * 1e3:.2f} mm)",
+        "hub_rows": "those of the pressed tyre, its contact held.",
+        "mass": "with what follows the hub of the tyre without the rim",
+    }
 
 
 def _on_iso_axes(matrices: Mapping[str, Array]) -> dict[str, Array]:

@@ -116,6 +116,7 @@ class FrfResult(Result):
 
     design: str  # name of the design: initial, fitted or set
     pressure_kPa: float
+    load_N: float = 0.0  # load on the road, with the patch held; absent: unloaded
     patch_mm: float  # width of the patch of the tread on which the force acts
     radius_m: float  # radius of the tread's points
     harmonics: int  # harmonics in the sum
@@ -136,10 +137,11 @@ class FrfResult(Result):
         patch_mm: float = PATCH_MM,
         form: ResponseForm = "receptance",
         measured: Path | None = None,
+        load_N: float = 0.0,
     ) -> FrfResult:
-        """The last design, rim held, unloaded. With a measured file, at its points, unless they are
-        given, and at its frequencies from ``from_Hz`` to ``to_Hz``. Raises InputError,
-        EvaluationFailed."""
+        """The last design, rim held, at a load with the patch held. With a measured file, at its
+        points, unless they are given, and at its frequencies from ``from_Hz`` to ``to_Hz``. Raises
+        InputError, EvaluationFailed."""
         known = read_measured_responses(measured, form, from_Hz, to_Hz) if measured else []
         places = points_of(known) if known else {"excite": EXCITE, "respond": RESPOND}
         excite, respond = excite or places["excite"], respond or places["respond"]
@@ -147,7 +149,6 @@ class FrfResult(Result):
             f = known[0].frequency_Hz
             from_Hz, to_Hz, step_Hz = float(f[0]), float(f[-1]), float(np.ptp(f) / (len(f) - 1))
         request = response_request(excite, respond, from_Hz, to_Hz, step_Hz, patch_mm)
-        given.evaluator.needs_response()
         name, values = [*given.designs.items()][-1]
         forces, seen = read_points(excite, hub=False), read_points(respond)
         tread = _of_tread(seen, forces)
@@ -157,7 +158,7 @@ class FrfResult(Result):
                 f"{measured}: no function in it is of {excite} and {respond}; the first is of"
                 f" {known[0].excite} and {known[0].respond}"
             )
-        result = _evaluated(given, values, request)
+        result = given.evaluator.respond(values, request, load_N)
         answer = result.response
         functions = [
             _entry(answer, force, e, point, tread, form).compared(by_points.get((force, point)))
@@ -169,17 +170,18 @@ class FrfResult(Result):
             design=name,
             pressure_kPa=result.pressure_kPa,
             patch_mm=patch_mm,
-            radius_m=answer["radius_m"],
+            radius_m=float(answer["radius_m"]),
             harmonics=int(answer["harmonics"]),
             frequency_Hz=[float(f) for f in answer["frequency_Hz"]],
             functions=functions,
-            findings=ResponseFindings(
-                words=_words(answer, result.modes[0].damping_ratio) + _compared_words(functions)
-            ),
+            findings=ResponseFindings(words=_words(answer, load_N) + _compared_words(functions)),
         )
+        if load_N:
+            functions_of_tyre = functions_of_tyre.model_copy(update={"load_N": load_N})
         text = functions_of_tyre.universal(given.case)
         files = [measured] if measured else []
-        return given.stamped(functions_of_tyre.with_files({"frf.uff": text}), measured=files)
+        written = functions_of_tyre.with_files({"frf.uff": text})
+        return given.stamped(written, measured=files, load_N=load_N)
 
     def quantities(self) -> dict[str, float]:
         numbers = {}
@@ -212,7 +214,8 @@ class FrfResult(Result):
     def tables(self) -> list[Table]:
         more = COMPARED if self._is_compared else {}
         columns = [*ResponseFunctionEntry.columns().values(), *more.values()]
-        title = f"{self.design}, {self.pressure_kPa:g} kPa, rim held, patch {self.patch_mm:g} mm"
+        held = f"{self.load_N:g} N, rim and contact held" if self.load_N else "rim held"
+        title = f"{self.design}, {self.pressure_kPa:g} kPa, {held}, patch {self.patch_mm:g} mm"
         rows = [
             [*each.cells(), *(column.cell(getattr(each, key)) for key, column in more.items())]
             for each in self.functions
@@ -246,12 +249,6 @@ class FrfResult(Result):
         title, frequencies = case.case.name, np.array(self.frequency_Hz)
         sets = [function_set(title, each, frequencies) for each in functions]
         return universal_text(title, nodes, sets, TREAD_SYSTEM, numbers.values())
-
-
-def _evaluated(given: StudyInput, values: Mapping[str, float], request: Json) -> Any:
-    from ..simulate.evaluate.evaluator import Question  # late: not for those who read results
-
-    return given.evaluator.evaluate(Question(values, response=request))
 
 
 def _entry(
@@ -300,9 +297,15 @@ def _compared_words(functions: Sequence[ResponseFunctionEntry]) -> list[str]:
     return [f"{len(known)} functions were measured: FRAC {span} (1: equal up to a factor)"]
 
 
-def _words(answer: Mapping[str, Any], damping: float | None) -> list[str]:
+def _words(answer: Mapping[str, Any], load_N: float) -> list[str]:
     words = []
-    if damping is None:
+    if load_N:
+        words.append(
+            f"the contact sticks; waves up to {int(answer['harmonics']) - 1} round the"
+            " circumference are in the motions: those of the tread near its own force lack the"
+            " shorter ones"
+        )
+    if not np.imag(answer["hub"]).any():
         words.append(
             "no compound has a loss factor, so peaks are as high as the frequency steps happen to"
             " meet them: add materials.NAME.loss_factor to the case (a Prony series adds no loss)"

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from math import isfinite
+from math import isfinite, radians
 from pathlib import Path
 from typing import Any
 
@@ -82,6 +82,14 @@ def read_sector(folder: Path, sector: dict[str, Any]) -> list[Block]:
     job = sector["job"]
     text = read_deck(folder / f"{job}.inp")
     return grammar.check(read_keywords(text, job), revolve=False)[0]
+
+
+def response_points(response: Mapping[str, Any]) -> list[list[tuple[float, int]]]:
+    """Angle, rad, and component of the points that are excited, and of those that respond."""
+    return [
+        [(radians(angle), TREAD_DIRECTIONS.index(way)) for angle, way in response[which]]
+        for which in ("excite", "respond")
+    ]
 
 
 def _must(holds: object, key: str, value: Any, right: str) -> None:

@@ -8,7 +8,8 @@ of the whole tyre, the displacement of the inflated one, and per footprint i the
 and the displacement, as NAME_i; where modes were asked for: mode_frequency_Hz (m,), mode_shape
 (m, ring, node, 3) at mode_node, modal mass 1 kg; with friction the patch's forces along the road in
 these, mode_traction_N (m,), their sizes summed, and sliding_frequency_Hz, sliding_shape of the same
-tyre while nothing holds the patch along the road.
+tyre while nothing holds the patch along the road. Where a response was asked for in place of
+modes: response_NAME, the fields of `ResponseResult` and of `Superelement`.
 """
 
 from __future__ import annotations
@@ -25,20 +26,23 @@ import numpy as np
 
 from ...errors import Refused, RunFailed
 from ...language.text import WHOLE_DECK, DeckError
+from ..deck.request import response_points
 from ..modes.harmonics import Vibration, lowest_of_all
+from ..modes.response import tread_patch
 from ..section.band import Numbering
 from ..section.model import Model
 from ..section.parts.elastic import Elastic
 from ..section.parts.hourglass import Hourglass
 from ..section.parts.pressure import Pressure
 from ..section.symmetry import HALF_TURN
-from ..solid3d.circumference import HalfCircle, half_circle, waves_beyond
+from ..solid3d.circumference import WAVE_BY_ELEMENTS, HalfCircle, half_circle, waves_beyond
 from ..solid3d.revolved import Revolved
 from .contact import flat_road
 from .contact_newton import ContactNewton, PressedState
 from .half_turn_symmetry import HalfTurn
 from .loaded_modes import SPARE, loaded_modes
 from .patch import patch
+from .pressed_response import UNLOADED_MODES, PressedResponse
 from .rim_stiffness import reactions, rim_stiffness
 from .road_data import InflatedTangent, ModeRequest, RimRequest, RoadData
 from .slopes import Slopes
@@ -48,6 +52,7 @@ from .tread import tread_of
 Array = np.ndarray
 log = logging.getLogger("tyrecal_solvers")
 PATCH_ARRAYS = ("ring", "node", "along_m", "across_m", "pressure_Pa", "area_m2", "traction_Pa")
+RESPONSE = "response_"  # begins the names of arrays of a response
 MODE_ARRAYS = (
     *("mode_frequency_Hz", "mode_node", "mode_shape"),
     *("mode_traction_N", "sliding_frequency_Hz", "sliding_shape"),
@@ -108,7 +113,8 @@ def press(
             if load in rim_requests:
                 footprint |= _rim_reactions(work, state, rim_requests[load])
             if load in vibrations:
-                footprint |= _modes(work, state, vibrations[load], equations, U, rings)
+                vibrating = _response if vibrations[load].response else _modes
+                footprint |= vibrating(work, state, vibrations[load], equations, U, rings)
         except (RunFailed, np.linalg.LinAlgError) as error:
             cause = getattr(error, "cause", "crashed")
             if cause == "timed_out" and work.load:
@@ -244,6 +250,44 @@ def _modes(
     return arrays
 
 
+def _response(
+    work: ContactNewton,
+    state: PressedState,
+    wanted: ModeRequest,
+    equations: Numbering,
+    inflated: Array,
+    angles: Array,
+) -> dict[str, Array]:
+    """Response of the whole tyre about one load to forces on its tread, as arrays by name."""
+    request = wanted.response
+    assert request is not None
+    tyre = Revolved(wanted.model, work.tyre.loads, work.tyre.around)
+    U = work.symmetry.spread(state.parts)
+    lowest, highest = request["lowest_Hz"], request["highest_Hz"]
+    excited, seen = response_points(request)
+    vibration = Vibration(wanted.model, inflated, tyre.loads, equations, 0.0)
+    response = PressedResponse(
+        tyre,
+        work.symmetry,
+        U,
+        held(state.contact),
+        work.tyre.residual(U),
+        lowest_of_all(vibration, UNLOADED_MODES, work.check),
+        tread_patch(wanted.model.mesh.X, inflated, wanted.nodes, request["patch_m"]),
+        [*excited, *seen],
+        highest,
+        work.check,
+        work.release_factor() if wanted.model is work.tyre.model else None,
+    )
+    frequencies = np.linspace(lowest, highest, request["lines"])
+    harmonics = 1 + int(WAVE_BY_ELEMENTS / (2 * np.diff(angles).max()) + 1e-9)
+    result = response.result(frequencies, len(excited), harmonics)
+    arrays = {name: each for name, each in vars(result).items() if name != "matrices"}
+    if "modes" in request:
+        arrays |= vars(response.superelement(request["modes"], len(excited)))
+    return {f"{RESPONSE}{name}": np.asarray(each) for name, each in arrays.items()}
+
+
 def _traction(around: HalfCircle, forces: Array) -> float:
     """Sum of the sizes of nodal forces (k, n, 3) along the road, of the whole tyre, N."""
     nodes = len(around.angles)
@@ -267,7 +311,8 @@ def write(stem: Path, model: Model, result: dict[str, Any]) -> None:
         footprint = {**footprint, "node": numbers[footprint["node"]]}
         if "mode_node" in footprint:
             footprint["mode_node"] = numbers[footprint["mode_node"]]
-        for name in (*PATCH_ARRAYS, "displacement", "rim_reactions", *MODE_ARRAYS):
+        responses = [name for name in footprint if name.startswith(RESPONSE)]
+        for name in (*PATCH_ARRAYS, "displacement", "rim_reactions", *MODE_ARRAYS, *responses):
             if name in footprint:
                 arrays[f"{name}_{i}"] = footprint.pop(name)
         lines.append({**footprint, "rim_N": footprint["rim_N"].tolist()})
@@ -291,6 +336,13 @@ def read(stem: Path) -> dict[str, Any]:
             for name in (*PATCH_ARRAYS, "displacement", "rim_reactions", *MODE_ARRAYS):
                 if f"{name}_{i}" in arrays:
                     footprint[name] = arrays[f"{name}_{i}"]
+            of_response = [name for name in arrays if name.startswith(RESPONSE)]
+            if response := {
+                name.removeprefix(RESPONSE).removesuffix(f"_{i}"): arrays[name]
+                for name in of_response
+                if name.endswith(f"_{i}")
+            }:
+                footprint["response"] = response
     del answer["format"]
     if not answer["cause"]:
         del answer["cause"]

@@ -64,26 +64,40 @@ def rim_stiffness(
     what ``check`` raises to stop.
     """
     forces = tyre.residual(U)
-    X = np.real(tyre.model.mesh.X) - [0.0, reference_z]
-    fields = [rigid(X, pressed.around, shift, TURN @ turn) for shift, turn in UNIT_MOTIONS]
-    motions = [field * ~pressed.free for field in fields]
+    motions = rim_motions(tyre, pressed, reference_z)
     C = np.zeros((6, 6))
     for parity in (1, -1):
         symmetry = HalfTurn(tyre.model.mesh, pressed.free, pressed.around, parity)
         own = np.flatnonzero(parity == MOTION_PARITY)
         factor = factor or factor_with_hold(tyre, symmetry, hold, check)
         factor.to(symmetry.fold(hold))
-        follow = [_followed(tyre, symmetry, hold, motions[j], factor, check) for j in own]
+        follow = [followed(tyre, symmetry, hold, motions[j], factor, check) for j in own]
         images = [forces_on(tyre, hold, V) for V in follow]
         # by the energy of both halves, which is off by the square of the displacements' errors
         C[np.ix_(own, own)] = [[2 * float((V * F).sum()) for F in images] for V in follow]
         factor = None
+    C += turning_stiffness(tyre, pressed, forces, reference_z)
+    return (C + C.T) / 2
+
+
+def rim_motions(tyre: Revolved, pressed: HalfTurn, reference_z: float = 0.0) -> list[Array]:
+    """Fields (k, n, 3) of the rim's nodes alone by its six unit motions, m and rad."""
+    X = np.real(tyre.model.mesh.X) - [0.0, reference_z]
+    fields = [rigid(X, pressed.around, shift, TURN @ turn) for shift, turn in UNIT_MOTIONS]
+    return [field * ~pressed.free for field in fields]
+
+
+def turning_stiffness(
+    tyre: Revolved, pressed: HalfTurn, forces: Array, reference_z: float = 0.0
+) -> Array:
+    """G (6, 6) of the forces (k, n, 3) that hold the rim, and of caps at the cavity's open ends."""
+    G, X = np.zeros((6, 6)), np.real(tyre.model.mesh.X) - [0.0, reference_z]
     for i, j in zip(*np.nonzero(np.equal.outer(MOTION_PARITY[3:], MOTION_PARITY[3:])), strict=True):
         bent = (TURN[..., i] @ TURN[..., j] + TURN[..., j] @ TURN[..., i]) / 2
         second = ~pressed.free * rigid(X, pressed.around, np.zeros(3), bent)
-        C[3 + i, 3 + j] += 2 * float((forces * second).sum())
-    C[[3, 4], [3, 4]] += _caps(tyre.loads, X)
-    return (C + C.T) / 2
+        G[3 + i, 3 + j] += 2 * float((forces * second).sum())
+    G[[3, 4], [3, 4]] += _caps(tyre.loads, X)
+    return G
 
 
 def reactions(C: Array, motions: Array) -> Array:
@@ -118,15 +132,17 @@ def _caps(loads: Sequence[TyrePart], X: Array) -> float:
     return float(np.pi * (thrust * X[:, 0] ** 2 * X[:, 1]).sum())
 
 
-def _followed(
+def followed(
     tyre: Revolved,
     symmetry: HalfTurn,
     hold: csr_matrix,
     motion: Array,
     factor: ContactUpdate,
     check: Callable[[], None],
+    tolerance: float = RIM_RTOL,
 ) -> Array:
-    """The field (k, n, 3) of a motion of the rim that the free displacements follow."""
+    """The field (k, n, 3) of a motion of the rim that the free displacements follow; ``tolerance``:
+    of the forces that are left. Raises RunFailed, and what ``check`` raises to stop."""
     shape = symmetry.mask.shape
 
     def product(v: Array) -> Array:
@@ -138,7 +154,7 @@ def _followed(
         return factor.solve(v.reshape(shape)).ravel()
 
     right = -symmetry.gather(forces_on(tyre, hold, motion)).ravel()
-    parts, _, left = gmres(product, precondition, right, RIM_RTOL, MAX_RIM_GMRES)
+    parts, _, left = gmres(product, precondition, right, tolerance, MAX_RIM_GMRES)
     if left > MAX_RIM_RESIDUAL:
         raise RunFailed(
             "no_equilibrium", f"the rim's stiffness was not found in {MAX_RIM_GMRES} iterations"

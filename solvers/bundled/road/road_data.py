@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -37,6 +38,8 @@ class ModeRequest:
     count: int
     nodes: Array  # rows at which their shapes are wanted
     wheel_kg: float | None = None  # of a wheel that is free along the load
+    # in place of modes: responses to a force on the tread, as `deck.request` has them
+    response: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ from .template_process import TemplateProcess
 
 ELEMENTS_A_WAVE = 7.5  # of quadratic ones: the frequencies are right to 0.4 %
 WAVES_OF_STIFFNESS = 4  # round the circumference, that a motion of the rim bends the tyre into
+WAVES_OF_RESPONSE = 12  # round the circumference: twice as many change it by 1 % of its largest
 DeckRequest = Mapping[str, Any]  # what is asked of a deck, see `Decks.request`
 OWN_TEXT = "own deck"  # of a user's deck, as it stands
 NEAR_ZERO = 1e-4  # of a variable's span: below, steps are shares of this
@@ -201,6 +202,9 @@ def _abaqus(tyre: Tyre, env: Any, request: DeckRequest) -> dict[str, str]:
     waves = request["highest_harmonic"] if names["loaded_modes"] else 0
     if names["rim_motions"]:
         waves = max(waves, WAVES_OF_STIFFNESS)
+    if request.get("response"):
+        waves = max(waves, WAVES_OF_RESPONSE)
+        names["road"]["wheel"] = None
     if names["loaded_modes"] or names["rim_motions"]:
         half = fine_enough(tyre.case.road.element_angles_deg, waves)
         names["road"]["angles"] = half + half[::-1]

@@ -57,6 +57,15 @@ class PressQuestion(NamedTuple):
     gradients: tuple[str, ...] = ()
     base: Mapping[str, float] | None = None
     rim_stiffness: bool = False
+    response: Mapping[str, Any] | None = None
+
+
+class Responses(NamedTuple):
+    """Responses of a design, as `Solver.read` has them, and its state."""
+
+    pressure_kPa: float
+    response: Mapping[str, Any]
+    deflection_m: float = 0.0
 
 
 @dataclass
@@ -139,6 +148,20 @@ class Evaluator:
             self.shapes.setdefault(_key(nominal), _shape(result))
         return result
 
+    def respond(
+        self, values: Mapping[str, float], request: Mapping[str, Any], load_N: float = 0.0
+    ) -> Responses:
+        """Responses of a design, unloaded or pressed on the road with ``load_N``, its rim and patch
+        held. Raises what `evaluate` and `press` do."""
+        self.needs_response()
+        if not load_N:
+            result = self.evaluate(Question(values, response=request))
+            return Responses(result.pressure_kPa, result.response)
+        pressed = self.press(values, [load_N], response=request)
+        (footprint,) = pressed.footprints
+        assert footprint.response is not None
+        return Responses(pressed.pressure_kPa, footprint.response, footprint.deflection_m)
+
     def _start_of(self, design: Design) -> Array | None:
         """Inflated shape (n, 4) from which a design's inflation starts: that of its nominal design,
         which is evaluated first, so that the answer depends on no other question. None: at rest, as
@@ -168,24 +191,28 @@ class Evaluator:
         gradients: tuple[str, ...] = (),
         base: Mapping[str, float] | None = None,
         rim_stiffness: bool = False,
+        response: Mapping[str, Any] | None = None,
     ) -> Pressed:
         """One design on the road at rising loads, as far as the solver gets, with so many ``modes``
         at each; gradients: names of variables whose slopes are wanted (`Footprint.slopes`); base:
         values of the design whose state on the road begins the first load (None: the inflated
-        tyre); rim_stiffness: that of the rim is wanted at each load, too.
+        tyre); rim_stiffness: that of the rim is wanted at each load, too;
+        response: in place of modes, responses there.
 
         Raises what `evaluate` does; DeckRefused too where the solver has no road.
         """
-        self.needs_road(bool(modes), rim_stiffness)
+        vibrates = modes or bool(response)
+        self.needs_road(bool(vibrates), rim_stiffness)
         design, loads = self._with(values), tuple(loads_N)
         start = None
-        if base and not (modes or rim_stiffness) and _key(self._with(base)) != _key(design):
+        if base and not (vibrates or rim_stiffness) and _key(self._with(base)) != _key(design):
             start = self._pressed(base, loads, gradients)
         decks = Decks(
             design,
             gradients,
             loads_N=loads,
-            loaded_modes=modes,
+            loaded_modes=int(vibrates),
+            response=response,
             pressed_start=start,
             rim_stiffness=rim_stiffness,
         )

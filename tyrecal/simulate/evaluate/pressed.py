@@ -53,6 +53,8 @@ class Footprint:
     # (6, 6) forces and moments at the rim, N and N m, along and about the deck's axes (down, axle,
     # rolling direction), for a shift (m) or turn (rad) along or about each; the patch is held
     rim_reactions: Annotated[Array, of.shaped(of.REAL, 6, 6)] | None = None
+    # responses with the rim and the patch held, as `Solver.read` has them
+    response: Mapping[str, Any] | None = None
     # the gas' first wave fore and aft, and up and down, between rigid walls
     cavity_Hz: of.HertzPair | None = None
     # by variable and name, derivatives of the numbers above by the requested variables

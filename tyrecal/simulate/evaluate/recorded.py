@@ -145,6 +145,8 @@ class _Pressed(_Tyre):
                 and set(map(int, each.node)) <= set(map(int, self.nodes))
             ):
                 raise ValueError("a patch is not on this tyre")
+            if each.response is not None:
+                _Response.model_validate(each.response)
             parts = (each.mode_frequency_Hz, each.mode_node, each.mode_shape)
             if any(part is not None for part in parts):
                 if any(part is None for part in parts):
@@ -197,11 +199,13 @@ def contradiction(answer: Mapping[str, Any], decks: Decks, folder: Path) -> str:
                 return f"it has {count} modes of harmonic {n}, {each} were requested"
     if wanted := request.get("response"):
         shape = len(wanted["respond"]), len(wanted["excite"]), wanted["lines"]
-        if _shape(answer.get("response", {}).get("receptance", 0)) != shape:
-            return "it has not the responses that were requested"
-        matrices = [answer["response"].get(name) for name in ("stiffness", "mass", "loss")]
-        if "modes" in wanted and len({*map(_shape, matrices)} - {()}) != 1:
-            return "it has not the matrices that were requested"
+        for each in answer.get("footprints", [answer]):
+            response = each.get("response", {})
+            if _shape(response.get("receptance", 0)) != shape:
+                return "it has not the responses that were requested"
+            matrices = [response.get(name) for name in ("stiffness", "mass", "loss")]
+            if "modes" in wanted and len({*map(_shape, matrices)} - {()}) != 1:
+                return "it has not the matrices that were requested"
     return _other_nodes(answer, folder)
 
 

@@ -1,0 +1,288 @@
+"""Response of the pressed tyre, its rim and its patch held, to forces on patches of its tread.
+
+    x = (rim, q),   u = Psi rim + V q,   K = [C    0     ]   M = [Psi^T M Psi  Psi^T M V]
+                                             [0  V^T K V]       [V^T M Psi        1    ]
+
+Psi: fields that follow the six unit motions of the rim (`rim_stiffness`); C: its stiffness; V:
+modes with the rim held up to `SETTLES_UP_TO` times the highest frequency, static responses to the
+forces and to the inertia of Psi, to the inertia of these and so on, and to the losses of all that.
+The force of the tyre on a hub that is held is what x has of the forces less K + i L - omega^2 M
+times q; the road bears the rest.
+
+Each parity of the half turn is a problem of its own. Modal masses are those of the whole tyre. The
+directions of the hub are those of `modes.response`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from ...errors import Refused
+from ..modes.harmonics import HarmonicModes
+from ..modes.response import ResponseResult, TreadPatch
+from ..modes.superelement import Superelement
+from ..section.materials import Material
+from ..section.symmetry import HALF_TURN
+from ..solid3d.revolved import Revolved
+from . import davidson
+from .contact_update import ContactUpdate
+from .half_turn_symmetry import HalfTurn
+from .loaded_modes import Inertia, factor_with_hold, forces_on, standing_waves
+from .rim_stiffness import MOTION_PARITY, followed, rim_motions, turning_stiffness
+
+Array = np.ndarray
+SETTLES_UP_TO = 1.2  # times the highest frequency
+INERTIA_ROUNDS = 2  # of static responses to the inertia of the ones before
+RIM_FOLLOWED_RTOL = 1e-10  # of forces that Psi leaves, which are missing in those on the hub
+REFINEMENTS = 2  # of static responses; what is left of an error counts by its square
+SAMPLES_OF_PATCH = 8  # angles
+UNLOADED_MODES = 120  # to start from
+FEWEST_MODES, MORE_MODES = 8, 10  # of a parity that are sought
+SNAPSHOTS = 40  # frequencies in the band
+
+
+@dataclass(frozen=True)
+class _Reduced:
+    """One parity of the tyre on the rim's motions (b,) and q."""
+
+    places: Array  # (b,) of its motions of the rim
+    stiffness: Array  # (b + q, b + q)
+    mass: Array
+    lossy: list[Array]  # stiffness of each part with losses
+    tread: Array  # (p, b + q) motions of the points
+
+    def at(self, omega: float, losses: Sequence[float]) -> tuple[Array, Array]:
+        """Motions of the points (p, p), and forces on the hub (b, p), per N at each point."""
+        Z = self.stiffness - omega**2 * self.mass + 0j
+        for eta, part in zip(losses, self.lossy, strict=True):
+            Z += 1j * eta * part
+        b = len(self.places)
+        q = np.linalg.solve(Z[b:, b:], self.tread[:, b:].T)
+        return self.tread[:, b:] @ q, self.tread[:, :b].T - Z[:b, b:] @ q
+
+
+class PressedResponse:
+    """Reduced problems of a tyre at the field U (k, n, 3), m, whose patch ``hold`` (k n 3, k n 3)
+    holds, N/m.
+
+    pressed: the symmetry of U; forces (k, n, 3): what holds it there; unloaded: modes of the
+    inflated tyre; points: angle (rad) and component of points of the tread. Raises RunFailed, and
+    what ``check`` raises to stop.
+    """
+
+    def __init__(
+        self,
+        tyre: Revolved,
+        pressed: HalfTurn,
+        U: Array,
+        hold: csr_matrix,
+        forces: Array,
+        unloaded: list[HarmonicModes],
+        patch: TreadPatch,
+        points: Sequence[tuple[float, int]],
+        highest_Hz: float,
+        check: Callable[[], None],
+        factor: ContactUpdate | None = None,
+    ):
+        self._tyre, self._pressed, self._hold, self._check = tyre, pressed, hold, check
+        self._unloaded, self._patch, self._points = unloaded, patch, points
+        self.highest_Hz = highest_Hz
+        model = tyre.model
+        tyre.residual(U)
+        self._parts: list[tuple[Material, int, Revolved]] = []
+        for k, material in enumerate(model.lossy):
+            for modulus in (0, 1):
+                if parts := model.material_parts(k, modulus):
+                    part = Revolved(replace(model, parts=parts), [], tyre.around)
+                    part.residual(U)
+                    self._parts.append((material, modulus, part))
+        self._mass = Inertia(model, tyre.around)
+        self._turning = turning_stiffness(tyre, pressed, forces)
+        self._motions = rim_motions(tyre, pressed)
+        self.reduced = [self._of_parity(1, factor), self._of_parity(-1, None)]
+
+    def _losses(self, hertz: float) -> list[float]:
+        at = np.array([hertz])
+        return [float(m.loss.at(at)[modulus][0]) for m, modulus, _ in self._parts if m.loss]
+
+    def _of_parity(self, parity: int, factor: ContactUpdate | None) -> _Reduced:
+        tyre, pressed, hold, check = self._tyre, self._pressed, self._hold, self._check
+        symmetry = HalfTurn(tyre.model.mesh, pressed.free, pressed.around, parity)
+        factor = factor or factor_with_hold(tyre, symmetry, hold, check)
+        factor.to(symmetry.fold(hold))
+        field = lambda x: symmetry.spread(x.reshape(symmetry.mask.shape))
+        gather = lambda F: symmetry.gather(F).ravel()
+
+        def operator(image: Callable[[Array], Array]) -> davidson.Operator:
+            def apply(block: Array) -> Array:
+                check()
+                return np.array([gather(image(field(x))) for x in block])
+
+            return apply
+
+        stiffness = lambda V: forces_on(tyre, hold, V)
+        K, M = operator(stiffness), operator(self._mass)
+        inverse = lambda block: factor.solve(block.reshape(-1, *symmetry.mask.shape)).reshape(
+            len(block), -1
+        )
+
+        places = np.flatnonzero(parity == MOTION_PARITY)
+        psi = [
+            followed(tyre, symmetry, hold, self._motions[j], factor, check, RIM_FOLLOWED_RTOL)
+            for j in places
+        ]
+        tread = [self._motion(symmetry, *point) for point in self._points]
+        rows = np.array([gather(F) for F in tread] + [gather(self._mass(V)) for V in psi])
+        rows = rows[rows.any(1)]
+        statics = inverse(rows)
+        for _ in range(REFINEMENTS):
+            statics += inverse(rows - K(statics))
+
+        modes = self._modes(symmetry, K, M, inverse)
+        basis = davidson.basis_of(modes, K, M)
+        newest = basis.add(statics, K, M)
+        damped = len(basis.vectors)
+        for _ in range(INERTIA_ROUNDS):
+            newest = basis.add(inverse(basis.inertias[-newest:]), K, M)
+        lossy = [operator(part.product) for _, _, part in self._parts]
+        if lossy:
+            losses = self._losses(self.highest_Hz / 2)
+            images = sum(
+                eta * part(basis.vectors[:damped]) for eta, part in zip(losses, lossy, strict=True)
+            )
+            basis.add(inverse(images), K, M)
+
+        def with_rim(image: Callable[[Array], Array], of_basis: Array) -> Array:
+            """A matrix (b + q, b + q) of the whole tyre."""
+            images = [image(V) for V in psi]
+            rim = 2 * np.array([[(V * F).sum() for F in images] for V in psi])
+            across = np.sqrt(2) * np.array([gather(F) for F in images]) @ basis.vectors.T
+            whole = np.block([[rim, across], [across.T, of_basis]])
+            return np.asarray(whole + whole.T) / 2
+
+        C = with_rim(stiffness, basis.vectors @ basis.images.T)
+        b = len(places)
+        C[:b, b:] = C[b:, :b] = 0.0  # the round-off of Psi
+        C[:b, :b] += self._turning[np.ix_(places, places)]
+        moved = [[(F * V).sum() for V in psi] for F in tread]
+        own = np.array([gather(F) for F in tread]) @ basis.vectors.T / np.sqrt(2)
+        return _Reduced(
+            places,
+            C,
+            with_rim(self._mass, np.eye(len(basis.vectors))),
+            [
+                with_rim(part.product, basis.vectors @ apply(basis.vectors).T)
+                for (_, _, part), apply in zip(self._parts, lossy, strict=True)
+            ],
+            np.hstack([np.reshape(moved, (len(tread), b)), own]),
+        )
+
+    def _modes(
+        self,
+        symmetry: HalfTurn,
+        K: davidson.Operator,
+        M: davidson.Operator,
+        inverse: davidson.Operator,
+    ) -> Array:
+        """Modes (m, size) of a parity up to `SETTLES_UP_TO` times the highest frequency, and one
+        beyond."""
+        limit = (2 * np.pi * SETTLES_UP_TO * self.highest_Hz) ** 2
+        unloaded = sum(int((m.eigenvalues < limit).sum()) for m in self._unloaded)
+        start = [
+            (symmetry.parts(V) * symmetry.mask).ravel()
+            for V in standing_waves(self._unloaded, symmetry)
+        ]
+        basis, count = davidson.basis_of(np.array(start), K, M), max(FEWEST_MODES, unloaded)
+        while True:
+            values, modes = davidson.lowest(K, M, inverse, basis, count)
+            if values[-1] > limit:
+                return np.asarray(modes[: np.searchsorted(values, limit) + 1])
+            count += MORE_MODES
+
+    def _motion(self, symmetry: HalfTurn, angle: float, way: int) -> Array:
+        """Forces (k, n, 3) on half the tyre whose work on a field of the parity is the mean motion
+        of the patch about a point."""
+        around, patch = symmetry.around, self._patch
+        F = np.zeros(symmetry.shape)
+        x, w = np.polynomial.legendre.leggauss(SAMPLES_OF_PATCH)
+        for place, weight in zip(angle + patch.half_angle * x, w / 2, strict=True):
+            place = place % (2 * np.pi)
+            nodes, sign = patch.nodes, 1.0
+            if place > np.pi:  # the image of the other half
+                place, nodes = 2 * np.pi - place, symmetry.other[nodes]
+                sign = symmetry.parity * HALF_TURN[way]
+            at = around.at(np.array([place]))[0]
+            F[:, nodes, way] += sign * weight * np.multiply.outer(at, patch.weights)
+        return F
+
+    def result(self, frequencies_Hz: Array, excited: int, harmonics: int) -> ResponseResult:
+        """Responses to the first ``excited`` points of the others; harmonics: that the functions
+        round the tyre hold."""
+        seen, f = len(self._points) - excited, len(frequencies_Hz)
+        receptance = np.zeros((seen, excited, f), complex)
+        hub = np.zeros((6, excited, f), complex)
+        for i, hertz in enumerate(frequencies_Hz):
+            losses = self._losses(hertz)
+            for reduced in self.reduced:
+                motion, force = reduced.at(2 * np.pi * hertz, losses)
+                receptance[:, :, i] += motion[excited:, :excited]
+                hub[reduced.places, :, i] += force[:, :excited]
+        radius = self._patch.radius
+        return ResponseResult(frequencies_Hz, receptance, hub, radius, harmonics, harmonics)
+
+    def superelement(self, count: int, first: int) -> Superelement:
+        """Matrices on the rim's motions and at most ``count`` others, and motions of the points
+        from ``first`` on. Raises Refused if the modes in the band are more."""
+        limit = (2 * np.pi * self.highest_Hz) ** 2
+        losses = self._losses(self.highest_Hz / 2)
+        own = [self._condensed(each, limit, losses, count // 2) for each in self.reduced]
+        size = 6 + sum(len(each.mass) - len(each.places) for each in own)
+        K, M, loss = (np.zeros((size, size)) for _ in range(3))
+        tread = np.zeros((len(self._points), size))
+        start = 6
+        for each in own:
+            at = np.append(each.places, start + np.arange(len(each.mass) - len(each.places)))
+            start = int(at[-1]) + 1
+            K[np.ix_(at, at)], M[np.ix_(at, at)] = each.stiffness, each.mass
+            loss[np.ix_(at, at)] = each.lossy[0]
+            tread[:, at] = each.tread
+        return Superelement(K, M, loss, tread[first:])
+
+    def _condensed(
+        self, reduced: _Reduced, limit: float, losses: Sequence[float], count: int
+    ) -> _Reduced:
+        """The same with at most ``count`` coordinates q, and one matrix of losses: the modes in the
+        band and, of the others, what holds most of their energy in responses there."""
+        b, parts = len(reduced.places), zip(losses, reduced.lossy, strict=True)
+        loss = sum((eta * part for eta, part in parts), np.zeros_like(reduced.mass))
+        values, turn = np.linalg.eigh(reduced.stiffness[b:, b:])
+        kept = int(np.searchsorted(values, limit))
+        if kept > count:
+            raise Refused(
+                f"matrices need at least {2 * kept} coordinates of modes, got {2 * count}"
+            )
+        seen = []
+        for square in limit * np.linspace(0, 1, SNAPSHOTS) ** 2:
+            Z = reduced.stiffness + 1j * loss - square * reduced.mass
+            forces = np.hstack([reduced.tread[:, b:].T, -Z[b:, :b]])
+            q = (turn.T @ np.linalg.solve(Z[b:, b:], forces))[kept:]
+            seen += [q.real, q.imag]
+        scale = np.sqrt(values[kept:, None])
+        more, size, _ = np.linalg.svd(scale * np.hstack(seen), full_matrices=False)
+        more = np.linalg.qr(more[:, : count - kept] / scale)[0]
+        _, own = np.linalg.eigh(more.T @ (values[kept:, None] * more))
+        T = np.zeros((len(loss), b + kept + more.shape[1]))
+        T[:b, :b], T[b:, b : b + kept] = np.eye(b), turn[:, :kept]
+        T[b:, b + kept :] = turn[:, kept:] @ more @ own
+        apply = lambda matrix: T.T @ matrix @ T
+        return _Reduced(
+            reduced.places,
+            apply(reduced.stiffness),
+            apply(reduced.mass),
+            [apply(loss)],
+            reduced.tread @ T,
+        )
