@@ -93,6 +93,12 @@ def in_engineers_units(value: float, unit: str, digits: int = 6) -> str:
     return f"{rounded:.12g} {name}".rstrip()
 
 
+def printed_value(value: float, unit: str) -> str:
+    """A value of the case as a page prints it: ``printed_value(2.595e-7, "m2")`` is
+    '0.2595 mm²'."""
+    return printed_unit(in_engineers_units(value, unit, 4))
+
+
 def signed(value: float, digits: int) -> str:
     """A number with its sign and so many decimals, in which what rounds to 0 is '+0'."""
     return f"{round(value, digits) + 0.0:+.{digits}f}"

@@ -238,5 +238,9 @@
   }
 
   document.querySelectorAll(".viewer").forEach(viewer);
+  const cut = new ResizeObserver((seen) => seen.forEach(({ target }) => {
+    target.classList.toggle("cut", target.scrollWidth > target.clientWidth + 1);
+  }));
+  document.querySelectorAll(".wide").forEach((each) => cut.observe(each));
   addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((each) => { each.open = true; }));
 })();

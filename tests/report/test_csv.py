@@ -79,7 +79,7 @@ HEADS = {  # columns with their units, as a user's script reads them
 }
 FIRST_ROWS = {  # numbers in their columns
     "fit.csv": "0,0,axial,1,36.85,30.86,31.7,-2.649842271293379,,,,,,",
-    "fit_variables.csv": "A_belt,2e-07,3.6e-07,1e-07,1e-05,3.6e-08,,True,,False,",
+    "fit_variables.csv": "A_belt,2e-07,3.6e-07,1e-07,1e-05,3.6e-08,,True,,False,m2",
     "effects.csv": "filler,K,3.0,0.1,4.5,1.5,0.886,1000000.0,1100000.0",
     "stiffness.csv": "initial,240.0,4000.0,210000.0,110000.0,350000.0,4800.0,200000.0,0.29,0.3,"
     "0.02,0.13,0.14",

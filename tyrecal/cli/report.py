@@ -20,15 +20,19 @@ from .terminal import Terminal
     help="HTML file to write (default: report.html in DIR; for several DIRs, in the current"
     " folder).",
 )
-@option("--author", default="", metavar="NAME", help="Name under the title (default: none).")
+@option("--title", default="", metavar="WORDS", help="Title (default: names of the cases).")
+@option("--author", default="", metavar="NAME", help="Name above the title (default: none).")
 @options.with_terminal
-def command(folders: tuple[Path, ...], output: Path | None, author: str, terminal: Terminal) -> int:
+def command(
+    folders: tuple[Path, ...], output: Path | None, title: str, author: str, terminal: Terminal
+) -> int:
     """Show the results in DIR (of fit, modes, sweep-pressure, footprint, sensitivities, effects,
     sample, diagnose) on one HTML page.
 
-    The page is one file that needs no network: summary, tables, plots, and mode shapes that turn
-    and vibrate. It prints on A4 and works on a phone. Fits and diagnoses of several folders are
-    shown side by side. Every study also writes it with --report.
+    The page is one file that needs no network: key figures, plots, mode shapes that turn and
+    vibrate, and tables, each with its numbers as a CSV file inside. It prints on A4 and works on
+    a phone. Fits and diagnoses of several folders are shown side by side. Every study also writes
+    it with --report.
 
     \b
     tyrecal report p235_75r17
@@ -37,7 +41,7 @@ def command(folders: tuple[Path, ...], output: Path | None, author: str, termina
     from ..report.html.page import write_page
 
     path = output or (folders[0] / "report.html" if len(folders) == 1 else Path("report.html"))
-    written = write_page(path, folders, author)
+    written = write_page(path, folders, author, title)
     terminal.result({"page": str(path), "bytes": written.size, "found": written.found})
     for folder, studies in written.found.items():
         terminal.say(f"{folder}: {', '.join(studies)}")

@@ -26,7 +26,9 @@ def draw_convergence(history: Sequence[Mapping[str, Any]], unit: str = "Hz") -> 
     point = np.array([row["point"] for row in history])
     objective = np.array([row["objective_Hz"] or np.nan for row in history], float)
     failed = np.isnan(objective)
-    figure = new_figure(8.0, 5.6)
+    figure = new_figure(
+        8.0, 5.6, caption="The objective and the variables, design point by design point"
+    )
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     headline(figure, _summary(objective, unit))
 
@@ -100,7 +102,8 @@ def _summary(objective: np.ndarray, unit: str) -> str:
 @in_house_style
 def draw_deviations(modes: Sequence[FittedMode]) -> Figure:
     """Draw deviations in % from the targets before and after the fit, one row per mode."""
-    figure = new_figure(5.2, 0.9 + 0.26 * len(modes))
+    words = "Deviations of frequencies from their targets before and after the fit"
+    figure = new_figure(5.2, 0.9 + 0.26 * len(modes), caption=words)
     axes = figure.add_subplot()
     after = [mode.deviation_percent for mode in modes]
     before = [100 * (mode.initial_Hz / mode.target_Hz - 1) for mode in modes]
@@ -125,7 +128,11 @@ def draw_states(fit: FitResult) -> Figure:
     states = list(dict.fromkeys(each.state for each in fit.modes))
     name = lambda mode: f"{mode.label.display} {mode.symmetry or ''}".rstrip()
     names = list(dict.fromkeys(map(name, fit.modes)))
-    figure = new_figure(1.6 + 1.7 * len(states), 1.3 + 0.26 * len(names))
+    words = (
+        "Deviations from the targets after the fit, a column a state; bars: one standard deviation"
+        " of the measured value"
+    )
+    figure = new_figure(1.6 + 1.7 * len(states), 1.3 + 0.26 * len(names), caption=words)
     grid = figure.subplots(1, len(states), sharex=True, sharey=True, squeeze=False)[0]
     for axes, state in zip(grid, states, strict=True):
         own = [mode for mode in fit.modes if mode.state == state]

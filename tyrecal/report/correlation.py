@@ -12,9 +12,10 @@ from ..simulate.modes.label import in_words
 from ..studies.fit.result import FitResult
 from ..studies.labels import LabelsResult
 from .figure import in_house_style, new_figure
+from .sensitivities import CELL_INK, CELL_LIGHT
 
 Array = np.ndarray
-MAC_WORDS = "MAC of each measured shape with each mode of the design"
+MAC_WORDS = "Agreement of shapes, 1 for equal ones (MAC)"
 MIN_WRITTEN, DARK_CELL = 0.1, 0.6  # MAC from which a cell has its number, and has it in white
 
 
@@ -39,14 +40,15 @@ def _draw(
     title: str, rows: Sequence[str], columns: Sequence[str], matrix: Sequence[Sequence[float]]
 ) -> Figure:
     values = np.array(matrix)
-    figure = new_figure(2.4 + 0.34 * len(columns), 1.8 + 0.28 * len(rows))
+    width, height = 2.4 + 0.34 * len(columns), 1.8 + 0.28 * len(rows)
+    figure = new_figure(width, height, caption=f"{MAC_WORDS}. {title}")
     axes = figure.add_subplot()
     edges = [np.arange(count + 1) - 0.5 for count in values.shape]  # cells, as vectors on a page
     axes.pcolormesh(edges[1], edges[0], values, cmap="Blues", vmin=0, vmax=1)
     axes.invert_yaxis()
     for (i, j), value in np.ndenumerate(values):
         if value >= MIN_WRITTEN:
-            colour = "white" if value > DARK_CELL else "0.2"
+            colour = CELL_LIGHT if value > DARK_CELL else CELL_INK
             axes.text(j, i, f"{value:.2f}", ha="center", va="center", fontsize=6, color=colour)
     axes.set_xticks(range(len(columns)), list(map(in_words, columns)), rotation=90, fontsize=7)
     axes.set_yticks(range(len(rows)), list(map(in_words, rows)), fontsize=7)

@@ -298,13 +298,14 @@ def _where(d: Diagnosis) -> Iterator[str]:
 def _fields(study: DiagnosedCase) -> Iterator[str]:
     """The section as the data describe it."""
     rows = [
-        f"| {v.field} | {v.place.replace('_', ' ')} | {signed(v.value, 2)} {v.unit} |"
-        f" {v.sigma:.2g} | {v.before:.2g} |"
+        f"| {v.field} | {v.place.replace('_', ' ')} |"
+        f" {signed(v.value, 1 if v.sigma >= 1 else 2)} {v.unit} | {v.sigma:.2g} {v.unit} |"
+        f" {v.before:.2g} {v.unit} |"
         for v in study.section
     ]
     if rows:
         yield "The section by these data, if nothing else is wrong:"
-        head = "| | where | likeliest | standard deviation | prior |"
+        head = "| number | where | likeliest | standard deviation | prior |"
         yield "\n".join([head, "|---|---|---|---|---|", *rows])
 
 
@@ -474,6 +475,7 @@ def _assumptions(study: DiagnosedCase) -> Iterator[str]:
     d = study.diagnosis
     kind = "assumed, not in the case" if study.assumed_sources else "stated by the case"
     words = ", ".join(source.words for source in study.sources if source.words) or "none"
+    words = words.replace(" degrees", "°")
     yield f"Uncalibrated constants, one standard deviation each ({kind}): {words}."
     a = d.problem.assumed
     form = "as recorded for every mode" if a.form is None else f"{100 * a.form:g} % in every mode"

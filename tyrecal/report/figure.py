@@ -54,9 +54,11 @@ in_house_style = rc_context(
 )
 
 
-def new_figure(width: float, height: float, layout: str | None = "constrained") -> Figure:
-    """An empty figure, its size in inches."""
-    figure = Figure((width, height), dpi=DPI, layout=layout)  # type: ignore[arg-type]
+def new_figure(
+    width: float, height: float, layout: str | None = "constrained", caption: str = ""
+) -> Figure:
+    """An empty figure, its size in inches; caption: the words below it on a page."""
+    figure = Figure((width, height), dpi=DPI, layout=layout, label=caption)  # type: ignore[arg-type]
     FigureCanvasAgg(figure)
     return figure
 

@@ -53,7 +53,9 @@ def draw_patches(patches: Sequence[PatchData], highest_kPa: float) -> Figure:
     columns = min(MAX_COLUMNS, len(patches))
     lines = -(-len(patches) // columns)
     inch = min(2.4, 9.0 / columns) / width
-    figure = new_figure(1.4 + columns * (inch * width + 0.25), 0.9 + lines * (inch * length + 0.35))
+    size = 1.4 + columns * (inch * width + 0.25), 0.9 + lines * (inch * length + 0.35)
+    words = f"Contact pressure at each load, {patches[0].design} tyre; dots: nodes in contact"
+    figure = new_figure(*size, caption=words)
     grid = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
     levels = MaxNLocator(MAX_BANDS).tick_values(0.0, highest_kPa)
     for axes in grid.flat[len(patches) :]:
@@ -92,7 +94,8 @@ def patch_edge(patch: PatchData) -> Path:
 @in_house_style
 def draw_curves(rows: Sequence[FootprintRow]) -> Figure:
     """Area, deflection, stiffness and mean pressure over the load, every design of the rows."""
-    figure = new_figure(8.6, 6.2)
+    words = "Contact area, deflection, vertical stiffness and mean contact pressure over the load"
+    figure = new_figure(8.6, 6.2, caption=words)
     grid = figure.subplots(2, 2).ravel()
     for colour, design in zip(COLOURS, dict.fromkeys(row.design for row in rows), strict=False):
         own = [row for row in rows if row.design == design]

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ..simulate.modes.label import FAMILIES, Label
 from ..simulate.modes.loaded import SYMMETRIES
-from ..studies.loaded_result import LoadRow
+from ..studies.loaded_result import LoadRow, LoadSweep
 from .figure import COLOURS, MARKERS, in_house_style, new_figure
 from .pressure import GAP, name_lines
 
@@ -18,6 +18,11 @@ MEMBER_STYLES: dict[str, dict[str, Any]] = {  # symmetric solid, antisymmetric d
     SYMMETRIES[1]: {"ls": (0, (4, 2)), "mfc": "white"},
 }
 Curve = tuple[list[float], list[float]]
+
+
+def figures(result: LoadSweep) -> dict[str, Figure]:
+    """The figure of the study by its name."""
+    return {"load": draw_load_sweep(result.rows)}
 
 
 @in_house_style
@@ -30,7 +35,8 @@ def draw_load_sweep(rows: Sequence[LoadRow]) -> Figure:
     designs = {row.design: _curves(rows, row.design) for row in rows}
     labels = {label for curves in designs.values() for label, _ in curves}
     shown = [name for name in (*FAMILIES, None) if any(x.family == name for x in labels)]
-    figure = new_figure(1.0 + 4.4 * len(shown), 0.6 + 5.4 * len(designs))
+    size = 1.0 + 4.4 * len(shown), 0.6 + 5.4 * len(designs)
+    figure = new_figure(*size, caption="Frequencies of the loaded tyre over the load")
     grid = figure.subplots(len(designs), len(shown), sharex=True, sharey=True, squeeze=False)
     for line, (design, curves) in zip(grid, designs.items(), strict=True):
         for axes, name in zip(line, shown, strict=True):

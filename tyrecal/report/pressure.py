@@ -34,7 +34,11 @@ def draw_pressure_sweep(
     labels = sorted({label for curves in designs.values() for label in curves}, key=str)
     columns = {name: [x for x in labels if x.family == name] for name in (*FAMILIES, None)}
     shown = [name for name in columns if columns[name]]
-    figure = new_figure(1.2 + 4.2 * len(shown), 7.6)
+    words = (
+        "Frequencies over the inflation pressure and, below, their sensitivities; solid: fitted,"
+        " dashed: initial, crosses: targets"
+    )
+    figure = new_figure(1.2 + 4.2 * len(shown), 7.6, caption=words)
     grid = figure.subplots(
         2, len(shown), sharex=True, sharey="row", height_ratios=[5, 3], squeeze=False
     )

@@ -13,7 +13,9 @@ from .figure import COLOURS, in_house_style, new_figure
 def draw_responses(result: FrfResult) -> dict[str, Figure]:
     """The figure frf: a column for each unit, magnitude above phase."""
     units = list(dict.fromkeys(each.unit for each in result.functions))
-    figure = new_figure(1.0 + 4.4 * len(units), 5.4)
+    figure = new_figure(
+        1.0 + 4.4 * len(units), 5.4, caption="Response functions: magnitude and phase"
+    )
     grid = figure.subplots(2, len(units), sharex=True, squeeze=False, height_ratios=[2, 1])
     for (upper, lower), unit in zip(grid.T, units, strict=True):
         for i, each in enumerate(f for f in result.functions if f.unit == unit):

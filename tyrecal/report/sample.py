@@ -26,7 +26,11 @@ def draw_corner(result: SampleResult) -> Figure:
     """Corner picture: on the diagonal the shares of the draws with median, 90 % and, dashed, the
     linear standard errors; below it each pair, darker where more draws lie."""
     names, n = list(result.variables), len(result.variables)
-    figure = new_figure(1.2 + 2.4 * n, 1.0 + 2.2 * n)  # inches
+    words = (
+        "Draws of the variables, each alone and in pairs; ticks: ends of the 90 % interval; areas"
+        " hold 90 % and 50 % of the draws"
+    )
+    figure = new_figure(1.2 + 2.4 * n, 1.0 + 2.2 * n, caption=words)  # inches
     grid = figure.subplots(n, n, squeeze=False)
     pairs = {(pair.a, pair.b): pair.counts for pair in result.pairs}
     for i, row in enumerate(names):

@@ -45,7 +45,8 @@ def draw_section(section: SectionData, name: str, pressure_kPa: float) -> Figure
     The belt's edge is repeated four times as large. Where the inflation is known, the inflated
     outline is dashed, at true scale.
     """
-    figure = new_figure(9.0, 8.0)
+    words = "Section in mm: elements, cords, and what the rim holds"
+    figure = new_figure(9.0, 8.0, caption=words)
     axes = figure.add_subplot(aspect="equal", anchor="N", **AXIS_LABELS)
     entries = _draw(axes, section, 1.0)
     axes.axvline(0, color=GREY, lw=0.8, ls=(0, (12, 3, 2, 3)))
@@ -153,7 +154,8 @@ def draw_section_map(
     by_name: dict[str, PartChange] = {}
     for place in places:  # of several rubbers in a region the likelier one
         by_name.setdefault(place.region.split(",")[0], place)
-    figure = new_figure(MAP_WIDTH, 8.0)
+    caption = "Evidence that one part of the section is changed alone, over no change"
+    figure = new_figure(MAP_WIDTH, 8.0, caption=caption)
     axes, bars = figure.subplots(2, 1)
     axes.set(aspect="equal", **AXIS_LABELS)
     for name, cells in parts.areas.items():

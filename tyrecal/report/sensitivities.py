@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..studies.sensitivities.result import MAX_NUMBERS_SHOWN, SensitivitiesResult, heading_of, named
@@ -11,6 +12,8 @@ from .figure import in_house_style, new_figure
 from .table import MINUS
 
 DIVERGING = colormaps["RdBu_r"]
+# of texts in cells; no greys, which a dark page would turn round while the cells keep their colours
+CELL_INK, CELL_LIGHT = "#22262b", "#fffffe"
 DARK = 0.6  # of the largest value, above which a cell's text is white
 
 
@@ -25,21 +28,30 @@ def draw_heat_map(result: SensitivitiesResult) -> Figure:
     numbers = list(result.by_number().items())[:MAX_NUMBERS_SHOWN]
     quantities = list(result.quantity_values)
     values = np.array([[own[each].value for each in quantities] for _, own in numbers])
-    figure = new_figure(3.2 + 0.6 * len(quantities), 1.6 + 0.24 * len(numbers))
+    caption = "Change of each quantity, in %, with 1 % more of a number: d ln q / d ln x"
+    width, height = 3.2 + 0.6 * len(quantities), 1.6 + 0.24 * len(numbers)
+    figure = new_figure(width, height, caption=caption)
     axes = figure.add_subplot()
-    largest = max(abs(values).max(), 1e-12)
-    edges = [np.arange(count + 1) - 0.5 for count in values.shape]  # cells, as vectors on a page
-    axes.pcolormesh(edges[1], edges[0], values, cmap=DIVERGING, vmin=-largest, vmax=largest)
-    axes.invert_yaxis()
-    for (i, j), value in np.ndenumerate(values):
-        colour = "white" if abs(value) > DARK * largest else "0.2"
-        text = f"{round(value, 2) + 0.0:.2f}".replace("-", MINUS)
-        axes.text(j, i, text, ha="center", va="center", fontsize=7, color=colour)
+    draw_cells(axes, values, 2)
     axes.set_xticks(
         range(len(quantities)), [heading_of(each).replace(" ", "\n") for each in quantities]
     )
     axes.set_yticks(range(len(numbers)), [named(own[quantities[0]]) for _, own in numbers])
-    axes.tick_params(length=0, top=True, labeltop=True, bottom=False, labelbottom=False)
-    axes.spines[:].set_visible(False)
     axes.set_xlabel("d ln q / d ln x")
     return figure
+
+
+def draw_cells(axes: Axes, values: np.ndarray, digits: int, full: float | None = None) -> None:
+    """A matrix as cells with their numbers, names of columns above; full: value of full colour,
+    default the largest one."""
+    largest = full or max(np.nanmax(abs(values)), 1e-12)
+    edges = [np.arange(count + 1) - 0.5 for count in values.shape]  # cells, as vectors on a page
+    axes.pcolormesh(edges[1], edges[0], values, cmap=DIVERGING, vmin=-largest, vmax=largest)
+    axes.invert_yaxis()
+    for (i, j), value in np.ndenumerate(values):
+        colour = CELL_LIGHT if abs(value) > DARK * largest else CELL_INK
+        text = f"{round(value, digits) + 0.0:.{digits}f}".replace("-", MINUS)
+        text = text if np.isfinite(value) else "\N{EN DASH}"
+        axes.text(j, i, text, ha="center", va="center", fontsize=7, color=colour)
+    axes.tick_params(length=0, top=True, labeltop=True, bottom=False, labelbottom=False)
+    axes.spines[:].set_visible(False)

@@ -5,20 +5,48 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from ..studies.effects import CatalogueEntry, EffectResult, Effects
 from ..studies.signature import Signature
 from ..tyre.effects import catalogue
+from ..units import in_engineers_units
 from .figure import COLOURS, GREY, headline, in_house_style, new_figure
 from .table import MINUS
 
+MAX_SIGNATURES = 3  # effects with a picture on a page
 BAR = 0.38  # thickness of a bar, of the distance of two labels
 
 
+def figures(result: Effects) -> dict[str, Figure]:
+    """Figures by name of the effects that move the modes most."""
+    known = [each for each in result.rows if each.before_percent]
+    most = sorted(known, key=lambda each: -(each.before_percent or 0.0))[:MAX_SIGNATURES]
+    return {f"effect_{each.id}": draw_signature(_signature(each), each) for each in most}
+
+
+def _signature(effect: EffectResult) -> Signature:
+    """The signature that effects.json holds; a mode that is not at every pressure is left out."""
+    by_label = [{mode.label: mode for mode in row.modes} for row in effect.rows]
+    labels = tuple(label for label in by_label[0] if all(label in modes for modes in by_label))
+    changes = [
+        [[getattr(modes[label], when) for label in labels] for modes in by_label]
+        for when in ("before_percent", "after_percent")
+    ]
+    before, after = np.array(changes, float)  # None becomes NaN
+    pressures = tuple(row.pressure_kPa for row in effect.rows)
+    absorbed, mass_kg = effect.absorbed, effect.mass_kg
+    return Signature(
+        effect.id, effect.value, pressures, labels, before, after, absorbed, {}, mass_kg
+    )
+
+
 @in_house_style
-def draw_signature(signature: Signature) -> Figure:
-    """Change of every mode in per cent, a panel per pressure."""
-    effect = catalogue()[signature.id]
+def draw_signature(signature: Signature, entry: CatalogueEntry | None = None) -> Figure:
+    """Change of every mode in per cent, a panel per pressure; entry: of the effect, by default as
+    the catalogue has it."""
+    effect = entry or catalogue()[signature.id]
     count = len(signature.pressures_kPa)
-    figure = new_figure(8.0, 1.2 + 1.8 * count)
+    words = f"{effect.title}: change of every mode, before and after a re-fit of the variables"
+    figure = new_figure(8.0, 1.2 + 1.8 * count, caption=words)
     panels = np.atleast_1d(figure.subplots(count, 1, sharex=True, sharey=True))
     places = np.arange(len(signature.labels))
     digits = 1 if np.nanmax(abs(signature.before)) >= 1 else 2
@@ -37,7 +65,7 @@ def draw_signature(signature: Signature) -> Figure:
         axes.set_title(f"{signature.pressures_kPa[k]:g} kPa", loc="left", fontsize=9, color="0.3")
     figure.supylabel("change of frequency, %", fontsize=9)
     panels[-1].set_xticks(places, [label.display.replace(" ", "\n") for label in signature.labels])
-    size = f"{effect.symbol} = {signature.value:.4g} {effect.unit}".strip()
+    size = f"{effect.symbol} = {in_engineers_units(signature.value, effect.unit, 4)}"
     absorbed = (
         f": calibration absorbs {100 * signature.absorbed:.1f} %" if signature.absorbed else ""
     )

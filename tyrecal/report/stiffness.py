@@ -22,7 +22,7 @@ def figures(result: StiffnessResult) -> dict[str, Figure]:
 def draw_stiffness(rows: Sequence[StiffnessRow]) -> Figure:
     """Vertical, lateral, longitudinal and torsional stiffness over the load. A pressure has a
     colour, a design a line style."""
-    figure = new_figure(8.6, 6.2)
+    figure = new_figure(8.6, 6.2, caption="Static stiffnesses over the load")
     grid = figure.subplots(2, 2).ravel()
     pressures = sorted({row.pressure_kPa for row in rows})
     states = dict.fromkeys((row.design, row.pressure_kPa) for row in rows)

@@ -18,7 +18,8 @@ def figures(result: SweepResult) -> dict[str, Figure]:
     swept = [each.name for each in result.numbers_swept][:MAX_PANELS]
     labels = [mode.label for mode in result.modes]
     families = [name for name in (*FAMILIES, None) if any(x.family == name for x in labels)]
-    figure = new_figure(1.4 + 3.2 * len(swept), 0.8 + 2.6 * len(families))
+    size = 1.4 + 3.2 * len(swept), 0.8 + 2.6 * len(families)
+    figure = new_figure(*size, caption="Frequencies over each number that was swept")
     grid = figure.subplots(len(families), len(swept), sharex="col", sharey="row", squeeze=False)
     by_mode = {
         label: [m.frequency_Hz for row in result.rows for m in row.modes if m.label == label]

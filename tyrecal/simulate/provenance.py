@@ -51,6 +51,7 @@ def provenance(
         "mesh": c.mesh.level,
         "targets": c.targets.source or None,
         "measured_sha256": measured_sha256(files) if files else None,
+        **({"measured_files": [file.name for file in files]} if files else {}),
     }
 
 

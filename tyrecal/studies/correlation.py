@@ -78,14 +78,14 @@ class ShapeCorrelation(ResultPart):
             for each in self.pairs
         ]
         title = f"Shapes of {self.file}, {self.pressure_kPa:g} kPa"
-        return Table(columns, rows, title, self._level)
+        return Table(columns, rows, title, self._level, csv=None)
 
     def sensors_table(self) -> Table:
         """The signals that agree least."""
         columns = list(SensorAgreement.columns().values())
         least = sorted(self.sensors, key=lambda each: -each.ecomac)[:MAX_SENSORS_SHOWN]
         title = f"Sensors of {self.file} that agree least"
-        return Table(columns, [each.cells() for each in least], title)
+        return Table(columns, [each.cells() for each in least], title, csv=None)
 
     def sentences(self) -> list[str]:
         """Undecided shapes, and sensors that agree least."""

@@ -15,6 +15,7 @@ from ..simulate.evaluate.failure import EvaluationFailed
 from ..simulate.modes.label import Label
 from ..tyre.case import LoadedCase
 from ..tyre.effects import Effect
+from ..units import in_engineers_units
 from .result import (
     Column,
     CsvRow,
@@ -120,11 +121,28 @@ class EffectResult(CatalogueEntry):
     refitted: dict[str, Refitted]  # variables before and after the new fit
     rows: Annotated[list[EffectRow], Field(min_length=1)]  # changes at each pressure
 
+    @property
+    def size(self) -> str:
+        """Its parameter and the value of it."""
+        return f"{self.symbol} = {in_engineers_units(self.value, self.unit, 4)}"
+
+    @property
+    def words(self) -> str:
+        """How large it is, and how much of it calibration hides."""
+        words = f"{self.title}, {self.size}"
+        if self.before_percent is None:
+            return f"{words}: no mode is known with it"
+        words += f": {self.before_percent:.1f} % (rms)"
+        if self.after_percent is not None:
+            words += f", {self.after_percent:.1f} % once the variables are fitted again"
+        return words
+
 
 class Effects(Result):
     """effects.json, which is a list; empty where no effect had an answer."""
 
     study, stem, heading = "effects", "effects", "Effects"
+    figures = "tyrecal.report.signature:figures"
 
     rows: list[EffectResult]  # effects, each an entry of the list
     failed: list[Failed] = Field(default=[])  # effects without a solution
@@ -159,17 +177,19 @@ class Effects(Result):
         ]
         return {"modes": modes}
 
+    def summary(self) -> list[str]:
+        return [each.words for each in self.rows]
+
     def tables(self) -> list[Table]:
         """How far each effect moves the modes, and the variables that follow it."""
         if not self.rows:
             return []
         percent, absorbed = Column("before %"), Column("absorbed %", ".1f", 100.0)
-        size, mass = Column("size", ".4g"), Column("kg", "+.2f")
+        mass = Column("kg", "+.2f")
         rows = [
             [
                 each.id,
-                size.cell(each.value),
-                each.unit,
+                in_engineers_units(each.value, each.unit, 4),
                 mass.cell(each.mass_kg),
                 *map(percent.cell, (each.before_percent, each.after_percent)),
                 absorbed.cell(each.absorbed),
@@ -182,7 +202,7 @@ class Effects(Result):
             " and the change of the variables"
         )
         names = [Column(name) for name in self.rows[0].refitted]
-        words = [Column("effect", ""), size, Column("unit", ""), mass]
+        words = [Column("effect", ""), Column("size"), mass]
         return [Table([*words, percent, Column("after %"), absorbed, *names], rows, "", caption)]
 
     def numbers(self) -> list[Table]:
@@ -194,20 +214,21 @@ class Effects(Result):
         heads = [each for x in labels for each in (Column(x.display), change)]
         rows = []
         for each in self.rows:
-            size = f"{each.symbol} = {each.value:.4g} {each.unit}".rstrip()
             modes = {m.label: m for r in each.rows if r.pressure_kPa == middle for m in r.modes}
             cells = []
             for label in labels:
                 mode = modes.get(label)
                 cells.append(change.cell(mode and mode.before_percent))
                 cells.append(change.cell(mode and mode.after_percent))
-            rows.append([each.title, size, *cells, share.cell(each.absorbed)])
+            rows.append([each.title, each.size, *cells, share.cell(each.absorbed)])
         caption = (
             f"Change of frequency, %, at {middle:g} kPa: before and after a re-fit of the"
             " variables. Absorbed: share of the change, over all pressures, that calibration"
             " hides."
         )
-        return [Table([Column("effect", ""), Column("", ""), *heads, share], rows, "", caption)]
+        return [
+            Table([Column("effect", ""), Column("", ""), *heads, share], rows, "", caption, "modes")
+        ]
 
 
 def run(

@@ -92,6 +92,7 @@ class FootprintResult(Result):
     """footprint.json"""
 
     study, stem, heading = "footprint", "footprint", "Footprint"
+    part = "tyrecal.report.html.footprint:part"
     follows_fit = True
 
     pressure_kPa: dict[str, float] = Field(default={})  # inflation pressure by design

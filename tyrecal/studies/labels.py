@@ -89,7 +89,7 @@ class Labels(ResultPart):
             ]
             for each in self.frequencies
         ]
-        return Table(heads, rows, title="Labels of frequencies without a label")
+        return Table(heads, rows, title="Labels of frequencies without a label", csv="labels")
 
     def csv_rows(self) -> list[CsvRow]:
         """A row a frequency, with each rival in words."""

@@ -60,6 +60,7 @@ class LoadSweep(Result):
 
     study, stem, heading = "sweep-load", "load_sweep", "Frequencies over load"
     command = "modes --sweep-load"
+    figures = "tyrecal.report.load:figures"
 
     pressure_kPa: dict[str, float] = Field(default={})  # inflation pressure by design
     designs: dict[str, dict[str, float]] = Field(default={})  # values of the variables by design

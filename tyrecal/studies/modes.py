@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
 EXTRA = {  # further columns of the table, of fields of `ModeEntry`
     "damping_ratio": Column("damping %", ".2f", 100),
-    "sliding_Hz": Column("sliding_Hz"),
-    "grip_mm": Column("grip_mm"),
+    "sliding_Hz": Column("sliding, Hz"),
+    "grip_mm": Column("grip, mm"),
     "symmetry": Column("symmetry", ""),
     "member": Column("member", ".0f"),
     "clarity": Column("clarity"),
@@ -47,6 +47,7 @@ class ModesResult(Result):
     """modes.json"""
 
     study, stem, heading = "modes", "modes", "Modes"
+    part = "tyrecal.report.html.modes:part"
 
     pressure_kPa: float
     load_N: float

@@ -52,6 +52,7 @@ class PressureSweep(Result):
     """pressure_sweep.json"""
 
     study, stem, heading = "sweep-pressure", "pressure_sweep", "Frequencies over pressure"
+    part = "tyrecal.report.html.pressure:part"
     follows_fit = True
 
     slopes: str = ""  # how sensitivities were computed: exact, or differences
@@ -134,7 +135,7 @@ class PressureSweep(Result):
         caption = f"sensitivity: d ln f / d ln p, at {findings.from_kPa:g} and {high}"
         if any(mode.standard_error_Hz is not None for mode in own[0].modes):
             caption += "; ±: 90 % interval of the tyre's own frequency"
-        return Table(columns, rows, findings.design, caption)
+        return Table(columns, rows, findings.design, caption, "rise")
 
     def numbers(self) -> list[Table]:
         tables = []

@@ -74,6 +74,9 @@ class Table:
     rows: Sequence[Sequence[Cell]]
     title: str = ""
     caption: str = ""
+    csv: str | None = (
+        ""  # key of `Result.csv_rows` with its numbers, "" of `Result.csv`; None: none
+    )
 
 
 class ResultPart(BaseModel):
@@ -119,6 +122,7 @@ class Provenance(ResultPart):
     mesh: str  # mesh level
     targets: str | None = None  # source of the targets
     measured_sha256: str | None = None  # hash of the measured file, as by sha256sum
+    measured_files: list[str] = Field(default=[])  # names of the measured files
 
     def __str__(self) -> str:
         given = [f"{name}={as_written(value)}" for name, value in self.overrides.items()]
@@ -150,7 +154,8 @@ class Result(ResultPart):
     stem: ClassVar[str] = ""  # of its files
     command: ClassVar[str] = ""  # where it is not the study
     heading: ClassVar[str] = ""  # on the page
-    figures: ClassVar[str] = ""  # "module:function" of a study from outside, see `page`
+    figures: ClassVar[str] = ""  # "module:function": of the result, to figures by name
+    part: ClassVar[str] = ""  # "module:function" of its part of a page, see `report.html.parts`
     is_seldom: ClassVar[bool] = False  # a page does not say that it is absent
     fits: ClassVar[bool] = False  # it finds a design, which it passes on
     follows_fit: ClassVar[bool] = False  # it studies the design of a fit before it too

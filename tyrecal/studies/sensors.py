@@ -56,7 +56,7 @@ class SensorsResult(Result):
         columns = [*NAME_COLUMNS, Column("Hz"), *SensedMode.columns().values()]
         rows = [[*m.named(), f"{m.frequency_Hz:.2f}", *m.cells()] for m in self.modes]
         places = [each.cells() for each in self.places]
-        return [Table([*SensorPlace.columns().values()], places), Table(columns, rows)]
+        return [Table([*SensorPlace.columns().values()], places), Table(columns, rows, csv=None)]
 
     def sentences(self) -> list[str]:
         rare = [mode.label.display for mode in self.modes if mode.labelled < 0.9]

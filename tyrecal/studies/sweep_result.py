@@ -155,7 +155,7 @@ class SweepResult(Result):
             " its low to its high end, by least squares; linear: share of the variance that these"
             " changes explain"
         )
-        return [Table([*heads, share], rows, caption=caption)]
+        return [Table([*heads, share], rows, caption=caption, csv="modes")]
 
 
 def run(

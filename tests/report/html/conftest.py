@@ -10,24 +10,25 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from tyrecal.report import sample
-from tyrecal.report.html import page
+from tyrecal.report.html import parts
+from tyrecal.report.html.parts import PageFigure
 from tyrecal.studies.sample.result import SampleResult
 
 ANY_CHAPTER = "any-chapter-"  # what ids begin with, in place of the chapter's own
-_drawn: dict[tuple[str, ...], Markup] = {}
+_drawn: dict[tuple[str, str], PageFigure] = {}
 _corners: dict[str, Figure] = {}
-_picture, _draw_corner = page._picture, sample.draw_corner
+_picture, _draw_corner = parts.drawn, sample.draw_corner
 
 
 @pytest.fixture(autouse=True)
 def drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    def picture(
-        result: Any, prefix: str, name: str, words: str, file: str, draw: partial[Any]
-    ) -> Markup:
-        key = name, words, repr(draw.args)
-        if key not in _drawn:
-            _drawn[key] = _picture(result, ANY_CHAPTER, name, words, file, draw)
-        return Markup(_drawn[key].replace(ANY_CHAPTER, prefix))
+    def picture(key: str, draw: partial[Any]) -> PageFigure:
+        chapter, _, name = key.partition("-")
+        known = name, repr(draw.args)
+        if known not in _drawn:
+            _drawn[known] = _picture(f"{ANY_CHAPTER}{name}", draw)
+        kept = _drawn[known]
+        return PageFigure(Markup(kept.svg.replace(ANY_CHAPTER, f"{chapter}-")), kept.caption)
 
     def corner(sampled: SampleResult) -> Figure:
         """Drawn before the page takes the picture of it."""
@@ -36,5 +37,5 @@ def drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
             _corners[key] = _draw_corner(sampled)
         return _corners[key]
 
-    monkeypatch.setattr(page, "_picture", picture)
+    monkeypatch.setattr(parts, "drawn", picture)
     monkeypatch.setattr(sample, "draw_corner", corner)

@@ -58,6 +58,7 @@ def fit() -> dict[str, Any]:
                 "upper": 1e-5,
                 "standard_error": 3.6e-8,
                 "at_bound": False,
+                "unit": "m2",
             },
             "C10": {
                 "initial": 1e6,
@@ -66,6 +67,7 @@ def fit() -> dict[str, Any]:
                 "upper": 1e7,
                 "standard_error": None,
                 "at_bound": True,
+                "unit": "Pa",
             },
         },
         "fixed": {"angle": 70.0},
@@ -94,7 +96,22 @@ def fit() -> dict[str, Any]:
                 "deviation_percent": -3.7,
             }
         ],
-        "correlations": {"A_belt": {"A_belt": 1.0}},
+        "fixed_units": {"angle": "degrees"},
+        "noise_Hz": 1.5,
+        "responses": [
+            {
+                "c": 2,
+                "m": 0,
+                "kind": None,
+                "pressure_kPa": 240.0,
+                "scatter": 0.01,
+                "response": {"A_belt": 1.25, "C10": -0.5},
+            }
+        ],
+        "correlations": {
+            "A_belt": {"A_belt": 1.0, "C10": -0.25},
+            "C10": {"A_belt": -0.25, "C10": 1.0},
+        },
         "singular_values": [30.0, 5.0],
         "starts": [{}],
     }

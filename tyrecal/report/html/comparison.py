@@ -9,13 +9,20 @@ from typing import TypeVar
 
 from ...studies.diagnose.result import DiagnosisResult
 from ...studies.fit.result import ROAD_QUANTITIES, FitResult, FittedMode
-from ...units import signed
+from ...studies.result import Column, Table
+from ...units import printed_value, signed
+from ..fit import farthest
 from ..table import CLOSE, FAR, MINUS
+from .diagnosis import verdict_words
+from .parts import PageSection, PageTable, Paragraphs, shown_table
 from .results import Results
-from .summary import verdict_words
 
 Content = TypeVar("Content")
 NOTHING, NB = "–", "\N{NO-BREAK SPACE}"
+LEGEND = (
+    f"○ within {CLOSE:g} %, ◐ within {FAR:g} %, ● beyond. Compare objectives only if the fits have"
+    " the same targets. Objectives in sigmas count standard deviations."
+)
 UNITS = {"Hz": "Hz", "sigma": "sigmas"}
 
 
@@ -36,12 +43,39 @@ class Group:
     rows: list[ComparisonRow]
 
 
-def comparison(results: Sequence[Results]) -> list[Group]:
-    """Objective, variables, deviations of the fits, verdicts of the diagnoses; nothing where fewer
-    than two folders hold any."""
+@dataclass
+class ComparisonTable(PageTable):
+    """Rows in groups, a column a folder; folders: id, name and case of each."""
+
+    groups: Sequence[Group] = ()
+    folders: Sequence[tuple[str, str, str]] = ()
+    kind = "comparison"
+
+
+def comparison(results: Sequence[Results], prefixes: Sequence[str]) -> PageSection | None:
+    """The section that sets folders side by side; None where fewer than two hold a fit or a
+    diagnosis. prefixes: of the folders' ids."""
+    if sum(bool(each.fit or each.diagnosis) for each in results) < 2:
+        return None
+    groups, names = comparison_groups(results), [each.folder.resolve().name for each in results]
+    rows = [
+        [f"{row.name} {row.more}".rstrip(), *row.cells] for group in groups for row in group.rows
+    ]
+    heads = [Column("", ""), *(Column(name) for name in names)]
+    plain = shown_table(Table(heads, rows), "Fits and diagnoses side by side", "comparison")
+    folders = [
+        (f"{prefix}top", name, each.case)
+        for prefix, name, each in zip(prefixes, names, results, strict=True)
+    ]
+    table = ComparisonTable(
+        plain.table, plain.caption, plain.file, plain.text, groups=groups, folders=folders
+    )
+    return PageSection("comparison", "Side by side", [Paragraphs("legend", [LEGEND]), table])
+
+
+def comparison_groups(results: Sequence[Results]) -> list[Group]:
+    """Objective, variables, deviations of the fits, verdicts of the diagnoses."""
     fits, diagnoses = [each.fit for each in results], [each.diagnosis for each in results]
-    if sum(bool(fit or diagnosis) for fit, diagnosis in zip(fits, diagnoses, strict=True)) < 2:
-        return []
     groups = []
     if any(fits):
         names = dict.fromkeys(n for fit in fits if fit for n in (*fit.variables, *fit.fixed))
@@ -68,7 +102,7 @@ def _whole(fits: Sequence[FitResult | None]) -> Iterator[ComparisonRow]:
         "objective", "initial", _cells(fits, lambda fit: _objective(fit, "initial_"))
     )
     yield ComparisonRow("objective", "fitted", _cells(fits, _objective))
-    yield ComparisonRow("worst mode", "", _cells(fits, _worst))
+    yield ComparisonRow("worst target", "", _cells(fits, _worst))
     yield ComparisonRow("verdict", "chi2 per degree of freedom", _cells(fits, _fit_verdict))
     yield ComparisonRow("converged", "design points", _cells(fits, _end))
     yield ComparisonRow("pressure", "", _cells(fits, _pressures))
@@ -105,10 +139,8 @@ def _pressures(fit: FitResult) -> str:
 
 
 def _worst(fit: FitResult) -> str:
-    if not fit.modes:
-        return NOTHING
-    worst = max(fit.modes, key=lambda mode: abs(mode.deviation_percent))
-    return f"{worst.label.display} {_graded(fit, _aim(worst))}{NB}%"
+    worst = farthest(fit)
+    return f"{worst[0]} {_grade(worst[1])}{NB}%" if worst else NOTHING
 
 
 def _aim(mode: FittedMode) -> tuple[str, str]:
@@ -120,13 +152,15 @@ def _aim(mode: FittedMode) -> tuple[str, str]:
 def _variable(fit: FitResult, name: str) -> str:
     """Value and standard error of a variable in one fit, as text."""
     if name in fit.fixed:
-        return f"{fit.fixed[name]:.4g} held"
+        return f"{printed_value(fit.fixed[name], fit.fixed_units.get(name, ''))} held"
     known = fit.variables.get(name)
     if known is None:
         return NOTHING
     error = known.percent(known.standard_error_total or known.standard_error)
     spread = f" ±{NB}{error}{NB}%" if error else ""
-    return f"{known.value:.4g}{spread}{', at bound' if known.at_bound else ''}"
+    return (
+        f"{printed_value(known.value, known.unit)}{spread}{', at bound' if known.at_bound else ''}"
+    )
 
 
 def _deviations(fit: FitResult) -> dict[tuple[str, str], float]:
@@ -139,8 +173,11 @@ def _deviations(fit: FitResult) -> dict[tuple[str, str], float]:
 
 def _graded(fit: FitResult, aim: tuple[str, str]) -> str:
     off = _deviations(fit).get(aim)
-    if off is None:
-        return NOTHING
+    return NOTHING if off is None else _grade(off)
+
+
+def _grade(off: float) -> str:
+    """A deviation in per cent with the mark of how near it is."""
     grade = "○" if abs(off) <= CLOSE else "◐" if abs(off) <= FAR else "●"
     return f"{grade}{NB}{signed(off, 2)}".replace("-", MINUS)
 

@@ -54,6 +54,7 @@ class Results:
     studies: dict[str, Result]  # by name, in the order of a page
     fit_shapes: Shapes | None = None
     history: list[Json] = field(default_factory=list)
+    history_csv: str = ""
     modes_shapes: Shapes | None = None
     patches: Patches | None = None
     diagnosis_section: DiagnosisSection | None = None
@@ -97,11 +98,13 @@ def read_results(folder: Path) -> Results:
         raise InputError(f"'{folder}' {what}; give a folder of results")
     types = result_types()
     studies = {name: _read(folder / f"{kind.stem}.json", kind) for name, kind in types.items()}
+    history = _text(folder / "fit_history.csv")
     results = Results(
         folder,
         {name: each for name, each in studies.items() if each and _is_filled(each)},
         _read(folder / "fit_shapes.json", Shapes),
-        _history(folder / "fit_history.csv"),
+        _history(history, folder / "fit_history.csv"),
+        history or "",
         _read(folder / "modes_shapes.json", Shapes),
         _read(folder / "footprint_patches.json", Patches),
         _read(folder / "diagnosis_section.json", DiagnosisSection),
@@ -163,9 +166,8 @@ def _text(path: Path) -> str | None:
         raise InputError(f"'{path}' is damaged: it is no text") from None
 
 
-def _history(path: Path) -> list[Json]:
+def _history(text: str | None, path: Path) -> list[Json]:
     """Design points of fit_history.csv; empty if there is none. Raises InputError."""
-    text = _text(path)
     if text is None:
         return []
     points: list[Json] = []

@@ -1,17 +1,65 @@
-"""Mode shapes packed for the page's script: 16 bit whole numbers in base64."""
+"""Mode shapes and the section on the page; shapes are packed for its script as 16 bit whole numbers
+in base64."""
 
 from __future__ import annotations
 
 from base64 import b64encode
+from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
 from ...files import Json
 from ...simulate.modes.label import Label
+from ...studies.modes import ModesResult
+from ...studies.result import Named
+from ...tyre.case import as_written
+from ..section import draw_section
 from ..shape_data import Shape, Shapes
+from .parts import Block, Chapter, PageSection, Paragraphs, ShapeViewer, lists_of
 
 INT16_MAX = 32767
 PAGE_ANGLES = 60  # round the circumference, in the page
+
+
+def shape_section(
+    chapter: Chapter, what: str, heading: str, shapes: Shapes | None, table: Sequence[Named]
+) -> PageSection:
+    """Shapes of the modes of a study that turn and vibrate, or why there are none; table: the modes
+    that they must be of. Raises InputError."""
+    why = ""
+    if shapes is None:
+        why = f"The mode shapes are not in this folder; 'tyrecal {what} --report' keeps them."
+    elif not shapes.are_of(table):
+        why, shapes = "The mode shapes in this folder are from another run: not shown.", None
+    elif not shapes.modes:
+        why = "This solver gives shapes on the crown only, so there is no section to revolve."
+    blocks: list[Block] = [Paragraphs("absent", [why])] if why else []
+    if shapes and shapes.modes:
+        with lists_of(chapter.results.folder / f"{what}_shapes.json"):
+            blocks.append(ShapeViewer(f"{what}-data", packed(shapes), heading))
+    if shapes and shapes.load_N:
+        heading += f" under {shapes.load_N:g} N, on the tread"
+    if shapes and shapes.provenance and shapes.provenance.overrides:
+        given = shapes.provenance.overrides.items()
+        changes = (f"{name} = {as_written(value)}" for name, value in given)
+        heading += f", with {', '.join(changes)}"
+    return PageSection(f"{what}-shapes", heading, blocks)
+
+
+def section_drawing(chapter: Chapter) -> Iterator[PageSection]:
+    """The section of the fitted tyre, or of that whose modes are known. Raises InputError."""
+    results = chapter.results
+    fit, modes = results.fit, results.get(ModesResult)
+    for what, shapes, table in (
+        ("fit", results.fit_shapes, fit.of_first_state if fit else ()),
+        ("modes", results.modes_shapes, modes.modes if modes else ()),
+    ):
+        if shapes and shapes.section and table and shapes.are_of(table):
+            plot = partial(draw_section, shapes.section, shapes.case, shapes.pressure_kPa)
+            drawing = chapter.figure("section", f"{what}_shapes.json", plot)
+            yield PageSection("section", "Section", [drawing])
+            return
 
 
 def packed(shapes: Shapes) -> Json:

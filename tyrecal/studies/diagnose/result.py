@@ -18,10 +18,11 @@ from pydantic import Field
 from ...errors import InputError
 from ...files import Json
 from ...simulate.modes.label import Label
+from ...units import signed
 from .. import named
 from ..inference.observations import Observable
 from ..labels import Labels
-from ..result import CsvRow, Result, ResultPart, StudyInput, rows_csv
+from ..result import Column, CsvRow, Result, ResultPart, StudyInput, Table, rows_csv
 from .constants_posterior import ConstantShift, constants_posterior
 from .evidence import NONE, OUTSIDE
 from .gap import projection
@@ -160,6 +161,7 @@ class DiagnosisResult(Result):
     """diagnosis.json"""
 
     study, stem, heading = "diagnose", "diagnosis", "Diagnosis"
+    part = "tyrecal.report.html.diagnosis:part"
 
     verdict: VerdictKind  # verdict; outside: no effect of the catalogue explains the gap
     words: str  # verdict in words
@@ -240,6 +242,26 @@ class DiagnosisResult(Result):
     def conclusion(self) -> dict[str, str | None]:
         return {"verdict": self.verdict, "effect": self.effect, "words": self.words}
 
+    def tables(self) -> list[Table]:
+        """Parts of the section, each changed alone."""
+        if not self.section_map:
+            return []
+        evidence = Column("ln evidence", "+.1f")
+        heads = [Column("part", ""), Column("stiffness, %"), Column("mass, %"), evidence]
+        rows = [
+            [
+                part.region.replace("_", " "),
+                f"{_change(part.stiffness_percent, 0)} ± {part.stiffness_sigma:.0f}",
+                f"{_change(part.mass_percent, 0)} ± {part.mass_sigma:.0f}",
+                _change(part.evidence, 1),
+                ", ".join(part.same_as).replace("_", " "),
+            ]
+            for part in self.section_map
+        ]
+        return [
+            Table([*heads, Column("looks like", "")], rows, "One part changed alone", "", "section")
+        ]
+
     def csv(self) -> str:
         residuals: list[CsvRow] = [each.model_dump() for each in self.gap.residuals]
         return rows_csv(residuals)
@@ -270,6 +292,12 @@ class DiagnosisResult(Result):
         if self.under_load:
             tables["under_load"] = [each.model_dump() for each in self.under_load.rows]
         return tables | ({"labels": self.labels.csv_rows()} if self.labels else {})
+
+
+def _change(value: float, digits: int) -> str:
+    """A number with its sign, and 0 without one."""
+    text = signed(value, digits)
+    return text if float(text) else text[1:]
 
 
 def diagnosis_result(

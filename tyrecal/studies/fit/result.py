@@ -18,7 +18,7 @@ from ...tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ...tyre.number_units import unit_of
 from ...tyre.state import AS_THE_CASE
 from ...tyre.values import with_values
-from ...units import printed_unit
+from ...units import display_unit, printed_unit
 from .. import named
 from ..correlation import ShapeCorrelation
 from ..fitted import NOT_CONVERGED
@@ -73,7 +73,7 @@ DAMPING_COLUMNS = {
     "damping_ratio": Column("damping %", ".2f", 100),
     "target_damping_ratio": Column("target %", ".2f", 100),
 }
-HERTZ, RESULT_DIGITS = Column("Hz"), Column("", ".4g")
+HERTZ = Column("Hz")
 
 
 @dataclass
@@ -209,6 +209,7 @@ class FitResult(Result):
 
     fits = True
     study, stem, heading = "fit", "fit", "Fit"
+    part = "tyrecal.report.html.fit:part"
 
     method: str  # slsqp or gauss-newton
     prior: bool = False  # whether what is known of variables and model entered the fit
@@ -233,6 +234,7 @@ class FitResult(Result):
     label_margin: float  # least clarity of a label
     variables: dict[str, FittedVariable]  # fitted variables by name
     fixed: dict[str, float]  # variables that were held, with their values
+    fixed_units: dict[str, str] = Field(default={})  # units of the numbers that these set
     # uncertain numbers that were fitted too, those among the variables
     freed: dict[str, FreedNumberFit] = Field(default={})
     modes: list[FittedMode]  # modes with a target
@@ -481,7 +483,7 @@ class FitResult(Result):
             for each in self.states
         ]
         rows.insert(0, ["nothing", "", "", *(self._percent(n, error) for n, error in own.items())])
-        tables = [Table(heads, rows, title="What each state adds")]
+        tables = [Table(heads, rows, title="What each state adds", csv="states")]
         if self.next_states:
             heads = [Column("added", ""), Column("errors become"), *heads[3:]]
             rows = [
@@ -490,7 +492,7 @@ class FitResult(Result):
                 for each in self.next_states[:MAX_PROPOSED]
             ]
             tables.append(
-                Table(heads, rows, title="Best state to measure next, for the same modes")
+                Table(heads, rows, "Best state to measure next, for the same modes", csv="states")
             )
         return tables
 
@@ -502,23 +504,26 @@ class FitResult(Result):
         heads = [Column("variable", ""), Column("unit", "")]
         heads += map(Column, ("initial", "fitted", "bounds", "std. err. %", "scatter %"))
         heads += [Column("by data %")] * self.prior
-        rows: list[list[Any]] = [
-            [
-                name,
-                ", ".join(filter(None, (printed_unit(each.unit), "at bound" * each.at_bound))),
-                *map(RESULT_DIGITS.cell, (each.initial, each.value)),
-                f"{each.lower:g}..{each.upper:g}",
-                each.percent(each.standard_error_total),
-                each.percent(each.standard_error),
-                *[_percent_of(each.explained_by_data)] * self.prior,
-            ]
-            for name, each in self.variables.items()
-        ]
-        rows += [
-            [name, "held", *map(RESULT_DIGITS.cell, (value, value)), *[None] * (len(heads) - 4)]
-            for name, value in self.fixed.items()
-        ]
-        return Table(heads, rows)
+        rows: list[list[Any]] = []
+        for name, each in self.variables.items():
+            unit, factor = display_unit(each.unit)
+            numbers = each.initial, each.value, each.lower, each.upper
+            initial, value, lower, upper = (f"{factor * x:.4g}" for x in numbers)
+            rows.append(
+                [
+                    name,
+                    ", ".join(filter(None, (printed_unit(unit), "at bound" * each.at_bound))),
+                    *(initial, value, f"{lower} to {upper}"),
+                    each.percent(each.standard_error_total),
+                    each.percent(each.standard_error),
+                    *[_percent_of(each.explained_by_data)] * self.prior,
+                ]
+            )
+        for name, held in self.fixed.items():
+            unit, factor = display_unit(self.fixed_units.get(name, ""))
+            words = ", ".join(filter(None, (printed_unit(unit), "held")))
+            rows.append([name, words, *[f"{factor * held:.4g}"] * 2, *[None] * (len(heads) - 4)])
+        return Table(heads, rows, csv="variables")
 
 
 def fit_result(
@@ -551,6 +556,8 @@ def fit_result(
     good = best.converged and moved
     covariance = None if isinstance(total, str) else total.of_values
     judged = judge(problem, point, known, covariance, good, readings)
+    sets = problem.case.case.variables
+    fixed_units = {name: unit_of(sets[name].sets[0]) for name in problem.fixed if name in sets}
     content = {
         "format": 1,
         "method": method,
@@ -578,6 +585,7 @@ def fit_result(
         "label_margin": point.clarity,
         "variables": _variables(problem, initial, point, known, total, judged.chi2_per_dof),
         "fixed": dict(problem.fixed),
+        **({"fixed_units": fixed_units} if fixed_units else {}),
         **({"freed": _freed(problem, point)} if problem.freed else {}),
         "modes": _modes(problem, initial, point, several),
         **({"footprint": pressed} if pressed else {}),

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from ...units import printed_unit
+from ...units import display_unit, printed_unit, printed_value
 from ..result import (
     NAME_COLUMNS,
     Column,
@@ -209,10 +209,14 @@ class SampleResult(Result):
         rows: list[list[Any]] = []
         for name, v in self.variables.items():
             half = (v.high - v.low) / (2 * 1.645)  # as a standard error, were it normal
-            percent = [f"{100 * each / v.median:.2g}" for each in (half, v.standard_error)]
-            figures = [*map(DIGITS.cell, (v.median, v.low, v.high)), *percent]
-            rows.append([name, *figures, DIGITS.cell(v.best), printed_unit(v.unit)])
-        tables = [Table([*map(Column, heads)], rows), *self._predicted()]
+            shares = (100 * each / v.median for each in (half, v.standard_error))
+            percent = [f"{x:.0f}" if abs(x) >= 10 else f"{x:.2g}" for x in shares]
+            unit, factor = display_unit(v.unit)
+            median, low, high, best = (
+                DIGITS.cell(factor * x) for x in (v.median, v.low, v.high, v.best)
+            )
+            rows.append([name, median, low, high, *percent, best, printed_unit(unit)])
+        tables = [Table([*map(Column, heads)], rows, csv="variables"), *self._predicted()]
         return [*tables, self._shares()] if self.variance_shares else tables
 
     def _shares(self) -> Table:
@@ -233,7 +237,7 @@ class SampleResult(Result):
             " are uniform over the emulator's box (sample.json), on a logarithmic scale if they are"
         )
         heads = [*NAME_COLUMNS, deviation, *(Column(name) for name in [*names, "interactions"])]
-        return Table(heads, rows, "Shares of the variance", caption)
+        return Table(heads, rows, "Shares of the variance", caption, "shares")
 
     def _predicted(self) -> list[Table]:
         hertz = Column("Hz", ".2f")
@@ -281,10 +285,11 @@ class SampleResult(Result):
         return sentences
 
     def summary(self) -> list[str]:
-        ranges = (
-            f"{name} {v.low:.4g} to {v.high:.4g} {printed_unit(v.unit)}".rstrip()
+        ranges = [
+            f"{name} {DIGITS.cell(display_unit(v.unit)[1] * v.low)} to"
+            f" {printed_value(v.high, v.unit)}"
             for name, v in self.variables.items()
-        )
+        ]
         return [f"90 % of the draws: {', '.join(ranges)}"]
 
     def doubts(self) -> list[str]:

@@ -187,7 +187,7 @@ class SensitivitiesResult(Result):
             "gain: after the others are freed; chance: probability that the best of all numbers"
             " gains as much by chance"
         )
-        return Table(columns, rows, "Numbers to free", caption)
+        return Table(columns, rows, "Numbers to free", caption, "selection")
 
     def sentences(self) -> list[str]:
         sentences = []
