@@ -7,7 +7,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 from operator import attrgetter
 
 import numpy as np
@@ -94,26 +93,19 @@ class ContactNewton:
         self.free_radius = road.height
         self.flat = self._flat_height(tyre.model.mesh.X, np.flatnonzero(~symmetry.free.any(1)))
         self.road = road
-        self._inflated = U
         tyre.residual(U)
         self.parts = symmetry.parts(U)
         self.height = self.free_radius
         self.load = 0.0
         self._bound = road.forces(U, self.free_radius).bound(1.0)
         self.first: FirstGuess | None = None
+        self._order: Elimination | None = None  # from the tangents of the first preconditioner
         self._factor: ContactUpdate | None = None
         self._used = 0
         self._stale = False  # the preconditioner is of a load that was much smaller
         self._formed_at = 0.0  # its load, N
         self._slope: tuple[Array, float] | None = None  # of parts and height by the load
         self.factorisations = self.products = self.iterations = 0
-
-    @cached_property
-    def order(self) -> Elimination:
-        """The order of elimination, from the inflated tyre's tangents."""
-        tyre = Revolved(self.tyre.model, self.tyre.loads, self.tyre.around)
-        tyre.residual(self._inflated)
-        return Elimination(tyre.tangents(np.float32), self.symmetry)
 
     def to(self, load: float) -> PressedState:
         """The equilibrium at ``load`` (N), in smaller steps where need be.
@@ -392,7 +384,9 @@ class ContactNewton:
         self.factorisations += 1
         self._stale, self._factor, self._formed_at = False, None, self.load
         stiffness = self.symmetry.fold(contact.matrix(positive=True))
-        self._factor = ContactUpdate(Factor(self.order, self.tyre.tangents(np.float32), stiffness))
+        tangents = self.tyre.tangents(np.float32)
+        self._order = self._order or Elimination(tangents, self.symmetry)
+        self._factor = ContactUpdate(Factor(self._order, tangents, stiffness))
         return self._factor
 
     def _unit(self, contact: Contact) -> tuple[Array, float]:

@@ -21,7 +21,7 @@ from .half_turn_symmetry import ODD, HalfTurn
 Array = np.ndarray
 Tangents = list[tuple[Array, Array, Array, Array]]
 # of what couples the parts over what does not, above which a column takes both as one
-MIN_COUPLING = 2e-3
+MIN_COUPLING = 5e-2
 MAX_RUN = 256  # rows that are added at once: of squares on the diagonal half is added in vain
 
 
@@ -131,9 +131,9 @@ class Factor:
             if front.cells:
                 unknowns = place[order.unknowns(front.parts, *front.cells)]
                 free = np.argsort(unknowns)[-len(here) :]  # place is -1 where nothing is free
-                whole = order.box(tangents, front.parts, *front.cells)[free][:, free]
-                first, onward, rest = whole[:n, :n].copy("F"), whole[n:, :n].copy(), whole[n:, n:]
-                rest = rest.copy()
+                whole = order.box(tangents, front.parts, *front.cells)[free]
+                first, onward = whole[:n, free[:n]].T, whole[n:, free[:n]]  # it is symmetric
+                rest = whole[n:, free[n:]]
             else:
                 first = np.zeros((n, n), np.float32, "F")
                 onward, rest = np.zeros((m, n), np.float32), np.zeros((m, m), np.float32)

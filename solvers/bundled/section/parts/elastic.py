@@ -152,10 +152,15 @@ class ElasticAtStations(AtStations):
     def tangents(self, precision: Precision) -> tuple[Array, Array, Array]:
         A = self.A if self.law.weighted_tangent else self.A * self._weights[..., None]
         s, e, g, k, d = A.shape[2], self.e, self.g, self.k, self.d
-        A = A.transpose(2, 0, 1, 3, 4).astype(precision)
+        # (e, g, k, s, k): all stations of a point in one product
+        A = np.ascontiguousarray(A.swapaxes(2, 3), dtype=precision)
         B0, B1 = self.rows.B0.astype(precision), self.rows.B1.astype(precision)
         B0t, B1t = B0.reshape(e, g * k, d).swapaxes(1, 2), B1.reshape(e, g * 3, d).swapaxes(1, 2)
-        AB1 = A[..., self.rows.around] @ B1
-        K0 = B0t @ (A @ B0).reshape(s, e, g * k, d)
-        K1 = B0t @ AB1.reshape(s, e, g * k, d)
-        return K0, K1, B1t @ AB1[..., self.rows.around, :].reshape(s, e, g * 3, d)
+        AB0 = A.reshape(e, g, k * s, k) @ B0
+        AB1 = A[..., self.rows.around].reshape(e, g, k * s, 3) @ B1
+        of_B1 = AB1.reshape(e, g, k, s * d)[:, :, self.rows.around]
+        K0 = B0t @ AB0.reshape(e, g * k, s * d)
+        K1 = B0t @ AB1.reshape(e, g * k, s * d)
+        K2 = B1t @ of_B1.reshape(e, g * 3, s * d)
+        at_stations = lambda K: K.reshape(e, d, s, d).transpose(2, 0, 1, 3)
+        return at_stations(K0), at_stations(K1), at_stations(K2)
