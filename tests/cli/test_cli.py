@@ -95,6 +95,22 @@ def test_modes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert heavier["mass_kg"] > 1.5 * printed["mass_kg"]
 
 
+def test_modes_next_to_measurements(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A mode measured in this state has its deviation; one at another pressure has none."""
+    out, measured = tmp_path / "out", tmp_path / "measured.csv"
+    measured.write_text("c,m,frequency_Hz,sigma_Hz,pressure_kPa\n2,0,80,0.1,240\n3,0,90,0.1,200\n")
+    arguments = ["modes", CASE, "--mesh", "coarse", "--measured", str(measured)]
+    assert run(*arguments, "--output", str(out), "--json") == 0
+    modes = json.loads(capsys.readouterr().out)["modes"]
+    (compared,) = [mode for mode in modes if "measured_Hz" in mode]
+    assert (compared["c"], compared["m"], compared["measured_Hz"]) == (2, 0, 80.0)
+    percent = 100 * (compared["frequency_Hz"] / 80.0 - 1)
+    assert compared["deviation_percent"] == pytest.approx(percent)
+    for words in (["--pressure-kPa", "220"], ["--load-N", "4000"]):
+        assert run(*arguments, *words, "--output", str(tmp_path / "none")) == 2
+    assert not (tmp_path / "none").exists()
+
+
 @pytest.mark.slow
 def test_fit_writes_the_same_bytes_twice(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

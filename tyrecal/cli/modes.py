@@ -12,7 +12,7 @@ from . import arguments, options
 from .arguments import parse_loads
 from .main import EXIT_SOLVER
 from .options import Study
-from .parameters import option
+from .parameters import FileOrFolder, option
 
 if TYPE_CHECKING:
     from ..tyre.case import LoadedCase
@@ -27,6 +27,12 @@ if TYPE_CHECKING:
     options.sweep_load,
     options.wheel,
     options.fitted("; with --sweep-load the initial one too"),
+)
+@option(
+    "--measured",
+    type=FileOrFolder(exists=True, folder=False),
+    metavar="FILE",
+    help="Measurements (CSV) to compare with, at the pressure of the modes, without a load.",
 )
 @option(
     "--pictures/--no-pictures",
@@ -45,6 +51,7 @@ def command(
     sweep: str | None,
     wheel: str | None,
     fitted: Path | None,
+    measured: Path | None,
     pictures: bool | None,
     dry_run: bool,
     study: options.Study,
@@ -55,11 +62,13 @@ def command(
     patch sticks to the road. Pairs split into a member symmetric about the patch and an
     antisymmetric one. sliding_Hz is the frequency if nothing holds the patch along the road.
     grip_mm is the largest motion of the crown before the patch slides. --sweep-load follows the
-    modes over the load: load_sweep.json, .csv and .png.
+    modes over the load: load_sweep.json, .csv and .png. --measured compares a design with data to
+    which it was not fitted.
 
     \b
     tyrecal modes cases/p235_75r17.yaml --set A_belt=3e-7 --pressure-kPa 200
     tyrecal modes cases/p235_75r17.yaml --set rebar_layers.belt_1.angle_deg=68 --json
+    tyrecal modes my.yaml --fitted my --pressure-kPa 300 --measured at_300.csv
     tyrecal modes cases/p235_75r17.yaml --fitted p235_75r17 --load-N 4000
     tyrecal modes cases/p235_75r17.yaml --sweep-load 0,1000,2000,4000 --fitted p235_75r17/fit.json
     """
@@ -75,6 +84,8 @@ def command(
         raise click.UsageError("--dry-run goes with --load-N or --sweep-load")
     if pictures and load_N is not None:
         raise click.UsageError("--pictures goes with --sweep-load, or without a load")
+    if measured and loads:
+        raise click.UsageError("--measured goes without a load")
     terminal = study.terminal
     if not (fitted and sweep):
         why = "only one design is evaluated; --sweep-load with --fitted evaluates two"
@@ -82,6 +93,10 @@ def command(
     loaded, values = study.load(case, assignments, pressure_kPa)
     if sweep is None:
         loaded, values = arguments.one_design(fitted, loaded, assignments, terminal)
+    if measured:
+        from ..measured.targets import with_measured
+
+        loaded, _ = with_measured(loaded, measured)
     if wheel:
         road = with_part(loaded.case.road, wheel=wheel.replace("-", "_"))
         loaded = changed(loaded, road=road)
@@ -106,10 +121,13 @@ def command(
         draw = pictures is not False
         jobs = plan.at_once if loads else 1
         return over_loads(loaded, evaluator, run, designs, loads, study, jobs, draw)
-    run = study.run(loaded, "modes", evaluator, load_N=loads[0] if loads else 0.0)
+    files, load = [measured] if measured else [], loads[0] if loads else 0.0
+    run = study.run(loaded, "modes", evaluator, measured=files, load_N=load)
     if loads:
         return at_load(loaded, evaluator, run, values, loads[0], study)
     result, evaluation, modes = studies.run(loaded, evaluator, values)
+    if measured:
+        result = result.compared(loaded)
     if lossy and all(mode.damping_ratio is None for mode in result.modes):
         name = evaluator.solver.name
         terminal.note(f"solver '{name}' computes no damping: loss factors have no effect")
@@ -120,10 +138,12 @@ def command(
 
         draw_evaluation(run.new, "modes", loaded, evaluation, modes, run.figure_format)
     run.finish()
-    from ..report.table import shown, tyre_doubts
+    from ..report.table import nearness, shown, tyre_doubts
 
     terminal.result(result.content())
     terminal.show(shown(*result.tables()))
+    if compared := [mode.model_dump() for mode in result.modes if mode.measured_Hz]:
+        terminal.say(f"{nearness(compared)}.")
     for doubt in tyre_doubts(result.content()):
         terminal.warn(doubt)
     study.page(run)

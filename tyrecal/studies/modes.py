@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
+from ..errors import InputError
 from ..files import Json
 from ..simulate.evaluate.results import Evaluation
-from ..simulate.modes.label import Mode, labelled
+from ..simulate.modes.label import Label, Mode, labelled
 from ..tyre.case import LoadedCase
 from .result import (
     NAME_COLUMNS,
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from ..simulate.evaluate.evaluator import Evaluator
 
 EXTRA = {  # further columns of the table, of fields of `ModeEntry`
+    "measured_Hz": Column("measured"),
+    "deviation_percent": Column("deviation %", "+.2f"),
     "damping_ratio": Column("damping %", ".2f", 100),
     "sliding_Hz": Column("sliding, Hz"),
     "grip_mm": Column("grip, mm"),
@@ -63,6 +66,32 @@ class ModesResult(Result):
     def run(cls, given: StudyInput) -> ModesResult:
         """Evaluate the initial design."""
         return given.stamped(run(given.case, given.evaluator, given.designs["initial"])[0])
+
+    def compared(self, case: LoadedCase) -> ModesResult:
+        """The result with the targets of ``case``, of the unloaded tyre in its own state, next to
+        its modes. Raises InputError if it has none."""
+        measured = {
+            Label(target.c, target.m, target.kind): target.frequency_Hz
+            for target in case.case.targets.modes
+            if target.pressure_kPa is None and target.rim is None and not target.load_N
+        }
+        if not measured:
+            raise InputError(
+                f"no frequency of the unloaded tyre was measured at {self.pressure_kPa:g} kPa; give"
+                " --pressure-kPa of one in the file"
+            )
+        modes = [
+            mode.model_copy(
+                update={
+                    "measured_Hz": measured[mode.label],
+                    "deviation_percent": 100 * (mode.frequency_Hz / measured[mode.label] - 1),
+                }
+            )
+            if mode.label in measured
+            else mode
+            for mode in self.modes
+        ]
+        return self.model_copy(update={"modes": modes})
 
     def quantities(self) -> dict[str, float]:
         numbers = {"mass_kg": self.mass_kg}

@@ -312,6 +312,8 @@ class ModeEntry(Named):
     """A mode of modes.json or of a sweep."""
 
     multiplicity: int = 1  # 2: a pair of modes
+    measured_Hz: float | None = None  # measured frequency, of a comparison with measurements
+    deviation_percent: float | None = None  # computed over measured, less 1
     damping_ratio: float | None = None  # fraction of critical damping
     clarity: float | None = None  # clarity of the label, 0 to 1
     member: int | None = None  # 1 or 2: member of a split pair
