@@ -2,6 +2,7 @@
 
     python -m tests.blind.archive pack DIR       # add the groups DIR/NAME, truth in DIR-truth/NAME
     python -m tests.blind.archive unpack DIR     # all groups
+    python -m tests.blind.archive truth FILE.csv # truth of the benchmark, with its difficulty
 
 In tests/benchmarks/blind, by the group's name, all groups of a kind in one solid archive:
 trials.tar.xz (measured values, case, rules), truth.tar.xz (to the last byte, so that the seal
@@ -12,6 +13,7 @@ as they were hashed before the truth was opened, and its answers as packed; and 
 
 from __future__ import annotations
 
+import csv
 import io
 import json
 import lzma
@@ -21,9 +23,11 @@ from collections.abc import Mapping
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from tyrecal.studies.blind.ruler import RULER_FILE
+from tyrecal.studies.blind.score import score
 from tyrecal.studies.blind.seal import ANSWERS, SEAL, TRUTH, seal_answers
 
 ARCHIVE = Path(__file__).parents[1] / "benchmarks" / "blind"
@@ -94,6 +98,19 @@ def pack(groups: Mapping[str, tuple[Path, Path]]) -> None:
     _read.cache_clear()
 
 
+def truth_rows() -> list[list[object]]:
+    """What the score of the benchmark reads (`benchmarks/blind/benchmark.py`): of each trial its
+    kind, effect, size, lambda, band (`Scored`), and the answers that count as right."""
+    rows: list[list[object]] = []
+    with TemporaryDirectory() as made:
+        for name in STUDIES[1:]:
+            unpack(name, folder := Path(made) / name)
+            for each in score(folder, folder.with_name(f"{name}-truth")):
+                numbers = (float(f"{x:.4g}") for x in (each.size, each.lam, min(each.band, 1e9)))
+                rows.append([each.id, each.kind, each.law, *numbers, " ".join(each.group)])
+    return rows
+
+
 def read_by_scorers(answer: Mapping[str, Any]) -> dict[str, Any]:
     """The part of an answer that the scorers read: sizes of effects whole, other numbers to
     `ANSWER_DIGITS`."""
@@ -154,6 +171,10 @@ def main(what: str, place: str) -> None:
             unpack(name, top / name, sealed / name)
     elif what == "pack":
         pack({each.name: (each, sealed / each.name) for each in top.iterdir() if each.is_dir()})
+    elif what == "truth":
+        with Path(place).open("w", encoding="utf-8", newline="") as file:
+            head = ["trial", "kind", "effect", "size", "lambda", "band", "group"]
+            csv.writer(file, lineterminator="\n").writerows([head, *truth_rows()])
     else:
         raise SystemExit(__doc__)
 
