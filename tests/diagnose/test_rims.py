@@ -17,7 +17,7 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.result import Residual, diagnosis_result
 from tyrecal.studies.diagnose.study import study
-from tyrecal.studies.inference.covariance import BETWEEN_SUPPORTS, alike
+from tyrecal.studies.inference.covariance import BETWEEN_RIMS, alike
 from tyrecal.studies.inference.effect_ranges import effect_ranges
 from tyrecal.studies.inference.model import Answer, ModelRow, Query
 from tyrecal.studies.inference.observations import Observable, observe
@@ -76,7 +76,7 @@ def test_an_observation_says_its_rim(tmp_path: Path) -> None:
         key=lambda row: (row[1] == FREE, row[0].c, row[0].m, row[0].kind or ""),  # type: ignore[union-attr]
     )
     same = alike(rows)
-    assert same[0, 5] == same[4, 9] == BETWEEN_SUPPORTS and same[0, 6] == 0
+    assert same[0, 5] == same[4, 9] == BETWEEN_RIMS and same[0, 6] == 0
     assert str(rows[9]) == "[2,0] at 240 kPa, rim free"
     for row in rows:
         observable = Residual(row=str(row), run=0, percent=1.0, sigma_percent=1.0).of

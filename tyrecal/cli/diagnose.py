@@ -51,7 +51,7 @@ file = FileOrFolder(exists=True, folder=False)
     help="Effect to leave out, because it is ruled out; repeatable.",
 )
 @option(
-    "--form-percent",
+    "--form-percent",  # an exact section: section.known_from of the case is exact
     type=NumberWithin(0, 20),
     metavar="PERCENT",
     help="Error of the model's own form in every frequency (default: of its mesh, mode by mode,"
@@ -193,7 +193,8 @@ def command(
 
 
 def _with_effects(case: Path, added: tuple[str, ...], output: Path | None, allowed: bool) -> Path:
-    """The new case's file. Raises click.UsageError, CaseError."""
+    """Write the case with the effects ``added``; returns its path. allowed: unusual values too.
+    Raises click.UsageError, CaseError."""
     from ..studies.diagnose.add import add
     from ..tyre.case import parse_assignment
     from ..tyre.load import load_case

@@ -43,6 +43,7 @@ def command(folder: Path, verify: bool, prune: float | None, terminal: Terminal)
         below = next((path.parent for path in sorted(folder.glob("*/record"))), None)
         hint = f"; did you mean '{below}'?" if below else ""
         raise click.UsageError(f"'{folder}': there is no evaluation store here{hint}")
+    # inf: none of the evaluations is in use by this command, so that all may be removed
     store = Store(own if own.is_dir() else folder, opened=float("inf"))
     removed = None if prune is None else store.prune(round(1e6 * prune))
     summary = store.summary(verify)

@@ -82,7 +82,8 @@ class CaseModes:
         return _shape(self.modes[0]).points
 
     def signals(self, mode: Mode, sensors: Sensors) -> Array:
-        """Signals of both modes of a doublet at the sensors, (k, 2); for c = 0 of one, (k, 1).
+        """Motions along the sensors' directions in both modes of a doublet, (k, 2); for c = 0 in
+        one, (k, 1). Both have components r, theta, z.
 
         Raises InputError if a sensor is not on the tyre.
         """

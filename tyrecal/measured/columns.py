@@ -50,10 +50,10 @@ ENDING = re.compile(
     r"^(.+?)(?:\s*/\s*|\s+in\s+|[\s_]|(?=%))(%|hz|kpa|bar|psi|n|m2|n[\s_]per[\s_]m|kg|kn|lbf|kgf|dan|percent)$"
 )
 LENGTH_ENDING = re.compile(r"^(.+)[\s_](m|mm|cm|in|inch)$")  # 'mode m' ends in no unit
-DAMPINGS = {"damping_ratio": 1.0, "loss_factor": 0.5}  # damping ratio per unit of each
+DAMPING_RATIO_OF = {"damping_ratio": 1.0, "loss_factor": 0.5}  # damping ratio per unit of each
 FRACTIONS = {"damping_ratio", "modal_damping_ratio", *HEADINGS["loss_factor"].split()}
 TABLES = {"pressure": units.PRESSURE, "load": units.LOAD, **units.QUANTITIES}
-TABLES |= dict.fromkeys(DAMPINGS, units.DAMPING_UNITS)
+TABLES |= dict.fromkeys(DAMPING_RATIO_OF, units.DAMPING_UNITS)
 NUMBER_MEANINGS = {*TABLES, "sigma", "value"}  # what numbers with a decimal mark stand in
 LENGTHS = {name for name, table in units.QUANTITIES.items() if table is units.LENGTH}
 

@@ -14,7 +14,7 @@ from ..tyre.number_table import NumberMarks
 from ..tyre.state import RIMS
 from ..tyre.usual import USUAL_MEASUREMENTS
 from ..units import QUANTITIES
-from .columns import DAMPINGS, TableColumn
+from .columns import DAMPING_RATIO_OF, TableColumn
 from .measurement import AS_CASE, DAMPING_RATIO, OF_A_MODE, Measurement
 from .mode_names import label_parts
 
@@ -103,10 +103,10 @@ class Line:
 
     def _damping_ratio(self) -> float:
         """Damping ratio of the line's mode, NaN where none is given. Raises InputError."""
-        given = [meaning for meaning in DAMPINGS if self.cell(meaning)]
+        given = [meaning for meaning in DAMPING_RATIO_OF if self.cell(meaning)]
         if not given:
             return nan
-        ratio = DAMPINGS[given[0]] * self.number(given[0])
+        ratio = DAMPING_RATIO_OF[given[0]] * self.number(given[0])
         if refusal := USUAL_MEASUREMENTS[DAMPING_RATIO].refusal(ratio):
             raise InputError(
                 f"{given[0]} is '{self.cell(given[0])}', a damping ratio of {ratio:g}: {refusal};"

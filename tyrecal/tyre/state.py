@@ -30,7 +30,7 @@ SPRINGS = tuple(
 """Numbers of a case that are compliances of what holds its rim."""
 PRESSURE_PATH, RIM_FREE = "pressure_kPa", "rim.free"
 WHEEL_FREE = "effects.wheel_free"
-STANDING = "effects.road_contact"  # which a wheel that hangs freely does not
+STANDING = "effects.road_contact"  # a wheel that hangs freely does not touch the road
 
 
 @dataclass(frozen=True)
@@ -62,8 +62,9 @@ class TyreState:
         return TyreState(pressure, self.load_N, self.rim or rim_of(case))
 
     def kept(self, before: LoadedCase, after: LoadedCase) -> TyreState:
-        """The state of a target of the case ``before``, as the case ``after``, in which its user
-        has set numbers, has to state it. A pressure that a variable sets stays its own."""
+        """The state of a target of the case ``before``, written for the case ``after``, in which
+        the user has set numbers: None becomes the pressure and rim of ``before`` if they differ.
+        If a variable sets the pressure, None stays: the pressure of that variable."""
         pressure, rim = self.pressure_kPa, self.rim
         if pressure is None and pressure_name(before) == PRESSURE_PATH:
             pressure = before.case.pressure_kPa

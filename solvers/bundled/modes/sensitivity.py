@@ -2,9 +2,10 @@
 
     d lambda/dp = phi^H (dK/dp + D_u K[v] - lambda dM/dp) phi,    v = -K0^-1 dr/dp
 
-(Nelson's first-order formula about the equilibrium r(u, p) = 0.) All three terms come from one
-complex step: the quadratic forms of the shape phi are evaluated on the model built from the deck
-with its number p + i h dp, at the state u + i h v; no second derivative is written out.
+(Nelson's first-order formula, phi^H M phi = 1.) r(u, p) = 0: out-of-balance force of the inflated
+state u; K0 = dr/du. All three terms come from one complex step: the quadratic forms of phi are
+evaluated on the model of the deck with its number p + i h, at the state u + i h v; no second
+derivative is written out.
 """
 
 from __future__ import annotations
@@ -32,10 +33,10 @@ def state_rate(
 ) -> Array:
     """v = dU/dp (n, 3) of the equilibrium U; ``model``, ``loads`` carry p's tangent.
 
-    ``factor``: of the real Newton tangent at U.
+    ``factor``: of the real Newton tangent K0 at U.
     """
-    rate = np.imag(mechanics.gradient(model, U, loads)) / COMPLEX_STEP
-    rate = numbering.gather(model.mesh.symmetry.force(rate))
+    rate = np.imag(mechanics.gradient(model, U, loads)) / COMPLEX_STEP  # dr/dp
+    rate = numbering.gather(model.mesh.symmetry.force(rate))  # of the whole tyre, by equation
     return np.asarray(numbering.spread(-factor.solve(rate)).real)
 
 
@@ -51,14 +52,14 @@ def eigenvalue_rates(
     """d lambda/dp (m,) of the modes ``fields``, lambda (m,).
 
     ``model`` and ``loads`` carry the tangent of p, V = dU/dp; ``rim_and_air``: what moves along.
-    Where the model has tables of moduli, lambda changes its own modulus:
+    If the model has tables of moduli, lambda changes its own modulus, rho times the static one:
     d lambda/dp = (d lambda/dp at that modulus) / (1 - d lambda/d rho d rho/d lambda).
     """
     state = U + 1j * COMPLEX_STEP * V
     if rim_and_air:
         fields = rim_and_air.carried(model.mesh.X, fields)
     total = np.zeros(len(eigenvalues), complex)
-    own, copies = 1.0, model.mesh.symmetry.copies
+    denominator, copies = 1.0, model.mesh.symmetry.copies
     spins = [load for load in loads if isinstance(load, Spin)]
     for part in (*model.parts, *(load for load in loads if not isinstance(load, Spin))):
         total += part.form(state, fields)
@@ -70,15 +71,16 @@ def eigenvalue_rates(
                 total += (ratio - 1) * form
                 # d rho / d lambda = rho (d ln rho / d ln f) / (2 lambda)
                 slope = np.array([table.slope(f) for f in hertz])
-                own = own - copies * form.real * ratio.real * slope / (2 * eigenvalues)
+                rate = ratio.real * slope / (2 * eigenvalues)
+                denominator = denominator - copies * form.real * rate
     M = mechanics.mass(model)
     total -= eigenvalues * _energies(M, fields).sum(1)
-    if spins:  # of all parts at once, their mass being there
+    if spins:  # centrifugal: -Omega^2 M in r and theta, of all parts at once
         total -= _energies(spins[0].spin2 * M, fields) @ np.diag(IN_PLANE)
     total *= copies
     if rim_and_air:
         total += rim_and_air.forms(model, state, loads, fields, eigenvalues)
-    return total.imag / COMPLEX_STEP / own
+    return total.imag / COMPLEX_STEP / denominator
 
 
 @dataclass(frozen=True)
@@ -111,20 +113,20 @@ class RimAndAir:
         eigenvalues: Array,
     ) -> Array:
         """Part of the rim and the gas in phi^H (K - lambda M) phi per mode (m,), complex: with the
-        tangent of the number p of the deck."""
+        tangent of the number p of the deck. The gas: as in `cavity`, with its Q, H, C and w."""
         total = np.zeros(len(eigenvalues), complex)
         X = model.mesh.X
         forces = mechanics.gradient(model, state, loads) if self.wheel else state
-        whole = model.mesh.symmetry.force
-        forces = whole(forces.real) + 1j * whole(forces.imag)
-        couplings = {m: coupling(self.air, X, state, m) for m in set(fields.n.tolist()) if self.air}
-        for j, ((m,), (real,), (imag,)) in enumerate(fields.modes):
+        of_whole_tyre = model.mesh.symmetry.force
+        forces = of_whole_tyre(forces.real) + 1j * of_whole_tyre(forces.imag)
+        couplings = {n: coupling(self.air, X, state, n) for n in set(fields.n.tolist()) if self.air}
+        for j, ((n,), (real,), (imag,)) in enumerate(fields.modes):  # one harmonic n per mode
             if self.wheel:
-                stiffness, inertia = self.wheel.own(int(m), X, forces)
+                stiffness, inertia = self.wheel.own(int(n), X, forces)
                 total[j] += (stiffness - eigenvalues[j] * inertia) @ abs(self.rim[j]) ** 2
             for part, w in ((real, self.flow[j].real), (imag, self.flow[j].imag)):
-                if m in couplings:
-                    air = couplings[m]
+                if n in couplings:
+                    air = couplings[n]
                     H = air.H[air.flowing, air.flowing]
                     swept = air.strain(part, w)
                     total[j] += swept @ np.linalg.solve(air.Q, swept)

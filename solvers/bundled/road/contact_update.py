@@ -4,7 +4,8 @@ Woodbury: with the factor's K = L L^T, and a change D of the contact stiffness a
 
     (K + E D E^T)^-1 = L^-T (1 - Y (1 + D Y^T Y)^-1 D Y^T) L^-1,   Y = L^-1 E
 
-Columns of Y are formed when a component's contact first changes, and kept.
+E: unit columns, one for each of those dofs. Columns of Y are formed when the contact of a dof first
+changes, and kept.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from .multifrontal import Factor
 
 Array = np.ndarray
 COLUMNS_AT_ONCE = 64  # columns that are formed at a time
-# change of a component's contact stiffness over the stiffest contact, left to GMRES
+# change of a dof's contact stiffness over the largest one, below which it is left to GMRES
 MIN_STIFFNESS_CHANGE = 1e-3
 
 
@@ -29,10 +30,12 @@ class ContactUpdate:
 
     def __init__(self, factor: Factor):
         self.factor = factor
-        self._column = np.full(factor.order.symmetry.mask.size, -1)  # of each dof in Y
-        self._blocks: list[list[Array]] = []  # Y by the times of forming, by the factor's fronts
-        self._compliance = np.zeros((0, 0))
-        self._active = np.zeros(0, int)
+        # column of Y of each dof, -1: none
+        self._column = np.full(factor.order.symmetry.mask.size, -1)
+        # rows of Y in each front of the factor: one list for each time that columns were formed
+        self._blocks: list[list[Array]] = []
+        self._compliance = np.zeros((0, 0))  # Y^T Y, m/N
+        self._active = np.zeros(0, int)  # columns of Y whose contact has changed
 
     def copy(self) -> ContactUpdate:
         """A copy whose further columns are its own."""
@@ -78,7 +81,7 @@ class ContactUpdate:
         return self.factor.forward(right.reshape(-1, *self.factor.order.symmetry.mask.shape))
 
     def solve(self, right: Array) -> Array:
-        """The inverse times parts (..., 2, k, q, 3)."""
+        """The inverse times parts (..., 2, f, q, 3)."""
         rows = right.reshape(-1, *right.shape[-4:])
         y = self.factor.forward(rows)
         if len(self._active):
@@ -96,7 +99,7 @@ class ContactUpdate:
 
 
 def _side_by_side(pieces: Sequence[Array]) -> Array:
-    """Columns of all; no rows stand for zeros."""
+    """Columns of all pieces (rows, columns) side by side; a piece without rows is 0."""
     rows = max(len(piece) for piece in pieces)
     whole = np.zeros((rows, sum(piece.shape[1] for piece in pieces)), np.float32)
     start = 0
@@ -107,7 +110,7 @@ def _side_by_side(pieces: Sequence[Array]) -> Array:
 
 
 def _products(left: list[Array], right: list[Array]) -> Array:
-    """left^T right, summed over the pieces."""
+    """left^T right (columns, columns), summed over the fronts."""
     total = np.zeros((left[0].shape[1], right[0].shape[1]))
     for a, b in zip(left, right, strict=True):
         if len(a) and len(b):

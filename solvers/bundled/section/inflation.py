@@ -26,9 +26,9 @@ MAX_ITERATIONS = 30  # of Newton's method
 MAX_QUICK_ITERATIONS = 18  # iterations after which another path is likely to be shorter
 STIFFENING = 8.0  # multiple of the rubber's stiffness that inflates without trouble
 SECTION_RADIUS = 0.3  # meridional radius of curvature over the section's height, for the start
-EASED = 300.0  # bulk over shear modulus of rubber that inflates in few iterations
+EASED = 300.0  # largest bulk over shear modulus of rubber that inflates in few iterations
 MIN_INERTIA, MAX_INERTIA = 4e5, 4e15  # of the inertia that holds back a wrinkling path, rad2/s2
-BUCKLING_STRAIN = 1e-3  # logarithmic, from which on compressed cords are named as the cause
+BUCKLING_STRAIN = 1e-3  # logarithmic compression above which cords are named as the cause
 TENSION_FACTOR = 0.05  # factor on the artificial tension from one iteration to the next
 
 
@@ -43,13 +43,14 @@ def equilibrium(
     """Displacements (n, 3) in equilibrium under ``loads``, reached from the displacements
     ``start``, and how many factorisations they took.
 
-    A ``guess`` (n, 3), the shape of a tyre alike, is tried first, the whole load from ``start``
-    next. Where that takes long, because soft rubber between stiff cords wrinkles on the way, the
-    rubber is stiffened and let down again step by step. Where that fails too the load comes in
-    steps. Each is another path to the same equilibrium. ``check`` is called between steps and may
-    raise to stop.
+    A ``guess`` (n, 3), the shape of a similar tyre, is tried first, then the whole load from
+    ``start``. If that takes long, because soft rubber between stiff cords wrinkles on the way, the
+    rubber is stiffened and softened again step by step. If that fails too, the load is applied in
+    steps. All paths lead to the same equilibrium. ``check`` is called between steps and may raise
+    to stop.
 
-    Nearly incompressible rubber is made so afterwards: Newton's straight steps change its volume.
+    Nearly incompressible rubber first gets a lower bulk modulus (`EASED`), because Newton's
+    straight steps change its volume.
 
     Raises NoEquilibrium with the pressure that was reached.
     """
@@ -108,8 +109,8 @@ class _Solver:
         self.model, self.numbering, self.loads = model, numbering, loads
         self.pressures = [abs(load.pressure) for load in loads if isinstance(load, Pressure)]
         self.full = max(self.pressures, default=0.0)
-        # a slack membrane has no stiffness against pressure yet, so the first tangents from rest
-        # carry the tension p rho that the cords are about to take up
+        # N/m. A slack membrane has no stiffness against pressure, so the first tangents from rest
+        # have the tension p rho that the pressure will give the cords (rho: radius of curvature)
         self.tension = self.full * SECTION_RADIUS * np.ptp(model.mesh.X[:, 0].real)
         self.factorisations = 0
         self.why = ""
@@ -182,7 +183,8 @@ def _newton(
     tension: float,
     longest: int,
 ) -> tuple[Array | None, int, str]:
-    """Equilibrium (n, 3) by Newton's method from U, number of factorisations, and why it failed.
+    """Equilibrium (n, 3) by Newton's method from U, None if it failed; number of factorisations;
+    and why it failed.
 
     mass: lumped (size,), which holds back a wrinkling path; tension: artificial tension of the
     cords at first, N/m, which vanishes on the way; longest: most iterations.
@@ -207,7 +209,7 @@ def _newton(
             used += 1
             held = band.copy(order="F")
             if inertia:
-                held[0] += inertia * mass()
+                held[0] += inertia * mass()  # row 0 of the lower band: the diagonal
             try:
                 step = -Cholesky(held).solve(force)
                 break
@@ -238,8 +240,8 @@ def _newton(
 
 
 def _load_force(model: Model, U: Array, loads: Sequence[TyrePart], numbering: Numbering) -> Array:
-    """Force (size,), N, of the pressure alone, of at least 1 Pa, or of the spin where there is
-    none: the scale of what counts as balanced."""
+    """Force (size,), N per radian, of the pressure alone, of at least 1 Pa, or of the spin if there
+    is no pressure: the out-of-balance force is small compared with it."""
     pressures = [load for load in loads if isinstance(load, Pressure)]
     felt = [Pressure(p.lines, max(float(np.real(p.pressure)), 1.0)) for p in pressures]
     if not loads:

@@ -10,7 +10,7 @@ from pydantic import PlainValidator
 Array = np.ndarray
 REAL = "fiu"  # NumPy's letters for kinds of number
 MIN_NUMBER_BYTES = 4  # of a number with decimals: half precision has three digits
-MIN_ANSWER_HZ, MAX_ANSWER_HZ = 1e-3, 1e5  # of a tyre's vibrations, and far beyond
+MIN_ANSWER_HZ, MAX_ANSWER_HZ = 1e-3, 1e5  # far beyond those of a tyre's vibrations
 
 
 def shaped(
@@ -43,7 +43,8 @@ PositiveFinite = Annotated[float, shaped(REAL, least=0.0)]
 Hertz = Annotated[float, shaped(REAL, least=MIN_ANSWER_HZ, most=MAX_ANSWER_HZ)]
 HertzPair = Annotated[Array, shaped(REAL, 2, least=MIN_ANSWER_HZ, most=MAX_ANSWER_HZ)]
 HertzArray = Annotated[Array, shaped(REAL, None, least=MIN_ANSWER_HZ, most=MAX_ANSWER_HZ)]
-Points = Annotated[Array, shaped(REAL, None, 3)]
+# components r, theta, z: at nodes (k, 3); by ring (ring, node, 3); of m modes (m, ring, node, 3)
+Vectors = Annotated[Array, shaped(REAL, None, 3)]
 RealArray = Annotated[Array, shaped(REAL, None)]
 WholeArray = Annotated[Array, shaped("iu", None)]
 Field3D = Annotated[Array, shaped(REAL, None, None, 3)]

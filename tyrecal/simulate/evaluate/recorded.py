@@ -100,7 +100,7 @@ class _Response(_Part):
 class _Modes(_Tyre):
     modes: Annotated[list[_Mode], Field(min_length=1)]
     gradients: dict[str, of.RealArray]
-    displacement: of.Points
+    displacement: of.Vectors
     mass_gradients: dict[str, of.Finite] = Field(default_factory=dict)
     response: _Response | None = None
 

@@ -89,7 +89,8 @@ class Store:
     """
 
     folder: Path
-    opened: float = field(default_factory=lambda: time.time() - 1)  # file times lag behind
+    # time, s, from which on used evaluations are this run's; 1 s early: file times lag behind
+    opened: float = field(default_factory=lambda: time.time() - 1)
     _warned: bool = False
 
     def __post_init__(self) -> None:

@@ -52,7 +52,9 @@ class Fitted(NamedTuple):
     d: Array  # x - x0 (q, v), at the likeliest zeta
     chi2: Array  # (q,)
     covariance: Array  # of d (q, v, v): the inverse of its posterior information
-    coupled: Array  # (q, k) share of Z at each zeta of `veering.rule`; k = 0: no coupled modes
+    # (q, k) posterior density, times a factor, at each zeta of `veering.rule`; k = 0: no coupled
+    # modes
+    coupled: Array
 
     @property
     def zeta(self) -> Array:

@@ -1,12 +1,13 @@
 """Predictions for modes that were not measured, with their standard deviations.
 
-All rows together are normal with covariance T, as in `reweighed`. Given the m measured ones:
+The n measured rows y and the m others y' are normal with covariance T, as in `reweighed`, and means
+mu and mu', the model at the prior's centre of x. Given y:
 
-    E y' = m' + T'm T_mm^-1 (y - m),   var y' = T'' - T'm T_mm^-1 T_m'
+    E y' = mu' + T'n T_nn^-1 (y - mu),   var y' = T'' - T'n T_nn^-1 T_n'
 
-(Rasmussen and Williams, Gaussian Processes for Machine Learning, eq. 2.19), m at the prior's
-centre. So the errors of constants and of the section that the data show correct the predictions,
-too. Means and variances are pooled over the sizes of effects and over explanations.
+(Rasmussen and Williams, Gaussian Processes for Machine Learning, eq. 2.19). So the errors of
+constants and of the section that the data show correct the predictions, too. Means and variances
+are pooled over q: sizes of effects, couplings zeta, or explanations.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from .reweighed import LinearFit, line_about
 Array = np.ndarray
 # probability of a size or an explanation over that of the likeliest below which it is left out
 NEGLIGIBLE = 1e-3
-WORTH_COUPLING = 0.01  # share of a value of zeta (`veering`) above which it is used
+MIN_ZETA_SHARE = 0.01  # probability of a value of zeta (`veering`) above which it is used
 HALF_90 = 1.6449  # half of a 90 % interval of a normal distribution, in standard deviations
 
 
@@ -101,29 +102,30 @@ def expected_by(
         ),
     )
     added = joint.added({id: e[on] for id, e in hypothesis.values.items()}, len(on))
-    ways = (
-        _coupled(hypothesis.fitted.coupled[on]) if joint.integrand else [(None, np.ones(len(on)))]
-    )
-    each = [_conditional(line_about(joint, added, d, k), joint, count) for k, _ in ways]
-    weights = np.concatenate([p[on] * share for _, share in ways])
+    couplings: list[tuple[int | None, Array]] = [(None, np.ones(len(on)))]
+    if joint.veering.active:
+        couplings = _coupled(hypothesis.fitted.coupled[on])
+    each = [_conditional(line_about(joint, added, d, k), joint, count) for k, _ in couplings]
+    weights = np.concatenate([p[on] * share for _, share in couplings])
     mean, variance = (np.concatenate(part) for part in zip(*each, strict=True))
     return _pooled(weights, mean, variance)
 
 
 def _coupled(coupled: Array) -> list[tuple[int | None, Array]]:
-    """Indices of zeta in `veering.rule` with the share (q,) of each, from `Fitted.coupled`, or from
-    the prior of zeta if no near modes were measured."""
+    """Indices of zeta in `veering.rule` with the probability (q,) of each. coupled (q, k): density
+    at its k points (`Fitted.coupled`); without points, if no near modes were measured, the prior's
+    N(0, 1)."""
     zeta, weights = rule()[0], leggauss(ZETA_POINTS)[1]
     if not coupled.shape[1]:
         coupled = np.tile(np.exp(-(zeta**2) / 2), (len(coupled), 1))
     share = coupled * weights
     share = share / share.sum(1, keepdims=True)
-    return [(k, share[:, k]) for k in range(len(zeta)) if share[:, k].max() > WORTH_COUPLING]
+    return [(k, share[:, k]) for k in range(len(zeta)) if share[:, k].max() > MIN_ZETA_SHARE]
 
 
 def _conditional(line: LinearFit, problem: InverseProblem, count: int) -> tuple[Array, Array]:
-    """Mean and variance (q, m) of the rows after the first ``count``, given these."""
-    J = line.slopes * problem.spread
+    """Mean and variance (q, m) of the rows after the first ``count``, which are measured."""
+    J = line.slopes * problem.spread  # by x in standard deviations of its prior
     T = line.covariance(problem) + J @ J.transpose(0, 2, 1)
     known, cross = T[:, :count, :count], T[:, :count, count:]
     gain = np.linalg.solve(known, cross).transpose(0, 2, 1)

@@ -1,12 +1,15 @@
-"""Model-form error: standard deviation of ln f by what our own model is another than the tyre.
+"""Model-form error: standard deviation of ln f by the difference between model and tyre.
 
-By mesh and element, per mode: computed once by tests/studies/form_error.py, which says how. By the
-laws of compounds and cords: two that agree at small strain part as the pressure strains them, and
-smoothly: partly alike in all modes, as cords stretch in all of them, partly alike in a family, as
-sidewalls shear in one and bend in the other, partly one mode another way than the next. Over which
-pressures that is alike is computed by tests/studies/material_laws.py with other laws for cords and
-rubber: these move all modes by 0.22 % and single ones beside that by 0.07 %, where 0.3 % of each
-leave room for laws that nobody tried. Nothing is taken from measured data.
+By mesh and element, per mode (`PERCENT`): computed once by tests/studies/form_error.py.
+
+By the material laws of compounds and cords: two laws that agree at small strain differ as the
+pressure strains the tyre. Their error is the sum of three independent parts, each with the standard
+deviation `MATERIAL_LAWS` and smooth over the pressure: one that all modes share (cords stretch in
+all of them), one that a family shares (sidewalls shear in one, bend in the other), and one of each
+mode. tests/studies/material_laws.py computed the smoothness with other laws of cords and rubber.
+They moved all modes by 0.22 %, and single modes by 0.07 % more; 0.3 % leaves room for other laws.
+
+Nothing is taken from measured data.
 """
 
 from __future__ import annotations
@@ -18,7 +21,7 @@ import numpy as np
 from ...simulate.modes.label import Label
 
 Array = np.ndarray
-PERCENT = {
+PERCENT = {  # standard deviation of ln f by mesh and element, per cent
     "[0,0] axial": 0.13,
     "[0,0] torsional": 0.44,
     "[1,0]": 0.18,
@@ -34,17 +37,17 @@ PERCENT = {
     "[6,0]": 0.16,
     "[6,1]": 0.16,
 }
-OTHERS = 0.44  # of modes that the study has not: as the worst of those that it has
-# l, of ln p, over which that is alike, computed with them
+OTHERS = 0.44  # per cent, of all other modes: the largest of `PERCENT`
+# correlation length of these errors over ln p, l of `at_pressures`; computed with them
 FORM_LENGTH = 0.54
-# of ln f of a tyre that is none of our own computing, by judgement, each: what all modes share,
-# what a family's do, and what is a mode's own
+# standard deviation of ln f by each of the three parts of the error of material laws, of a measured
+# tyre; by judgement
 MATERIAL_LAWS = 0.003
-LAWS_LENGTH = 0.8  # l, of ln p, computed
+LAWS_LENGTH = 0.8  # correlation length of that error over ln p, computed
 
 
 def form_error(label: Label | None) -> float:
-    """Relative standard deviation of a mode's frequency; 0 for what is no mode."""
+    """Standard deviation of a mode's ln f by mesh and element; 0 for the mass (None)."""
     return 0.0 if label is None else PERCENT.get(str(label), OTHERS) / 100
 
 
@@ -56,8 +59,8 @@ def at_pressures(pressures_kPa: Array, length: float) -> Array:
 
 
 def laws_alike(labels: Sequence[Label | None], pressures_kPa: Array) -> Array:
-    """Covariance (n, n) of what laws do to modes at pressures (n,), each part of variance 1: over
-    all modes, within a family, and within a mode; 0 of what is no mode."""
+    """Covariance (n, n) of the error of material laws in ln f at pressures (n,) if each of its
+    three parts has the variance 1; 0 for the mass (label None)."""
     modes = np.array([label is not None for label in labels], float)
     of_families = _same([label and label.family for label in labels])
     alike = np.outer(modes, modes) + of_families + _same(labels)
@@ -65,5 +68,5 @@ def laws_alike(labels: Sequence[Label | None], pressures_kPa: Array) -> Array:
 
 
 def _same(of: Sequence[object]) -> Array:
-    """1 where two are the same (n, n), 0 where they are not or are None."""
+    """1 where two are the same (n, n), 0 if they differ or are None."""
     return np.array([[float(a is not None and a == b) for b in of] for a in of])

@@ -47,7 +47,8 @@ class Assumed:
     # standard deviation of the model's error in ln f of every mode; None: the recorded one of each
     # mode (`form_error`), and that of material laws
     form: float | None = None
-    split: float = 0.003  # distance of the two modes of a pair by non-uniformity, in ln f
+    # standard deviation, in ln f, of the distance of the two modes of a pair by non-uniformity
+    split: float = 0.003
     # standard deviation of the error of an effect's shift over that shift; None: that of each
     # effect (`Effect.response_error`)
     response_error: float | None = None

@@ -187,6 +187,7 @@ class Outline(Part):
     belt_step_m: Positive = 0.010  # how much narrower the second belt is
 
 
+# exact: of data that were computed with this very section
 SectionOrigin = Literal["exact", "measured", "drawing", "size_code"]
 
 

@@ -90,6 +90,7 @@ EFFECT = Effect(
     add=add,
     add_to_deck=add_to_deck,
     needs="vibration_modulus",
-    # error of its shifts, relative: compounds differ in it by a third, and so do parts
+    # error of its shifts, relative, by judgement: each compound stiffens by up to a third more or
+    # less than the mean, and a mode strains several of them
     response_error=0.08,
 )

@@ -26,7 +26,9 @@ class Effect:
     low: float
     high: float
     changes: tuple[str, ...]  # keywords of the deck that it touches
-    signature: str  # which modes move, which way and how far, as this model says
+    # which modes move, which way and how far: by this model, on the tyre of cases/p235_75r17.yaml
+    # as fitted, at its pressure
+    signature: str
     toggle: str  # the experiment that would prove it
     aliases: tuple[str, ...]  # ids of effects that frequencies alone hardly distinguish from it
     # the case with the effect of that parameter (not 0) in it, written in the case's own numbers,

@@ -35,6 +35,7 @@ EFFECT = Effect(
     aliases=("belt_width", "cap_ply", "bead_filler", "spindle_torsional"),
     add=add,
     needs="frequency_modulus",
-    # error of its shifts, relative: compounds differ in it by a third, and so do parts
+    # error of its shifts, relative, by judgement: each compound stiffens by up to a third more or
+    # less than the mean, and a mode strains several of them
     response_error=0.08,
 )
