@@ -25,8 +25,8 @@ def load(
 ) -> Any:
     """The case with its start values, mesh level, assignments and pressure applied.
 
-    Says which numbers of the file do not count. Returns (case, values of the variables). Raises
-    InputError, click.UsageError; both for numbers that no tyre has, too, unless they are allowed.
+    Prints notes on numbers of the file that other values replace. Returns (case, values of the
+    variables). Raises InputError, click.UsageError, also for unusual numbers that are not allowed.
     """
     from ..measured.load import load_case
     from ..tyre.case import as_written, overruled, start_values, with_level
@@ -54,8 +54,8 @@ def load(
 
 
 def refuse_unusual(loaded: Any, option: str, name: str, value: Setting, allowed: bool) -> None:
-    """Raises click.UsageError where no tyre has such a value of the variable, or number by its
-    path, ``name``, unless it is ``allowed``. option: where it is stated."""
+    """Raises click.UsageError if the value of ``name``, a variable or path, is unusual and not
+    ``allowed``. option: the option that gives it, for the message."""
     from ..tyre.values import unusual_value
 
     if not allowed and (message := unusual_value(loaded, name, value)):
@@ -63,7 +63,8 @@ def refuse_unusual(loaded: Any, option: str, name: str, value: Setting, allowed:
 
 
 def parse_numbers(option: str, text: str, what: str) -> list[float]:
-    """Finite numbers, separated by commas; ``what`` they must be. Raises click.UsageError."""
+    """Finite numbers, separated by commas. what: description of them for the message. Raises
+    click.UsageError."""
     from math import isfinite
 
     try:
@@ -76,7 +77,7 @@ def parse_numbers(option: str, text: str, what: str) -> list[float]:
 
 
 def parse_loads(text: str, option: str = "--loads-N", zero: bool = False) -> list[float]:
-    """Loads in N; ``zero``: 0 may be the first. Raises click.UsageError."""
+    """Rising loads, N. zero: the first may be 0. Raises click.UsageError."""
     from itertools import pairwise
 
     from ..tyre.case.schema import MAX_CASE_LOAD_N, MIN_CASE_LOAD_N
@@ -144,8 +145,8 @@ def parse_pressure_list(flag: str, loaded: Any, text: str, allowed: bool) -> lis
 
 
 def fitted_values(path: Path, loaded: Any, terminal: Terminal) -> dict[str, float]:
-    """The design of a fit.json, or of the one in a results folder; reports how the fit was made
-    otherwise. Raises click.UsageError where it is not this case's."""
+    """Values by variable of the fit in ``path``, a fit.json or its folder. Prints a note if the fit
+    had another mesh. Raises click.UsageError if the fit is of another tyre."""
     from ..errors import InputError
     from ..studies.fitted import read_fitted
 
@@ -154,10 +155,10 @@ def fitted_values(path: Path, loaded: Any, terminal: Terminal) -> dict[str, floa
         if not path.is_file():
             raise click.UsageError(f"--fitted: there is no fit.json in the folder '{folder}'")
     try:
-        values, otherwise = read_fitted(path, loaded)
+        values, differences = read_fitted(path, loaded)
     except InputError as error:
         raise click.UsageError(f"--fitted: {error}") from None
-    for sentence in otherwise:
+    for sentence in differences:
         terminal.note(f"--fitted: {sentence}")
     return values
 
@@ -166,7 +167,8 @@ def one_design(
     fitted: Path | None, loaded: Any, assigned: Sequence[str], terminal: Terminal
 ) -> tuple[Any, dict[str, float]]:
     """The case and the values of its variables for a command that evaluates one design: the fitted
-    one where ``fitted`` is given. Raises click.UsageError where --set gives a variable too."""
+    one if ``fitted`` is given, else the start. Raises click.UsageError if both ``fitted`` and --set
+    give a variable."""
     from ..tyre.case import parse_setting, start_values
     from ..tyre.values import overridden
 
@@ -180,9 +182,9 @@ def one_design(
 
 
 def _given(loaded: Any, assigned: Sequence[str], pressure_kPa: float | None) -> dict[str, Setting]:
-    """Values that the user sets, by variable or path: each number once.
+    """Values by variable or path that --set and --pressure-kPa give, each number once.
 
-    Raises ValueError; click.UsageError where two values are given for one number.
+    Raises ValueError; click.UsageError if one number gets two values.
     """
     from ..tyre.case import parse_setting
     from ..tyre.own_deck.numbers import as_known
@@ -195,7 +197,7 @@ def _given(loaded: Any, assigned: Sequence[str], pressure_kPa: float | None) -> 
     if pressure_kPa is not None:
         options.append((f"--pressure-kPa {pressure_kPa:g}", "pressure_kPa", pressure_kPa))
     given: dict[str, Setting] = {}
-    first: dict[str, tuple[str, Setting]] = {}  # by path
+    first: dict[str, tuple[str, Setting]] = {}  # option and value that set a path first
     for option, name, value in options:
         paths = paths_of(loaded, name)
         known = [first[path] for path in paths if path in first]
@@ -211,7 +213,7 @@ def _given(loaded: Any, assigned: Sequence[str], pressure_kPa: float | None) -> 
 
 
 def _refuse_text(loaded: Any, text: str) -> None:
-    """Raises click.UsageError where an assignment leads to text of the case, such as a file."""
+    """Raises click.UsageError if an assignment is to a text of the case, such as a file name."""
     from ..tyre.case.document import read_document
     from ..tyre.case.mistakes import dotted
     from ..tyre.values import is_choice, paths_of, value_at
@@ -245,8 +247,8 @@ def _replaced(loaded: Any, assigned: Sequence[str]) -> list[str]:
 
 
 def refuse_set(assigned: Sequence[str], path: str, options: str) -> None:
-    """Raises click.UsageError where --set gives a number, or one in a list, at a path, or of a
-    variable, that ``options`` give."""
+    """Raises click.UsageError if --set gives the number, or a number of the list, at ``path``,
+    which ``options`` give. path: or name of a variable."""
     for text in assigned:
         name = text.partition("=")[0].strip()
         if name == path or name.startswith(f"{path}."):
@@ -254,7 +256,7 @@ def refuse_set(assigned: Sequence[str], path: str, options: str) -> None:
 
 
 def refuse_unknown(option: str, name: str, known: Collection[str], what: str) -> None:
-    """Raises click.UsageError where ``name`` is not among ``known``: what was probably meant."""
+    """Raises click.UsageError, with the most similar name, if ``name`` is not in ``known``."""
     from ..tyre.case.mistakes import suggestion
 
     if name not in known:

@@ -161,10 +161,10 @@ def command(
         with progress, reached(scheduler) as address:
             reports = run_batch(tasks, jobs, address, progress.notify)
     except BaseException:
-        if not scheduler:  # whose workers finish what is under way
-            _sweep(tasks)
+        if not scheduler:  # workers of a scheduler still finish their cases
+            _drop_run_folders(tasks)
         raise
-    _sweep(tasks)
+    _drop_run_folders(tasks)
     reports.sort(key=lambda report: str(report["name"]))
     drift = compare(reports, before) if before and not write_baseline else None
     result = summary(wanted, reports, drift)
@@ -175,7 +175,7 @@ def command(
         _write(baseline, json_text(baseline_of(reports, before)))
     run.finish(cases={report["name"]: report["facts"] for report in reports}, scheduler=address)
     terminal.result(result)
-    _tell(result, terminal)
+    _print_summary(result, terminal)
     if write_baseline:
         terminal.say(f"baseline written to {baseline}")
     terminal.say(f"results in {run.folder}")
@@ -183,7 +183,7 @@ def command(
 
 
 def _studies(text: str) -> tuple[str, ...]:
-    """The requested studies, in the order in which they are done. Raises click.UsageError."""
+    """The requested studies, in the order of their runs. Raises click.UsageError."""
     names, known = [word.strip() for word in text.split(",")], runnable()
     for word in names:
         arguments.refuse_unknown("--studies", word, known, "study")
@@ -191,8 +191,8 @@ def _studies(text: str) -> tuple[str, ...]:
 
 
 def _prepare(tasks: Sequence[Any], folder: Path) -> None:
-    """Make the cases' folders in ``folder`` ready. Raises InputError where one is another
-    case's; OSError where one is a link."""
+    """Prepare the cases' folders in ``folder``. Raises InputError if one holds results of another
+    case; OSError if one is a link."""
     from .output import refuse_other
 
     for task in tasks:
@@ -201,11 +201,11 @@ def _prepare(tasks: Sequence[Any], folder: Path) -> None:
             if part != Path():
                 refuse_link(folder / part)
         refuse_other(task.folder, task.path)
-    _sweep(tasks)
+    _drop_run_folders(tasks)
 
 
-def _sweep(tasks: Sequence[Any]) -> None:
-    """Drop the run folders of processes that died."""
+def _drop_run_folders(tasks: Sequence[Any]) -> None:
+    """Remove the solver's run folders that ended processes have left."""
     from contextlib import suppress
 
     from ..simulate.evaluate.folders import drop_unfinished
@@ -216,8 +216,8 @@ def _sweep(tasks: Sequence[Any]) -> None:
             (task.folder / "runs").rmdir()
 
 
-def _tell(result: Mapping[str, Any], terminal: Terminal) -> None:
-    """Print failures, drift, and how many cases have each."""
+def _print_summary(result: Mapping[str, Any], terminal: Terminal) -> None:
+    """Print verdicts, failures, drift from the baseline, and the number of cases by outcome."""
     from ..report.batch import drift_table, failures_table
 
     for case in result["cases"]:
@@ -242,14 +242,15 @@ def _tell(result: Mapping[str, Any], terminal: Terminal) -> None:
             ("new_studies", "not in the baseline, so not compared"),
         ):
             if drift[key]:
-                terminal.say(f"{what}: {_some(drift[key])}")
+                terminal.say(f"{what}: {_listed(drift[key])}")
     counts = dict(result["counts"])
     total = counts.pop("cases")
     parts = ", ".join(f"{number} {what}" for what, number in counts.items() if number)
     terminal.say(f"{total} case{'s' * (total > 1)}: {parts}")
 
 
-def _some(names: Sequence[str], most: int = 10) -> str:
+def _listed(names: Sequence[str], most: int = 10) -> str:
+    """Up to ``most`` names, and the number of the others."""
     rest = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + rest
 

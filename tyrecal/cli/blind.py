@@ -23,7 +23,7 @@ truth = option(
 
 
 def trials(flag: str, name: str, default: int, what: str) -> Any:
-    """How many trials of a kind are made."""
+    """The option for the number of trials of one kind."""
     number = WholeNumber(0)
     help = f"Trials {what}."
     return option(
@@ -95,7 +95,7 @@ def power(
 
     loaded, _ = arguments.load(case, mesh, (), None, terminal, allow_unusual)
     rules = Protocol("", case.name, {}, noise=noise_percent / 100).about(loaded.case.pressure_kPa)
-    if pressures:
+    if pressures:  # the held-out pressure only has to be one that is computed anyway
         rules = replace(rules, given_kPa=pressures, held_out_kPa=pressures[0])
     record = Store(store.resolve()) if store else None
     evaluator = Evaluator(TyreDesign(loaded), store=record)
@@ -191,18 +191,20 @@ def make(
     evaluator = Evaluator(TyreDesign(case), "bundled", store=store)
 
     def ruler() -> Json:
+        """Measure the ruler, and print the powers of the effects by it."""
         model = tyre_model(case, evaluator, protocol, jobs)
         content = measure(model, rows_of(case, protocol))
-        known = ruler_of(content, labels_of(case))
-        terminal.say(words(powers(known, protocol), known, protocol, model.ranges))
+        measured = ruler_of(content, labels_of(case))
+        terminal.say(words(powers(measured, protocol), measured, protocol, model.ranges))
         return content
 
     with terminal.progress("make trials") as bar:
         progress = _progress("made", terminal, bar)
-        mark = made(folder, sealed, case, protocol, maker, ruler, jobs, seed, progress)
+        sha256 = made(folder, sealed, case, protocol, maker, ruler, jobs, seed, progress)
     number = sum(counts.values())
-    terminal.result({"trials": number, "folder": str(folder), "truth": str(sealed), "sha256": mark})
-    terminal.say(f"{number} trials in {folder}; the truth is in {sealed}, sha256 {mark}")
+    result = {"trials": number, "folder": str(folder), "truth": str(sealed), "sha256": sha256}
+    terminal.result(result)
+    terminal.say(f"{number} trials in {folder}; the truth is in {sealed}, sha256 {sha256}")
     return 0
 
 
@@ -259,9 +261,9 @@ def answer(
         model = emulate(model)
     with terminal.progress("answer trials") as bar:
         rows = blind.rows_of(case, protocol)
-        mark = blind.answer(folder, model, rows, jobs, _progress("answered", terminal, bar))
-    terminal.result({"folder": str(folder), "sha256": mark})
-    terminal.say(f"all trials of {folder} are answered, sha256 {mark}")
+        sha256 = blind.answer(folder, model, rows, jobs, _progress("answered", terminal, bar))
+    terminal.result({"folder": str(folder), "sha256": sha256})
+    terminal.say(f"all trials of {folder} are answered, sha256 {sha256}")
     return 0
 
 
@@ -292,11 +294,12 @@ def score(folder: Path, truth: Path | None, terminal: Terminal) -> int:
 
 
 def _sealed(folder: Path, truth: Path | None) -> Path:
+    """Folder of the sealed truth of the trials in ``folder``."""
     return truth or folder.with_name(f"{folder.name}-truth")
 
 
 def _progress(what: str, terminal: Terminal, bar: Progress) -> Callable[[int, int], None]:
-    """Moves the bar, and writes a line at every tenth of the way."""
+    """Function that moves the bar, and prints a line after every tenth of the trials."""
 
     def on_progress(done: int, total: int) -> None:
         bar.at(done, total)

@@ -1,4 +1,4 @@
-"""Completion for shells: cases, and the names that stand in them. Wrong or no files: nothing."""
+"""Completion for shells: cases, and names in them; of a wrong or missing file, nothing."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from click.shell_completion import CompletionItem, split_arg_string
 Items = list[CompletionItem]
 SUFFIXES = (".yaml", ".yml")
 MAX_CASES = 200  # case files; a folder with more has the shell's own completion
-PLAIN = re.compile(r"[A-Za-z0-9_.\-]+=?")  # all that a shell takes as it stands
+PLAIN = re.compile(r"[A-Za-z0-9_.\-]+=?")  # a word that needs no quotes in a shell
 PLAIN_PATH = re.compile(r"[A-Za-z0-9_.\-/]+")
-MAX_DEPTH = 3  # folders below the one typed in which cases are looked for
+MAX_DEPTH = 3  # levels of folders, that of the typed path included, searched for cases
 
 
 def cases(ctx: click.Context, param: click.Parameter, incomplete: str) -> Items:
-    """Case files, those in folders below too; the shell's own completion without any, or where a
-    name needs quotes, which only the shell adds."""
+    """Case files, also those in folders below. The shell's own completion if there are none, or if
+    a name needs quotes, which only the shell adds."""
     start = Path(incomplete).parent
     paths = [str(path) for path in _yaml(start, MAX_DEPTH) if str(path).startswith(incomplete)]
     if not 0 < len(paths) <= MAX_CASES or not all(map(PLAIN_PATH.fullmatch, paths)):
@@ -45,7 +45,7 @@ def effects(ctx: click.Context, param: click.Parameter, incomplete: str) -> Item
 
 
 def effect_values(ctx: click.Context, param: click.Parameter, incomplete: str) -> Items:
-    """``EFFECT=``."""
+    """Ids of effects, each with the = of EFFECT=VALUE."""
     from ..tyre.effects import IDS
 
     return _starting((f"{id}=" for id in IDS), incomplete)
@@ -77,7 +77,7 @@ def numbers(ctx: click.Context, param: click.Parameter, incomplete: str) -> Item
 
 
 def _starting(names: Iterable[str], incomplete: str) -> Items:
-    """Completions of a word among ``names``."""
+    """Those ``names`` that begin with the typed word."""
     if incomplete.endswith("="):  # a number follows
         return []
     return [
@@ -115,7 +115,7 @@ def _part(key: str) -> dict[str, Any]:
 
 
 def _numbers(node: Any, path: str = "") -> Iterator[str]:
-    """Dotted paths of the numbers that describe the tyre."""
+    """Dotted paths of a case's numbers, without those of variables and targets."""
     inner = node.items() if isinstance(node, dict) else enumerate(node)
     for key, value in inner:
         if not path and key in ("variables", "targets", "format"):

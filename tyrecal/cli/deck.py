@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..tyre.own_deck.own_decks import OwnDecks
     from ..tyre.own_deck.text import Block
 
-MAX_DECK_DOUBTS = 10  # doubts about a deck
+MAX_DECK_DOUBTS = 10  # printed sentences on lines that are not checked for ABAQUS
 
 
 @click.command()
@@ -93,7 +93,7 @@ def command(
     else:
         decks = Decks(design, tuple(values) if evaluator.has_gradients else ())
     paths = []
-    with TemporaryDirectory() as fresh:  # an adapter's plain writing must meet no link
+    with TemporaryDirectory() as fresh:  # an adapter writes plainly, and could follow links
         try:
             written = adapter.write(decks, Path(fresh))
         except adapter.refusals as error:
@@ -101,7 +101,7 @@ def command(
         # what is refused leaves the folder untouched
         run = Run(case, output, "deck", adapter, loaded=loaded)
         for path in written:
-            place = run.folder / path.relative_to(fresh)  # what a deck includes may lie in folders
+            place = run.folder / path.relative_to(fresh)  # included files may be in folders
             for above in reversed(place.relative_to(run.folder).parents[:-1]):
                 private_dir(run.folder / above)
             paths.append(str(place))
@@ -131,7 +131,7 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
     if path.suffix in (".yaml", ".yml"):
         loaded, _ = arguments.load(path, mesh, assignments, None, terminal, allow_unusual=True)
         if isinstance(loaded.kind, DecksIn3D):
-            content = known_of_decks(loaded, loaded.kind.decks, terminal)
+            content = describe_decks(loaded, loaded.kind.decks, terminal)
             terminal.result(content)
             refused = content["abaqus"]["refuses"] and loaded.case.solver.name != "calculix"
             return EXIT_INPUT if refused else 0
@@ -182,7 +182,7 @@ def _say_what_solvers_take(
         terminal.say(f"CalculiX does not honour: {sentence}")
 
 
-def known_of_decks(loaded: LoadedCase, decks: OwnDecks, terminal: Terminal) -> Json:
+def describe_decks(loaded: LoadedCase, decks: OwnDecks, terminal: Terminal) -> Json:
     """Print what is known of decks in three dimensions, what is added to them, what ABAQUS refuses
     of them by its manual, and what CalculiX lacks; returns the same as data."""
     from ..simulate.deck.decks_design import OUTPUT, added_words
@@ -192,12 +192,12 @@ def known_of_decks(loaded: LoadedCase, decks: OwnDecks, terminal: Terminal) -> J
     jobs_blocks = decks.with_numbers(numbers, 1e3 * loaded.case.pressure_kPa)
     report: dict[str, list[str]] = {"refuses": [], "unknown": []}
     before: list[Block] = []
-    for (_, old), blocks in zip(decks.jobs, jobs_blocks, strict=True):
-        before = before if old else []
+    for (_, old_job), blocks in zip(decks.jobs, jobs_blocks, strict=True):
+        before = before if old_job else []  # blocks of the jobs that this one continues
         for kind, sentences in asked_by_abaqus(blocks, before).items():
             report[kind] += sentences
         before = [*before, *blocks]
-    lacking = lacking_in_calculix(before)
+    lacking = lacking_in_calculix(before)  # of the last chain of jobs
     places = [f"{row.place.file}, line {row.place.line}" for _, row, *_ in decks.pressures]
     added = {solver: added_words(decks, solver) for solver in OUTPUT}
     jobs = [f"{job}, which continues {old}" if old else job for job, old in decks.jobs]

@@ -1,4 +1,4 @@
-"""The case of a command that is given no CASE: of the last fit of this folder, or its only case."""
+"""The case of a command without CASE: that of the last fit in this folder, or its only case."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from ..files import read_runs
 if TYPE_CHECKING:
     from .options import Study
 
-CASE_KEYS = {"size", "pressure_kPa", "solver"}  # that tell a case from other YAML
+CASE_KEYS = {"size", "pressure_kPa", "solver"}  # by which a case differs from other YAML
 
 
 def default_case(
     case: Path | None, fitted: Path | None, study: Study
 ) -> tuple[Path, Path | None, Study]:
-    """Case, fit.json to compare with and study: as given; without a case, of the last fit that
-    converged in a folder here and whose case is at its place, with that folder for the results;
-    else the only case here. Raises click.UsageError."""
+    """Case, fit.json to compare with, and study: as given if there is a case.
+
+    Else those of the last fit in a folder here that converged and whose case file exists; results
+    go to that folder. Else the only case here. Raises click.UsageError."""
     from ..simulate.case_folder import named_case
     from ..studies.fitted import has_good
     from ..tyre.case.document import read_document

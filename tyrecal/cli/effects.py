@@ -108,6 +108,7 @@ def command(
     if not evaluator.has_gradients:
         from ..studies.difference_runs import runs_in_words
 
+        # at each pressure: the plain tyre, a neighbour by each variable, and each effect
         runs = len(kPa) * (1 + len(values) + len(able))
         terminal.note(runs_in_words(evaluator, values, runs, study.jobs))
     with terminal.progress("effects") as bar:

@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from ..studies.result import Result
     from ..tyre.case import LoadedCase
 
-STUDY_OF_FORMS = {
+STUDY_OF_FORMS = {  # study whose result each format is made from
     **dict.fromkeys(("case", "deck", "matrices"), "fit"),
     "tir": "stiffness",
     "uff": "modes",
 }
-SAME_HZ = 1e-4  # relative, between frequencies of results and of this run
-OPTIONS_OF_FORMS = {
+SAME_HZ = 1e-4  # relative difference up to which a result's frequency is that of this run
+OPTIONS_OF_FORMS = {  # formats that an option goes with
     "--solver": ("deck", "matrices"),
     **dict.fromkeys(("--modes", "--points", "--pressure-kPa", "--load-N"), ("matrices",)),
     **dict.fromkeys(("--nominal-load-N", "--nominal-pressure-kPa", "--donor"), ("tir",)),
@@ -155,7 +155,7 @@ def command(
         raise click.UsageError(f"there is no {study}.json in the folder '{folder}'{advice}")
     of_case = form == "matrices" and results.suffix in (".yaml", ".yml")
     case = results if of_case else case or _case_of(results, study)
-    loaded = load_case(case, allow_unusual=not of_case)  # its user knows it from the results
+    loaded = load_case(case, allow_unusual=not of_case)  # accepted for the results
     if form == "tir":
         files = _property_file(loaded, results, nominal_N, nominal_kPa, donor)
     elif form == "uff":
@@ -195,7 +195,7 @@ def command(
 
 
 def _as_fitted(fit: Path, case: LoadedCase, terminal: Terminal) -> LoadedCase:
-    """The case as the fit left it; a fit that did not converge is reported."""
+    """The case with the fit's values; a fit that did not converge gives a warning."""
     from ..files import read_json
     from ..studies.fitted import as_fitted, is_good
 
@@ -212,7 +212,7 @@ def _property_file(
     nominal_kPa: float | None,
     donor: Path | None,
 ) -> dict[str, bytes]:
-    """The .tir of the stiffnesses in ``results`` by its name. Raises InputError."""
+    """Name and content of the .tir by the stiffnesses in ``results``. Raises InputError."""
     from ..measured.tir import read_property_file
     from ..studies.fitted import read_result
     from ..studies.property_file import property_text, structural_keys
@@ -226,7 +226,7 @@ def _property_file(
 
 
 def _universal_file(case: LoadedCase, results: Path) -> dict[str, bytes]:
-    """The universal file of the modes in ``results`` by its name. Raises InputError."""
+    """Name and content of the universal file of the modes in ``results``. Raises InputError."""
     from ..report.universal_shapes import shapes_text
     from ..simulate.evaluate.evaluator import Question
     from ..simulate.modes.label import UNIT_MASS_SOLVERS, labelled
@@ -238,9 +238,9 @@ def _universal_file(case: LoadedCase, results: Path) -> dict[str, bytes]:
         raise InputError(f"'{results}' is under a load: run 'tyrecal modes' without one")
     evaluator = _evaluator_of(loaded, modes, results.parent)
     evaluation = evaluator.evaluate(Question(modes.variables))
-    ours = [mode.frequency_Hz for mode in labelled(evaluation)]
-    theirs = [each.frequency_Hz for each in modes.modes if each.member is None]
-    if not all(any(isclose(f, x, rel_tol=SAME_HZ) for x in ours) for f in theirs):
+    computed_Hz = [mode.frequency_Hz for mode in labelled(evaluation)]
+    stated_Hz = [each.frequency_Hz for each in modes.modes if each.member is None]
+    if not all(any(isclose(f, x, rel_tol=SAME_HZ) for x in computed_Hz) for f in stated_Hz):
         raise InputError(f"'{results}' has other frequencies: run 'tyrecal modes' again")
     unit_mass = evaluator.solver.name in UNIT_MASS_SOLVERS
     text = shapes_text(loaded, evaluation, labelled(evaluation), unit_mass)

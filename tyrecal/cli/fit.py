@@ -124,8 +124,8 @@ def command(
     freed = [name.strip() for name in free.split(",")] if free else []
     calibration = FitStudy(loaded, study.evaluator(loaded), measured, fixed, freed, prior)
     file = measured or loaded.measured
-    questions = doubts_of_file(file) if file else []
-    for doubt in questions:
+    file_doubts = doubts_of_file(file) if file else []
+    for doubt in file_doubts:
         terminal.warn(doubt)
     evaluator = calibration.evaluator
     if calibration.evaluates_one_by_one and starts == 1:
@@ -161,7 +161,7 @@ def command(
     for each in fit.left_out:
         terminal.note(f"{calibration.measured or case}: not used: {each}")
     for warning in (*tyre_doubts(result), *fit_doubts(result)):
-        if warning not in questions:
+        if warning not in file_doubts:
             terminal.warn(warning)
     good = fit.found.is_good
     earlier = not good and has_good(run.folder / "fit.json")
@@ -181,11 +181,11 @@ def command(
     words = ["tyrecal", "diagnose", str(case)]
     if measured or not loaded.measured:
         words += ["--measured", str(measured or "FILE")]
-    next_ = join_command(words)
+    next_command = join_command(words)
     reason, fits = fit.found.reason, fit.found.verdict == FITS
     may_lack_effects = fits or reason is None or not reason.excludes_effects
     if good and may_lack_effects and loaded.kind.names_its_parts and read_targets(loaded):
-        terminal.say(f"next: {next_} finds what the model lacks")
+        terminal.say(f"next: {next_command} finds what the model lacks")
     return 0 if good else EXIT_FIT
 
 
@@ -197,7 +197,7 @@ def _write_shapes(
     from ..simulate.evaluate.evaluator import Question
     from ..tyre.values import with_values
 
-    state = next(iter(fit.fitted.states))
+    state = next(iter(fit.fitted.states))  # the first of the targets' states
     values = state.design(loaded, fit.fitted.values)
     modes = sorted(fit.fitted.modes.values(), key=lambda mode: mode.frequency_Hz)
     evaluation = evaluator.evaluate(Question(values))
@@ -212,14 +212,14 @@ def _write_shapes(
 
 
 class _Points:
-    """Reports the progress of a fit: each design with --verbose, the latest and the best on a
-    terminal."""
+    """Prints the progress of a fit: each design with --verbose; the latest design and the best
+    objective, in ``unit``, on a terminal."""
 
     def __init__(self, terminal: Terminal, bar: Progress, unit: str):
         self.terminal, self.bar, self.unit, self.best = terminal, bar, unit, float("inf")
 
     def notify(self, number: int, values: Mapping[str, float], outcome: Any) -> None:
-        """One more design point."""
+        """Print a design with its objective, or why it failed."""
         objective = getattr(outcome, "objective", None)
         self.best = self.best if objective is None else min(self.best, objective)
         state = f"{objective:.4f} {self.unit}" if objective is not None else f"failed: {outcome}"

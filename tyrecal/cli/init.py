@@ -23,6 +23,7 @@ POSITIVE = NumberWithin(min=0, min_open=True)
 
 
 def _length(flag: str, text: str, unit: str = "mm") -> Any:
+    """The option for a length of the section in ``unit``."""
     return option(
         f"--{flag}-{unit}",
         f"{flag}_{unit}".replace("-", "_"),
@@ -193,14 +194,15 @@ def _write(
     force: bool,
     terminal: Terminal,
 ) -> None:
-    """Write case, section and picture, none over an existing file and only what is right."""
+    """Write the checked draft's case, section (m) and schema, and draw it. Raises InputError if a
+    file exists and ``force`` is not given."""
     from ..files import atomic_write, make_folder
     from ..tyre.case.editor import SCHEMA_FILE, case_schema
     from ..tyre.load import load_case
 
     table = target.with_name(draft.file)
-    own = file is not None and file.resolve() == table.resolve()  # it is there already
-    contents = {target: draft.text.encode(), **({} if own else {table: draft.content})}
+    in_place = file is not None and file.resolve() == table.resolve()
+    contents = {target: draft.text.encode(), **({} if in_place else {table: draft.content})}
     for path in [*contents, *([picture] if picture else [])]:
         if path.exists() and not force:
             raise InputError(f"'{path}' exists already; give --force to write over it")
@@ -210,7 +212,7 @@ def _write(
         with atomic_write(path) as partial:
             partial.write_bytes(content)
     loaded = load_case(target, allow_unusual=True)
-    outside = loaded.section.points[-1]
+    outside = loaded.section.points[-1]  # (stations, 2): r, z, m, of the outermost line
     written = {"case": str(target), "section": str(table)}
     terminal.result({**written, "picture": str(picture) if picture else None})
     terminal.say(
@@ -223,7 +225,7 @@ def _write(
 
 
 def _modes(case: Path) -> str:
-    """The command to go on with."""
+    """The command that computes the modes of a case."""
     from ..simulate.program import join_command
 
     return join_command(["tyrecal", "modes", str(case)])
@@ -247,7 +249,7 @@ def lengths_given(stated: dict[str, Any]) -> bool:
 
 
 def _numbers_of_marks(deck: OwnDeck | OwnDecks, assigned: tuple[str, ...]) -> dict[str, float]:
-    """Numbers of marks by --set. Raises InputError, UsageError for those that are missing."""
+    """Numbers of marks by --set. Raises UsageError; InputError if a mark has no number."""
     from ..tyre.case import parse_assignment
 
     try:
@@ -267,12 +269,11 @@ def _numbers_of_marks(deck: OwnDeck | OwnDecks, assigned: tuple[str, ...]) -> di
 
 @dataclass(frozen=True)
 class NewFiles:
-    """Where the case of a deck and its picture go: --output, the picture's suffix ("": none), and
-    whether over files that exist."""
+    """Where the case of a deck and its picture are written."""
 
-    output: Path | None
-    suffix: str
-    force: bool
+    output: Path | None  # of the case; None: next to the deck
+    suffix: str  # of the picture; "": none
+    force: bool  # write over files that exist
 
     def of_deck(self, file: Path) -> tuple[Path, Path | None]:
         """Paths of the case of a deck, and of its picture. Raises InputError, UsageError."""
@@ -335,12 +336,12 @@ def _from_decks(
     from ..tyre.case.editor import SCHEMA_FILE, case_schema
     from ..tyre.case.own_case import own_decks_case
     from ..tyre.load import load_case
-    from .deck import known_of_decks
+    from .deck import describe_decks
 
     text = own_decks_case(decks, size, pressure_kPa, numbers)
     target, _ = new.of_deck(decks.path)
     write_text(target, text)
     write_text(target.with_name(SCHEMA_FILE), case_schema())
     loaded = load_case(target, allow_unusual=True)
-    terminal.result({"case": str(target), **known_of_decks(loaded, decks, terminal)})
+    terminal.result({"case": str(target), **describe_decks(loaded, decks, terminal)})
     terminal.say(f"next: {_modes(target)} --solver abaqus")

@@ -41,7 +41,8 @@ COMMANDS = {  # name: one line of help, so that the overview imports no command
     "doctor": "Check the installation: packages, solvers, machine, a known tyre.",
     "completion": "Print a script for shell completion of commands, cases and names.",
 }
-NOT_LOADED = "failed to map segment|cannot allocate memory|Cannot allocate memory"  # of the loader
+# messages of the system if a library cannot be loaded for lack of memory
+NOT_LOADED = "failed to map segment|cannot allocate memory|Cannot allocate memory"
 NO_MEMORY = "there is not enough memory: use fewer --jobs, a coarser --mesh or another machine"
 EXIT_INPUT, EXIT_SOLVER, EXIT_FIT, EXIT_BATCH = 2, 3, 4, 5
 EXIT_CODES = {
@@ -57,7 +58,7 @@ EXIT_CODES = {
 
 
 class Interrupted(TyrecalError):
-    """A signal ended the command; the words name it, and how to continue."""
+    """A signal ended the command; the text states which, and how to continue."""
 
     def __init__(self, how_to_go_on: str = ""):
         number = pending_interrupt() or signal.SIGINT
@@ -66,14 +67,14 @@ class Interrupted(TyrecalError):
 
 
 def _outside() -> dict[str, EntryPoint]:
-    """Commands of studies from outside: see `tyrecal.studies`."""
+    """Commands of installed packages other than tyrecal: see `tyrecal.studies`."""
     from importlib.metadata import entry_points
 
     return {entry.name: entry for entry in entry_points(group="tyrecal.commands")}
 
 
 def _load(entry: EntryPoint) -> click.Command:
-    """A command from outside. Raises InputError."""
+    """The command of an installed package. Raises InputError."""
     from ..tyre.plugins import load_plugin
 
     command: click.Command = load_plugin(entry, "command")
@@ -81,7 +82,7 @@ def _load(entry: EntryPoint) -> click.Command:
 
 
 def _outside_commands() -> dict[str, click.Command]:
-    """The commands from outside; one that cannot be loaded is named and left out."""
+    """The commands of installed packages. One that cannot be loaded is reported and left out."""
     commands = {}
     for name, entry in _outside().items():
         try:
@@ -125,7 +126,7 @@ class Commands(click.Group):
                 isinstance(error, KeyboardInterrupt) or pending_interrupt()
             ):
                 raise
-        # the error is forgotten by now, and with it what was under way: its processes have ended
+        # outside of "except", so that the error and what it holds are released, processes too
         changed = "no file is half written; run the same command again to write them all"
         raise Interrupted(
             ctx.meta.get(RESUME, changed if CHANGED.is_set() else "nothing was changed")
@@ -146,7 +147,7 @@ class Commands(click.Group):
 
 
 def _meant(name: str) -> str:
-    """The command that a misspelt one stands for; else all of them."""
+    """Hint at the command that a misspelt name stands for; else the list of all."""
     from ..tyre.case.mistakes import suggestion
 
     begun = [command for command in COMMANDS if command.startswith(name.lower())]
@@ -175,8 +176,8 @@ def cli(ctx: click.Context) -> None:
 
 
 def _defaults(command: str | None) -> dict[str, Any]:
-    """Values of the user's settings in place of options. Raises InputError, but not where the
-    installation is looked at."""
+    """Defaults of options by the user's settings. Raises InputError, except for commands that check
+    the installation."""
     from ..simulate.settings import settings
 
     try:
@@ -228,8 +229,8 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _mistake(wrong: click.ClickException) -> str:
-    """The sentence on a wrong command line. Click's own on an unknown option differs from one
-    version to the next."""
+    """Message for a wrong command line. Click's own message for an unknown option depends on its
+    version."""
     if not isinstance(wrong, click.NoSuchOption):
         return wrong.format_message()
     from ..tyre.case.mistakes import suggestion
@@ -240,7 +241,7 @@ def _mistake(wrong: click.ClickException) -> str:
 
 
 def _exit_code(failure: Exception) -> int | None:
-    """Exit code of a failure with a known cause, None for a bug of ours."""
+    """Exit code of a failure with a known cause; None for a bug of tyrecal."""
     if isinstance(failure, TyrecalError):
         return failure.exit_code
     return EXIT_INPUT if isinstance(failure, OSError) or _lacks_memory(failure) else None

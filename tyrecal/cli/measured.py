@@ -175,7 +175,7 @@ def import_files(
     if output.resolve() in [path.resolve() for path in files]:
         raise click.UsageError(f"--output {output}: is one of the files to read")
     layout = _layout(axle, centre, directions, highest, band, response or "")
-    sigmas = floor / 100, (assumed or 0.0) / 100
+    sigmas = floor / 100, (assumed or 0.0) / 100  # relative: smallest, and of one run
     gathered = gather(files, pressure_kPa, layout, *sigmas, leave_out, keep_going)
     shapes = [each for path in files for each in read_shapes(path)]
     for run in gathered.runs:
@@ -301,7 +301,7 @@ def _place_sensors(
     highest: int | None,
     study: options.Study,
 ) -> int:
-    """`sensors --place`."""
+    """Place ``count`` sensors for the modes [c,0] and [c,1] of a case."""
     from ..measured.case_modes import evaluate_case_modes
     from ..studies.sensors import place
 
@@ -313,7 +313,7 @@ def _place_sensors(
     most = loaded.case.analysis.highest_harmonic if highest is None else highest
     every = evaluate_case_modes(loaded, evaluator, values, most)
     modes = sorted((m for m in every.modes if m.label.m < 2), key=lambda m: m.frequency_Hz)
-    return study.present(run, place(every, modes, count, axes, mass_kg, 0), {})
+    return study.present(run, place(every, modes, count, axes, mass_kg, seed=0), {})
 
 
 @command.command("label")
@@ -401,7 +401,8 @@ def _label_shapes(
     assumed: float,
     study: options.Study,
 ) -> int:
-    """`label_file` of a universal file."""
+    """Label the modes in a universal file by their shapes. assumed: relative standard deviation of
+    the frequencies."""
     from dataclasses import replace
 
     from ..measured.case_modes import evaluate_case_modes
@@ -428,7 +429,7 @@ def _label_shapes(
 
 
 def _refuse_universal_options(file: Path) -> None:
-    """Raises click.UsageError where an option was given that counts for universal files alone."""
+    """Raises click.UsageError if an option was given that only universal files take."""
     context = click.get_current_context()
     names = ("axle", "centre", "directions", "highest", "band", "response", "assumed")
     for parameter in context.command.params:
@@ -474,6 +475,7 @@ def _layout(
 
 
 def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
+    """``count`` numbers of an option. Raises click.UsageError."""
     what = f"{count} numbers, separated by commas"
     numbers = arguments.parse_numbers(option, text, what)
     if len(numbers) != count:

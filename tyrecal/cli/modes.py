@@ -77,7 +77,7 @@ def command(
     from ..studies.pressing_plan import PlannedState, plan_pressing
     from ..tyre.effects.edit import changed, with_part
 
-    loads = wanted_loads(load_N, sweep)
+    loads = requested_loads(load_N, sweep)
     if wheel and not loads:
         raise click.UsageError("--wheel goes with --load-N or --sweep-load")
     if dry_run and not loads:
@@ -120,11 +120,11 @@ def command(
         run = study.run(loaded, "modes", evaluator, "sweep-load", load_N=loads)
         draw = pictures is not False
         jobs = plan.at_once if loads else 1
-        return over_loads(loaded, evaluator, run, designs, loads, study, jobs, draw)
+        return write_load_sweep(loaded, evaluator, run, designs, loads, study, jobs, draw)
     files, load = [measured] if measured else [], loads[0] if loads else 0.0
     run = study.run(loaded, "modes", evaluator, measured=files, load_N=load)
     if loads:
-        return at_load(loaded, evaluator, run, values, loads[0], study)
+        return write_modes_at_load(loaded, evaluator, run, values, loads[0], study)
     result, evaluation, modes = studies.run(loaded, evaluator, values)
     if measured:
         result = result.compared(loaded)
@@ -150,8 +150,8 @@ def command(
     return 0
 
 
-def wanted_loads(load_N: float | None, sweep: str | None) -> list[float]:
-    """The requested loads, N; empty: the unloaded tyre alone. Raises click.UsageError."""
+def requested_loads(load_N: float | None, sweep: str | None) -> list[float]:
+    """The requested loads, N; empty: only the unloaded tyre. Raises click.UsageError."""
     if load_N is not None and sweep is not None:
         raise click.UsageError("give --load-N or --sweep-load, not both")
     if sweep is not None:
@@ -162,7 +162,7 @@ def wanted_loads(load_N: float | None, sweep: str | None) -> list[float]:
     return [] if load_N is None else parse_loads(repr(load_N), "--load-N")
 
 
-def at_load(
+def write_modes_at_load(
     loaded: LoadedCase,
     evaluator: Any,
     run: Any,
@@ -170,7 +170,7 @@ def at_load(
     load_N: float,
     study: Study,
 ) -> int:
-    """Modes under one load, in modes.json, with their shapes in modes_shapes.json."""
+    """Write the modes under one load to modes.json, and their shapes to modes_shapes.json."""
     from ..report.shape_data import loaded_data
     from ..report.table import shown
     from ..studies.loaded import LoadedTyre, load_tyres
@@ -193,7 +193,7 @@ def at_load(
     return 0
 
 
-def over_loads(
+def write_load_sweep(
     loaded: LoadedCase,
     evaluator: Any,
     output: Any,
@@ -203,7 +203,7 @@ def over_loads(
     jobs: int,
     pictures: bool,
 ) -> int:
-    """Modes over the load, in load_sweep.json, .csv and .png."""
+    """Write the modes over the load to load_sweep.json, .csv and .png."""
     from ..studies.loaded_result import run
 
     with study.terminal.progress("modes on the road") as bar:

@@ -53,21 +53,21 @@ if TYPE_CHECKING:
     from ..simulate.evaluate.store import Store
     from ..tyre.case import LoadedCase
 
-# what is locked; who holds it, which Windows reads meanwhile
+# the locked file; facts on the process that holds it, apart because Windows reads no locked file
 LOCK_FILE, OWNER = ".lock", ".lock.json"
 log = logging.getLogger("tyrecal")
 AnyResult = TypeVar("AnyResult", bound=Result)
-NEW = ".new-"  # folder of a run's results until all are there
+NEW = ".new-"  # start of the name of a run's folder of results until all are written
 
 
 class Lock:
-    """A folder that this process holds."""
+    """The lock of a folder by this process."""
 
     def __init__(self, held: BaseFileLock, owner: Path):
         self._held, self._owner = held, owner
 
     def close(self) -> None:
-        """Give the folder back; the end of the process does so too, however it ends."""
+        """Release the folder; the end of the process releases it too."""
         self._owner.unlink(missing_ok=True)
         self._held.release()
 
@@ -75,7 +75,7 @@ class Lock:
 def lock(folder: Path, command: str, started: str) -> Lock | None:
     """Lock ``folder``; None, with a warning, where the file system has no locks.
 
-    Raises InputError, naming the other process; NotAFile for what is no lock; OSError.
+    Raises InputError, with the process that holds it; NotAFile if the lock is no file; OSError.
     """
     from filelock import FileLock, SoftFileLock, Timeout
 
@@ -112,17 +112,17 @@ def _owner(path: Path) -> str:
         return "'tyrecal {command}', process {pid} on {host} since {started}".format(
             **read_json(path, follow=False)
         )
-    except (OSError, ValueError, KeyError, TypeError):  # it is about to write who it is
+    except (OSError, ValueError, KeyError, TypeError):  # not written yet
         return "another process"
 
 
 class Run:
-    """One command's run: its folder, locked until the command ends, and its study's entry in
-    run.json, which holds all that differs between runs.
+    """One command's run: its results folder, locked until the command ends, and the entry of its
+    study in run.json, with all facts that differ between runs.
 
-    Results are written to a folder of their own, ``new``; those of the study's last run stay in
-    their place until all new ones are there (`finish`), and where the run fails. Raises
-    InputError where it holds another case's results or another command works in it; OSError.
+    Results are written to a separate folder, ``new``. Those of the study's last run stay in place
+    until all new ones are written (`finish`), and if the run fails. Raises InputError if the folder
+    holds results of another case or another command works in it; OSError.
     """
 
     def __init__(
@@ -143,7 +143,7 @@ class Run:
         self._clock, self._finished = time.monotonic(), False
         self.store: Store | None = None
         self.counts: Counts | None = None
-        self.measured: Sequence[Path] = ()  # files that are read, which no result may replace
+        self.measured: Sequence[Path] = ()  # input files, which no result may replace
         resume("nothing was computed; the same command starts from the beginning")
         if self.folder.exists() and not self.folder.is_dir():
             raise InputError(f"'{self.folder}' is a file; give a folder with --output")
@@ -160,10 +160,10 @@ class Run:
         with writing(self.folder):
             self.new = Path(tempfile.mkdtemp(prefix=NEW, dir=self.folder))
         self._write_facts()
-        click.get_current_context().call_on_close(self._say_unfinished)
+        click.get_current_context().call_on_close(self._record_unfinished)
 
     def open_store(self, folder: Path | None, none: bool) -> Store | None:
-        """The evaluation store: in ``folder``, or next to the results, or ``none``."""
+        """The evaluation store in ``folder`` (None: next to the results). none: no store."""
         words = "no evaluation is stored (--no-store); the same command starts from the beginning"
         if not none:
             from ..simulate.evaluate.store import Store
@@ -195,7 +195,7 @@ class Run:
                 save(figure, self.new / f"{name}.{self.figure_format}")
 
     def write_json(self, name: str, content: Any) -> Any:
-        """Write a result file with its provenance; returns what stands in it."""
+        """Write a result file with its provenance; returns its content."""
         if isinstance(content, BaseModel):
             content = content.model_dump(exclude_unset=True)
         if self.provenance:
@@ -204,7 +204,7 @@ class Run:
         return content
 
     def write_text(self, name: str, text: str) -> None:
-        """Write a result file. Raises InputError where it would replace a file that is read."""
+        """Write a result file. Raises InputError if it would replace an input file."""
         place = self.folder / name
         if place.resolve() in [each.resolve() for each in self.measured]:
             raise InputError(f"'{place}' is read, a result would replace it: give another --output")
@@ -221,8 +221,8 @@ class Run:
         return not self._finished and any(results(self.folder, self.study))
 
     def finish(self, aside: str = "", **facts: Any) -> None:
-        """Have the results take their place, or stand in the folder ``aside`` of the results, and
-        write run.json: command, times, host, versions, and what else is volatile."""
+        """Move the results to the results folder, or to its folder ``aside``, and write run.json:
+        command, times, host, versions and further ``facts``."""
         if aside:
             self.placed = self.folder / aside
             private_dir(self.placed)
@@ -255,13 +255,14 @@ class Run:
         }
         write_runs(self.folder, {self.study: entry})
 
-    def _say_unfinished(self) -> None:
+    def _record_unfinished(self) -> None:
+        """Write to run.json when an unfinished run ended."""
         if not self._finished:
-            with contextlib.suppress(OSError):  # what went wrong before is what is told
+            with contextlib.suppress(OSError):  # the error that ended the run is the one to print
                 self._write_facts()
 
     def _drop_unfinished(self) -> None:
-        """Remove what processes that were ended, now or in an earlier run, left of their runs."""
+        """Remove the solver's run folders that ended processes have left."""
         from ..simulate.evaluate.folders import drop_unfinished
 
         drop_unfinished(self.runs)
@@ -284,20 +285,20 @@ class Run:
 
 
 def drop_new(folder: Path) -> None:
-    """Remove what a killed run had written so far; call it where none can be at work."""
+    """Remove results of killed runs; call it only if no run can be active."""
     for left in folder.glob(f"{NEW}*"):
         shutil.rmtree(left, ignore_errors=True)  # which leaves a link alone
 
 
 def refuse_other(folder: Path, case: Path) -> None:
-    """Raises InputError where ``folder`` holds results of another case than ``case``;
-    OSError where its run.json is no file."""
+    """Raises InputError if ``folder`` holds results of another case than ``case``; OSError if its
+    run.json is no file."""
     if not os.path.lexists(folder / RUN):
         return
     entries = list(read_runs(folder).values())
     if not belongs_to(entries, folder, case):
         named = [file for entry in entries if (file := named_case(entry, folder))]
-        named.sort(key=lambda file: not file.exists())  # one that is there comes first
+        named.sort(key=lambda file: not file.exists())  # existing files first
         raise InputError(
             f"folder '{folder}' holds results of {named[0] if named else 'something else'};"
             " give another one with --output"
@@ -305,7 +306,7 @@ def refuse_other(folder: Path, case: Path) -> None:
 
 
 def _arguments() -> list[str]:
-    """The words of the present command line, as `main` was given them."""
+    """The words of the command line, as `main` got them."""
     context = click.get_current_context(silent=True)
     given = context.find_root().obj if context else None
     return list(sys.argv[1:] if given is None else given)

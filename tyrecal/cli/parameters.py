@@ -1,8 +1,7 @@
-"""Options and types of all commands, with their messages about a value that is wrong, or given
-twice.
+"""Options and types of all commands, with their messages about wrong and repeated values.
 
-A command declares options by `option`, in place of click's, with the types of this module, whose
-errors say what would be right.
+A command declares options by `option`, in place of click's, with the types of this module. Their
+errors state a value that works.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-# of a number, by the end of its option or metavar: unit and example
+# unit and example of a number, by the end of its option or metavar
 ENDINGS = {
     "kPa": ("kPa", "240"),
     "N": ("N", "4000"),
@@ -31,8 +30,8 @@ UNIT = re.compile(rf"[-_]({'|'.join(ENDINGS)})$")
 
 
 class Option(click.Option):
-    """An option that is refused where it is given twice with two values; one that is ``multiple``
-    collects them. Values of the environment and the settings do not count."""
+    """An option that may not be given twice with different values, unless it is ``multiple``.
+    Values of the environment and the settings do not count."""
 
     def add_to_parser(self, parser: Any, ctx: click.Context) -> None:
         """Have the parser keep every value."""
@@ -43,7 +42,7 @@ class Option(click.Option):
     def consume_value(
         self, ctx: click.Context, opts: Mapping[str, Any]
     ) -> tuple[Any, ParameterSource]:
-        """The value, and who gave it. Raises click.UsageError."""
+        """The value and its source. Raises click.UsageError."""
         values = opts.get(str(self.name))
         if isinstance(values, list) and not self.multiple:
             for other in [] if ctx.resilient_parsing else values[1:]:
@@ -62,7 +61,7 @@ class Option(click.Option):
 
 
 def split_names(ctx: click.Context, param: click.Parameter, values: Any) -> tuple[str, ...]:
-    """The names of a repeatable option, each of whose values may be a list with commas."""
+    """The names of a repeatable option; each value may be a list with commas."""
     return tuple(filter(None, (name.strip() for value in values for name in value.split(","))))
 
 
@@ -71,10 +70,10 @@ names_option = partial(option, multiple=True, callback=split_names)
 
 
 class _Answering(click.ParamType):
-    """Answers a wrong value by what it must be."""
+    """A type whose error states what the value must be."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The value by its type; a number that is not finite is none. Raises click.UsageError."""
+        """The value by its type; numbers must be finite. Raises click.UsageError."""
         try:
             converted = super().convert(value, param, ctx)
             if not isinstance(converted, float) or isfinite(converted):
@@ -85,7 +84,7 @@ class _Answering(click.ParamType):
         raise click.UsageError(f"{option}{value}: {self.answer(value, param)}", ctx)
 
     def answer(self, value: Any, param: click.Parameter | None) -> str:
-        """Words for what would be right in place of ``value``."""
+        """Words that state what to give in place of ``value``."""
         raise NotImplementedError
 
 
@@ -147,7 +146,7 @@ class FileOrFolder(_Answering, click.Path):
         super().__init__(exists, file_okay=file, dir_okay=folder, path_type=Path)
 
     def answer(self, value: Any, param: click.Parameter | None) -> str:
-        """Why it cannot be had, and what lies near it."""
+        """Why the path is refused, with a similar path that exists."""
         path = Path(value)
         from ..tyre.case.mistakes import nearby
 

@@ -9,15 +9,15 @@ from typing import Any
 
 import click
 
-BETWEEN_S = 30.0  # lines where there is no terminal
+BETWEEN_S = 30.0  # time between lines of progress if there is no terminal
 
 
 class BatchProgress:
-    """A bar on a terminal; elsewhere a line now and then, and one for each case that fails."""
+    """A bar on a terminal; else a line every `BETWEEN_S`, and one for each case that fails."""
 
     def __init__(self, total: int, quiet: bool, verbose: bool):
         self.total, self.quiet, self.verbose = total, quiet, verbose
-        self.done = self.run = self.bad = 0
+        self.done = self.run = self.bad = 0  # cases: all, really run, not good
         self.began = self.reported = time.monotonic()
         self.bar: Any = None
 
@@ -37,7 +37,7 @@ class BatchProgress:
             self.bar.stop()
 
     def notify(self, report: Mapping[str, Any]) -> None:
-        """One more case."""
+        """Count and show a finished case."""
         entries = report["studies"]
         bad = [study for study, entry in entries.items() if entry["status"] != "good"]
         self.done, self.bad = self.done + 1, self.bad + bool(bad)
@@ -59,15 +59,15 @@ class BatchProgress:
 
 
 def seconds_left(elapsed_s: float, run: int, left: int) -> float | None:
-    """How long ``left`` cases take, where ``run`` really ran in ``elapsed_s``; None for none.
+    """Time of the ``left`` cases, if ``run`` cases took ``elapsed_s``; None if none has run.
 
-    Cases that an earlier run answers cost next to nothing, so they do not count.
+    Cases with results of an earlier run take almost no time, so they do not count.
     """
     return elapsed_s * left / run if run else None
 
 
 def clock(seconds: float) -> str:
-    """Minutes and seconds, with hours where there are some."""
+    """Minutes and seconds, with hours if there are any."""
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"

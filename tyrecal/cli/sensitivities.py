@@ -83,9 +83,8 @@ def command(
             raise click.UsageError(f"--loads-N {loads}: give --of a quantity on the road too")
     evaluator = study.evaluator(loaded)
     needs_gradients(evaluator)
-    designs = {
-        "initial": values
-    }  # about which numbers are selected: a fitted one has the data in it
+    # numbers are selected about the initial design: a fitted one contains the data already
+    designs = {"initial": values}
     if fitted:
         designs["fitted"] = arguments.fitted_values(fitted, loaded, study.terminal)
     file = measured or loaded.measured

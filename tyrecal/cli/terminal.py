@@ -17,7 +17,7 @@ from ..files import NotWritten, json_text, printable
 from .progress import BETWEEN_S, clock
 
 SOLVERS = "tyrecal_solvers"  # logger of the solvers that ship
-RESUME = "tyrecal.resume"  # key of the context's notes: how to go on after Ctrl-C
+RESUME = "tyrecal.resume"  # key of click's context: how to continue after Ctrl-C, in words
 
 
 def coloured() -> bool | None:
@@ -32,20 +32,20 @@ def error(text: str) -> None:
 
 
 def _plain(text: str) -> str:
-    """Lines without control characters: names and words may come from a stranger's files."""
+    """Lines without control characters, which names from foreign files may contain."""
     return "\n".join(map(printable, text.split("\n")))
 
 
 def say(text: str, err: bool = False, **how: Any) -> None:
-    """Print. Raises OSError where standard output is a file on a full disc."""
+    """Print. Raises OSError if standard output is a file on a full disk."""
     with _reaching(err):
         click.echo(text, err=err, **how)
 
 
 @contextmanager
 def _reaching(err: bool) -> Iterator[None]:
-    """A reader that has closed the pipe (`| head`) misses the rest, and costs no result. Where
-    standard error is full, or its terminal gone, no message is possible."""
+    """Context in which a closed pipe (`| head`) loses output, but no result. If standard error is
+    full or its terminal has gone, messages are lost, too."""
     try:
         yield
     except OSError as error:
@@ -65,8 +65,8 @@ def resume(words: str) -> None:
 class Terminal:
     """Output of a command under --json, --quiet and --verbose.
 
-    Results go to standard output; beside --json only the JSON does. Errors and warnings go to
-    standard error, whatever is asked for.
+    Results go to standard output; with --json only the JSON does. Errors and warnings always go to
+    standard error.
     """
 
     as_json: bool = False
@@ -74,17 +74,17 @@ class Terminal:
     verbose: bool = False
 
     def say(self, text: str) -> None:
-        """A line of the result, for people: on standard error beside JSON."""
+        """Print a line of the result for people; with --json on standard error."""
         if not self.quiet:
             say(_plain(text), err=self.as_json)
 
     def note(self, text: str) -> None:
-        """A remark on the result, always on standard error."""
+        """Print a remark on standard error."""
         if not self.quiet:
             say(_plain(text), err=True)
 
     def show(self, table: Any, beside_json: bool = False) -> None:
-        """A table of the result, for people; beside JSON, which holds the same, only on demand."""
+        """Print a table of the result for people; with --json only if ``beside_json``."""
         if self.quiet or (self.as_json and not beside_json):
             return
         from rich.console import Console
@@ -100,7 +100,7 @@ class Terminal:
         say(text.get(), nl=False, err=self.as_json, color=coloured())
 
     def result(self, content: Any) -> None:
-        """The result for programs, where they ask for it."""
+        """Print the result as JSON if --json is given."""
         if self.as_json:
             say(json_text(content), nl=False)
 
@@ -119,8 +119,8 @@ class Terminal:
 
     @contextmanager
     def progress(self, what: str, stages: Sequence[str] = ()) -> Iterator[Progress]:
-        """How far ``what`` is while it lasts, on standard error: a bar on a terminal, elsewhere a
-        line for each of its ``stages`` and now and then one more; nothing with --quiet."""
+        """Show the progress of ``what`` on standard error: a bar on a terminal, else a line for
+        each of its ``stages`` and one every `BETWEEN_S`; nothing with --quiet."""
         if self.quiet:
             yield Progress(what)
             return
@@ -135,7 +135,7 @@ class Terminal:
         from rich.text import Text
 
         class Clock(ProgressColumn):
-            """Goes on between two designs."""
+            """Time that also advances between two designs."""
 
             def render(self, task: Any) -> Text:
                 return Text(shown.clock(time.monotonic()))
@@ -172,7 +172,7 @@ def _listening(progress: Progress) -> Iterator[Progress]:
 
 
 class Progress:
-    """Progress of the work: on a ``bar``, or by lines that ``say`` gets; else does nothing."""
+    """Progress of the work ``what``: on a bar (`show_on`), or as lines that ``say`` prints."""
 
     def __init__(
         self, what: str, stages: Sequence[str] = (), say: Callable[[str], None] | None = None
@@ -181,7 +181,8 @@ class Progress:
         self._bar: Any = None
         self._task: Any = None
         self._done, self._began = 0.0, time.monotonic()
-        self._total = self._before = self._piece = 0  # of the stage; before the last piece; of it
+        # numbers of designs: of the stage, of its pieces before the last one, of the last piece
+        self._total = self._before = self._piece = 0
         self._of_stage = self._said = self._began
 
     def show_on(self, bar: Any) -> None:
@@ -189,7 +190,7 @@ class Progress:
         self._bar, self._task = bar, bar.add_task(self._what, total=None)
 
     def begin(self, stage: str) -> None:
-        """A stage begins, one of ``stages``; without any, the whole."""
+        """Begin a stage, one of ``stages``, or the whole work if there are none."""
         if stage in self._stages:
             place = f"stage {self._stages.index(stage) + 1} of {len(self._stages)}"
             self._what = f"{place}, {stage}"
@@ -199,8 +200,8 @@ class Progress:
         self._reset()
 
     def at(self, done: int, total: int) -> None:
-        """``done`` of ``total`` are finished, of what was begun last: 0, or another total, begins
-        a further piece of the stage, which is counted on top of those before."""
+        """Show that ``done`` of ``total`` designs of the last piece are finished. 0, or another
+        total, begins a further piece of the stage, which is added to those before."""
         if total != self._piece or not done:
             self._before, self._piece = self._total, total
             self._total += total
@@ -209,7 +210,7 @@ class Progress:
         self._show(self._before + done, self._what)
 
     def within(self, done: int, total: int) -> None:
-        """``done`` of ``total`` parts of the next one are finished."""
+        """Show that ``done`` of the ``total`` loads of the next design are finished."""
         if done < total:
             whole = int(self._done)
             self._show(whole + done / total, f"{self._what}, load {done + 1} of {total}")
@@ -227,7 +228,7 @@ class Progress:
     def _show(self, done: float, words: str) -> None:
         self._done, now = done, time.monotonic()
         if self._bar:
-            # at once: the next may be done within a blink
+            # refresh at once: the next design may be finished before the bar's next refresh
             self._bar.update(self._task, completed=done, description=words, refresh=True)
         elif self._say and now > self._said + BETWEEN_S:
             self._said = now
@@ -235,7 +236,7 @@ class Progress:
             self._say(f"{words}{count}, {self.clock(now)}")
 
     def clock(self, now: float) -> str:
-        """Time elapsed in all and, once something is done, time left of this stage."""
+        """Total time elapsed and, if a design is finished, time left in this stage, in words."""
         elapsed = f"{clock(now - self._began)} elapsed"
         if not 0 < self._done < self._total:
             return elapsed
@@ -244,7 +245,7 @@ class Progress:
 
 
 class _Loads(logging.Handler):
-    """Passes on what the solver reaches on the road: ``loads``, (done, total), of its records."""
+    """Shows the loads that the solver reports in its log: ``loads`` = (done, total) of a record."""
 
     def __init__(self, progress: Progress):
         super().__init__(logging.INFO)
@@ -253,5 +254,5 @@ class _Loads(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         if loads := getattr(record, "loads", None):
             self.progress.within(*loads)
-        else:  # on the way to a load
+        else:  # between two loads
             self.progress.words(record.getMessage())

@@ -1,4 +1,4 @@
-"""The seal of a blind study: its truth is in a separate folder, and its sha256 is with the trials.
+"""The seal of a blind trial: its truth is in a separate folder, its sha256 with the trials.
 
 truth.json has a random number, so that the truth cannot be guessed from its hash. ``answer`` never
 opens its folder, and refuses to work if a truth is among the trials. Answers are hashed before
@@ -24,9 +24,9 @@ def seal(folder: Path, sealed: Path, content: Json) -> str:
     text = json.dumps({"nonce": secrets.token_hex(32), **content}, indent=1, allow_nan=False)
     with atomic_write(sealed / TRUTH) as partial:
         partial.write_text(text + "\n", encoding="utf-8")
-    mark = _sha256(sealed / TRUTH)
-    write_json(folder / SEAL, {"sha256": mark})
-    return mark
+    digest = _sha256(sealed / TRUTH)
+    write_json(folder / SEAL, {"sha256": digest})
+    return digest
 
 
 def open_truth(folder: Path, sealed: Path) -> Json:
@@ -49,9 +49,9 @@ def refuse_open_truth(folder: Path) -> None:
 
 def seal_answers(folder: Path, files: list[Path]) -> str:
     """Write the sha256 of all answers together to ``folder``; returns it."""
-    mark = _of_all(files)
-    write_json(folder / ANSWERS, {"sha256": mark, "count": len(files)})
-    return mark
+    digest = _sha256_of_all(files)
+    write_json(folder / ANSWERS, {"sha256": digest, "count": len(files)})
+    return digest
 
 
 def check_answers(folder: Path) -> list[Path]:
@@ -62,14 +62,15 @@ def check_answers(folder: Path) -> list[Path]:
     names = {path.stem for path in (folder / "trials").glob("*.csv")}
     if {path.stem for path in files} != names:
         raise InputError(f"{folder}: not every trial has one answer; 'tyrecal blind answer' first")
-    if stated.get("sha256") != _of_all(files):
+    if stated.get("sha256") != _sha256_of_all(files):
         raise InputError(f"{folder}: answers were changed after they were hashed")
     return files
 
 
-def _of_all(files: list[Path]) -> str:
-    marks = "".join(f"{path.name} {_sha256(path)}\n" for path in sorted(files))
-    return sha256(marks.encode()).hexdigest()
+def _sha256_of_all(files: list[Path]) -> str:
+    """sha256 of one line for each file: its name and sha256."""
+    lines = "".join(f"{path.name} {_sha256(path)}\n" for path in sorted(files))
+    return sha256(lines.encode()).hexdigest()
 
 
 def _sha256(path: Path) -> str:
