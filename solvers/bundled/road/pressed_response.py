@@ -272,7 +272,7 @@ class PressedResponse:
             q = (turn.T @ np.linalg.solve(Z[b:, b:], forces))[kept:]
             seen += [q.real, q.imag]
         scale = np.sqrt(values[kept:, None])
-        more, size, _ = np.linalg.svd(scale * np.hstack(seen), full_matrices=False)
+        more, _, _ = np.linalg.svd(scale * np.hstack(seen), full_matrices=False)
         more = np.linalg.qr(more[:, : count - kept] / scale)[0]
         _, own = np.linalg.eigh(more.T @ (values[kept:, None] * more))
         T = np.zeros((len(loss), b + kept + more.shape[1]))
