@@ -13,11 +13,14 @@ import pytest
 
 from tyrecal.measured.universal import read_universal
 from tyrecal.measured.universal_text import WrittenShape, line_set, shape_set, universal_text
-from tyrecal.report.universal_shapes import shapes_text
+from tyrecal.report.universal_shapes import loaded_shapes_text, shapes_text
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.results import Evaluation, HarmonicShape, RawMode, RingShape
-from tyrecal.simulate.modes.label import labelled
+from tyrecal.simulate.modes.label import Label, labelled
+from tyrecal.simulate.modes.loaded import Member
 from tyrecal.simulate.provenance import provenance
+from tyrecal.studies import loaded as loaded_studies
+from tyrecal.studies.loaded import Loaded, LoadedMode, LoadedTyre
 from tyrecal.studies.modes import modes_result
 from tyrecal.tyre.case import start_values, with_level
 from tyrecal.tyre.load import load_case
@@ -223,6 +226,34 @@ def test_shapes_of_a_solver_in_three_dimensions(tmp_path: Path) -> None:
     assert np.allclose(first, [0, 0, -1], atol=1e-5) and np.allclose(second, [1, 0, 0], atol=1e-5)
 
 
+def on_road() -> LoadedTyre:
+    """A tyre of 8 rings of three points, the lowest pressed in by 20 mm, that moves down, forward
+    and along the axle."""
+    angles = 2 * np.pi * np.arange(8) / 8
+    surface = np.tile([[0.3, 0.0, z] for z in (-0.05, 0.0, 0.05)], (8, 1, 1))
+    surface[0, :, 0] -= 0.02
+    cos, sin, o = np.cos(angles)[:, None], np.sin(angles)[:, None], np.zeros((8, 3))
+    motions = np.array([[cos + o, -sin + o, o], [-sin + o, -cos + o, o], [o, o, 1 + o]])
+    modes = tuple(
+        LoadedMode(Member(Label(1, 0), "symmetric"), 60.0 + k, 1.0, 1.0, np.moveaxis(each, 0, -1))
+        for k, each in enumerate(motions)
+    )
+    return LoadedTyre(220.0, 9.3, (Loaded(4000.0, 0.02, modes, surface=surface),), angles=angles)
+
+
+def test_shapes_on_the_road(tmp_path: Path) -> None:
+    """Points where the load has put them, a modal mass of 1, motions along x, y and z."""
+    text = loaded_shapes_text(CASE, on_road(), True)
+    assert "6.00000E+01  1.00000E+00" in text
+    file = read_universal(written(tmp_path, text))
+    assert len(file.nodes) == 24 and len(file.lines) == 3 + 8
+    assert file.nodes[2] == pytest.approx((0, 0, -0.28), abs=1e-12)
+    assert file.nodes[8] == pytest.approx((-0.3, 0, 0), abs=1e-12)  # behind the hub
+    directions = ([0, 0, -1], [1, 0, 0], [0, 1, 0])
+    for shape, direction in zip(file.shapes, directions, strict=True):
+        assert np.allclose(np.nan_to_num(shape.values.real), direction, atol=1e-5)
+
+
 def test_the_command(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -239,8 +270,13 @@ def test_the_command(
 
     assert exported() == 0
     assert len(read_universal(tmp_path / "export" / "205_60r15.uff").shapes) == 3
+    given = on_road()
+    monkeypatch.setattr(loaded_studies, "load_tyres", lambda *of: {"initial": given})
+    modes = [{**content["modes"][0], "frequency_Hz": 61.0, "multiplicity": 1}]
+    assert exported(load_N=4000.0, modes=modes) == 0
+    assert "[1,0]" in (tmp_path / "export" / "205_60r15.uff").read_text()
     assert exported(load_N=4000.0) == 2
-    assert "is under a load: run 'tyrecal modes' without one" in capsys.readouterr().err
+    assert "has other frequencies" in capsys.readouterr().err
     content["modes"][0]["frequency_Hz"] = 41.5
     assert exported() == 2
     assert "has other frequencies: run 'tyrecal modes' again" in capsys.readouterr().err

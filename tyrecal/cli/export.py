@@ -121,8 +121,9 @@ def command(
     fitted design if it has one. The comment of a key states its misfit. Run 'tyrecal stiffness' at
     three loads or more, and at several pressures, first.
 
-    A uff has the modes of the modes.json in DIR: the surface's points and lines, and two shapes for
-    a pair (data sets 151, 164, 2411, 82, 55; SI; x forward, y left, z up).
+    A uff has the modes of the modes.json in DIR, unloaded or on the road: points and lines of the
+    surface, and two shapes for a pair (data sets 151, 164, 2411, 82, 55; SI; x forward, y left, z
+    up).
 
     Matrices are those of the tyre at a pressure, and at a load with its contact held: stiffness,
     mass and loss on the six motions of the hub and its modes (Craig and Bampton), as Matrix Market
@@ -227,23 +228,30 @@ def _property_file(
 
 def _universal_file(case: LoadedCase, results: Path) -> dict[str, bytes]:
     """Name and content of the universal file of the modes in ``results``. Raises InputError."""
-    from ..report.universal_shapes import shapes_text
+    from ..report.universal_shapes import loaded_shapes_text, shapes_text
     from ..simulate.evaluate.evaluator import Question
     from ..simulate.modes.label import UNIT_MASS_SOLVERS, labelled
     from ..studies.fitted import read_result
+    from ..studies.loaded import LoadedTyre, load_tyres
     from ..studies.modes import ModesResult
 
     loaded, modes = read_result(results, case, ModesResult)
-    if modes.load_N:
-        raise InputError(f"'{results}' is under a load: run 'tyrecal modes' without one")
     evaluator = _evaluator_of(loaded, modes, results.parent)
-    evaluation = evaluator.evaluate(Question(modes.variables))
-    computed_Hz = [mode.frequency_Hz for mode in labelled(evaluation)]
+    unit_mass = evaluator.solver.name in UNIT_MASS_SOLVERS
+    if modes.load_N:
+        designs = {"initial": modes.variables}
+        tyre = load_tyres(loaded, evaluator, designs, [modes.load_N])["initial"]
+        if not isinstance(tyre, LoadedTyre):
+            raise tyre
+        computed_Hz = [mode.frequency_Hz for mode in tyre.loads[-1].modes]
+        text = loaded_shapes_text(loaded, tyre, unit_mass)
+    else:
+        evaluation = evaluator.evaluate(Question(modes.variables))
+        computed_Hz = [mode.frequency_Hz for mode in labelled(evaluation)]
+        text = shapes_text(loaded, evaluation, labelled(evaluation), unit_mass)
     stated_Hz = [each.frequency_Hz for each in modes.modes if each.member is None]
     if not all(any(isclose(f, x, rel_tol=SAME_HZ) for x in computed_Hz) for f in stated_Hz):
         raise InputError(f"'{results}' has other frequencies: run 'tyrecal modes' again")
-    unit_mass = evaluator.solver.name in UNIT_MASS_SOLVERS
-    text = shapes_text(loaded, evaluation, labelled(evaluation), unit_mass)
     return {f"{case.path.stem}.uff": text.encode()}
 
 

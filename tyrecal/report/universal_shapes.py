@@ -1,8 +1,9 @@
-"""Mode shapes of the unloaded tyre as a universal file: `tyrecal export --format uff`.
+"""Mode shapes as a universal file: `tyrecal export --format uff`.
 
 x is forward, y to the left along the axle, z up, from the wheel's centre; angles go round from the
 bottom, backwards. A pair has two shapes. Shapes on the section are on points of the tyre's inflated
-outer surface, those of solvers in three dimensions on the solver's points.
+outer surface, those of solvers in three dimensions on the solver's points, and those under a load
+on the tread's, where the load has put them.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from ..measured.universal_text import WrittenShape, line_set, shape_set, univers
 from ..simulate.evaluate.results import Evaluation, HarmonicShape, RingShape
 from ..simulate.modes.label import Mode
 from ..simulate.modes.rings import on_rings
+from ..studies.loaded import LoadedTyre
 from ..studies.response import TREAD_SYSTEM
 from ..tyre.case import LoadedCase
 from ..tyre.resolve import resolved
@@ -41,18 +43,44 @@ def shapes_text(
         shapes, points, unit_mass = _on_solvers_points(evaluation), first.points, False
     else:
         shapes, points = _on_surface(case, evaluation, modes)
+    return _text(case.case.name, points, points * [1, 0, 1], shapes, unit_mass)
+
+
+def loaded_shapes_text(case: LoadedCase, tyre: LoadedTyre, unit_mass: bool) -> str:
+    """Text of the file, of the tyre at its last load."""
+    last = tyre.loads[-1]
+    assert last.surface is not None and tyre.angles is not None
+    places = last.surface.reshape(-1, 3)
+    angles = np.repeat(tyre.angles, last.surface.shape[1])
+    rest = np.tile(last.surface[len(tyre.angles) // 2], (len(tyre.angles), 1))  # far from the road
+    points = np.column_stack([rest[:, 0], angles, rest[:, 2]])
+    shapes = [
+        (str(mode.member), mode.frequency_Hz, None, RingShape(points, mode.shape.reshape(-1, 3)))
+        for mode in last.modes
+        if mode.shape is not None
+    ]
+    return _text(case.case.name, points, places, shapes, unit_mass)
+
+
+def _text(
+    title: str, points: Array, places: Array, shapes: Sequence[NamedShape], unit_mass: bool
+) -> str:
+    """Text of the file; points (p, 3): R, Theta, Z, by which lines are drawn; places (p, 3): along
+    r, theta, z at these angles."""
     numbers = range(1, len(points) + 1)
     cos, sin = np.cos(points[:, 1]), np.sin(points[:, 1])
-    places = np.column_stack([points[:, 0] * cos, points[:, 0] * sin, points[:, 2]])
-    title = case.case.name
+
+    def along_axes(vectors: Array) -> Array:
+        r, theta, z = vectors.T
+        turned = np.column_stack([r * cos - theta * sin, r * sin + theta * cos, z])
+        return np.asarray(turned @ TREAD_SYSTEM.axes)
+
     sets = [line_set(k, line) for k, line in enumerate(_lines(points), start=1)]
     for k, (name, hertz, damping, shape) in enumerate(shapes, start=1):
-        r, theta, z = np.nan_to_num(shape.displacement).T
-        vectors = np.column_stack([r * cos - theta * sin, r * sin + theta * cos, z])
-        moved = vectors @ TREAD_SYSTEM.axes
+        moved = along_axes(np.nan_to_num(shape.displacement))
         written = WrittenShape(name, hertz, moved, damping or 0.0, float(unit_mass))
         sets.append(shape_set(title, k, written, numbers))
-    nodes = dict(zip(numbers, (places @ TREAD_SYSTEM.axes).tolist(), strict=True))
+    nodes = dict(zip(numbers, along_axes(places).tolist(), strict=True))
     return universal_text(title, nodes, sets)
 
 
