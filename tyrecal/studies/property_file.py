@@ -9,7 +9,7 @@ or not at all.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -279,7 +279,14 @@ def _add_fitted(result: StructuralKeys, each: CurveFit, rows: RowsOfDesign) -> N
     if loose := [name for name, end in zip(names, ends, strict=True) if end]:
         words += f"; {', '.join(loose)} at the end of its range, not determined"
     if at is not rows:
-        words += f" at FNOMIN, {_percent(off(written, rows))} over all loads"
+        loads = np.unique(rows.column("load_N"))
+        place = int(np.searchsorted(loads, rows.nominal_N))
+        first, *_, last = loads[max(0, place - 1) : place + 2]
+        near = replace(rows, rows=[row for row in rows.rows if first <= row.load_N <= last])
+        words += (
+            f" at FNOMIN; no key has its change with load: {_percent(off(written, near))} from"
+            f" {first:g} to {last:g} N, {_percent(off(written, rows))} over all loads"
+        )
     result.add(each.section, words, dict(zip(names, written, strict=True)))
 
 
