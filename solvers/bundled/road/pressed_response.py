@@ -4,7 +4,7 @@
                                              [0  V^T K V]       [V^T M Psi        1    ]
 
 Psi: fields that follow the six unit motions of the rim (`rim_stiffness`); C: its stiffness; V:
-modes with the rim held up to `SETTLES_UP_TO` times the highest frequency, static responses to the
+modes with the rim held up to `MODES_UP_TO` times the highest frequency, static responses to the
 forces and to the inertia of Psi, to the inertia of these and so on, and to the losses of all that.
 The force of the tyre on a hub that is held is what x has of the forces less K + i L - omega^2 M
 times q; the road bears the rest.
@@ -35,18 +35,18 @@ from .loaded_modes import Inertia, factor_with_hold, forces_on, standing_waves
 from .rim_stiffness import MOTION_PARITY, followed, rim_motions, turning_stiffness
 
 Array = np.ndarray
-SETTLES_UP_TO = 1.2  # times the highest frequency
+MODES_UP_TO = 1.2  # times the highest frequency
 INERTIA_ROUNDS = 2  # of static responses to the inertia of the ones before
 RIM_FOLLOWED_RTOL = 1e-10  # of forces that Psi leaves, which are missing in those on the hub
 REFINEMENTS = 2  # of static responses; what is left of an error counts by its square
 SAMPLES_OF_PATCH = 8  # angles
 UNLOADED_MODES = 120  # to start from
-FEWEST_MODES, MORE_MODES = 8, 10  # of a parity that are sought
+MIN_PARITY_MODES, FURTHER_MODES = 8, 10  # of a parity that are sought
 SNAPSHOTS = 40  # frequencies in the band
 
 
 @dataclass(frozen=True)
-class _Reduced:
+class _OneParity:
     """One parity of the tyre on the rim's motions (b,) and q."""
 
     places: Array  # (b,) of its motions of the rim
@@ -109,7 +109,7 @@ class PressedResponse:
         at = np.array([hertz])
         return [float(m.loss.at(at)[modulus][0]) for m, modulus, _ in self._parts if m.loss]
 
-    def _of_parity(self, parity: int, factor: ContactUpdate | None) -> _Reduced:
+    def _of_parity(self, parity: int, factor: ContactUpdate | None) -> _OneParity:
         tyre, pressed, hold, check = self._tyre, self._pressed, self._hold, self._check
         symmetry = HalfTurn(tyre.model.mesh, pressed.free, pressed.around, parity)
         factor = factor or factor_with_hold(tyre, symmetry, hold, check)
@@ -170,7 +170,7 @@ class PressedResponse:
         C[:b, :b] += self._turning[np.ix_(places, places)]
         moved = [[(F * V).sum() for V in psi] for F in tread]
         own = np.array([gather(F) for F in tread]) @ basis.vectors.T / np.sqrt(2)
-        return _Reduced(
+        return _OneParity(
             places,
             C,
             with_rim(self._mass, np.eye(len(basis.vectors))),
@@ -188,20 +188,20 @@ class PressedResponse:
         M: davidson.Operator,
         inverse: davidson.Operator,
     ) -> Array:
-        """Modes (m, size) of a parity up to `SETTLES_UP_TO` times the highest frequency, and one
+        """Modes (m, size) of a parity up to `MODES_UP_TO` times the highest frequency, and one
         beyond."""
-        limit = (2 * np.pi * SETTLES_UP_TO * self.highest_Hz) ** 2
+        limit = (2 * np.pi * MODES_UP_TO * self.highest_Hz) ** 2
         unloaded = sum(int((m.eigenvalues < limit).sum()) for m in self._unloaded)
         start = [
             (symmetry.parts(V) * symmetry.mask).ravel()
             for V in standing_waves(self._unloaded, symmetry)
         ]
-        basis, count = davidson.basis_of(np.array(start), K, M), max(FEWEST_MODES, unloaded)
+        basis, count = davidson.basis_of(np.array(start), K, M), max(MIN_PARITY_MODES, unloaded)
         while True:
             values, modes = davidson.lowest(K, M, inverse, basis, count)
             if values[-1] > limit:
                 return np.asarray(modes[: np.searchsorted(values, limit) + 1])
-            count += MORE_MODES
+            count += FURTHER_MODES
 
     def _motion(self, symmetry: HalfTurn, angle: float, way: int) -> Array:
         """Forces (k, n, 3) on half the tyre whose work on a field of the parity is the mean motion
@@ -253,8 +253,8 @@ class PressedResponse:
         return Superelement(K, M, loss, tread[first:])
 
     def _condensed(
-        self, reduced: _Reduced, limit: float, losses: Sequence[float], count: int
-    ) -> _Reduced:
+        self, reduced: _OneParity, limit: float, losses: Sequence[float], count: int
+    ) -> _OneParity:
         """The same with at most ``count`` coordinates q, and one matrix of losses: the modes in the
         band and, of the others, what holds most of their energy in responses there."""
         b, parts = len(reduced.places), zip(losses, reduced.lossy, strict=True)
@@ -272,14 +272,14 @@ class PressedResponse:
             q = (turn.T @ np.linalg.solve(Z[b:, b:], forces))[kept:]
             seen += [q.real, q.imag]
         scale = np.sqrt(values[kept:, None])
-        more, _, _ = np.linalg.svd(scale * np.hstack(seen), full_matrices=False)
+        more = np.linalg.svd(scale * np.hstack(seen), full_matrices=False)[0]
         more = np.linalg.qr(more[:, : count - kept] / scale)[0]
         _, own = np.linalg.eigh(more.T @ (values[kept:, None] * more))
         T = np.zeros((len(loss), b + kept + more.shape[1]))
         T[:b, :b], T[b:, b : b + kept] = np.eye(b), turn[:, :kept]
         T[b:, b + kept :] = turn[:, kept:] @ more @ own
         apply = lambda matrix: T.T @ matrix @ T
-        return _Reduced(
+        return _OneParity(
             reduced.places,
             apply(reduced.stiffness),
             apply(reduced.mass),

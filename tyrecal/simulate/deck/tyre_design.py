@@ -27,7 +27,9 @@ from .template_process import TemplateProcess
 
 ELEMENTS_A_WAVE = 7.5  # of quadratic ones: the frequencies are right to 0.4 %
 WAVES_OF_STIFFNESS = 4  # round the circumference, that a motion of the rim bends the tyre into
-WAVES_OF_RESPONSE = 12  # round the circumference: twice as many change it by 1 % of its largest
+# round the circumference: half as many more change forces on the hub up to 300 Hz by 0.5 % of the
+# largest, motions at their own force by 3 %
+WAVES_OF_RESPONSE = 8
 DeckRequest = Mapping[str, Any]  # what is asked of a deck, see `Decks.request`
 OWN_TEXT = "own deck"  # of a user's deck, as it stands
 NEAR_ZERO = 1e-4  # of a variable's span: below, steps are shares of this

@@ -60,7 +60,7 @@ class PressQuestion(NamedTuple):
     response: Mapping[str, Any] | None = None
 
 
-class Responses(NamedTuple):
+class ResponseAnswer(NamedTuple):
     """Responses of a design, as `Solver.read` has them, and its state."""
 
     pressure_kPa: float
@@ -150,17 +150,17 @@ class Evaluator:
 
     def respond(
         self, values: Mapping[str, float], request: Mapping[str, Any], load_N: float = 0.0
-    ) -> Responses:
+    ) -> ResponseAnswer:
         """Responses of a design, unloaded or pressed on the road with ``load_N``, its rim and patch
         held. Raises what `evaluate` and `press` do."""
         self.needs_response()
         if not load_N:
             result = self.evaluate(Question(values, response=request))
-            return Responses(result.pressure_kPa, result.response)
+            return ResponseAnswer(result.pressure_kPa, result.response)
         pressed = self.press(values, [load_N], response=request)
         (footprint,) = pressed.footprints
         assert footprint.response is not None
-        return Responses(pressed.pressure_kPa, footprint.response, footprint.deflection_m)
+        return ResponseAnswer(pressed.pressure_kPa, footprint.response, footprint.deflection_m)
 
     def _start_of(self, design: Design) -> Array | None:
         """Inflated shape (n, 4) from which a design's inflation starts: that of its nominal design,
