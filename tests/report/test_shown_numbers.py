@@ -12,6 +12,13 @@ import pytest
 from tyrecal.cli.doctor import _words as doctor_words
 from tyrecal.report import diagnosis
 from tyrecal.report.convergence import draw_convergence, draw_deviations, draw_states
+from tyrecal.report.fit import (
+    draw_bounds,
+    draw_correlations,
+    draw_normalised,
+    draw_responses,
+    normalised,
+)
 from tyrecal.report.load import draw_load_sweep
 from tyrecal.report.measured import measured_table
 from tyrecal.report.pressure import draw_pressure_sweep
@@ -72,6 +79,42 @@ def test_deviations_of_states_stand_in_their_panels() -> None:
         assert list(points.get_xdata()) == [mode.deviation_percent for mode in FIT.modes]
         halves = [np.ptp(segment[:, 0]) / 2 for segment in spread.get_segments()]
         assert halves == pytest.approx([50 / mode.target_Hz for mode in FIT.modes])
+
+
+def test_residuals_are_in_standard_deviations() -> None:
+    """Of the target where they are known, else as the fit leaves them: 1.5 Hz."""
+    known = dict(normalised(FIT))
+    assert known["[2,0]"] == pytest.approx((79.42 - 79.5) / (0.01 * 79.5))
+    assert known["[3,1]"] == pytest.approx((107.9 - 102.7) / 1.5)
+    assert known["contact area 4000 N"] == pytest.approx((0.013 - 0.0135) / 2e-4)
+    figure = draw_normalised(FIT)
+    assert figure and [bar.get_width() for bar in figure.axes[0].containers[0]] == list(
+        known.values()
+    )
+    assert draw_normalised(FIT.model_copy(update={"noise_Hz": None, "footprint": []}))
+
+
+def test_variables_stand_between_their_bounds() -> None:
+    (axes,) = draw_bounds(FIT).axes
+    marks = {line.get_marker(): [] for line in axes.lines}
+    for line in axes.lines:
+        if len(line.get_xdata()) == 1:
+            marks[line.get_marker()].append(line.get_xdata()[0])
+    # on a logarithmic scale from 1e-7 to 1e-5, and from 0.8 to 10 MPa
+    assert marks["o"] == pytest.approx([math.log10(3.6) / 2, 0.0])
+    assert marks["s"] == pytest.approx([math.log10(2) / 2, math.log(1 / 0.8) / math.log(12.5)])
+    words = [text.get_text() for text in axes.texts]
+    assert {"0.1 mm²", "10 mm²", "0.36 mm²", "0.8 MPa, at bound"} <= set(words)
+
+
+def test_correlations_and_responses_have_their_numbers() -> None:
+    figure = draw_correlations(FIT)
+    assert figure
+    cells, values = ([t.get_text() for t in axes.texts] for axes in figure.axes)
+    assert cells == ["1.00", f"{MINUS}0.25", f"{MINUS}0.25", "1.00"]
+    assert [float(text) for text in values] == FIT.singular_values
+    responses = draw_responses(FIT)
+    assert responses and [t.get_text() for t in responses.axes[0].texts] == ["1.2", f"{MINUS}0.5"]
 
 
 def test_convergence_shows_every_point_and_the_best_so_far() -> None:

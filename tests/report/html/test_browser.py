@@ -120,9 +120,23 @@ def test_no_error_no_request_and_nothing_beside_the_screen(
     assert browser.execute_script("return document.documentElement.scrollWidth") <= width
     dark = browser.execute_script("return getComputedStyle(document.body).backgroundColor")
     assert (dark == "rgb(255, 255, 255)") == (scheme == "light")
-    table = "const table = document.querySelector('.of');"
-    cut = f"{table} return table.offsetWidth > table.parentNode.clientWidth"
-    assert width < 1280 or not browser.execute_script(cut)  # what the results are of is read whole
+    wide = "[...document.querySelectorAll('{}.wide')].filter((each) => each.offsetParent)"
+    cut = f"return {wide}.filter((each) => each.scrollWidth > each.clientWidth + 1).length"
+    assert width < 1280 or not browser.execute_script(cut.format("#provenance "))
+    assert width > 360 or browser.execute_script(cut.format("")) > 5
+    hint = f"return {wide.format('')}.filter((each) => each.classList.contains('cut')).length"
+    assert browser.execute_script(hint) == browser.execute_script(cut.format(""))
+
+
+@pytest.mark.parametrize("width", [360, 1280])
+def test_contents_stay_in_sight(browser: Any, address: str, width: int) -> None:
+    show(browser, address, width)
+    top = "return document.querySelector('nav').getBoundingClientRect().top"
+    assert browser.execute_script(f"window.scrollTo(0, 6000); {top}") == 0
+    last = "document.querySelector('nav a[href=\"#provenance\"]').click();"
+    heading = "return document.querySelector('#provenance h2').getBoundingClientRect().top"
+    place = browser.execute_script(f"{last} {heading}")
+    assert 0 <= place < 800  # not below the contents, and on the screen
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
