@@ -78,12 +78,14 @@ def test_every_result_file_carries_it(project: Path) -> None:
     for name, content in files.items():
         for each in content if isinstance(content, list) else [content]:
             of = each["provenance"]
-            assert set(of) == KEYS, name
+            is_measured = {"measured_files"} if of["measured_sha256"] else set()
+            assert set(of) == KEYS | is_measured, name
             same = of["tyre_sha256"] == tyre_sha256(case)
             assert same == (not name.startswith("modes")) == (of["overrides"] == {})
             assert (of["mesh"], of["solver"]) == (case.case.mesh.level, "bundled")
     of = files["fit.json"]["provenance"]
     assert of["measured_sha256"] == sha256(MEASURED.encode()).hexdigest()
+    assert [Path(name).suffix for name in of["measured_files"]] == [".csv"]
     assert of["state"] == {"pressure_kPa": 240.0, "load_N": 0.0, "rim": "fixed"}
     assert files["modes.json"]["provenance"]["overrides"] == {TURNED: 68.0}
     assert files["pressure_sweep.json"]["provenance"]["state"]["pressure_kPa"] == [100.0, 320.0]

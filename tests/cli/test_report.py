@@ -18,7 +18,7 @@ from .test_cli import run
 
 def timeless(page: Path) -> bytes:
     """The page without when its studies ran."""
-    return re.sub(rb"\d{4}-\d\d-\d\d( \d\d:\d\d UTC)?", b"", page.read_bytes())
+    return re.sub(rb"\d{4}-\d\d-\d\d(( |%20)\d\d:\d\d( |%20)UTC)?", b"", page.read_bytes())
 
 
 @pytest.mark.slow

@@ -82,7 +82,7 @@ def test_deviations_of_states_stand_in_their_panels() -> None:
 
 
 def test_residuals_are_in_standard_deviations() -> None:
-    """Of the target where they are known, else as the fit leaves them: 1.5 Hz."""
+    """Stated with the target or, without one, as the fit leaves them: 1.5 Hz."""
     known = dict(normalised(FIT))
     assert known["[2,0]"] == pytest.approx((79.42 - 79.5) / (0.01 * 79.5))
     assert known["[3,1]"] == pytest.approx((107.9 - 102.7) / 1.5)

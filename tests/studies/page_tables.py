@@ -217,8 +217,9 @@ def refitted(name: str, true: float, factor: float) -> Callable[[Record], list[f
 
 def drawn(name: str) -> Callable[[Record], list[float]]:
     """A row of the table that `sample` prints."""
-    keys = ("median", "low", "high", "%", "linear %", "best")
-    return of("sample", *(f"{name} {key}" for key in keys))
+    factor = 1e-6 if name == "C10" else 1e6  # MPa and mm²
+    values = [(f"{name} {key}", factor) for key in ("median", "low", "high", "best")]
+    return of("sample", *values[:3], f"{name} %", f"{name} linear %", values[3])
 
 
 def points(*steps: str) -> Callable[[Record], list[float]]:
