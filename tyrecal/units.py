@@ -7,6 +7,8 @@ import re
 from collections.abc import Mapping
 from math import pi
 
+from .errors import InputError
+
 INCH, POUND, POUND_FORCE = 0.0254, 0.45359237, 4.4482216152605  # m, kg, N
 LENGTH = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "inch": INCH, "in": INCH}
 QUANTITIES: dict[str, dict[str, float]] = {
@@ -55,6 +57,33 @@ LOAD = {
     "lbs": POUND_FORCE,
 }
 DAMPING_UNITS = {"%": 0.01, "1": 1.0, "-": 1.0}  # to fractions of critical
+UNITS_BY_DIMENSION: dict[
+    str, Mapping[str, float]
+] = {  # units that a number on a command line may have
+    "pressure": PRESSURE,
+    "mass": QUANTITIES["mass_kg"],  # before loads, of which a kg may be one, too
+    "load": LOAD,
+    "length": LENGTH,
+    "area": QUANTITIES["contact_area_m2"],
+    "angle": {"degrees": 1.0, "deg": 1.0, "°": 1.0, "rad": 180 / pi},
+    "frequency": QUANTITIES["frequency_Hz"],
+    "stiffness": QUANTITIES["vertical_stiffness_N_per_m"],
+    "density": {"kg/m3": 1.0, "g/cm3": 1e3, "t/m3": 1e3},
+    "temperature difference": {"K": 1.0},
+    "share": {"percent": 1.0, "%": 1.0},
+}
+UNIT_EXAMPLES = {  # of a number with another unit, by dimension
+    "pressure": "2.4bar",
+    "load": "4kN",
+    "length": "17in",
+    "area": "0.26mm2",
+    "angle": "5deg",
+    "frequency": "0.1kHz",
+    "mass": "12g",
+}
+NUMBER_WITH_UNIT = re.compile(
+    r"([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*([^\d\s.,][^\s,]*)?", re.I
+)
 SAID = {  # SI unit: what people say, and how many of it one is
     "m": ("mm", 1e3),
     "m2": ("mm²", 1e6),
@@ -74,6 +103,37 @@ def plain(unit: str) -> str:
 def factor(table: Mapping[str, float], unit: str) -> float | None:
     """The factor of a `plain` unit, None where ``table`` does not have it."""
     return next((each for name, each in table.items() if plain(name) == unit), None)
+
+
+def read_number(text: str, unit: str) -> float:
+    """A number in ``unit``, which may be written with another unit of its dimension. Raises
+    InputError.
+
+    >>> read_number("2.4bar", "kPa"), read_number("240", "kPa"), read_number("17in", "mm")
+    (240.0, 240.0, 431.8)
+    """
+    match = NUMBER_WITH_UNIT.fullmatch(text.strip())
+    if not match:
+        raise InputError(f"must be {number_words(unit)}")
+    number, own = float(match[1]), match[2]
+    if not own:
+        return number
+    units = next((each for each in UNITS_BY_DIMENSION.values() if unit in each), {})
+    per_own = factor(units, plain(own))
+    if per_own is None:
+        what = next(
+            (name for name, each in UNITS_BY_DIMENSION.items() if factor(each, plain(own))), ""
+        )
+        is_other = f"{own} is a unit of {what}" if what else f"there is no unit '{own}'"
+        raise InputError(f"{is_other}: must be {number_words(unit)}")
+    return float(f"{number * per_own / units[unit]:.12g}")
+
+
+def number_words(unit: str, what: str = "a number") -> str:
+    """Words for a number in ``unit``: 'a number in kPa, or as 2.4bar'."""
+    name = next((name for name, each in UNITS_BY_DIMENSION.items() if unit in each), "")
+    example = f", or as {UNIT_EXAMPLES[name]}" if name in UNIT_EXAMPLES else ""
+    return what + (f" in {printed_unit(unit)}{example}" if unit else " without a unit")
 
 
 def display_unit(unit: str) -> tuple[str, float]:

@@ -76,7 +76,8 @@ def test_its_words() -> None:
     )
     assert str(plan).endswith("; about 2 designs x 2 states x 1 or 2 loads: about 6 runs")
     assert plan.content()["seconds"] is None
-    assert "nothing is pressed" in str(replace(PLAN, states=()))
+    unloaded = str(replace(PLAN, states=(PlannedState(),), starts=1))
+    assert "3-D" not in unloaded and "2 designs x 1 state + 1 before: 3 runs; about" in unloaded
 
 
 @pytest.mark.parametrize(
@@ -85,7 +86,7 @@ def test_its_words() -> None:
         (["footprint", CASE, "--loads-N", "2000,4000"], (1, 1, [2], 2)),
         (["modes", CASE, "--sweep-load", "0,1000,4000"], (1, 1, [2], 2)),
         (["modes", CASE, "--load-N", "4000"], (1, 1, [1], 1)),
-        (["fit", CASE], (15, 0, [], 0)),
+        (["fit", CASE], (15, 1, [0], 15)),
     ],
 )
 def test_a_dry_run_prints_it_and_runs_nothing(
@@ -105,8 +106,8 @@ def test_a_dry_run_prints_it_and_runs_nothing(
 def test_a_dry_run_of_a_fit_over_two_pressures(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The fit has two stiffnesses at one pressure, a length at another, and ten designs of
-    Gauss-Newton."""
+    """The fit has two stiffnesses at one pressure, a length at another, the mass on no road, and
+    ten designs of Gauss-Newton."""
     table = tmp_path / "measured.csv"
     table.write_text(
         "load [N],pressure [kPa],vertical stiffness [N/mm],contact length [mm],sigma [%]\n"
@@ -115,9 +116,4 @@ def test_a_dry_run_of_a_fit_over_two_pressures(
     words = ["fit", CASE, "--measured", str(table), "--mesh", "coarse", "--dry-run"]
     assert run(*words, "--method", "gauss-newton", "--starts", "2") == 0
     printed = capsys.readouterr().out
-    assert "about 20 designs x 2 states x 1 or 2 loads: about 60 runs; about" in printed
-
-
-def test_modes_without_a_load_have_no_plan(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("modes", CASE, "--dry-run") == 2
-    assert "--dry-run goes with --load-N or --sweep-load" in capsys.readouterr().err
+    assert "about 20 designs x 3 states x 0, 1 or 2 loads: about 80 runs; about" in printed

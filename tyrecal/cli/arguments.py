@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -62,18 +63,26 @@ def refuse_unusual(loaded: Any, option: str, name: str, value: Setting, allowed:
         raise click.UsageError(f"{option}: {message}")
 
 
-def parse_numbers(option: str, text: str, what: str) -> list[float]:
-    """Finite numbers, separated by commas. what: description of them for the message. Raises
-    click.UsageError."""
-    from math import isfinite
+LIST_EXAMPLES = {"N": "3000,5000 or 3kN,5kN", "kPa": "160,240 or 1.6bar,2.4bar", "Hz": "20,200"}
 
+
+def parse_numbers(option: str, text: str, unit: str = "", count: int = 0) -> list[float]:
+    """Numbers in ``unit``, each of which may be written with another one, separated by commas; so
+    many of them (0: any). Raises click.UsageError."""
+    from ..errors import InputError
+    from ..units import number_words, read_number
+
+    words = text.split(",")
     try:
-        numbers = [float(word) for word in text.split(",")]
-    except ValueError:
-        numbers = []
-    if not numbers or not all(map(isfinite, numbers)):
-        raise click.UsageError(f"{option} {text}: must be {what}")
-    return numbers
+        if count in (0, len(words)):
+            return [read_number(word, unit) for word in words]
+    except InputError:
+        pass
+    right = number_words(unit)
+    if count != 1:
+        what = f"{count or ''} numbers in {unit}".removesuffix(" in ").strip()
+        right = f"{what}, as in {LIST_EXAMPLES.get(unit, '0,0,0.1')}"
+    raise click.UsageError(f"{option} {text}: must be {right}")
 
 
 def parse_loads(text: str, option: str = "--loads-N", zero: bool = False) -> list[float]:
@@ -82,7 +91,7 @@ def parse_loads(text: str, option: str = "--loads-N", zero: bool = False) -> lis
 
     from ..tyre.case.schema import MAX_CASE_LOAD_N, MIN_CASE_LOAD_N
 
-    loads = parse_numbers(option, text, "numbers in N, as in 3000,5000")
+    loads = parse_numbers(option, text, "N")
     for place, load in enumerate(loads):
         if not (MIN_CASE_LOAD_N <= load <= MAX_CASE_LOAD_N or (zero and load == place == 0)):
             raise click.UsageError(
@@ -134,7 +143,7 @@ def parse_pressures(
 
 def parse_pressure_list(flag: str, loaded: Any, text: str, allowed: bool) -> list[float]:
     """The pressures of an option, kPa; ``allowed``: unusual ones too. Raises click.UsageError."""
-    pressures = parse_numbers(flag, text, "numbers in kPa, as in 160,240")
+    pressures = parse_numbers(flag, text, "kPa")
     for pressure in pressures:
         if not 0 < pressure < 2000 or pressures.count(pressure) > 1:
             raise click.UsageError(
@@ -169,12 +178,13 @@ def one_design(
     """The case and the values of its variables for a command that evaluates one design: the fitted
     one if ``fitted`` is given, else the start. Raises click.UsageError if both ``fitted`` and --set
     give a variable."""
-    from ..tyre.case import parse_setting, start_values
+    from ..tyre.case import start_values
     from ..tyre.values import overridden
 
     if fitted is None:
         return loaded, start_values(loaded)
-    for name, _ in map(parse_setting, assigned):
+    for text in assigned:
+        name = text.partition("=")[0].strip()
         if name in loaded.case.variables:
             raise click.UsageError(f"--set {name}: the design is that of --fitted")
     values = fitted_values(fitted, loaded, terminal)
@@ -188,12 +198,13 @@ def _given(loaded: Any, assigned: Sequence[str], pressure_kPa: float | None) -> 
     """
     from ..tyre.case import parse_setting
     from ..tyre.own_deck.numbers import as_known
-    from ..tyre.values import paths_of
+    from ..tyre.values import paths_of, unit_named
 
     for text in assigned:
         _refuse_text(loaded, text)
     options: list[tuple[str, str, Setting]] = []
-    options += [(f"--set {text}", *parse_setting(text)) for text in assigned]
+    unit_of = partial(unit_named, loaded)
+    options += [(f"--set {text}", *parse_setting(text, unit_of)) for text in assigned]
     if pressure_kPa is not None:
         options.append((f"--pressure-kPa {pressure_kPa:g}", "pressure_kPa", pressure_kPa))
     given: dict[str, Setting] = {}
@@ -233,10 +244,11 @@ def _refuse_text(loaded: Any, text: str) -> None:
 def _replaced(loaded: Any, assigned: Sequence[str]) -> list[str]:
     """A line for each number that --set replaces: its path, the case's value and the one used."""
     from ..tyre.case import as_written, parse_setting, start_values
-    from ..tyre.values import paths_of, value_at
+    from ..tyre.values import paths_of, unit_named, value_at
 
     lines = []
-    for name, value in map(parse_setting, assigned):
+    for text in assigned:
+        name, value = parse_setting(text, partial(unit_named, loaded))
         paths = paths_of(loaded, name)
         if name in loaded.case.variables:
             before, what = start_values(loaded)[name], f"{name} ({', '.join(paths)})"

@@ -129,7 +129,7 @@ def command(
     from ..report.diagnosis import page
     from ..report.shape_data import parts_data
     from ..studies.diagnose.diagnosis import STAGES
-    from ..studies.diagnose.study import parse_change, states_measured
+    from ..studies.diagnose.study import parse_change, planned, states_measured
     from ..studies.diagnose.study import study as diagnosed
     from ..studies.inference.inverse_problem import Assumed
     from ..studies.variable import read_variables
@@ -155,7 +155,11 @@ def command(
     evaluator = study.evaluator(loaded)
     others = [*repeats, *(path for path, _ in changes)]
     states = states_measured(loaded, measured, others)
-    run = study.run(loaded, "diagnose", evaluator, measured=[measured, *others], **states)
+    plan = None
+    if study.dry_run:
+        plan = planned(loaded, evaluator, measured, considered, study.jobs)
+    files = [measured, *others]
+    run = study.run(loaded, "diagnose", evaluator, measured=files, plan=plan, **states)
     form = None if form_percent is None else form_percent / 100
     assumed = Assumed(form, split_percent / 100, further=further)
     with terminal.progress("diagnose", STAGES) as bar:
@@ -198,12 +202,13 @@ def _with_effects(case: Path, added: tuple[str, ...], output: Path | None, allow
     from ..studies.diagnose.add import add
     from ..tyre.case import parse_assignment
     from ..tyre.load import load_case
+    from ..tyre.number_units import EFFECT_PATH, unit_of
 
     loaded = load_case(case, allowed)
     effects: dict[str, float] = {}
     try:
         for text in added:
-            id, value = parse_assignment(text)
+            id, value = parse_assignment(text, lambda id: unit_of(EFFECT_PATH + id))
             arguments.refuse_unusual(loaded, f"--add {text}", f"effects.{id}", value, allowed)
             if effects.setdefault(id, value) != value:
                 raise InputError(f"{id} is given twice, as {effects[id]:g} and {value:g}")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import click
 
 from . import arguments, complete, options
-from .parameters import FileOrFolder, Number, option
+from .parameters import FileOrFolder, option
 
 
 @click.command()
@@ -23,9 +24,9 @@ from .parameters import FileOrFolder, Number, option
 @options.fitted()
 @option(
     "--value",
-    type=Number(),
     metavar="V",
-    help="Size of the effect NAME (default: the end of its range).",
+    help="Size of the effect NAME in its unit, or with another (default: the end of its range)."
+    " Example: 12mm.",
 )
 @option(
     "--pressures-kPa",
@@ -42,7 +43,7 @@ def command(
     name: str | None,
     case: Path | None,
     fitted: Path | None,
-    value: float | None,
+    value: str | None,
     pressures: str | None,
     pictures: bool,
     assignments: tuple[str, ...],
@@ -63,7 +64,10 @@ def command(
     from ..report.table import shown
     from ..simulate.evaluate.solver import installed
     from ..studies.effects import CatalogueEntry, run
+    from ..studies.pressing_plan import PlannedState, plan_evaluations
     from ..tyre.effects import IDS, catalogue
+    from ..tyre.number_units import EFFECT_PATH, unit_of
+    from ..tyre.state import pressure_name
 
     terminal = study.terminal
 
@@ -86,9 +90,11 @@ def command(
 
     loaded, _ = study.load(case, assignments)
     loaded, values = arguments.one_design(fitted, loaded, assignments, terminal)
+    size = None
     if name and value is not None:
-        path = f"effects.{name}"
-        arguments.refuse_unusual(loaded, f"--value {value:g}", path, value, study.allow_unusual)
+        path = EFFECT_PATH + name
+        (size,) = arguments.parse_numbers("--value", value, unit_of(path), 1)
+        arguments.refuse_unusual(loaded, f"--value {value}", path, size, study.allow_unusual)
     evaluator = study.evaluator(loaded)
     adapter = evaluator.solver
     kPa = [round(loaded.case.pressure_kPa * share / 3, 6) for share in (2, 3, 4)]
@@ -96,11 +102,14 @@ def command(
         kPa = arguments.parse_pressure_list(
             "--pressures-kPa", loaded, pressures, study.allow_unusual
         )
-    output = study.run(loaded, "effects", evaluator, pressure_kPa=kPa)
     entries = [CatalogueEntry.of(catalogue()[id], solvers, loaded) for id in chosen]
+    able = [each for each in entries if name or adapter.name in each.solvers]
+    designs = [{**values, pressure_name(loaded): p} for p in kPa]
+    plan = plan_evaluations(loaded, evaluator, designs, len(values), study.jobs)
+    plan = replace(plan, states=(*plan.states, *[PlannedState()] * len(able)))
+    output = study.run(loaded, "effects", evaluator, plan=plan, pressure_kPa=kPa)
     if name and not terminal.as_json:
         terminal.say(effect_text(entries[0]) + "\n")
-    able = [each for each in entries if name or adapter.name in each.solvers]
     for each in entries:
         if each not in able:
             terminal.say(f"{each.id}: solver '{adapter.name}' cannot express it")
@@ -114,7 +123,7 @@ def command(
     with terminal.progress("effects") as bar:
         evaluator.on_progress = bar.at
         result, signatures = run(
-            loaded, evaluator, values, kPa, able, value, study.jobs, study.notify
+            loaded, evaluator, values, kPa, able, size, study.jobs, study.notify
         )
     figures = {}
     if pictures:

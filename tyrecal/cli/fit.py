@@ -68,7 +68,6 @@ if TYPE_CHECKING:
 )
 @options.seed("the drawn starts")
 @option("--pictures/--no-pictures", default=True, help="Draw convergence, section, modes.")
-@options.dry_run
 @options.scheduler
 @options.figure_format
 @options.study
@@ -84,7 +83,6 @@ def command(
     starts: int,
     seed: int,
     pictures: bool,
-    dry_run: bool,
     scheduler: str,
     study: options.Study,
 ) -> int:
@@ -140,9 +138,7 @@ def command(
             " its runs"
         )
     plan = calibration.pressing_plan(method, starts, study.jobs)
-    if (plan.runs or dry_run) and study.print_plan(plan, dry_run):
-        return 0
-    run = study.run(loaded, "fit", evaluator)
+    run = study.run(loaded, "fit", evaluator, plan=plan)
     with terminal.progress("fit") as bar, reached(scheduler) as evaluator.scheduler:
         unit = "sigma" if calibration.measured else objective_unit(loaded)
         points = _Points(terminal, bar, unit)

@@ -25,7 +25,6 @@ DESIGNS = ("initial", "fitted")
     help="Designs to press (default: initial, and fitted with --fitted).",
 )
 @option("--pictures/--no-pictures", default=True, help="Draw the patches; write VTU.")
-@options.dry_run
 @options.figure_format
 @options.study
 def command(
@@ -36,7 +35,6 @@ def command(
     fitted: Path | None,
     compare: str | None,
     pictures: bool,
-    dry_run: bool,
     study: options.Study,
 ) -> int:
     """Press the tyre of CASE on a flat road, load after load.
@@ -74,9 +72,7 @@ def command(
         options.say_idle(terminal, study.jobs, "one design is pressed alone; --fitted adds another")
     pressed_to = [PlannedState(len(loads_N))]
     plan = plan_pressing(loaded, evaluator, pressed_to, len(designs), study.jobs)
-    if study.print_plan(plan, dry_run):
-        return 0
-    output = study.run(loaded, "footprint", evaluator, load_N=loads_N)
+    output = study.run(loaded, "footprint", evaluator, plan=plan, load_N=loads_N)
     with terminal.progress("footprint") as bar:
         evaluator.on_progress = bar.at
         result, pressed, meshes = run(

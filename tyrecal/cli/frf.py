@@ -108,6 +108,7 @@ def command(
     tyrecal frf my.yaml --measured hammer.uff --to-Hz 250
     """
     from ..studies.measured_response import read_measured_responses
+    from ..studies.pressing_plan import PlannedState, plan_evaluations, plan_pressing
     from ..studies.response import EXCITE, RESPOND, FrfResult, response_request
     from ..studies.result import StudyInput
 
@@ -125,8 +126,11 @@ def command(
     if load:
         evaluator.needs_road(modes=True)
     designs = {"fitted" if fitted else "initial": values}
+    plan = plan_evaluations(loaded, evaluator, [values])
+    if load:
+        plan = plan_pressing(loaded, evaluator, [PlannedState(1, modes=True)])
     files = [measured] if measured else []
-    output = study.run(loaded, "frf", evaluator, measured=files, load_N=load)
+    output = study.run(loaded, "frf", evaluator, measured=files, plan=plan, load_N=load)
     given = StudyInput(loaded, evaluator, designs)
     result = FrfResult.run(
         given,

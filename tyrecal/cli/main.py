@@ -169,7 +169,8 @@ def cli(ctx: click.Context) -> None:
     tyrecal modes cases/p235_75r17.yaml --pressure-kPa 200
     tyrecal fit cases/p235_75r17.yaml
 
-    Every command has --help with examples, --json, --quiet and --verbose.
+    Every command has --help with examples, --json, --quiet and --verbose. Numbers may have a unit:
+    --pressure-kPa 2.4bar, --loads-N 4kN, --set A_belt=0.26mm2. Studies have --dry-run.
     """
     ctx.color = coloured()
     ctx.default_map = _defaults(ctx.invoked_subcommand)

@@ -303,13 +303,15 @@ def _place_sensors(
 ) -> int:
     """Place ``count`` sensors for the modes [c,0] and [c,1] of a case."""
     from ..measured.case_modes import evaluate_case_modes
+    from ..studies.pressing_plan import plan_evaluations
     from ..studies.sensors import place
 
     loaded, values = study.load(case, assignments)
     if fitted:
         values = arguments.fitted_values(fitted, loaded, study.terminal)
     evaluator = study.evaluator(loaded)
-    run = study.run(loaded, "measured sensors", evaluator, "sensors")
+    plan = plan_evaluations(loaded, evaluator, [values])
+    run = study.run(loaded, "measured sensors", evaluator, "sensors", plan=plan)
     most = loaded.case.analysis.highest_harmonic if highest is None else highest
     every = evaluate_case_modes(loaded, evaluator, values, most)
     modes = sorted((m for m in every.modes if m.label.m < 2), key=lambda m: m.frequency_Hz)
@@ -368,6 +370,7 @@ def label_file(
     from ..studies.fit.result import FitResult
     from ..studies.labelling.label import fitted_prior, label
     from ..studies.labelling.result import labels_result
+    from ..studies.pressing_plan import DESIGNS_OF_LABELS, PlannedState, plan_pressing
 
     loaded, values = study.load(case, assignments)
     if is_universal(file):
@@ -384,7 +387,11 @@ def label_file(
         fit = FitResult.model_validate(read_json(path))
         fixed, prior = fit.fixed, fitted_prior(loaded, fit)
     evaluator = study.evaluator(loaded)
-    run = study.run(loaded, "measured label", evaluator, "labels", measured=[file])
+    states = {each.state.of(loaded) for each in readings if not each.load_N}
+    slopes = PlannedState(sensitivities=len(values))
+    designs = DESIGNS_OF_LABELS
+    plan = plan_pressing(loaded, evaluator, [slopes] * len(states), designs, study.jobs, True)
+    run = study.run(loaded, "measured label", evaluator, "labels", measured=[file], plan=plan)
     labelled = label(loaded, evaluator, readings, prior, fixed=fixed, jobs=study.jobs)
     written = run.write(labels_result(loaded, labelled))
     run.write_text("labelled.csv", measurements_csv(labelled.readings))
@@ -410,11 +417,13 @@ def _label_shapes(
     from ..measured.measurement import measurements_csv
     from ..report.correlation import figures
     from ..studies.labelling.result import shape_labels_result
+    from ..studies.pressing_plan import plan_evaluations
 
     if fitted:
         values = arguments.fitted_values(fitted, loaded, study.terminal)
     evaluator = study.evaluator(loaded)
-    run = study.run(loaded, "measured label", evaluator, "labels", measured=[file])
+    plan = plan_evaluations(loaded, evaluator, [values])
+    run = study.run(loaded, "measured label", evaluator, "labels", measured=[file], plan=plan)
     case_modes = evaluate_case_modes(loaded, evaluator, values, layout.highest)
     pressure_kPa = loaded.case.pressure_kPa
     gathered = gather([file], pressure_kPa, replace(layout, case=case_modes), assumed=assumed)
@@ -465,19 +474,10 @@ def _layout(
     from ..measured.modal import Layout
     from ..simulate.modes.label import MAX_SAMPLED_HARMONIC
 
-    x, y, z = _numbers("--centre", centre, 3)
-    limits = _numbers("--band", band, 2) if band else None
+    x, y, z = arguments.parse_numbers("--centre", centre, count=3)
+    limits = arguments.parse_numbers("--band", band, "Hz", 2) if band else None
     if limits and not 0 <= limits[0] < limits[1]:
         raise click.UsageError(f"--band {band}: must rise from 0 or more")
     most = MAX_SAMPLED_HARMONIC if highest is None else highest
     within = (limits[0], limits[1]) if limits else None
     return Layout(axle or "", (x, y, z), directions or "", most, within, response)
-
-
-def _numbers(option: str, text: str, count: int) -> tuple[float, ...]:
-    """``count`` numbers of an option. Raises click.UsageError."""
-    what = f"{count} numbers, separated by commas"
-    numbers = arguments.parse_numbers(option, text, what)
-    if len(numbers) != count:
-        raise click.UsageError(f"{option} {text}: must be {what}")
-    return tuple(numbers)

@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     help="Draw the section and the modes (default: no); with --sweep-load the frequencies"
     " over the load (default: yes).",
 )
-@options.dry_run
 @options.figure_format
 @options.study
 def command(
@@ -53,7 +52,6 @@ def command(
     fitted: Path | None,
     measured: Path | None,
     pictures: bool | None,
-    dry_run: bool,
     study: options.Study,
 ) -> int:
     """Evaluate one design of CASE: frequencies with their labels, in modes.json.
@@ -74,14 +72,12 @@ def command(
     """
     from ..report.shape_data import tyre_data
     from ..studies import modes as studies
-    from ..studies.pressing_plan import PlannedState, plan_pressing
+    from ..studies.pressing_plan import PlannedState, plan_evaluations, plan_pressing
     from ..tyre.effects.edit import changed, with_part
 
     loads = requested_loads(load_N, sweep)
     if wheel and not loads:
         raise click.UsageError("--wheel goes with --load-N or --sweep-load")
-    if dry_run and not loads:
-        raise click.UsageError("--dry-run goes with --load-N or --sweep-load")
     if pictures and load_N is not None:
         raise click.UsageError("--pictures goes with --sweep-load, or without a load")
     if measured and loads:
@@ -108,21 +104,19 @@ def command(
         evaluator.needs_road(modes=True)
     if fitted and sweep is not None:
         designs["fitted"] = arguments.fitted_values(fitted, loaded, terminal)
+    plan = plan_evaluations(loaded, evaluator, [values])
     if loads:
         pressed_to = [PlannedState(sum(load > 0 for load in loads), modes=True)]
         plan = plan_pressing(loaded, evaluator, pressed_to, len(designs), study.jobs)
-        if study.print_plan(plan, dry_run):
-            return 0
     lossy = any(getattr(m, "loss_factor", None) for m in loaded.case.materials.values())
     if lossy and loads:
         terminal.note("no damping is computed on the road: loss factors have no effect")
     if sweep is not None:
-        run = study.run(loaded, "modes", evaluator, "sweep-load", load_N=loads)
+        run = study.run(loaded, "modes", evaluator, "sweep-load", plan=plan, load_N=loads)
         draw = pictures is not False
-        jobs = plan.at_once if loads else 1
-        return write_load_sweep(loaded, evaluator, run, designs, loads, study, jobs, draw)
+        return write_load_sweep(loaded, evaluator, run, designs, loads, study, plan.at_once, draw)
     files, load = [measured] if measured else [], loads[0] if loads else 0.0
-    run = study.run(loaded, "modes", evaluator, measured=files, load_N=load)
+    run = study.run(loaded, "modes", evaluator, measured=files, plan=plan, load_N=load)
     if loads:
         return write_modes_at_load(loaded, evaluator, run, values, loads[0], study)
     result, evaluation, modes = studies.run(loaded, evaluator, values)

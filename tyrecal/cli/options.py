@@ -196,8 +196,8 @@ def every(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
 dry_run = option(
     "--dry-run",
     is_flag=True,
-    help="Print the problem size on the road, the number of runs, and their approximate time and"
-    " memory; run and write nothing.",
+    help="Print the problem size, the number of runs, their approximate time and memory; run and"
+    " write nothing.",
 )
 pressures = every(_from, _to, _steps)
 report = option(
@@ -219,6 +219,7 @@ SERIAL_OPTIONS = (
     store,
     no_store,
     allow_unusual,
+    dry_run,
     *OUTPUT_OPTIONS,
 )
 STUDY = (jobs, *SERIAL_OPTIONS[:-3], report, *OUTPUT_OPTIONS)
@@ -269,6 +270,7 @@ class Study:
     store: Path | None
     no_store: bool
     allow_unusual: bool
+    dry_run: bool
     jobs: int = 1  # designs evaluated at a time
     report: bool = False
     figure_format: str = "png"
@@ -299,14 +301,25 @@ class Study:
         evaluator: Evaluator,
         study: str = "",
         measured: Sequence[Path] = (),
+        plan: PressingPlan | None = None,
         **state: Any,
     ) -> Run:
         """The command's run, with the record behind ``evaluator``; ``study``: where it is not
-        ``command``; measured, state: of the results' `provenance`. Raises InputError,
+        ``command``; measured, state: of the results' `provenance`; plan: of its evaluations, by
+        default of one. A dry run ends here, before anything is written. Raises InputError,
         OSError."""
         from ..simulate.provenance import provenance
+        from ..studies.pressing_plan import plan_evaluations
+        from ..tyre.case import start_values
         from .output import Run
 
+        if self.dry_run:
+            plan = plan or plan_evaluations(loaded, evaluator, [start_values(loaded)])
+            self.terminal.result(plan.content())
+            self.terminal.say(str(plan))
+            raise click.exceptions.Exit(0)
+        if plan and plan.on_road:
+            self.terminal.note(str(plan))
         block = provenance(loaded, evaluator.solver, measured, **state)
         run = Run(loaded.path, self.output, command, evaluator.solver, study, block, loaded)
         run.figure_format, run.measured = self.figure_format, measured
@@ -325,16 +338,6 @@ class Study:
             self.terminal.note(
                 f"results of '{run.study}' in '{run.folder}' are those of an earlier run"
             )
-
-    def print_plan(self, plan: PressingPlan, dry_run: bool) -> bool:
-        """Print the plan of a run on the road: as the result of a dry run, else as a remark.
-        Returns ``dry_run``."""
-        if dry_run:
-            self.terminal.result(plan.content())
-            self.terminal.say(str(plan))
-        else:
-            self.terminal.note(str(plan))
-        return dry_run
 
     def notify(self, words: str, failure: EvaluationFailed | None) -> None:
         """How a study goes: a place that was reached, or why it was not."""

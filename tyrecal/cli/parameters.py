@@ -17,12 +17,16 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-# unit and example of a number, by the end of its option or metavar
+from ..errors import InputError
+
+# of a number, by its unit, the end of its option or metavar: the unit in words and examples
 ENDINGS = {
-    "kPa": ("kPa", "240"),
-    "N": ("N", "4000"),
-    "mm": ("mm", "12"),
-    "in": ("inches", "7.5"),
+    "kPa": ("kPa", "240 or 2.4bar"),
+    "N": ("N", "4000 or 4kN"),
+    "mm": ("mm", "12 or 1.2cm"),
+    "in": ("inches", "7.5 or 190mm"),
+    "Hz": ("Hz", "250 or 0.25kHz"),
+    "g": ("g", "5"),
     "MB": ("MB", "100"),
     "percent": ("percent", "0.3"),
 }
@@ -88,16 +92,31 @@ class _Answering(click.ParamType):
         raise NotImplementedError
 
 
+def unit_of(param: click.Parameter | None) -> str:
+    """The unit that an option's name or metavar ends with; "": none."""
+    names = [param.opts[0], param.metavar or ""] if param else []
+    return next((match[1] for name in names if (match := UNIT.search(name))), "")
+
+
 class _Number(_Answering):
     what = "a number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The number in the option's unit, with whatever unit it was given. Raises
+        click.UsageError."""
+        from ..units import read_number
+
+        if unit := unit_of(param):
+            with suppress(InputError):
+                value = read_number(str(value), unit)
+        return super().convert(value, param, ctx)
 
     def answer(self, value: Any, param: click.Parameter | None) -> str:
         """Unit and range of the answer, with an example."""
         default = param.default if param and type(param.default) in (int, float) else 2
         unit, example = "", f"{default:g}"
-        for name in [param.opts[0], param.metavar or ""] if param else []:
-            if match := UNIT.search(name):
-                unit, example = ENDINGS[match[1]]
+        if ending := unit_of(param):
+            unit, example = ENDINGS[ending]
         words = self.what + (f" in {unit}" if unit else "")
         low, high = getattr(self, "min", None), getattr(self, "max", None)
         if low is not None:
@@ -108,7 +127,7 @@ class _Number(_Answering):
 
 
 class Number(_Number, click.types.FloatParamType):
-    """A number in the unit that its option names."""
+    """A number in the unit that its option names; 2.4bar and 36psi for --pressure-kPa, too."""
 
 
 class NumberWithin(_Number, click.FloatRange):

@@ -71,6 +71,7 @@ def command(
         check,
         measured_readings,
         modal,
+        planned,
         run,
         states_sampled,
     )
@@ -89,7 +90,8 @@ def command(
     check(loaded, readings)
     files = [measured] if measured else []
     states = states_sampled(loaded, readings)
-    output = study.run(loaded, "sample", evaluator, measured=files, **states)
+    plan = planned(loaded, evaluator, readings, study.jobs) if study.dry_run else None
+    output = study.run(loaded, "sample", evaluator, measured=files, plan=plan, **states)
     with terminal.progress("sample", SAMPLE_STAGES) as bar:
         evaluator.on_progress = bar.at
         run_options = study.jobs, bar.begin, terminal.note

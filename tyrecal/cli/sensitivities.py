@@ -70,7 +70,7 @@ def command(
     """
     from ..studies.result import StudyInput
     from ..studies.sensitivities.deviations import measured_values
-    from ..studies.sensitivities.result import SensitivitiesResult, loads_on_road
+    from ..studies.sensitivities.result import SensitivitiesResult, loads_on_road, planned
     from ..studies.sensitivities.table import kinds_of, needs_gradients, numbers_of
 
     loaded, values = study.load(case, assignments, pressure_kPa)
@@ -92,8 +92,10 @@ def command(
         measured_values(loaded, measured)
     on_road = loads_on_road(loaded, kinds, loads_N)
     files = [file] if file else []
-    output = study.run(loaded, "sensitivities", evaluator, measured=files, load_N=on_road or 0.0)
     given = StudyInput(loaded, evaluator, designs, jobs=study.jobs)
+    plan = planned(given, numbers_of(loaded, by), on_road, file) if study.dry_run else None
+    load = on_road or 0.0
+    output = study.run(loaded, "sensitivities", evaluator, measured=files, plan=plan, load_N=load)
     with study.terminal.progress("sensitivities") as bar:
         evaluator.on_progress = bar.at
         result = SensitivitiesResult.run(given, by=by, of=kinds, loads_N=loads_N, measured=measured)

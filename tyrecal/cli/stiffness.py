@@ -22,7 +22,6 @@ from .parameters import option
 )
 @options.fitted(" and the initial one")
 @option("--pictures/--no-pictures", default=True, help="Draw the stiffnesses over the load.")
-@options.dry_run
 @options.figure_format
 @options.study
 def command(
@@ -32,7 +31,6 @@ def command(
     pressures: str | None,
     fitted: Path | None,
     pictures: bool,
-    dry_run: bool,
     study: options.Study,
 ) -> int:
     """Find the vertical, lateral, longitudinal and torsional stiffness of the tyre of CASE on a
@@ -76,9 +74,8 @@ def command(
         designs[FITTED] = arguments.fitted_values(fitted, loaded, terminal)
     pressed_to = [PlannedState(len(loads_N), rim_stiffness=True) for _ in kPa]
     plan = plan_pressing(loaded, evaluator, pressed_to, len(designs), study.jobs)
-    if study.print_plan(plan, dry_run):
-        return 0
-    output = study.run(loaded, "stiffness", evaluator, load_N=loads_N, pressure_kPa=kPa)
+    state = {"load_N": loads_N, "pressure_kPa": kPa}
+    output = study.run(loaded, "stiffness", evaluator, plan=plan, **state)
     with terminal.progress("stiffness") as bar:
         evaluator.on_progress = bar.at
         result = run(loaded, evaluator, designs, loads_N, kPa, plan.at_once, study.notify)

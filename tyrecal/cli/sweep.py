@@ -52,8 +52,9 @@ def command(
     tyrecal sweep my.yaml C10=8e5:1.2e6 A_belt=2e-7:4e-7 --latin-hypercube 200 --seed 1
     """
     from ..simulate.evaluate.cluster import reached
+    from ..studies.pressing_plan import plan_evaluations
     from ..studies.result import StudyInput
-    from ..studies.sweep import read_ranges, swept_state
+    from ..studies.sweep import DEFAULT_POINTS, grid, read_ranges, swept_state
     from ..studies.sweep_result import run
     from ..tyre.state import pressure_name
 
@@ -71,7 +72,12 @@ def command(
     evaluator = study.evaluator(loaded)
     designs = {"fitted" if fitted else "initial": values}
     given = StudyInput(loaded, evaluator, designs, jobs=study.jobs)
-    output = study.run(loaded, "sweep", evaluator, **swept_state(loaded, swept))
+    count = latin_hypercube or DEFAULT_POINTS * len(swept)
+    points = [{each.name: each.low for each in swept}] * count if sampled else grid(swept)
+    states = [{**values, **point} for point in points]
+    plan = plan_evaluations(loaded, evaluator, states, at_once=study.jobs)
+    state = swept_state(loaded, swept)
+    output = study.run(loaded, "sweep", evaluator, plan=plan, **state)
     with study.terminal.progress("sweep") as bar, reached(scheduler) as evaluator.scheduler:
         evaluator.on_progress = bar.at
         result = run(given, swept, sampled, latin_hypercube or 0, seed, study.notify)

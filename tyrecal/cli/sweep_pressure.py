@@ -50,8 +50,9 @@ def command(
     from ..simulate.evaluate.cluster import reached
     from ..studies.fit.prediction import read_responses
     from ..studies.fit.targets import read_targets
+    from ..studies.pressing_plan import plan_evaluations
     from ..studies.pressure_result import FITTED, run
-    from ..tyre.state import rim_of
+    from ..tyre.state import pressure_name, rim_of
 
     terminal = study.terminal
     options.not_both(study.jobs, scheduler)
@@ -63,7 +64,10 @@ def command(
     if fitted:
         designs[FITTED] = arguments.fitted_values(fitted, loaded, terminal)
         fit = read_responses(fitted)
-    output = study.run(loaded, "sweep-pressure", evaluator, pressure_kPa=pressures)
+    name = pressure_name(loaded)
+    states = [{**each, name: p} for each in designs.values() for p in pressures]
+    plan = plan_evaluations(loaded, evaluator, states, int(evaluator.has_gradients), study.jobs)
+    output = study.run(loaded, "sweep-pressure", evaluator, plan=plan, pressure_kPa=pressures)
     with terminal.progress("sweep") as bar, reached(scheduler) as evaluator.scheduler:
         evaluator.on_progress = bar.at
         result = run(loaded, evaluator, designs, pressures, study.jobs, study.notify, fit)

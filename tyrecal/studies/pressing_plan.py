@@ -1,9 +1,9 @@
-"""How large the problem of pressing a tyre on the road is, and about how long it takes, before it
-runs. Commands print it before they start, and with --dry-run instead of starting."""
+"""How often the solver runs for a study, on how large a problem, and about how long it takes.
+Commands print it with --dry-run; on the road, where a run takes minutes, always."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from ..files import Json
 from ..simulate.deck.decks_design import design_of
 from ..simulate.evaluate.evaluator import Evaluator
 from ..tyre.case import LoadedCase
+from ..tyre.values import paths_of, value_at
 
 # The costs of the bundled solver's factorisation grow as its entries: unknowns of the whole problem
 # times those of a section. Seconds of one processor, and bytes, for 1e9 of them.
@@ -18,16 +19,20 @@ FIRST_LOAD_S, FURTHER_LOAD_S = 150.0, 40.0
 FURTHER_DESIGN_S = 35.0  # of the first load of a design or state that begins at another one's
 MODES_AT_LOAD_S = 30.0  # in addition, for the modes at each load
 RIM_AT_LOAD_S = 30.0  # in addition, for the stiffness of the rim at each load
+# Seconds of an evaluation without a road, and more of them for each unknown of the section
+UNLOADED_S, UNLOADED_PER_UNKNOWN_S = 0.015, 2.4e-5
 MEMORY_BYTES, PROCESS_BYTES = 2.5e9, 1.5e8  # the latter of a process without any
 SENSITIVITY_SHARE = 0.08  # of a press, for the exact sensitivities by one variable
+UNLOADED_SENSITIVITY_SHARE = 0.15  # of an evaluation without a road, for the same
 DESIGNS_OF_FIT = {"slsqp": 15, "gauss-newton": 10}  # most that a start takes, as a rule
+DESIGNS_OF_LABELS = 5  # at which frequencies without labels are compared, as a rule
 
 
 @dataclass(frozen=True)
 class PlannedState:
     """One state of a design, and the loads to which it is pressed there."""
 
-    loads: int  # how many
+    loads: int = 0  # how many; 0: the tyre is on no road
     modes: bool = False  # those at each load are wanted
     sensitivities: int = 0  # number of variables with exact ones
     neighbours: int = 0  # further designs, from which sensitivities are differences
@@ -36,7 +41,7 @@ class PlannedState:
 
 @dataclass(frozen=True)
 class PressingPlan:
-    """Size of the problem, number of runs, likely time and memory.
+    """Size of the problem, number of runs, likely time and memory, on the road and without one.
 
     >>> plan = PressingPlan(nodes=100, places_round=17, designs=1, states=())
     >>> plan.section_unknowns
@@ -51,6 +56,12 @@ class PressingPlan:
     at_once: int = 1  # how many of them run side by side
     is_timed: bool = True  # the estimates hold for the solver
     is_estimate: bool = False
+    starts: int = 0  # runs before them: of the design at which they start, or of a calibration
+
+    @property
+    def on_road(self) -> bool:
+        """Whether anything is pressed on the road."""
+        return any(each.loads for each in self.states)
 
     @property
     def section_unknowns(self) -> int:
@@ -64,23 +75,36 @@ class PressingPlan:
 
     @property
     def runs(self) -> int:
-        """Loads that are reached in all: designs x states x loads."""
-        return self.designs * sum(each.loads * (1 + each.neighbours) for each in self.states)
+        """Runs in all: designs x states x loads, and ``starts``."""
+        each = sum(max(1, x.loads) * (1 + x.neighbours) for x in self.states)
+        return self.designs * each + self.starts
 
     @property
     def seconds(self) -> float | None:
         """Likely time on quiet processors, nothing answered from the record; None: not known."""
         if not self.is_timed:
             return None
+        unloaded_s = UNLOADED_S + UNLOADED_PER_UNKNOWN_S * self.section_unknowns
+        total = unloaded_s * self.starts
+        for state in self.states:
+            if not state.loads:
+                share = 1 + UNLOADED_SENSITIVITY_SHARE * state.sensitivities + state.neighbours
+                total += unloaded_s * self.designs * share
+        return (total + self._pressing_s) / self.at_once
+
+    @property
+    def _pressing_s(self) -> float:
+        """Seconds of all that is pressed on the road."""
+        states = [each for each in self.states if each.loads]
         # designs and states begin at the first one's equilibrium, except where more is wanted
-        alone = [each.modes or each.rim_stiffness for each in self.states]
+        alone = [each.modes or each.rim_stiffness for each in states]
         total = 0.0 if all(alone) else FIRST_LOAD_S - FURTHER_DESIGN_S
-        for each, is_alone in zip(self.states, alone, strict=True):
+        for each, is_alone in zip(states, alone, strict=True):
             begun = FIRST_LOAD_S if is_alone else FURTHER_DESIGN_S
             press = begun + FURTHER_LOAD_S * (each.loads - 1) + self._more_s(each)
             share = 1 + SENSITIVITY_SHARE * each.sensitivities + each.neighbours
             total += self.designs * press * share
-        return 1e-9 * self._entries * total / self.at_once
+        return 1e-9 * self._entries * total
 
     def _more_s(self, state: PlannedState) -> float:
         """Seconds for results at each load in addition to the footprint."""
@@ -91,6 +115,7 @@ class PressingPlan:
     def memory_bytes(self) -> float | None:
         """Likely memory of all that run side by side; None: not known."""
         factors = 1 + (self.designs * len(self.states) > 1)  # the first design's, too
+        factors *= self.on_road
         of_one = factors * 1e-9 * self._entries * MEMORY_BYTES + PROCESS_BYTES
         return self.at_once * of_one if self.is_timed else None
 
@@ -113,30 +138,27 @@ class PressingPlan:
         }
 
     def __str__(self) -> str:
-        if not self.states:
-            return "no target is on the road: nothing is pressed"
-        loads = sorted({each.loads for each in self.states})
         about = "about " * self.is_estimate
-        size = (
-            f"size: {self.section_unknowns} unknowns in the section, {self.unknowns} in 3-D"
-            f" ({self.nodes} nodes x {self.places_round} stations round half the tyre)"
-        )
-        counts = (
-            f"{about}{_count(self.designs, 'design')} x {_count(len(self.states), 'state')}"
-            f" x {_count(loads[-1], 'load', loads[:-1])}: {about}{_count(self.runs, 'run')}"
-        )
-        words = [size, counts]
+        size = f"size: {self.section_unknowns} unknowns in the section"
+        counts = f"{about}{_count(self.designs, 'design')} x {_count(len(self.states), 'state')}"
+        if self.on_road:
+            size += (
+                f", {self.unknowns} in 3-D"
+                f" ({self.nodes} nodes x {self.places_round} stations round half the tyre)"
+            )
+            loads = sorted({each.loads for each in self.states})
+            counts += f" x {_count(loads[-1], 'load', loads[:-1])}"
+        counts += f" + {self.starts} before" * bool(self.starts)
+        words = [size, f"{counts}: {about}{_count(self.runs, 'run')}"]
         if self.seconds is not None and self.memory_bytes is not None:
-            words += [
-                f"about {time_in_words(self.seconds)}",
-                f"{self.memory_bytes / 1e9:.1f} GB of memory",
-            ]
+            words += [f"about {time_in_words(self.seconds)} in the solver"]
+            words += [f"{self.memory_bytes / 1e9:.1f} GB of memory"]
         return "; ".join(words)
 
 
 def _count(number: int, noun: str, more: Sequence[int] = ()) -> str:
     """'1 state', '2 states', '1 or 2 loads'."""
-    numbers = " or ".join(map(str, [*more, number]))
+    numbers = " or ".join(filter(None, [", ".join(map(str, more)), str(number)]))
     return f"{numbers} {noun}{'s' * (number != 1)}"
 
 
@@ -171,6 +193,31 @@ def plan_pressing(
     if plan.memory_bytes and available is not None:
         most = min(most, int(available / plan.memory_bytes))
     return replace(plan, at_once=max(1, min(at_once, most)))
+
+
+def plan_evaluations(
+    case: LoadedCase,
+    evaluator: Evaluator,
+    designs: Sequence[Mapping[str, float]],
+    sensitivities: int = 0,
+    at_once: int = 1,
+) -> PressingPlan:
+    """The plan of designs on no road, each with so many sensitivities: of their differences, where
+    the solver gives none. The case's own design is evaluated first where others start from it."""
+    exact = evaluator.has_gradients
+    state = PlannedState(0, False, *((sensitivities, 0) if exact else (0, sensitivities)))
+    plan = plan_pressing(case, evaluator, [state], len(designs), at_once)
+    if evaluator.design.nominal is None or "start" not in evaluator.solver.capabilities:
+        return plan
+    # without the sensitivities of a design its run answers for the start, too
+    others = designs[:1] if sensitivities else designs
+
+    def is_nominal(values: Mapping[str, float]) -> bool:
+        numbers = [(path, x) for name, x in values.items() for path in paths_of(case, name)]
+        same = all(value_at(case, path) == x for path, x in numbers)
+        return same and evaluator.design.at(values).is_nominal  # which is slow
+
+    return replace(plan, starts=int(not any(map(is_nominal, others))))
 
 
 def available_memory_bytes() -> float | None:

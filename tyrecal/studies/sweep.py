@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 from math import isfinite, prod
 from typing import Any
@@ -18,10 +19,10 @@ from ..simulate.evaluate.evaluator import Evaluator, Question
 from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from ..simulate.modes.find import LabelledModes, find_modes
 from ..simulate.modes.label import Label
-from ..tyre.case import LoadedCase
+from ..tyre.case import LoadedCase, parse_assignment
 from ..tyre.own_deck.numbers import as_known
 from ..tyre.state import pressure_name
-from ..tyre.values import unusual_value, with_values
+from ..tyre.values import unit_named, unusual_value, with_values
 from .fit.targets import target_labels
 from .sensitivities.table import numbers_of
 from .variable import read_variables
@@ -61,7 +62,7 @@ def read_ranges(
     """Ranges NAME=A:B:N of a grid or, if ``sampled``, NAME=A:B; without any, all variables about
     their values, within their bounds. Raises InputError, for ends that no tyre has too, unless
     they are allowed."""
-    ranges = [_read_range(text, sampled) for text in texts] or _about_variables(case)
+    ranges = [_read_range(case, text, sampled) for text in texts] or _about_variables(case)
     known = [as_known(each.name, case.deck_numbers) for each in ranges]
     for name in known:
         if known.count(name) > 1:
@@ -85,19 +86,23 @@ def read_ranges(
     return ranges
 
 
-def _read_range(text: str, sampled: bool) -> SweptRange:
+def _read_range(case: LoadedCase, text: str, sampled: bool) -> SweptRange:
     form, example = ("NAME=A:B", "such as C10=8e5:1.2e6") if sampled else ("NAME=A:B:N", EXAMPLE)
     match = RANGE_TEXT.fullmatch(text)
     if not match or (match[4] is None) != sampled:
         with_samples = " with a Latin hypercube" if sampled else ""
         raise InputError(f"'{text}' is no range{with_samples}: must be {form}, {example}")
+    name = match[1].strip()
+    ends = [
+        parse_assignment(f"{name}={each}", partial(unit_named, case)) for each in match.group(2, 3)
+    ]
     try:
-        low, high, steps = float(match[2]), float(match[3]), int(match[4] or 2)
+        (_, low), (_, high), steps = *ends, int(match[4] or 2)
     except ValueError:
         raise InputError(f"'{text}': must be {form} with numbers, {example}") from None
     if not (isfinite(low) and isfinite(high) and low < high and steps > 1):
         raise InputError(f"'{text}': A must be less than B, and N at least 2, {example}")
-    return SweptRange(match[1].strip(), low, high, steps)
+    return SweptRange(name, low, high, steps)
 
 
 def _about_variables(case: LoadedCase) -> list[SweptRange]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from .effects import catalogue
 
 EFFECT_PATH = "effects."
@@ -14,6 +16,7 @@ UNIT_BY_ENDING = {  # by a key's end, the longer first
     "rad_per_N_m": "rad/(N m)",
     "rad_per_s": "rad/s",
     "kPa": "kPa",
+    "N": "N",
     "Pa": "Pa",
     "deg": "degrees",
     "m": "m",
@@ -25,9 +28,12 @@ UNIT_BY_ENDING = {  # by a key's end, the longer first
 
 
 def unit_of(path: str) -> str:
-    """The unit of the number at a dotted path, "" where it has none."""
+    """The unit of the number at a dotted path, "" where it has none; a number in a list has that of
+    the list's key."""
+    path = re.sub(r"(\.\d+)+$", "", path)
     if path.startswith(EFFECT_PATH):
-        return catalogue()[path.removeprefix(EFFECT_PATH)].unit
+        effect = catalogue().get(path.removeprefix(EFFECT_PATH))
+        return effect.unit if effect else ""
     if path.endswith(" / angle"):  # of a user's deck
         return "degrees"
     return next((unit for end, unit in UNIT_BY_ENDING.items() if path.endswith(f"_{end}")), "")

@@ -19,6 +19,7 @@ from .case.parts import Setting, as_written
 from .case.schema import Case
 from .case.shape import explain, type_at
 from .case.stations import read_section_of
+from .number_units import unit_of
 from .own_deck.numbers import as_known, canonical
 from .plugins import IDS
 from .resolve import resolved
@@ -139,6 +140,12 @@ def paths_of(loaded: LoadedCase, name: str) -> list[str]:
     """Dotted paths of the numbers that the variable or the path ``name`` sets. Raises InputError
     with a suggestion for an unknown name."""
     return [dotted(keys) for keys in _keys(loaded, name)]
+
+
+def unit_named(loaded: LoadedCase, name: str) -> str:
+    """The unit of the number that the variable or the path ``name`` sets, "" where it has none.
+    Raises InputError as `paths_of` does."""
+    return unit_of(paths_of(loaded, name)[0])
 
 
 def value_at(loaded: LoadedCase, path: str) -> Any:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import isfinite, nan
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ from ...tyre.case import LoadedCase
 from ...tyre.case.mistakes import suggestion
 from ...tyre.effects import catalogue
 from ...tyre.number_units import EFFECT_PATH
+from ...units import read_number
 from ..difference_runs import runs_in_words
 from ..fit.targets import rims_of
 from ..inference.check_units import check_units
@@ -26,11 +26,13 @@ from ..inference.expansion import first_points
 from ..inference.inverse_problem import Assumed, Toggle
 from ..inference.model import EffectRange, Query
 from ..inference.observations import Observations, observe
+from ..inference.run_estimate import estimate, model_of
 from ..inference.tyre_model import TyreModel
 from ..inference.uncertainties import Source, calibrated, sources
 from ..labelling.label import label
 from ..labelling.result import labels_posterior
 from ..labels import Labels
+from ..pressing_plan import PlannedState, PressingPlan
 from ..variable import read_variables
 from .calibrated import calibrated_variables
 from .diagnosis import Diagnosis, diagnose
@@ -186,9 +188,23 @@ def study(
     )
 
 
+def planned(
+    case: LoadedCase, evaluator: Evaluator, measured: Path, effects: Sequence[str], jobs: int
+) -> PressingPlan:
+    """About how often the solver runs, before it does."""
+    readings = in_states(case, readings_of(case, measured, labelled=False))
+    model = model_of(case, evaluator, readings, effects)
+    loaded = [each for each in readings if each.load_N and not each.rim]
+    pressed = [
+        PlannedState(len({each.load_N for each in loaded if each.pressure_kPa == kPa}))
+        for kPa in sorted({each.pressure_kPa for each in loaded})
+    ]
+    return estimate(model, _runs(model), jobs, pressed)
+
+
 def _runs(model: TyreModel) -> int:
-    """About how many runs a diagnosis by differences takes: the calibration, the expansion about
-    it, and the likeliest effects again at one more size and at their re-fits."""
+    """About how many runs a diagnosis takes: the calibration, the expansion about it, and the
+    likeliest effects again at one more size and at their re-fits."""
     x = model.start
     likely = [Query(x, {id: span.high or span.low}) for id, span in model.ranges.items()]
     again = 2 * model.runs([replace(each, near=x) for each in likely[:LIKELIEST]])
@@ -243,11 +259,9 @@ def parse_change(text: str) -> Toggle:
     if id not in known:
         raise InputError(f"'{text}': there is no effect '{id}'{suggestion(id, known)}")
     try:
-        number = float(value)
-    except ValueError:
-        number = nan
-    if not isfinite(number):
-        raise InputError(f"'{text}': '{value.strip()}' is not a number")
+        number = read_number(value, known[id].unit if mark == "=" else "")
+    except InputError as error:
+        raise InputError(f"'{text}': {error}") from None
     if mark == "*" and number == 1:
         raise InputError(f"'{text}': a factor of 1 changes nothing")
     return Toggle(id, number, mark == "*")

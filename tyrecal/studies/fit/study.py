@@ -99,25 +99,28 @@ class FitStudy:
         return one_state and self.evaluator.has_gradients
 
     def pressing_plan(self, method: str, starts: int, jobs: int) -> PressingPlan:
-        """Size, runs and likely time of the designs on the road; without states where nothing was
-        measured there."""
+        """Size, runs and likely time of the designs of a fit, in all states."""
         free = [name for name in self._plain.case.variables if name not in self.fixed]
         if self.needs_labels:
             loaded = [each for each in self.readings if each.load_N]
             places = {(each.state, each.label is not None) for each in loaded}
+            states = {each.state.of(self._plain) for each in self.readings if not each.load_N}
             exact = False
         else:
             problem = self._problem
             places = {(each.state, bool(each.member)) for each in problem.road}
+            states = {*problem.labels}
             exact = problem.exact_on_road > 0
         loads = Counter((state.unloaded, modal) for state, modal in places)
-        states = [
+        slopes = (len(free), 0) if self.evaluator.has_gradients else (0, len(free))
+        planned = [PlannedState(0, False, *slopes) for _ in states]
+        planned += [
             PlannedState(count, modal, *((len(free), 0) if exact and not modal else (0, len(free))))
             for (_, modal), count in loads.items()
         ]
         designs = DESIGNS_OF_FIT[method] * starts
-        at_once = starts if starts > 1 else sum(1 + each.neighbours for each in states)
-        return plan_pressing(self.case, self.evaluator, states, designs, min(jobs, at_once), True)
+        at_once = starts if starts > 1 else sum(1 + each.neighbours for each in planned)
+        return plan_pressing(self.case, self.evaluator, planned, designs, min(jobs, at_once), True)
 
     def run(
         self,
@@ -134,7 +137,7 @@ class FitStudy:
         the design that was fitted, until they are the same. Raises what `label` and `calibrate` do.
         """
         plan = self.pressing_plan(method, starts, jobs)
-        jobs = plan.at_once if plan.runs else jobs  # as the memory allows
+        jobs = plan.at_once if plan.on_road else jobs  # as the memory allows
 
         def calibrated() -> Fit:
             return calibrate(

@@ -169,10 +169,11 @@ class TyreModel:
         return [self._completed(point, known) for point in points]
 
     def runs(self, points: Sequence[Query]) -> int:
-        """How many runs of the solver the points take by differences, if none is recorded; without
-        those of coupled modes."""
+        """How many runs of the solver the points take, if none is recorded; without those of
+        coupled modes."""
         wanted = [each for p in self._queries(points)[1].values() for each in self._wanted(p)]
-        runs = sum(1 + len(names) for _, names in wanted)
+        exact = self.evaluator.has_gradients
+        runs = sum(1 if exact else 1 + len(names) for _, names in wanted)
         if self.has_uncertain_compounds and any(map(_needs_constants, points)):
             runs += len(self.states) * (1 + count_numbers(self.case))
         return runs
@@ -184,7 +185,7 @@ class TyreModel:
 
     @property
     def runs_of_calibration(self) -> int:
-        """About how many runs a plain fit takes by differences: steps, and the constants twice."""
+        """About how many runs a plain fit takes: steps, and the constants twice."""
         x = self.start
         steps = FIT_STEPS * self.runs([Query(x)])
         return 2 * self.runs([Query(x, constants=True)]) + steps

@@ -28,8 +28,10 @@ from ..inference.inverse_problem import Assumed, places
 from ..inference.model import Answer, Query
 from ..inference.observations import Observable, Observations, observe
 from ..inference.plain_fit import plain_fit
+from ..inference.run_estimate import estimate, model_of, selection_runs
 from ..inference.tyre_model import TyreModel
 from ..inference.uncertainties import Source, calibrated, sources
+from ..pressing_plan import PressingPlan
 from ..variable import DesignVariable, read_variables
 from .box import Draws, grow_box
 from .chains import needs_emcee
@@ -99,10 +101,7 @@ def run(
     pressures = _pressures(case, {row.pressure_kPa for row in observations.rows}, at_kPa)
     rims = list(dict.fromkeys([None, *(row.rim for row in observations.rows)]))
     if not evaluator.has_gradients:
-        count = len(model.start) + (len(pressures) > 1)
-        boxes = len(rims) * EACH[0] * count * (1 + count)
-        runs = model.runs_of_calibration + boxes + model.runs([Query(model.start, constants=True)])
-        say(runs_in_words(evaluator, model.first_design, runs, jobs))
+        say(runs_in_words(evaluator, model.first_design, _runs(model, len(rims)), jobs))
     check_units(model, observations, ["what was measured"])
     where = places(observations, known)
     x = plain_fit(model, observations, where)
@@ -186,6 +185,23 @@ def run(
         noise,
         float((np.sqrt(np.diag(total)) / spread).max()) - 1,
     )
+
+
+def planned(
+    case: LoadedCase, evaluator: Evaluator, readings: Sequence[Measurement] | None, jobs: int
+) -> PressingPlan:
+    """About how often the solver runs, before it does."""
+    rows = targets_as_readings(case, None) if readings is None else modal(readings)
+    model = model_of(case, evaluator, rows)
+    return estimate(model, _runs(model, len({None, *(row.rim for row in rows)})), jobs)
+
+
+def _runs(model: TyreModel, rims: int) -> int:
+    """About how many runs: the calibration, one box for each rim, and what is predicted. Almost
+    always there are several pressures, which count as a coordinate of a box."""
+    count = len(model.start) + 1
+    each = 1 if model.evaluator.has_gradients else 1 + count
+    return rims * EACH[0] * count * each + selection_runs(model)
 
 
 def whitening(sigma: Array) -> Array:

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from pydantic import Field
 
 from ...errors import InputError
+from ...measured.targets import in_states, readings_of
 from ...simulate.modes.label import FAMILIES, Label, in_words
 from ...tyre.case import LoadedCase
 from ...tyre.footprint_quantities import FOOTPRINT_QUANTITIES
+from ..inference.run_estimate import model_of, selection_runs
 from ..inference.section_fields import known_from
+from ..pressing_plan import PlannedState, PressingPlan, plan_evaluations, plan_pressing
 from ..result import Cell, Column, CsvRow, Result, ResultPart, StudyInput, Table, csv_text
 from .deviations import deviations, measured_values
 from .selection import CHANCE, Candidates, likeliest_shifts, select_numbers
@@ -211,6 +215,24 @@ def loads_on_road(
     if FOOTPRINT_QUANTITIES.keys().isdisjoint(kinds_of(of)):
         return []
     return list(loads_N or loads_of(case))
+
+
+def planned(
+    given: StudyInput, names: Sequence[str], loads_N: Sequence[float], measured: Path | None
+) -> PressingPlan:
+    """How often the solver runs, before it does; about how often, where a file of measurements is
+    fitted before numbers are selected."""
+    case, evaluator, values = given.case, given.evaluator, [*given.designs.values()][-1]
+    plan = plan_evaluations(case, evaluator, [values], len(names), given.jobs)
+    if loads_N:
+        road = PlannedState(len(loads_N), sensitivities=len(names))
+        pressed = plan_pressing(case, evaluator, [*plan.states, road], 1, given.jobs)
+        plan = replace(pressed, starts=plan.starts)
+    if not measured:
+        return plan
+    readings = in_states(case, readings_of(case, measured))
+    runs = selection_runs(model_of(case, evaluator, readings))
+    return replace(plan, starts=plan.starts + runs, is_estimate=True)
 
 
 def family_of(quantity: str) -> str:

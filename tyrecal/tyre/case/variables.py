@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from math import isfinite
 
 from ...errors import InputError
+from ...units import read_number
 from .checks import at, find
 from .loaded import LoadedCase
 from .parts import Setting, as_written
@@ -43,16 +44,21 @@ def overruled(loaded: LoadedCase, given: Collection[str] = ()) -> list[str]:
     return sentences
 
 
-def parse_assignment(text: str) -> tuple[str, float]:
+def parse_assignment(
+    text: str, unit_of: Callable[[str], str] = lambda name: ""
+) -> tuple[str, float]:
     """``NAME=VALUE`` as name and number. Raises InputError."""
-    name, value = parse_setting(text)
+    name, value = parse_setting(text, unit_of)
     if value is None or isinstance(value, str):
         raise InputError(f"{name} is '{as_written(value)}', must be a number")
     return name, value
 
 
-def parse_setting(text: str) -> tuple[str, Setting]:
-    """``NAME=VALUE`` as name and number, true, false, null or a word. Raises InputError."""
+def parse_setting(
+    text: str, unit_of: Callable[[str], str] = lambda name: ""
+) -> tuple[str, Setting]:
+    """``NAME=VALUE`` as name and number, true, false, null or a word; unit_of: the unit of a name's
+    number, which may be written with another. Raises InputError."""
     name, equals, value = text.partition("=")
     name = name.strip()
     if not equals or not name:
@@ -64,7 +70,10 @@ def parse_setting(text: str) -> tuple[str, Setting]:
     except ValueError:
         if WORD.fullmatch(value.strip()):
             return name, value.strip()
-        raise InputError(f"{name} is '{value.strip()}', must be a number") from None
+        try:
+            number = read_number(value, unit_of(name))
+        except InputError as error:
+            raise InputError(f"{name} is '{value.strip()}': {error}") from None
     if not isfinite(number):
         raise InputError(f"{name} is '{value.strip()}', must be a finite number")
     return name, number
