@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import sys
+from typing import Any
 
 import pytest
 from pydantic import BaseModel
@@ -24,7 +25,8 @@ from .conftest import CASES, ROOT
 
 SITE = CASES / "site"
 sys.path.insert(0, str(SITE))
-import reference  # noqa: E402  it is where Sphinx looks for it
+import notebook  # noqa: E402  they are where Sphinx looks for them
+import reference  # noqa: E402
 
 
 def properties(model: type[BaseModel]) -> set[str]:
@@ -103,3 +105,27 @@ def test_no_option_is_hidden() -> None:
 def test_every_table_is_on_a_page() -> None:
     texts = "".join(path.read_text(encoding="utf-8") for path in SITE.glob("*.md"))
     assert {*re.findall(r"\[\[(.*)\]\]", texts)} == {*reference.TABLES}
+
+
+def numbers_in(outputs: list[dict[str, Any]]) -> list[float]:
+    """Numbers that outputs of a cell show; pictures have none."""
+    data = [each.get("data", {"text/plain": each.get("text", "")}) for each in outputs]
+    text = "\n".join(each.get("text/html") or each["text/plain"] for each in data)
+    text = re.sub(r"<style.*?</style>|<Picture.*?>|tyre \w+, ", "", text, flags=re.S)
+    return [float(x) for x in re.findall(r"-?\d+\.?\d*(?:e[-+]\d+)?", text)]
+
+
+@pytest.mark.slow
+def test_the_notebook_shows_the_numbers_of_a_new_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its cells run in order; a last digit that is shown may differ by one."""
+    pytest.importorskip("pandas")
+    monkeypatch.chdir(ROOT)
+    stored, names = notebook.read(), dict[str, Any]()
+    assert notebook.NOTEBOOK.stat().st_size < 150_000
+    for count, cell in enumerate(notebook.code_cells(stored), start=1):
+        anew = notebook.run(cell["source"], names, count)
+        kinds = [sorted(each.get("data", ["text"])) for each in cell["outputs"]]
+        assert [sorted(each.get("data", ["text"])) for each in anew] == kinds
+        old, new = numbers_in(cell["outputs"]), numbers_in(anew)
+        assert new == pytest.approx(old, rel=2e-3, abs=0.011)
+    assert count > 4

@@ -18,6 +18,7 @@ from pathlib import Path
 from textwrap import dedent
 from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
+import notebook
 from effect_pictures import picture
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -339,6 +340,7 @@ def exit_codes() -> str:
 
 
 TABLES = {
+    "notebook": notebook.markdown,
     "results": result_keys,
     "effects": effects,
     "keywords": keywords,

@@ -11,7 +11,14 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 
 from ..studies.fit.result import FitResult, FittedMode
 from ..studies.result import in_lines
+from . import correlation
 from .figure import COLOURS, GREY, MARKERS, headline, in_house_style, new_figure
+
+
+def figures(fit: FitResult) -> dict[str, Figure]:
+    """Deviations from the targets, and how shapes agree."""
+    deviations = draw_states(fit) if fit.states else draw_deviations(fit.modes)
+    return {"deviations": deviations, **correlation.figures(fit)}
 
 
 @in_house_style

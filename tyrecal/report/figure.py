@@ -54,11 +54,20 @@ in_house_style = rc_context(
 )
 
 
+class Picture(Figure):
+    """A figure that a notebook shows as it is written to a file."""
+
+    def _repr_png_(self) -> bytes:
+        file = io.BytesIO()
+        write_png(self, file)
+        return file.getvalue()
+
+
 def new_figure(
     width: float, height: float, layout: str | None = "constrained", caption: str = ""
 ) -> Figure:
     """An empty figure, its size in inches; caption: the words below it on a page."""
-    figure = Figure((width, height), dpi=DPI, layout=layout, label=caption)  # type: ignore[arg-type]
+    figure = Picture((width, height), dpi=DPI, layout=layout, label=caption)  # type: ignore[arg-type]
     FigureCanvasAgg(figure)
     return figure
 
@@ -95,18 +104,22 @@ def use_plain_numbers(figure: Figure) -> None:
 
 @in_house_style
 def save(figure: Figure, path: Path) -> None:
-    """Write a picture in the format of the suffix of ``path``, one of `files.PICTURE_FORMATS`.
-
-    A PNG has 256 colours: a third of the size, and no difference to see. It keeps the numbers that
-    it draws, see `drawn`.
-    """
-    use_plain_numbers(figure)
+    """Write a picture in the format of the suffix of ``path``, one of `files.PICTURE_FORMATS`."""
     kind = path.suffix[1:]
-    if kind != "png":
+    with atomic_write(path) as partial:
+        if kind == "png":
+            write_png(figure, partial)
+            return
+        use_plain_numbers(figure)
         undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
-        with atomic_write(path) as partial:
-            figure.savefig(partial, format=kind, metadata=undated[kind])
-        return
+        figure.savefig(partial, format=kind, metadata=undated[kind])
+
+
+@in_house_style
+def write_png(figure: Figure, file: Path | io.BytesIO) -> None:
+    """Write a PNG of 256 colours: a third of the size, and no difference to see. It keeps the
+    numbers that it draws, see `drawn`."""
+    use_plain_numbers(figure)
     canvas = figure.canvas
     assert isinstance(canvas, FigureCanvasAgg)
     canvas.draw()
@@ -114,8 +127,7 @@ def save(figure: Figure, path: Path) -> None:
     small = image.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     kept = PngInfo()
     kept.add_itxt(drawn.PNG_KEY, json.dumps(drawn.drawn_numbers(figure)), zip=True)
-    with atomic_write(path) as partial:
-        small.save(partial, "PNG", compress_level=COMPRESSION, pnginfo=kept)
+    small.save(file, "PNG", compress_level=COMPRESSION, pnginfo=kept)
 
 
 @in_house_style

@@ -11,7 +11,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 from matplotlib.ticker import MaxNLocator
 
-from ..studies.footprint import FootprintRow
+from ..studies.footprint import FootprintResult, FootprintRow
 from .figure import COLOUR_MAP, COLOURS, GREY, headline, in_house_style, new_figure
 from .shape_data import PatchData
 
@@ -38,6 +38,11 @@ def draw_footprint(rows: Sequence[FootprintRow], patches: Sequence[PatchData]) -
         own = [patch for patch in patches if patch.design == design]
         figures[f"footprint_{design}"] = draw_patches(own, highest)
     return figures
+
+
+def figures(result: FootprintResult) -> dict[str, Figure]:
+    """The curves of the rows; the pressure in the patch is in another file."""
+    return {"footprint": draw_curves(result.rows)}
 
 
 @in_house_style

@@ -10,13 +10,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..simulate.modes.label import FAMILIES, Label
-from ..studies.pressure_result import PressureRow
+from ..studies.pressure_result import PressureRow, PressureSweep
 from .figure import COLOURS, GREY, MARKERS, in_house_style, new_figure
 
 LINE_STYLES = {"initial": (0, (4, 2)), "fitted": "-"}
 GAP = 0.042  # of an axis' height between two labels' centres
 
 Curves = dict[Label, tuple[np.ndarray, np.ndarray, np.ndarray]]
+
+
+def figures(result: PressureSweep) -> dict[str, Figure]:
+    """The picture of the rows, without targets."""
+    return {"pressure_sweep": draw_pressure_sweep(result.rows, [])}
 
 
 @in_house_style

@@ -93,6 +93,7 @@ class FootprintResult(Result):
 
     study, stem, heading = "footprint", "footprint", "Footprint"
     part = "tyrecal.report.html.footprint:part"
+    figures = "tyrecal.report.footprint:figures"
     follows_fit = True
 
     pressure_kPa: dict[str, float] = Field(default={})  # inflation pressure by design

@@ -59,8 +59,8 @@ class LoadSweep(Result):
     """load_sweep.json"""
 
     study, stem, heading = "sweep-load", "load_sweep", "Frequencies over load"
-    command = "modes --sweep-load"
     figures = "tyrecal.report.load:figures"
+    command = "modes --sweep-load"
 
     pressure_kPa: dict[str, float] = Field(default={})  # inflation pressure by design
     designs: dict[str, dict[str, float]] = Field(default={})  # values of the variables by design

@@ -53,6 +53,7 @@ class PressureSweep(Result):
 
     study, stem, heading = "sweep-pressure", "pressure_sweep", "Frequencies over pressure"
     part = "tyrecal.report.html.pressure:part"
+    figures = "tyrecal.report.pressure:figures"
     follows_fit = True
 
     slopes: str = ""  # how sensitivities were computed: exact, or differences

@@ -19,6 +19,9 @@ from ..files import Json, json_text
 from ..simulate.evaluate.failure import EvaluationFailed
 from ..simulate.modes.label import Label
 from ..tyre.case import as_written
+from ..tyre.case.mistakes import shortened
+from ..tyre.case.parts import MAX_REPR
+from .notebook import Notebook
 
 if TYPE_CHECKING:
     from ..simulate.evaluate.evaluator import Evaluator
@@ -95,6 +98,9 @@ class ResultPart(BaseModel):
             if isinstance(each, Column)
         }
 
+    def __repr__(self) -> str:
+        return shortened(super().__repr__(), MAX_REPR)
+
     def cells(self) -> list[str | None]:
         """A table's row."""
         return [column.cell(getattr(self, key)) for key, column in self.columns().items()]
@@ -147,7 +153,7 @@ class StudyInput:
         return result.stamped(provenance(self.case, self.evaluator.solver, **of))
 
 
-class Result(ResultPart):
+class Result(Notebook, ResultPart):
     """A study: its result file, and how to run it. Older files do not record their origin."""
 
     study: ClassVar[str] = ""  # the command, as its entry in run.json
@@ -169,6 +175,10 @@ class Result(ResultPart):
         """Run the study; the result has its provenance. A study declares its options as further
         arguments by keyword. Raises InputError, EvaluationFailed."""
         raise InputError(f"the study '{cls.study}' is run by its command only")
+
+    @property
+    def shown(self) -> Self:
+        return self
 
     def quantities(self) -> dict[str, float]:
         """Numbers that a batch compares with a baseline, named ``KIND`` or ``KIND WHERE``:
@@ -205,11 +215,14 @@ class Result(ResultPart):
 
     def texts(self) -> dict[str, str]:
         """The files by name."""
-        texts = {f"{self.stem}.json": json_text(self.content())}
-        texts |= {f"{self.stem}.csv": table} if (table := self.csv()) else {}
+        tables = {f"{name}.csv": text for name, text in self.csv_texts().items()}
+        return {f"{self.stem}.json": json_text(self.content())} | tables | self._files
+
+    def csv_texts(self) -> dict[str, str]:
+        """The CSV files by their names without ``.csv``."""
+        texts = {self.stem: table} if (table := self.csv()) else {}
         further = self.csv_rows().items()
-        texts |= {f"{self.stem}_{name}.csv": rows_csv(rows) for name, rows in further if rows}
-        return texts | self._files
+        return texts | {f"{self.stem}_{name}": rows_csv(rows) for name, rows in further if rows}
 
     def csv(self) -> str:
         """The rows, all digits, in the units of the JSON file; "": there is no such file."""

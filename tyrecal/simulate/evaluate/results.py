@@ -39,7 +39,7 @@ class RawMode:
     """
 
     frequency_Hz: float
-    shape: HarmonicShape | RingShape
+    shape: HarmonicShape | RingShape = field(repr=False)
     multiplicity: int  # 2: a pair with n > 0, 1: a single mode
     members: tuple[float, float] | None = None
     damping_ratio: float | None = None  # fraction of critical damping; None: not known

@@ -14,7 +14,7 @@ The residuals of the fit have covariance C = S P S; a group G of them, r_G^T C_G
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import chdtrc, ndtr
@@ -61,14 +61,15 @@ class Gap:
     chi2: float  # T
     freedom: int  # degrees of freedom of T
     p_value: float  # probability of a larger T without a gap
-    residuals: Array  # (n,) r = ln measured - ln model
-    spread: Array  # (n,) their standard deviation without a gap, the root of C's diagonal
+    residuals: Array = field(repr=False)  # (n,) r = ln measured - ln model
+    # (n,) their standard deviation without a gap, the root of C's diagonal
+    spread: Array = field(repr=False)
     groups: tuple[ResidualGroup, ...]
-    contrasts: tuple[Contrast, ...]
+    contrasts: tuple[Contrast, ...] = field(repr=False)
     # by effect: share of its squared shift, in standard deviations, that a fit hides
-    absorbed: Mapping[str, float]
+    absorbed: Mapping[str, float] = field(repr=False)
     # by variable and effect: change of the fitted variable by the effect at the end of its range
-    bias_percent: Mapping[str, Mapping[str, float]]
+    bias_percent: Mapping[str, Mapping[str, float]] = field(repr=False)
 
     @property
     def rms_percent(self) -> float:

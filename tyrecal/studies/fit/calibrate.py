@@ -17,6 +17,7 @@ from ...tyre.case import LoadedCase
 from ...tyre.case.schema import cannot_fit
 from ...tyre.state import pressure_name
 from ..far_off import far_off
+from ..notebook import Notebook
 from ..result import csv_text
 from . import gauss_newton, slsqp
 from .judge import measured_rows
@@ -38,7 +39,7 @@ MAX_REPLACED = 20  # replaced starts per start asked for
 
 
 @dataclass
-class Fit:
+class Fit(Notebook):
     """A finished fit."""
 
     found: FitResult  # what fit.json holds: `result` is its content
@@ -52,6 +53,10 @@ class Fit:
         ended = FIT_VERDICT_WORDS[result.verdict]
         values = ", ".join(f"{name}={each.value:.4g}" for name, each in result.variables.items())
         return f"Fit({ended}, {before:.4g} to {after:.4g} {result.objective_unit}: {values})"
+
+    @property
+    def shown(self) -> FitResult:
+        return self.found
 
     @property
     def result(self) -> Json:

@@ -210,6 +210,7 @@ class FitResult(Result):
     fits = True
     study, stem, heading = "fit", "fit", "Fit"
     part = "tyrecal.report.html.fit:part"
+    figures = "tyrecal.report.convergence:figures"
 
     method: str  # slsqp or gauss-newton
     prior: bool = False  # whether what is known of variables and model entered the fit

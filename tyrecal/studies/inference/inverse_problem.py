@@ -69,9 +69,9 @@ class Added(NamedTuple):
 class InverseProblem:
     """n observations and the model of them, in v variables x (as logarithms)."""
 
-    observations: Observations
-    expansion: Expansion
-    ranges: Mapping[str, EffectRange]
+    observations: Observations = field(repr=False)
+    expansion: Expansion = field(repr=False)
+    ranges: Mapping[str, EffectRange] = field(repr=False)
     places: Array  # (n,) of the observations among the model's rows
     centre: Array  # (v,) mean of the prior of x
     spread: Array  # (v,) standard deviation of the prior of x

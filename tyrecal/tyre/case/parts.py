@@ -20,7 +20,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from .mistakes import CaseData
+from .mistakes import CaseData, shortened
 
 LEAST, LARGEST = 1e-30, 1e15  # beyond, products of numbers leave what a computer holds
 Moduli = Literal["long_term", "instantaneous"]
@@ -51,6 +51,8 @@ Setting = float | bool | str | None
 """A value that a user sets: a number, true or false, a word that the schema lists, null."""
 Disagreement = tuple[str, str]
 """A key of a part, and what would be right there."""
+MAX_REPR = 300
+"""Characters of a part in Python."""
 WRONG = object()
 """Stands in a part's values for one that is already reported."""
 
@@ -82,6 +84,9 @@ class Part(BaseModel):
     model_config = ConfigDict(
         extra="forbid", strict=True, allow_inf_nan=False, frozen=True, defer_build=True
     )
+
+    def __repr__(self) -> str:
+        return shortened(super().__repr__(), MAX_REPR)
 
     @classmethod
     def problems(cls, values: CaseData) -> Iterator[Disagreement]:

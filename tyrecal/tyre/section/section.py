@@ -9,7 +9,7 @@ Gauges: the thickness between two lines of the section, scaled region by region.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 
@@ -35,11 +35,12 @@ class Section:
 
     # the lines from the inner surface to the outer, e.g. inner, ply, belt1, belt2, outer
     names: tuple[str, ...]
-    points: Array  # (line, station, 2): r and z in m, NaN where a line is absent
+    # (line, station, 2): r and z in m, NaN where a line is absent
+    points: Array = field(repr=False)
     regions: tuple[tuple[str, int], ...]  # name and number of stations' intervals, in order
-    rigid: Array  # (station,): held by the rim
+    rigid: Array = field(repr=False)  # (station,): held by the rim
     # the outer and the inner curve (point, 2), m, where it was drawn between such
-    outline: tuple[Array, ...] = ()
+    outline: tuple[Array, ...] = field(default=(), repr=False)
 
     @cached_property
     def _content(self) -> tuple[object, ...]:
