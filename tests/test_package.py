@@ -109,7 +109,7 @@ def test_every_requirement_states_its_lowest_version() -> None:
 
 def test_developers_have_every_extra_but_docs() -> None:
     extras = PROJECT["optional-dependencies"]
-    assert {"cluster", "sample", "excel", "docs", "dev"} == set(extras)
+    assert {"cluster", "sample", "excel", "notebook", "docs", "dev"} == set(extras)
     tested = [packages for name, packages in extras.items() if name != "docs"]
     assert all(set(packages) <= set(extras["dev"]) for packages in tested)
 

@@ -145,7 +145,7 @@ def test_an_added_effect_makes_a_case(
         (["--measured", "none.csv"], "none.csv"),
         (["--measured", "M", "--effect", "magic"], "--effect magic: there is no such effect"),
         (["--measured", "M", "--toggled", "M", "magic=0"], "there is no effect 'magic'"),
-        (["--measured", "M", "--toggled", "M", "bead_filler=nan"], "is not a number"),
+        (["--measured", "M", "--toggled", "M", "bead_filler=nan"], "must be a number"),
         (["--measured", "M", "--toggled", "M", "bead_filler*1"], "changes nothing"),
         (["--measured", "M", "--effect", "belt_width", "--without", "belt_width"], "no effect"),
         (["--add", "bead_filler=1", "--set", "C10=1.1e6"], "no --set"),

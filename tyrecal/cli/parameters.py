@@ -79,13 +79,17 @@ class _Answering(click.ParamType):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """The value by its type; numbers must be finite. Raises click.UsageError."""
         try:
-            converted = super().convert(value, param, ctx)
+            converted = super().convert(self.read(value, param), param, ctx)
             if not isinstance(converted, float) or isfinite(converted):
                 return converted
         except click.BadParameter:
             pass
         option = f"{param.opts[0]} " if isinstance(param, click.Option) else ""
         raise click.UsageError(f"{option}{value}: {self.answer(value, param)}", ctx)
+
+    def read(self, value: Any, param: click.Parameter | None) -> Any:
+        """The value as click's own type reads it."""
+        return value
 
     def answer(self, value: Any, param: click.Parameter | None) -> str:
         """Words that state what to give in place of ``value``."""
@@ -101,15 +105,14 @@ def unit_of(param: click.Parameter | None) -> str:
 class _Number(_Answering):
     what = "a number"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The number in the option's unit, with whatever unit it was given. Raises
-        click.UsageError."""
+    def read(self, value: Any, param: click.Parameter | None) -> Any:
+        """The number in the option's unit, whichever unit it is given with."""
         from ..units import read_number
 
         if unit := unit_of(param):
             with suppress(InputError):
-                value = read_number(str(value), unit)
-        return super().convert(value, param, ctx)
+                return read_number(str(value), unit)
+        return value
 
     def answer(self, value: Any, param: click.Parameter | None) -> str:
         """Unit and range of the answer, with an example."""

@@ -23,7 +23,7 @@ NEEDS_PANDAS = (
 
 
 class Notebook:
-    """Shows ``shown``, the result itself or the one that an object holds."""
+    """Object that shows a result: itself, or the one that it holds."""
 
     @property
     def shown(self) -> Any:
