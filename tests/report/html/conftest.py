@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from functools import partial
 from typing import Any
 
@@ -15,8 +16,8 @@ from tyrecal.report.html.parts import PageFigure
 from tyrecal.studies.sample.result import SampleResult
 
 ANY_CHAPTER = "any-chapter-"  # what ids begin with, in place of the chapter's own
-_drawn: dict[tuple[str, str], PageFigure] = {}
-_corners: dict[str, Figure] = {}
+_drawn: dict[tuple[str, bytes], PageFigure] = {}
+_corners: dict[bytes, Figure] = {}
 _picture, _draw_corner = parts.drawn, sample.draw_corner
 
 
@@ -24,7 +25,7 @@ _picture, _draw_corner = parts.drawn, sample.draw_corner
 def drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
     def picture(key: str, draw: partial[Any]) -> PageFigure:
         chapter, _, name = key.partition("-")
-        known = name, repr(draw.args)
+        known = name, pickle.dumps(draw.args)
         if known not in _drawn:
             _drawn[known] = _picture(f"{ANY_CHAPTER}{name}", draw)
         kept = _drawn[known]
@@ -32,7 +33,7 @@ def drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def corner(sampled: SampleResult) -> Figure:
         """Drawn before the page takes the picture of it."""
-        key = repr(sampled)
+        key = pickle.dumps(sampled)
         if key not in _corners:
             _corners[key] = _draw_corner(sampled)
         return _corners[key]
