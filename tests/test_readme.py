@@ -17,6 +17,7 @@ from pathlib import Path
 
 import pytest
 
+from tyrecal.tyre.effects import catalogue
 from tyrecal.version import BUILD_SITE
 
 from .cli.test_cli import run
@@ -43,6 +44,7 @@ GUIDES = [
     "cases/measured_data.md",
     "cases/paper.md",
     "cases/real_data.md",
+    "cases/site/tutorial.md",
     "solvers/README.md",
 ]
 PACKAGED = ("ccx", "chromedriver", "fish")  # by Debian: CI installs them, tests do without
@@ -51,6 +53,7 @@ MAKERS = {  # first words of blocks whose files those below them read
     "README.md": ["tyrecal fit cases/p235_75r17.yaml\n"],
     "cases/own_template.md": ["mkdir -p cases/my_templates"],
     "cases/measured_data.md": ["tyrecal measured import "],
+    "cases/site/tutorial.md": ["tyrecal "],
 }
 QUICK = [  # first words of blocks of the README that the quick set runs; they need no block above
     "tyrecal init"
@@ -108,18 +111,19 @@ def single_blanks(text: str) -> list[str]:
     return [" ".join(line.split()) for line in text.splitlines()]
 
 
-Clone = Callable[[str, int], Path]
+Clone = Callable[[str, int], tuple[Path, str]]
 
 
 @pytest.fixture(scope="module")
 def clone(tmp_path_factory: pytest.TempPathFactory) -> Clone:
-    """The folder as the makers among a guide's first ``count`` blocks leave it, each run once.
+    """The folder as the makers among a guide's first ``count`` blocks leave it, each run once, and
+    the output of the last one.
 
     It is always the same one, since results know the path of their case.
     """
     top = tmp_path_factory.mktemp("guide")
     folder = top / "clone"
-    kept: dict[tuple[str, ...], Path] = {}
+    kept: dict[tuple[str, ...], tuple[Path, str]] = {}
 
     def fresh(guide: str) -> Path:
         path = top / Path(guide).parent.name / Path(guide).stem
@@ -129,15 +133,16 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> Clone:
                 case.write_text(re.sub(r"( level:) default\b", r"\1 coarse", case.read_text()))
         return path
 
-    def after(guide: str, blocks: list[str]) -> Path:
+    def after(guide: str, blocks: list[str]) -> tuple[Path, str]:
         name = (guide, *blocks)
         if name not in kept and blocks:
-            execute(blocks[-1], after(guide, blocks[:-1]))
-            kept[name] = Path(shutil.copytree(folder, top / f"after {len(kept)} blocks"))
+            output = execute(blocks[-1], after(guide, blocks[:-1])[0])
+            kept[name] = shutil.copytree(folder, top / f"after {len(kept)} blocks"), output
         elif name not in kept:
-            kept[name] = fresh(guide)
+            kept[name] = fresh(guide), ""
+        made, output = kept[name]
         shutil.rmtree(folder, ignore_errors=True)
-        return Path(shutil.copytree(kept[name], folder))
+        return shutil.copytree(made, folder), output
 
     return lambda guide, count: after(
         guide, [block for block in blocks(guide)[:count] if makes(guide, block)]
@@ -147,11 +152,10 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> Clone:
 @pytest.mark.parametrize(("guide", "number"), parameters())
 def test_commands_of(guide: str, number: int, clone: Clone) -> None:
     block = blocks(guide)[number]
-    if makes(guide, block):
-        clone(guide, number + 1)
-    else:
-        output = single_blanks(execute(block, clone(guide, number)))
-        assert not set(single_blanks(examples(guide)[block])) - set(output), output
+    is_kept = makes(guide, block)
+    output = clone(guide, number + 1)[1] if is_kept else execute(block, clone(guide, number)[0])
+    lines = single_blanks(output)
+    assert not set(single_blanks(examples(guide)[block])) - set(lines), lines
 
 
 @pytest.mark.parametrize("guide", MAKERS)
@@ -165,10 +169,23 @@ def test_the_quick_blocks_are_in_the_readme() -> None:
         assert any(block.startswith(words) for block in blocks("README.md")), words
 
 
+def test_the_tutorial_names_the_planted_effect_and_predicts_better() -> None:
+    """By its printed lines, which the tests of its blocks compare with the commands'."""
+    text = (ROOT / "cases/site/tutorial.md").read_text()
+    (planted,) = set(re.findall(r"--set effects\.(\w+=\S+)", text))
+    id, value = planted.split("=")
+    (title,) = re.findall(r"## Named: (.*)", text)
+    assert title == catalogue()[id].title
+    (size,) = re.findall(rf"\| {title} \| \S+ \| \S+ \((\S+) to (\S+)\) mm/kN", text)
+    assert float(size[0]) < 1e6 * float(value) < float(size[1])
+    before, after = re.findall(r"within 2 % of their targets \(rms (\S+) %\)", text)[-2:]
+    assert float(after) < float(before) / 10
+
+
 @pytest.mark.guide
 def test_the_results_table_is_what_the_fit_gives(clone: Clone) -> None:
     """And every other figure of a document that this fit gives."""
-    content = json.loads((clone("README.md", 1) / "p235_75r17/fit.json").read_text("utf-8"))
+    content = json.loads((clone("README.md", 1)[0] / "p235_75r17/fit.json").read_text("utf-8"))
     assert not list(differences({**recorded(), "fit": of_fit(content)}))
 
 
@@ -190,7 +207,7 @@ def test_the_error_in_the_reference_is_the_commands(
 def test_python_of(guide: str, clone: Clone) -> None:
     (program,) = re.findall(r"```python\n(.*?)```", (ROOT / guide).read_text(), re.S)
     done = subprocess.run(
-        [sys.executable, "-c", program], cwd=clone(guide, 0), capture_output=True, text=True
+        [sys.executable, "-c", program], cwd=clone(guide, 0)[0], capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr[-1500:]
     assert len(done.stdout.splitlines()) >= 6
