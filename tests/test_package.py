@@ -59,8 +59,13 @@ def test_every_file_of_a_package_ships() -> None:
 
 def core() -> list[metadata.Distribution]:
     """The packages that `pip install .` installs: tyrecal, all it needs, all that those need."""
+    return list(closure(["tyrecal"]).values())
+
+
+def closure(requirements: list[str]) -> dict[str, metadata.Distribution]:
+    """Installed packages by name: those required, and all that they need in turn."""
     needed: dict[str, metadata.Distribution] = {}
-    waiting = [Requirement("tyrecal")]
+    waiting = [*map(Requirement, requirements)]
     while waiting:
         requirement = waiting.pop()
         name = requirement.name.lower().replace("_", "-")
@@ -70,7 +75,7 @@ def core() -> list[metadata.Distribution]:
             continue
         needed[name] = metadata.distribution(requirement.name)
         waiting += map(Requirement, needed[name].requires or [])
-    return list(needed.values())
+    return needed
 
 
 def licence(distribution: metadata.Distribution) -> str:
@@ -87,6 +92,32 @@ def test_no_part_of_the_core_is_under_the_gpl(distribution: metadata.Distributio
     words = licence(distribution)
     assert words, distribution.name
     assert not re.search(r"\bA?GPL|(?<!Lesser )General Public License", words), words
+
+
+def families(words: str) -> set[str]:
+    """Families of licences that a text names."""
+    names = {"Python Software Foundation": "PSF", "Mozilla": "MPL", "GNU": "GPL", "Public D": "CC0"}
+    for name, short in names.items():
+        words = words.replace(name, short)
+    return set(re.findall("BSD|MIT|Apache|PSF|MPL|GPL|Zlib|CC0", words))
+
+
+@pytest.mark.parametrize(
+    "group", ["", *(each for each in PROJECT["optional-dependencies"] if each != "dev")]
+)
+def test_the_page_of_licences_is_what_the_packages_state(group: str) -> None:
+    """Every package that a user installs, those of an extra if it is installed."""
+    page = (ROOT / "cases/site/licences.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| ([\w.-]+) \| .* \| (.*) \|$", page, re.M))
+    required = PROJECT["optional-dependencies"][group] if group else PROJECT["dependencies"]
+    names = {Requirement(each).name for each in required}
+    assert names <= rows.keys()
+    try:
+        installed = closure(required)
+    except metadata.PackageNotFoundError:
+        pytest.skip(f"the extra '{group}' is not installed")
+    stated = {name: licence(distribution) for name, distribution in installed.items()}
+    assert not {n: words for n, words in stated.items() if families(words) != families(rows[n])}
 
 
 def test_no_text_installs_tyrecal_by_its_name() -> None:
