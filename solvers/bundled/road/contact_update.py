@@ -65,20 +65,14 @@ class ContactUpdate:
             return
         before = len(self._compliance)
         self._column[dofs] = before + np.arange(len(dofs))
-        pieces = [
-            self._columns(some) for some in np.array_split(dofs, -(-len(dofs) // COLUMNS_AT_ONCE))
-        ]
+        some = np.array_split(dofs, -(-len(dofs) // COLUMNS_AT_ONCE))
+        pieces = [self.factor.columns(each) for each in some]
         new = [_side_by_side(each) for each in zip(*pieces, strict=True)]
         earlier = [_products(block, new) for block in self._blocks]
         corner = _products(new, new)
         across = np.concatenate([*earlier, corner], 0)
         self._compliance = np.block([[self._compliance, across[:before]], [across.T]])
         self._blocks.append(new)
-
-    def _columns(self, dofs: Array) -> list[Array]:
-        right = np.zeros((len(dofs), self._column.size), np.float32)
-        right[np.arange(len(dofs)), dofs] = 1.0
-        return self.factor.forward(right.reshape(-1, *self.factor.order.symmetry.mask.shape))
 
     def solve(self, right: Array) -> Array:
         """The inverse times parts (..., 2, f, q, 3)."""

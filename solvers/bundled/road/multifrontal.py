@@ -116,7 +116,7 @@ class Factor:
         self.order = order
         fronts = order.fronts
         self._unknowns = np.concatenate([front.own for front in fronts])  # as they are eliminated
-        place = np.full(order.symmetry.mask.size, -1)
+        self._place = place = np.full(order.symmetry.mask.size, -1)
         place[self._unknowns] = np.arange(len(self._unknowns))
         self.contact = _within_parts(contact, fronts)
         touching = csr_matrix(self.contact[self._unknowns][:, self._unknowns])
@@ -157,7 +157,16 @@ class Factor:
 
     def forward(self, right: Array) -> list[Array]:
         """L^-1 right for parts (v, 2, f, q, 3): by front, (rows, v), without rows where it is 0."""
-        b = right.reshape(len(right), -1)[:, self._unknowns].T.astype(np.float32, order="C")
+        flat = right.reshape(len(right), -1)
+        return self._forward(flat[:, self._unknowns].T.astype(np.float32, order="C"))
+
+    def columns(self, dofs: Array) -> list[Array]:
+        """What `forward` gives for units at some of the parts' free components, flat indices."""
+        b = np.zeros((len(self._unknowns), len(dofs)), np.float32)
+        b[self._place[dofs], np.arange(len(dofs))] = 1.0
+        return self._forward(b)
+
+    def _forward(self, b: Array) -> list[Array]:
         pieces = []
         for own, left, L, X in self._steps:
             y = b[own]
