@@ -2,9 +2,9 @@
 
     K(f) = K + sum_l (rho_l(f) - 1) dK_l,    K(f_j) phi_j = lambda_j M phi_j,  lambda = (2 pi f)^2
 
-dK_l: the part of K that grows with the shear modulus of law l; rho_l: its storage over its static
-shear modulus, from the deck's table, linear between its rows in the logarithms of both. The j-th
-mode of a harmonic is the fixed point of the j-th eigenvalue.
+dK_l: the part of K that is proportional to the shear modulus of law l. rho_l: its storage modulus
+over its static one, from the deck's table; between its rows ln rho is linear in ln f. Mode j of a
+harmonic is the fixed point of the j-th eigenvalue. Shapes have phi^H M phi = 1.
 """
 
 from __future__ import annotations
@@ -20,9 +20,11 @@ from .bordered import Bordered
 from .harmonics import HarmonicModes, Vibration
 
 Array = np.ndarray
-START_HZ = 60.0  # amid the modes of a tyre
-FREQUENCY_RTOL = 1e-13  # of a frequency for a given shape
-SHAPE_RTOL = 1e-4  # of a frequency, from one shape to the next: its square is what is left
+START_HZ = 60.0  # in the middle of the modes of a tyre
+# relative change of a frequency at which iterations end: with a given shape, and from one shape to
+# the next, whose square is the error that remains
+FREQUENCY_RTOL = 1e-13
+SHAPE_RTOL = 1e-4
 MAX_SETTLING = 40  # iterations of a mode at its own modulus
 
 
@@ -78,7 +80,7 @@ def _unsettled(n: int, j: int) -> RunFailed:
 
 
 def joined(modes: list[HarmonicModes]) -> HarmonicModes:
-    """Modes of one harmonic in one."""
+    """The modes of several objects of one harmonic in one object."""
     join = lambda name: np.concatenate([getattr(m, name) for m in modes])
     return replace(
         modes[0],

@@ -32,8 +32,8 @@ EXACT = 1e-12  # m, the last digits of a deck
 
 
 def mirror_images(X: Array) -> Array:
-    """Each node's mirror image (n,) in the middle plane, -1 where there is none; X (n, 2). Of nodes
-    in one place the first is that of the first."""
+    """Each node's mirror image (n,) in the middle plane, -1 if it has none; X (n, 2). If several
+    nodes have one place, the first is the image of the first, and so on."""
     seen: Counter[tuple[int, int]] = Counter()
     places = []
     for r, z in np.round(X.real / SAME_PLACE).astype(int).tolist():
@@ -44,29 +44,30 @@ def mirror_images(X: Array) -> Array:
 
 
 class Whole:
-    """All elements are there: fields and sums are whole."""
+    """A model of all elements: fields and sums are those of the whole tyre."""
 
-    copies = 1  # of the elements that are there make the tyre
+    copies = 1  # factor from sums over the model's elements to those of the whole tyre
 
     def share(self, rows: Array) -> Array:
-        """Share (e, 1) of the integration weights of elements (e, a) that counts."""
+        """Factor (e, 1) on the integration weights of elements with the nodes ``rows`` (e, a)."""
         return np.ones((len(rows), 1))
 
     def field(self, u: Array) -> Array:
-        """The whole of a field (n, 3, ...) known on z >= 0."""
+        """The field (n, 3, ...) on all nodes, from its values on z >= 0."""
         return u
 
     def force(self, f: Array) -> Array:
-        """The whole of forces (n, 3, ...) that the elements there exert in a kept field."""
+        """Forces (n, 3, ...) of the whole tyre in a kept field, by those of its elements here."""
         return f
 
     def kept(self, u: Array) -> Array:
-        """c = a + i b of a real field (n, 3, ...); a complex one is kept as it is."""
+        """c = a + i b (n, 3, ...) of a real field: a its kept part, b its reversed part. A complex
+        field is kept already."""
         return u
 
 
 class MirrorHalf(Whole):
-    """The elements of z >= 0 are there, and by half those that are their own mirror images.
+    """A model of the elements of z >= 0; those that are their own mirror images count by half.
 
     X (n, 2): R, Z of all nodes; other (n,): their mirror images; here, middle (n,): those of
     z >= 0, of z = 0.
@@ -94,11 +95,11 @@ class MirrorHalf(Whole):
         return _signed(u[self.other].conj())
 
     def images(self, rows: Array) -> Array:
-        """Nodes (e, a) of the elements' mirror images, the other way round as their sense is."""
+        """Nodes (e, a) of the elements' mirror images, in the opposite order as the sense turns."""
         return np.asarray(self.other[rows][:, ::-1])
 
     def keeps(self, rows: Array) -> Array:
-        """Mask (e,) of the elements that are there."""
+        """Mask (e,) of the elements that the model has."""
         own = (np.sort(rows) == np.sort(self.other[rows])).all(1)
         return np.asarray(own | self.here[rows].all(1))
 
@@ -107,8 +108,8 @@ class MirrorHalf(Whole):
         return np.where(beside, 1.0, 0.5)[:, None]
 
     def alike(self, X: Array) -> Array:
-        """X (n, 2) with tangents (imaginary) that move both sides alike. What moves them against
-        each other is reversed by the half turn, and changes no eigenvalue at first order."""
+        """X (n, 2) with tangents (imaginary) that move both sides alike. The half turn reverses the
+        rest of the tangents, so that it changes no eigenvalue at first order."""
         if not np.iscomplexobj(X):
             return X
         return X.real + 0.5j * (X.imag + X.imag[self.other] * [1, -1])

@@ -95,7 +95,8 @@ class ResponseModel(Protocol):
     spread: Array  # (v,) standard deviation of the prior of x
     sources: Sequence[str]  # names of the k sources of error: constants that no fit calibrates
     ranges: Mapping[str, EffectRange]  # effects by id
-    material_laws: float  # standard deviation of ln f by laws other than its own
+    # standard deviation of ln f by each part of the error of material laws (`form_error`)
+    material_laws: float
 
     @property
     def sloped(self) -> Collection[str]:

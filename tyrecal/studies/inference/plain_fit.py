@@ -12,8 +12,9 @@ from .model import Answer, Query, ResponseModel
 from .observations import Observations
 
 Array = np.ndarray
-MAX_STEPS, MAX_STEP, CLOSE_ENOUGH = 12, 0.7, 0.02  # steps; largest and last one, in x
-MAX_COVARIANCES, SAME_COVARIANCE = 4, 0.1  # of x, within which constants stand for one another
+MAX_STEPS, MAX_STEP, CLOSE_ENOUGH = 12, 0.7, 0.02  # number of steps; largest and last step in x
+# covariances by constants are formed anew at most so often, if x has moved by more than so much
+MAX_COVARIANCES, SAME_COVARIANCE = 4, 0.1
 
 
 def plain_fit(

@@ -1,19 +1,22 @@
-"""How far the section may be off, smoothly: meridian, gauges, compounds' stiffness and density.
+"""Errors of the section, smooth along it: meridian, gauges, compounds' stiffness and density.
 
 Each is a Gaussian random field over s, the arc length of the carcass from the crown (0) to where
-the rim holds it (1), alike on both sides, its covariance exp(-(s - s')^2 / (2 l^2)) in units of its
-variance; meridian and gauges are 0 at the rim. Karhunen and Loeve's components of it, with 99 % of
-the variance, are sources of error (Rasmussen and Williams, Gaussian Processes, sec. 4.3). Besides,
-a bead filler of a rubber of its own may be higher: by that modes across the wheel rise less with
-the pressure. And how much a bead yields between the rim and its wires nobody knows: whether a car's
-rim holds the whole bead or its surface (`rim.holds`) is worth 6 % of [0,0] lateral, 2 % of
-torsional, as if it held 7 mm further up. So from where on it holds is uncertain, too, by a share of
-the bead's thickness. The case states what its section is known from, and so how large they are:
+the rim holds it (1), the same on both sides. Its correlation is exp(-(s - s')^2 / (2 l^2));
+meridian and gauges are 0 at the rim. Its Karhunen-Loeve components with 99 % of the variance are
+sources of error (Rasmussen and Williams, Gaussian Processes, sec. 4.3). Two are single numbers:
+
+* the height of a bead filler with its own rubber: with a higher one, modes across the wheel rise
+  less with the pressure;
+* the place from which on the rim holds the bead, because the bead yields between the rim and its
+  wires. Whether a car's rim holds the whole bead or its surface (`rim.holds`) changes [0,0] lateral
+  by 6 % and torsional by 2 %, as if it held 7 mm further up.
+
+The case states what its section is known from. That gives their standard deviations:
 
     section: {stations: tyre.csv, known_from: drawing}
 
-One that says nothing is taken as drawn: who cut a tyre would say so, and `tyrecal init` says what
-it made by a size. Only data that were computed with this very section have an exact one.
+The default is a drawing; `tyrecal init` states what it made from a size code. Only data that were
+computed with this very section have an exact one.
 """
 
 from __future__ import annotations
@@ -33,25 +36,26 @@ from ...tyre.section.curve import length_along
 from .regions import split_by_region
 
 Array = np.ndarray
-SECTION = "section "  # with which their names begin
+SECTION = "section "  # start of the names of these sources of error
 OF_COMPOUNDS = ("stiffness", "density")
 OF_ORIGIN = ("meridian", "filler", "gauge", *OF_COMPOUNDS)
 FIELD_KINDS = ("meridian", "filler", "hold", "gauge", *OF_COMPOUNDS)
 ALONG_CARCASS = ("filler", "hold")
-# standard deviations, by judgement: m along the normal, m of the filler's tip along the carcass
-# (fillers of one size reach 30 to 60 mm above the rim), the others relative
+# standard deviations in the order of OF_ORIGIN, by judgement: meridian, m along its normal; tip of
+# the filler, m along the carcass (fillers of one size reach 30 to 60 mm above the rim); gauge,
+# stiffness, density, relative
 SECTION_SIZES = {
     "exact": (0.0, 0.0, 0.0, 0.0, 0.0),  # that of the model which made the data
     "measured": (0.3e-3, 1e-3, 0.02, 0.03, 0.01),  # a cut tyre and a scale
     "drawing": (0.8e-3, 2e-3, 0.04, 0.05, 0.01),  # moulds are true, plies and rubber flow
     "size_code": (3e-3, 9e-3, 0.10, 0.10, 0.02),  # tyres of one size from several makers
 }
-HOLD = 0.3  # of a bead's thickness: how far up or down the carcass the rim may as well hold it
-CAR_HEIGHT = 0.15  # m of carcass above the rim; beyond, lengths by a size code are in proportion
+HOLD = 0.3  # standard deviation of the place where the rim begins to hold, over bead thickness
+CAR_HEIGHT = 0.15  # m of carcass above the rim; errors by a size code grow with larger heights
 UNSAID: SectionOrigin = "drawing"
-CORRELATION_LENGTH = 0.25  # l, of the half meridian
-KEPT_VARIANCE = 0.99  # of the variance
-FIELD_GRID = 200  # points for the components
+CORRELATION_LENGTH = 0.25  # l, over s
+KEPT_VARIANCE = 0.99  # share of the variance that the components have
+FIELD_GRID = 200  # points on s at which the components are computed
 COMPOUNDS_ALIKE = 0.5  # correlation of two compounds at one place
 
 
@@ -118,7 +122,8 @@ def fields(case: LoadedCase) -> dict[str, SectionField]:
 
 
 def sizes(case: LoadedCase) -> tuple[float, ...]:
-    """Standard deviations, of the section's own size. Raises InputError without a carcass."""
+    """Standard deviations in the order of OF_ORIGIN, for a section of this height. Raises
+    InputError without a carcass."""
     known = known_from(case)
     meridian, filler, *others = SECTION_SIZES[known]
     carcass = case.section.points[case.section.names.index(carcass_line(case))]
@@ -158,9 +163,9 @@ def filler_tip(case: LoadedCase) -> int | None:
 
 
 def higher_filler(case: LoadedCase) -> Array:
-    """How far stations go along the carcass as the filler's tip does so by 1: (1, stations), or
-    (0, stations) without a filler. Those up to the turn-up's end (the belt's, where it is the tip)
-    and down to the rim go in proportion."""
+    """Motion of the stations along the carcass if the filler's tip moves by 1, (1, stations);
+    (0, stations) without a filler. It falls linearly to 0 at the rim, and at the end of the turn-up
+    (of the belt, if the turn-up ends at the tip)."""
     s, tip = arc_length(case), filler_tip(case)
     if tip is None:
         return np.empty((0, len(s)))
@@ -172,15 +177,15 @@ def higher_filler(case: LoadedCase) -> Array:
 
 
 def bead_thickness(case: LoadedCase) -> float:
-    """m, where the rim begins to hold it."""
+    """Thickness, m, of the bead where the rim begins to hold it."""
     at_rim = case.section.points[[0, -1], rim_edge(case.section)]
     return float(np.hypot(*(at_rim[1] - at_rim[0])))
 
 
 def higher_hold(case: LoadedCase) -> Array:
-    """How far stations go along the carcass as the place from which on the rim holds it does so by
-    1: (1, stations). All that it holds goes along; those above up to the filler's tip, or to the
-    widest point, in proportion."""
+    """Motion (1, stations) of the stations along the carcass if the place where the rim begins to
+    hold moves by 1. All stations that it holds move by 1. Above, the motion falls linearly to 0 at
+    the filler's tip, or at the widest point."""
     s = arc_length(case)
     carcass = case.section.points[case.section.names.index(carcass_line(case))]
     tip = filler_tip(case)
@@ -196,8 +201,8 @@ def arc_length(case: LoadedCase) -> Array:
 
 
 def components(s: Array) -> Array:
-    """Karhunen and Loeve's, at one standard deviation (k, stations), of a field that is 0 from
-    s = 1 on."""
+    """Karhunen-Loeve components (k, stations), each at one standard deviation, of a field that is 0
+    from s = 1 on."""
     t = (np.arange(FIELD_GRID) + 0.5) / FIELD_GRID
     end = np.ones(1)
     free = lambda a, b: _kernel(a, b) - _kernel(a, end) @ _kernel(end, b)
@@ -210,13 +215,13 @@ def components(s: Array) -> Array:
 
 
 def moved(case: LoadedCase, field: SectionField, amount: float) -> LoadedCase:
-    """The case with so much of a component of its meridian, filler or gauges."""
+    """The case with ``amount`` times a component of its meridian, filler, hold or gauges."""
     section = case.section
     carcass = section.points[section.names.index(carcass_line(case))]
     if field.kind == "gauge":
         points = carcass + (section.points - carcass) * (1 + amount * field.values)[:, None]
     elif field.kind in ALONG_CARCASS:
-        # surfaces keep their shape, lines inside their distance from the carcass
+        # stations slide along each surface, and parallel to the carcass on the lines inside
         arc = length_along(carcass)
         along = np.stack([np.gradient(carcass, arc, axis=0)] * len(section.names))
         along[[0, -1]] = np.gradient(section.points[[0, -1]], arc, axis=1)
@@ -230,7 +235,7 @@ def moved(case: LoadedCase, field: SectionField, amount: float) -> LoadedCase:
 
 
 def with_fields(case: LoadedCase, amounts: Mapping[str, float]) -> LoadedCase:
-    """The case with so much of each of its components, by name: a tyre as it may be."""
+    """The case with the given amounts, in standard deviations, of all components by name."""
     known = fields(case)
     if not known:
         return case
@@ -258,7 +263,7 @@ def with_fields(case: LoadedCase, amounts: Mapping[str, float]) -> LoadedCase:
 
 
 def _kernel(a: Array, b: Array) -> Array:
-    """Correlation (a, b) of a field that is alike on both sides of the crown."""
+    """Correlation between places ``a`` and ``b`` of a field that is the same on both sides."""
     k = lambda x: np.exp(-(x**2) / (2 * CORRELATION_LENGTH**2))
     both = k(a[:, None] - b) + k(a[:, None] + b)
     return np.asarray(both / np.sqrt(np.outer(1 + k(2 * a), 1 + k(2 * b))))

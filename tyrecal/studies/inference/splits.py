@@ -1,7 +1,8 @@
-"""Splits of pairs: what non-uniformity does to them, alike in all states of a tyre, and effects.
+"""Likelihood of the splits of pairs, the distances of their two modes in ln f.
 
-A pair that an effect holds a_p apart in state p is measured s_p = |a_p + u + noise of tau_p| apart,
-u ~ N(0, w^2) the tyre's own non-uniformity, one number a pair. Over all signs
+In state p the measured split is s_p = |a_p + u + noise|: a_p by an effect; u ~ N(0, w^2) by the
+tyre's non-uniformity, one number for a pair in all states; noise of standard deviation tau_p.
+Summed over the unknown signs
 
     p(s) = integral N(u; 0, w^2) prod_p [N(s_p - a_p - u; tau_p^2) + N(s_p + a_p + u; tau_p^2)] du
 
@@ -18,24 +19,24 @@ import numpy as np
 from .observations import Observations
 
 Array = np.ndarray
-FAR_OUT = 6.0  # standard deviations of u, beyond what the splits ask for
-MIN_SPLIT_WIDTH = 1e-9  # of u
+FAR_OUT = 6.0  # standard deviations w of u that the grid reaches beyond its likeliest values
+MIN_SPLIT_WIDTH = 1e-9  # smallest w
 
 
 @dataclass(frozen=True)
 class Splits:
-    """Splits of m pairs in up to k states, empty places aside."""
+    """Splits of m pairs in up to k states each."""
 
     places: Array  # (m, k) place of each pair and state among the observations
-    there: Array  # (m, k) whether it was measured
+    there: Array  # (m, k) whether there is such a state of the pair
     s: Array  # (m, k) measured split, in ln f
     tau: Array  # (m, k) its standard deviation
     width: float  # w, in ln f
-    known: dict[bytes, float] = field(default_factory=dict, repr=False)  # ln p(s) by what is apart
+    known: dict[bytes, float] = field(default_factory=dict, repr=False)  # ln p(s) by bytes of a
 
     @classmethod
     def of(cls, observations: Observations, width: float) -> Splits:
-        """All pairs of which both members were measured."""
+        """Splits of all pairs whose two members were measured. width: w, in ln f."""
         by_label: dict[str, list[int]] = {}
         for i in np.flatnonzero(np.isfinite(observations.split)).tolist():
             by_label.setdefault(str(observations.rows[i].label), []).append(i)
@@ -54,12 +55,12 @@ class Splits:
         return int(self.there.sum())
 
     def ln_likelihood(self, apart: Array) -> Array:
-        """ln p(s) (q,) where effects hold all rows ``apart`` (q, n)."""
+        """ln p(s) (q,) with the splits ``apart`` (q, n) of all rows by effects."""
         if not self.count:
             return np.zeros(len(apart))
         keys = [row.tobytes() for row in apart]
         new = {key: row for key, row in zip(keys, apart, strict=True) if key not in self.known}
-        if new:  # most effects hold no pair apart, and the rest few sizes in many explanations
+        if new:  # most effects split no pair, so that few values differ
             a = np.where(self.there, np.array([*new.values()])[:, self.places], 0.0)
             u, h = self._grid(float(a.max()))
             ln, _ = self._integrand(a, u)
@@ -68,10 +69,10 @@ class Splits:
         return np.array([self.known[key] for key in keys])
 
     def chi2(self) -> float:
-        """s^T C^-1 s with C = tau^2 + w^2, the signs averaged by their probability: as many in the
-        mean as there are splits, where no effect holds a pair apart.
+        """s^T C^-1 s without effects, C = tau^2 + w^2, averaged over the signs by probability. Its
+        expected value is the number of splits.
 
-        s^T C^-1 s = <u^2 / w^2 + sum (s_p - u)^2 / tau_p^2> - 1 over u that the splits leave.
+        s^T C^-1 s = <u^2 / w^2 + sum (s_p - u)^2 / tau_p^2> - 1, mean over the posterior of u.
         """
         if not self.count:
             return 0.0
@@ -86,18 +87,18 @@ class Splits:
         return float(((weight * total).sum(-1) - 1).sum())
 
     def _grid(self, most_apart: float) -> tuple[Array, float]:
-        """The g points u (g,) of the trapezoidal rule, and the step between."""
+        """The g points u (g,) of the trapezoidal rule, and their step."""
         measured = np.where(self.there, self.tau**-2.0, 0.0).sum(1).max()
         precision = measured + self.width**-2.0
-        # u that the splits leave has its middle at this share of what was measured at most
+        # the posterior mean of u is at most the share measured / precision of the largest split
         reach = FAR_OUT * self.width + measured / precision * (self.s.max() + most_apart)
         count = 2 * int(np.ceil(reach * np.sqrt(precision))) + 1
         u = np.linspace(-reach, reach, count)
         return u, float(u[1] - u[0])
 
     def _integrand(self, a: Array, u: Array) -> tuple[Array, Array]:
-        """ln of the integrand (q, m, g) at u (g,), and the probability (q, m, k, g) that s has the
-        sign of a + u."""
+        """ln of the integrand (q, m, g) at u (g,) with the splits ``a`` (q, m, k) by effects, and
+        the probability (q, m, k, g) that a + u + noise is positive."""
         s, tau = self.s[..., None], self.tau[..., None]
         centre = a[..., None] + u
         plus, minus = -(((s - centre) / tau) ** 2) / 2, -(((s + centre) / tau) ** 2) / 2

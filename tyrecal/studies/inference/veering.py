@@ -1,15 +1,15 @@
 """Two modes of one harmonic near each other, coupled by uncalibrated constants.
 
-Uncoupled, their a, b = (2 pi f)^2 cross as a tyre changes: that is what slopes extrapolate. Coupled
-by q they are the eigenvalues of [[a, q], [q, b]] and veer (Leissa, ZAMP 25 (1974)):
+Uncoupled, their a, b = (2 pi f)^2 cross as a tyre changes: slopes extrapolate these. Coupled by q
+they are the eigenvalues of [[a, q], [q, b]] and veer (Leissa, ZAMP 25 (1974)):
 
     lambda = (a + b)/2 +- D,  D = sqrt(delta^2 + q^2),  delta = (a - b)/2,
 
-(1 +- delta/D)/2 of either uncoupled mode in each. In the basis of the modes at x0 a cord angle adds
-to q in proportion, and hardly to a and b: to first order it does nothing, near a crossing it moves
-both modes by up to q. So q = size * zeta with zeta ~ N(0, 1), one for all pairs and pressures,
-which the evidence integrates over, and (a + b)/2 rises by rise * zeta^2; all lambda in units of the
-pair's at x0.
+(1 +- delta/D)/2: share of each uncoupled mode in a coupled one. In the basis of the modes at x0 a
+change of a cord angle adds a proportional q, and hardly changes a and b. To first order it moves no
+mode; near a crossing it moves both by up to q. So q = size * zeta, zeta ~ N(0, 1), the same for all
+pairs and pressures; the evidence integrates over it. (a + b)/2 rises by rise * zeta^2. All lambda
+are relative to that of the pair at x0.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from .observations import Observations
 
 Array = np.ndarray
 MAX_ZETA = 4.0  # standard deviations, from 0 to which zeta is integrated
-ZETA_POINTS, ZETA_GRID = 8, 64  # Gauss and Legendre's up to there, and a finer grid between
+ZETA_POINTS, ZETA_GRID = 8, 64  # Gauss-Legendre points from 0 to MAX_ZETA; points of a finer grid
 NEGLIGIBLE_SHIFT = 5e-4  # shift of ln f at 3 standard deviations of q
-MISLABELLED = 0.01  # of laboratories that give a mode to the label of which it has nothing
+MISLABELLED = 0.01  # probability of a label of whose uncoupled mode the measured one has no share
 
 
 def partner(label: Label | None) -> Label | None:
@@ -40,10 +40,12 @@ def partner(label: Label | None) -> Label | None:
 
 
 def coupling(at_0: Array, slopes: Array, above: Array) -> tuple[Array, Array]:
-    """|q| and the rise of (a + b)/2 over lambda for a constant, from ln f (2, pressures) of a pair
-    at x0, its slopes there by a standard deviation of the constant, and ln f with that much more.
+    """|q| and the rise of (a + b)/2, both over lambda, by one standard deviation of a constant.
 
-    delta^2 + q^2 is (delta0 + p z)^2 + (q z)^2 there, whichever mode has which label.
+    at_0: ln f (2, pressures) of a pair at x0; slopes: its derivatives by the constant in standard
+    deviations; above: ln f with the constant one standard deviation higher.
+    D^2 = delta^2 + q^2 = (delta_0 + p z)^2 + (q z)^2 with the constant z standard deviations higher
+    and p = d delta / dz, whichever mode has which label.
     """
     scale = at_0.mean(0)
     here, there = (np.exp(2 * (ln_f - scale)) for ln_f in (at_0, above))
@@ -57,8 +59,11 @@ def coupling(at_0: Array, slopes: Array, above: Array) -> tuple[Array, Array]:
 
 @cache
 def rule() -> tuple[Array, Array, Array]:
-    """zeta (k,) above 0, the sign of q does not matter; what ln of an integrand there is on a finer
-    grid (m, k), by an even cubic spline; ln of weight times density (m,)."""
+    """Integration over zeta >= 0, because the sign of q does not matter.
+
+    Returns the points zeta (k,); the matrix (m, k) from ln of the integrand there to ln on a finer
+    grid of m points, by an even cubic spline; ln of weight times density (m,) on that grid.
+    """
     from scipy.interpolate import CubicSpline
 
     zeta = MAX_ZETA * (np.polynomial.legendre.leggauss(ZETA_POINTS)[0] + 1) / 2
@@ -70,14 +75,14 @@ def rule() -> tuple[Array, Array, Array]:
 
 @dataclass(frozen=True)
 class Veering:
-    """Observed rows, and what each may be coupled with."""
+    """Coupling of the n observed rows with other modes."""
 
-    size: Array  # (n,) of q; 0: the row is not coupled
-    rise: Array  # (n,) of (a + b)/2
-    scale: Array  # (n,) ln f that lambda is counted from
-    partner: Array  # (n,) place of the other mode's row, -1 where it was not measured
-    other: Array  # (n,) its ln f at x0
-    side: Array  # (n,) 1: the upper of the two as measured, -1: the lower
+    size: Array  # (n,) standard deviation of q; 0: the row is not coupled
+    rise: Array  # (n,) rise of (a + b)/2 at zeta = 1
+    scale: Array  # (n,) mean ln f of the pair at x0: lambda = exp(2 (ln f - scale))
+    partner: Array  # (n,) row of the other mode, -1: it was not measured
+    other: Array  # (n,) ln f of the other mode at x0
+    side: Array  # (n,) 1: the upper of the two measured modes, -1: the lower
 
     @property
     def active(self) -> bool:
@@ -85,9 +90,9 @@ class Veering:
         return bool(self.size.any())
 
     def mixed(self, eta: Array, zeta: float) -> tuple[Array, Array, Array, Array]:
-        """ln f (q, n) of the coupled modes from those of uncoupled ones (q, n); d ln f by its own
-        ln f and by its partner's (q, n); ln probability (q,) of the labels, each the likelier the
-        more of the mode is its own."""
+        """ln f (q, n) of coupled modes from ``eta`` (q, n) of uncoupled ones; their derivatives by
+        the row's and by the partner's eta (q, n); ln probability (q,) of the labels, larger with
+        the share of the label's uncoupled mode."""
         on = np.flatnonzero(self.size)
         q, mate, scale = zeta * self.size[on], self.partner[on], self.scale[on]
         there = np.where(mate >= 0, eta[:, mate], self.other[on])
@@ -96,9 +101,11 @@ class Veering:
         D = np.sqrt(delta**2 + q**2)
         side = np.where(mate >= 0, self.side[on], np.where(delta < 0, -1.0, 1.0))
         eigenvalues = (a + b) / 2 + self.rise[on] * zeta**2 + side * D
-        share = (1 + side * delta / np.maximum(D, 1e-300)) / 2  # of its own
+        share = (1 + side * delta / np.maximum(D, 1e-300)) / 2  # of the row's uncoupled mode
         each = np.log(MISLABELLED + (1 - MISLABELLED) * share)
-        ln_label = each.sum(1) / max(len(on), 1)  # labels go together
+        ln_label = each.sum(1) / max(
+            len(on), 1
+        )  # one label decides the other, so their mean counts
         ln_f, own, part = eta.copy(), np.ones_like(eta), np.zeros_like(eta)
         ln_f[:, on] = scale + np.log(np.maximum(eigenvalues, 1e-6)) / 2
         own[:, on] = share * a / eigenvalues
@@ -106,7 +113,7 @@ class Veering:
         return ln_f, own, part, ln_label
 
     def weights(self, y: Array, zeta: float) -> Array:
-        """d ln f of coupled modes by ln f of uncoupled ones (n, n), where they are as measured."""
+        """d ln f of coupled by ln f of uncoupled modes (n, n), at the measured ln f ``y`` (n,)."""
         own, part = np.ones(len(y)), np.zeros(len(y))
         apart = (np.exp(2 * (y - self.scale)) - np.exp(2 * (y[self.partner] - self.scale))) / 2
         r = np.sqrt(1 - np.minimum(zeta * self.size / np.maximum(abs(apart), 1e-300), 1.0) ** 2)
