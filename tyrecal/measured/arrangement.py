@@ -1,10 +1,10 @@
-"""How a test was measured: which channels count, which side of its functions was moved over the
-tyre, and which files are parts of one test.
+"""Arrangement of tests: the channels that count, the side of the functions that was moved over the
+tyre, and the files that are parts of one test.
 
 ``gather`` calls it once for all universal files. By reciprocity the response at i to a force at j
-is the response at j to a force at i; so where the hammer was moved past fixed accelerometers, the
-impacts are the shape's points. Files with a common reference that measure other channels are parts
-of one test, those that measure the same ones are repeats.
+is the response at j to a force at i. So if the hammer was moved and the accelerometers were fixed,
+the impacts are the shape's points. Files with a common reference and different channels are parts
+of one test; files with the same channels are repeats.
 """
 
 from __future__ import annotations
@@ -30,12 +30,11 @@ FUNCTION_UNITS = {  # of functions, as they state it without brackets and blanks
     )
     for force, b in (("", 1.0), ("/n", 1.0), ("/kn", 1e3), ("/lbf", 4.4482216))
 }
-SAME_CHANNELS = 0.5  # share of a file's channels that another has, from which on they are repeats
+SAME_CHANNELS = 0.5  # share of common channels from which two files are repeats
 
 
 class Arranged(NamedTuple):
-    """Tests, a universal file each that holds what counts of one or several, and what a user has to
-    know."""
+    """Tests, each as one universal file with the channels that count, and notes for the user."""
 
     tests: list[Universal]
     notes: list[str]

@@ -1,21 +1,21 @@
 """Frequency-response functions to modes, with the standard deviation of each frequency.
 
 Poles by least squares in the complex frequency domain (LSCF): H(z) D(z) = N(z) with a common
-denominator D for all signals, for rising orders of D. A pole that comes again from one order to
-the next is stable; stable poles within 1 % of each other are one mode, whose frequency and damping
-are their medians. Residues, and so shapes, by least squares in the frequency domain with one term
-for the modes below the band and one for those above.
+denominator D for all signals, for rising orders of D. A pole that two successive orders have is
+stable; stable poles within 1 % of each other are one mode, whose frequency and damping are their
+medians. Residues, and so shapes, by least squares in the frequency domain with one term for the
+modes below the band and one for those above.
 
 Powers of z = exp(-i w T) with real coefficients, from 0 Hz on, are nearly dependent over a narrow
-band: over 70 to 90 Hz rounding decided which mode was found. So the band alone, shifted, is laid
-round three quarters of the unit circle, with complex coefficients (the condition of 40 powers is
-then about cos(pi / 8)^-40 = 24); the denominator comes from the data by QR, not from normal
-equations, which would square the condition; and RIDGE of the data's size bounds what rounding can
-do where the order is higher than the data have modes.
+band: over 70 to 90 Hz rounding decided which mode was found. So only the band, shifted, is mapped
+to three quarters of the unit circle, with complex coefficients (the condition of 40 powers is then
+about cos(pi / 8)^-40 = 24). The denominator follows from the data by QR, not from normal equations,
+which would square the condition. RIDGE times the norm of the data limits the effect of rounding if
+the order is higher than the number of modes.
 
-No formula states how far such a frequency is off. The delete-one-group jackknife over the
-sensors tells what noise does, and the spread s over the orders (1.48 times the median deviation)
-what the model's order does: with the frequency theta_j from all of g groups of points but j,
+The error of a frequency has two parts: noise, by the delete-one-group jackknife over the sensors,
+and the order, by the spread s over the orders (1.48 times the median deviation). With the frequency
+theta_j from all of g groups of points except j,
 
     sigma^2 = (g - 1) / g sum_j (theta_j - mean theta)^2 + s^2
 """
@@ -42,7 +42,7 @@ MODE_WIDTH = 0.01  # relative width of one mode's poles
 MIN_STABLE_SHARE = 0.4  # share of the orders in which a mode's pole has to be stable
 DAMPING_RANGE = (0.002, 0.2)  # ratios that a tyre's mode can have
 DEVIATION = 1.4826  # standard deviation of a normal variable over its median deviation
-MAX_GROUPS = 10  # of the jackknife, at most
+MAX_GROUPS = 10  # largest number of groups of the jackknife
 FORMS = ("receptance", "mobility", "accelerance")
 
 
@@ -69,10 +69,10 @@ def identify(measured: Responses, low_Hz: float, high_Hz: float) -> Identified:
 
     Raises InputError where the functions hold no mode, or lie at uneven frequencies.
     """
-    above_0 = measured.frequency_Hz > 0  # where nothing moves or everything drifts
+    above_0 = measured.frequency_Hz > 0  # at 0 Hz sensors show no motion, or drift
     f, points = measured.frequency_Hz[above_0], measured.points
-    # velocity over force, whose modes are about as high at all frequencies: least squares heed them
-    # alike
+    # velocity over force: peaks of all modes are about equally high, so that least squares weigh
+    # them alike
     to_mobility = (2j * np.pi * f) ** (1 - FORMS.index(measured.form))
     mobility = measured.values[:, above_0] * to_mobility
     if len(f) < 50 or not np.allclose(np.diff(f), f[1] - f[0], rtol=1e-3):
@@ -169,7 +169,7 @@ def _modes(poles: list[Array], low_Hz: float, high_Hz: float) -> Array:
         before = candidates
     stable.sort()
     rest, modes = np.array(stable).reshape(-1, 2), []
-    while len(rest):  # the most crowded place first
+    while len(rest):  # the frequency with the most stable poles first
         near = np.abs(rest[:, None, 0] / rest[None, :, 0] - 1) < MODE_WIDTH / 2
         centre = np.median(rest[near[np.argmax(near.sum(1))]], axis=0)
         mine = np.abs(rest[:, 0] / centre[0] - 1) < MODE_WIDTH
@@ -184,7 +184,7 @@ def _modes(poles: list[Array], low_Hz: float, high_Hz: float) -> Array:
 
 def _jackknife(again: list[Array], frequencies: Array) -> Array:
     """Standard deviation of each frequency (modes,), Hz, from the modes (modes, 3) found without
-    one group each; NaN where fewer than three saw it."""
+    each group; NaN if fewer than three of these sets have the mode."""
     nearest = np.full((len(again), len(frequencies)), np.nan)
     for j, modes in enumerate(again):
         for i, hertz in enumerate(frequencies):

@@ -9,11 +9,11 @@ noise, over a grid; s: any size, p(s) ~ 1/s:
 
     ln p(u | label, nu) = -1/2 ln|S + nu I| - k/2 ln(u^T (S + nu I)^-1 u) + constant
 
-A label's probability is its share of the sum of prior p(u | label). The prior knows one thing
-about tyres: [c,m+2] is above [c,m], so a file in which [c,m] was not found below is hardly of
-[c,m+2]. Labels that these sensors cannot distinguish share their probability by their priors
-alone: how clean a shape looks says nothing about its order there. Where a case is given, its shapes
-are in the covariances and its frequencies in the prior (``case_modes``). A label whose own motions
+A label's probability is its share of the sum of prior p(u | label). The prior contains that [c,m+2]
+is above [c,m]: it is small for [c,m+2] if [c,m] was not found below it. Labels that these sensors
+cannot distinguish share their probability by their priors alone, because there the shape has no
+information about the order. If a case is given, its shapes are in the covariances and its
+frequencies in the prior (``case_modes``). A label whose own motions
 have less than `MIN_SEEN` of the mean square of all motions on these sensors is not seen, and never
 given. A column is the index of an order m among those of a harmonic (``covariance``): m itself from
 0 to 3, on c = 0 also AXIAL_COLUMN, 4, of [0,0] axial. BELT is the radius, over the largest one,
@@ -38,13 +38,13 @@ from .sensors import Sensors
 Array = np.ndarray
 
 MIN_LABEL_PROBABILITY = 0.9  # probability from which a label is given
-MIN_LN_ODDS = 5.0  # expected logarithm of the odds below which sensors cannot tell two labels apart
-ODDS_NOISE = 0.02  # nu at which it is expected
+MIN_LN_ODDS = 5.0  # expected ln of the odds below which sensors do not distinguish two labels
+ODDS_NOISE = 0.02  # nu for that expectation
 NOISE_VARIANCES = (1e-4, 1e-3, 1e-2, 5e-2, 0.2)  # nu, over the mean variance of a label's signals
-WITHOUT_LOWER = 0.02  # prior of [c,m+2] without [c,m] below it, of 1
+WITHOUT_LOWER = 0.02  # prior of [c,m+2] without [c,m] below it, over that with it
 SHAPES_DRAWN, DRAWN_NOISE = 64, 0.01  # shapes drawn of each label, and their nu
-MIN_LABELLED = 0.9  # share of a label's shapes that get it, for the sensors to tell it
-MIN_TAKEN = 0.03  # mean probability that a rival takes, to be named
+MIN_LABELLED = 0.9  # share of a label's shapes that must get it, for the sensors to recognise it
+MIN_TAKEN = 0.03  # mean probability from which a rival label is listed
 
 
 @dataclass(frozen=True)

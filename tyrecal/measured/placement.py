@@ -1,10 +1,10 @@
-"""Where to put sensors on a tyre so that its modes are distinguished, and what they do to it.
+"""Places of sensors that distinguish a tyre's modes, and frequency shifts by the sensors' mass.
 
 Candidates are the nodes of the tread at even angles. A sensor has a row phi for each direction that
-it measures: the modes of the case there, all of one mean square and doublets as two columns. The
-next sensor is the one that raises ln det(1 + Phi^T Phi) most, Phi being all rows so far. For one
-direction each and many candidates this is QR with column pivoting of Phi^T, until its columns are
-used up, and then the choice that spreads the errors least.
+it measures: the modes of the case there, scaled to the same mean square, a doublet as two columns.
+The next sensor is the one that raises ln det(1 + Phi^T Phi) most, Phi being all rows so far. With
+one direction each this is QR with column pivoting of Phi^T until its rank is reached, and
+D-optimal design from there on.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ Array = np.ndarray
 ANGLE_STEPS = 48  # candidates round the tyre
 NEAR_HULL_m = 1e-3  # distance from the section's convex hull up to which a node is outside
 DRAWN_TESTS = 100
-DRAWN_NOISE_SHARE, DRAWN_OFF_m = 0.05, 0.002  # of a mode's root mean square signal; of a place
+# standard deviations of noise over a mode's root mean square signal, and of a place, m
+DRAWN_NOISE_SHARE, DRAWN_OFF_m = 0.05, 0.002
 
 
 def place_sensors(case: CaseModes, modes: Sequence[Mode], count: int, axes: str) -> Sensors:

@@ -5,9 +5,9 @@ The value is the mean over n runs, and sigma that of the mean:
     sigma^2 = max( v / n, sum sigma_i^2 / n^2, (floor value)^2 ),
     v = (4 v_all (mean x)^2 + sum_i (x_i - mean x)^2) / (4 + n - 1)
 
-sigma_i are what each run states itself, v_all the variance of one run (relative) pooled over all
-labels: a variance from three runs is drawn towards it, as if it were known from four more. The
-floor is for what repeats do not show: another bench, another day, the sensors' own mass.
+sigma_i: standard deviations that the runs state. v_all: relative variance of one run, pooled over
+all labels; it counts like four more repeats of each value. The floor is for scatter that repeats do
+not show: another bench, another day, the mass of the sensors.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from ..tyre.usual import MAX_SIGMA
 from .measurement import Measurement
 
 FLOOR = 0.001  # of the value
-PRIOR_REPEATS = 4.0  # repeats that the scatter of all values is worth for that of one value
+PRIOR_REPEATS = 4.0  # number of repeats of one value that the pooled variance counts as
 
 
 def combined(
@@ -83,7 +83,7 @@ def mean_damping(values: Sequence[Measurement]) -> dict[str, Any]:
 
 
 def _pooled(groups: dict[object, list[Measurement]], quantity: str) -> float | None:
-    """Relative variance of one run, over all that was repeated; None where nothing was."""
+    """Relative variance of one run, pooled over all repeated values; None without repeats."""
     total, freedom = 0.0, 0
     for runs in groups.values():
         if runs[0].quantity == quantity and len(runs) > 1:

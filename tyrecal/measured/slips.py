@@ -6,9 +6,9 @@ deviation is
 
     t_i = |d_i| sqrt((n - 1) / n) / s,    s^2 = the scatter of all repeats of the file without it.
 
-The largest is taken away, then the largest of the rest, and so on; the slips are those up to the
-last that Student's t does not allow (Rosner's generalised extreme studentised deviate). So two
-slips do not hide each other, and no slip adds to the scatter that it is compared with.
+The largest is removed, then the largest of the rest, and so on. The slips are all up to the last
+one whose t_i exceeds the limit by Student's t (Rosner's generalised extreme studentised deviate).
+So two slips do not hide each other, and no slip adds to the scatter that it is compared with.
 `repeats.combined`, which averages repeats, must leave out all runs that are reported here.
 """
 
@@ -27,8 +27,8 @@ FEW_REPEATS = 3  # degrees of freedom below which a file does not show the scatt
 # relative difference between repeats of such a file above which one is a slip
 MAX_REPEAT_STEP = {"frequency_Hz": 0.05, "mass_kg": 0.05}
 MAX_REPEAT_STEP_ELSE = 0.25  # of all other quantities
-MIN_COMMON, MIN_SHIFT = 3, 0.02  # labels of two runs, and their mean ln ratio
-MAX_SLIPS = 12  # slips that are looked for
+MIN_COMMON, MIN_SHIFT = 3, 0.02  # common labels of two runs, and their mean ln ratio, to report
+MAX_SLIPS = 12  # largest number of slips
 USUAL_STEPS = [digit * 10.0**power for power in range(2, -8, -1) for digit in (5, 2.5, 2, 1.25, 1)]
 MIN_SCATTER = 1e-4  # relative scatter that repeats of a test have at least
 

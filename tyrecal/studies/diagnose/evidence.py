@@ -2,10 +2,10 @@
 
     ln Z(e) = -r^T S^-1 r / 2 - ln|2 pi S| / 2 - x^T x / 2 - ln|I + J^T S^-1 J| / 2 + ln p(splits)
 
-at the re-fitted x, counted from its centre in units of its spread (Laplace's approximation;
-MacKay, Information Theory, ch. 27-28). r: residual in ln f; S: the problem's Sigma plus the
-covariance of the error of the effect's law. Then
-Z = integral of Z(e) p(e) de, p(e) uniform over the range, by Gauss and Legendre's rule.
+at the re-fitted x, here less its centre, over its spread (Laplace's approximation; MacKay,
+Information Theory, ch. 27-28). r: residual in ln f; S: the problem's Sigma plus the covariance of
+the effect's response error. Then Z = integral of Z(e) p(e) de by the Gauss-Legendre rule, p(e)
+uniform over the range.
 """
 
 from __future__ import annotations
@@ -28,17 +28,18 @@ from .gap import family
 Array = np.ndarray
 NONE: Final = "none"
 OUTSIDE: Final = "outside"
-PRIOR_OUTSIDE: Final = 0.10  # of a cause that no effect of the catalogue explains, before the data
-RULE_POINTS = {1: 25, 2: 15, 3: 9}  # of the rule in each parameter, by the number of effects
-FEW_POINTS = {2: 7, 3: 5}  # that show which sets of effects matter: ln Z within 0.5
+PRIOR_OUTSIDE: Final = 0.10  # prior of a cause that no effect of the catalogue explains
+RULE_POINTS = {1: 25, 2: 15, 3: 9}  # points of the rule in each parameter, by number of effects
+FEW_POINTS = {2: 7, 3: 5}  # fewer points, with ln Z within 0.5, to find the sets that matter
 COVERAGE = 2.0  # standard deviations within which a stated number may be off (GUM, k = 2)
-SHARP_FALL = 2.0  # of ln Z from the best point to its neighbours, above which points are added
+SHARP_FALL = 2.0  # fall of ln Z from the best point to a neighbour above which points are added
 MAX_ZOOMS = 6  # refinements of a grid about its best point
-REFIT_STEPS = 16  # of Gauss and Newton, halved where they rise, in a model that is quadratic
-COUPLED_STEPS = 8  # more where near modes are coupled
+REFIT_STEPS = 16  # Gauss-Newton steps, halved if the misfit rises, of a model quadratic in x
+COUPLED_STEPS = 8  # further steps if near modes are coupled
 REFITTED = 1e-6  # expected fall of the misfit below which a re-fit has converged
 FAR_BELOW, ABOVE_POINTS = 20.0, 1.0  # limits of a spline in ln Z: below and above its best point
-UNKNOWN = (0.005, 0.01, 0.02, 0.04)  # shifts of ln f by causes outside the catalogue
+# standard deviations of shifts of ln f by causes outside the catalogue
+UNKNOWN = (0.005, 0.01, 0.02, 0.04)
 UNKNOWN_ALIKE = 0.9  # correlation of such a shift of a mode in two states
 SMOOTH_HARMONICS, SMOOTH_LN_F = 2.0, 0.5  # correlation lengths of smooth shifts, in c and in ln f
 INFLATION = (2.0, 4.0)  # factors on all standard deviations of Sigma

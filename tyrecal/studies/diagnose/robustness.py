@@ -39,7 +39,7 @@ FACTORS = {0.5: "half", 2.0: "twice"}
 # least probability of a hypothesis that is evaluated again, over that of the likeliest one
 MIN_WEIGHED = 1e-5
 MAX_WEIGHED = 20  # hypotheses with effects that are evaluated again
-MAX_LN_BELOW_BEST = 8.0  # of the ln posterior of grid points that are kept
+MAX_LN_BELOW_BEST = 8.0  # ln posterior below the best one, up to which grid points are kept
 JUDGED = {UNDECIDED: "undecided", NO_GAP: "no gap", "outside": "not explained by the catalogue"}
 
 

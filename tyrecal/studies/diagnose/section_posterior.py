@@ -1,9 +1,9 @@
-"""The section's fields as the data describe them, where nothing else is wrong.
+"""Posterior of the errors of the section (`section_fields`), of a tyre without effects.
 
-z: components of the fields in their standard deviations, with the prior N(0, 1); G (n, k): changes
-of ln f by z = 1. Then E z = G^T S^-1 r, cov z = I - G^T P G, r what the plain calibration leaves
-and P what it cannot absorb. (P r of the deviations at the variables' prior is S^-1 r of those at
-the calibration.)
+z: components of the fields in standard deviations, with the prior N(0, 1); G (n, k): changes of
+ln f by z = 1. Then E z = G^T S^-1 r, cov z = I - G^T P G; r: residuals of the plain calibration, P:
+the part of a residual that it does not absorb. (S^-1 r is P times the residuals at the centre of
+the prior.)
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ FIELD_UNITS = dict.fromkeys(("meridian", *ALONG_CARCASS), ("mm", 1e3))  # the ot
 def section_posterior(
     case: LoadedCase, sources: Sequence[Source], diagnosis: Diagnosis
 ) -> list[FieldValue]:
-    """Meridian and gauges amid each region, the filler's tip, the rim's hold, compounds by part."""
+    """Errors of meridian and gauges in the middle of each region, of the filler's tip, of the rim's
+    hold, and of the compounds by part."""
     problem = diagnosis.bare
     columns = [k for k, source in enumerate(sources) if source.field]
     P, inverse, _ = projection(problem, diagnosis.hypothesis(NONE).fitted.d[0])

@@ -1,10 +1,10 @@
-"""How many effects a tyre has, and which: hypotheses of one, two and three, built forwards.
+"""Hypotheses of one, two and three effects, built by adding one effect after the other.
 
-Before the data: none 0.25, outside the catalogue 0.10; of the rest two effects have the share
-``further`` of one's, three that of two's, and all sets of as many effects the same. Of 26 effects
-there are 325 pairs and 2600 triples; tried are the likeliest singles with every other effect, those
-that explain most together, and, where pairs carry weight, these with whatever the rest of the gap
-is most like.
+Priors: no effect 0.25, outside the catalogue 0.10. The rest is shared so that two effects have
+``further`` times the prior of one, three ``further`` times that of two; all sets of the same number
+are equally probable. 26 effects have 325 pairs and 2600 triples. So these sets are tried: the
+likeliest single effects with every other one; the pairs that explain most together; and probable
+pairs with the effects that are most like the residual that they leave.
 """
 
 from __future__ import annotations
@@ -23,12 +23,14 @@ from .evidence import NONE, OUTSIDE, PRIOR_OUTSIDE, Hypothesis, explain, grid, o
 Array = np.ndarray
 PRIOR_NONE: Final = 0.25  # probability of no effect, before the data
 MAX_EFFECTS = 3  # at a time
-COUPLED_POINTS = 3  # of the rule in what couples modes, that stand for all from two effects on
-PARTNERS = 4  # singles that are tried with every other
-BASES, BASES_WITHIN = 3, 3.0  # pairs that a third is added to; ln probability behind the best
-THIRDS = 4  # effects that are added to each
-HIDDEN_PAIRS = 4  # more, that explain most together
-FEW_ENOUGH = 8.0  # ln probability of a set behind the best of fewer, for few points to be enough
+COUPLED_POINTS = 3  # values of zeta (`veering.rule`) that are used for two and three effects
+PARTNERS = 4  # single effects that are tried with every other
+# number of pairs that a third effect is added to; ln probability that they may be behind the best
+BASES, BASES_WITHIN = 3, 3.0
+THIRDS = 4  # effects that are added to each pair
+HIDDEN_PAIRS = 4  # further pairs, that explain most together
+# ln probability behind the best smaller set, beyond which `evidence.FEW_POINTS` are enough
+FEW_ENOUGH = 8.0
 
 
 def weigh_hypotheses(
@@ -36,24 +38,24 @@ def weigh_hypotheses(
     pairs: bool = True,
     before: tuple[InverseProblem, Sequence[Hypothesis]] | None = None,
 ) -> list[Hypothesis]:
-    """Every hypothesis with its evidence; ``pairs``: of two and three effects, too; before: an
-    earlier problem and its hypotheses; those whose model answers did not change are reused."""
-    stand = _standing(problem, *before) if before else {}
+    """Every hypothesis with its evidence. pairs: include sets of two and three effects; before: an
+    earlier problem and its hypotheses, reused if the model's answers did not change."""
+    reusable = _reusable(problem, *before) if before else {}
     ids = list(problem.expansion.nodes)
     prior = priors(len(ids), problem.assumed.further, MAX_EFFECTS if pairs else 1)
     plain = refit(problem, {}, 1)
     none = Hypothesis(NONE, PRIOR_NONE, float(plain.ln_evidence[0]), {}, np.zeros(1), plain)
     hypotheses = [none, outside(problem)]
-    hypotheses += [stand.get(id) or explain(problem, [id], prior[1]) for id in ids]
+    hypotheses += [reusable.get(id) or explain(problem, [id], prior[1]) for id in ids]
     for count in range(2, len(prior) + 1):
-        hypotheses += _with_one_more(problem, hypotheses, count, prior[count], stand)
+        hypotheses += _with_one_more(problem, hypotheses, count, prior[count], reusable)
     return hypotheses
 
 
-def _standing(
+def _reusable(
     problem: InverseProblem, before: InverseProblem, hypotheses: Sequence[Hypothesis]
 ) -> dict[str, Hypothesis]:
-    """Hypotheses, by key, whose effects have not been evaluated again since."""
+    """Earlier hypotheses, by key, whose effects have not been evaluated again since."""
     now, then = problem.expansion, before.expansion
     new = {frozenset([id]) for id, nodes in now.nodes.items() if nodes is not then.nodes[id]}
     new |= {frozenset(ids) for ids, each in now.joint.items() if each is not then.joint.get(ids)}
@@ -66,7 +68,7 @@ def _standing(
 
 
 def priors(effects: int, further: float, most: int = MAX_EFFECTS) -> dict[int, float]:
-    """Prior of each set of 1, 2, ... of so many effects: they sum to 0.65 over all sets."""
+    """Prior of one set of 1, 2, ... effects, of ``effects`` in all; all sets together have 0.65."""
     counts = range(1, min(most if further else 1, effects) + 1)
     total = sum(further ** (k - 1) for k in counts)
     rest = 1 - PRIOR_NONE - PRIOR_OUTSIDE
@@ -81,14 +83,14 @@ def probabilities(hypotheses: Sequence[Hypothesis]) -> dict[str, float]:
 
 
 def before(hypotheses: Sequence[Hypothesis]) -> dict[str, float]:
-    """Prior probability by key, of what was weighed."""
+    """Prior probability by key, of the hypotheses that were evaluated."""
     return _by_key(
         hypotheses, np.array([h.prior for h in hypotheses]), lambda h: np.exp(h.ln_weights)
     )
 
 
 def present(p: Mapping[str, float], ids: Sequence[str]) -> float:
-    """Probability that all of these effects are there, alone or with others."""
+    """Probability that all these effects are present, alone or with others."""
     total = sum(each for key, each in p.items() if set(ids) <= set(key.split("+")))
     return min(total, 1.0)  # rounded
 
@@ -96,8 +98,8 @@ def present(p: Mapping[str, float], ids: Sequence[str]) -> float:
 def _by_key(
     hypotheses: Sequence[Hypothesis], p: Array, over: Callable[[Hypothesis], Array]
 ) -> dict[str, float]:
-    """Sum of ``p`` by key; of effects that the case states as uncertain, the share ``over`` each
-    key."""
+    """Sum by key of the hypotheses' probabilities ``p``. If the case states an effect as uncertain,
+    p is divided by the weights ``over`` its grid (`Hypothesis.shares`)."""
     totals = {h.key: 0.0 for h in hypotheses}
     for h, whole in zip(hypotheses, p.tolist(), strict=True):
         if not h.prior_sd:
@@ -113,10 +115,10 @@ def _with_one_more(
     hypotheses: Sequence[Hypothesis],
     count: int,
     prior: float,
-    stand: Mapping[str, Hypothesis],
+    reusable: Mapping[str, Hypothesis],
 ) -> list[Hypothesis]:
-    """Sets of ``count`` effects: the likeliest of one less, each with others; ``stand``: by key,
-    those that are known."""
+    """Sets of ``count`` effects: the likeliest sets of one effect less, each with others. reusable:
+    known hypotheses by key."""
     order = [h.key for h in hypotheses if h.key in problem.expansion.nodes]
     singles = {h.key: h for h in hypotheses if h.key in order}
     fewer = [h for h in hypotheses if len(h.values) == count - 1]
@@ -132,7 +134,7 @@ def _with_one_more(
     most, result = max(h.ln_evidence + np.log(h.prior) for h in hypotheses), []
     for ids in sorted(sets, key=lambda ids: [order.index(id) for id in ids]):
         among = coupled_most([singles[id] for id in ids])
-        h = stand.get("+".join(ids)) or explain(problem, ids, prior, among, few=True)
+        h = reusable.get("+".join(ids)) or explain(problem, ids, prior, among, few=True)
         if h.few and h.ln_evidence + np.log(prior) > most - FEW_ENOUGH:
             h = explain(problem, ids, prior, among)
         result.append(h)
@@ -155,14 +157,14 @@ def with_sets(
 
 
 def coupled_most(known: Sequence[Hypothesis]) -> dict[int, float]:
-    """The values of zeta (`veering.rule`) with most of the evidence, which stand for all of them:
-    {index in the rule: share of the evidence, mean over ``known``}; {} if no modes are coupled."""
+    """The values of zeta with the most evidence: {index in `veering.rule`: density, mean over
+    ``known``}; {} if no modes are coupled."""
     share = np.mean([h.fitted.coupled.T @ h.posterior for h in known], axis=0)
     return {int(k): float(share[k]) for k in np.argsort(-share)[:COUPLED_POINTS]}
 
 
 def next_candidates(problem: InverseProblem, base: Hypothesis) -> list[str]:
-    """Effects by their gain in addition to those of ``base``, the first `THIRDS`."""
+    """The `THIRDS` effects with the largest gain in addition to those of ``base``."""
     gains = {id: float(own.max()) for id, (own, *_) in _gains(problem, base).items()}
     return sorted(gains, key=lambda id: -gains[id])[:THIRDS]
 
@@ -170,9 +172,8 @@ def next_candidates(problem: InverseProblem, base: Hypothesis) -> list[str]:
 def hidden_pairs(
     problem: InverseProblem, none: Hypothesis, tried: Container[frozenset[str]]
 ) -> list[frozenset[str]]:
-    """Pairs that are not among ``tried`` by what both gain together, the first `HIDDEN_PAIRS`: two
-    may hide one another from calibration, as a lateral and a tilting spring do, of which neither
-    looks likely alone."""
+    """The `HIDDEN_PAIRS` pairs not in ``tried`` with the largest gain together. Calibration may
+    hide each of two effects alone, as with a lateral and a tilting spring."""
     gains = {}
     for (a, (own, _, Pc)), (b, (other, c, _)) in combinations(_gains(problem, none).items(), 2):
         if frozenset((a, b)) not in tried:
@@ -184,8 +185,9 @@ def _gains(problem: InverseProblem, base: Hypothesis) -> dict[str, tuple[Array, 
     """For each effect that is not in ``base``, over its range (q,): its gain in ln likelihood, its
     shift c (q, n), and c P (q, n).
 
-    With r the residual of the base's likeliest fit and P what neither calibration nor the sizes
-    that it has already absorb, c gains c^T P r - c^T P c / 2, and one more, c', -c^T P c' besides.
+    r: residual of the base's likeliest fit; P: the part of a residual that neither x nor the sizes
+    of the base's effects absorb. c gains c^T P r - c^T P c / 2; c and c' together gain -c^T P c'
+    more than the sum of both.
     """
     best = base.best
     problem = replace(problem, zeta=float(base.fitted.zeta[best]))

@@ -1,12 +1,13 @@
-"""How far the gap shrinks where no data were used: before and after, and what chance alone does.
+"""Shrinkage of the errors on held-out data by an effect, and the shrinkage by chance alone.
 
-The held-out set is chosen by rule. Everything is attributed and fitted on the rest; there
-R = 1 - G_after / G_before, G the rms of the errors on the held-out rows. The placebo: the same on
-tyres without any effect, drawn from the plain model and Sigma, each with its own likeliest effect.
+A rule chooses the held-out rows; effect and variables are fitted to the other rows. G: rms of the
+errors in ln f on the held-out rows, before and after the effect is added; R = 1 - G_after /
+G_before. The placebo is R of tyres without any effect, drawn from the plain model and Sigma, each
+with its likeliest effect.
 
-The fits of a diagnosis attribute a part of the errors to the uncalibrated constants. An ordinary
-calibration, least squares of ln f, does not, and comes closer. So its errors without and with the
-effect, at the size that the diagnosis gives on the rest, are listed, too.
+The fits of a diagnosis attribute a part of the errors to the uncalibrated constants. A calibration
+by least squares of ln f does not, and has smaller errors. So its errors are listed too, without the
+effect and with the size that the diagnosis gives on the fitted rows.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from .evidence import NONE, Hypothesis, explain, grid, refit
 
 Array = np.ndarray
 PLACEBOS, DRAWS = 200, 200  # simulated tyres without effects; sizes drawn from the posterior
-LEAST_SQUARES_STEPS = 8  # of Gauss and Newton's method
+LEAST_SQUARES_STEPS = 8  # Gauss-Newton steps
 
 
 @dataclass(frozen=True)
@@ -121,8 +122,8 @@ def shrink(problem: InverseProblem, key: str | None = None, seed: int = 0) -> Sh
 
 
 def _least_squares(problem: InverseProblem, hold: Array, sizes: Mapping[str, float]) -> Array:
-    """Errors in ln f on the held-out rows (n,) after least squares of the other frequencies' ln, of
-    run 0, with effects of these sizes in the model; the prior holds x as in all fits."""
+    """Errors in ln f on the held-out rows (n,) of run 0 after least squares of ln of its other
+    frequencies, with effects of these sizes in the model. x has its prior as in all fits."""
     rows = problem.observations.rows
     used = ~hold & np.array([bool(row.label) and not row.run for row in rows])
     out = problem.only(hold & np.array([not row.run for row in rows]))

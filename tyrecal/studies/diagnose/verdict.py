@@ -18,8 +18,8 @@ UNDECIDED: Final = "undecided"
 NO_GAP: Final = "no_gap"
 SURE = 0.7  # probability from which an effect is named
 RULED_OUT = 0.05  # probability of no effect, below which there is a gap
-CHECK = 0.01  # p-value of an explanation's own fit, below which it does not fit
-SET = 0.9  # probability that the candidates hold together
+CHECK = 0.01  # p-value of chi2 of an explanation, below which it does not fit
+SET = 0.9  # probability that the candidates have together
 PERHAPS = 0.1  # probability of a further effect, from which it is mentioned
 
 
@@ -50,10 +50,10 @@ def decide(
 ) -> Verdict:
     """The verdict by fixed rules.
 
-    named: the most effects of which p >= 0.7 that they are there, alone or with others; the
-    likeliest fit with them has p > 0.01, p(none) < 0.05, two degrees of freedom are left, and no
-    size is at the bound of its range; outside: p >= 0.5 and p(none) < 0.05, or nothing that fits;
-    no_gap: "none" is likelier than it was before, and likeliest.
+    named: the largest set of effects that are present with p >= 0.7, alone or with others, if
+    chi2 of the likeliest fit with them has p > 0.01, p(none) < 0.05, two degrees of freedom are
+    left, and no size is at the bound of its range. outside: p(none) < 0.05, and p(outside) >= 0.5
+    or that fit has p <= 0.01. no_gap: "none" is the likeliest, and likelier than its prior.
     """
     order = sorted(probabilities, key=lambda key: -probabilities[key])
     totals = np.cumsum([probabilities[key] for key in order])
@@ -101,13 +101,13 @@ def no_gap_words(none: float) -> str:
 
 
 def holds(key: str, ids: str) -> bool:
-    """Whether an explanation has all of these effects."""
+    """Whether the hypothesis ``key`` has all effects of the key ``ids``."""
     return set(ids.split("+")) <= set(key.split("+"))
 
 
 def most_sure(probabilities: Mapping[str, float]) -> str | None:
-    """The most effects, as a key that was weighed, that are there with p >= 0.7 together, the
-    likeliest of as many; None where no effect is."""
+    """Key of the largest set of effects that are present together with p >= 0.7; of several such
+    sets the likeliest; None if there is none."""
     keys = [key for key in probabilities if key not in (NONE, OUTSIDE)]
     sure = [
         (key.count("+"), p, key)
@@ -118,8 +118,7 @@ def most_sure(probabilities: Mapping[str, float]) -> str | None:
 
 
 def perhaps(probabilities: Mapping[str, float], named: str) -> list[Further]:
-    """Effects in addition to those that are named, p >= 0.1 that they are there too, likeliest
-    first."""
+    """Effects that are present in addition to the named ones with p >= 0.1, likeliest first."""
     ids = named.split("+")
     others = {id for key in probabilities for id in key.split("+")} - {*ids, NONE, OUTSIDE}
     also = [Further(id, present(probabilities, [*ids, id])) for id in others]
@@ -128,7 +127,7 @@ def perhaps(probabilities: Mapping[str, float], named: str) -> list[Further]:
 
 
 def _with_at_bound(ids: Sequence[str]) -> str:
-    """Effects of an explanation whose size is the last of its range: more would fit better."""
+    """Words on effects whose size is at the bound of its range: a larger one would fit better."""
     return f", with {' and '.join(ids)} at the bound of its range" if ids else ""
 
 

@@ -45,15 +45,16 @@ class FieldValue:
 def section_map(
     problem: InverseProblem, P: Array, residuals: Array, parts: Sequence[SectionPart]
 ) -> tuple[list[PartChange], int]:
-    """Parts by falling evidence, and how many combinations of them the data see.
+    """Parts by falling evidence, and the number of their combinations that the data determine
+    better than the prior.
 
-    A part's relative change has the prior N(0, s^2). With residuals r and g = d eta by it,
-    a = g^T P g and b = g^T P r, it is b / (a + 1/s^2), and over no change (Z0)
-    ln Z / Z0 = b^2 / (a + 1/s^2) / 2 - ln(1 + s^2 a) / 2. Below, g is times s.
+    A part's relative change has the prior N(0, s^2). r: residuals, g: d eta by the change,
+    a = g^T P g, b = g^T P r. The change is b / (a + 1/s^2), its evidence Z, that of no change Z0:
+    ln Z / Z0 = b^2 / (a + 1/s^2) / 2 - ln(1 + s^2 a) / 2. In the code g is multiplied by s.
     """
     if not parts:
         return [], 0
-    # of a part d eta by ln of its stiffness or density, for all rows of the model
+    # d eta by ln of a part's stiffness or density, for all rows of the model
     columns = [(part.stiffness, STIFFNESS_PRIOR, part) for part in parts]
     columns += [(part.mass, MASS_PRIOR, part) for part in parts]
     G = np.array([g[problem.places] * s for g, s, _ in columns])
