@@ -14,7 +14,7 @@ import numpy as np
 from ...errors import RunFailed
 
 Array = np.ndarray
-# residual of the inverse, in the norm of M, over 1 / lambda; lambda's is its square
+# residual of 1 / (lambda - shift) in the norm of M, relative; lambda's relative error is its square
 INVERSE_RTOL = 1e-7
 MAX_BASIS = 300  # vectors
 

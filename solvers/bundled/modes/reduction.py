@@ -1,9 +1,9 @@
-"""A few fields of a harmonic in which its response to given forces is right up to a frequency.
+"""A few fields of a harmonic that represent its response to given forces up to a frequency.
 
-Static responses to the forces, to the inertia of those, and so on (Krylov's vectors of K^-1 M), are
-right to a higher power of the frequency with every round, and hold all that is static from the
-first on. Where there are losses, the responses to those of the modes are added: modes couple by
-losses, and are complex.
+They are the static responses to the forces, to the inertia of these responses, and so on (Krylov
+vectors of K^-1 M). The first are exact for static forces; each round is right to a higher power of
+the frequency. If there are losses, the responses to the losses of the modes are added, because
+losses couple the modes and make them complex.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from ..section.symmetry import Whole
 from .harmonics import Vibration
 
 Array = np.ndarray
-FREQUENCIES_SETTLED = 1e-7  # of the square of a frequency, from one round to the next
-SAME_VECTOR = 1e-10  # of a vector that others span: what is left of its square in the norm of M
+FREQUENCIES_SETTLED = 1e-7  # relative change of omega^2 from one round to the next
+SAME_VECTOR = 1e-10  # share of a vector's square, in the norm of M, below which others span it
 
 
 class PartOfStiffness:
@@ -35,7 +35,7 @@ class PartOfStiffness:
             self._three.append(assembled(dofs, 3 * nodes) if dofs else None)
 
     def times(self, V: Array, n: int, numbering: Coordinates, symmetry: Whole) -> Array:
-        """K_k(n) V in coordinates (size, k)."""
+        """K_k(n) V (size, k) for k fields V (size, k), both in coordinates."""
         fields = numbering.spread(V)
         flat = fields.reshape(-1, V.shape[1])
         image = np.zeros(flat.shape, complex if n else flat.dtype)
@@ -46,7 +46,7 @@ class PartOfStiffness:
 
 
 class ResponseBasis:
-    """Fields V (size, k) of harmonic n, in coordinates, with V^H M V = 1 and V^H K V = K."""
+    """Fields V (size, k) of harmonic n, in coordinates: V^H M V = 1; ``K`` (k, k) is V^H K(n) V."""
 
     def __init__(self, vibration: Vibration, n: int, forces: Array):
         """forces (size, p), in coordinates. Raises RunFailed."""
@@ -57,7 +57,7 @@ class ResponseBasis:
         self.add(forces[:, np.abs(forces).max(0) > 0])
 
     def add(self, forces: Array) -> None:
-        """Static responses to forces (size, p), less what the basis has of them already."""
+        """Add static responses to forces (size, p), made orthogonal to the basis."""
         new, image = self._solve(forces), forces
         for _ in range(2):  # Gram and Schmidt, twice for round-off
             part = self._MV.conj().T @ new
@@ -74,8 +74,8 @@ class ResponseBasis:
         self.K = (K + K.conj().T) / 2
 
     def settle(self, limit: float) -> None:
-        """Add responses to the inertia of the newest ones until the frequencies that the basis
-        makes settle up to omega^2 = ``limit``."""
+        """Add responses to the inertia of the newest fields until the basis' frequencies up to
+        omega^2 = ``limit`` no longer change."""
         before: Array = np.zeros(0)
         while self._newest:
             values = np.linalg.eigvalsh(self.K)

@@ -1,9 +1,10 @@
 """Preconditioner of the tyre in three dimensions: multifrontal Cholesky, in single precision
 (Duff and Reid, ACM Trans. Math. Softw. 9, 302, 1983).
 
-A front gathers the stiffness of its cells, or what the boxes inside it have left, eliminates its
-own unknowns as one dense block and leaves the rest to the next box. Where cords run at a bias the
-fold's two parts are eliminated together, elsewhere each by itself.
+A front assembles the stiffness of its cells, or the Schur complements of the fronts inside its box.
+It eliminates its own unknowns as one dense block; the Schur complement of the others goes to the
+next front. Columns with biased cords eliminate the two parts of `HalfTurn` together, the others
+each part separately.
 """
 
 from __future__ import annotations
@@ -20,13 +21,14 @@ from .half_turn_symmetry import ODD, HalfTurn
 
 Array = np.ndarray
 Tangents = list[tuple[Array, Array, Array, Array]]
-# of what couples the parts over what does not, above which a column takes both as one
+# largest stiffness between the two parts over that within one, above which a column eliminates both
+# together
 MIN_COUPLING = 5e-2
-MAX_RUN = 256  # rows that are added at once: of squares on the diagonal half is added in vain
+MAX_RUN = 256  # rows added at once; a block on the diagonal adds its upper half needlessly
 
 
 class Elimination:
-    """The order of elimination of a state's tangents, and how their cells are put together."""
+    """Order of elimination of a state's tangents, and assembly of their cells."""
 
     def __init__(self, tangents: Tangents, symmetry: HalfTurn):
         self.symmetry, around = symmetry, symmetry.around
@@ -35,9 +37,9 @@ class Elimination:
             [[[_fold(column, kind, g, h) for h in (0, 1)] for g in (0, 1)] for kind in column.kinds]
             for column in self.dissection.columns
         ]
-        # what a station's tangents by u u, u v, v u, v v (v = du/dTheta) are to the functions round
-        # the circumference: per piece, products of two of its functions or slopes, even or odd ones
-        # (2, 2, 4, s, f f)
+        # products that turn a station's tangents by u u, u v, v u, v v (v = du/dTheta) into those
+        # by functions round the circumference: for each piece, two of its functions or slopes, even
+        # or odd ones (2, 2, 4, s, f f)
         N = np.stack(
             [[F[:, rows] for F in (around.N, around.slope)] for rows in (around.even, around.odd)]
         )
@@ -50,7 +52,7 @@ class Elimination:
         self.fronts = self.dissection.fronts(self._coupled(tangents))
 
     def _coupled(self, tangents: Tangents) -> int:
-        """The first column whose parts a bias couples, looked at next to the road."""
+        """The first column whose two parts biased cords couple, by its cell next to the road."""
         for column in range(len(self.dissection.columns)):
             table = abs(self.box(tangents, (0, 1), (column, column + 1), (0, 1)))
             half = len(table) // 2
@@ -190,10 +192,10 @@ class Factor:
 
 
 def _within_parts(contact: csr_matrix, fronts: list[Front]) -> csr_matrix:
-    """The contact without what it couples of two parts that are eliminated each by itself."""
+    """The contact stiffness without its coupling of parts that are eliminated separately."""
     if not contact.nnz:
         return contact
-    alone = np.full(contact.shape[0], -1)  # the part of such unknowns
+    alone = np.full(contact.shape[0], -1)  # part of unknowns eliminated without the other part
     for front in fronts:
         if len(front.parts) == 1:
             alone[front.own] = front.parts[0]
@@ -206,9 +208,9 @@ def _within_parts(contact: csr_matrix, fronts: list[Front]) -> csr_matrix:
 
 
 def _add(blocks: tuple[Array, Array, Array], here: Array, some: Array, block: Array) -> None:
-    """Add the lower triangle of a block between ``some`` of the unknowns ``here`` to that of a
-    front, run by run. Its ``blocks``: between its own unknowns, from them to the rest, and between
-    the rest."""
+    """Add the lower triangle of ``block``, between the unknowns ``some``, to a front's ``blocks``,
+    run by run. here: the front's unknowns; blocks: between its own unknowns, from these to the
+    rest, and between the rest."""
     own = len(blocks[0])
     at = np.searchsorted(here, some)
     is_cut = (np.diff(at) != 1) | (at[1:] == own)

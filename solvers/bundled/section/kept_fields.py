@@ -7,8 +7,8 @@ of fields and forces are those of the coordinates. With z > 0 first, the middle 
     [K   E] [c]   [f]       L L^H = K,   W = L^-1 E,   S = Re(D - W^H W)
     [E^H D] [m] = [g]       S m = g - Re(W^H L^-1 f),  c = L^-H (L^-1 f - W m)
 
-the band L being that of half as many unknowns. Real and imaginary parts alternate in a coordinate
-vector, so that it is real, as K is in them; those of the middle plane have zero imaginary parts.
+The band of L is that of half as many unknowns. Real and imaginary parts alternate in a coordinate
+vector, so that vector and K are real in them. Imaginary parts on the middle plane are zero.
 """
 
 from __future__ import annotations
@@ -43,12 +43,12 @@ class KeptFields:
         self._inner, self._order = inner, np.concatenate([inner.order, on_plane])
         self.size, m = 2 * len(self._order), len(on_plane)
         first = inner.equation[adjacent].min(initial=inner.size)
-        # place in the corner of the last equations and the middle plane
+        # row in the corner [E, D]: of the last equations of the band, then of the middle plane
         self._corner = np.full(free.size, -1)
         self._corner[self._order[first:]] = np.arange(len(self._order) - first)
         self._near = inner.size - int(first)
         self._scatter: dict[bytes, tuple[Array, Array]] = {}
-        # a component's value where its coordinate is 1; its factor on each side of the half's M
+        # value of a component whose coordinate is 1; factor of a component on both sides of M
         self._length, self._weight = np.full((2, len(self._order), 1), [[[1 / ROOT2]], [[1.0]]])
         self._length[inner.size :], self._weight[inner.size :] = 1.0, ROOT2
         real = self._order % 3 == 0
@@ -102,8 +102,8 @@ class KeptFields:
         return self._zeroed(np.stack([c.real, c.imag], 1), u.shape[2:])
 
     def apart(self, u: Array) -> Array:
-        """Coordinates (size, 2 k) of real fields (n, 3, k), what half a turn keeps of them and what
-        it reverses apart: together they span them, whatever the harmonic."""
+        """Coordinates (size, 2 k) of real fields (n, 3, k): of their kept parts, then of their
+        reversed parts. Together they span the fields in every harmonic."""
         turned = self.symmetry.turned(u)
         return np.hstack([self.gather((u + turned) / 2), self.gather((u - turned) / 2)])
 
@@ -133,8 +133,8 @@ def _complex(x: Array) -> Array:
 
 
 class KeptCholesky:
-    """Factor of K(n) as above: of its band (b + 1, s), which it overwrites, and its ``corner``, E
-    of the last of its equations over D; ``phase`` (m,): 1 or i, which times a real number is the
+    """Factor of K(n) as above: of its band (b + 1, s), which it overwrites, and its ``corner``: E
+    of the band's last equations, over D. phase (m,): 1 or i; times a real coordinate it is the
     field on the middle plane. Raises Indefinite.
     """
 

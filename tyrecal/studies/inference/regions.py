@@ -1,4 +1,5 @@
-"""Slopes of the modes by stiffness and mass of each part of the section, preload included."""
+"""Sensitivities of the modes to stiffness and mass of each part of the section, with the change of
+the inflated state."""
 
 from __future__ import annotations
 
@@ -20,12 +21,12 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class SectionPart:
-    """A part of the section."""
+    """Sensitivities of the n rows to the material of one part of the section."""
 
     name: str
     stiffness: Array  # (n,) d ln f by ln of its moduli
     mass: Array  # (n,) d ln f, or d ln mass, by ln of its density
-    material: str  # what the split case calls it
+    material: str  # its name in the case of `split_by_region`
     rubber: bool = True  # or cords
 
 
@@ -48,10 +49,10 @@ class Parted(Protocol):
 
 
 def regions(model: Parted, x: Array) -> list[SectionPart]:
-    """Every region's rubber (the crown's in two: tread and what lies under it), every cord; of a
-    user's deck every compound and cord.
+    """The rubber of every region (at the crown in two parts: tread, and below it) and every cord;
+    of a user's deck every compound and cord.
 
-    One evaluation a state, with exact slopes by the constants of each part. Raises
+    One evaluation for each state, with exact slopes by the constants of each part. Raises
     EvaluationFailed.
     """
     case, parts = split_by_region(model.case)
@@ -95,7 +96,7 @@ def regions(model: Parted, x: Array) -> list[SectionPart]:
 
 
 def count_numbers(case: LoadedCase) -> int:
-    """How many numbers sensitivities are taken by in each state."""
+    """Number of constants by which each state's evaluation has sensitivities."""
     signs, density = _paths(*split_by_region(case))
     return sum(map(len, signs.values())) + len(density)
 
@@ -103,13 +104,14 @@ def count_numbers(case: LoadedCase) -> int:
 def _paths(
     case: LoadedCase, parts: Iterable[str]
 ) -> tuple[dict[str, dict[str, int]], dict[str, str]]:
-    """Moduli, with their signs, and density of the materials of a split case."""
+    """By material of a split case: paths of its moduli, each with the sign of d ln modulus / d ln
+    number, and the path of its density."""
     moduli = {material: case.kind.moduli(case.case, material) for material in parts}
     return moduli, {material: case.kind.density(material) for material in parts}
 
 
 def split_by_region(case: LoadedCase) -> tuple[LoadedCase, Mapping[str, str]]:
-    """The tyre with a material of its own in each of its parts, and the parts' names by material
+    """The tyre with a separate material in each of its parts, and the parts' names by material
     (`TyreKind.parts`)."""
     split, parts = case.kind.parts(case.case, case.section)
     return replace(case, case=split), parts

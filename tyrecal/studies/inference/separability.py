@@ -16,8 +16,9 @@ import numpy as np
 from .inverse_problem import InverseProblem
 
 Array = np.ndarray
-VISIBLE, APART = 10.0, 9.0  # lambda of a visible effect, and between two that can be told apart
-GRID_POINTS = 81  # sizes of an effect
+# least lambda of a visible effect, and least delta^2 between two that can be distinguished
+VISIBLE, APART = 10.0, 9.0
+GRID_POINTS = 81  # number of sizes of an effect
 
 
 @dataclass(frozen=True)
@@ -25,10 +26,10 @@ class Separability:
     """Separability of the effects ``ids`` (m,)."""
 
     ids: tuple[str, ...]
-    sizes: Mapping[str, float]  # the parameter that each is judged at
-    lambdas: Mapping[str, float]  # at those sizes
+    sizes: Mapping[str, float]  # parameter of each effect in lambda and delta
+    lambdas: Mapping[str, float]  # lambda at those sizes
     full: Mapping[str, float]  # lambda at the far end of the range
-    cosines: Array  # (m, m) g_i P g_j / (|P^1/2 g_i| |P^1/2 g_j|): 1 where two look alike
+    cosines: Array  # (m, m) g_i P g_j / (|P^1/2 g_i| |P^1/2 g_j|); 1: the two look alike
     distances: Array  # (m, m) delta_ij^2, row i at its size
     smallest: Mapping[str, float | None]  # the parameter with lambda = 10; None beyond the range
 
@@ -51,7 +52,8 @@ class Separability:
 
 
 def separate(problem: InverseProblem, P: Array, sizes: Mapping[str, float]) -> Separability:
-    """Judge each effect at its size, or at full size where it would not be seen at that."""
+    """Separability of the effects at their sizes, or at full size if one is not visible at its
+    own."""
     ids = tuple(problem.expansion.nodes)
     grids, shifts, ends = {}, {}, {}
     for id in ids:

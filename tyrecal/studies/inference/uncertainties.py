@@ -1,4 +1,4 @@
-"""Sources of error: uncalibrated numbers of the case, and how far they may be off."""
+"""Sources of error: uncalibrated numbers of the case, with their standard deviations."""
 
 from __future__ import annotations
 
@@ -15,29 +15,28 @@ from .section_fields import SectionField, fields, known_from, words
 DENSITY_PERCENT, MODULUS_PERCENT, SPACING_PERCENT, GAUGE_PERCENT = 1.5, 3.0, 1.0, 3.0
 ANGLE_deg, PRESSURE_kPa = 1.0, 1.0
 RIM_WIDTH = EFFECT_PATH + "rim_width"
-# m between the places where the rim holds the beads: by their build as well as by the rim's width;
-# by judgement, 2.5 mm a side from one maker of a size to another
+# standard deviation, m, of the distance between the places where the rim holds the beads, by build
+# and rim width; by judgement, 2.5 mm on each side between makers of one size
 BEAD_SEAT_DISTANCE = {"exact": 0.0, "measured": 0.5e-3, "drawing": 1e-3, "size_code": 5e-3}
 
 
 @dataclass(frozen=True)
 class Source:
-    """Something that is uncertain."""
+    """One source of error: numbers that are off together, or a field of the section."""
 
     name: str
-    steps: dict[str, float]  # of a number by its path, in its unit, at one standard deviation
-    words: str  # the same for people
-    field: SectionField | None = None  # of the section, which has no steps
+    steps: dict[str, float]  # change of numbers by path, in their units, at one standard deviation
+    words: str  # the same in words
+    field: SectionField | None = None  # of the section; steps are then empty
 
 
 def sources(case: LoadedCase) -> tuple[list[Source], bool]:
-    """The case's own sources, else the assumed ones; whether they are assumed. A number that a
-    design variable sets is none: the fit finds it.
+    """The case's own sources, else the assumed ones; whether they are assumed. Numbers that design
+    variables set are not among them, because the fit finds them.
 
-    Assumed, a standard deviation each: rubber densities 1.5 %, moduli of cords 3 %, spacings 1 %,
-    gauges that the case has 3 %, cord angles 1 degree, pressure 1 kPa. Then, of a section that is
-    not exact, how far apart the rim holds the beads, unless the case states `effects.rim_width`,
-    and the section's fields.
+    Assumed standard deviations: rubber densities 1.5 %, moduli of cords 3 %, spacings 1 %, gauges
+    of the case 3 %, cord angles 1 degree, pressure 1 kPa. If the section is not exact, its fields
+    are added, and the distance between the beads' seats unless the case states `effects.rim_width`.
     """
     constants, assumed = _constants(case)
     of_section = [Source(name, {}, "", field) for name, field in fields(case).items()]
@@ -75,7 +74,7 @@ def _assumed(case: LoadedCase, taken: set[str]) -> Iterator[Source]:
 
 
 def _usual(case: LoadedCase) -> Iterator[tuple[str, str, float, float]]:
-    """Name, path, and standard deviation, per cent or absolute."""
+    """Name, path, standard deviation in per cent (else 0), and absolute one (else 0)."""
     yield "pressure", "pressure_kPa", 0.0, PRESSURE_kPa
     yield from _of_deck(case.deck_numbers)
     for name, material in case.case.materials.items():
@@ -95,7 +94,7 @@ def _usual(case: LoadedCase) -> Iterator[tuple[str, str, float, float]]:
 
 
 def _of_deck(numbers: Mapping[str, float]) -> Iterator[tuple[str, str, float, float]]:
-    """Sources of plain numbers of a user's deck, by their paths."""
+    """As `_usual`, for the numbers of a user's deck."""
     rubbers = {path.split(" / ")[0] for path in numbers if " / HYPERELASTIC / " in path}
     for path in numbers:
         *heads, field = path.split(" / ")
@@ -122,7 +121,7 @@ def calibrated(case: LoadedCase) -> set[str]:
 
 
 def values_of(case: LoadedCase, own_sources: list[Source]) -> dict[str, float]:
-    """The case's own numbers at every path of the sources, effects aside."""
+    """The case's numbers at the paths of the sources, without effects."""
     paths = [
         path for source in own_sources for path in source.steps if not path.startswith(EFFECT_PATH)
     ]
