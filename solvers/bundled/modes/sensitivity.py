@@ -71,8 +71,8 @@ def eigenvalue_rates(
                 total += (ratio - 1) * form
                 # d rho / d lambda = rho (d ln rho / d ln f) / (2 lambda)
                 slope = np.array([table.slope(f) for f in hertz])
-                rate = ratio.real * slope / (2 * eigenvalues)
-                denominator = denominator - copies * form.real * rate
+                own_change = copies * form.real * ratio.real * slope / (2 * eigenvalues)
+                denominator = denominator - own_change
     M = mechanics.mass(model)
     total -= eigenvalues * _energies(M, fields).sum(1)
     if spins:  # centrifugal: -Omega^2 M in r and theta, of all parts at once
