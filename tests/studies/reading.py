@@ -48,6 +48,7 @@ like mended in nearly all files:
 | seed | tyre | simulate | measured | studies | report, batch, cli | solvers |
 |---|---|---|---|---|---|---|
 | 20261701 | 5 | 6 | 6 | 6 | 4 | 6 |
+| 20261702 | 3 | 2 | 2 | 8 | 3 | 9 |
 """
 
 from __future__ import annotations
