@@ -53,7 +53,7 @@ MAKERS = {  # first words of blocks whose files those below them read
     "README.md": ["tyrecal fit cases/p235_75r17.yaml\n"],
     "cases/own_template.md": ["mkdir -p cases/my_templates"],
     "cases/measured_data.md": ["tyrecal measured import "],
-    "cases/site/tutorial.md": ["tyrecal "],
+    "cases/site/tutorial.md": ["tyrecal ", "for "],
 }
 QUICK = [  # first words of blocks of the README that the quick set runs; they need no block above
     "tyrecal init"
