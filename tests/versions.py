@@ -1,12 +1,13 @@
 """Installs tyrecal with the lowest versions that pyproject.toml states, and with the newest ones.
 
-With each it runs tests of the command line, README's fit and its report:
+With each it runs tests of the command line, README's fit, a diagnosis and the report:
 
     python -m tests.versions
 
 Lowest: every package at its lower bound at once, on the lowest Python that is stated. Newest: on
-the newest Python of this machine. Nothing is compiled. Exits with 1 if one of them fails, or if
-the lowest Python is not here.
+the newest Python of this machine, from the wheel that the source archive builds; its files
+are compared with the tree's. Nothing is compiled. Exits with 1 if one of them fails, or if the
+lowest Python is not here.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import tomllib
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from zipfile import ZipFile
 
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
@@ -37,6 +39,8 @@ TESTS = [
 ]
 LOWEST = "lowest-direct"  # of what is stated; what that needs in turn is the newest
 CASE = ROOT / "cases/p235_75r17.yaml"
+MEASURED = ROOT / "cases/measured/p235_75r17_soft_clamp.csv"
+PACKAGES = {"tyrecal": "tyrecal", "tyrecal_solvers": "solvers", "tyrecal_templates": "templates"}
 ENV = {**os.environ, "UV_PYTHON_DOWNLOADS": "never"}  # what is tested is what the machine has
 
 
@@ -61,14 +65,41 @@ def pythons() -> dict[int, Path]:
     return known
 
 
-def install(uv: Path, python: Path, resolution: str, folder: Path) -> dict[str, Version]:
+def build(uv: Path, folder: Path) -> Path:
+    """The wheel, built from the source archive. Raises CalledProcessError."""
+    run([uv, "build", "-q", ROOT, "--out-dir", folder])
+    (wheel,) = folder.glob("*.whl")
+    return wheel
+
+
+def differences(wheel: Path) -> list[str]:
+    """Files of the wheel that are not the tree's, and files of the tree that it lacks: it has no
+    tests, cases and guides, and all of the packages but their documents."""
+    tree = {
+        f"{package}/{path.relative_to(ROOT / top).as_posix()}": path
+        for package, top in PACKAGES.items()
+        for path in (ROOT / top).rglob("*")
+        if path.is_file() and path.suffix not in (".md", ".pyc")
+    }
+    with ZipFile(wheel) as file:
+        names = {name for name in file.namelist() if ".dist-info/" not in name}
+        changed = {
+            name for name in names & tree.keys() if file.read(name) != tree[name].read_bytes()
+        }
+    return sorted((names ^ tree.keys()) | changed)
+
+
+def install(
+    uv: Path, python: Path, resolution: str, folder: Path, wheel: Path
+) -> dict[str, Version]:
     """The packages that tyrecal, its extras and its tests state, as installed in a new environment
-    ``folder``. Raises CalledProcessError."""
+    ``folder``; the lowest of a tree, of which alone uv takes these. Raises CalledProcessError."""
     run([uv, "venv", "-q", "--python", python, folder])
     into = ["--python", folder]
     wheels = ["--only-binary", ":all:", "--no-binary", PROJECT["name"]]
-    how = ["-q", "--resolution", resolution, *wheels, *into]
-    run([uv, "pip", "install", *how, "-e", f"{ROOT}[dev]"])
+    tyrecal = ["-e", f"{ROOT}[dev]"] if resolution == LOWEST else [f"{wheel}[dev]"]
+    how = ["-q", "--resolution", resolution, *(wheels if resolution == LOWEST else wheels[:2])]
+    run([uv, "pip", "install", *how, *into, *tyrecal])
     lines = run([uv, "pip", "freeze", "-q", *into]).splitlines()
     versions = dict(line.split("==") for line in lines if "==" in line)
     return {name: Version(versions[name]) for name in stated()}
@@ -85,19 +116,24 @@ def stated() -> dict[str, Version]:
 
 
 def passes(name: str, python: Path, folder: Path) -> bool:
-    """Return whether tests, fit and report end with code 0."""
+    """Return whether tests, fit, diagnosis and report end with code 0."""
     start = time.monotonic()
     folder.mkdir()
     tyrecal = [python, "-m", "tyrecal"]
     try:
         tests = run([python, "-m", "pytest", "-m", "quick", "-p", "no:cacheprovider", *TESTS])
         run([*tyrecal, "fit", CASE, "--quiet"], folder)
+        effect = ["--effect", "spindle_tilt", "--mesh", "coarse", "--no-pictures", "--quiet"]
+        run([*tyrecal, "diagnose", CASE, "--measured", MEASURED, *effect], folder)
         run([*tyrecal, "report", CASE.stem], folder)
     except subprocess.CalledProcessError as error:
         print(f"{name}: {error}\n{error.stdout}", flush=True)
         return False
     last = tests.strip().splitlines()[-1]
-    print(f"{name}: {last}, fit and report end [{time.monotonic() - start:.0f} s]", flush=True)
+    print(
+        f"{name}: {last}, fit, diagnosis and report end [{time.monotonic() - start:.0f} s]",
+        flush=True,
+    )
     return True
 
 
@@ -114,10 +150,14 @@ def main() -> int:
     with TemporaryDirectory() as name:
         folder = Path(name)
         run([sys.executable, "-m", "pip", "install", "-q", "--target", folder / "uv", "uv"])
+        wheel = build(folder / "uv/bin/uv", folder / "dist")
+        if wrong := differences(wheel):
+            print("files of the wheel differ from the tree's:", *wrong)
+            return 1
         jobs = []
         for number, (words, (python, resolution)) in enumerate(environments.items()):
             start, place = time.monotonic(), folder / f"env{number}"
-            versions = install(folder / "uv/bin/uv", python, resolution, place)
+            versions = install(folder / "uv/bin/uv", python, resolution, place, wheel)
             print(f"{words}, installed [{time.monotonic() - start:.0f} s]:")
             print(*(f"{name} {version}" for name, version in versions.items()), sep=", ")
             if resolution == LOWEST and versions != stated():
