@@ -15,7 +15,7 @@ from ..tyre.values import paths_of, value_at
 
 # The costs of the bundled solver's factorisation grow as its entries: unknowns of the whole problem
 # times those of a section. Seconds of one processor, and bytes, for 1e9 of them.
-FIRST_LOAD_S, FURTHER_LOAD_S = 80.0, 30.0
+FIRST_LOAD_S, FURTHER_LOAD_S = 90.0, 30.0
 FURTHER_DESIGN_S = 35.0  # of the first load of a design or state that begins at another one's
 MODES_AT_LOAD_S = 30.0  # in addition, for the modes at each load
 RIM_AT_LOAD_S = 30.0  # in addition, for the stiffness of the rim at each load
