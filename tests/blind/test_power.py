@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from tyrecal.studies.blind.make import USUAL_LABELS, labels_of
-from tyrecal.studies.blind.power import NAMED_AS_A_RULE, powers, words
 from tyrecal.studies.blind.protocol import Protocol
 from tyrecal.studies.blind.ruler import measure, ruler_of
 from tyrecal.studies.inference.model import Answer, Query
 from tyrecal.studies.inference.separability import VISIBLE
 from tyrecal.tyre.case.schema import Targets
 
+from .study3.power import NAMED_AS_A_RULE, powers
 from .toy import CASE, Scale, protocol
 
 SCALE = Scale()
@@ -59,15 +59,6 @@ def test_sizes_are_where_lambda_is_ten_and_twenty_five(id: str) -> None:
         assert (size is None) == (power.full < least)
         if size is not None:
             assert lam(id, size) == pytest.approx(least, rel=1e-3)
-
-
-def test_what_is_found_is_said_and_what_is_hidden_too() -> None:
-    text = words(list(FOUND.values()), RULER, RULES, SCALE.ranges)
-    assert "at 160, 240, 320 kPa, every value to 0.2% and the mass to 0.5%" in text
-    louder = replace(RULES, noise=1.0, mass=1.0)
-    hidden = words(powers(RULER, louder), RULER, louder, SCALE.ranges)
-    last = hidden.splitlines()[-1]
-    assert "at any size in their range" in last and all(f"`{id}`" in last for id in SCALE.g)
 
 
 def test_pressures_lie_about_the_tyres_own_and_any_tyre_has_modes() -> None:

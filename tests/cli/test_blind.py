@@ -64,9 +64,6 @@ def test_a_study_from_end_to_end(
         monkeypatch.setattr(f"tyrecal.studies.blind.emulated.{name}", value)
     only = lambda case, evaluator, ids=None: effect_ranges(case, evaluator, ["spindle_lateral"])
     monkeypatch.setattr("tyrecal.studies.blind.answer.effect_ranges", only)  # the ruler's, too
-    assert run("blind", "power", str(coarse), "--noise-percent", "0.5") == 0
-    output = capsys.readouterr().out
-    assert "every value to 0.5%" in output and "| `spindle_lateral` |" in output
     out = tmp_path / "t"
     make = [
         "make",

@@ -112,7 +112,7 @@ NUMBERS_AND_WORDS = {
     "modes CASE --jobs 0": "must be a whole number, 1 to 256, as in 1",
     "sample CASE --draws 2.5": "must be a whole number, 1000 to 10000000, as in 100000",
     "diagnose CASE --split-percent nan": "must be a number in percent, 0 to 20, as in 0.3",
-    "blind power CASE --pressure-kPa 0": "must be a number in kPa, above 0, as in 240 or 2.4bar",
+    "plan CASE --pressure-kPa 0": "must be a number in kPa, above 0, as in 240 or 2.4bar",
     "init 205/60R15 --rim-width-in 7x": "must be a number in inches, above 0, as in 7.5 or 190mm",
     "store . --prune big": "must be a number in MB, 0 or more, as in 100",
     "modes CASE --wheel hold": "must be held or free-along-load; did you mean 'held'?",

@@ -70,6 +70,8 @@ HEADS = {  # columns with their units, as a user's script reads them
     "sample_variables.csv": "variable,mean,median,low,high,standard_error,best,lower,upper,unit",
     "sample_shares.csv": "c,m,kind,frequency_Hz,deviation_percent,first.A_belt,first.angle,"
     "total.A_belt,total.angle",
+    "plan_steps.csv": "what,hours,total_hours,chance,predicted_percent",
+    "plan_effects.csv": "id,chance,unit,base,largest_lambda,detectable_from,named_from,similar",
     "diagnosis.csv": "row,run,percent,sigma_percent",
     "diagnosis_probabilities.csv": "explanation,probability",
     "diagnosis_section.csv": "region,stiffness_percent,stiffness_sigma,mass_percent,mass_sigma,"

@@ -48,6 +48,9 @@ DEFAULTS = {  # of a baseline that is written for the first time; people edit th
     },
     "sample/median": {"relative": 0.05},  # chains differ by a share of their spread
     "sample/predicted_Hz": {"relative": 1e-3},
+    "plan/hours": {"absolute": 1.0},
+    "plan/chance": {"absolute": 0.03},
+    "plan/percent": {"relative": 0.05},
     "diagnose/verdict": {"absolute": 0.0},
     "diagnose/gap_p_value": {"absolute": 0.01},
     "diagnose/gap_rms_percent": {"relative": 0.01},

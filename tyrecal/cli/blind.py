@@ -1,4 +1,4 @@
-"""tyrecal blind make, answer, score"""
+"""tyrecal blind make, answer, score; power, the old name of plan"""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import click
 
 from ..files import Json
 from . import arguments, complete, options
-from .parameters import FileOrFolder, NumberWithin, WholeNumber, names_option, option
-from .terminal import Progress, Terminal, resume
+from .parameters import FileOrFolder, WholeNumber, names_option, option
+from .plan import command as plan
+from .terminal import Progress, Terminal, resume, say
 
 folder = click.argument("folder", type=FileOrFolder(file=False), metavar="DIR")
 truth = option(
@@ -36,77 +37,24 @@ def command() -> None:
     """Test the diagnosis on synthetic data with a hidden effect.
 
     \b
-    tyrecal blind power cases/p235_75r17.yaml
     tyrecal blind make trials --case cases/p235_75r17.yaml --effects 60 --none 40 --outside 20
     tyrecal blind answer trials --jobs 2
     tyrecal blind score trials
     """
 
 
-@command.command()
-@options.case_argument
-@option(
-    "--pressure-kPa",
-    "pressures",
-    type=NumberWithin(0, min_open=True),
-    multiple=True,
-    metavar="KPA",
-    help="Pressure of the measurements, kPa; repeatable (default: 2/3, 1 and 4/3 times the"
-    " case's).",
-)
-@option(
-    "--noise-percent",
-    type=NumberWithin(0, 20, min_open=True),
-    default=0.2,
-    show_default=True,
-    metavar="PERCENT",
-    help="Scatter of every frequency, one standard deviation in per cent.",
-)
-@options.every(options.mesh, options.jobs, options.store, options.allow_unusual)
-@options.with_terminal
-def power(
-    case: Path,
-    pressures: tuple[float, ...],
-    noise_percent: float,
-    mesh: str,
-    jobs: int,
-    store: Path | None,
-    allow_unusual: bool,
-    terminal: Terminal,
-) -> int:
-    """List the effects that could be found on a tyre, and their smallest sizes, before it is
-    measured.
-
-    The modes are the case's targets. If it has none, they are [0,0] to [4,0].
+@command.command(params=[*plan.params])
+def power(**values: Any) -> int:
+    """The old name of 'tyrecal plan', until version 0.3.0.
 
     \b
-    tyrecal blind power cases/p235_75r17.yaml --pressure-kPa 160 --pressure-kPa 240
+    tyrecal blind power cases/p235_75r17.yaml
+    tyrecal plan cases/p235_75r17.yaml
     """
-    from dataclasses import asdict, replace
-
-    from ..simulate.deck.tyre_design import TyreDesign
-    from ..simulate.evaluate.evaluator import Evaluator
-    from ..simulate.evaluate.store import Store
-    from ..studies.blind.answer import rows_of, tyre_model
-    from ..studies.blind.make import labels_of
-    from ..studies.blind.power import powers, words
-    from ..studies.blind.protocol import Protocol
-    from ..studies.blind.ruler import measure, ruler_of
-
-    loaded, _ = arguments.load(case, mesh, (), None, terminal, allow_unusual)
-    rules = Protocol("", case.name, {}, noise=noise_percent / 100).about(loaded.case.pressure_kPa)
-    if pressures:  # the held-out pressure only has to be one that is computed anyway
-        rules = replace(rules, given_kPa=pressures, held_out_kPa=pressures[0])
-    record = Store(store.resolve()) if store else None
-    evaluator = Evaluator(TyreDesign(loaded), store=record)
-    with terminal.progress("weigh effects") as bar:
-        evaluator.on_progress = bar.at
-        model, rows = tyre_model(loaded, evaluator, rules, jobs), rows_of(loaded, rules)
-        ruler = ruler_of(measure(model, rows), labels_of(loaded))
-    effect_powers = powers(ruler, rules)
-    terminal.result({"power": [asdict(each) for each in effect_powers]})
-    terminal.say(words(effect_powers, ruler, rules, model.ranges))
-    return 0
+    say("'tyrecal blind power' is now 'tyrecal plan'; the old name goes in 0.3.0", err=True)
+    assert plan.callback
+    code: int = plan.callback(**values)
+    return code
 
 
 @command.command()
@@ -169,12 +117,10 @@ def make(
     from ..simulate.evaluate.evaluator import Evaluator
     from ..simulate.evaluate.store import Store
     from ..studies.blind.answer import rows_of, tyre_model
-    from ..studies.blind.make import labels_of
     from ..studies.blind.make import make as made
     from ..studies.blind.maker import bundled_maker
-    from ..studies.blind.power import powers, words
     from ..studies.blind.protocol import Protocol
-    from ..studies.blind.ruler import measure, ruler_of
+    from ..studies.blind.ruler import measure
 
     if not effects + plain + outside:
         raise click.UsageError("there must be at least one trial")
@@ -191,12 +137,7 @@ def make(
     evaluator = Evaluator(TyreDesign(case), "bundled", store=store)
 
     def ruler() -> Json:
-        """Measure the ruler, and print the powers of the effects by it."""
-        model = tyre_model(case, evaluator, protocol, jobs)
-        content = measure(model, rows_of(case, protocol))
-        measured = ruler_of(content, labels_of(case))
-        terminal.say(words(powers(measured, protocol), measured, protocol, model.ranges))
-        return content
+        return measure(tyre_model(case, evaluator, protocol, jobs), rows_of(case, protocol))
 
     with terminal.progress("make trials") as bar:
         progress = _progress("made", terminal, bar)

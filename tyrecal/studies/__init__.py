@@ -86,6 +86,11 @@ STUDIES = {  # in the order of a page and of a batch
     ),
     "labels": Entry("tyrecal.studies.labels:LabelsResult"),
     "sensors": Entry("tyrecal.studies.sensors:SensorsResult"),
+    "plan": Entry(
+        "tyrecal.studies.plan.result:PlanResult",
+        "Plan a test: what to measure, in which order, and what it can find.",
+        runs_by_name=True,
+    ),
     "diagnose": Entry(
         "tyrecal.studies.diagnose.result:DiagnosisResult",
         "Find where model and measurements differ, and which effect explains it.",

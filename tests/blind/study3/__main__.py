@@ -36,7 +36,6 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.studies.blind.answer import answer, case_of, rows_of, tyre_model
 from tyrecal.studies.blind.make import labels_of
-from tyrecal.studies.blind.power import NAMED_AS_A_RULE, Power, powers
 from tyrecal.studies.blind.protocol import read_protocol
 from tyrecal.studies.blind.ruler import read_ruler
 from tyrecal.studies.blind.seal import ANSWERS, SEAL
@@ -47,6 +46,7 @@ from .cases import GROUPS, LABELS, LEARNED_FROM, Group, written
 from .kinds import further
 from .make import FENICS, make
 from .maker import computed
+from .power import NAMED_AS_A_RULE, Power, powers
 from .rises import rises, table_of_rises
 from .score import scored
 from .section import columns, mould

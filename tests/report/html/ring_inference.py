@@ -225,3 +225,35 @@ def diagnosis(effect: str) -> dict[str, Any]:
         "rung": 1,
         "next_measurements": [{"what": "weigh the tyre", "gain": 2.4, "hours": 0.25}],
     }
+
+
+def plan() -> dict[str, Any]:
+    step = {"hours": 1.0, "chance": 0.25, "predicted_percent": 0.27}
+    effect = {"unit": "m", "base": 0.0, "largest_lambda": 91.0, "similar": ["bead_seat"]}
+    sizes = {"detectable_from": 0.004, "named_from": None}
+    return {
+        "format": 1,
+        "noise_percent": 0.2,
+        "step_hours": {"mount": 2.0, "frf_set": 0.75},
+        "steps": [
+            {"what": "response functions at 160 kPa", "total_hours": 1.0, **step},
+            {"what": "response functions at 240 kPa", "total_hours": 2.0, **step},
+        ],
+        "effects": [{"id": "rim_width", "chance": [0.25, 0.5], **effect, **sizes}],
+        "false_alarm": 0.01,
+        "draws": 100,
+        "variables": [{"name": "C10", "before_percent": 50.0, "after_percent": 0.5}],
+        "modes": [
+            {
+                "c": 2,
+                "m": 0,
+                "kind": None,
+                "frequency_Hz": 79.5,
+                "before_percent": 9.5,
+                "after_percent": 0.2,
+            }
+        ],
+        "sensors": [{"sensor": 1, "radius_m": 0.3, "angle_deg": 7.5, "z_m": 0.05}],
+        "axes": "rtz",
+        "not_labelled": ["[4,0]"],
+    }

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from .ring import fit, parts, pressure_sweep, provenance, shapes, sweep
-from .ring_inference import diagnosis, effects, sample, sensitivities
+from .ring_inference import diagnosis, effects, plan, sample, sensitivities
 from .ring_under_load import (
     footprint,
     load_sweep,
@@ -48,6 +48,7 @@ def write(folder: Path, name: str = "Toy & sons", effect: str = "rim_width") -> 
         "sensitivities.json": sensitivities(),
         "effects.json": effects(name),
         "sample.json": sample(),
+        "plan.json": plan(),
         "diagnosis.json": diagnosis(effect),
         "diagnosis_section.json": {"format": 1, "case": name, **parts()},
     }

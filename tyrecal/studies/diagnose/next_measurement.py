@@ -34,21 +34,38 @@ Sizes = Mapping[str, Array]  # equally probable parameters (q,) of an explanatio
 MIN_PROBABILITY, MAX_EXPLANATIONS = 0.005, 10  # others do not count
 MAX_EVALUATED = 4  # explanations whose further rows need runs of the solver; others do not count
 SIZES = 7  # of each explanation
-COST_HOURS = dict(
+STEP_HOURS = dict(
+    mount=2.0,  # take the tyre off its rim and put it on again
+    pressure=0.25,  # set a pressure and let the tyre settle
+    frf_set=0.75,  # measure the response functions of all sensors
+    change=1.0,  # switch an effect on or off
+    check=1.0,  # measure a number of the section or of a compound
     weigh=0.1,
+    gauge=0.1,  # compare the pressure gauge with a second one
+    thermometer=0.1,
     rim=0.2,
     seat=0.2,
     calliper=0.5,
-    pressure=1.0,
-    helium=1.0,
-    harmonics=1.0,
-    check=1.0,
-    mount=3.0,
-    clamp=3.0,
-    toggle=4.0,
     cut=8.0,
 )
-"""Of a laboratory, as an orientation."""
+"""Hours of each step in a laboratory: assumptions."""
+
+
+def cost_hours(steps: Mapping[str, float]) -> dict[str, float]:
+    """Hours of each measurement, from those of its steps."""
+    one_set = steps["pressure"] + steps["frf_set"]
+    tools = ("weigh", "gauge", "thermometer", "rim", "seat", "calliper", "cut", "check")
+    sets = dict.fromkeys(("pressure", "helium", "harmonics"), one_set)
+    mounted = dict.fromkeys(("mount", "clamp"), steps["mount"] + one_set)
+    return {
+        **{tool: steps[tool] for tool in tools},
+        **sets,
+        **mounted,
+        "toggle": steps["mount"] + steps["change"] + one_set,
+    }
+
+
+COST_HOURS = cost_hours(STEP_HOURS)
 DIRECT_READINGS = {
     "rim": ("measure the rim between its flanges", {"rim_width"}),
     "seat": ("check that the moulded line runs level with the rim flange", {"bead_seat"}),

@@ -1,0 +1,183 @@
+"""A case planned: `PlanResult` of a laboratory, its order and its chances."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from ...errors import InputError
+from ...measured.case_modes import evaluate_case_modes
+from ...simulate.evaluate.evaluator import Evaluator
+from ...simulate.modes.label import Label
+from ...tyre.case import LoadedCase, start_values
+from ...tyre.case.mistakes import suggestion
+from ..blind.make import labels_of
+from ..diagnose.next_measurement import STEP_HOURS
+from ..inference.separability import APART, GRID_POINTS, VISIBLE, smallest
+from ..sensors import SensorsResult, place
+from ..variable import read_variables
+from .chance import NONE, shares
+from .laboratory import Laboratory, laboratory
+from .order import order
+from .result import (
+    LABELLED,
+    PLAN_STAGES,
+    PlannedEffect,
+    PlannedMode,
+    PlannedVariable,
+    PlanResult,
+    PlanStep,
+)
+
+Array = np.ndarray
+TRIED_TYRES, DRAWN_TYRES = (
+    8,
+    100,
+)  # drawn tyres of each effect: to choose steps, and for the chances
+NAMED_AS_A_RULE = 25.0  # lambda from which nearly all effects were named in trials
+SENSOR_AXES = "rtz"  # that planned sensors measure
+
+
+def plan(
+    case: LoadedCase,
+    evaluator: Evaluator,
+    hours: float | None,
+    sensors: int | None,
+    pressures_kPa: Sequence[float],
+    noise: float,
+    step_hours: Mapping[str, float],
+    jobs: int = 1,
+    stage: Callable[[str], None] = lambda stage: None,
+) -> PlanResult:
+    """The plan of a case; see `PlanResult.run`. Raises InputError, EvaluationFailed."""
+    for name in step_hours:
+        if name not in STEP_HOURS:
+            raise InputError(f"'{name}' is no step{suggestion(name, STEP_HOURS)}")
+    if not evaluator.has_gradients:
+        raise InputError(
+            "a plan needs exact sensitivities, which this solver does not give: --solver bundled"
+        )
+    stage(PLAN_STAGES[0])
+    labels, steps = labels_of(case), {**STEP_HOURS, **step_hours}
+    placed = _sensors(case, evaluator, labels, sensors) if sensors else None
+    confused = [m.label for m in placed.modes if m.labelled < LABELLED] if placed else []
+    seen = [label for label in labels if label not in confused]
+    if not seen:
+        raise InputError(f"{sensors} sensors distinguish none of the modes: give more --sensors")
+    lab = laboratory(case, evaluator, seen, pressures_kPa, noise, steps, jobs)
+    stage(PLAN_STAGES[1])
+    linear, limit = lab.linear, np.inf if hours is None else hours
+    done = order(lab, linear.draw(TRIED_TYRES, np.random.default_rng(0)), limit)
+    if not done:
+        least = min(each.hours for each in lab.menu.values() if each.pressure_kPa is not None)
+        raise InputError(f"--hours {hours:g} is too short: one set of functions takes {least:g} h")
+    drawn = linear.draw(DRAWN_TYRES, np.random.default_rng(1))
+    parts = [done[: k + 1] for k in range(len(done))]
+    chances = [shares(drawn, linear.found(drawn, lab.rows(part))) for part in parts]
+    sound = [each.pop(NONE) for each in chances]
+    widths = [_widths(lab, part) for part in ([], *parts)]
+    rms = [float(np.sqrt(np.mean(f**2))) for _, f in widths[1:]]
+    eta = lab.problem.observations.y[lab.item == "mount"]
+    result = PlanResult(
+        format=1,
+        noise_percent=100 * noise,
+        step_hours=steps,
+        steps=[
+            PlanStep(
+                what=lab.menu[part[-1]].what,
+                hours=lab.menu[part[-1]].hours,
+                total_hours=lab.hours(part),
+                chance=float(np.mean([*chance.values()])),
+                predicted_percent=100 * width,
+            )
+            for part, chance, width in zip(parts, chances, rms, strict=True)
+        ],
+        effects=_effects(lab, done, chances),
+        false_alarm=1 - sound[-1],
+        draws=DRAWN_TYRES,
+        variables=[
+            PlannedVariable(
+                name=v.name, before_percent=percent * before, after_percent=percent * after
+            )
+            for v, before, after in zip(
+                read_variables(case), widths[0][0], widths[-1][0], strict=True
+            )
+            for percent in [100 * v.slope(v.start) / abs(v.start)]
+        ],
+        modes=[
+            PlannedMode(
+                c=label.c,
+                m=label.m,
+                kind=label.kind,
+                frequency_Hz=float(np.exp(ln_f)),
+                before_percent=100 * before,
+                after_percent=100 * after,
+            )
+            for label, ln_f, before, after in zip(
+                seen, eta, widths[0][1], widths[-1][1], strict=True
+            )
+        ],
+        sensors=placed.places if placed else [],
+        axes=placed.axes if placed else "",
+        not_labelled=[str(label) for label in confused],
+    )
+    return result.with_files({"plan.md": result.page()})
+
+
+def _sensors(
+    case: LoadedCase, evaluator: Evaluator, labels: Sequence[Label], count: int
+) -> SensorsResult:
+    """Places of sensors, and how often they label each mode."""
+    highest = max(label.c for label in labels)
+    every = evaluate_case_modes(case, evaluator, start_values(case), highest)
+    modes = [mode for mode in every.modes if mode.label in labels]
+    return place(every, modes, count, SENSOR_AXES, 0.0, 0)
+
+
+def _widths(lab: Laboratory, done: Sequence[str]) -> tuple[Array, Array]:
+    """Standard deviations of the variables x (v,), and of ln f of the modes at the case's pressure,
+    without the scatter of a measurement, after some items, if no effect is there."""
+    linear, rows = lab.linear, lab.rows(done)
+    wanted = np.flatnonzero(lab.item == "mount")
+    tyre = linear.covariance.copy()
+    tyre[wanted, wanted] -= lab.problem.observations.scatter[wanted] ** 2
+    inverse = np.linalg.inv(linear.covariance[np.ix_(rows, rows)])
+    J, prior = linear.jacobian[rows], np.diag(lab.problem.spread**2)
+    of_x = prior - prior @ J.T @ inverse @ J @ prior
+    cross = tyre[np.ix_(wanted, rows)]
+    of_f = tyre[np.ix_(wanted, wanted)] - cross @ inverse @ cross.T
+    return np.sqrt(np.diag(of_x)), np.sqrt(np.maximum(np.diag(of_f), 0.0))
+
+
+def _effects(
+    lab: Laboratory, done: Sequence[str], chances: Sequence[Mapping[str, float]]
+) -> list[PlannedEffect]:
+    """Effects by falling chance, with lambda = g^T C^-1 g of the whole plan."""
+    linear, rows = lab.linear, lab.rows(done)
+    inverse = np.linalg.inv(linear.covariance[np.ix_(rows, rows)])
+    square = lambda g: np.einsum("qn,nm,qm->q", g, inverse, g)
+    sizes, shifts, lambdas = {}, {}, {}
+    for id, nodes in lab.problem.expansion.nodes.items():
+        sizes[id] = np.linspace(*nodes.reach, GRID_POINTS)
+        shifts[id] = linear.shifts(id, sizes[id])[0][:, rows]
+        lambdas[id] = square(shifts[id])
+    far = {id: shifts[id][np.argmax(each)] for id, each in lambdas.items()}
+    result = [
+        PlannedEffect(
+            id=id,
+            chance=[chance[id] for chance in chances],
+            unit=lab.problem.ranges[id].unit,
+            base=lab.problem.ranges[id].base,
+            largest_lambda=float(each.max()),
+            detectable_from=smallest(sizes[id], each, VISIBLE),
+            named_from=smallest(sizes[id], each, NAMED_AS_A_RULE),
+            similar=[
+                other
+                for other, g in shifts.items()
+                if other != id and square(g - far[id]).min() < APART <= each.max()
+            ],
+        )
+        for id, each in lambdas.items()
+    ]
+    return sorted(result, key=lambda effect: (-effect.at_end, effect.id))
