@@ -99,7 +99,7 @@ def pack(groups: Mapping[str, tuple[Path, Path]]) -> None:
 
 
 def truth_rows() -> list[list[object]]:
-    """What the score of the benchmark reads (`benchmarks/blind/benchmark.py`): of each trial its
+    """Rows that the score of `benchmarks/blind/benchmark.py` reads: of each trial its
     kind, effect, size, lambda, band (`Scored`), and the answers that count as right."""
     rows: list[list[object]] = []
     with TemporaryDirectory() as made:

@@ -30,7 +30,7 @@ def laboratory(noise: float = 0.001, size: float = 0.02) -> Laboratory:
 
 
 def test_probabilities_are_those_of_the_diagnosis() -> None:
-    """Of a tyre that is linear, without scatter by chance: the same integrals by the same rule."""
+    """A tyre that is linear, without scatter by chance: the same integrals by the same rule."""
     lab = laboratory()
     linear = lab.linear
     tyres = linear.draw(4, generator(3))
@@ -56,8 +56,8 @@ def test_a_pair_that_an_effect_holds_apart_shows_it() -> None:
     )
     for linear, least, most in ((shown, 0.9, 1.0), (hidden, 0.0, 0.1)):
         tyres = linear.draw(20, generator(0))
-        found = shares(tyres, linear.found(tyres, np.arange(len(linear.sigma))))
-        assert least <= found["e0"] <= most
+        chances = shares(tyres, linear.found(tyres, np.arange(len(linear.sigma))))
+        assert least <= chances["e0"] <= most
     n = len(toy.rows)
     own = shown.problem.assumed.split**2
     assert np.diag(shown.sigma)[n:] == pytest.approx(np.full(n, own + 0.003**2))
@@ -80,13 +80,13 @@ def test_the_order_keeps_within_the_hours_and_gains_with_each_step() -> None:
     assert len(set(whole)) == len(whole) and order(lab, tyres, 1.0) == whole[:1]
     assert order(lab, tyres, 0.5) == []
     with_effect = tyres.only(np.array(tyres.keys) != NONE)
-    found = [
+    chances = [
         float(lab.linear.found(with_effect, lab.rows(whole[:k])).mean())
         for k in range(len(whole) + 1)
     ]
-    assert len(whole) > 1 and found[-1] > found[1] > found[0] == 0
+    assert len(whole) > 1 and chances[-1] > chances[1] > chances[0] == 0
     singles = {n: lab.linear.found(with_effect, lab.rows([n])).mean() for n in lab.menu}
-    assert found[1] == max(singles.values())
+    assert chances[1] == max(singles.values())
 
 
 def test_pressures_are_a_step_apart_unless_a_user_names_them() -> None:

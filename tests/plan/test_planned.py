@@ -13,8 +13,8 @@ JUDGES = "linear", "evidence"
 @pytest.mark.parametrize("judge", JUDGES)
 def test_effects_are_found_as_often_as_promised(judge: str) -> None:
     rows = read()
-    for found, stated, error in promised(rows, of_judge(rows, judge)[0]).values():
-        assert abs(found - stated) <= 3 * error
+    for share, stated, error in promised(rows, of_judge(rows, judge)[0]).values():
+        assert abs(share - stated) <= 3 * error
 
 
 @pytest.mark.parametrize("judge", JUDGES)

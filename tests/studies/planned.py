@@ -191,7 +191,7 @@ def campaign(lab: Laboratory, plan: Sequence[str], tyre: int, sound: bool, judge
 
 
 def more_of(lab: Laboratory, plan: Sequence[str], row: Row, sets: bool) -> Row:
-    """What only `judged` has of a tyre: `next`, and with pairs and triples."""
+    """Figures of a tyre that only `judged` has: `next`, and with pairs and triples."""
     id, sound = row["effect"], row["effect"] == NONE
     _, measured = drawn(lab, id, np.random.default_rng([SEED, row["tyre"], sound]))
     more: Row = {}
@@ -280,9 +280,9 @@ def promised(rows: Sequence[Row], tyres: Sequence[Row]) -> dict[str, tuple[float
     result = {}
     for step, promise in (("first", "promised_first"), ("end", "promised")):
         p = np.array([rows[0][promise][row["effect"]] for row in tyres])
-        found = np.array([row[step] >= FOUND for row in tyres])
+        hits = np.array([row[step] >= FOUND for row in tyres])
         variance = (p * (1 - p)).mean() * (1 / len(p) + 1 / (MANY * DRAWN_TYRES * 26))
-        result[step] = float(found.mean()), float(p.mean()), float(np.sqrt(variance))
+        result[step] = float(hits.mean()), float(p.mean()), float(np.sqrt(variance))
     return result
 
 
@@ -311,8 +311,8 @@ def tell(rows: list[Row]) -> None:
                 print("|", " | ".join([judge, name, *numbers, *cells]), "|")
     for judge in ("linear", "evidence"):
         tyres, sound = of_judge(rows, judge)
-        for step, (found, stated, error) in promised(rows, tyres).items() if tyres else ():
-            print(f"{judge}, found, {step}: {found:.3f}, promised {stated:.3f} +- {error:.3f}")
+        for step, (share, stated, error) in promised(rows, tyres).items() if tyres else ():
+            print(f"{judge}, found, {step}: {share:.3f}, promised {stated:.3f} +- {error:.3f}")
         accused = sum(row["accused"] >= FOUND for row in sound)
         print(f"{judge}, sound tyres accused: {accused} of {len(sound)}")
     both = [row for row in of_judge(rows, "evidence")[0] if "with_sets" in row]

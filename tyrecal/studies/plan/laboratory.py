@@ -1,4 +1,4 @@
-"""What a laboratory may measure of a tyre, with its hours: all rows in one linear diagnosis.
+"""Measurements that a laboratory may take of a tyre, with their hours, in one linear diagnosis.
 
 The model is evaluated once, at the case's start and in all states of the menu. Each row belongs to
 one item of the menu; a plan is a sequence of items.
@@ -130,15 +130,15 @@ def laboratory(
         add("helium", f"fill with helium, {own_kPa:g} kPa", cost["helium"], own, run=1)
         changes = (Toggle(CAVITY_GAS, HELIUM, times=True, base=ranges[CAVITY_GAS].base),)
     add("weigh", "weigh the tyre", cost["weigh"], [(None, 0.0)])
-    asked = list(dict.fromkeys(rows))
-    model = TyreModel(case, evaluator, asked, own_sources, ranges, jobs)
+    distinct = list(dict.fromkeys(rows))
+    model = TyreModel(case, evaluator, distinct, own_sources, ranges, jobs)
     expanded = replace(expand(model, model.start), coupling=None)
-    places = [asked.index(row) for row in rows]
+    places = [distinct.index(row) for row in rows]
     shows, readings = _readings(expanded, model, own_sources)
     for tool, _ in readings:
         menu[tool] = Item(PLANNED_READINGS[tool][0], cost[tool])
     item += [tool for tool, _ in readings]
-    count = len(asked)
+    count = len(distinct)
     expansion = _with_readings(expanded, model, shows, [id for _, id in readings])
     places += range(count, count + len(shows))
     observed += [Observable(f"reading {i}", None, 0.0) for i in range(len(shows))]

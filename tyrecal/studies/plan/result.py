@@ -141,8 +141,8 @@ class PlanResult(Result):
             for each in self.effects
         ]
         heads = [Column("effect", ""), Column("chance"), *sizes]
-        found = Table(heads, rows, "Chance of a find, at the end")
-        return [Table(columns, steps, "Measure in this order"), found]
+        effects = Table(heads, rows, "Chance of a find, at the end")
+        return [Table(columns, steps, "Measure in this order"), effects]
 
     def numbers(self) -> list[Table]:
         variables = [each.cells() for each in self.variables]
