@@ -163,7 +163,7 @@ class Factor:
         return self._forward(flat[:, self._unknowns].T.astype(np.float32, order="C"))
 
     def columns(self, dofs: Array) -> list[Array]:
-        """What `forward` gives for units at some of the parts' free components, flat indices."""
+        """L^-1 times units at some free components of the parts, flat indices, as `forward` has it."""
         b = np.zeros((len(self._unknowns), len(dofs)), np.float32)
         b[self._place[dofs], np.arange(len(dofs))] = 1.0
         return self._forward(b)
