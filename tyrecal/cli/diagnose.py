@@ -51,14 +51,15 @@ file = FileOrFolder(exists=True, folder=False)
     help="Effect to leave out, because it is ruled out; repeatable.",
 )
 @option(
-    "--form-percent",  # an exact section: section.known_from of the case is exact
+    # a standard deviation; an exact section: section.known_from of the case is exact
+    "--form-percent",
     type=NumberWithin(0, 20),
     metavar="PERCENT",
     help="Error of the model's own form in every frequency (default: of its mesh, mode by mode,"
     " and of material laws, if the section is not exact).",
 )
 @option(
-    "--split-percent",
+    "--split-percent",  # its standard deviation, over the frequency
     type=NumberWithin(0, 20),
     default=0.3,
     show_default=True,

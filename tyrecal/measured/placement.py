@@ -3,8 +3,8 @@
 Candidates are the nodes of the tread at even angles. A sensor has a row phi for each direction that
 it measures: the modes of the case there, scaled to the same mean square, a doublet as two columns.
 The next sensor is the one that raises ln det(1 + Phi^T Phi) most, Phi being all rows so far. With
-one direction each this is QR with column pivoting of Phi^T until its rank is reached, and
-D-optimal design from there on.
+one direction each this is close to QR with column pivoting of Phi^T until its rank is reached (the
+1 regularises it), and D-optimal design from there on.
 """
 
 from __future__ import annotations
@@ -66,6 +66,7 @@ def tread_places(points: Array) -> Array:
     R, Z = points.T
     equations = ConvexHull(points).equations  # unit normals, and offsets
     is_outside = (points @ equations[:, :2].T + equations[:, 2]).max(1) > -NEAR_HULL_m
+    # BELT: share of the largest radius from which a node counts as belt
     rows = np.flatnonzero(is_outside & (BELT * R.max() < R))
     angles = 2 * np.pi * np.arange(ANGLE_STEPS) / ANGLE_STEPS
     return np.array([[R[row], angle, Z[row]] for row in rows for angle in angles])

@@ -43,8 +43,8 @@ def superelement(
 ) -> Superelement:
     """Matrices with at most ``count`` coordinates of modes: of the harmonics 0 and 1, which alone
     move the rim, up to `MOVE_RIM_UP_TO` times the highest frequency with the static response of the
-    rest, then the lowest of the others. points: angle (rad) and component of each. Raises Refused
-    if the rim needs more."""
+    rest, then the lowest of the others. points: angle (rad) and component (0, 1, 2: r, theta, z) of
+    each. Raises Refused if the rim needs more."""
     limit = (2 * np.pi * response.highest_Hz) ** 2
     blocks = [_Block(response, k, points) for k in range(len(response.harmonics))]
     parts = [block.with_static_shapes(limit) for block in blocks[:2]]
@@ -85,20 +85,22 @@ class _ModeMatrices:
 
 
 class _Block:
-    """A harmonic in real coordinates."""
+    """A harmonic in real coordinates; a field is Re[a exp(i n Theta)], with an amplitude a."""
 
     def __init__(self, response: Response, k: int, points: Sequence[tuple[float, int]]):
         reduced = response.harmonics[k]
+        # the integral of cos^2 n Theta round the tyre: matrices of `reduced` are per radian
         self.n, self._circle = reduced.n, np.pi if reduced.n else 2 * np.pi
-        stiffness, loss = response.at_middle(reduced)
+        stiffness, loss = response.at_middle(reduced)  # of the band of frequencies
         self.eigenvalues, turn = np.linalg.eigh(stiffness)
         self._loss = turn.conj().T @ loss @ turn
+        # share: the mean of cos n Theta over a patch about Theta = 0
         self._moved, share = reduced.moved @ turn, response.patch.share(reduced.n)
         self._motion = reduced.forces.conj().T @ turn  # of the patch (3, m), m modes
         self._tread = np.array(
             [share * np.exp(1j * self.n * angle) * self._motion[way] for angle, way in points]
         )
-        # rim: amplitude exp(-i angle of the axis) of each motion, by its coordinates
+        # the rim's motion along an axis has the amplitude exp(-i angle); here its conjugate
         self._turns = np.zeros((6, len(reduced.moved)), complex)
         for motion_place, place in enumerate(RIM_PLACES.get(self.n, ())):
             for axis, angle in enumerate(RIM_AXES if self.n else RIM_AXES[:1]):

@@ -72,6 +72,7 @@ class HarmonicBasis:
         """Displacement (d, fields) of the attached components."""
         columns = []
         for family in self.families:
+            # share: the mean of cos n Theta over the sector that a component is spread over
             pick = family.shapes[:, attached.rows, attached.components].T
             pick = pick * np.sqrt(family.whole) * attached.share(family.n)
             columns += [pick.real, -pick.imag] if family.n else [pick.real]

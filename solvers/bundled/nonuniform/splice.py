@@ -1,4 +1,4 @@
-"""A tyre one sector of which is of other stuff: a splice.
+"""A tyre with one sector of another material: a splice.
 
 The section's constants at the angle Theta are C + chi(Theta) (C' - C), chi = 1 in the sector, 0
 elsewhere, by its Fourier series up to twice the highest harmonic N of the displacements, which is
@@ -104,9 +104,10 @@ class FullCircle:
         self.free = vibration.numbering.free
         around = tyre.around
         share = sector.share(_angles(len(around.weights)), 2 * highest)
+        # int N^T N chi dTheta (k, k), rad, of the functions N round the tyre
         self._waves = around.N.T @ ((around.weights * share)[:, None] * around.N)
-        self._each = 2 * np.pi / len(around.angles)  # rad
-        self._more = mass(sector.model) - vibration.mass
+        self._each = 2 * np.pi / len(around.angles)  # rad; int N^T N dTheta is this times 1
+        self._more = mass(sector.model) - vibration.mass  # of the sector, per radian
 
     def turning(self, turn: float) -> FullCircle:
         """A copy for the fields that half a turn multiplies by ``turn``."""
@@ -182,7 +183,7 @@ def sector_modes(
     check: Callable[[], None] = lambda: None,
     beyond: int = EXTRA_SHAPE_HARMONICS,
 ) -> list[HarmonicModes]:
-    """The ``count`` lowest modes of each harmonic of a tyre with a sector of other stuff.
+    """The ``count`` lowest modes of each harmonic of a tyre with a sector of another material.
 
     U: the plain tyre's state under ``loads``; model: the plain one; ``beyond``: harmonics of the
     displacements above the highest wanted. Raises RunFailed.

@@ -57,11 +57,11 @@ MAX_DEFLECTION_STEP = 0.1
 class PressedState:
     """An equilibrium."""
 
-    parts: Array  # (2, k, q, 3) of the displacements, m
+    parts: Array  # (2, f, q, 3) of the displacements, m
     height: float  # the road's, m
     contact: Contact
     stiffness: float  # vertical, of the tangent, dF / d(deflection), N/m
-    # parts (m/N) and the road's rise that the tangent answers a unit of half its force with
+    # displacements' parts and rise of the road, m/N, by a unit of half the road's force
     unit: tuple[Array, float]
 
 
@@ -70,7 +70,7 @@ class FirstGuess:
     """Where the first load begins."""
 
     load: float  # N
-    moved: Array  # (2, k, q, 3): what the load adds to the inflated tyre's parts, m
+    moved: Array  # (2, f, q, 3): what the load adds to the inflated tyre's parts, m
     deflection: float  # m
     factor: ContactUpdate
     share: float = 1.0  # of the load, at which this tyre has about this deflection
@@ -334,8 +334,9 @@ class ContactNewton:
     def solve(
         self, tangent: Tangent, force: Array, lacking: float, tolerance: float
     ) -> tuple[Array, float, int, float]:
-        """Parts and rise of the road that a tangent answers ``force`` and ``lacking`` with, the
-        iterations, and the relative residual that is left."""
+        """Displacements' parts and rise of the road, m, that solve a tangent's equations for
+        ``force`` on the parts and ``lacking`` on the road (half its force), N; the iterations; and
+        the relative residual that is left."""
         factor = self._factor or self._form(tangent.contact)
         shape, scale = self.parts.shape, max(tangent.stiffness, 1.0) ** -0.5
         right = np.append(force.ravel(), lacking * scale)
@@ -390,7 +391,7 @@ class ContactNewton:
         return self._factor
 
     def _unit(self, contact: Contact) -> tuple[Array, float]:
-        """Parts and the road's rise that answer a unit of the force of half the tyre."""
+        """Displacements' parts and rise of the road, m/N, by a unit of half the road's force."""
         tangent = Tangent.of(contact, self.symmetry)
         unit, rise, left = self.solve_closely(tangent, 0 * self.parts, 1.0, UNIT_RTOL)
         if left > MAX_UNIT_RESIDUAL:

@@ -20,7 +20,7 @@ from .dissection import Dissection, ElementColumn, Front, Kind, Range
 from .half_turn_symmetry import ODD, HalfTurn
 
 Array = np.ndarray
-Tangents = list[tuple[Array, Array, Array, Array]]
+Tangents = list[tuple[Array, Array, Array, Array]]  # of each part, as `Revolved.tangents`
 # largest stiffness between the two parts over that within one, above which a column eliminates both
 # together
 MIN_COUPLING = 5e-2
@@ -122,6 +122,8 @@ class Factor:
         place[self._unknowns] = np.arange(len(self._unknowns))
         self.contact = _within_parts(contact, fronts)
         touching = csr_matrix(self.contact[self._unknowns][:, self._unknowns])
+        # of each front: its unknowns, those left to later fronts, L (`dense_cholesky`), and
+        # X = L^-1 times the stiffness between both
         self._steps: list[tuple[slice, Array, Array, Array]] = []
         rests: dict[int, tuple[Array, Array]] = {}
         start = 0

@@ -159,6 +159,7 @@ class PressedResponse:
         def with_rim(image: Callable[[Array], Array], of_basis: Array) -> Array:
             """A matrix (b + q, b + q) of the whole tyre."""
             images = [image(V) for V in psi]
+            # the basis has unit mass on half the tyre, so sqrt(1/2) of it on the whole
             rim = 2 * np.array([[(V * F).sum() for F in images] for V in psi])
             across = np.sqrt(2) * np.array([gather(F) for F in images]) @ basis.vectors.T
             whole = np.block([[rim, across], [across.T, of_basis]])

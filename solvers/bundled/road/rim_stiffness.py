@@ -115,6 +115,7 @@ def rigid(X: Array, around: HalfCircle, shift: Array, matrix: Array) -> Array:
     R, Z = X.T
     place = np.stack([c * R, s * R, np.broadcast_to(Z, (SAMPLES, len(Z)))], -1)
     down, along, across = np.moveaxis(shift + place @ matrix.T, -1, 0)
+    # amplitudes of exp(i n theta) for n = 0, 1, 2; `turn`: their coefficients (k,)
     waves = np.fft.rfft(np.stack([c * down + s * along, c * along - s * down, across], -1), axis=0)
     waves[1:] *= 2
     turns = [around.turn(n)[:, None, None] * waves[n] for n in range(3)]
@@ -123,7 +124,8 @@ def rigid(X: Array, around: HalfCircle, shift: Array, matrix: Array) -> Array:
 
 def _caps(loads: Sequence[TyrePart], X: Array) -> float:
     """Stiffness, N m/rad, of a turn about a diameter that caps at the open ends of the pressed
-    surfaces add; zero if surfaces close the cavity."""
+    surfaces add; zero if surfaces close the cavity. A surface runs from z > 0 to z < 0 (V > 0), so
+    each open end adds - p pi r^2 |z|."""
     thrust = np.zeros(len(X))
     for load in loads:
         assert isinstance(load, Pressure)

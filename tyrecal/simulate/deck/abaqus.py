@@ -313,6 +313,7 @@ def frequency_rubber(m: Rubber, analysis: Analysis) -> TemplateNames:
         "D1": m.D1_per_Pa / static[1],
         "moduli": "LONG TERM",
         "prony": [],
+        # as *VISCOELASTIC has them: 1 - G'/G, G''/G and K''/K, G and K long-term; K' = K
         "storage": [
             {
                 "frequency": float(f),

@@ -28,8 +28,9 @@ LEADS_OUTSIDE = re.compile(  # but for comments: an absolute path or one upwards
     r"^(?!\*\*).*=[ \t]*[\"']?(?:[/\\~@]|\.\.|[a-z]:[/\\]).*|^\*[ \t]*USER[ \t]*SUBROUTINE.*",
     re.MULTILINE | re.IGNORECASE,
 )
-DesignKey = tuple[str, float, tuple[tuple[str, float], ...]]  # what tells designs apart
-DeckSlopes = dict[str, list[tuple[str, int, int, float]]]
+# what distinguishes designs: header, pressure (kPa), and values by name
+DesignKey = tuple[str, float, tuple[tuple[str, float], ...]]
+DeckSlopes = dict[str, list[tuple[str, int, int, float]]]  # see `Decks.tangents`
 
 
 class DesignEvaluator(Protocol):

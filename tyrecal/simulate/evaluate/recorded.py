@@ -2,6 +2,7 @@
 
 `check` judges an answer or a recorded failure by itself, `contradiction` an answer by what was
 asked. `Evaluator` makes a typed failure of a run's wrong answer, and sets a wrong record aside.
+The axes of arrays: `Solver.read`, under load `Footprint`. A number is above ``least``, not equal.
 """
 
 from __future__ import annotations
@@ -45,8 +46,8 @@ class _Mode(_Part):
     three dimensions, with its displacement."""
 
     frequency_Hz: of.Hertz
-    multiplicity: Annotated[Any, of.shaped("iu", least=0, most=2)]  # 2: both of a pair
-    n: Annotated[Any, of.shaped("iu", least=-1)] = 0  # harmonic of the amplitude
+    multiplicity: Annotated[Any, of.shaped("iu", least=0, most=2)]  # 1, or 2: both of a pair
+    n: Annotated[Any, of.shaped("iu", least=-1)] = 0  # harmonic of the amplitude, from 0
     # (points, 3) along r, theta, z
     amplitude: Annotated[Any, of.shaped("c" + of.REAL, None, 3)] = None
     # (points, 3) along r, theta, z; NaN where the solver does not give it
@@ -72,6 +73,7 @@ class _Tyre(_Part):
     pressure_Pa: Annotated[Any, of.shaped(of.REAL, least=-1e-9)]
     mass_kg: of.PositiveFinite
     nodes: of.WholeArray
+    # uninflated: (k, 2) R, Z, or (k, 3) R, Theta, Z; m and rad
     points: Annotated[Any, of.shaped(of.REAL, None, None)]
 
     @model_validator(mode="after")
@@ -86,11 +88,12 @@ class _Response(_Part):
     """Responses to a force on the tread."""
 
     frequency_Hz: of.RealArray
-    receptance: Annotated[Any, of.shaped("c", None, None, None)]
-    hub: Annotated[Any, of.shaped("c", 6, None, None)]
-    radius_m: of.PositiveFinite
-    harmonics: Annotated[Any, of.shaped("iu", least=0)]
-    harmonics_wanted: Annotated[Any, of.shaped("iu", least=0)]
+    receptance: Annotated[Any, of.shaped("c", None, None, None)]  # (respond, excite, f)
+    hub: Annotated[Any, of.shaped("c", 6, None, None)]  # (6, excite, f) forces and moments
+    radius_m: of.PositiveFinite  # of the inflated tread
+    harmonics: Annotated[Any, of.shaped("iu", least=0)]  # that were summed
+    harmonics_wanted: Annotated[Any, of.shaped("iu", least=0)]  # for the patch's size
+    # the first three (d, d), on motions of the rim and on modes; tread (respond, d)
     stiffness: Annotated[Any, of.shaped("f", None, None)] = None
     mass: Annotated[Any, of.shaped("f", None, None)] = None
     loss: Annotated[Any, of.shaped("f", None, None)] = None
@@ -147,12 +150,14 @@ class _Pressed(_Tyre):
                 raise ValueError("a patch is not on this tyre")
             if each.response is not None:
                 _Response.model_validate(each.response)
+            # (m,), (j,) and (m, ring, j, 3)
             parts = (each.mode_frequency_Hz, each.mode_node, each.mode_shape)
             if any(part is not None for part in parts):
                 if any(part is None for part in parts):
                     raise ValueError("of modes under load a part is missing")
                 if _shape(parts[2])[:3] != (*_shape(parts[0]), rings, *_shape(parts[1])):
                     raise ValueError("modes under load do not go together")
+            # (m,), and of the modes of a sliding patch frequencies and shapes, as above
             free = (each.mode_traction_N, each.sliding_frequency_Hz, each.sliding_shape)
             if any(part is not None for part in free) and not (
                 all(part is not None for part in (*parts, *free))

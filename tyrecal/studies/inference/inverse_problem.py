@@ -99,7 +99,7 @@ class InverseProblem:
         self, observations: Observations, constants: Array, mixed: Array | None = None
     ) -> Array:
         """Covariance of other observations, whose constants (m, k) are given."""
-        laws = self.expansion.material_laws
+        laws = self.expansion.material_laws  # standard deviation of their error, in ln f
         return covariance(observations, constants, laws, self.assumed.form, mixed)
 
     @cached_property
@@ -179,6 +179,7 @@ class InverseProblem:
                     off[ids.index(id)][:, rows] = self._response_error(id) * a[:, self.places[rows]]
                     more = self.expansion.nodes[id].shape_uncertainty_at(e)
                     shape_uncertainty[ids.index(id)][:, rows] = more[:, self.places[rows]]
+            # joint: what two effects together change beyond the sum of both
             for both, joint in self.expansion.joint.items():
                 if set(both) <= set(here):
                     a, B = joint.at(*(here[id] for id in both))

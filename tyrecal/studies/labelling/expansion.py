@@ -1,8 +1,8 @@
 """Labelings where the model is expanded about their own mean: Gauss-Newton over the likeliest one.
 
-The tree (`tree`) takes ln f to be linear in the design. So the model is expanded anew at the design
-that the likeliest labeling finds, until neither changes: the probabilities are then of slopes where
-the measured values put the tyre, not where the case began.
+The tree (`tree`) takes ln f to be linear in z, with x = mean + root z (`Prior`). So the model is
+expanded anew at the design that the likeliest labeling finds, until neither changes: the
+probabilities are then of slopes where the measured values put the tyre, not where the case began.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class Prior:
 
 @dataclass(frozen=True)
 class ModesNearDesign:
-    """The model at a design: its n in-plane and out-of-plane modes. A list of frequencies cannot
-    tell modes across the belt and overtones."""
+    """The model at a design: its n in-plane and out-of-plane modes. Other modes have no labels in a
+    list of frequencies."""
 
     labels: tuple[Label, ...]
     states: Array  # (n,) number of the state of each mode
@@ -56,14 +56,14 @@ class LabelSearch:
     settled: bool
 
     def labels(self, place: int = 0) -> list[Label | None]:
-        """Label of each measured frequency under the labeling at a place; None: foreign."""
+        """Label of each measured frequency under the labeling at a place, 0: the most probable.
+        None: foreign, no mode of the tyre."""
         own = self.labelings.modes[place]
         return [self.expansion.labels[j] if j >= 0 else None for j in own]
 
 
-Measured = Callable[
-    [ModesNearDesign], Frequencies
-]  # what is admissible hangs on the modes that there are
+# the measured frequencies; which modes each can be depends on the modes that there are
+Measured = Callable[[ModesNearDesign], Frequencies]
 
 
 def find_labels(
@@ -72,8 +72,8 @@ def find_labels(
     prior: Prior,
     first: Array | None = None,
 ) -> LabelSearch:
-    """first: where the model is expanded first, by default at the prior's mean. Raises what
-    ``expand`` does."""
+    """Labelings of the measured frequencies; first: coordinates where the model is expanded first,
+    by default the prior's mean. Raises what ``expand`` does."""
     x, seen = prior.mean if first is None else first, list[LabelSearch]()
     for round_ in range(1, ROUNDS + 1):
         at = expand(x)
@@ -95,7 +95,7 @@ def find_labels(
 
 
 def admissible(labels: Sequence[Label | None], states: Array, at: ModesNearDesign) -> Array:
-    """(m, n): the modes that each measured frequency can be, a label or None for unlabelled
-    ones."""
+    """Whether each of m measured frequencies can be each of n modes, (m, n); labels: of the
+    frequencies, None for unlabelled ones."""
     same = np.array([[own in (None, label) for label in at.labels] for own in labels])
     return (states[:, None] == at.states) & same

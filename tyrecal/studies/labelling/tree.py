@@ -37,7 +37,8 @@ Array = np.ndarray
 MISSED = 0.2  # probability of a mode within the band
 FOREIGN = 0.5  # frequencies that are no mode, expected
 FOREIGN_MARGIN = 0.1  # of ln f, by which the band of foreign ones is wider than what was measured
-VIEWS = {(True, True): 0.6, (True, False): 0.2, (False, True): 0.2}  # families seen: probability
+# whether in-plane and out-of-plane modes are seen: probability
+VIEWS = {(True, True): 0.6, (True, False): 0.2, (False, True): 0.2}
 UNSEEN = 0.02  # probability of being measured, of a mode of the other family
 DISCREPANCIES = (0.0, 0.01, 0.03, 0.1)  # standard deviations of ln f, each as likely
 ALIKE = 4.0  # waves over which the discrepancy of a family's modes falls by e
@@ -137,7 +138,7 @@ def labelings(measured: Frequencies, modes: Modes) -> Labelings:
 
 
 def _of_each(modes: Array, probabilities: Array, shape: tuple[int, ...]) -> Array:
-    """(m, n + 1), see `Labelings`."""
+    """Probability (m, n + 1) of every mode of a frequency, the last of foreign."""
     each = np.zeros(shape)
     for own, p in zip(modes, probabilities, strict=True):
         each[range(len(own)), own] += p  # -1 is the last column

@@ -18,17 +18,17 @@ WORD = re.compile(r"[A-Za-z]\w*")
 
 
 def start_values(loaded: LoadedCase) -> dict[str, float]:
-    """The start value of every variable by name, in the unit of the numbers it sets: its user's,
-    else the case file's."""
+    """The start value of every variable by name, in the unit of the numbers it sets: the value that
+    the user gave for this run, else that of the case file."""
     variables = loaded.case.variables
     given = {name: x for name, x in loaded.overrides.items() if isinstance(x, int | float)}
     return {name: given.get(name, v.start) for name, v in variables.items()}
 
 
 def overruled(loaded: LoadedCase, given: Collection[str] = ()) -> list[str]:
-    """A sentence for every number in the case file that its variable's start, which is what
-    counts, differs from: who edits that number alone changes nothing. Variables whose values are
-    ``given`` are left out."""
+    """A sentence for every number in the case file that differs from the start of its variable: the
+    start counts, so editing that number alone changes nothing. Variables whose values are ``given``
+    are left out."""
     sentences = []
     for name, variable in loaded.case.variables.items():
         for path in [] if name in given else variable.sets:
@@ -85,6 +85,7 @@ def with_level(loaded: LoadedCase, level: str) -> LoadedCase:
     if level not in mesh.levels:
         raise InputError(f"mesh level '{level}' is not one of the case's: {', '.join(mesh.levels)}")
     case = loaded.case.model_copy(update={"mesh": mesh.model_copy(update={"level": level})})
+    # `as_read`: the case before any number was set, or None
     read = loaded.as_read and with_level(loaded.as_read, level)
     return replace(loaded, case=case, as_read=read)
 

@@ -38,12 +38,12 @@ def _spindle(key: str, along: str, **entry: Any) -> Effect:
     return Effect(
         title=f"{direction.capitalize()} compliance of the spindle",
         low=0.0,
-        pressure_power=-1,
+        pressure_power=-1,  # of the range: the same share of the tyre's compliance at any pressure
         changes=("*SPRING", "*MASS", "*ROTARY INERTIA", "*BOUNDARY"),
         add=add,
         add_to_deck=add,
         needs="spindle",
-        response_error=0.04,  # springs in series; its mass is integrated over
+        response_error=0.04,  # springs in series; `heavier` has the uncertain mass
         shape_uncertainty=lambda case, value: heavier(add(case, value)),
         **entry,
     )
