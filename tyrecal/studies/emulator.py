@@ -7,12 +7,12 @@ In the box, t = (x - centre) / half, |t_j| <= 1, x the logarithms of the variabl
 by least squares of values and slopes together: an evaluation gives 1 + v equations. q is ln f of
 every mode except the two [0, 0] ones. Where those meet, they avoid each other and change names.
 Then their frequencies are not smooth, but the trace and the discriminant of the 2 x 2 problem that
-they solve are (see fit/crossing.py),
+they solve are (`fit.crossing`),
 
     m = (ln f_axial + ln f_torsional) / 2,    s = (ln f_axial - ln f_torsional)^2
 
 and so is the difference without their coupling, d = (ln f_axial - ln f_torsional) c, c the
-clearness of their names; its sign says which of m +- sqrt(s) / 2 is the axial one.
+smaller clarity of their labels; its sign says which of m +- sqrt(s) / 2 is the axial one.
 
 The error: each design is left out in turn, and what the others say there is compared with it. With
 the equations M a = q, M = Q R, rows i of one design, H = Q Q^T (Cook and Weisberg, Residuals and

@@ -2,8 +2,8 @@
 
 The revolved mesh keeps the section's node numbers in that plane. A node there stands for one
 sector of the mesh, so a mass or a spring moves with the mean of the displacement over the angle
-beta = 360 degrees / sectors: a harmonic n counts by sin(n beta/2) / (n beta/2). The bare point
-would give way without bound as harmonics are added.
+beta = 360 degrees / sectors: a harmonic n counts by sin(n beta/2) / (n beta/2). A bare point
+would yield without bound as harmonics are added.
 """
 
 from __future__ import annotations

@@ -92,7 +92,7 @@ class Evaluator:
     solver_name: str = ""  # else the design's
     folder: Path | None = None  # of the run folders; None: temporary ones
     keep: bool = False  # the folders of successful runs too; those of failures always are
-    store: Store | None = None  # the record, asked before the solver and told what it said
+    store: Store | None = None  # answers of earlier runs: read before a run, written after it
     scheduler: str = ""  # address of a Dask scheduler for several questions, else processes
     command: tuple[str, ...] = ()  # words that start the solver's program, else the user's settings
     counts: Counts = field(default_factory=Counts)

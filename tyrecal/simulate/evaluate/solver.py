@@ -55,16 +55,19 @@ class Solver(Protocol):
 
     def read(self, folder: Path) -> SolverAnswer:
         """pressure_Pa, mass_kg, modes [{frequency_Hz, multiplicity, n, amplitude}], gradients
-        {variable: [Hz per unit]}, nodes, points, displacement and,
-        for fits to the mass, mass_gradients {variable: kg per unit}. A doublet that is split is one
-        mode of multiplicity 2 at the mean frequency, with ``members`` [Hz, Hz]. Where a loss factor
-        is known, each mode has its damping_ratio, a fraction of critical damping. Where
-        ``decks.request`` has a response {lowest_Hz, highest_Hz, lines, patch_m, excite, respond}
-        of points [degrees, direction] of the tread: response {frequency_Hz (f,), receptance
-        (respond, excite, f), hub (6, excite, f), radius_m, harmonics, harmonics_wanted}. Of the
-        hub: force along Theta = 0, along 90 degrees, along the axle, and moments about them. With
-        ``modes`` N in it also stiffness, mass and loss (d, d) on these six motions of the rim and
-        at most N coordinates of modes with the rim held, and tread (respond, d).
+        {variable: [Hz per unit]}, nodes, points (as in `HarmonicShape`), displacement (as in
+        `Evaluation`) and, for fits to the mass, mass_gradients {variable: kg per unit}. A doublet
+        that is split is one mode of multiplicity 2 at the mean frequency, with ``members`` [Hz,
+        Hz]. Where a loss factor is known, each mode has its damping_ratio, a fraction of critical
+        damping.
+
+        Where ``decks.request`` has a response {lowest_Hz, highest_Hz, lines, patch_m, excite,
+        respond} of points [degrees, direction] of the tread: response {frequency_Hz (f,),
+        receptance (respond, excite, f) in m/N, hub (6, excite, f) in N/N and N m/N, radius_m of
+        the inflated tread, harmonics that were summed, harmonics_wanted for the patch's size}. Of
+        the hub: force along Theta = 0, along 90 degrees, along the axle, and moments about them.
+        With ``modes`` N in it also stiffness, mass and loss (d, d) on these six motions of the rim
+        and at most N coordinates of modes with the rim held, and tread (respond, d).
 
         A solver in three dimensions gives each mode {frequency_Hz, multiplicity 1, displacement
         (k, 3)} at ``points`` (k, 3), as in `RingShape`; pairs are joined by the tool.

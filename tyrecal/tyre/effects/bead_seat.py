@@ -16,7 +16,8 @@ from .edit import changed, unused, with_part
 from .effect import Effect
 from .parts import carcass_line, held_regions, present, rim_edge, stations
 
-# of the bead: elements that are shorter yet are a finer mesh of the clamped edge, worth 0.4 %
+# of the bead's length: shorter elements are a finer mesh of the clamped edge, which alone moves
+# [0,0] lateral by 0.4 %
 LEAST = 0.02
 GAP_ENDING = "_gap"  # with which the region's name ends
 

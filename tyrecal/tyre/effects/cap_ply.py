@@ -62,8 +62,8 @@ EFFECT = Effect(
     toggle="section a tyre of the same build, or read the construction on its sidewall",
     aliases=("belt_width", "bead_filler", "belt_angle"),
     add=add,
-    # error of its shifts, relative: one layer or more at the edges; wound at 0 to 5 degrees; its
-    # width is integrated over
+    # error of its shifts, relative: one layer or more at the edges; wound at 0 to 5 degrees; a
+    # diagnosis integrates over its width
     response_error=0.10,
     shape_uncertainty=to_the_edge,
 )

@@ -25,7 +25,7 @@ EFFECT = Effect(
     # workshop gauges are within 10 kPa; 1 kPa a degree between inflation and test
     low=-10.0,
     high=10.0,
-    pressure_power=1,
+    pressure_power=1,  # of the range: a gauge is off by the same share of any pressure
     changes=("*DSLOAD",),
     signature=(
         "all up alike: +1.4 to +1.7 % at +10 kPa and 240 kPa, +2.3 % at 160 kPa, +1.1 % "

@@ -28,7 +28,7 @@ EFFECT = Effect(
     # a few degrees of warming in a run from 160 to 320 kPa, and in a truck's from 480 to 960
     low=-5.0,
     high=5.0,
-    pressure_power=-1,
+    pressure_power=-1,  # of the range: the same change of temperature over 2/3 to 4/3 of any p
     changes=("*HYPERELASTIC",),
     signature=(
         "no change at the case's pressure, below it all up, above it all down by the "
