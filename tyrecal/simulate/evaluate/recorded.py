@@ -93,7 +93,7 @@ class _Response(_Part):
     radius_m: of.PositiveFinite  # of the inflated tread
     harmonics: Annotated[Any, of.shaped("iu", least=0)]  # that were summed
     harmonics_wanted: Annotated[Any, of.shaped("iu", least=0)]  # for the patch's size
-    # the first three (d, d), on motions of the rim and on modes; tread (respond, d)
+    # the first three (d, d), d coordinates: motions of the rim, then modes; tread (respond, d)
     stiffness: Annotated[Any, of.shaped("f", None, None)] = None
     mass: Annotated[Any, of.shaped("f", None, None)] = None
     loss: Annotated[Any, of.shaped("f", None, None)] = None

@@ -2,7 +2,7 @@
 
 Two modes that are coupled, however weakly, avoid each other. With d the difference of the
 frequencies that they would have alone and 2 delta their coupling, the gap between them and the
-clearness of their labels, a difference of shares (Landau and Lifshitz, Quantum Mechanics, sec. 79):
+clarity of their labels, a difference of shares (Landau and Lifshitz, Quantum Mechanics, sec. 79):
 
     g = +- sqrt(d^2 + 4 delta^2),    c = cos^2 phi - sin^2 phi = |d / g|,    tan 2 phi = 2 delta / d
 
@@ -25,8 +25,8 @@ from .problem import Point, Problem
 Array = np.ndarray
 AXIAL, TORSIONAL = Label(0, 0, "axial"), Label(0, 0, "torsional")
 PAIR = (AXIAL, TORSIONAL)
-MIXED = 0.8  # labels of the two modes are less clear than this: they have met
-TELLING = 0.3  # clearness from which on the slope of g tells that of d
+MIXED = 0.8  # clarity of the two labels below which the modes have met
+TELLING = 0.3  # clarity above which the slope of g determines that of d
 
 
 @dataclass(frozen=True)
