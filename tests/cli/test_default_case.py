@@ -18,7 +18,9 @@ from tyrecal.tyre.load import load_case
 from ..conftest import CASES
 from .test_cli import run
 
-STUDY = Study(Terminal(), "", "", (), None, None, no_store=False, allow_unusual=False)
+STUDY = Study(
+    Terminal(), "", "", (), None, None, no_store=False, allow_unusual=False, dry_run=False
+)
 
 
 @pytest.fixture

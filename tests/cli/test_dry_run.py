@@ -26,6 +26,8 @@ STUDIES = {  # of each command with --dry-run: the words that a run needs
     "effects": ["effects", "--case", CASE],
     "sample": ["sample", CASE, "--measured", MEASURED],
     "diagnose": ["diagnose", CASE, "--measured", MEASURED],
+    "plan": ["plan", CASE],
+    "blind power": ["blind", "power", CASE],
     "measured sensors": ["measured", "sensors", CASE, "--place", "8"],
     "measured label": ["measured", "label", CASE, "unlabelled.csv"],
 }
@@ -51,7 +53,9 @@ def test_every_study_has_it() -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(name, marks=[pytest.mark.slow] * (name in ("sample", "diagnose")))
+        pytest.param(
+            name, marks=[pytest.mark.slow] * (name in ("sample", "diagnose", "blind power"))
+        )
         for name in STUDIES
     ],
 )

@@ -153,7 +153,7 @@ def test_pandas_is_named_where_it_is_missing(
         results["modes"].to_dataframe()
 
 
-WITHOUT_FIGURE = {"modes", "effects", "diagnose", "sensors"}  # theirs need more than the result
+WITHOUT_FIGURE = {"modes", "diagnose", "sensors"}  # theirs need more than the result
 
 
 def test_figures_are_those_of_the_page(results: dict[str, Result]) -> None:

@@ -75,11 +75,12 @@ def command(
     tyrecal plan cases/p235_75r17.yaml --hours 4 --sensors 12 --step-hours mount=1.5
     """
     from ..studies.plan.result import PLAN_STAGES
-    from ..studies.plan.study import plan
+    from ..studies.plan.study import plan, planned
 
     loaded, _ = study.load(case, assignments)
     evaluator = study.evaluator(loaded)
-    run = study.run(loaded, "plan", evaluator)
+    runs = planned(loaded, evaluator, sensors, pressures, study.jobs)
+    run = study.run(loaded, "plan", evaluator, plan=runs)
     given = dict(map(_step, steps))
     with study.terminal.progress("plan", PLAN_STAGES) as bar:
         evaluator.on_progress = bar.at

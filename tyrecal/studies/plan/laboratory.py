@@ -7,11 +7,12 @@ one item of the menu; a plan is a sequence of items.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
+from ...errors import InputError
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase
@@ -26,13 +27,14 @@ from ..diagnose.next_measurement import (
     MASS_PERCENT,
     MIN_OFFERED_STEP,
     READING,
+    STEP_HOURS,
     cost_hours,
     offered_kPa,
 )
 from ..inference.effect_ranges import effect_ranges
 from ..inference.expansion import EffectResponse, Expansion, expand
 from ..inference.inverse_problem import InverseProblem, Toggle
-from ..inference.model import ModelRow
+from ..inference.model import EffectRange, ModelRow
 from ..inference.observations import Observable, Observations
 from ..inference.section_fields import SECTION
 from ..inference.tyre_model import TyreModel
@@ -87,6 +89,65 @@ class Laboratory:
         return sum(self.menu[name].hours for name in done)
 
 
+@dataclass(frozen=True)
+class Offer:
+    """Items of the menu of measurements by name, and the rows that they give."""
+
+    ranges: Mapping[str, EffectRange]
+    menu: dict[str, Item] = field(default_factory=dict)
+    item: list[str] = field(default_factory=list)  # of each row
+    rows: list[ModelRow] = field(default_factory=list)
+    observed: list[Observable] = field(default_factory=list)
+    changes: list[Toggle] = field(default_factory=list)
+
+    def add(self, name: str, what: str, hours: float, at: Sequence[ModelRow], run: int = 0) -> None:
+        """Add an item with its rows."""
+        where = at[0][1] if at and at[0][0] and name.endswith("kPa") else None
+        self.menu[name] = Item(what, hours, where if isinstance(where, float) else None)
+        self.item.extend([name] * len(at))
+        self.rows.extend(at)
+        self.observed.extend(replace(Observable.of(row), run=run) for row in at)
+
+    def model(self, case: LoadedCase, evaluator: Evaluator, jobs: int) -> TyreModel:
+        """The tyre's model of the rows, each once."""
+        distinct = list(dict.fromkeys(self.rows))
+        return TyreModel(case, evaluator, distinct, sources(case)[0], self.ranges, jobs)
+
+
+def offer(
+    case: LoadedCase,
+    evaluator: Evaluator,
+    labels: Sequence[Label],
+    pressures_kPa: Sequence[float],
+    steps: Mapping[str, float] = STEP_HOURS,
+) -> Offer:
+    """What may be measured of a case; see `laboratory`. Raises InputError if the solver gives no
+    exact sensitivities."""
+    if not evaluator.has_gradients:
+        raise InputError(
+            "a plan needs exact sensitivities, which this solver does not give: --solver bundled"
+        )
+    own_kPa, cost = case.case.pressure_kPa, cost_hours(steps)
+    taken = {path.removeprefix(EFFECT_PATH) for path in calibrated(case)}
+    ranges = {id: span for id, span in effect_ranges(case, evaluator)[0].items() if id not in taken}
+    made = Offer(ranges)
+    for p in map(float, pressures_kPa or offered_kPa(own_kPa, [])):
+        at: list[ModelRow] = [(label, p) for label in labels]
+        made.add(f"{p:g} kPa", f"response functions at {p:g} kPa", cost["pressure"], at)
+    own: list[ModelRow] = [(label, own_kPa) for label in labels]
+    again = f"mount the tyre again and repeat {own_kPa:g} kPa"
+    made.add("mount", again, cost["mount"], own)
+    if HELD_BY & {*ranges}:
+        held: list[ModelRow] = [(label, TyreState(own_kPa, 0.0, "fixed")) for label in labels]
+        made.add("clamp", f"clamp the rim rigidly, {own_kPa:g} kPa", cost["clamp"], held)
+    if CAVITY_GAS in ranges:
+        made.add("helium", f"fill with helium, {own_kPa:g} kPa", cost["helium"], own, run=1)
+        gas = ranges[CAVITY_GAS].base
+        made.changes.append(Toggle(CAVITY_GAS, HELIUM, times=True, base=gas))
+    made.add("weigh", "weigh the tyre", cost["weigh"], [(None, 0.0)])
+    return made
+
+
 def laboratory(
     case: LoadedCase,
     evaluator: Evaluator,
@@ -102,37 +163,12 @@ def laboratory(
     relative, of every frequency; steps: hours of each step, see `next_measurement.STEP_HOURS`.
     Raises InputError, EvaluationFailed.
     """
-    own_kPa, cost = case.case.pressure_kPa, cost_hours(steps)
-    own_sources = sources(case)[0]
-    taken = {path.removeprefix(EFFECT_PATH) for path in calibrated(case)}
-    ranges = {id: span for id, span in effect_ranges(case, evaluator)[0].items() if id not in taken}
-    menu, item = dict[str, Item](), list[str]()
-    rows, observed = list[ModelRow](), list[Observable]()
-
-    def add(name: str, what: str, hours: float, at: Sequence[ModelRow], run: int = 0) -> None:
-        where = at[0][1] if at and at[0][0] and name.endswith("kPa") else None
-        menu[name] = Item(what, hours, where if isinstance(where, float) else None)
-        item.extend([name] * len(at))
-        rows.extend(at)
-        observed.extend(replace(Observable.of(row), run=run) for row in at)
-
-    for p in map(float, pressures_kPa or offered_kPa(own_kPa, [])):
-        at: list[ModelRow] = [(label, p) for label in labels]
-        add(f"{p:g} kPa", f"response functions at {p:g} kPa", cost["pressure"], at)
-    own: list[ModelRow] = [(label, own_kPa) for label in labels]
-    again = f"mount the tyre again and repeat {own_kPa:g} kPa"
-    add("mount", again, cost["mount"], own)
-    if HELD_BY & {*ranges}:
-        held: list[ModelRow] = [(label, TyreState(own_kPa, 0.0, "fixed")) for label in labels]
-        add("clamp", f"clamp the rim rigidly, {own_kPa:g} kPa", cost["clamp"], held)
-    changes: tuple[Toggle, ...] = ()
-    if CAVITY_GAS in ranges:
-        add("helium", f"fill with helium, {own_kPa:g} kPa", cost["helium"], own, run=1)
-        changes = (Toggle(CAVITY_GAS, HELIUM, times=True, base=ranges[CAVITY_GAS].base),)
-    add("weigh", "weigh the tyre", cost["weigh"], [(None, 0.0)])
-    distinct = list(dict.fromkeys(rows))
-    model = TyreModel(case, evaluator, distinct, own_sources, ranges, jobs)
+    own_kPa, cost, own_sources = case.case.pressure_kPa, cost_hours(steps), sources(case)[0]
+    made = offer(case, evaluator, labels, pressures_kPa, steps)
+    ranges, menu, item, rows, observed = made.ranges, made.menu, made.item, made.rows, made.observed
+    model = made.model(case, evaluator, jobs)
     expanded = replace(expand(model, model.start), coupling=None)
+    distinct = list(dict.fromkeys(rows))
     places = [distinct.index(row) for row in rows]
     shows, readings = _readings(expanded, model, own_sources)
     for tool, _ in readings:
@@ -156,7 +192,7 @@ def laboratory(
         apart,
     )
     problem = InverseProblem(
-        seen, expansion, ranges, places_array, model.start, model.spread, changes
+        seen, expansion, ranges, places_array, model.start, model.spread, tuple(made.changes)
     )
     return Laboratory(problem, np.array(item), menu, own_kPa, bool(pressures_kPa))
 

@@ -14,11 +14,14 @@ from ...tyre.case import LoadedCase, start_values
 from ...tyre.case.mistakes import suggestion
 from ..blind.make import labels_of
 from ..diagnose.next_measurement import STEP_HOURS
+from ..inference.expansion import first_points
+from ..inference.run_estimate import estimate
 from ..inference.separability import APART, GRID_POINTS, VISIBLE, smallest
+from ..pressing_plan import PressingPlan
 from ..sensors import SensorsResult, place
 from ..variable import read_variables
 from .chance import NONE, shares
-from .laboratory import Laboratory, laboratory
+from .laboratory import Laboratory, laboratory, offer
 from .order import order
 from .result import (
     LABELLED,
@@ -31,10 +34,7 @@ from .result import (
 )
 
 Array = np.ndarray
-TRIED_TYRES, DRAWN_TYRES = (
-    8,
-    100,
-)  # drawn tyres of each effect: to choose steps, and for the chances
+TRIED_TYRES, DRAWN_TYRES = 8, 100  # drawn of each effect: to choose steps, and for the chances
 NAMED_AS_A_RULE = 25.0  # lambda from which nearly all effects were named in trials
 SENSOR_AXES = "rtz"  # that planned sensors measure
 
@@ -54,10 +54,6 @@ def plan(
     for name in step_hours:
         if name not in STEP_HOURS:
             raise InputError(f"'{name}' is no step{suggestion(name, STEP_HOURS)}")
-    if not evaluator.has_gradients:
-        raise InputError(
-            "a plan needs exact sensitivities, which this solver does not give: --solver bundled"
-        )
     stage(PLAN_STAGES[0])
     labels, steps = labels_of(case), {**STEP_HOURS, **step_hours}
     placed = _sensors(case, evaluator, labels, sensors) if sensors else None
@@ -123,6 +119,19 @@ def plan(
         not_labelled=[str(label) for label in confused],
     )
     return result.with_files({"plan.md": result.page()})
+
+
+def planned(
+    case: LoadedCase,
+    evaluator: Evaluator,
+    sensors: int | None,
+    pressures_kPa: Sequence[float],
+    jobs: int,
+) -> PressingPlan:
+    """About how often the solver runs for a plan, before it does. Raises InputError."""
+    model = offer(case, evaluator, labels_of(case), pressures_kPa).model(case, evaluator, jobs)
+    runs = model.runs(first_points(model, model.start))
+    return estimate(model, runs + (1 if sensors else 0), jobs)
 
 
 def _sensors(
