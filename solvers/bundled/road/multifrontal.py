@@ -165,7 +165,7 @@ class Factor:
         return self._forward(flat[:, self._unknowns].T.astype(np.float32, order="C"))
 
     def columns(self, dofs: Array) -> list[Array]:
-        """L^-1 times units at some free components of the parts, flat indices, as `forward` has it."""
+        """L^-1 times units at free components of the parts, flat indices, as `forward` has it."""
         b = np.zeros((len(self._unknowns), len(dofs)), np.float32)
         b[self._place[dofs], np.arange(len(dofs))] = 1.0
         return self._forward(b)

@@ -121,7 +121,7 @@ def offer(
     pressures_kPa: Sequence[float],
     steps: Mapping[str, float] = STEP_HOURS,
 ) -> Offer:
-    """What may be measured of a case; see `laboratory`. Raises InputError if the solver gives no
+    """The menu of measurements of a case; see `laboratory`. Raises InputError if the solver gives no
     exact sensitivities."""
     if not evaluator.has_gradients:
         raise InputError(
