@@ -121,8 +121,9 @@ def offer(
     pressures_kPa: Sequence[float],
     steps: Mapping[str, float] = STEP_HOURS,
 ) -> Offer:
-    """The menu of measurements of a case; see `laboratory`. Raises InputError if the solver gives no
-    exact sensitivities."""
+    """The menu of measurements of a case; see `laboratory`.
+
+    Raises InputError if the solver gives no exact sensitivities."""
     if not evaluator.has_gradients:
         raise InputError(
             "a plan needs exact sensitivities, which this solver does not give: --solver bundled"
