@@ -16,6 +16,7 @@ Percent = Annotated[float, Field(ge=0)]
 PLAN = "tyrecal.studies.plan.study:plan"  # not imported by those who read results
 NOISE_PERCENT = 0.2  # of every frequency, where nobody says
 PLAN_STAGES = ("evaluate the tyre and each effect", "choose the measurements")
+HALF_95 = 1.96  # half of a 95 % interval of a normal distribution, in standard deviations
 LABELLED = 0.9  # share of drawn tests in which sensors must label a mode for it to count
 
 
@@ -167,7 +168,9 @@ class PlanResult(Result):
             " over all effects)",
             f"found in 80 % or more: {', '.join(sure) or 'none'}",
             f"found in less than 20 %: {', '.join(never) or 'none'}",
-            f"a sound tyre is accused with a chance of {self.false_alarm:.3f}",
+            f"{round(self.draws * self.false_alarm)} of {self.draws} drawn tyres without an effect"
+            f" are accused; a chance is the share of {self.draws} drawn tyres, known to ±"
+            f" {HALF_95 * 0.5 / self.draws**0.5:.1g} or better (95 %)",
             "found means that 'tyrecal diagnose' gives the effect a probability of 0.9: stop as"
             " soon as it does",
             f"assumed hours: {hours}; assumed scatter {self.noise_percent:g} %",
