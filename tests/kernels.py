@@ -2,9 +2,9 @@
 
     python -m tests.kernels [--every] [pytest's arguments]
 
-Each kernel once, with one thread and with two in turn, this processor's own with two, as `pytest`
-itself has it with one; ``--every``: all kernels with one and with two. One run more at a time than
-there are cores. A kernel that the processor cannot run, or for which the libraries have another's,
+Each kernel once but this processor's own, which `pytest` itself has, with one thread and with two
+in turn; ``--every``: all kernels with one and with two. One run more at a time than there are
+cores. A kernel that the processor cannot run, or for which the libraries have another's,
 is said.
 Exits with 1 where a run failed.
 """
@@ -77,7 +77,7 @@ def tested(kernel: str, core: str, threads: int, more: list[str]) -> bool:
 def main(more: list[str]) -> int:
     own = run(["-c", ASK], "").stdout.strip()
     every, more = "--every" in more, [each for each in more if each != "--every"]
-    chosen = sorted(kernels(own).items(), key=lambda kernel: kernel[1] == own)  # its own last
+    chosen = [(name, core) for name, core in kernels(own).items() if every or core != own]
     turns = {core: THREADS[(len(chosen) - i) % 2] for i, (_, core) in enumerate(chosen)}
     jobs = [
         (name, core, n, more) for name, core in chosen for n in THREADS if every or n == turns[core]

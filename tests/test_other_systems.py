@@ -40,7 +40,7 @@ slow = pytest.mark.slow
 
 def results(folder: Path) -> dict[str, bytes]:
     """Result files by their path in ``folder``, records and pages without their dates."""
-    times = rb"\d{4}-\d\d-\d\d \d\d:\d\d UTC"
+    times = rb"\d{4}-\d\d-\d\d( |%20)\d\d:\d\d( |%20)UTC"
     return {
         path.relative_to(folder).as_posix(): re.sub(times, b"", path.read_bytes())
         for path in sorted(folder.rglob("*"))

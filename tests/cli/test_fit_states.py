@@ -65,7 +65,7 @@ def test_a_case_holds_targets_in_several_states(case: Path, tmp_path: Path) -> N
     assert state == {"pressure_kPa": [160, 240], "load_N": 0, "rim": ["fixed", "free"]}
     assert fit["mass"]["fitted"] == pytest.approx(fit["mass_kg"])
     page = (tmp_path / "report.html").read_text()
-    assert "160 kPa" in page and "states side by side" in page
+    assert "160 kPa" in page and "rim free" in page
     shapes = json.loads((tmp_path / "fit_shapes.json").read_text())
     assert shapes["pressure_kPa"] == 240
 

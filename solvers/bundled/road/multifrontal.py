@@ -23,7 +23,7 @@ Array = np.ndarray
 Tangents = list[tuple[Array, Array, Array, Array]]  # of each part, as `Revolved.tangents`
 # largest stiffness between the two parts over that within one, above which a column eliminates both
 # together
-MIN_COUPLING = 5e-2
+MIN_COUPLING = 2e-3
 MAX_RUN = 256  # rows added at once; a block on the diagonal adds its upper half needlessly
 
 

@@ -260,5 +260,5 @@ def lists_of(path: Path) -> Iterator[None]:
         yield
     except InputError:
         raise
-    except (ValueError, IndexError, TypeError):
+    except (ValueError, LookupError, TypeError):
         raise InputError(f"'{path}' is damaged: its lists do not go together") from None

@@ -11,7 +11,6 @@ from ...files import Json
 from .score import Scored
 from .statistics import brier, calibration_error, calibration_quantile, clopper_pearson
 
-# of `Difficulty.band`, or of lambda alone
 DIFFICULTY_BANDS = ((0.0, 4.0), (4.0, 10.0), (10.0, 25.0), (25.0, float("inf")))
 DETECTED = 10.0  # band from which an effect counts as detectable
 
@@ -25,7 +24,6 @@ def summary(trials: Sequence[Scored]) -> Json:
     detected = [t for t in effects if t.band >= DETECTED]
     stated = np.array([t.probabilities[t.ranked[0]] for t in trials])
     right = np.array([t.ranked[0] == t.truth for t in trials], float)
-    # shrinkage by what is named where there is no effect
     placebo = float(np.quantile([t.shrinkage for t in none], 0.95)) if none else None
     proven = [t for t in detected if t.verdict == "named"]
     parameters = [t.parameter_held for t in trials if t.parameter_held is not None]
@@ -191,8 +189,8 @@ def _rate(each: Json) -> str:
     if not each["count"]:
         return "none"
     return (
-        f"{each['right']} of {each['count']}, {100 * each['share']:.0f} %"
-        f" ({100 * each['low']:.0f} to {100 * each['high']:.0f} %)"
+        f"{each['right']} of {each['count']}, {each['share']:.0%}"
+        f" ({each['low']:.0%} to {each['high']:.0%})"
     )
 
 
