@@ -6,7 +6,10 @@ Draws among sentences of at least five words that have a number or state a behav
 seed 20261128, 5 were wrong on 2026-11-27 and are mended: one start of 50 that ends elsewhere, what
 a batch's pruning keeps, a truck's soft liner (stable), the shift by another law of cords, the rim
 of a case of decks. Of the 60 of seed 20261203, 1 was wrong on the same day and is mended: the least
-shortfall of the real tyre's predicted modes.
+shortfall of the real tyre's predicted modes. Of the 60 of seed 20261801, 7 were wrong on the same
+day and are mended: the waves from which a tyre is unstable, the sensitivity of vertical stiffness,
+the first box of a sampling, numbers that cannot be variables, a total error with a prior, designs
+outside an emulator's box, the tangent that antisymmetric modes on the road use.
 """
 
 from __future__ import annotations
