@@ -20,13 +20,12 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.modes.label import Label, label_modes
 from tyrecal.simulate.modes.match import match
-from tyrecal.studies.blind.answer import answer, case_of, rows_of, tyre_model
+from tyrecal.studies.blind.answer import case_of
 from tyrecal.studies.blind.make import Trial, labels_of
 from tyrecal.studies.blind.maker import Computed
 from tyrecal.studies.blind.protocol import read_json, read_protocol
 from tyrecal.studies.blind.ruler import read_ruler
 from tyrecal.studies.blind.seal import SEAL, TRUTH
-from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE
 from tyrecal.tyre.case import LoadedCase, with_level
 from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.load import load_case
@@ -415,33 +414,3 @@ def test_the_tables_on_record_are_what_the_scorer_says(tmp_path: Path) -> None:
     assert len(sections) == len(series) > 1
     for part in sections:
         assert "\n## " + part.rstrip() in recorded
-
-
-@pytest.mark.slow
-def test_an_answer_on_record_is_given_again(tmp_path: Path) -> None:
-    """The first trial by name with the fewest effects, in a group of series 17.
-
-    Only the effects that the record gives a probability are in the model: to evaluate the others,
-    which together have less than 1e-4, takes five times as long.
-    """
-    folder = tmp_path / "trials"
-    unpack("175_70r13_own_17", folder)
-    weighed = lambda path: len(read_json(path)["diagnosis"]["probabilities"])
-    first, *others = sorted((folder / "answers").glob("*.json"), key=lambda p: (weighed(p), p.name))
-    recorded = {first.name: read_json(first)["diagnosis"]}
-    for path in others:
-        (folder / "trials" / f"{path.stem}.csv").unlink()
-    for path in (first, *others):
-        path.unlink()
-    keys = recorded[first.name]["probabilities"]
-    effects = sorted({id for key in keys for id in key.split("+")} - {NONE, OUTSIDE})
-    case, protocol = case_of(folder), read_protocol(folder)
-    model = tyre_model(case, Evaluator(TyreDesign(case)), protocol, effects=effects)
-    answer(folder, model, rows_of(case, protocol), further=further(protocol.counts))
-    for name, before in recorded.items():
-        now = read_json(folder / "answers" / name)["diagnosis"]
-        assert (now["verdict"], now["effect"]) == (before["verdict"], before["effect"])
-        keys = now["probabilities"].keys() | before["probabilities"].keys()
-        for key in keys:
-            then, again = (each["probabilities"].get(key, 0.0) for each in (before, now))
-            assert again == pytest.approx(then, abs=0.02), (name, key)

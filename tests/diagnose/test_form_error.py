@@ -8,8 +8,6 @@ import pytest
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.inference.form_error import (
     FORM_LENGTH,
-    LAWS_LENGTH,
-    MATERIAL_LAWS,
     OTHERS,
     PERCENT,
     at_pressures,
@@ -27,15 +25,6 @@ def test_what_is_on_record_is_what_the_study_finds() -> None:
     percent, length = computed()
     assert percent == pytest.approx(PERCENT, abs=0.006)
     assert length == pytest.approx(FORM_LENGTH, abs=0.006)
-
-
-@pytest.mark.slow
-def test_laws_that_are_computed_are_within_what_laws_may_do() -> None:
-    """As smooth over the pressure as is on record, and smaller."""
-    percent, length = material_laws.computed()
-    assert percent == pytest.approx([0.22, 0.04, 0.07], abs=0.006)
-    assert max(percent) < 100 * MATERIAL_LAWS
-    assert length == pytest.approx(LAWS_LENGTH, abs=0.06)
 
 
 def test_what_laws_do_falls_into_what_is_shared_and_what_is_not() -> None:

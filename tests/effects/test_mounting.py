@@ -80,9 +80,11 @@ def test_more_of_the_hub_goes_along_where_its_clamp_gives_way(way: str) -> None:
 @pytest.mark.ccx
 @pytest.mark.parametrize("holds", ["bead_surface"])  # whole_bead agrees as well; 40 s more
 def test_calculix_says_of_a_bead_that_does_not_sit_what_we_do(holds: str) -> None:
-    """Over two fifths of it: frequencies within 0.4 %, and what the gap moves them by to 0.05 %."""
+    """Over two fifths of it: frequencies within 0.4 %, and what the gap moves them by to 0.05 %, of
+    the modes with at most one wave, which it moves most."""
     case = load_case(CASES / "p235_75r17.yaml")
-    case = changed(case, rim=with_part(case.case.rim, holds=holds))
+    few = with_part(case.case.analysis, highest_harmonic=1)
+    case = changed(case, rim=with_part(case.case.rim, holds=holds), analysis=few)
     ln_f = np.log(
         [
             [
