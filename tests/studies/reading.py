@@ -42,13 +42,14 @@ files of the later lots before:
 | 20261502 | 1 | 0 | 1 | 3 | 1 | 5 |
 | 20261503 | 1 | 0 | 2 | 4 | 0 | 3 |
 
-By two others, who had read nothing before, the second after the first one's were answered and their
-like mended in nearly all files:
+By three others, who had read nothing before, each after the questions of the one before were
+answered, and their like in nearly all files:
 
 | seed | tyre | simulate | measured | studies | report, batch, cli | solvers |
 |---|---|---|---|---|---|---|
 | 20261701 | 5 | 6 | 6 | 6 | 4 | 6 |
 | 20261702 | 3 | 2 | 2 | 8 | 3 | 9 |
+| 20261703 | 4 | 7 | 2 | 5 | 2 | 7 |
 """
 
 from __future__ import annotations
