@@ -59,23 +59,6 @@ def results(folder: Path) -> dict[str, bytes]:
         pytest.param(["sweep-pressure", CASE, *COARSE, *TWO, "--steps", "3"], 3, marks=slow),
         pytest.param(["footprint", CASE, *COARSE, "--loads-N", "300"], 1, marks=slow),
         pytest.param(["effects", "bead_filler", "--case", CASE, *COARSE, *TWO], 3, marks=slow),
-        pytest.param(
-            [
-                "diagnose",
-                CASE,
-                *COARSE,
-                *TWO,
-                "--measured",
-                WHEELER,
-                "--effect",
-                "rim_width",
-                "--effect",
-                "bead_filler",
-                "--no-pictures",
-            ],
-            3,
-            marks=slow,
-        ),
     ],
     ids=lambda each: each[0] if isinstance(each, list) else "",
 )

@@ -231,7 +231,7 @@ def test_ci_runs_the_readmes_test_command_then_what_it_leaves_out() -> None:
         ".venv-test/bin/python -m tests.kernels || failed=1",
         "wait $versions || failed=1",
         "wait $programs",
-        '.venv-test/bin/pytest -n 3 -m "not quick" || failed=1',
+        '.venv-test/bin/pytest -n 4 -m "not quick" || failed=1',
         "exit ${failed:-0}",
     ]
 
