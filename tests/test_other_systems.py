@@ -33,7 +33,6 @@ CASE = str(CASES / "p235_75r17.yaml")
 OTHER = str(CASES / "205_60r15.yaml")
 COARSE = ["--mesh", "coarse"]
 TWO = ["--jobs", "2"]
-WHEELER = str(CASES / "p235_75r17_wheeler.csv")
 VOLATILE = {"run.json", ".lock", ".lock.json"}
 slow = pytest.mark.slow
 
