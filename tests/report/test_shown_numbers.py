@@ -30,7 +30,7 @@ from tyrecal.studies.diagnose.where import PartChange
 from tyrecal.studies.fit.result import FitResult
 from tyrecal.studies.loaded_result import LoadSweep
 from tyrecal.studies.modes import ModesResult
-from tyrecal.studies.result import Deviation
+from tyrecal.studies.result import Column, Deviation, Table
 from tyrecal.studies.sample.result import SampleResult
 from tyrecal.studies.signature import Signature
 
@@ -177,6 +177,8 @@ def test_a_deviation_keeps_its_sign_in_tables() -> None:
     assert Deviation(FIT.modes[0].deviation_percent, "30.86") == table.rows[0][2]
     text = "\n".join(lines(shown(table), 200))
     assert "30.86 -2.65" in text and MINUS not in text
+    nothing = Table([Column("Hz", "")], [[Deviation(-0.001, "30.86")]])
+    assert any("30.86 +0.00" in line for line in lines(shown(nothing), 200))
 
 
 def test_measured_modes_have_hertz_sigma_damping_and_label() -> None:
@@ -186,14 +188,14 @@ def test_measured_modes_have_hertz_sigma_damping_and_label() -> None:
 
 
 def test_bars_of_a_signature_have_their_signs_and_a_legend() -> None:
-    before, after = np.array([[5.0, -2.5]]), np.array([[1.5, np.nan]])
+    before, after = np.array([[5.0, -2.5]]), np.array([[-0.04, np.nan]])
     labels = Label(2, 0), Label(0, 0, "axial")
     given = Signature("bead_filler", 3.0, (240.0,), labels, before, after, 0.886, {}, 0.0)
     figure = draw_signature(given)
     (panel,) = figure.axes
     assert [bar.get_height() for bar in panel.patches[:2]] == [5.0, -2.5]
     texts = [text.get_text() for text in panel.texts if text.get_text()]
-    assert texts == ["+5.0", f"{MINUS}2.5", "+1.5", "lost"]
+    assert texts == ["+5.0", f"{MINUS}2.5", "+0.0", "lost"]
     assert len(figure.legends[0].get_texts()) == 2 and "88.6 %" in figure.get_suptitle()
     assert [each.get_text() for each in panel.get_xticklabels()] == ["[2,0]", "[0,0]\nlateral"]
 

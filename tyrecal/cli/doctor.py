@@ -113,7 +113,7 @@ def _words(report: Json) -> list[str]:
     lines += ["", f"a known tyre by solver '{check['solver']}', {check['seconds']:g} s:"]
     for mode in check["modes"]:
         hertz, off = mode["frequency_Hz"], mode["deviation_percent"]
-        now = "not found" if hertz is None else f"{hertz:.2f} Hz ({off:+.3f} %)"
+        now = "not found" if hertz is None else f"{hertz:.2f} Hz ({off:+z.3f} %)"
         lines.append(
             f"  {in_words(mode['label']):<17}recorded {mode['recorded_Hz']:.2f}, now {now}"
         )

@@ -207,7 +207,9 @@ def _constants(d: Diagnosis) -> Iterator[str]:
     """Constants that the data move, reported and not named."""
     moved = [each for each in constants_posterior(d) if abs(each.shift_in_sd) >= 1]
     if moved:
-        names = ", ".join(f"{e.name.replace('_', ' ')} {e.shift_in_sd:+.1f}" for e in moved[:SHOWN])
+        names = ", ".join(
+            f"{e.name.replace('_', ' ')} {e.shift_in_sd:+z.1f}" for e in moved[:SHOWN]
+        )
         yield (
             f"Constants that the data move by one standard deviation or more (not causes): {names}."
         )
@@ -245,7 +247,7 @@ def _gap(d: Diagnosis) -> Iterator[str]:
         if abs(moved[worst]) > 1:
             yield (
                 f"Calibration hides {100 * g.absorbed[id]:.0f} % of `{id}`: ignored at full size,"
-                f" it would move {worst} by {moved[worst]:+.0f} %."
+                f" it would move {worst} by {moved[worst]:+z.0f} %."
             )
 
 
@@ -269,22 +271,22 @@ def _where(d: Diagnosis) -> Iterator[str]:
     strange = [c for c in d.gap.contrasts if c.p_value < 0.05 / max(1, len(d.gap.contrasts))]
     for c in strange:
         name = GROUP_WORDS.get(c.name, c.name)
-        yield f"{name[0].upper() + name[1:]}: {c.percent:+.2f} % ± {c.sigma_percent:.2f} %."
+        yield f"{name[0].upper() + name[1:]}: {c.percent:+z.2f} % ± {c.sigma_percent:.2f} %."
     if d.parts:
         best = d.parts[0]
         heavier = abs(best.mass_percent / best.mass_sigma) > abs(
             best.stiffness_percent / best.stiffness_sigma
         )
         change = (
-            f"mass {best.mass_percent:+.0f} % ± {best.mass_sigma:.0f} %"
+            f"mass {best.mass_percent:+z.0f} % ± {best.mass_sigma:.0f} %"
             if heavier
-            else f"stiffness {best.stiffness_percent:+.0f} % ± {best.stiffness_sigma:.0f} %"
+            else f"stiffness {best.stiffness_percent:+z.0f} % ± {best.stiffness_sigma:.0f} %"
         )
         same = f" (looks the same as {', '.join(best.same_as)})" if best.same_as else ""
         if best.evidence > 1:
             yield (
                 f"Best change of a single part of the section: {best.region}{same}, {change}, ln"
-                f" evidence {best.evidence:+.1f}."
+                f" evidence {best.evidence:+z.1f}."
             )
         else:
             yield (
@@ -325,7 +327,7 @@ def _under_load(study: DiagnosedCase) -> Iterator[str]:
         rows = [f"| kPa | N | measured | {' | '.join(f'{head}, %' for head in heads.values())} |"]
         rows.append("|" + "---|" * (3 + len(heads)))
         for row in under_load.rows:
-            percent = [f"{100 * row.off[key]:+.1f}" if key in row.off else "" for key in heads]
+            percent = [f"{100 * row.off[key]:+z.1f}" if key in row.off else "" for key in heads]
             cells = [f"{row.pressure_kPa:g}", f"{row.load_N:g}", _measured(row), *percent]
             rows.append(f"| {' | '.join(cells)} |")
         yield "\n".join(rows)

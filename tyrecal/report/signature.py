@@ -76,4 +76,4 @@ def draw_signature(signature: Signature, entry: CatalogueEntry | None = None) ->
 
 
 def _text(value: float, digits: int) -> str:
-    return f"{round(value, digits) + 0.0:+.{digits}f}".replace("-", MINUS)
+    return f"{value:+z.{digits}f}".replace("-", MINUS)

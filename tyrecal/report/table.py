@@ -35,7 +35,7 @@ def nearness(modes: Sequence[Mapping[str, Any]]) -> str:
         name += f" ({state_words(worst['pressure_kPa'], worst['load_N'], worst['rim'])})"
     return (
         f"{len(near)} of {len(modes)} frequencies come within {CLOSE:g} % of their targets (rms"
-        f" {rms:.1f} %); farthest off is {name} with {worst['deviation_percent']:+.1f} %"
+        f" {rms:.1f} %); farthest off is {name} with {worst['deviation_percent']:+z.1f} %"
     )
 
 
@@ -206,7 +206,7 @@ def _cell(cell: Cell) -> Text:
     if isinstance(cell, Deviation):
         off = abs(cell.percent)
         colour = "green" if off < CLOSE else "yellow" if off < FAR else "red"
-        return Text(f"{cell.value} ".lstrip()).append(f"{cell.percent:+.2f}", colour)
+        return Text(f"{cell.value} ".lstrip()).append(f"{cell.percent:+z.2f}", colour)
     return Text(EMPTY_CELL if cell is None else cell)
 
 

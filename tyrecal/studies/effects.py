@@ -67,7 +67,7 @@ class Refitted(ResultPart):
         """How far it moves."""
         if not self.before:
             return f"{self.after - self.before:+.3g}"
-        return f"{100 * (self.after / self.before - 1):+.1f} %"
+        return f"{100 * (self.after / self.before - 1):+z.1f} %"
 
 
 class CatalogueEntry(ResultPart):
@@ -185,7 +185,7 @@ class Effects(Result):
         if not self.rows:
             return []
         percent, absorbed = Column("before %"), Column("absorbed %", ".1f", 100.0)
-        mass = Column("kg", "+.2f")
+        mass = Column("kg", "+z.2f")
         rows = [
             [
                 each.id,
@@ -210,7 +210,7 @@ class Effects(Result):
         first = self.rows[0].rows
         middle = first[len(first) // 2].pressure_kPa
         labels = dict.fromkeys(m.label for e in self.rows for row in e.rows for m in row.modes)
-        change, share = Column("left", "+.1f"), Column("absorbed, %", ".0f", 100.0)
+        change, share = Column("left", "+z.1f"), Column("absorbed, %", ".0f", 100.0)
         heads = [each for x in labels for each in (Column(x.display), change)]
         rows = []
         for each in self.rows:

@@ -214,7 +214,7 @@ def _by_load(values: Mapping[float, float]) -> list[dict[str, float]]:
 
 def _larger(ratios: Mapping[float, float]) -> str:
     """Where the fitted tyre has the larger area."""
-    listed = ", ".join(f"{100 * (x - 1):+.1f} % at {load:g} N" for load, x in ratios.items())
+    listed = ", ".join(f"{100 * (x - 1):+z.1f} % at {load:g} N" for load, x in ratios.items())
     odd = [f"{load:g} N" for load, x in ratios.items() if x <= 1]
     claim = "the fitted tyre's area is larger than the initial one's at"
     if not odd:

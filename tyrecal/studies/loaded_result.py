@@ -211,7 +211,7 @@ def _cavity_words(loads: Sequence[Loaded]) -> list[str]:
     fore_aft, vertical = loads[-1].cavity_Hz
     return [
         f"the cavity's first mode at {loads[-1].load_N:g} N, between rigid walls: fore-aft"
-        f" {fore_aft:.1f}, vertical {vertical:.1f} Hz, split {vertical - fore_aft:+.1f}"
+        f" {fore_aft:.1f}, vertical {vertical:.1f} Hz, split {vertical - fore_aft:+z.1f}"
     ]
 
 
@@ -273,7 +273,7 @@ def _splitting(splits: Sequence[Mapping[str, Any]]) -> list[str]:
         if not each["grows"]
     ]
     last = ", ".join(
-        f"[{each['c']},{each['m']}] {each['split_Hz'][-1]['split']:+.1f}"
+        f"[{each['c']},{each['m']}] {each['split_Hz'][-1]['split']:+z.1f}"
         for each in splits
         if each["split_Hz"]
     )

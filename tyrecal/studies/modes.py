@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 EXTRA = {  # further columns of the table, of fields of `ModeEntry`
     "measured_Hz": Column("measured"),
-    "deviation_percent": Column("deviation %", "+.2f"),
+    "deviation_percent": Column("deviation %", "+z.2f"),
     "damping_ratio": Column("damping %", ".2f", 100),
     "sliding_Hz": Column("sliding, Hz"),
     "grip_mm": Column("grip, mm"),

@@ -87,4 +87,4 @@ def _html(table: Any) -> str:
 def _cell(cell: Any) -> str:
     if cell is None or isinstance(cell, str):
         return f"<td>{escape(cell or '')}</td>"
-    return f"<td>{escape(f'{cell.value} {cell.percent:+.2f}'.strip())}</td>"
+    return f"<td>{escape(f'{cell.value} {cell.percent:+z.2f}'.strip())}</td>"

@@ -97,7 +97,7 @@ class ResponseFunctionEntry(ResultPart):
         return self.model_copy(update={**parts, **agreement(values, self.values)})
 
 
-COMPARED = {"frac": Column("FRAC", ".3f"), "level_dB": Column("measured/computed dB", "+.1f")}
+COMPARED = {"frac": Column("FRAC", ".3f"), "level_dB": Column("measured/computed dB", "+z.1f")}
 
 
 class ResponseFindings(ResultPart):

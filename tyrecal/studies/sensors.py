@@ -30,7 +30,7 @@ class SensedMode(Named):
 
     labelled: Annotated[float, Column("labelled %", ".0f", 100)]  # share of drawn tests
     # shift of the frequency by the sensors' mass, mean of both of a doublet
-    shift_percent: Annotated[float, Column("mass shift %", "+.2f")]
+    shift_percent: Annotated[float, Column("mass shift %", "+z.2f")]
     split_percent: Annotated[float, Column("split %", ".2f")]  # of a doublet by the mass
 
 

@@ -39,7 +39,7 @@ from .sweep import (
     swept_state,
 )
 
-LOWEST, CHANGE = Column("lowest Hz"), Column("", "+.2f")
+LOWEST, CHANGE = Column("lowest Hz"), Column("", "+z.2f")
 
 
 class SweptNumber(ResultPart):

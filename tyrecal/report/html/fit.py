@@ -97,7 +97,7 @@ def _key_figures(fit: FitResult) -> Iterator[KeyFigure]:
         "before and after the fit",
     )
     if worst := farthest(fit):
-        yield KeyFigure("Farthest from its target", f"{worst[1]:+.1f} %", worst[0])
+        yield KeyFigure("Farthest from its target", f"{worst[1]:+z.1f} %", worst[0])
     yield KeyFigure("Mass", f"{fit.mass_kg:.2f} kg", "tyre without rim")
 
 
@@ -119,7 +119,7 @@ def fit_words(fit: FitResult) -> list[str]:
     moves = []
     for name, v in fit.variables.items():
         unit, factor = display_unit(v.unit)
-        share = f" ({100 * (v.value / v.initial - 1):+.0f} %)" if v.initial else ""
+        share = f" ({100 * (v.value / v.initial - 1):+z.0f} %)" if v.initial else ""
         after = printed_value(v.value, v.unit)
         moves.append(f"{name} from {factor * v.initial:.4g} to {after}{share}")
     return [*words, f"{', '.join(moves)}."]

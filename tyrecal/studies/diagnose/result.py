@@ -246,7 +246,7 @@ class DiagnosisResult(Result):
         """Parts of the section, each changed alone."""
         if not self.section_map:
             return []
-        evidence = Column("ln evidence", "+.1f")
+        evidence = Column("ln evidence", "+z.1f")
         heads = [Column("part", ""), Column("stiffness, %"), Column("mass, %"), evidence]
         rows = [
             [

@@ -371,7 +371,7 @@ class FitResult(Result):
 
     def sentences(self) -> list[str]:
         """How far freed numbers moved, and how far the standard errors hold."""
-        moved = [f"{name} by {each.shift_in_sd:+.2f}" for name, each in self.freed.items()]
+        moved = [f"{name} by {each.shift_in_sd:+z.2f}" for name, each in self.freed.items()]
         words = ", ".join(moved)
         freed = [f"Freed, in standard deviations of what is known: {words}."] if moved else []
         compared = [f"{words}." for each in self.shapes for words in each.sentences()]

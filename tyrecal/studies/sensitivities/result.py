@@ -171,7 +171,7 @@ class SensitivitiesResult(Result):
             Column("freed", ""),
             gain := Column("gain in chi2", ".1f"),
             p_value := Column("chance", ".2g"),
-            shift := Column("shift, std. dev.", "+.2f"),
+            shift := Column("shift, std. dev.", "+z.2f"),
             Column("not distinguished from it", ""),
         ]
         rows = [
