@@ -24,7 +24,7 @@ UNLOADED_S, UNLOADED_PER_UNKNOWN_S = 0.015, 2.4e-5
 MEMORY_BYTES, PROCESS_BYTES = 2.5e9, 1.5e8  # the latter of a process without any
 SENSITIVITY_SHARE = 0.08  # of a press, for the exact sensitivities by one variable
 UNLOADED_SENSITIVITY_SHARE = 0.15  # of an evaluation without a road, for the same
-DESIGNS_OF_FIT = {"slsqp": 15, "gauss-newton": 10}  # most that a start takes, as a rule
+DESIGNS_OF_FIT = {"slsqp": 20, "gauss-newton": 7}  # of a start, about
 DESIGNS_OF_LABELS = 5  # at which frequencies without labels are compared, as a rule
 
 
