@@ -63,6 +63,26 @@ def densely(road: FlatRoad, U: Array, height: float, count: int = 4000) -> tuple
     return road.stiffness * float(force), float(covered)
 
 
+def test_a_fourth_column_of_a_span_adds_to_its_third(work: Round) -> None:
+    """Where waves follow, a span's third function also moves a column of theirs; where that is the
+    third again, it counts once."""
+    tread = work.road(AROUND, STIFFNESS).tread
+    three, count, nodes = tread.columns[:, :3], len(AROUND.angles), len(work.U)
+    columns = np.concatenate([three, three[:, 2:]], 1)
+    columns[0, 3] = count
+    U = np.random.default_rng(7).normal(size=(count + 1, nodes, 3)) * 1e-3
+    both = U[:count].copy()
+    both[three[0, 2]] += U[count]
+    share = np.array([0.2, 0.7])
+    plain = replace(tread, columns=three).everywhere(share)
+    own = replace(tread, columns=columns, shape=U.shape).everywhere(share)
+    first = own.t == 0
+    for of in ("positions", "rates"):
+        at = getattr(own, of)(U)
+        np.testing.assert_allclose(at[first], getattr(plain, of)(both)[first], rtol=1e-12)
+        np.testing.assert_allclose(at[~first], getattr(plain, of)(U[:count])[~first], rtol=1e-12)
+
+
 def test_places(work: Round) -> None:
     """Undeformed points lie on the cylinder, of spans that begin within 60 degrees of the road, and
     a shift moves them by itself; their rates are the derivatives by the angle."""
