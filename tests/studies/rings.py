@@ -1,6 +1,7 @@
 """Labels of modes measured on rings of sensors: how many are given, and how many are wrong?
 
-    python -m tests.studies.rings [modes] [seed] [edge of the band in Hz] [--case]
+    python -m tests.studies.rings [modes] [seed] [edge of the band in Hz]
+    python -m tests.studies.rings --case [tests] [seed]      # resumable; or only the tables
 
 Each test is one tyre of three (`TYRES`), with its modes up to an edge of the band drawn between
 110 and 170 Hz (or the one given), from the tool's own exact shapes. One, two or three rings are at
@@ -10,8 +11,14 @@ that is noted. Noise is 2 to 10 % of a mode's root mean square signal. Labels ar
 `measured import` gives without a case, with the band's highest harmonic and one more. "can tell":
 labels that `measured sensors` says these sensors can tell.
 
-With --case labels are those of `measured label CASE FILE`, and the measured tyre is one of
-`OTHER_DESIGNS` with variables off the case's by a factor of 1.65 (a standard deviation).
+With --case labels are those of `measured label CASE FILE`, rings have radial or triaxial sensors,
+and the model (coarse mesh, start values) is not the tyre (default mesh). Its variables are off by a
+factor of 1.65 (a standard deviation), its frequencies as `tree.DISCREPANCIES` say, and a tenth of
+another mode of the same c is mixed into each shape. Measured are its modes less none to three, of
+`SECOND` of the doublets both modes 0.5 % apart; in every second test a foreign frequency anywhere
+in the band, its shape random. Frequencies have 0.5 % noise. The same test is labelled by shapes and
+frequencies together, by shapes alone (frequencies known within a factor of 20), and by frequencies
+alone. A label counts as decided from 90 % on.
 """
 
 from __future__ import annotations
@@ -20,10 +27,11 @@ import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import json
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -32,14 +40,25 @@ import numpy as np
 
 from tests.cli.test_cli import run
 from tests.conftest import CASES
-from tyrecal.measured.case_modes import CaseModes
+from tyrecal.files import Json
 from tyrecal.measured.labels import Labeller
+from tyrecal.measured.measurement import Measurement
 from tyrecal.measured.modal import label_in_turn
 from tyrecal.measured.sensors import MeasuredMode, Sensors
+from tyrecal.measured.shapes import SensorShapes, ShapeOfMode
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.results import HarmonicShape
 from tyrecal.simulate.modes.label import Label, Mode, labelled
+from tyrecal.studies.blind.statistics import (
+    calibration_error,
+    calibration_quantile,
+    clopper_pearson,
+)
+from tyrecal.studies.labelling.label import label
+from tyrecal.studies.labelling.tree import DISCREPANCIES, FOREIGN_MARGIN, SECOND, discrepancy
+from tyrecal.studies.labels import SURE_LABEL
+from tyrecal.tyre.case import LoadedCase, with_level
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.values import with_values
 
@@ -51,7 +70,11 @@ GROUPS = tuple((count, name) for count in RINGS for name in DIRECTIONS)
 BAND_EDGE, NOISE, ANGLES = (110.0, 170.0), (0.02, 0.10), (8, 24)
 TREAD = 0.95  # of the largest radius, from which the tread's width is counted
 OFF_m = 0.002
-OTHER_DESIGNS = 6  # of each tyre
+# of tests with a case: share of another mode in a shape; noise of frequencies; distance of a doublet's
+# modes in ln f
+MIXED, SIGMA, DOUBLET, MOST_MISSED = 0.1, 0.005, 0.005, 3
+WAYS, FOREIGN = ("together", "shapes", "frequencies"), "no mode"
+RESULT = Path(__file__).parents[1] / "benchmarks" / "ring_labels.jsonl"
 
 
 @dataclass(frozen=True)
@@ -67,13 +90,7 @@ class RingTest:
 @cache
 def tyre_modes(name: str, design: int = 0) -> tuple[Mode, ...]:
     """Modes by rising frequency, up to c = 10; design: 0, as the case has it, or another."""
-    with TemporaryDirectory() as folder:
-        path = CASES / name if name.endswith(".yaml") else Path(folder) / "tyre.yaml"
-        if not path.exists() and run(
-            "init", name, "--output", str(path), "--no-pictures", "--quiet"
-        ):
-            raise RuntimeError(f"init {name} failed")
-        case = with_values(load_case(path), {"analysis.highest_harmonic": 10})
+    case = with_values(case_of(name), {"analysis.highest_harmonic": 10})
     random = np.random.default_rng(design)
     off = lambda: np.clip(0.5 * random.standard_normal(), -0.9, 0.9) if design else 0.0
     values = {key: float(v.start * np.exp(off())) for key, v in case.case.variables.items()}
@@ -114,11 +131,9 @@ def draw_test(
     return RingTest(chosen, Sensors(points + off, along), signals, highest)
 
 
-def labels_given(
-    test: RingTest, case: CaseModes | None = None
-) -> Iterator[tuple[Label, Label | None, bool]]:
+def labels_given(test: RingTest) -> Iterator[tuple[Label, Label | None, bool]]:
     """True label of each mode, the label given, and whether the sensors can distinguish it."""
-    labeller = Labeller(test.sensors, test.highest, case)
+    labeller = Labeller(test.sensors, test.highest)
     alike = labeller.looks_like()
     measured = [
         (MeasuredMode(mode.frequency_Hz, u), labeller, "")
@@ -128,7 +143,134 @@ def labels_given(
         yield mode.label, given.judged.label, not alike[mode.label]
 
 
-def main(count: int = 5000, seed: int = 1, edge_Hz: int = 0, with_case: bool = False) -> None:
+def measured_tyre(modes: Sequence[Mode], random: np.random.Generator) -> list[Mode]:
+    """Modes of a tyre that is not the model, with both modes of some doublets."""
+    labels = list(dict.fromkeys(mode.label for mode in modes))
+    C = discrepancy(labels, random.choice(DISCREPANCIES))
+    off = random.multivariate_normal(np.zeros(len(labels)), C, method="cholesky")
+    result = []
+    for mode in modes:
+        shape = mode.raw.shape
+        same = [m.raw.shape for m in modes if m.label.c == mode.label.c and m is not mode]
+        other = same[random.integers(len(same))].amplitude
+        size = np.linalg.norm(shape.amplitude) / np.linalg.norm(other)
+        mixed = shape.amplitude + MIXED * size * random.choice([-1, 1]) * other
+        ln_f = np.log(mode.frequency_Hz) + off[labels.index(mode.label)]
+        raw = replace(mode.raw, shape=replace(shape, amplitude=mixed))
+        count = 1 + (mode.label.c > 0 and random.random() < SECOND)
+        for apart in (0.0, DOUBLET)[:count]:
+            f = float(np.exp(ln_f + apart + SIGMA * random.standard_normal()))
+            result.append(replace(mode, frequency_Hz=f, raw=raw))
+    return sorted(result, key=lambda mode: mode.frequency_Hz)
+
+
+def case_of(name: str) -> LoadedCase:
+    """A case, or what `init` makes of a size."""
+    if name.endswith(".yaml"):
+        return load_case(CASES / name)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "tyre.yaml"
+        if run("init", name, "--output", str(path), "--no-pictures", "--quiet"):
+            raise RuntimeError(f"init {name} failed")
+        return load_case(path)
+
+
+@cache
+def model_of(name: str) -> tuple[LoadedCase, Evaluator]:
+    case = with_level(case_of(name), "coarse")
+    return case, Evaluator(TyreDesign(case))
+
+
+def labelled_with_case(number: int, seed: int) -> Json:
+    """A drawn test: the true label of each frequency, and by each way the likeliest one with its
+    probability, and the probability of all together."""
+    random = np.random.default_rng([seed, number])
+    rings, name = (1, 2, 3)[number % 3], ("r", "rtz")[number // 3 % 2]
+    tyre = TYRES[random.integers(len(TYRES))]
+    case, evaluator = model_of(tyre)
+    own = measured_tyre(tyre_modes(tyre, 1 + 1000 * seed + number), random)
+    test = draw_test(own, rings, DIRECTIONS[name], random)
+    kept = random.permutation(len(test.modes))[random.integers(MOST_MISSED + 1) :]
+    measured = [
+        (test.modes[i].frequency_Hz, str(test.modes[i].label), test.signals[i]) for i in kept
+    ]
+    if random.random() < 0.5:
+        low, high = (np.log(end(f for f, *_ in measured)) for end in (min, max))
+        f = np.exp(random.uniform(low - FOREIGN_MARGIN, high + FOREIGN_MARGIN))
+        measured.append((float(f), FOREIGN, random.standard_normal(len(test.sensors.points))))
+    measured.sort(key=lambda each: each[0])
+    kPa = case.case.pressure_kPa
+    shapes = SensorShapes(
+        file="",
+        pressure_kPa=kPa,
+        signals=[str(k) for k in range(len(test.sensors.points))],
+        points=test.sensors.points.tolist(),
+        directions=test.sensors.directions.tolist(),
+        modes=[
+            ShapeOfMode(c=None, m=None, kind=None, member="", frequency_Hz=f, values=u.tolist())
+            for f, _, u in measured
+        ],
+    )
+    record: Json = {"test": number, "tyre": tyre, "rings": rings, "directions": name}
+    record["true"] = [label for _, label, _ in measured]
+    elsewhere = shapes.model_copy(update={"pressure_kPa": 2 * kPa})
+    for way, sigma, there in (
+        ("together", SIGMA, shapes),
+        ("shapes", 3.0, shapes),
+        ("frequencies", SIGMA, elsewhere),
+    ):
+        readings = [
+            Measurement("frequency_Hz", None, "", kPa, 0.0, f, sigma * f) for f, *_ in measured
+        ]
+        found = label(case, evaluator, readings, shapes=[there]).found
+        best = found.labelings
+        record[way] = {
+            "labels": [str(each or FOREIGN) for each in found.labels()],
+            "p": [round(float(best.each[i, j]), 4) for i, j in enumerate(best.modes[0])],
+            "together": round(float(best.probabilities[0]), 4),
+        }
+    return record
+
+
+def tables(records: Sequence[Json]) -> None:
+    """Print a line for each way, and for shapes and frequencies together each kind of test."""
+    for way in WAYS:
+        tell(way, records, way)
+    for rings in RINGS:
+        for name in ("r", "rtz"):
+            chosen = [r for r in records if (r["rings"], r["directions"]) == (rings, name)]
+            for way in WAYS:
+                tell(f"{rings} {name}, {way}", chosen, way)
+
+
+def tell(title: str, records: Sequence[Json], way: str) -> None:
+    """Print how often labels are right, and how often that is stated."""
+    right = np.array(
+        [a == b for r in records for a, b in zip(r["true"], r[way]["labels"], strict=True)]
+    )
+    p = np.array([each for r in records for each in r[way]["p"]])
+    whole = [r["true"] == r[way]["labels"] for r in records]
+    low, high = clopper_pearson(int(right.sum()), len(right))
+    sure = p >= SURE_LABEL
+    print(
+        f"{title} | {len(records)} | {len(right)} | {right.mean():.1%} ({low:.1%} to {high:.1%}) |"
+        f" {p.mean():.1%} | {np.mean(~sure):.1%} | {right[sure].mean():.2%} of {sure.sum()} |"
+        f" {p[sure].mean():.2%} | {np.mean(whole):.1%} |"
+        f" {np.mean([r[way]['together'] for r in records]):.1%} |"
+        f" {calibration_error(p, right):.3f} of {calibration_quantile(p):.3f}"
+    )
+
+
+def with_case(count: int = 200, seed: int = 1) -> None:
+    """Draw the tests that are not recorded, and print the tables."""
+    lines = RESULT.read_text().splitlines() if RESULT.exists() else []
+    for number in range(len(lines), count):
+        lines.append(json.dumps(labelled_with_case(number, seed)))
+        RESULT.write_text("\n".join(lines) + "\n")
+    tables([json.loads(line) for line in lines])
+
+
+def main(count: int = 5000, seed: int = 1, edge_Hz: int = 0) -> None:
     """Print a line for each number of rings and set of directions, and each wrong label."""
     random = np.random.default_rng(seed)
     tallies = {group: Counter[str]() for group in GROUPS}
@@ -137,11 +279,9 @@ def main(count: int = 5000, seed: int = 1, edge_Hz: int = 0, with_case: bool = F
         rings, name = group = GROUPS[number % len(GROUPS)]
         number += 1
         tyre = TYRES[random.integers(len(TYRES))]
-        case = CaseModes(tyre_modes(tyre)) if with_case else None
-        modes = tyre_modes(tyre, int(random.integers(1, OTHER_DESIGNS + 1)) if with_case else 0)
         edge = (edge_Hz, edge_Hz) if edge_Hz else BAND_EDGE
-        test = draw_test(modes, rings, DIRECTIONS[name], random, edge)
-        for true, given, can_tell in labels_given(test, case):
+        test = draw_test(tyre_modes(tyre), rings, DIRECTIONS[name], random, edge)
+        for true, given, can_tell in labels_given(test):
             is_given, is_wrong = given is not None, given not in (None, true)
             tallies[group].update(
                 modes=1, given=is_given, wrong=is_wrong, can=can_tell, both=can_tell and is_given
@@ -159,4 +299,4 @@ def main(count: int = 5000, seed: int = 1, edge_Hz: int = 0, with_case: bool = F
 
 if __name__ == "__main__":
     numbers = [int(word) for word in sys.argv[1:] if word != "--case"]
-    main(*numbers, with_case="--case" in sys.argv)  # type: ignore[misc]
+    (with_case if "--case" in sys.argv else main)(*numbers)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 from click.core import ParameterSource
@@ -14,8 +14,6 @@ from .terminal import Terminal
 
 if TYPE_CHECKING:
     from ..measured.modal import Layout
-    from ..studies.labels import LabelsResult
-    from .output import Run
 
 files = click.argument(
     "files",
@@ -350,9 +348,8 @@ def label_file(
     """Find the mode of each frequency in FILE by the model of CASE, and its probability.
 
     FILE: a measurements CSV without labels (c and m), or a universal file as for 'tyrecal measured
-    import', measured at the case's pressure. The shapes of a universal file are compared with those
-    of the case. The case's frequencies are expected to be right within 15 % (a standard deviation).
-    If neither decides, a mode gets no label.
+    import', measured at the case's pressure. All frequencies are judged together and, where shapes
+    were measured (a universal file, or a CSV that was imported from one), with the shapes.
 
     Writes labels.json, labels.csv, and labelled.csv: the measurements with the likeliest labels.
     Frequencies that are no mode of the tyre are left out. The variables are expected near their
@@ -364,9 +361,13 @@ def label_file(
     tyrecal measured label cases/p235_75r17.yaml run1.uff --set pressure_kPa=200
     """
     from ..files import read_json
+    from ..measured.gather import unlabelled
     from ..measured.measurement import measurements_csv
+    from ..measured.shapes import read_shapes
     from ..measured.tables import read_measurements
     from ..measured.universal import is_universal
+    from ..report.correlation import figures
+    from ..report.table import shown
     from ..studies.fit.result import FitResult
     from ..studies.labelling.label import fitted_prior, label
     from ..studies.labelling.result import labels_result
@@ -375,9 +376,14 @@ def label_file(
     loaded, values = study.load(case, assignments)
     if is_universal(file):
         layout = _layout(axle, centre, directions, highest, band, response or "")
-        return _label_shapes(loaded, values, file, fitted, layout, (assumed or 0.0) / 100, study)
-    _refuse_universal_options(file)
-    readings = read_measurements(file, labelled=False)
+        readings, shapes, notes = unlabelled(
+            file, loaded.case.pressure_kPa, layout, (assumed or 0.0) / 100
+        )
+        for note in notes:
+            study.terminal.note(note)
+    else:
+        _refuse_universal_options(file)
+        readings, shapes = read_measurements(file, labelled=False), read_shapes(file)
     if not any(each.is_unlabelled for each in readings):
         raise click.UsageError(f"{file}: every frequency has a label")
     prior, fixed = None, dict[str, float]()
@@ -392,48 +398,21 @@ def label_file(
     designs = DESIGNS_OF_LABELS
     plan = plan_pressing(loaded, evaluator, [slopes] * len(states), designs, study.jobs, True)
     run = study.run(loaded, "measured label", evaluator, "labels", measured=[file], plan=plan)
-    labelled = label(loaded, evaluator, readings, prior, fixed=fixed, jobs=study.jobs)
+    labelled = label(
+        loaded, evaluator, readings, prior, fixed=fixed, jobs=study.jobs, shapes=shapes
+    )
     written = run.write(labels_result(loaded, labelled))
+    run.write_figures(figures(written))
     run.write_text("labelled.csv", measurements_csv(labelled.readings))
-    _print_labels(written, run, study)
-    return 0
-
-
-def _label_shapes(
-    loaded: Any,
-    values: dict[str, float],
-    file: Path,
-    fitted: Path | None,
-    layout: Layout,
-    assumed: float,
-    study: options.Study,
-) -> int:
-    """Label the modes in a universal file by their shapes. assumed: relative standard deviation of
-    the frequencies."""
-    from dataclasses import replace
-
-    from ..measured.case_modes import evaluate_case_modes
-    from ..measured.gather import gather
-    from ..measured.measurement import measurements_csv
-    from ..report.correlation import figures
-    from ..studies.labelling.result import shape_labels_result
-    from ..studies.pressing_plan import plan_evaluations
-
-    if fitted:
-        values = arguments.fitted_values(fitted, loaded, study.terminal)
-    evaluator = study.evaluator(loaded)
-    plan = plan_evaluations(loaded, evaluator, [values])
-    run = study.run(loaded, "measured label", evaluator, "labels", measured=[file], plan=plan)
-    case_modes = evaluate_case_modes(loaded, evaluator, values, layout.highest)
-    pressure_kPa = loaded.case.pressure_kPa
-    gathered = gather([file], pressure_kPa, replace(layout, case=case_modes), assumed=assumed)
-    state = gathered.rows[0].state.of(loaded).with_defaults(loaded)
-    for note in gathered.notes:
-        study.terminal.note(note)
-    labels = run.write(shape_labels_result(gathered.runs[0], case_modes, state))
-    run.write_figures(figures(labels))
-    run.write_text("labelled.csv", measurements_csv(gathered.rows))
-    _print_labels(labels, run, study)
+    run.finish()
+    terminal = study.terminal
+    terminal.result(written.content())
+    for table in written.tables():
+        terminal.show(shown(table))
+    terminal.say("\n".join(written.sentences()))
+    for doubt in written.doubts():
+        terminal.warn(doubt)
+    study.finish(run)
     return 0
 
 
@@ -445,21 +424,6 @@ def _refuse_universal_options(file: Path) -> None:
         source = context.get_parameter_source(parameter.name or "")
         if parameter.name in names and source is ParameterSource.COMMANDLINE:
             raise click.UsageError(f"{parameter.opts[0]}: {file} is a table, not a universal file")
-
-
-def _print_labels(labels: LabelsResult, run: Run, study: options.Study) -> None:
-    """Print and write the labels of frequencies."""
-    from ..report.table import shown
-
-    run.finish()
-    terminal = study.terminal
-    terminal.result(labels.content())
-    for table in labels.tables():
-        terminal.show(shown(table))
-    terminal.say("\n".join(labels.sentences()))
-    for doubt in labels.doubts():
-        terminal.warn(doubt)
-    study.finish(run)
 
 
 def _layout(

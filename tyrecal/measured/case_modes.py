@@ -1,16 +1,14 @@
-"""The modes of a case, which help to find the labels of measured shapes; ``labels`` calls this.
+"""The modes of a case at sensors; ``shape_likelihood`` compares measured shapes with them.
 
-A mode's shape at the sensors is most of the covariance of its label, and its frequency a part of
-the label's prior. A case that is not calibrated has errors: `FREQUENCY_OFF` of its frequencies, and
-`SHAPE_OFF` of its shapes, which is the weight of the label's covariance without a case.
+A mode's shape at the sensors is most of the covariance of its signals. A case that is not
+calibrated has errors in its shapes: `SHAPE_OFF`, the weight of its label's covariance without a
+case.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from math import exp, log
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +16,7 @@ from scipy.spatial import KDTree
 
 from ..errors import InputError
 from ..simulate.evaluate.results import HarmonicShape
-from ..simulate.modes.label import BELT, Label, Mode, labelled
+from ..simulate.modes.label import BELT, Mode, labelled
 from .covariance import MIN_SEEN
 from .sensors import Sensors
 
@@ -28,7 +26,6 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 
-FREQUENCY_OFF = 0.15  # standard deviation of ln frequency
 SHAPE_OFF = 0.05  # mean square error of a shape of the case over its mean square
 MAX_OFF_TYRE = 0.03  # m, largest distance of a sensor from the case's tyre
 PER_HARMONIC = 4  # modes evaluated of each harmonic c: m = 0 to 3
@@ -36,7 +33,7 @@ PER_HARMONIC = 4  # modes evaluated of each harmonic c: m = 0 to 3
 
 @dataclass(frozen=True)
 class CaseModes:
-    """Frequencies and shapes of the labels that a case has."""
+    """Frequencies and shapes of a case's modes."""
 
     modes: Sequence[Mode]  # with harmonic shapes, the lowest mode of each label
 
@@ -46,35 +43,15 @@ class CaseModes:
         R, Z = self.points.T
         return float(np.abs(Z[R / R.max() > BELT]).max())
 
-    def covariance(self, label: Label, sensors: Sensors, S: Array) -> Array:
-        """Covariance (k, k) of the signals of k sensors for a label; the mean of its diagonal is 1.
+    def covariance(self, mode: Mode, sensors: Sensors, S: Array) -> Array:
+        """Covariance (k, k) of the signals of k sensors for a mode; the mean of its diagonal is 1.
 
-        S (k, k): the covariance without a case. Raises InputError if a sensor is not on the tyre.
+        S (k, k): that of its label without a case. Raises InputError if a sensor is not on the
+        tyre.
         """
-        mode = self._by_label.get(label)
-        if mode is None:
-            return S
         u = self.signals(mode, sensors)
         whole = float(np.sum(u**2)) / len(u)
         return (u @ u.T / whole + SHAPE_OFF * S) / (1 + SHAPE_OFF) if whole else S
-
-    def likelihood(self, label: Label, frequency_Hz: float) -> float:
-        """Likelihood of a frequency for a label, at most 1. A label that the case does not have is
-        expected above the case's modes of the same c."""
-        mode = self._by_label.get(label)
-        above = [each.frequency_Hz for each in self.modes if each.label.c == label.c]
-        expected = mode.frequency_Hz if mode else max(above, default=frequency_Hz)
-        off = log(frequency_Hz / expected) / FREQUENCY_OFF
-        return 1.0 if mode is None and off > 0 else exp(-0.5 * off**2)
-
-    def expected_Hz(self, label: Label | None) -> float | None:
-        """The case's frequency of a label, None if it has none."""
-        mode = self._by_label.get(label) if label else None
-        return mode.frequency_Hz if mode else None
-
-    @cached_property
-    def _by_label(self) -> dict[Label, Mode]:
-        return {mode.label: mode for mode in self.modes}
 
     @property
     def points(self) -> Array:
@@ -126,12 +103,17 @@ def evaluate_case_modes(
     count = max(case.case.analysis.modes_per_harmonic, PER_HARMONIC)
     answer = evaluator.of(TyreDesign(wide)).evaluate(Question(values, (), count))
     modes = labelled(answer)
+    require_harmonic_shapes(modes, evaluator.solver.name)
+    return CaseModes(modes)
+
+
+def require_harmonic_shapes(modes: Sequence[Mode], solver: str) -> None:
+    """Raises InputError where modes have no shape for each number of waves."""
     if not all(isinstance(mode.raw.shape, HarmonicShape) for mode in modes):
         raise InputError(
-            f"solver '{evaluator.solver.name}' gives no shape for each number of waves; label"
-            " universal files with --solver bundled"
+            f"solver '{solver}' gives no shape for each number of waves; compare measured shapes"
+            " with --solver bundled"
         )
-    return CaseModes(modes)
 
 
 def _shape(mode: Mode) -> HarmonicShape:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import isfinite
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from .measurement import Measurement
 from .modal import Geometry, LabelledMode, Layout, ModalTest, measurements_of, read_modal_test
 from .repeats import FLOOR, combined, one_for_both
 from .sense import doubts
+from .shapes import SensorShapes, shapes_of
 from .slips import common_shifts, contradictions
 from .tables import read_table
 from .tir import property_measurements
@@ -115,7 +116,7 @@ def gather(
     rows = combined(kept, floor, assumed)
     more = [each for each in values if each.is_unlabelled]
     without_label = _without_labels(more, rows, floor, assumed)
-    if without_label:
+    if without_label and (layout is None or layout.labels):
         why = next((e.judged.why for run in runs for e in run.modes if not e.judged.label), "")
         notes.append(
             f"{len(without_label)} of {len(rows) + len(without_label)} values are frequencies"
@@ -125,6 +126,19 @@ def gather(
         if any(isfinite(each.damping_ratio) for each in without_label):
             notes.append("damping of frequencies without a label is left out: it belongs to a mode")
     return Gathered(rows + without_label, runs, notes, [*common_shifts(kept), *doubts(rows)])
+
+
+def unlabelled(
+    path: Path, pressure_kPa: float, layout: Layout | None = None, assumed: float = 0.0
+) -> tuple[list[Measurement], list[SensorShapes], list[str]]:
+    """Frequencies of a universal file without labels, their shapes, and notes for the user.
+
+    Arguments and errors as of `gather`.
+    """
+    own = replace(layout or Layout(), labels=False)
+    gathered = gather([path], pressure_kPa, own, assumed=assumed)
+    shapes = [each for run in gathered.runs for each in shapes_of(run, pressure_kPa)]
+    return gathered.rows, shapes, gathered.notes
 
 
 def _without_labels(

@@ -12,12 +12,12 @@ noise, over a grid; s: any size, p(s) ~ 1/s:
 A label's probability is its share of the sum of prior p(u | label). The prior contains that [c,m+2]
 is above [c,m]: it is small for [c,m+2] if [c,m] was not found below it. Labels that these sensors
 cannot distinguish share their probability by their priors alone, because there the shape has no
-information about the order. If a case is given, its shapes are in the covariances and its
-frequencies in the prior (``case_modes``). A label whose own motions
-have less than `MIN_SEEN` of the mean square of all motions on these sensors is not seen, and never
-given. A column is the index of an order m among those of a harmonic (``covariance``): m itself from
-0 to 3, on c = 0 also AXIAL_COLUMN, 4, of [0,0] axial. BELT is the radius, over the largest one,
-from which a sensor is on the belt; HALF_WIDTHS are half widths of narrow and wide belts over it.
+information about the order. A label whose own motions have less than `MIN_SEEN` of the mean square
+of all motions on these sensors is not seen, and never given. A column is the index of an order m
+among those of a harmonic (``covariance``): m itself from 0 to 3, on c = 0 also AXIAL_COLUMN, 4, of
+[0,0] axial. BELT is the radius, over the largest one, from which a sensor is on the belt;
+HALF_WIDTHS are half widths of narrow and wide belts over it. With a case, `studies/labelling`
+judges shapes and frequencies together instead.
 
 ``modal`` judges the shapes of a file with it, lowest frequency first. `Labeller.looks_like` draws
 shapes and judges them the same way, so it says what an import will do.
@@ -31,7 +31,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..simulate.modes.label import AXIAL_COLUMN, BELT, MAX_SAMPLED_HARMONIC, Label
-from .case_modes import CaseModes
 from .covariance import HALF_WIDTHS, MIN_SEEN, label_covariances
 from .sensors import Sensors
 
@@ -65,35 +64,24 @@ class Labeller:
     """Finds the label of shapes on one layout of sensors, and its probability.
 
     highest: the largest c that is possible in the measured band; fewer leave less to confuse.
-    case: whose belt, shapes and frequencies count, too.
-
-    Raises InputError where a sensor is not on the case's tyre.
     """
 
-    def __init__(
-        self, sensors: Sensors, highest: int = MAX_SAMPLED_HARMONIC, case: CaseModes | None = None
-    ):
-        self.sensors, self.case = sensors, case
-        every = label_covariances(sensors, highest, case.half_width if case else None)
-        self.labels = [_label(c, column) for c, column, *_ in every]
+    def __init__(self, sensors: Sensors, highest: int = MAX_SAMPLED_HARMONIC):
+        self.sensors = sensors
+        every = label_covariances(sensors, highest)
+        self.labels = [label_of_column(c, column) for c, column, *_ in every]
         self.covariance = [S for *_, S, _ in every]
-        if case:
-            pairs = zip(self.labels, self.covariance, strict=True)
-            self.covariance = [case.covariance(label, sensors, S) for label, S in pairs]
         self.is_seen = np.array([seen >= MIN_SEEN for *_, seen in every])
         self._spectra = [np.linalg.eigh(S) for S in self.covariance]
         is_alike = self._odds() < MIN_LN_ODDS
         self._groups = [np.flatnonzero(row) for row in is_alike]  # each label, and its rivals
 
-    def judge(
-        self, shape: Array, below: Collection[Label] = (), frequency_Hz: float | None = None
-    ) -> Judged:
+    def judge(self, shape: Array, below: Collection[Label] = ()) -> Judged:
         """The label of a real shape (k,), a signal each, with its probability.
 
-        below: labels found in the same file at lower frequencies; frequency_Hz: counts where there
-        is a case.
+        below: labels found in the same file at lower frequencies.
         """
-        p = self._probabilities(shape[:, None], below, frequency_Hz)[:, 0]
+        p = self._probabilities(shape[:, None], below)[:, 0]
         order = np.argsort(-p, kind="stable")
         first = order[0]
         probabilities = {self.labels[i]: float(p[i]) for i in order}
@@ -104,14 +92,10 @@ class Labeller:
             return Judged(None, probabilities, why)
         return Judged(self.labels[first], probabilities)
 
-    def _probabilities(
-        self, shapes: Array, below: Collection[Label] = (), frequency_Hz: float | None = None
-    ) -> Array:
+    def _probabilities(self, shapes: Array, below: Collection[Label] = ()) -> Array:
         """Probability of each label for shapes (k, n): (labels, n)."""
-        evidence = np.array([_evidence(*spectrum, shapes) for spectrum in self._spectra])
+        evidence = np.array([ln_density(*spectrum, shapes) for spectrum in self._spectra])
         prior = self._prior(below)
-        if self.case and frequency_Hz:
-            prior *= [self.case.likelihood(label, frequency_Hz) for label in self.labels]
         p = np.exp(evidence - evidence.max(0)) * prior[:, None]
         p /= p.sum(0)
         for n, first in enumerate(np.argmax(p, axis=0)):
@@ -122,7 +106,7 @@ class Labeller:
     def ln_evidence(self, shape: Array) -> float:
         """ln of the mean probability density of a real shape (k,) over all labels, but for a
         constant: comparable between assumptions on which way the sensors of one shape point."""
-        each = [_evidence(*spectrum, shape[:, None])[0] for spectrum in self._spectra]
+        each = [ln_density(*spectrum, shape[:, None])[0] for spectrum in self._spectra]
         return float(np.logaddexp.reduce(each) - np.log(len(each)))
 
     def _prior(self, below: Collection[Label]) -> Array:
@@ -185,16 +169,16 @@ class Labeller:
         return f"sensors let {a.display} and {b.display} look alike: {_missing(self.sensors)}"
 
 
-def _evidence(values: Array, vectors: Array, shapes: Array) -> Array:
-    """ln of the mean over nu of p(u | label, nu), (n,), of shapes (k, n). values (k,), vectors
-    (k, k): of S."""
+def ln_density(values: Array, vectors: Array, shapes: Array) -> Array:
+    """ln of the mean over nu of p(u | label, nu), but for a constant, (n,), of shapes (k, n).
+    values (k,), vectors (k, k): of S."""
     v = np.maximum(values, 0.0) + np.array(NOISE_VARIANCES)[:, None]
     square = np.maximum((1 / v) @ (vectors.T @ shapes) ** 2, 1e-300)
     each = -0.5 * np.log(v).sum(1)[:, None] - 0.5 * len(values) * np.log(square)
     return np.asarray(np.logaddexp.reduce(each))
 
 
-def _label(c: int, column: int) -> Label:
+def label_of_column(c: int, column: int) -> Label:
     """The label of an order: column m, and on c = 0 the two modes [0,0]."""
     if c == 0 and column in (0, AXIAL_COLUMN):
         return Label(0, 0, "axial" if column == AXIAL_COLUMN else "torsional")

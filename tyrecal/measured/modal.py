@@ -18,7 +18,6 @@ import numpy as np
 from ..errors import InputError
 from ..simulate.modes.label import BELT, MAX_SAMPLED_HARMONIC, TAKES_PART, Label
 from ..tyre.usual import USUAL_MEASUREMENTS
-from .case_modes import CaseModes
 from .geometry import sensors_of
 from .identify import FORMS, Responses, identify
 from .labels import Judged, Labeller
@@ -53,7 +52,7 @@ class Layout:
     band: tuple[float, float] | None = None  # Hz; None: all
     # receptance, mobility or accelerance (`identify.FORMS`), for functions that do not state theirs
     form: str = ""
-    case: CaseModes | None = None  # a case whose shapes and frequencies help to find labels
+    labels: bool = True  # whether modes get labels by their shapes alone
 
 
 @dataclass(frozen=True)
@@ -126,7 +125,7 @@ def read_modal_test(file: Universal, geometry: Geometry, layout: Layout) -> Moda
         else:
             identified, test = _from_functions(file, layout)
         judged, note = _with_labellers(identified, geometry, layout)
-        modes = tuple(label_in_turn(judged))
+        modes = tuple(label_in_turn(judged) if layout.labels else map(_unlabelled, judged))
         return replace(test, modes=modes, notes=test.notes + (note,) * bool(note))
 
 
@@ -165,7 +164,7 @@ def _readings(signals: Sequence[Signal], geometry: Geometry, layout: Layout) -> 
         known = [
             j for j in labellers.values() if np.allclose(j.sensors.directions, sensors.directions)
         ]
-        labellers[name] = known[0] if known else Labeller(sensors, layout.highest, layout.case)
+        labellers[name] = known[0] if known else Labeller(sensors, layout.highest)
     return labellers
 
 
@@ -356,12 +355,17 @@ def label_in_turn(identified: Sequence[tuple[MeasuredMode, Labeller, str]]) -> l
     return without_overtones(modes)
 
 
+def _unlabelled(identified: tuple[MeasuredMode, Labeller, str]) -> LabelledMode:
+    mode, labeller, place = identified
+    return LabelledMode(mode, labeller.sensors, *_unit(mode), Judged(None, {}), place)
+
+
 def _labelled(
     mode: MeasuredMode, labeller: Labeller, place: str, below: Collection[Label] = ()
 ) -> LabelledMode:
     """The mode with its label, or with the reason why it has none."""
     shape, collinearity = _unit(mode)
-    judged = labeller.judge(shape, below, mode.frequency_Hz)
+    judged = labeller.judge(shape, below)
     R = labeller.sensors.points[:, 0]
     belt = R / R.max() > BELT  # sensors on the belt and not on a sidewall
     belt_share = np.mean(shape[belt] ** 2) / (np.mean(shape**2) or 1.0)

@@ -24,6 +24,8 @@ if TYPE_CHECKING:  # readers of shapes identify no modes
 
 Array = np.ndarray
 Vector = tuple[float, float, float]
+SAME_PRESSURE_kPa = 0.5  # pressures that differ by less are one
+SAME_MODE = 0.01  # largest relative distance of a frequency, a mean of repeats, from its shape's
 
 
 class ShapeOfMode(BaseModel):
@@ -63,6 +65,13 @@ class SensorShapes(BaseModel):
     def sensors(self) -> Sensors:
         """Layout of the sensors."""
         return Sensors(np.array(self.points), np.array(self.directions), tuple(self.signals))
+
+    def nearest(self, hertz: Array, kPa: Array) -> dict[int, int]:
+        """The mode that is nearest to each of n frequencies (n,), measured at pressures (n,), place
+        by place; none farther than `SAME_MODE`, or measured at another pressure."""
+        off = abs(np.divide.outer(hertz, [mode.frequency_Hz for mode in self.modes]) - 1)
+        off[abs(kPa - self.pressure_kPa) > SAME_PRESSURE_kPa] = np.inf
+        return {i: j for i, j in enumerate(off.argmin(1).tolist()) if off[i, j] < SAME_MODE}
 
     def spans(self) -> dict[str, Array]:
         """Shapes (k, 1) by name, and both of a doublet together, (k, 2)."""

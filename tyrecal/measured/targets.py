@@ -25,9 +25,9 @@ from ..tyre.state import AS_THE_CASE, PRESSURE_PATH, RIM_FREE, WHEEL_FREE, TyreS
 from ..tyre.values import set_values
 from .measurement import Measurement
 from .repeats import mean_damping
+from .shapes import SAME_PRESSURE_kPa
 from .tables import read_measurements
 
-SAME_PRESSURE_kPa = 0.5  # pressures that differ by less are one
 PRESSED_RIM: RimSupport = "fixed"  # footprints are computed with the rim clamped
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...simulate.modes.label import Label
+from ...simulate.modes.label import Label, Mode
 from .tree import Frequencies, Labelings, Modes, labelings
 
 Array = np.ndarray
@@ -34,13 +34,14 @@ class Prior:
 
 @dataclass(frozen=True)
 class ModesNearDesign:
-    """The model at a design: its n in-plane and out-of-plane modes. Other modes have no labels in a
-    list of frequencies."""
+    """The model at a design: its n in-plane and out-of-plane modes; where shapes were measured, all
+    others, too."""
 
     labels: tuple[Label, ...]
     states: Array  # (n,) number of the state of each mode
     ln_f: Array  # (n,)
     slopes: Array  # (n, v) d ln f / d x
+    modes: tuple[Mode, ...] = ()  # (n,) with their shapes
 
 
 @dataclass(frozen=True)

@@ -3,13 +3,17 @@ that they were measured in, and the readings with their likeliest labels."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from math import ceil
 
 import numpy as np
 
+from ...measured.case_modes import PER_HARMONIC, CaseModes, require_harmonic_shapes
 from ...measured.measurement import Measurement
+from ...measured.shape_likelihood import ln_shape_odds
+from ...measured.shapes import SensorShapes
 from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator, Question
 from ...simulate.modes.find import LabelledModes, find_modes
@@ -39,6 +43,8 @@ class Labelled:
     frequencies: list[list[Measurement]]
     found: LabelSearch
     start: ModesNearDesign  # the model where the variables are expected
+    states: Sequence[TyreState]  # of the modes of ``found`` and ``start``, by number
+    shapes: Sequence[SensorShapes] = ()  # that were measured with the readings
 
     @property
     def labels(self) -> list[Label | None]:
@@ -52,13 +58,15 @@ class Labelled:
 
     def under(self, place: int) -> list[Measurement]:
         """The readings with the labels of the labeling at a place, less those that are foreign."""
-        by_reading = {
-            id(reading): own
-            for each, own in zip(self.frequencies, self.found.labels(place), strict=True)
-            for reading in each
-        }
-        kept = [r for r in self.given if id(r) not in by_reading or by_reading[id(r)]]
-        return [replace(r, label=by_reading.get(id(r), r.label)) for r in kept]
+        modes = self.found.labelings.modes[place].tolist()
+        pairs = {j for j, count in Counter(modes).items() if j >= 0 and count > 1}
+        by_reading, seen = dict[int, Measurement | None](), set[int]()
+        for each, j, own in zip(self.frequencies, modes, self.found.labels(place), strict=True):
+            for r in each:
+                member = str(1 + (j in seen)) if j in pairs else r.member
+                by_reading[id(r)] = replace(r, label=own, member=member) if own else None
+            seen.add(j)
+        return [new for r in self.given if (new := by_reading.get(id(r), r))]
 
 
 def start_prior(variables: Sequence[DesignVariable]) -> Prior:
@@ -106,20 +114,23 @@ def label(
     about: Mapping[str, float] | None = None,
     fixed: Mapping[str, float] | None = None,
     jobs: int = 1,
+    shapes: Sequence[SensorShapes] = (),
 ) -> Labelled:
     """The readings with the likeliest labels, all frequencies of the unloaded tyre labelled
     together.
 
     prior: of the variables that are not ``fixed``, by default `start_prior`; about: the design at
-    which the model is expanded first, by default the prior's mean. Raises EvaluationFailed,
-    DeckRefused.
+    which the model is expanded first, by default the prior's mean; shapes: measured with the
+    readings. Raises EvaluationFailed, DeckRefused; InputError where a sensor is not on the tyre,
+    or the solver has no shapes to compare.
     """
     problem = Problem(case, evaluator, fixed)
     prior = prior or start_prior(problem.variables)
     frequencies = _of_unloaded(case, readings)
     states = list(dict.fromkeys(each[0].state.of(case) for each in frequencies))
     place = np.array([states.index(each[0].state.of(case)) for each in frequencies])
-    model = LabelledModel(problem, states, max(each[0].value for each in frequencies), jobs)
+    highest_Hz = max(each[0].value for each in frequencies)
+    model = LabelledModel(problem, states, highest_Hz, jobs, across=bool(shapes))
     values = [float(np.mean([r.value for r in each])) for each in frequencies]
     relative = [
         float(np.hypot.reduce([r.sigma for r in each])) / len(each) / value
@@ -131,7 +142,12 @@ def label(
         allowed = admissible(known, place, at)
         is_labelled = np.array([own is not None for own in known])
         return Frequencies(
-            np.log(values), np.array(relative), place, allowed, allowed.any(1) & is_labelled
+            np.log(values),
+            np.array(relative),
+            place,
+            allowed,
+            allowed.any(1) & is_labelled,
+            ln_shape(case, shapes, [each[0] for each in frequencies], place, at),
         )
 
     start = model.expand(prior.mean)
@@ -139,7 +155,52 @@ def label(
     if about:
         first = np.array([v.scaled(about[v.name]) for v in problem.variables])
     result = find_labels(model.expand, measured, prior, first)
-    return Labelled(readings, frequencies, result, start)
+    return Labelled(readings, frequencies, result, start, states, shapes)
+
+
+def _places(case: LoadedCase, readings: Sequence[Measurement]) -> tuple[Array, Array]:
+    """Frequencies (n,), Hz, and their pressures (n,), kPa."""
+    states = [each.state.with_defaults(case) for each in readings]
+    return np.array([each.value for each in readings]), np.array([s.pressure_kPa for s in states])
+
+
+def labelled_shapes(case: LoadedCase, labelled: Labelled) -> list[SensorShapes]:
+    """The measured shapes with the likeliest labels."""
+    readings = [each for each in labelled.readings if each.label and not each.load_N]
+    tests = []
+    for test in labelled.shapes:
+        modes = [mode.model_copy(update={"c": None, "m": None}) for mode in test.modes]
+        for i, j in test.nearest(*_places(case, readings)).items():
+            label = readings[i].label
+            assert label
+            own = {**asdict(label), "member": readings[i].member}
+            modes[j] = modes[j].model_copy(update=own)
+        tests.append(test.model_copy(update={"modes": modes}))
+    return tests
+
+
+def ln_shape(
+    case: LoadedCase,
+    shapes: Sequence[SensorShapes],
+    frequencies: Sequence[Measurement],
+    states: Array,
+    at: ModesNearDesign,
+) -> Array | None:
+    """ln of the odds (m, n) of m frequencies, in ``states`` (m,), as each of n modes by their
+    measured shapes; 0 without a shape. None if there are no shapes."""
+    if not shapes:
+        return None
+    odds = np.zeros((len(frequencies), len(at.modes)))
+    places = _places(case, frequencies)
+    for test in shapes:
+        own = test.nearest(*places)
+        for state in np.unique(states[[*own]]):
+            rows = np.array([i for i in own if states[i] == state])
+            columns = np.flatnonzero(at.states == state)
+            measured = np.array([test.modes[own[i]].values for i in rows.tolist()]).T
+            modes = CaseModes([at.modes[j] for j in columns])
+            odds[np.ix_(rows, columns)] += ln_shape_odds(modes, test.sensors, measured)
+    return odds
 
 
 def _of_unloaded(case: LoadedCase, readings: Sequence[Measurement]) -> list[list[Measurement]]:
@@ -157,9 +218,16 @@ class LabelledModel:
     """The modes of a case in ``states``, by its variables, up to above ``highest_Hz``."""
 
     def __init__(
-        self, problem: Problem, states: Sequence[TyreState], highest_Hz: float, jobs: int = 1
+        self,
+        problem: Problem,
+        states: Sequence[TyreState],
+        highest_Hz: float,
+        jobs: int = 1,
+        across: bool = False,
     ):
         self.problem, self.states, self.jobs = problem, states, jobs
+        # whether shapes are compared, those across the belt and of overtones, too
+        self.across = across
         self.top_Hz = BAND_ABOVE * highest_Hz
         self.harmonics = problem.case.case.analysis.highest_harmonic
 
@@ -179,12 +247,16 @@ class LabelledModel:
             (i, mode, row)
             for i, (modes, rows) in enumerate(by_state)
             for mode, row in zip(modes, rows, strict=True)
-            if mode.label.family and np.isfinite(row).all()
+            if (mode.label.family or self.across) and np.isfinite(row).all()
         ]
         hertz = np.array([mode.frequency_Hz for _, mode, _ in every])
         slopes = np.array([row for *_, row in every]) / hertz[:, None]
         labels = tuple(mode.label for _, mode, _ in every)
-        return ModesNearDesign(labels, np.array([i for i, *_ in every]), np.log(hertz), slopes)
+        modes = tuple(mode for _, mode, _ in every)
+        if self.across:
+            require_harmonic_shapes(modes, self.problem.evaluator.solver.name)
+        states = np.array([i for i, *_ in every])
+        return ModesNearDesign(labels, states, np.log(hertz), slopes, modes)
 
     def _evaluated(self, x: Array) -> list[tuple[list[Mode], Array]]:
         """Modes of each state, and d f / d x (modes, variables)."""
@@ -195,7 +267,8 @@ class LabelledModel:
         evaluator = problem.evaluator.of(TyreDesign(wide))
         values = problem.values(x)
         names = tuple(v.name for v in problem.variables)
-        count = max(case.case.analysis.modes_per_harmonic, MODES_PER_HARMONIC)
+        least = PER_HARMONIC if self.across else MODES_PER_HARMONIC
+        count = max(case.case.analysis.modes_per_harmonic, least)
         questions = [
             Question(*problem.question(values, state, names), count) for state in self.states
         ]

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...files import Json
-from ...measured.shapes import shapes_of
+from ...measured.case_modes import CaseModes
 from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase
-from ...tyre.state import TyreState
 from ..correlation import correlate
 from ..labels import (
     FOREIGN_WORDS,
@@ -23,11 +21,7 @@ from ..labels import (
     Labels,
     LabelsResult,
 )
-from .label import Labelled
-
-if TYPE_CHECKING:
-    from ...measured.case_modes import CaseModes
-    from ...measured.modal import ModalTest
+from .label import Labelled, labelled_shapes
 
 
 def labels_posterior(case: LoadedCase, labelled: Labelled) -> Labels:
@@ -93,49 +87,14 @@ def labels_posterior(case: LoadedCase, labelled: Labelled) -> Labels:
 
 
 def labels_result(case: LoadedCase, labelled: Labelled) -> LabelsResult:
-    """Labels as a result of their own."""
-    return LabelsResult.model_validate({"format": 1, "labels": labels_posterior(case, labelled)})
-
-
-def shape_labels_result(run: ModalTest, case_modes: CaseModes, state: TyreState) -> LabelsResult:
-    """The labels that shapes of a universal file, measured in a state, got by a case's modes."""
-    frequencies = []
-    for each in run.modes:
-        label, likely = each.judged.label, each.judged.probabilities
-        rivals = [
-            (own, p) for own, p in likely.items() if own != label and p >= MIN_RIVAL_PROBABILITY
-        ]
-        sigma = each.mode.sigma_Hz
-        frequencies.append(
-            LabelledFrequency(
-                **_entry(label),
-                probability=likely[label] if label else 1 - sum(p for _, p in rivals),
-                frequency_Hz=each.mode.frequency_Hz,
-                sigma_Hz=sigma if sigma > 0 else None,
-                pressure_kPa=state.pressure_kPa or 0.0,
-                rim=state.rim or "",
-                expected_Hz=case_modes.expected_Hz(label),
-                rivals=[
-                    LabelProbability(**_entry(own), probability=p) for own, p in rivals[:MAX_RIVALS]
-                ],
-            )
-        )
-    pairs = [(f.frequency_Hz, f.expected_Hz) for f in frequencies if f.expected_Hz]
-    off = np.log([measured / expected for measured, expected in pairs])
-    together = Labeling(
-        labels=[each.display for each in frequencies],
-        probability=float(np.prod([each.probability for each in frequencies if each.label])),
-    )
-    labels = Labels(
-        frequencies=frequencies,
-        labelings=[together],
-        model_off_percent=100 * float(np.sqrt(np.mean(off**2))) if len(off) else 0.0,
-        expansions=1,
-        settled=True,
-    )
-    tests = shapes_of(run, state.pressure_kPa or 0.0)
-    shapes = [correlate(each, case_modes) for each in tests]
-    return LabelsResult(format=1, labels=labels, shapes=shapes)
+    """Labels as a result of their own, and the measured shapes next to the model's."""
+    found, shapes = labelled.found.expansion, []
+    for test in labelled_shapes(case, labelled):
+        kPa = [each.with_defaults(case).pressure_kPa for each in labelled.states]
+        place = int(np.argmin(abs(np.array(kPa) - test.pressure_kPa)))
+        modes = [each for each, i in zip(found.modes, found.states, strict=True) if i == place]
+        shapes.append(correlate(test, CaseModes(modes)))
+    return LabelsResult(format=1, labels=labels_posterior(case, labelled), shapes=shapes)
 
 
 def _entry(label: Label | None) -> Json:

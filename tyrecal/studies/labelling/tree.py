@@ -16,6 +16,10 @@ frequency after the other, each conditions z for the next (Kalman, J. Basic Engi
     only the modes of one family are, where the shaker or the sensors see one direction (Views)
     foreign ones are FOREIGN on average (Poisson), anywhere in the band: FOREIGN / width each
 
+Where shapes were measured, too, that of a frequency is one more factor: p(shape | mode) over
+p(shape | foreign), `measured.shape_likelihood`. Then both modes of a pair may be measured: the
+second with the probability SECOND if the first is, and SPLIT from it.
+
 The tree of labelings grows a frequency at a time, lowest first, as in tracking of multiple
 hypotheses (Reid, IEEE Trans. Automatic Control 24 (1979) 843); branches a factor of exp(-CUT) below
 the best, or beyond the first BRANCHES, are cut. How far the model may be off is not known: the
@@ -41,6 +45,7 @@ FOREIGN_MARGIN = 0.1  # of ln f, by which the band of foreign ones is wider than
 VIEWS = {(True, True): 0.6, (True, False): 0.2, (False, True): 0.2}
 UNSEEN = 0.02  # probability of being measured, of a mode of the other family
 DISCREPANCIES = (0.0, 0.01, 0.03, 0.1)  # standard deviations of ln f, each as likely
+SECOND, SPLIT = 0.3, 0.01  # SPLIT: standard deviation, of ln f
 ALIKE = 4.0  # waves over which the discrepancy of a family's modes falls by e
 BRANCHES, CUT = 800, 20.0
 FOREIGN_MODE = -1  # what was measured is no mode of the tyre
@@ -65,6 +70,8 @@ class Frequencies:
     states: Array  # (m,) a number each
     allowed: Array  # (m, n) modes that each can be
     sure: Array  # (m,) it is not foreign
+    # (m, n) ln of p(shape | mode) over p(shape | foreign) of each; None: no shapes were measured
+    ln_shape: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -149,9 +156,15 @@ def discrepancy(labels: Sequence[Label], tau: float) -> Array:
     """Covariance (l, l) of ln f of l labelled modes: the error of form of each mode alone, and
     tau, which goes smoothly over the waves of a family, as what a model lacks does."""
     c = np.array([label.c for label in labels])
-    family = np.array([FAMILIES.index(label.family or FAMILIES[0]) for label in labels])
+    family = _families(labels)
     alike = np.exp(-abs(c[:, None] - c) / ALIKE) * (family[:, None] == family)
     return np.diag([form_error(label) ** 2 for label in labels]) + tau**2 * alike
+
+
+def _families(labels: Sequence[Label]) -> Array:
+    """Place (l,) of each label's family in `FAMILIES`; of modes across the belt, by their
+    parity."""
+    return np.array([FAMILIES.index(x.family or FAMILIES[x.m % 2]) for x in labels])
 
 
 def _tree(measured: Frequencies, modes: Modes, tau: float) -> tuple[Array, Array, Array, Array]:
@@ -162,25 +175,36 @@ def _tree(measured: Frequencies, modes: Modes, tau: float) -> tuple[Array, Array
     own = np.array([different.index(label) for label in modes.labels])
     root = np.linalg.cholesky(discrepancy(different, tau))
     H = np.hstack([modes.H, root[own]])
-    (count, n), k = measured.allowed.shape, H.shape[1]
-    family = np.array([FAMILIES.index(label.family or FAMILIES[0]) for label in modes.labels])
-    sees = np.array(list(VIEWS))[:, family]  # (views, n)
-    detection = np.where(sees, 1 - MISSED, UNSEEN)
+    sees = np.array(list(VIEWS))[:, _families(modes.labels)]  # (views, n)
+    detection, lost = np.where(sees, 1 - MISSED, UNSEEN), np.where(sees, MISSED, 1 - UNSEEN)
+    mode_of, ln_shape = np.arange(len(own)), np.zeros((len(measured.y), len(own)))
+    if measured.ln_shape is not None:  # columns of the pairs' second modes are behind the others
+        pairs = np.flatnonzero([label.c > 0 for label in modes.labels])
+        mode_of = np.append(mode_of, pairs)
+        ln_shape = measured.ln_shape[:, mode_of]
+        detection = np.append(detection, np.full((len(sees), len(pairs)), SECOND), axis=1)
+        lost = np.append(lost, np.full((len(sees), len(pairs)), 1 - SECOND), axis=1)
+    mu, H, allowed = modes.mu[mode_of], H[mode_of], measured.allowed[:, mode_of]
+    (count, n), k = allowed.shape, H.shape[1]
+    is_second = np.arange(n) >= len(own)
+    second = np.full(n, FOREIGN_MODE)  # column of the second mode of a pair, by that of the first
+    second[mode_of[is_second]] = np.flatnonzero(is_second)
     width = float(np.ptp(measured.y)) + 2 * FOREIGN_MARGIN
 
     ln = np.log(list(VIEWS.values()))[None]  # (branches, views)
     of_labelled, mean, P = np.zeros(1), np.zeros((1, k)), np.eye(k)[None]
-    free, chosen = np.ones((1, n), bool), np.empty((1, 0), int)
+    free, chosen = ~is_second[None], np.empty((1, 0), int)
     for i in range(count):
         PH = P @ H.T  # (branches, k, n)
-        variance = np.einsum("nk,bkn->bn", H, PH) + measured.s[i] ** 2
-        off = measured.y[i] - modes.mu - mean @ H.T
+        noise = measured.s[i] ** 2 + SPLIT**2 * is_second
+        variance = np.einsum("nk,bkn->bn", H, PH) + noise
+        off = measured.y[i] - mu - mean @ H.T
         score = -0.5 * (off**2 / variance + np.log(2 * np.pi * variance))
-        score[~(free & measured.allowed[i])] = -np.inf
+        score[~(free & allowed[i])] = -np.inf
         foreign = -np.inf if measured.sure[i] else np.log(FOREIGN / width)
         grown = np.concatenate(
             [
-                ln[:, None] + score[:, :, None] + np.log(detection.T),
+                ln[:, None] + (score + ln_shape[i])[:, :, None] + np.log(detection.T),
                 np.broadcast_to(ln[:, None] + foreign, (len(ln), 1, ln.shape[1])),
             ],
             axis=1,
@@ -198,21 +222,21 @@ def _tree(measured: Frequencies, modes: Modes, tau: float) -> tuple[Array, Array
         P = P[at] - gain[:, :, None] * column[:, None, :]
         ln, free = grown[at, mode], free[at]
         free[is_mode, j[is_mode]] = False
-        chosen = np.hstack([chosen[at], np.where(is_mode, mode, FOREIGN_MODE)[:, None]])
-    ln = np.logaddexp.reduce(ln + _missing(measured, modes, H, mean, P, free, sees), axis=1)
-    return chosen, ln, of_labelled, mean
-
-
-def _missing(
-    measured: Frequencies, modes: Modes, H: Array, mean: Array, P: Array, free: Array, sees: Array
-) -> Array:
-    """ln of the probability (branches, views) that the ``free`` modes were not measured: each is
-    above the band, or was missed."""
-    from scipy.special import ndtr
-
+        has_second = is_mode & (second[j] != FOREIGN_MODE)
+        free[has_second, second[j[has_second]]] = True
+        chosen = np.hstack([chosen[at], np.where(is_mode, mode_of[j], FOREIGN_MODE)[:, None]])
     end = np.array([measured.y[measured.states == state].max() for state in modes.states])
     spread = np.sqrt(np.einsum("nk,bkl,nl->bn", H, P, H, optimize=True))
-    within = ndtr((end - modes.mu - mean @ H.T) / spread)  # (branches, n)
-    lost = np.where(sees, MISSED, 1 - UNSEEN)  # (views, n)
+    missing = _missing((end[mode_of] - mu - mean @ H.T) / spread, free, lost)
+    return chosen, np.logaddexp.reduce(ln + missing, axis=1), of_labelled, mean
+
+
+def _missing(below: Array, free: Array, lost: Array) -> Array:
+    """ln of the probability (branches, views) that the ``free`` modes (branches, n) were not
+    measured: each is above the band, or was missed. below: of the band's end, in standard
+    deviations; lost (views, n): probability of a mode within the band to be missed."""
+    from scipy.special import ndtr
+
+    within = ndtr(below)
     each = np.log1p(-within[:, None] * (1 - lost))
     return np.asarray((each * free[:, None]).sum(2))

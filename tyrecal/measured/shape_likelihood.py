@@ -1,0 +1,44 @@
+"""How probable the shape of a measured mode is, for each mode of a case; `studies/labelling` weighs
+it together with all frequencies.
+
+A measured shape u (k,) has the density of `labels.ln_density`, S being the covariance of the case's
+mode on these sensors: of a doublet a plane. One shape in 50 (`SPOILT`), and half of those that the
+sensors hardly see, are like no mode: two modes mixed, or noise alone. With S = I, a random shape,
+
+    L = ln(((1 - e) p(u | S) + e p(u | I)) / p(u | I)),    e = SPOILT or 1/2
+
+is the ln of the odds of the mode against a frequency that is no mode of the tyre.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .case_modes import CaseModes
+from .covariance import label_covariances
+from .labels import label_of_column, ln_density
+from .sensors import Sensors
+
+Array = np.ndarray
+SPOILT = 0.02  # share of shapes that are like no mode
+
+
+def ln_shape_odds(case: CaseModes, sensors: Sensors, shapes: Array) -> Array:
+    """L (n, m) of n real shapes (k, n) for the m modes of a case.
+
+    Raises InputError where a sensor is not on the case's tyre.
+    """
+    k, highest = len(shapes), max(mode.label.c for mode in case.modes)
+    general = {
+        label_of_column(c, column): S
+        for c, column, S, _ in label_covariances(sensors, highest, case.half_width)
+    }
+    by_chance = ln_density(np.ones(k), np.eye(k), shapes)
+    odds = np.zeros((shapes.shape[1], len(case.modes)))
+    for j, mode in enumerate(case.modes):
+        same_c = [S for label, S in general.items() if label.c == mode.label.c]
+        S = general[mode.label] if mode.label in general else np.mean(same_c, axis=0)
+        own = ln_density(*np.linalg.eigh(case.covariance(mode, sensors, S)), shapes) - by_chance
+        spoilt = SPOILT if case.is_seen(mode, sensors) else 0.5
+        odds[:, j] = np.logaddexp(np.log(1 - spoilt) + own, np.log(spoilt))
+    return odds
