@@ -70,8 +70,8 @@ GROUPS = tuple((count, name) for count in RINGS for name in DIRECTIONS)
 BAND_EDGE, NOISE, ANGLES = (110.0, 170.0), (0.02, 0.10), (8, 24)
 TREAD = 0.95  # of the largest radius, from which the tread's width is counted
 OFF_m = 0.002
-# of tests with a case: share of another mode in a shape; noise of frequencies; distance of a doublet's
-# modes in ln f
+# of tests with a case: share of another mode in a shape; noise of frequencies; distance of the
+# modes of a doublet in ln f
 MIXED, SIGMA, DOUBLET, MOST_MISSED = 0.1, 0.005, 0.005, 3
 WAYS, FOREIGN = ("together", "shapes", "frequencies"), "no mode"
 RESULT = Path(__file__).parents[1] / "benchmarks" / "ring_labels.jsonl"

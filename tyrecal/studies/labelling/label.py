@@ -229,6 +229,7 @@ class LabelledModel:
         # whether shapes are compared, those across the belt and of overtones, too
         self.across = across
         self.top_Hz = BAND_ABOVE * highest_Hz
+        self.top_across_Hz = BAND_ABOVE * self.top_Hz  # of those across the belt
         self.harmonics = problem.case.case.analysis.highest_harmonic
 
     def expand(self, x: Array) -> ModesNearDesign:
@@ -247,7 +248,8 @@ class LabelledModel:
             (i, mode, row)
             for i, (modes, rows) in enumerate(by_state)
             for mode, row in zip(modes, rows, strict=True)
-            if (mode.label.family or self.across) and np.isfinite(row).all()
+            if (mode.label.family or self.across and mode.frequency_Hz < self.top_across_Hz)
+            and np.isfinite(row).all()
         ]
         hertz = np.array([mode.frequency_Hz for _, mode, _ in every])
         slopes = np.array([row for *_, row in every]) / hertz[:, None]
