@@ -27,6 +27,8 @@ from tyrecal.studies.labelling.tree import (
     FOREIGN,
     FOREIGN_MARGIN,
     MISSED,
+    SECOND,
+    SPLIT,
     UNSEEN,
     VIEWS,
     Frequencies,
@@ -48,32 +50,45 @@ def every_labeling(
     given: Frequencies, modes: Modes, tau: float
 ) -> Iterator[tuple[Any, float, float]]:
     """List each admissible labeling with ln of prior times evidence, and ln of the evidence of
-    its labelled frequencies, from the joint normal density."""
-    count, n = given.allowed.shape
-    C = modes.H @ modes.H.T + discrepancy(modes.labels, tau)
+    its labelled frequencies, from the joint normal density. With shapes, mode n + k is the second
+    of the pair k."""
+    (count, base), shapes = given.allowed.shape, given.ln_shape
+    mode_of = [*range(base), *range(base if shapes is not None else 0)]  # all of `OWN` are pairs
+    shapes = np.zeros((count, base)) if shapes is None else shapes
+    n = len(mode_of)
+    labels = [modes.labels[j] for j in mode_of]
+    C = (modes.H @ modes.H.T + discrepancy(modes.labels, tau))[np.ix_(mode_of, mode_of)]
+    mu, split = modes.mu[mode_of], np.where(np.arange(n) < base, 0.0, SPLIT)
     width = np.ptp(given.y) + 2 * FOREIGN_MARGIN
     for own in product(range(-1, n), repeat=count):
         used = [j for j in own if j >= 0]
-        fits = all(given.allowed[i, j] if j >= 0 else not given.sure[i] for i, j in enumerate(own))
-        if len({*used}) < len(used) or not fits:
+        fits = all(
+            given.allowed[i, mode_of[j]] if j >= 0 else not given.sure[i] for i, j in enumerate(own)
+        )
+        in_order = all(j < base or j - base in own[:i] for i, j in enumerate(own))
+        if len({*used}) < len(used) or not fits or not in_order:
             continue
         rows = [i for i, j in enumerate(own) if j >= 0]
-        S = C[np.ix_(used, used)] + np.diag(given.s[rows] ** 2)
-        off, gain = given.y[rows] - modes.mu[used], np.linalg.solve(S, C[used]).T
+        S = C[np.ix_(used, used)] + np.diag(given.s[rows] ** 2 + split[used] ** 2)
+        off, gain = given.y[rows] - mu[used], np.linalg.solve(S, C[used]).T
         of_labelled = float(multivariate_normal.logpdf(off, None, S)) if used else 0.0
         ln = of_labelled + (count - len(used)) * np.log(FOREIGN / width)
-        mean, P = modes.mu + gain @ off, C - gain @ C[used]
+        ln += sum(shapes[i, mode_of[j]] for i, j in enumerate(own) if j >= 0)
+        mean, P = mu + gain @ off, C - gain @ C[used]
         within = norm.cdf((given.y.max() - mean) / np.sqrt(np.diag(P)))
         views = []
         for sees, p in VIEWS.items():
-            seen = [1 - MISSED if sees[each.m] else UNSEEN for each in modes.labels]
-            lost = [MISSED if sees[each.m] else 1 - UNSEEN for each in modes.labels]
+            seen = [1 - MISSED if sees[each.m] else UNSEEN for each in labels[:base]]
+            lost = [MISSED if sees[each.m] else 1 - UNSEEN for each in labels[:base]]
+            seen, lost = seen + [SECOND] * base, lost + [1 - SECOND] * base
             terms = [
                 np.log(seen[j]) if j in used else np.log(1 - within[j] * (1 - lost[j]))
                 for j in range(n)
+                if j < base or j - base in used
             ]
             views.append(np.log(p) + sum(terms))
-        yield own, float(ln + np.logaddexp.reduce(views)), of_labelled
+        labeling = tuple(mode_of[j] if j >= 0 else -1 for j in own)
+        yield labeling, float(ln + np.logaddexp.reduce(views)), of_labelled
 
 
 @pytest.mark.numbers
@@ -111,6 +126,32 @@ def test_every_labeling_has_the_probability_of_its_joint_density() -> None:
     for i, j in ((0, 1), (1, -1), (2, 3)):
         share = sum(p for own, p in by_modes.items() if own[i] == j)
         assert result.each[i, j] == pytest.approx(share)
+
+
+@pytest.mark.numbers
+def test_shapes_count_in_the_same_probability() -> None:
+    """Three frequencies with shapes, two of them of one pair: against all labelings. What a
+    diagnosis weighs with its own evidence of the frequencies contains the shapes."""
+    random = generator("shapes")
+    modes = Modes(OWN, np.zeros(4, int), np.log([50, 52, 70, 75]), 0.1 * random.normal(size=(4, 2)))
+    every, none = np.ones((3, 4), bool), np.zeros(3, bool)
+    y, s = np.log([51.0, 51.3, 74.0]), np.full(3, 0.01)
+    ln_shape = random.normal(size=(3, 4)) + np.array([[3.0, 0, 0, 0], [3.0, 0, 0, 0], [0] * 4])
+    given = Frequencies(y, s, np.zeros(3, int), every, none, ln_shape)
+    result = labelings(given, modes)
+    total: dict[Any, float] = {}
+    evidence: dict[Any, float] = {}
+    for tau in DISCREPANCIES:
+        for own, ln, of_labelled in every_labeling(given, modes, tau):
+            total[own] = total.get(own, 0.0) + np.exp(ln)
+            evidence[own] = evidence.get(own, 0.0) + np.exp(of_labelled)
+    assert tuple(result.modes[0, :2]) == (0, 0)
+    by_modes = dict(zip(map(tuple, result.modes.tolist()), result.probabilities, strict=True))
+    for own, value in total.items():
+        share = value / sum(total.values())
+        assert by_modes.get(own, 0.0) == pytest.approx(share, rel=1e-6, abs=1e-8)
+    for own, ln_prior in zip(map(tuple, result.modes[:3].tolist()), result.ln_prior, strict=False):
+        assert ln_prior == pytest.approx(np.log(total[own] / evidence[own]), abs=1e-6)
 
 
 @pytest.mark.numbers

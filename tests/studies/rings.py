@@ -49,6 +49,7 @@ from tyrecal.measured.shapes import SensorShapes, ShapeOfMode
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.results import HarmonicShape
+from tyrecal.simulate.evaluate.store import Store
 from tyrecal.simulate.modes.label import Label, Mode, labelled
 from tyrecal.studies.blind.statistics import (
     calibration_error,
@@ -176,18 +177,21 @@ def case_of(name: str) -> LoadedCase:
 
 
 @cache
-def model_of(name: str) -> tuple[LoadedCase, Evaluator]:
+def model_of(name: str, store: Path | None) -> tuple[LoadedCase, Evaluator]:
+    """The case that labels a tyre, and its evaluator."""
     case = with_level(case_of(name), "coarse")
-    return case, Evaluator(TyreDesign(case))
+    return case, Evaluator(TyreDesign(case), store=Store(store) if store else None)
 
 
-def labelled_with_case(number: int, seed: int) -> Json:
+def labelled_with_case(
+    number: int, seed: int, store: Path | None = None, ways: Sequence[str] = WAYS
+) -> Json:
     """A drawn test: the true label of each frequency, and by each way the likeliest one with its
     probability, and the probability of all together."""
     random = np.random.default_rng([seed, number])
     rings, name = (1, 2, 3)[number % 3], ("r", "rtz")[number // 3 % 2]
     tyre = TYRES[random.integers(len(TYRES))]
-    case, evaluator = model_of(tyre)
+    case, evaluator = model_of(tyre, store)
     own = measured_tyre(tyre_modes(tyre, 1 + 1000 * seed + number), random)
     test = draw_test(own, rings, DIRECTIONS[name], random)
     kept = random.permutation(len(test.modes))[random.integers(MOST_MISSED + 1) :]
@@ -214,11 +218,9 @@ def labelled_with_case(number: int, seed: int) -> Json:
     record: Json = {"test": number, "tyre": tyre, "rings": rings, "directions": name}
     record["true"] = [label for _, label, _ in measured]
     elsewhere = shapes.model_copy(update={"pressure_kPa": 2 * kPa})
-    for way, sigma, there in (
-        ("together", SIGMA, shapes),
-        ("shapes", 3.0, shapes),
-        ("frequencies", SIGMA, elsewhere),
-    ):
+    for way in ways:
+        sigma = 3.0 if way == "shapes" else SIGMA
+        there = elsewhere if way == "frequencies" else shapes
         readings = [
             Measurement("frequency_Hz", None, "", kPa, 0.0, f, sigma * f) for f, *_ in measured
         ]
@@ -262,12 +264,17 @@ def tell(title: str, records: Sequence[Json], way: str) -> None:
 
 
 def with_case(count: int = 200, seed: int = 1) -> None:
-    """Draw the tests that are not recorded, and print the tables."""
+    """Label the tests that are not recorded, one way after the other, and print the tables."""
     lines = RESULT.read_text().splitlines() if RESULT.exists() else []
-    for number in range(len(lines), count):
-        lines.append(json.dumps(labelled_with_case(number, seed)))
-        RESULT.write_text("\n".join(lines) + "\n")
-    tables([json.loads(line) for line in lines])
+    records = [json.loads(line) for line in lines] + [{} for _ in range(count - len(lines))]
+    with TemporaryDirectory() as folder:
+        for way in WAYS:
+            for number in range(count):
+                if way in records[number]:
+                    continue
+                records[number] |= labelled_with_case(number, seed, Path(folder), [way])
+                RESULT.write_text("".join(f"{json.dumps(each)}\n" for each in records if each))
+    tables(records)
 
 
 def main(count: int = 5000, seed: int = 1, edge_Hz: int = 0) -> None:

@@ -117,6 +117,12 @@ def command() -> None:
 )
 @options.every(axle, centre, directions, highest, leave_out, response)
 @option(
+    "--labels/--no-labels",
+    default=True,
+    help="Whether shapes alone give labels; without, 'tyrecal diagnose', 'fit' and 'measured label'"
+    " judge shapes and frequencies together.",
+)
+@option(
     "--keep-going",
     is_flag=True,
     help="Leave out repeats that contradict each other, and list them, instead of stopping.",
@@ -137,6 +143,7 @@ def import_files(
     highest: int | None,
     leave_out: tuple[str, ...],
     response: str | None,
+    labels: bool,
     keep_going: bool,
     pictures: bool,
     figure_format: str,
@@ -164,6 +171,8 @@ def import_files(
     tyrecal measured import at_200.csv at_240.csv --output both.csv
     tyrecal measured import tyre.tir vertical.tdx --sigma-percent 2
     """
+    from dataclasses import replace
+
     from ..files import write_text
     from ..measured.correlation import auto_mac, auto_mac_words
     from ..measured.gather import gather, result
@@ -173,6 +182,7 @@ def import_files(
     if output.resolve() in [path.resolve() for path in files]:
         raise click.UsageError(f"--output {output}: is one of the files to read")
     layout = _layout(axle, centre, directions, highest, band, response or "")
+    layout = replace(layout, labels=labels)
     sigmas = floor / 100, (assumed or 0.0) / 100  # relative: smallest, and of one run
     gathered = gather(files, pressure_kPa, layout, *sigmas, leave_out, keep_going)
     shapes = [each for path in files for each in read_shapes(path)]
@@ -193,6 +203,8 @@ def import_files(
         save(draw_auto_mac(alike[-1]), output.with_name(f"{output.stem}_mac.{figure_format}"))
     for note in gathered.notes:
         terminal.note(note)
+    if not labels:
+        terminal.note("damping is left out with --no-labels: it belongs to a mode")
     for doubt in gathered.doubts:
         terminal.warn(doubt)
     terminal.result({**result(gathered), "auto_mac": alike})

@@ -56,8 +56,8 @@ class Judged:
 
     @property
     def confidence(self) -> float:
-        """Probability of the most probable label."""
-        return next(iter(self.probabilities.values()))
+        """Probability of the most probable label, 0 where none was looked for."""
+        return next(iter(self.probabilities.values()), 0.0)
 
 
 class Labeller:

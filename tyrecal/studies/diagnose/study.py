@@ -10,6 +10,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...files import Json
+from ...measured.gather import readings_with_shapes
 from ...measured.measurement import Measurement
 from ...measured.targets import in_states, readings_of
 from ...simulate.evaluate.evaluator import Evaluator
@@ -111,7 +112,7 @@ def study(
     """
     switched = [path for path, _ in toggled]
     paths = [measured, *repeats, *switched]
-    given = readings_of(case, measured, labelled=False)
+    given, shapes = readings_with_shapes(case, measured)
     runs = {path: in_states(case, readings_of(case, path)) for path in paths[1:]}
     runs[measured] = in_states(case, given)
     _check_copies(paths, runs)
@@ -140,7 +141,7 @@ def study(
         )
     labelled, readings = None, [Reading(observed(runs[measured]))]
     if any(each.is_unlabelled for each in given):
-        labelled = label(case, evaluator, given, jobs=jobs)
+        labelled = label(case, evaluator, given, jobs=jobs, shapes=shapes)
         readings = likely(labelled, lambda run: observed(in_states(case, run)))
     per_reading = [rows_if_exchanged(each.observations) for each in readings]
     rows = list(dict.fromkeys(row for each in per_reading for row in each))
@@ -192,7 +193,7 @@ def planned(
     case: LoadedCase, evaluator: Evaluator, measured: Path, effects: Sequence[str], jobs: int
 ) -> PressingPlan:
     """About how often the solver runs, before it does."""
-    readings = in_states(case, readings_of(case, measured, labelled=False))
+    readings = in_states(case, readings_with_shapes(case, measured)[0])
     model = model_of(case, evaluator, readings, effects)
     loaded = [each for each in readings if each.load_N and not each.rim]
     pressed = [
@@ -214,7 +215,7 @@ def _runs(model: TyreModel) -> int:
 def states_measured(case: LoadedCase, measured: Path, others: Sequence[Path] = ()) -> Json:
     """The states of all that is ``measured``, and in ``others`` too, as `provenance` takes them.
     Raises InputError where the case cannot be in one of them; OSError."""
-    readings = in_states(case, readings_of(case, measured, labelled=False))
+    readings = in_states(case, readings_with_shapes(case, measured)[0])
     for path in others:
         readings += in_states(case, readings_of(case, path))
     states = [each.state for each in readings]

@@ -11,9 +11,10 @@ from pathlib import Path
 from ...errors import InputError
 from ...files import Json
 from ...measured.case_modes import evaluate_case_modes
+from ...measured.gather import readings_with_shapes
 from ...measured.measurement import Measurement
-from ...measured.shapes import read_shapes
-from ...measured.targets import SAME_PRESSURE_kPa, in_set_state, readings_of, with_measured
+from ...measured.shapes import SAME_PRESSURE_kPa
+from ...measured.targets import in_set_state, with_measured
 from ...simulate.deck.decks_design import design_of
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.failure import EvaluationFailed
@@ -22,7 +23,7 @@ from ...tyre.case import LoadedCase, start_values
 from ...tyre.state import TyreState
 from ...tyre.values import with_values
 from ..correlation import correlate
-from ..labelling.label import label
+from ..labelling.label import label, labelled_shapes
 from ..labelling.result import labels_posterior
 from ..pressing_plan import DESIGNS_OF_FIT, PlannedState, PressingPlan, plan_pressing
 from .calibrate import Fit, FitNotify, calibrate, check, history_csv
@@ -62,8 +63,7 @@ class FitStudy:
         self._plain = with_values(case, {**start_values(case), **self.fixed})
         self.evaluator = evaluator.of(design_of(self._plain))
         file = self.measured
-        self.readings = readings_of(self._plain, file, labelled=False) if file else []
-        self.shapes = read_shapes(file) if file else []
+        self.readings, self.shapes = readings_with_shapes(self._plain, file) if file else ([], [])
         self.needs_labels = any(each.is_unlabelled for each in self.readings)
         self.used: Sequence[Measurement] = ()  # readings that are targets
         self.case, self.left_out = self._plain, list[str]()
@@ -191,15 +191,18 @@ class FitStudy:
     def _fit_with_labels(self, calibrated: Callable[[], Fit], jobs: int) -> Fit:
         """Label and fit in turn until the labels stay the same, at most `MAX_FITS` times."""
         case, evaluator, readings, fixed = self._plain, self.evaluator, self.readings, self.fixed
-        likeliest = label(case, evaluator, readings, fixed=fixed, jobs=jobs)
+        shapes = self.shapes
+        likeliest = label(case, evaluator, readings, fixed=fixed, jobs=jobs, shapes=shapes)
         for _ in range(MAX_FITS):
             used = likeliest
             self._set_targets(used.readings)
             fit = calibrated()
-            likeliest = label(case, evaluator, readings, None, fit.fitted.values, fixed, jobs)
+            about = fit.fitted.values
+            likeliest = label(case, evaluator, readings, None, about, fixed, jobs, shapes)
             same = likeliest.labels == used.labels
             if same:
                 break
+        self.shapes = labelled_shapes(case, likeliest)
         last = replace(likeliest.found, settled=likeliest.found.settled and same)
         labels = labels_posterior(case, replace(likeliest, found=last))
         fit.found = fit.found.model_copy(update={"labels": labels})

@@ -248,7 +248,7 @@ class LabelledModel:
             (i, mode, row)
             for i, (modes, rows) in enumerate(by_state)
             for mode, row in zip(modes, rows, strict=True)
-            if (mode.label.family or self.across and mode.frequency_Hz < self.top_across_Hz)
+            if (mode.label.family or (self.across and mode.frequency_Hz < self.top_across_Hz))
             and np.isfinite(row).all()
         ]
         hertz = np.array([mode.frequency_Hz for _, mode, _ in every])
