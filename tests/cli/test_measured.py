@@ -13,9 +13,12 @@ import numpy as np
 import pytest
 import pyuff
 
+from tyrecal.errors import InputError
+from tyrecal.measured.gather import readings_with_shapes
 from tyrecal.measured.tables import read_measurements
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.inference.observations import observe
+from tyrecal.tyre.load import load_case
 
 from ..measured.test_universal import ANGLES, function, geometry, shape, units, write
 from ..studies.measured_data import (
@@ -240,6 +243,50 @@ def test_shapes_are_labelled_by_a_case(tmp_path: Path, capsys: pytest.CaptureFix
         assert each["probability"] > 0.99
     rows = read_measurements(tmp_path / "labelled" / "labelled.csv")
     assert {row.label for row in rows} == set(right)
+
+
+def test_shapes_that_were_imported_without_labels(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`measured label` finds the labels by the shapes next to the table, and pairs them."""
+    table = str(tmp_path / "at_200.csv")
+    given = [*TEST, "--pressure-kPa", "200", "--sigma-percent", "0.2", "--no-pictures"]
+    assert run("measured", "import", str(SHAPES), *given, "--no-labels", "--output", table) == 0
+    assert all(row.is_unlabelled for row in read_measurements(Path(table), labelled=False))
+    case = [str(CASES / "p235_75r17.yaml"), table, "--mesh", "coarse"]
+    assert run("measured", "label", *case, "--output", str(tmp_path / "labelled")) == 0
+    right = truth(200.0)
+    rows = read_measurements(tmp_path / "labelled" / "labelled.csv")
+    pairs = {(row.label, row.member) for row in rows if row.label and row.label.c}
+    assert pairs == {(label, member) for label in right for member in "12" if label.c}
+    assert {row.label for row in rows} == set(right)
+    result = json.loads((tmp_path / "labelled" / "labels.json").read_text())
+    (shapes,) = result["shapes"]
+    assert [pair["computed"] for pair in shapes["pairs"] if pair["decided"]] == [
+        pair["measured"] for pair in shapes["pairs"] if pair["decided"]
+    ]
+
+
+def test_a_universal_file_that_needs_options_is_to_be_imported(tmp_path: Path) -> None:
+    path = write(tmp_path / "one.uff", shape(mode_in_plane()))
+    with pytest.raises(InputError, match="no coordinates.*measured import --no-labels"):
+        readings_with_shapes(load_case(CASES / "p235_75r17.yaml"), path)
+
+
+@pytest.mark.slow
+def test_a_diagnosis_takes_functions_as_they_come(tmp_path: Path) -> None:
+    """Its labels are those of the true modes, and their probabilities contain the shapes."""
+    given = [str(CASES / "p235_75r17.yaml"), "--measured", str(FUNCTIONS[0]), "--mesh", "coarse"]
+    more = ["--effect", "spindle_lateral", "--no-pictures", "--output", str(tmp_path)]
+    assert run("diagnose", *given, *more) == 0
+    labels = json.loads((tmp_path / "diagnosis.json").read_text())["labels"]
+    right = truth(240.0)
+    found = {
+        Label(e["c"], e["m"], e["kind"]): e for e in labels["frequencies"] if e["c"] is not None
+    }
+    for label, hertz in right.items():
+        assert found[label]["frequency_Hz"] == pytest.approx(hertz, rel=0.005)
+        assert found[label]["probability"] > 0.99
 
 
 def test_options_of_universal_files_are_refused_with_a_table(

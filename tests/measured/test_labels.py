@@ -327,9 +327,7 @@ def belt_and_walls() -> Sensors:
 def told_of(amplitude: np.ndarray) -> LabelledMode:
     """Labelled mode of a shape about whose label the labeller is sure."""
     sensors = belt_and_walls()
-    sure = SimpleNamespace(
-        sensors=sensors, judge=lambda shape, below, hertz: Judged(Label(2, 0), {}, "")
-    )
+    sure = SimpleNamespace(sensors=sensors, judge=lambda shape, below: Judged(Label(2, 0), {}, ""))
     return _labelled(MeasuredMode(66.0, amplitude), sure, "a.uff")  # type: ignore[arg-type]
 
 

@@ -19,7 +19,8 @@ file = FileOrFolder(exists=True, folder=False)
     "--measured",
     type=file,
     metavar="FILE",
-    help="Measurements (CSV), with or without labels (default: targets.file of the case).",
+    help="Measurements (CSV), with or without labels, or a universal file as for 'tyrecal measured"
+    " label' (default: targets.file of the case).",
 )
 @options.fitted(" as the calibration's first guess")
 @option(
