@@ -245,6 +245,7 @@ def test_shapes_are_labelled_by_a_case(tmp_path: Path, capsys: pytest.CaptureFix
     assert {row.label for row in rows} == set(right)
 
 
+@pytest.mark.slow
 def test_shapes_that_were_imported_without_labels(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -269,7 +270,7 @@ def test_shapes_that_were_imported_without_labels(
 
 def test_a_universal_file_that_needs_options_is_to_be_imported(tmp_path: Path) -> None:
     path = write(tmp_path / "one.uff", shape(mode_in_plane()))
-    with pytest.raises(InputError, match="no coordinates.*measured import --no-labels"):
+    with pytest.raises(InputError, match=r"no coordinates.*measured import --no-labels"):
         readings_with_shapes(load_case(CASES / "p235_75r17.yaml"), path)
 
 
@@ -281,12 +282,12 @@ def test_a_diagnosis_takes_functions_as_they_come(tmp_path: Path) -> None:
     assert run("diagnose", *given, *more) == 0
     labels = json.loads((tmp_path / "diagnosis.json").read_text())["labels"]
     right = truth(240.0)
-    found = {
+    by_label = {
         Label(e["c"], e["m"], e["kind"]): e for e in labels["frequencies"] if e["c"] is not None
     }
     for label, hertz in right.items():
-        assert found[label]["frequency_Hz"] == pytest.approx(hertz, rel=0.005)
-        assert found[label]["probability"] > 0.99
+        assert by_label[label]["frequency_Hz"] == pytest.approx(hertz, rel=0.005)
+        assert by_label[label]["probability"] > 0.99
 
 
 def test_options_of_universal_files_are_refused_with_a_table(

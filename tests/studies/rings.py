@@ -224,10 +224,10 @@ def labelled_with_case(
         readings = [
             Measurement("frequency_Hz", None, "", kPa, 0.0, f, sigma * f) for f, *_ in measured
         ]
-        found = label(case, evaluator, readings, shapes=[there]).found
-        best = found.labelings
+        search = label(case, evaluator, readings, shapes=[there]).found
+        best = search.labelings
         record[way] = {
-            "labels": [str(each or FOREIGN) for each in found.labels()],
+            "labels": [str(each or FOREIGN) for each in search.labels()],
             "p": [round(float(best.each[i, j]), 4) for i, j in enumerate(best.modes[0])],
             "together": round(float(best.probabilities[0]), 4),
         }

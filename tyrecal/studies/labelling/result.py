@@ -88,11 +88,11 @@ def labels_posterior(case: LoadedCase, labelled: Labelled) -> Labels:
 
 def labels_result(case: LoadedCase, labelled: Labelled) -> LabelsResult:
     """Labels as a result of their own, and the measured shapes next to the model's."""
-    found, shapes = labelled.found.expansion, []
+    at, shapes = labelled.found.expansion, []
     for test in labelled_shapes(case, labelled):
         kPa = [each.with_defaults(case).pressure_kPa for each in labelled.states]
         place = int(np.argmin(abs(np.array(kPa) - test.pressure_kPa)))
-        modes = [each for each, i in zip(found.modes, found.states, strict=True) if i == place]
+        modes = [each for each, i in zip(at.modes, at.states, strict=True) if i == place]
         shapes.append(correlate(test, CaseModes(modes)))
     return LabelsResult(format=1, labels=labels_posterior(case, labelled), shapes=shapes)
 
