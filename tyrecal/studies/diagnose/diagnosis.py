@@ -245,8 +245,19 @@ def _about(
 ) -> InverseProblem:
     """Observations and the model in an expansion."""
     where, start, spread = places(observations, rows), model.start, model.spread
+    damping = places(observations.damping, rows)
     return InverseProblem(
-        observations, expansion, model.ranges, where, start, spread, changes, assumed
+        observations,
+        expansion,
+        model.ranges,
+        where,
+        start,
+        spread,
+        changes,
+        assumed,
+        {},
+        0,
+        damping,
     )
 
 

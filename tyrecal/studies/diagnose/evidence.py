@@ -2,10 +2,10 @@
 
     ln Z(e) = -r^T S^-1 r / 2 - ln|2 pi S| / 2 - x^T x / 2 - ln|I + J^T S^-1 J| / 2 + ln p(splits)
 
-at the re-fitted x, here less its centre, over its spread (Laplace's approximation; MacKay,
-Information Theory, ch. 27-28). r: residual in ln f; S: the problem's Sigma plus the covariance of
-the effect's response error. Then Z = integral of Z(e) p(e) de by the Gauss-Legendre rule, p(e)
-uniform over the range.
+plus ln p(damping ratios) (`inference.damping`), at the re-fitted x, here less its centre, over its
+spread (Laplace's approximation; MacKay, Information Theory, ch. 27-28). r: residual in ln f; S: the
+problem's Sigma plus the covariance of the effect's response error. Then Z = integral of Z(e) p(e)
+de by the Gauss-Legendre rule, p(e) uniform over the range.
 """
 
 from __future__ import annotations
@@ -252,6 +252,8 @@ def refit_at(
     n = len(y)
     ln_evidence = -(chi2 + ln_det + n * np.log(2 * np.pi) + (off**2).sum(1) + ln_normal) / 2
     ln_evidence += problem.splits.ln_likelihood(added.split) + ln_label
+    if problem.damping:
+        ln_evidence += problem.damping.ln_likelihood(added.damping, d, normal)
     return Fitted(ln_evidence, d, chi2, np.linalg.inv(normal), np.zeros((len(d), 0)))
 
 

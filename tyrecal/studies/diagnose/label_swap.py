@@ -38,7 +38,8 @@ def exchanged(
 
     def read(a: Label, b: Label) -> InverseProblem:
         there = with_exchanged(problem.observations, a, b)
-        return replace(problem, observations=there, places=places(there, rows))
+        where, damping = places(there, rows), places(there.damping, rows)
+        return replace(problem, observations=there, places=where, damping_places=damping)
 
     shifts = problem.expansion.range_shifts(problem.places)
     # without effects, and with any of them as scatter: neither sees every exchange
@@ -89,7 +90,12 @@ def with_exchanged(observations: Observations, a: Label, b: Label) -> Observatio
             label = other[row.label]
             order[i] = where.get((label, row.state, row.run), i)
             rows[i] = row if order[i] != i else replace(row, label=label)
-    return replace(observations.at(order), rows=tuple(rows))
+    damping = observations.damping
+    new = tuple(
+        replace(row, label=other[row.label]) if row.label in other else row for row in damping.rows
+    )
+    damping = replace(damping, rows=new)
+    return replace(observations.at(order), rows=tuple(rows), damping=damping)
 
 
 def _near(observations: Observations) -> Iterator[tuple[Label, Label]]:

@@ -12,7 +12,7 @@ Learning, 2.115). Where the fit is the best one this is Laplace's approximation 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -50,6 +50,7 @@ class LinearFit:
     by_shape: Array  # (q, n, n) covariance by their uncertain shapes
     ln_label: Array  # (q,) ln probability of the labels
     split: Array  # (q, n) distance of the two modes of a pair, in ln f
+    ln_damping: Array | float = 0.0  # (q,) ln probability of the damping ratios
 
     def covariance(self, problem: InverseProblem, response_factor: float = 1.0) -> Array:
         """S (q, n, n): covariance of the observations under the hypothesis."""
@@ -67,6 +68,8 @@ class LinearFit:
         whole, taken = (w[:, :, 0] * r).sum(1), (J.transpose(0, 2, 1) @ w)[:, :, 0]
         ln = -(whole + np.linalg.slogdet(T)[1] + keep.sum() * np.log(2 * np.pi)) / 2
         ln += self.ln_label + problem.only(keep).splits.ln_likelihood(self.split[:, keep])
+        if problem.damping:
+            ln += self.ln_damping
         return ln, whole - (taken**2).sum(1)
 
 
@@ -83,8 +86,13 @@ def lines(
     places: list[int | None] = [*(among or range(len(problem.integrand)))]
     for k in places or [None]:
         at = problem if k is None else problem.integrand[k]
-        d = refit_at(problem, at, added, extra, near, COUPLED_STEPS).d
-        result.append(line_about(problem, added, d, k))
+        fitted = refit_at(problem, at, added, extra, near, COUPLED_STEPS)
+        line = line_about(problem, added, fitted.d, k)
+        if problem.damping:
+            information = np.linalg.inv(fitted.covariance)
+            ln = problem.damping.ln_likelihood(added.damping, fitted.d, information)
+            line = replace(line, ln_damping=ln)
+        result.append(line)
     return result
 
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..inference.inverse_problem import InverseProblem
+from ..inference.observations import DampingRatios
 from ..inference.section_fields import SECTION
 from .evidence import (
     NONE,
@@ -138,6 +139,10 @@ def _changes(problem: InverseProblem, sources: Sequence[str]) -> Iterator[Pertur
         yield Perturbation(
             f"the prior standard deviation of variables {times} as large", looser, every
         )
+    if problem.damping:
+        plain = replace(problem.observations, damping=DampingRatios())
+        undamped = replace(problem, observations=plain, damping_places=np.zeros(0, int))
+        yield Perturbation("without damping ratios", undamped, every)
     sure = replace(problem, assumed=replace(problem.assumed, form=0.0))
     yield Perturbation("no model error", sure, every)
     for label in sorted({row.label for row in rows if row.label}, key=str):

@@ -87,5 +87,8 @@ class Between:
             eta=plain.eta + shift,
             jacobian=plain.jacobian + self.straight(answer.jacobian - plain.jacobian),
             split=self.straight(answer.split),
+            damping=None
+            if answer.damping is None or plain.damping is None
+            else plain.damping + self.straight(answer.damping - plain.damping),
             slopes={id: self.straight(slope) for id, slope in answer.slopes.items()},
         )

@@ -33,6 +33,7 @@ FALLBACK = (0.25, 0.5)  # of an end of the range that has no solution
 MIDDLE = (0.25, 0.5, 0.75)  # of an end of the range, where an effect that matters is refined
 MAX_BEND = 0.3  # of a shift, by which the slope at the end may differ from the chord's
 CURVATURE_STEP = 0.05  # of a logarithm, for H from two Jacobians
+LEAST_DAMPING = 0.05  # of the plain tyre's damping ratio, the least that an effect may leave
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,15 @@ class EffectResponse:
     # (n,) by end of the range: `Answer.shape_uncertainty`
     shape_uncertainty: Mapping[float, Array] = field(default_factory=dict)
     anchor: Refinement | None = None
+    damping: Array | None = None  # (k, n) damping ratios at the nodes over those of the plain tyre
+
+    def damping_at(self, e: Array) -> Array:
+        """ln of the damping ratios over those of the plain tyre (q, n) at parameters (q,); 0 where
+        they are unknown."""
+        if self.damping is None:
+            return np.zeros((len(e), self.shift.shape[1]))
+        ratio = lagrange(self.values, e) @ np.nan_to_num(self.damping, nan=1.0)
+        return np.asarray(np.log(np.maximum(ratio, LEAST_DAMPING)))
 
     def at(self, e: Array) -> tuple[Array, Array, Array]:
         """a (q, n), B (q, n, v) and split (q, n) at parameters (q,)."""
@@ -99,6 +109,7 @@ class EffectResponse:
             sloped=put(self.sloped, id in answer.slopes),
             tilt=put(self.tilt, answer.jacobian - plain.jacobian),
             split=put(self.split, answer.split),
+            damping=None if self.damping is None else put(self.damping, _damping(answer, plain)),
         )
 
     def range_shifts(self) -> Array:
@@ -137,6 +148,9 @@ class Expansion:
     coupling: Coupling | None = None  # of modes by the sources of error
     joint: Mapping[tuple[str, ...], PairInteraction] = field(default_factory=dict)  # of two effects
     material_laws: float = 0.0  # see `ResponseModel`
+    damping: Array | None = None  # (n,) ln of the damping ratios at x0; None: unknown
+    damping_slopes: Array | None = None  # (n, v) d damping / dx at x0, by differences
+    losses: Array | None = None  # (n, k) see `Answer`
 
     def plain(self, x: Array) -> tuple[Array, Array]:
         """eta (n,) and Jacobian (n, v) without effects."""
@@ -163,11 +177,13 @@ def expand(model: ResponseModel, x0: Array) -> Expansion:
     first = answers[0]
     if isinstance(first, Exception):
         raise first
-    hessian = np.zeros((*first.jacobian.shape, count))
+    hessian, damping_slopes = np.zeros((*first.jacobian.shape, count)), 0 * first.jacobian
     for i in range(count):
         above = answers[1 + i]
         if isinstance(above, Answer):
             hessian[:, :, i] = (above.jacobian - first.jacobian) / CURVATURE_STEP
+            if first.damping is not None:
+                damping_slopes[:, i] = np.log(_damping(above, first)) / CURVATURE_STEP
     hessian = (hessian + hessian.transpose(0, 2, 1)) / 2
     assert first.constants is not None
     plain = Expansion(
@@ -179,6 +195,9 @@ def expand(model: ResponseModel, x0: Array) -> Expansion:
         first.constants,
         {},
         material_laws=model.material_laws,
+        damping=first.damping,
+        damping_slopes=damping_slopes,
+        losses=first.losses,
     )
     nodes, failed = {}, {}
     replies = dict(zip(pairs, answers[1 + count :], strict=True))
@@ -247,6 +266,7 @@ def carried(known: Expansion, model: ResponseModel, x0: Array) -> Expansion:
         nodes=nodes,
         coupling=first.coupling,
         joint={},
+        damping=first.damping,
     )
 
 
@@ -310,7 +330,7 @@ def _nodes(
     id: str, plain: Expansion, span: EffectRange, replies: Mapping[float, Answer | Exception]
 ) -> EffectResponse | None:
     """Nodes from 0 outwards as far as there are solutions; None where there is none at all."""
-    known = {0.0: Answer(plain.eta, plain.jacobian, plain.split), **replies}
+    known = {0.0: Answer(plain.eta, plain.jacobian, plain.split, damping=plain.damping), **replies}
     good = [0.0]
     reach = [max(0.0, span.low), min(0.0, span.high)]  # 0, or the near end of the range
     for side in (1, -1):
@@ -341,7 +361,17 @@ def _nodes(
             for e, each in zip(map(float, values), answers, strict=True)
             if e in (low, high) and each.shape_uncertainty is not None
         },
+        damping=None
+        if plain.damping is None
+        else np.array([_damping(each, plain) for each in answers]),
     )
+
+
+def _damping(answer: Answer, plain: Answer | Expansion) -> Array:
+    """Damping ratios over those of the plain tyre (n,), 1 where they are unknown."""
+    if answer.damping is None or plain.damping is None:
+        return np.ones_like(plain.eta)
+    return np.asarray(np.nan_to_num(np.exp(answer.damping - plain.damping), nan=1.0))
 
 
 def _nearer(span: EffectRange, replies: Mapping[float, Answer | Exception]) -> list[float]:

@@ -15,9 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from .covariance import alike, covariance
+from .damping import DampingEvidence
 from .expansion import Expansion
 from .model import EffectRange
-from .observations import Observations
+from .observations import DampingRatios, Observations
 from .splits import Splits
 from .veering import Veering, rule, veering
 
@@ -63,6 +64,7 @@ class Added(NamedTuple):
     split: Array  # (q, n) distance of the two modes of a pair with the effects, in ln f
     off: Array  # (k, q, n) standard deviation of the shift by `response_error`, mode by mode
     shape_uncertainty: Array  # (k, q, n) shift by one standard deviation of the uncertain shape
+    damping: Array  # (q, m) change of the ln of the measured damping ratios
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,8 @@ class InverseProblem:
     # factors on the standard deviations of some sources of error, by their index
     reduced: Mapping[int, float] = field(default_factory=dict)
     zeta: float = 0.0  # coupling of near modes, in its standard deviations: see `veering`
+    # (m,) of the measured damping ratios among the model's rows
+    damping_places: Array = field(default_factory=lambda: np.zeros(0, int))
 
     @property
     def constants(self) -> Array:
@@ -113,6 +117,16 @@ class InverseProblem:
         if not self.veering.active:
             return []
         return [replace(self, zeta=float(z)) for z in rule()[0]]
+
+    @cached_property
+    def damping(self) -> DampingEvidence | None:
+        """The measured damping ratios; None if there are none, or the model computes none."""
+        e, seen = self.expansion, self.observations.damping
+        if not seen.rows or e.damping is None or e.damping_slopes is None:
+            return None
+        at = self.damping_places
+        losses = np.zeros((len(e.damping), 0)) if e.losses is None else e.losses
+        return DampingEvidence.of(seen, e.damping[at], e.damping_slopes[at], losses[at])
 
     @cached_property
     def veering(self) -> Veering:
@@ -165,6 +179,10 @@ class InverseProblem:
         runs = np.array([row.run for row in self.observations.rows])
         ids = [id for id in self.expansion.nodes if id in effects or id in self._switched]
         off, shape_uncertainty = np.zeros((2, len(ids), count, n))
+        damping = np.zeros((count, len(self.damping_places)))
+        for id in [id for id in self.expansion.nodes if id in effects and damping.size]:
+            every = self.expansion.nodes[id].damping_at(effects[id])
+            damping += every[:, self.damping_places]
         for run in sorted(set(runs.tolist())):
             rows = np.flatnonzero(runs == run)
             here = dict(effects)
@@ -188,7 +206,8 @@ class InverseProblem:
         if self.zeta:
             shift, tilt = shift @ self.mixed.T, self.mixed @ tilt
         split = np.sqrt(np.maximum(square, 0.0))
-        return self.with_mixed_laws(Added(shift, tilt, split, off, shape_uncertainty))
+        added = Added(shift, tilt, split, off, shape_uncertainty, damping)
+        return self.with_mixed_laws(added)
 
     def with_mixed_laws(self, added: Added) -> Added:
         """Transform the response errors of effects to the coupled modes."""
@@ -222,7 +241,7 @@ class InverseProblem:
         return alike(self.observations.rows)
 
 
-def places(observations: Observations, rows: Sequence[tuple]) -> Array:
+def places(observations: Observations | DampingRatios, rows: Sequence[tuple]) -> Array:
     """Index (n,) of each observation among the model's rows."""
     known = {row: i for i, row in enumerate(rows)}
     return np.array([known[row.row] for row in observations.rows], int)

@@ -80,6 +80,9 @@ class Answer:
     # (n,) change of eta by one standard deviation of the effect's `Effect.shape_uncertainty`
     shape_uncertainty: Array | None = None
     by_pressure: Array | None = None  # (n,) d eta / d ln(pressure), if it was evaluated
+    damping: Array | None = None  # (n,) ln of the damping ratio, NaN: unknown; None: of all rows
+    # (n, k) change of ``damping`` by one standard deviation of each of k parts of the loss factors
+    losses: Array | None = None
 
 
 def state_of(where: Where) -> TyreState:

@@ -7,13 +7,14 @@ s = |ln f_a - ln f_b|, whose scatter is tau^2 = s_a^2 + s_b^2; s_a, s_b are rela
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from math import isnan
 from pathlib import Path
 
 import numpy as np
 
-from ...measured.measurement import Measurement
-from ...measured.repeats import PRIOR_REPEATS
+from ...measured.measurement import DAMPING_RATIO, DAMPING_SIGMA, Measurement
+from ...measured.repeats import PRIOR_REPEATS, mean_damping
 from ...simulate.modes.label import Label
 from ...tyre.case.parts import RimSupport
 from ...tyre.state import TyreState
@@ -58,6 +59,15 @@ class Observable:
 
 
 @dataclass(frozen=True)
+class DampingRatios:
+    """The m damping ratios that were measured on the tyre as it is, means over repeats."""
+
+    rows: tuple[Observable, ...] = ()
+    y: Array = field(default_factory=lambda: np.zeros(0))  # (m,) ln of the damping ratio
+    scatter: Array = field(default_factory=lambda: np.zeros(0))  # (m,) standard deviation of y
+
+
+@dataclass(frozen=True)
 class Observations:
     """The n frequencies and masses that were measured on one tyre."""
 
@@ -70,6 +80,7 @@ class Observations:
     split: Array  # (n,) distance of the two modes of a pair in ln f; NaN unless both were measured
     split_scatter: Array  # (n,) its standard deviation
     left_out: tuple[str, ...] = ()  # sentences about measurements that are not used
+    damping: DampingRatios = DampingRatios()  # of the same modes
 
     def at(self, places: Array) -> Observations:
         """The numbers at these indices; ``rows`` stays."""
@@ -107,9 +118,28 @@ def observe(
             rows.append(Observable(key[0], key[1], key[2], index, key[3]))
             numbers.append(_pair(run, key, split))
     table = np.array(numbers, float).reshape(-1, 4).T
+    damping = _damping([r for run in unloaded for r in run])
     return Observations(
-        tuple(rows), table[0], table[1], common, table[2], table[3], tuple(left_out)
+        tuple(rows), table[0], table[1], common, table[2], table[3], tuple(left_out), damping
     )
+
+
+def _damping(readings: Sequence[Measurement]) -> DampingRatios:
+    """Damping ratios that came with frequencies: means over repeats and the modes of a pair."""
+    by_mode: dict[ObservationKey, list[Measurement]] = {}
+    for each in readings:
+        if each.label and not isnan(each.damping_ratio):
+            key: ObservationKey = (DAMPING_RATIO, each.label, each.pressure_kPa, each.rim)
+            by_mode.setdefault(key, []).append(each)
+    keys = sorted(by_mode, key=_order)
+    y, scatter = np.zeros((2, len(keys)))
+    for i, key in enumerate(keys):
+        mean = mean_damping(by_mode[key])
+        y[i] = np.log(mean["damping_ratio"])
+        scatter[i] = mean["damping_sigma"] / mean["damping_ratio"]
+        if isnan(scatter[i]):
+            scatter[i] = DAMPING_SIGMA / np.sqrt(len(by_mode[key]))
+    return DampingRatios(tuple(Observable(*key[:3], rim=key[3]) for key in keys), y, scatter)
 
 
 def _used(run: Sequence[Measurement], left_out: list[str]) -> dict[tuple[str, ...], Measurement]:

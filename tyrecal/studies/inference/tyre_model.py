@@ -26,6 +26,7 @@ from ..variable import read_variables
 from .between import Between
 from .expansion import node_values
 from .form_error import MATERIAL_LAWS
+from .losses import loss_deviations, with_losses, with_twice_the_loss
 from .model import Answer, Coupling, EffectRange, ModelRow, Query, state_of
 from .regions import SectionPart, count_numbers, regions
 from .section_design import SectionDesign
@@ -49,7 +50,8 @@ class TyreModel:
     """ln f of the modes ``rows`` (label, where), and ln mass where the label is None.
 
     case: its variables are x; found: sources of error; ranges: effects that may be evaluated;
-    jobs: evaluations at a time. Where the solver gives no exact slopes, they are differences.
+    jobs: evaluations at a time; damped: whether damping ratios are wanted, for which compounds
+    without a loss factor get one. Where the solver gives no exact slopes, they are differences.
     """
 
     def __init__(
@@ -60,7 +62,11 @@ class TyreModel:
         own_sources: list[Source],
         ranges: Mapping[str, EffectRange],
         jobs: int = 1,
+        damped: bool = False,
     ):
+        self._deviations = loss_deviations(case) if damped else {}  # of loss factors
+        if damped:
+            case = with_losses(case)
         self.rows, self.found, self.jobs = list(rows), own_sources, jobs
         self.ranges: Mapping[str, EffectRange] = ranges
         self._present = case.case.effects
@@ -90,6 +96,7 @@ class TyreModel:
         self._between = Between.of(self.rows, self.states)
         self._known_moves: dict[tuple[str, float], bool] = {}
         self._plain_answers: dict[bytes, Answer] = {}
+        self._known_shares: dict[str, Array] = {}  # see `_loss_shares`
         self._known_parts: list[tuple[Array, list[SectionPart]]] = []
 
     @cached_property
@@ -261,7 +268,26 @@ class TyreModel:
         if point.coupled and constants is not None:
             coupled = self._coupling(point.x, answer.eta, constants)
             answer = replace(answer, coupling=coupled)
+        if constants is not None and self._deviations and answer.damping is not None:
+            shares = self._loss_shares(point.x, answer.damping)
+            each = [np.outer(shares[name], own) for name, own in self._deviations.items()]
+            answer = replace(answer, losses=np.sum(each, axis=0))
         return self._asked_rows(replace(answer, constants=constants))
+
+    def _loss_shares(self, x: Array, damping: Array) -> Mapping[str, Array]:
+        """Share (n,) of each compound in the loss of the modes, where it was first wanted.
+
+        Damping ratios are linear in each loss factor, so that twice of it adds its share.
+        """
+        if len(self._deviations) == 1:
+            return {name: np.ones(len(damping)) for name in self._deviations}
+        for name in self._deviations.keys() - self._known_shares.keys():
+            case, rows = with_twice_the_loss(self.case, name), self._between.rows
+            (twice,) = TyreModel(case, self.evaluator, rows, [], {}, self.jobs).answers([Query(x)])
+            if not isinstance(twice, Answer):
+                raise twice
+            self._known_shares[name] = np.expm1(twice.damping - damping)
+        return self._known_shares
 
     def _asked_rows(self, answer: Answer) -> Answer:
         """The answer without the rows that only serve to interpolate."""
@@ -276,6 +302,8 @@ class TyreModel:
             slopes={id: slope[:n] for id, slope in answer.slopes.items()},
             shape_uncertainty=cut(answer.shape_uncertainty),
             by_pressure=cut(answer.by_pressure),
+            damping=cut(answer.damping),
+            losses=cut(answer.losses),
         )
 
     def _shape_uncertainty(self, point: Query, eta: Array) -> Array | None:
@@ -435,7 +463,7 @@ class TyreModel:
         rows = self._between.rows
         eta, jacobian = np.zeros(len(rows)), np.zeros((len(rows), len(self.variables)))
         slopes, split = np.zeros((len(rows), len(self.found))), np.zeros(len(rows))
-        by_pressure = np.zeros(len(rows))
+        by_pressure, damping = np.zeros(len(rows)), np.full(len(rows), np.nan)
         by_effect = {id: np.full(len(rows), np.nan) for id in point.slopes}  # not the mass
         for i, (label, where) in enumerate(rows):
             if label and state_of(where) not in at:
@@ -450,6 +478,8 @@ class TyreModel:
             eta[i] = _ln(label, answer)
             if members := modes[label].raw.members:
                 split[i] = log(members[1] / members[0])
+            if ratio := modes[label].raw.damping_ratio:
+                damping[i] = log(ratio)
             for id, slope in by_effect.items():
                 path = EFFECT_PATH + id  # a state may hold it at 0
                 slope[i] = gradients[path][place] / f if path in gradients else 0.0
@@ -467,7 +497,13 @@ class TyreModel:
                     )
         known = by_pressure if self._between.inner.any() and not self._is_bare(point) else None
         return Answer(
-            eta, jacobian, split, slopes if point.constants else None, by_effect, by_pressure=known
+            eta,
+            jacobian,
+            split,
+            slopes if point.constants else None,
+            by_effect,
+            by_pressure=known,
+            damping=None if np.isnan(damping).all() else damping,
         )
 
     def _coupling(self, x: Array, eta: Array, constants: Array) -> Coupling | None:

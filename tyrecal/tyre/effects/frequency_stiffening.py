@@ -3,7 +3,10 @@ modulus."""
 
 from __future__ import annotations
 
+from math import pi, tan
+
 from ..case import LoadedCase
+from ..case.parts import Rubber
 from .edit import with_part, with_rubbers
 from .effect import Effect
 
@@ -12,10 +15,20 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     """Each mode's shear modulus times (f / f_ref)^value, at the mode's frequency f.
 
     f_ref is each rubber's ``reference_frequency_Hz`` (60 Hz): a tilt over the modes, no level.
+    By causality a modulus ~ f^a loses at least tan(pi a / 2): a smaller stated loss factor is
+    raised to that.
     """
-    return with_rubbers(
-        case, lambda m: with_part(m, frequency_exponent=m.frequency_exponent + value)
-    )
+
+    def stiffening(m: Rubber) -> Rubber:
+        a, loss = m.frequency_exponent + value, m.loss_factor
+        least = tan(pi * a / 2)
+        if isinstance(loss, list):
+            loss = [[hertz, max(eta, least)] for hertz, eta in loss]
+        elif loss is not None:
+            loss = max(loss, least)
+        return with_part(m, frequency_exponent=a, loss_factor=loss)
+
+    return with_rubbers(case, stiffening)
 
 
 EFFECT = Effect(
