@@ -17,6 +17,7 @@ from ..studies.diagnose.study import DiagnosedCase
 from ..studies.diagnose.under_load import LoadedRow
 from ..studies.diagnose.verdict import NAMED, NO_GAP, UNDECIDED, no_gap_words
 from ..studies.fit.result import OTHER_RESIDUALS
+from ..studies.inference.damping import FORM
 from ..tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ..units import display_unit, in_engineers_units, signed
 from .shape_data import parts_data
@@ -87,6 +88,7 @@ def _counted(d: Diagnosis) -> str:
     runs = 1 + len(d.problem.changes)
     rims = dict.fromkeys(row.rim or OWN_RIM for row in rows if row.label)
     held = f", rim {' and '.join(rims)}" if len(rims) > 1 else ""
+    held += f", {d.damping_ratios} damping ratios" if d.damping_ratios else ""
     return f"{modes} modes at {at} kPa{held}" + (f", {runs} runs" if runs > 1 else "")
 
 
@@ -517,5 +519,10 @@ def _assumptions(study: DiagnosedCase) -> Iterator[str]:
     if study.calibrated:
         names = ", ".join(f"`{id}`" for id in study.calibrated)
         yield f"Not considered, because a variable of the case calibrates them: {names}."
-    for left in d.problem.observations.left_out:
+    if d.damping_ratios:
+        yield (
+            f"Damping ratios: scatter as stated, {100 * FORM:g} % more in every mode,"
+            f" {study.model.losses}."
+        )
+    for left in d.left_out:
         yield f"Left out: {left}."

@@ -112,6 +112,8 @@ def diagnosis_words(result: DiagnosisResult) -> list[str]:
     words = [sentence(verdict_words(result) + (f": {result.words}" if gap else ""))]
     if result.effect:
         words[0] += f" Probability {present(result.probabilities, result.effect.split('+')):.2f}."
+    if result.damping_ratios:
+        words.append(f"{result.damping_ratios} damping ratios are weighed with the frequencies.")
     if result.robust:
         least, most = result.robust.range
         words.append(

@@ -71,6 +71,20 @@ class Diagnosis:
     def __repr__(self) -> str:
         return f"Diagnosis({self.verdict.kind}: {self.verdict.words})"
 
+    @property
+    def damping_ratios(self) -> int:
+        """Number of measured damping ratios that are used."""
+        damping = self.problem.damping
+        return damping.count if damping else 0
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Sentences about measurements that are not used."""
+        seen = self.problem.observations
+        unused = len(seen.damping.rows) - self.damping_ratios
+        more = f"{unused} damping ratios: the solver computes none of these modes"
+        return (*seen.left_out, *[more] * bool(unused))
+
     def hypothesis(self, key: str) -> Hypothesis:
         """The hypothesis of that key."""
         return next(h for h in self.hypotheses if h.key == key)

@@ -200,6 +200,7 @@ class DiagnosisResult(Result):
     exchanged_labels: list[str] = Field(default=[])  # labels that may be exchanged
     labels: Labels | None = None  # labels of frequencies that came without one
     left_out: list[str] = Field(default=[])  # measurements that are not used
+    damping_ratios: int = 0  # number of measured damping ratios that are used
     # effects that could not be evaluated, and why
     not_evaluated: dict[str, str] = Field(default={})
 
@@ -350,10 +351,11 @@ def diagnosis_result(
         ],
         exchanged_labels=[str(label) for label in d.exchanged or ()],
         labels=labels,
-        left_out=list(d.problem.observations.left_out),
+        left_out=list(d.left_out),
         not_evaluated=dict(d.problem.expansion.failed),
     )
-    return result.model_copy(update={"calibrated": calibrated}) if calibrated else result
+    more = {"calibrated": calibrated, "damping_ratios": d.damping_ratios}
+    return result.model_copy(update={key: value for key, value in more.items() if value})
 
 
 def _gap(diagnosis: Diagnosis, under_load: UnderLoad | None) -> GapPart:

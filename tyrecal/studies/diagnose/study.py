@@ -150,7 +150,8 @@ def study(
     for change in changes:
         ranges[change.id] = _reaching(ranges[change.id], change)
     own_sources, assumed_sources = sources(case)
-    model = TyreModel(case, evaluator, rows, own_sources, ranges, jobs)
+    damped = any(each.observations.damping.rows for each in readings)
+    model = TyreModel(case, evaluator, rows, own_sources, ranges, jobs, damped)
     variables = read_variables(case)
     begin = None
     if first_guess:

@@ -8,6 +8,8 @@ alike move all modes alike: then only the ratios between modes carry information
 
 from __future__ import annotations
 
+from math import exp
+
 import numpy as np
 
 from ...tyre.case import LoadedCase, number_at
@@ -38,9 +40,15 @@ def with_twice_the_loss(case: LoadedCase, name: str) -> LoadedCase:
     return changed(case, materials={**case.case.materials, **other})
 
 
-def stated_losses(case: LoadedCase) -> bool:
-    """Whether all compounds state a loss factor."""
-    return all(m.loss_factor for m in case.case.materials.values() if isinstance(m, Rubber))
+def losses_in_words(case: LoadedCase) -> str:
+    """Loss factors of a case as a diagnosis takes them."""
+    compounds = {k: m for k, m in case.case.materials.items() if isinstance(m, Rubber)}
+    assumed = ", ".join(name for name, m in compounds.items() if not m.loss_factor)
+    words = "loss factors as stated"
+    if assumed:
+        words += f", but {assumed}: none stated, {UNKNOWN:g} assumed within a factor of"
+        words += f" {exp(UNKNOWN_SD):.1f} (one standard deviation)"
+    return words
 
 
 def loss_deviations(case: LoadedCase) -> dict[str, Array]:

@@ -26,7 +26,7 @@ from ..variable import read_variables
 from .between import Between
 from .expansion import node_values
 from .form_error import MATERIAL_LAWS
-from .losses import loss_deviations, with_losses, with_twice_the_loss
+from .losses import loss_deviations, losses_in_words, with_losses, with_twice_the_loss
 from .model import Answer, Coupling, EffectRange, ModelRow, Query, state_of
 from .regions import SectionPart, count_numbers, regions
 from .section_design import SectionDesign
@@ -64,8 +64,10 @@ class TyreModel:
         jobs: int = 1,
         damped: bool = False,
     ):
-        self._deviations = loss_deviations(case) if damped else {}  # of loss factors
+        self.losses = ""  # loss factors in words
+        self._deviations: Mapping[str, Array] = {}  # of loss factors
         if damped:
+            self.losses, self._deviations = losses_in_words(case), loss_deviations(case)
             case = with_losses(case)
         self.rows, self.found, self.jobs = list(rows), own_sources, jobs
         self.ranges: Mapping[str, EffectRange] = ranges

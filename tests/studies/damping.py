@@ -1,0 +1,321 @@
+"""Does damping tell effects apart that frequencies confuse? Sealed trials, judged with and without.
+
+    python -m tests.studies.damping make FOLDER [--trials 120] [--sound 60]
+    python -m tests.studies.damping answer FOLDER
+    python -m tests.studies.damping table
+
+The P235/75R17 (coarse mesh, section taken as drawn, three pressures, nine modes). Tyres: one effect
+of `KINDS` by another law than the catalogue's (`tests.blind.laws`), 20 to 100 % of its range, or
+none; constants and section drawn as stated; computed by the solver; errors of the model drawn by
+its own covariance, frequencies with 0.2 %, damping ratios with 25 % scatter and 10 % of each mode.
+Loss: rate-independent and by stiffening add as a root of squares; 1 % less per kelvin. Two cases:
+loss factor `LOSS` stated (15 %), or no loss factor stated, and the tyre's as `losses` assumes it.
+
+``make`` seals: the truth is in one file, its sha256 heads the record, before anything is answered.
+The judge: all effects and their pairs by `weigh_hypotheses`, on an expansion about the start with
+each effect at further sizes; what `diagnose` evaluates anew at re-fits is left out. The same
+frequencies, with their noise, are judged three times: alone, with damping of either case.
+A pair: the effect, and that effect of another kind which its frequencies are most like (`RIVALS`).
+"""
+
+from __future__ import annotations
+
+import json
+import secrets
+from dataclasses import replace
+from hashlib import sha256
+from math import exp, log, pi, tan
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from tyrecal.simulate.deck.tyre_design import TyreDesign
+from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.simulate.evaluate.store import Store
+from tyrecal.studies.blind.draw import Truth, tyre
+from tyrecal.studies.diagnose.evidence import NONE
+from tyrecal.studies.diagnose.several import present, probabilities, weigh_hypotheses
+from tyrecal.studies.diagnose.verdict import decide
+from tyrecal.studies.fit.targets import target_labels
+from tyrecal.studies.inference.covariance import model_form
+from tyrecal.studies.inference.damping import FORM
+from tyrecal.studies.inference.effect_ranges import effect_ranges
+from tyrecal.studies.inference.expansion import MIDDLE, expand, refined
+from tyrecal.studies.inference.inverse_problem import InverseProblem
+from tyrecal.studies.inference.losses import STATED_SD, UNKNOWN, UNKNOWN_SD
+from tyrecal.studies.inference.model import Answer, Query
+from tyrecal.studies.inference.observations import DampingRatios, Observable, Observations
+from tyrecal.studies.inference.tyre_model import TyreModel
+from tyrecal.studies.inference.uncertainties import sources
+from tyrecal.tyre.case import LoadedCase, start_values
+from tyrecal.tyre.effects.edit import changed, with_part, with_rubbers
+
+from ..blind.laws import other_laws
+from ..effects.support import coarse
+
+Array = np.ndarray
+Row = dict[str, Any]
+BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+TRUTH, RESULT = BENCHMARKS / "damping_truth.json", BENCHMARKS / "damping.jsonl"
+PRESSURES_kPa = (160.0, 240.0, 320.0)
+NOISE, DAMPING_NOISE, SPLIT, SPREAD, SMALLEST = 0.002, 0.25, 0.003, 0.1, 0.2
+LOSS, LOSS_PER_KELVIN = 0.12, -0.01
+KINDS = {
+    "spindle": ("spindle_lateral", "spindle_radial", "spindle_torsional", "spindle_tilt"),
+    "stiffening": ("frequency_stiffening",),
+    "mass": ("point_mass", "tread_density", "tread_wear"),
+    "temperature": ("temperature",),
+}
+WAYS = "frequencies", "loss stated", "loss unknown"
+
+
+def study_case() -> LoadedCase:
+    """The tyre, its section taken as drawn."""
+    case = coarse()
+    return changed(case, section=with_part(case.case.section, known_from=None))
+
+
+def model_of(case: LoadedCase, store: Path | None, known_loss: bool, every: bool) -> TyreModel:
+    """The model of all rows, with the loss factor stated or not, with every effect or none."""
+    if known_loss:
+        case = with_rubbers(case, lambda m: with_part(m, loss_factor=LOSS))
+    evaluator = Evaluator(TyreDesign(case), store=Store(store) if store else None)
+    rows = [(label, p) for p in PRESSURES_kPa for label in target_labels(case)]
+    ranges = effect_ranges(case, evaluator)[0] if every else {}
+    return TyreModel(case, evaluator, list(rows), sources(case)[0], ranges, 1, damped=True)
+
+
+def problem_of(model: TyreModel) -> InverseProblem:
+    """The problem without data, about the start, each effect at further sizes."""
+    expansion = replace(expand(model, model.start), coupling=None)
+    for share in MIDDLE[1:]:
+        sizes = {
+            id: share * max(nodes.reach, key=abs)
+            for id, nodes in expansion.nodes.items()
+            if abs(nodes.values - share * max(nodes.reach, key=abs)).min() > 0
+        }
+        expansion = refined(expansion, model, sizes)
+    at = [Observable("frequency_Hz", label, float(p)) for label, p in model.rows]  # type: ignore[arg-type]
+    pair = np.array([bool(row.label and row.label.c) for row in at])
+    scatter = np.where(pair, NOISE / np.sqrt(2), NOISE)
+    apart = np.where(pair, NOISE * np.sqrt(2), np.nan)
+    seen = Observations(tuple(at), expansion.eta, scatter, 0.0, np.where(pair, 0.0, np.nan), apart)
+    every = np.arange(len(at))
+    return InverseProblem(
+        seen, expansion, model.ranges, every, model.start, model.spread, damping_places=every
+    )
+
+
+def drawn(case: LoadedCase, id: str, seed: list[int], model: TyreModel) -> tuple[Row, Row]:
+    """A trial: its truth, and what was measured. Raises EvaluationFailed, ValueError."""
+    random = np.random.default_rng(seed)
+    law = other_laws(frozenset(model.evaluator.solver.capabilities)).get(id)
+    size = law.drawn(random, SMALLEST) if law else 0.0
+    own = sources(case)[0]
+    variables = {
+        name: value * exp(random.uniform(-SPREAD, SPREAD))
+        for name, value in start_values(case).items()
+    }
+    constants = {source.name: float(random.normal()) for source in own}
+    truth = Truth("", "effect", id, size, variables, constants, 0, False)
+    eta, zeta, split = [], [], []
+    for p in PRESSURES_kPa:
+        made = tyre(truth, case, own, p, law)
+        made = with_rubbers(made, lambda m: with_part(m, loss_factor=UNKNOWN))
+        rows = [row for row in model.rows if row[1] == p]
+        kPa = made.case.pressure_kPa
+        there = TyreModel(made, Evaluator(TyreDesign(made)), [(x, kPa) for x, _ in rows], [], {})
+        (answer,) = there.answers([Query(there.start)])
+        if not isinstance(answer, Answer):
+            raise answer
+        assert answer.damping is not None
+        eta.append(answer.eta)
+        zeta.append(answer.damping - log(UNKNOWN))
+        split.append(answer.split)
+    at = tuple(Observable("frequency_Hz", label, float(p)) for label, p in model.rows)  # type: ignore[arg-type]
+    n, labels = len(at), [str(row.label) for row in at]
+    root = np.linalg.cholesky(model_form(at, model.material_laws) + 1e-12 * np.eye(n))
+    y = np.concatenate(eta) + root @ random.normal(size=n)
+    uneven = {label: random.normal() * SPLIT for label in dict.fromkeys(labels)}
+    members = np.concatenate(split) + [uneven[label] for label in labels]
+    noise = NOISE * random.normal(size=(2, n))
+    pair = np.array([bool(row.label and row.label.c) for row in at])
+    y = y + np.where(pair, noise.mean(0), noise[0])
+    members = np.where(pair, abs(members + noise[1] - noise[0]), 0.0)
+    off = {label: random.normal() * FORM for label in dict.fromkeys(labels)}
+    ln_zeta = np.concatenate(zeta) + [off[label] for label in labels]
+    ln_zeta = ln_zeta + DAMPING_NOISE * random.normal(size=n)
+    losses = {}
+    for way, middle, sd in zip(WAYS[1:], (LOSS, UNKNOWN), (STATED_SD, UNKNOWN_SD), strict=True):
+        loss = middle * exp(sd * random.normal())
+        if id == "frequency_stiffening":
+            loss = float(np.hypot(loss, tan(pi * size / 2)))
+        if id == "temperature":
+            loss *= exp(LOSS_PER_KELVIN * size)
+        losses[way] = log(loss)
+    measured = {"y": y.tolist(), "split": members.tolist()}
+    measured |= {way: (ln_zeta + loss).tolist() for way, loss in losses.items()}
+    return {"effect": id, "size": size, "loss": {k: exp(v) for k, v in losses.items()}}, measured
+
+
+def rivals(problem: InverseProblem) -> dict[str, str]:
+    """For each effect of `KINDS` that of another kind which frequencies least separate."""
+    from tyrecal.studies.diagnose.gap import projection
+
+    P = projection(problem, np.zeros_like(problem.centre))[0]
+    root = np.linalg.cholesky(P + 1e-9 * np.trace(P) * np.eye(len(P))).T
+    kind = {id: name for name, ids in KINDS.items() for id in ids}
+    g = {}
+    for id in kind:
+        e = np.array([max(problem.expansion.nodes[id].reach, key=abs)])
+        shift = root @ (problem.added({id: e}, 1).shift[0])
+        g[id] = shift / np.linalg.norm(shift)
+    return {
+        id: max((j for j in kind if kind[j] != kind[id]), key=lambda j: abs(float(g[id] @ g[j])))
+        for id in kind
+    }
+
+
+def judged(problem: InverseProblem, measured: Row, way: str) -> Row:
+    """Verdict and probabilities by frequencies, and by damping in that way."""
+    seen = problem.observations
+    y = np.array(measured["y"])
+    split = np.where(np.isfinite(seen.split), measured["split"], np.nan)
+    damping = DampingRatios()
+    if way in measured:
+        rows = tuple(replace(row, quantity="damping_ratio") for row in seen.rows)
+        damping = DampingRatios(rows, np.array(measured[way]), np.full(len(y), DAMPING_NOISE))
+    problem = replace(problem, observations=replace(seen, y=y, split=split, damping=damping))
+    hypotheses = weigh_hypotheses(problem)
+    p = probabilities(hypotheses)
+    verdict = decide(hypotheses, p, len(y), len(problem.centre))
+    ids = [id for ids in KINDS.values() for id in ids]
+    kept = {key: round(each, 5) for key, each in p.items() if each > 1e-3}
+    each = {id: float(f"{max(present(p, [id]), 1e-12):.3g}") for id in ids}
+    return {"verdict": verdict.kind, "named": verdict.key, "p": kept, "each": each}
+
+
+@click.group()
+def main() -> None:
+    """Make, answer, or print the table."""
+
+
+@main.command()
+@click.argument("folder", type=Path)
+@click.option("--trials", default=120)
+@click.option("--sound", default=60)
+def make(folder: Path, trials: int, sound: int) -> None:
+    """Draw and compute trials, seal the truth. Resumed."""
+    folder.mkdir(parents=True, exist_ok=True)
+    seed_file = folder / "seed"
+    if not seed_file.exists():
+        seed_file.write_text(str(secrets.randbits(63)))
+    seed, case = int(seed_file.read_text()), study_case()
+    model = model_of(case, None, True, False)
+    ids = [
+        id
+        for ids in zip(*(np.resize(ids, 12) for ids in KINDS.values()), strict=True)
+        for id in ids
+    ]
+    wanted = [str(ids[k % len(ids)]) for k in range(trials)] + [NONE] * sound
+    truths, order = [], np.random.default_rng(seed).permutation(len(wanted))
+    for place, k in enumerate(order.tolist()):
+        path = folder / f"made_{place:03}.json"
+        if not path.exists():
+            for again in range(20):
+                try:
+                    both = drawn(case, wanted[k], [seed, k, again], model)
+                    break
+                except (EvaluationFailed, ValueError):
+                    continue
+            path.write_text(json.dumps(both))
+        truth, measured = json.loads(path.read_text())
+        truths.append(truth)
+        (folder / f"trial_{place:03}.json").write_text(json.dumps(measured))
+    text = json.dumps({"nonce": secrets.token_hex(32), "seed": seed, "trials": truths}, indent=0)
+    (folder / "truth.json").write_text(text + "\n")
+    write({"sha256_of_truth": sha256((text + "\n").encode()).hexdigest(), "trials": len(truths)})
+
+
+@main.command()
+@click.argument("folder", type=Path)
+@click.option("--store", type=Path)
+def answer(folder: Path, store: Path | None) -> None:
+    """Judge each trial that is not on record, a line each; at the end the truth is published."""
+    case = study_case()
+    problems = {way: problem_of(model_of(case, store, way == WAYS[1], True)) for way in WAYS[1:]}
+    problems[WAYS[0]] = problems[WAYS[2]]
+    if len(read()) == 1:
+        write({"rivals": rivals(problems[WAYS[0]])})
+    done = {row["trial"] for row in read() if "trial" in row}
+    for k in range(read()[0]["trials"]):
+        if k not in done:
+            measured = json.loads((folder / f"trial_{k:03}.json").read_text())
+            write({"trial": k, **{way: judged(problems[way], measured, way) for way in WAYS}})
+    TRUTH.write_text((folder / "truth.json").read_text())
+    tell()
+
+
+def read() -> list[Row]:
+    """All rows."""
+    return [json.loads(line) for line in RESULT.read_text(encoding="utf-8").splitlines()]
+
+
+def write(row: Row) -> None:
+    """Add a row."""
+    with RESULT.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(row) + "\n")
+
+
+@main.command()
+def table() -> None:
+    """Print the table of the record."""
+    tell()
+
+
+def scored() -> dict[str, Row]:
+    """Counts by way: trials, right of the pair, top 1, named right and wrong, sound accused."""
+    head, other, *rows = read()
+    text = TRUTH.read_text(encoding="utf-8")
+    assert sha256(text.encode()).hexdigest() == head["sha256_of_truth"]
+    truths, result = json.loads(text)["trials"], {}
+    for way in WAYS:
+        count = dict.fromkeys(("effects", "pair", "top", "named", "wrong", "sound", "accused"), 0)
+        pairs: dict[str, list[int]] = {}
+        for row in rows:
+            own, id = row[way], truths[row["trial"]]["effect"]
+            if id == NONE:
+                count["sound"] += 1
+                count["accused"] += own["named"] is not None
+                continue
+            right = own["each"][id] > own["each"][other["rivals"][id]]
+            count["effects"] += 1
+            count["pair"] += right
+            pairs.setdefault(id, [0, 0])
+            pairs[id][0] += right
+            pairs[id][1] += 1
+            count["top"] += max(own["p"], key=own["p"].get) == id
+            count["named"] += own["named"] == id
+            count["wrong"] += own["named"] is not None and id not in own["named"].split("+")
+        result[way] = {**count, "pairs": pairs}
+    return result
+
+
+def tell() -> None:
+    """The table."""
+    counts = scored()
+    heads = list(counts[WAYS[0]])[:-1]
+    print("|", " | ".join(["judged by", *heads]), "|")
+    print("|---" * (len(heads) + 1) + "|")
+    for way, own in counts.items():
+        print("|", " | ".join([way, *(str(own[key]) for key in heads)]), "|")
+    for id, rival in read()[1]["rivals"].items():
+        each = [counts[way]["pairs"].get(id, [0, 0]) for way in WAYS]
+        print(f"{id} or {rival}:", ", ".join(f"{right} of {all}" for right, all in each))
+
+
+if __name__ == "__main__":
+    main()
