@@ -41,11 +41,11 @@ from tyrecal.studies.diagnose.several import present, probabilities, weigh_hypot
 from tyrecal.studies.diagnose.verdict import decide
 from tyrecal.studies.fit.targets import target_labels
 from tyrecal.studies.inference.covariance import model_form
-from tyrecal.studies.inference.damping import FORM
+from tyrecal.studies.inference.damping import DAMPING_FORM
 from tyrecal.studies.inference.effect_ranges import effect_ranges
 from tyrecal.studies.inference.expansion import MIDDLE, expand, refined
 from tyrecal.studies.inference.inverse_problem import InverseProblem
-from tyrecal.studies.inference.losses import STATED_SD, UNKNOWN, UNKNOWN_SD
+from tyrecal.studies.inference.losses import ASSUMED_LOSS, ASSUMED_LOSS_SD, STATED_LOSS_SD
 from tyrecal.studies.inference.model import Answer, Query
 from tyrecal.studies.inference.observations import DampingRatios, Observable, Observations
 from tyrecal.studies.inference.tyre_model import TyreModel
@@ -124,7 +124,7 @@ def drawn(case: LoadedCase, id: str, seed: list[int], model: TyreModel) -> tuple
     eta, zeta, split = [], [], []
     for p in PRESSURES_kPa:
         made = tyre(truth, case, own, p, law)
-        made = with_rubbers(made, lambda m: with_part(m, loss_factor=UNKNOWN))
+        made = with_rubbers(made, lambda m: with_part(m, loss_factor=ASSUMED_LOSS))
         rows = [row for row in model.rows if row[1] == p]
         kPa = made.case.pressure_kPa
         there = TyreModel(made, Evaluator(TyreDesign(made)), [(x, kPa) for x, _ in rows], [], {})
@@ -133,7 +133,7 @@ def drawn(case: LoadedCase, id: str, seed: list[int], model: TyreModel) -> tuple
             raise answer
         assert answer.damping is not None
         eta.append(answer.eta)
-        zeta.append(answer.damping - log(UNKNOWN))
+        zeta.append(answer.damping - log(ASSUMED_LOSS))
         split.append(answer.split)
     at = tuple(Observable("frequency_Hz", label, float(p)) for label, p in model.rows)  # type: ignore[arg-type]
     n, labels = len(at), [str(row.label) for row in at]
@@ -145,11 +145,13 @@ def drawn(case: LoadedCase, id: str, seed: list[int], model: TyreModel) -> tuple
     pair = np.array([bool(row.label and row.label.c) for row in at])
     y = y + np.where(pair, noise.mean(0), noise[0])
     members = np.where(pair, abs(members + noise[1] - noise[0]), 0.0)
-    off = {label: random.normal() * FORM for label in dict.fromkeys(labels)}
+    off = {label: random.normal() * DAMPING_FORM for label in dict.fromkeys(labels)}
     ln_zeta = np.concatenate(zeta) + [off[label] for label in labels]
     ln_zeta = ln_zeta + DAMPING_NOISE * random.normal(size=n)
     losses = {}
-    for way, middle, sd in zip(WAYS[1:], (LOSS, UNKNOWN), (STATED_SD, UNKNOWN_SD), strict=True):
+    for way, middle, sd in zip(
+        WAYS[1:], (LOSS, ASSUMED_LOSS), (STATED_LOSS_SD, ASSUMED_LOSS_SD), strict=True
+    ):
         loss = middle * exp(sd * random.normal())
         if id == "frequency_stiffening":
             loss = float(np.hypot(loss, tan(pi * size / 2)))
@@ -206,7 +208,7 @@ def main() -> None:
 @main.command()
 @click.argument("folder", type=Path)
 @click.option("--trials", default=120)
-@click.option("--sound", default=60)
+@click.option("--sound", default=40)
 def make(folder: Path, trials: int, sound: int) -> None:
     """Draw and compute trials, seal the truth. Resumed."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -246,15 +248,15 @@ def make(folder: Path, trials: int, sound: int) -> None:
 def answer(folder: Path, store: Path | None) -> None:
     """Judge each trial that is not on record, a line each; at the end the truth is published."""
     case = study_case()
-    problems = {way: problem_of(model_of(case, store, way == WAYS[1], True)) for way in WAYS[1:]}
-    problems[WAYS[0]] = problems[WAYS[2]]
-    if len(read()) == 1:
-        write({"rivals": rivals(problems[WAYS[0]])})
-    done = {row["trial"] for row in read() if "trial" in row}
-    for k in range(read()[0]["trials"]):
-        if k not in done:
-            measured = json.loads((folder / f"trial_{k:03}.json").read_text())
-            write({"trial": k, **{way: judged(problems[way], measured, way) for way in WAYS}})
+    for ways in (WAYS[:2], WAYS[2:]):
+        problem = problem_of(model_of(case, store, ways != WAYS[2:], True))
+        if len(read()) == 1:
+            write({"rivals": rivals(problem)})
+        done = {row["trial"] for row in read() if ways[0] in row}
+        for k in range(read()[0]["trials"]):
+            if k not in done:
+                measured = json.loads((folder / f"trial_{k:03}.json").read_text())
+                write({"trial": k, **{way: judged(problem, measured, way) for way in ways}})
     TRUTH.write_text((folder / "truth.json").read_text())
     tell()
 
@@ -285,7 +287,7 @@ def scored() -> dict[str, Row]:
     for way in WAYS:
         count = dict.fromkeys(("effects", "pair", "top", "named", "wrong", "sound", "accused"), 0)
         pairs: dict[str, list[int]] = {}
-        for row in rows:
+        for row in [row for row in rows if way in row]:
             own, id = row[way], truths[row["trial"]]["effect"]
             if id == NONE:
                 count["sound"] += 1

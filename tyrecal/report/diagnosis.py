@@ -17,7 +17,7 @@ from ..studies.diagnose.study import DiagnosedCase
 from ..studies.diagnose.under_load import LoadedRow
 from ..studies.diagnose.verdict import NAMED, NO_GAP, UNDECIDED, no_gap_words
 from ..studies.fit.result import OTHER_RESIDUALS
-from ..studies.inference.damping import FORM
+from ..studies.inference.damping import DAMPING_FORM
 from ..tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ..units import display_unit, in_engineers_units, signed
 from .shape_data import parts_data
@@ -521,7 +521,7 @@ def _assumptions(study: DiagnosedCase) -> Iterator[str]:
         yield f"Not considered, because a variable of the case calibrates them: {names}."
     if d.damping_ratios:
         yield (
-            f"Damping ratios: scatter as stated, {100 * FORM:g} % more in every mode,"
+            f"Damping ratios: scatter as stated, {100 * DAMPING_FORM:g} % more in every mode,"
             f" {study.model.losses}."
         )
     for left in d.left_out:

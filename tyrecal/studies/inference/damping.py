@@ -1,12 +1,12 @@
 """Measured damping ratios as evidence, in addition to the frequencies.
 
     ln zeta = ln zeta0 + a(e) + J (x - x0) + error,   error ~ N(0, S)
-    S = scatter^2 + FORM^2 (same mode) + L L^T
+    S = scatter^2 + DAMPING_FORM^2 (same mode) + L L^T
 
 zeta_r = 1/2 sum_k eta_k S_rk: half the loss factors eta_k of the compounds, weighted by their share
 S_rk of the mode's energy. a(e): what effects change, from the runs of the expansion; J: by x, from
 differences of these runs; L: by the loss factors, exact (`losses`). Uncertain constants of the case
-move ln zeta by 2 %, [0,0] axial by 9 % (P235/75R17, section measured): `FORM` has them.
+move ln zeta by 2 %, [0,0] axial by 9 % (P235/75R17, section measured): `DAMPING_FORM` has them.
 
 Given the frequencies, x ~ N(x_fit, N^-1), N: information of the fit. Integrated over x the
 likelihood has S + J N^-1 J^T for S. x itself is that of the frequencies: damping, at 25 %, adds
@@ -24,7 +24,7 @@ from .observations import DampingRatios
 Array = np.ndarray
 # standard deviation of ln zeta of a mode, alike in all states, by judgement: the uncertain
 # constants above, loss that changes with frequency and strain, and friction in the fixture
-FORM = 0.1
+DAMPING_FORM = 0.1
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class DampingEvidence:
         known = np.isfinite(at_x0)
         labels = [row.label for row in seen.rows]
         same = np.array([[float(a == b) for b in labels] for a in labels])
-        S = np.diag(seen.scatter**2) + FORM**2 * same + losses @ losses.T
+        S = np.diag(seen.scatter**2) + DAMPING_FORM**2 * same + losses @ losses.T
         inverse = np.zeros_like(S)
         inverse[np.ix_(known, known)] = np.linalg.inv(S[np.ix_(known, known)])
         ln_det = np.linalg.slogdet(S[np.ix_(known, known)])[1]

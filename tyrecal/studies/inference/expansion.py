@@ -33,7 +33,7 @@ FALLBACK = (0.25, 0.5)  # of an end of the range that has no solution
 MIDDLE = (0.25, 0.5, 0.75)  # of an end of the range, where an effect that matters is refined
 MAX_BEND = 0.3  # of a shift, by which the slope at the end may differ from the chord's
 CURVATURE_STEP = 0.05  # of a logarithm, for H from two Jacobians
-LEAST_DAMPING = 0.05  # of the plain tyre's damping ratio, the least that an effect may leave
+MIN_DAMPING_RATIO = 0.05  # of the plain tyre's damping ratio, the least that an effect may leave
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class EffectResponse:
         if self.damping is None:
             return np.zeros((len(e), self.shift.shape[1]))
         ratio = lagrange(self.values, e) @ np.nan_to_num(self.damping, nan=1.0)
-        return np.asarray(np.log(np.maximum(ratio, LEAST_DAMPING)))
+        return np.asarray(np.log(np.maximum(ratio, MIN_DAMPING_RATIO)))
 
     def at(self, e: Array) -> tuple[Array, Array, Array]:
         """a (q, n), B (q, n, v) and split (q, n) at parameters (q,)."""

@@ -15,19 +15,19 @@ import numpy as np
 from ...tyre.case import LoadedCase, number_at
 from ...tyre.case.schema import Rubber
 from ...tyre.effects.edit import changed, with_part, with_rubbers
+from .section_fields import COMPOUNDS_ALIKE  # in the ln of their loss factors, too
 
 Array = np.ndarray
 # loss factor of a compound that states none, and standard deviation of its ln, by judgement: 0.05
 # to 0.2 are usual for rubbers of tyres at 20 to 60 C and small strain
-UNKNOWN, UNKNOWN_SD = 0.1, 0.7
+ASSUMED_LOSS, ASSUMED_LOSS_SD = 0.1, 0.7
 # standard deviation of the ln of a stated one, by judgement: another batch, strain or temperature
-STATED_SD = 0.15
-ALIKE = 0.5  # correlation of the ln of two compounds' loss factors
+STATED_LOSS_SD = 0.15
 
 
 def with_losses(case: LoadedCase) -> LoadedCase:
     """The case with a loss factor in each compound."""
-    return with_rubbers(case, lambda m: with_part(m, loss_factor=m.loss_factor or UNKNOWN))
+    return with_rubbers(case, lambda m: with_part(m, loss_factor=m.loss_factor or ASSUMED_LOSS))
 
 
 def with_twice_the_loss(case: LoadedCase, name: str) -> LoadedCase:
@@ -46,8 +46,8 @@ def losses_in_words(case: LoadedCase) -> str:
     assumed = ", ".join(name for name, m in compounds.items() if not m.loss_factor)
     words = "loss factors as stated"
     if assumed:
-        words += f", but {assumed}: none stated, {UNKNOWN:g} assumed within a factor of"
-        words += f" {exp(UNKNOWN_SD):.1f} (one standard deviation)"
+        words += f", but {assumed}: none stated, {ASSUMED_LOSS:g} assumed within a factor of"
+        words += f" {exp(ASSUMED_LOSS_SD):.1f} (one standard deviation)"
     return words
 
 
@@ -70,7 +70,7 @@ def loss_deviations(case: LoadedCase) -> dict[str, Array]:
         parts += [part] * bool(part.any())
     free = ~np.any(parts, axis=0) if parts else np.ones(len(names), bool)
     stated = [not compounds or bool(compounds[name].loss_factor) for name in names]
-    size = np.where(stated, STATED_SD, UNKNOWN_SD) * free
-    parts.append(np.sqrt(ALIKE) * size)
-    parts += list(np.sqrt(1 - ALIKE) * np.diag(size))
+    size = np.where(stated, STATED_LOSS_SD, ASSUMED_LOSS_SD) * free
+    parts.append(np.sqrt(COMPOUNDS_ALIKE) * size)
+    parts += list(np.sqrt(1 - COMPOUNDS_ALIKE) * np.diag(size))
     return dict(zip(names, np.array(parts).T, strict=True))
