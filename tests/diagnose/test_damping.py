@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from math import pi, tan
 from pathlib import Path
 
@@ -162,7 +163,8 @@ def test_measured_ratios_are_means_with_their_labels(tmp_path: Path) -> None:
 def test_stiffening_loses_at_least_what_causality_demands() -> None:
     add, case = catalogue()["frequency_stiffening"].add, coarse()
     for stated, e, want in ((0.05, 0.2, tan(pi * 0.1)), (0.5, 0.2, 0.5), (None, 0.2, None)):
-        made = add(with_rubbers(case, lambda m, s=stated: with_part(m, loss_factor=s)), e)
+        lossy = partial(with_part, loss_factor=stated)
+        made = add(with_rubbers(case, lossy), e)
         assert made.case.materials["rubber"].loss_factor == want  # type: ignore[union-attr]
     table = with_rubbers(case, lambda m: with_part(m, loss_factor=[[10, 0.01], [100, 0.4]]))
     raised = add(table, 0.1).case.materials["rubber"].loss_factor  # type: ignore[union-attr]
@@ -201,6 +203,9 @@ def test_derivatives_of_a_tyre_of_two_compounds() -> None:
     made, step = expand(model, model.start), 1e-3
     assert made.damping_slopes is not None
     d = step * np.array((0.0, 0.0, 1.0))  # of C10; belt and carcass change hardly anything
-    ln = [each.damping for each in model.answers([Query(model.start + d), Query(model.start - d)])]
-    assert made.damping_slopes[:, 2] == pytest.approx((ln[0] - ln[1]) / 2 / step, abs=0.02)
+    above, below = model.answers([Query(model.start + d), Query(model.start - d)])
+    assert isinstance(above, Answer) and isinstance(below, Answer)
+    assert above.damping is not None and below.damping is not None
+    rise = above.damping - below.damping
+    assert made.damping_slopes[:, 2] == pytest.approx(rise / 2 / step, abs=0.02)
     assert abs(made.damping_slopes[:, :2]).max() < 0.1

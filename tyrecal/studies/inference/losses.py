@@ -18,9 +18,9 @@ from ...tyre.effects.edit import changed, with_part, with_rubbers
 from .section_fields import COMPOUNDS_ALIKE  # in the ln of their loss factors, too
 
 Array = np.ndarray
-# loss factor of a compound that states none, and standard deviation of its ln, by judgement: 0.05
-# to 0.2 are usual for rubbers of tyres at 20 to 60 C and small strain
-ASSUMED_LOSS, ASSUMED_LOSS_SD = 0.1, 0.7
+# loss factor of a compound that states none, and standard deviation of its ln, by judgement: 0.08
+# to 0.3 are usual for rubbers of tyres at 20 to 60 C and small strain
+ASSUMED_LOSS, ASSUMED_LOSS_SD = 0.15, 0.7
 # standard deviation of the ln of a stated one, by judgement: another batch, strain or temperature
 STATED_LOSS_SD = 0.15
 
