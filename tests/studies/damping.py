@@ -14,7 +14,8 @@ loss factor `LOSS` stated (15 %), or none stated, and the tyre's about `DRAWN_LO
 ``make`` seals: the truth is in one file, its sha256 heads the record, before anything is answered.
 The judge: all effects and their pairs by `weigh_hypotheses`, on an expansion about the start with
 each effect at further sizes; what `diagnose` evaluates anew at re-fits is left out. The same
-frequencies, with their noise, are judged three times: alone, with damping of either case.
+frequencies, with their noise, are judged three times: alone, with damping of either case. Damping
+moves no re-fit, so that it is added to the evidence of each, on the grids of the frequencies.
 A pair: the effect, and that effect of another kind which its frequencies are most like (`RIVALS`).
 """
 
@@ -36,7 +37,8 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.store import Store
 from tyrecal.studies.blind.draw import Truth, tyre
-from tyrecal.studies.diagnose.evidence import NONE
+from tyrecal.studies.diagnose.evidence import NONE, Hypothesis
+from tyrecal.studies.diagnose.gap import projection
 from tyrecal.studies.diagnose.several import present, probabilities, weigh_hypotheses
 from tyrecal.studies.diagnose.verdict import decide
 from tyrecal.studies.fit.targets import target_labels
@@ -166,8 +168,6 @@ def drawn(case: LoadedCase, id: str, seed: list[int], model: TyreModel) -> tuple
 
 def rivals(problem: InverseProblem) -> dict[str, str]:
     """For each effect of `KINDS` that of another kind which frequencies least separate."""
-    from tyrecal.studies.diagnose.gap import projection
-
     P = projection(problem, np.zeros_like(problem.centre))[0]
     root = np.linalg.cholesky(P + 1e-9 * np.trace(P) * np.eye(len(P))).T
     kind = {id: name for name, ids in KINDS.items() for id in ids}
@@ -182,19 +182,40 @@ def rivals(problem: InverseProblem) -> dict[str, str]:
     }
 
 
-def judged(problem: InverseProblem, measured: Row, way: str) -> Row:
-    """Verdict and probabilities by frequencies, and by damping in that way."""
+def judged(problem: InverseProblem, measured: Row) -> list[Hypothesis]:
+    """All hypotheses by frequencies."""
     seen = problem.observations
-    y = np.array(measured["y"])
     split = np.where(np.isfinite(seen.split), measured["split"], np.nan)
-    damping = DampingRatios()
-    if way in measured:
-        rows = tuple(replace(row, quantity="damping_ratio") for row in seen.rows)
-        damping = DampingRatios(rows, np.array(measured[way]), np.full(len(y), DAMPING_NOISE))
-    problem = replace(problem, observations=replace(seen, y=y, split=split, damping=damping))
-    hypotheses = weigh_hypotheses(problem)
+    own = replace(seen, y=np.array(measured["y"]), split=split)
+    return weigh_hypotheses(replace(problem, observations=own))
+
+
+def with_damping(
+    problem: InverseProblem, hypotheses: list[Hypothesis], ln_zeta: list[float]
+) -> list[Hypothesis]:
+    """The hypotheses by damping ratios, too."""
+    rows = tuple(replace(row, quantity="damping_ratio") for row in problem.observations.rows)
+    data = DampingRatios(rows, np.array(ln_zeta), np.full(len(rows), DAMPING_NOISE))
+    both = replace(problem, observations=replace(problem.observations, damping=data))
+    assert both.damping
+    result = []
+    for h in hypotheses:
+        added = both.added(h.values, len(h.fitted.d)).damping
+        information = np.linalg.inv(h.fitted.covariance)
+        more = both.damping.ln_likelihood(added, h.fitted.d, information)
+        if not h.values:
+            result.append(replace(h, ln_evidence=h.ln_evidence + float(more[0])))
+            continue
+        ln = h.fitted.ln_evidence + more
+        total = float(np.logaddexp.reduce(ln + h.ln_weights))
+        result.append(replace(h, ln_evidence=total, fitted=h.fitted._replace(ln_evidence=ln)))
+    return result
+
+
+def told(problem: InverseProblem, hypotheses: list[Hypothesis]) -> Row:
+    """Verdict and probabilities."""
     p = probabilities(hypotheses)
-    verdict = decide(hypotheses, p, len(y), len(problem.centre))
+    verdict = decide(hypotheses, p, len(problem.places), len(problem.centre))
     ids = [id for ids in KINDS.values() for id in ids]
     kept = {key: round(each, 5) for key, each in p.items() if each > 1e-3}
     each = {id: float(f"{max(present(p, [id]), 1e-12):.3g}") for id in ids}
@@ -249,15 +270,20 @@ def make(folder: Path, trials: int, sound: int) -> None:
 def answer(folder: Path, store: Path | None) -> None:
     """Judge each trial that is not on record, a line each; at the end the truth is published."""
     case = study_case()
-    for ways in (WAYS[:2], WAYS[2:]):
-        problem = problem_of(model_of(case, store, ways != WAYS[2:], True))
-        if len(read()) == 1:
-            write({"rivals": rivals(problem)})
-        done = {row["trial"] for row in read() if ways[0] in row}
-        for k in range(read()[0]["trials"]):
-            if k not in done:
-                measured = json.loads((folder / f"trial_{k:03}.json").read_text())
-                write({"trial": k, **{way: judged(problem, measured, way) for way in ways}})
+    problems = {way: problem_of(model_of(case, store, way == WAYS[1], True)) for way in WAYS[1:]}
+    problem = problems[WAYS[1]]
+    if len(read()) == 1:
+        write({"rivals": rivals(problem)})
+    done = {row["trial"] for row in read() if "trial" in row}
+    for k in range(read()[0]["trials"]):
+        if k in done:
+            continue
+        measured = json.loads((folder / f"trial_{k:03}.json").read_text())
+        hypotheses = judged(problem, measured)
+        row = {"trial": k, WAYS[0]: told(problem, hypotheses)}
+        for way, own in problems.items():
+            row[way] = told(own, with_damping(own, hypotheses, measured[way]))
+        write(row)
     TRUTH.write_text((folder / "truth.json").read_text())
     tell()
 
@@ -288,7 +314,7 @@ def scored() -> dict[str, Row]:
     for way in WAYS:
         count = dict.fromkeys(("effects", "pair", "top", "named", "wrong", "sound", "accused"), 0)
         pairs: dict[str, list[int]] = {}
-        for row in [row for row in rows if way in row]:
+        for row in rows:
             own, id = row[way], truths[row["trial"]]["effect"]
             if id == NONE:
                 count["sound"] += 1
