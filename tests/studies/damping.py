@@ -12,7 +12,7 @@ Loss: rate-independent and by stiffening add as a root of squares; 1 % less per 
 loss factor `LOSS` stated (15 %), or none stated, and the tyre's about `DRAWN_LOSS`, factor 2.
 
 ``make`` seals: the truth is in one file, its sha256 heads the record, before anything is answered.
-The judge: all effects and their pairs by `weigh_hypotheses`, on an expansion about the start with
+The judge: all single effects by `weigh_hypotheses`, then sets of them, too, on an expansion about the start with
 each effect at further sizes; what `diagnose` evaluates anew at re-fits is left out. The same
 frequencies, with their noise, are judged three times: alone, with damping of either case. Damping
 moves no re-fit, so that it is added to the evidence of each, on the grids of the frequencies.
@@ -47,7 +47,7 @@ from tyrecal.studies.inference.damping import DAMPING_FORM
 from tyrecal.studies.inference.effect_ranges import effect_ranges
 from tyrecal.studies.inference.expansion import MIDDLE, expand, refined
 from tyrecal.studies.inference.inverse_problem import InverseProblem
-from tyrecal.studies.inference.losses import ASSUMED_LOSS_SD, STATED_LOSS_SD
+from tyrecal.studies.inference.losses import ASSUMED_LOSS, ASSUMED_LOSS_SD, STATED_LOSS_SD
 from tyrecal.studies.inference.model import Answer, Query
 from tyrecal.studies.inference.observations import DampingRatios, Observable, Observations
 from tyrecal.studies.inference.tyre_model import TyreModel
@@ -81,10 +81,9 @@ def study_case() -> LoadedCase:
     return changed(case, section=with_part(case.case.section, known_from=None))
 
 
-def model_of(case: LoadedCase, store: Path | None, known_loss: bool, every: bool) -> TyreModel:
-    """The model of all rows, with the loss factor stated or not, with every effect or none."""
-    if known_loss:
-        case = with_rubbers(case, lambda m: with_part(m, loss_factor=LOSS))
+def model_of(case: LoadedCase, store: Path | None, every: bool) -> TyreModel:
+    """The model of all rows, with the loss factor stated, with every effect or none."""
+    case = with_rubbers(case, lambda m: with_part(m, loss_factor=LOSS))
     evaluator = Evaluator(TyreDesign(case), store=Store(store) if store else None)
     rows = [(label, p) for p in PRESSURES_kPa for label in target_labels(case)]
     ranges = effect_ranges(case, evaluator)[0] if every else {}
@@ -110,6 +109,25 @@ def problem_of(model: TyreModel) -> InverseProblem:
     return InverseProblem(
         seen, expansion, model.ranges, every, model.start, model.spread, damping_places=every
     )
+
+
+def unstated(problem: InverseProblem) -> InverseProblem:
+    """The problem of the case without a loss factor: there is one compound, so that damping ratios
+    are in proportion to it, and only stiffening changes it."""
+    expansion, nodes = problem.expansion, dict(problem.expansion.nodes)
+    assert expansion.damping is not None and expansion.losses is not None
+    own = nodes["frequency_stiffening"]
+    least = np.tan(np.pi * own.values / 2)
+    grown = np.maximum(1, least / ASSUMED_LOSS) / np.maximum(1, least / LOSS)
+    assert own.damping is not None
+    nodes["frequency_stiffening"] = replace(own, damping=own.damping * grown[:, None])
+    there = replace(
+        expansion,
+        nodes=nodes,
+        damping=expansion.damping + log(ASSUMED_LOSS / LOSS),
+        losses=expansion.losses * ASSUMED_LOSS_SD / STATED_LOSS_SD,
+    )
+    return replace(problem, expansion=there)
 
 
 def drawn(case: LoadedCase, id: str, seed: list[int], model: TyreModel) -> tuple[Row, Row]:
@@ -182,12 +200,12 @@ def rivals(problem: InverseProblem) -> dict[str, str]:
     }
 
 
-def judged(problem: InverseProblem, measured: Row) -> list[Hypothesis]:
-    """All hypotheses by frequencies."""
+def judged(problem: InverseProblem, measured: Row, sets: bool) -> list[Hypothesis]:
+    """All hypotheses by frequencies; sets: of two and three effects, too."""
     seen = problem.observations
     split = np.where(np.isfinite(seen.split), measured["split"], np.nan)
     own = replace(seen, y=np.array(measured["y"]), split=split)
-    return weigh_hypotheses(replace(problem, observations=own))
+    return weigh_hypotheses(replace(problem, observations=own), pairs=sets)
 
 
 def with_damping(
@@ -238,7 +256,7 @@ def make(folder: Path, trials: int, sound: int) -> None:
     if not seed_file.exists():
         seed_file.write_text(str(secrets.randbits(63)))
     seed, case = int(seed_file.read_text()), study_case()
-    model = model_of(case, None, True, False)
+    model = model_of(case, None, False)
     ids = [
         id
         for ids in zip(*(np.resize(ids, 12) for ids in KINDS.values()), strict=True)
@@ -270,20 +288,27 @@ def make(folder: Path, trials: int, sound: int) -> None:
 def answer(folder: Path, store: Path | None) -> None:
     """Judge each trial that is not on record, a line each; at the end the truth is published."""
     case = study_case()
-    problems = {way: problem_of(model_of(case, store, way == WAYS[1], True)) for way in WAYS[1:]}
-    problem = problems[WAYS[1]]
+    problem = problem_of(model_of(case, store, True))
+    problems = {WAYS[1]: problem, WAYS[2]: unstated(problem)}
     if len(read()) == 1:
         write({"rivals": rivals(problem)})
-    done = {row["trial"] for row in read() if "trial" in row}
-    for k in range(read()[0]["trials"]):
-        if k in done:
+    done = {(row["trial"], row["sets"]) for row in read() if "trial" in row}
+    every = range(read()[0]["trials"])
+    for k, sets in [*((k, False) for k in every), *((k, True) for k in every)]:
+        if (k, sets) in done:
             continue
         measured = json.loads((folder / f"trial_{k:03}.json").read_text())
-        hypotheses = judged(problem, measured)
-        row = {"trial": k, WAYS[0]: told(problem, hypotheses)}
+        hypotheses = judged(problem, measured, sets)
+        row = {"trial": k, "sets": sets, WAYS[0]: told(problem, hypotheses)}
         for way, own in problems.items():
             row[way] = told(own, with_damping(own, hypotheses, measured[way]))
         write(row)
+        if k == every[-1]:
+            reveal(folder)
+
+
+def reveal(folder: Path) -> None:
+    """Publish the truth, after all answers with single effects."""
     TRUTH.write_text((folder / "truth.json").read_text())
     tell()
 
@@ -305,7 +330,7 @@ def table() -> None:
     tell()
 
 
-def scored() -> dict[str, Row]:
+def scored(sets: bool = False) -> dict[str, Row]:
     """Counts by way: trials, right of the pair, top 1, named right and wrong, sound accused."""
     head, other, *rows = read()
     text = TRUTH.read_text(encoding="utf-8")
@@ -314,7 +339,7 @@ def scored() -> dict[str, Row]:
     for way in WAYS:
         count = dict.fromkeys(("effects", "pair", "top", "named", "wrong", "sound", "accused"), 0)
         pairs: dict[str, list[int]] = {}
-        for row in rows:
+        for row in [row for row in rows if row["sets"] == sets]:
             own, id = row[way], truths[row["trial"]]["effect"]
             if id == NONE:
                 count["sound"] += 1
@@ -334,16 +359,18 @@ def scored() -> dict[str, Row]:
 
 
 def tell() -> None:
-    """The table."""
-    counts = scored()
-    heads = list(counts[WAYS[0]])[:-1]
-    print("|", " | ".join(["judged by", *heads]), "|")
-    print("|---" * (len(heads) + 1) + "|")
-    for way, own in counts.items():
-        print("|", " | ".join([way, *(str(own[key]) for key in heads)]), "|")
-    for id, rival in read()[1]["rivals"].items():
-        each = [counts[way]["pairs"].get(id, [0, 0]) for way in WAYS]
-        print(f"{id} or {rival}:", ", ".join(f"{right} of {all}" for right, all in each))
+    """The tables: judged with single effects, and with sets of them."""
+    for sets in (False, True):
+        counts = scored(sets)
+        heads = list(counts[WAYS[0]])[:-1]
+        print("|", " | ".join(["with sets" if sets else "single effects", *heads]), "|")
+        print("|---" * (len(heads) + 1) + "|")
+        for way, own in counts.items():
+            print("|", " | ".join([way, *(str(own[key]) for key in heads)]), "|")
+        for id, rival in read()[1]["rivals"].items():
+            each = [counts[way]["pairs"].get(id, [0, 0]) for way in WAYS]
+            print(f"{id} or {rival}:", ", ".join(f"{right} of {all}" for right, all in each))
+        print()
 
 
 if __name__ == "__main__":
