@@ -17,14 +17,15 @@ from .parameters import FileOrFolder, Number, OneOf, option
     default="",
     metavar="POINT,...",
     help="Points of the tread where a force of 1 N acts: tread:ANGLEdeg:DIRECTION, radial,"
-    " tangential or lateral (default: tread:0deg:radial, or those of --measured).",
+    " tangential or lateral (default: tread:0deg:radial, at a load tread:180deg:radial, or those"
+    " of --measured).",
 )
 @option(
     "--respond",
     default="",
     metavar="POINT,...",
     help="Points of the response: of the tread, or of the hub fx, fy, fz, mx, my, mz (default:"
-    " hub:fz,tread:0deg:radial, or those of --measured).",
+    " hub:fz and the default of --excite, or those of --measured).",
 )
 @option(
     "--from-Hz",
@@ -109,7 +110,7 @@ def command(
     """
     from ..studies.measured_response import read_measured_responses
     from ..studies.pressing_plan import PlannedState, plan_evaluations, plan_pressing
-    from ..studies.response import EXCITE, RESPOND, FrfResult, response_request
+    from ..studies.response import FrfResult, default_points, response_request
     from ..studies.result import StudyInput
 
     options.say_idle(study.terminal, study.jobs, "only one design is evaluated")
@@ -117,7 +118,9 @@ def command(
         raise click.UsageError("--step-Hz: the frequencies are those of --measured")
     if measured:
         read_measured_responses(measured, form, from_Hz, to_Hz)
-    response_request(excite or EXCITE, respond or RESPOND, from_Hz, to_Hz, step_Hz, patch_mm)
+    points = default_points(load_N)
+    excited, seen = excite or points["excite"], respond or points["respond"]
+    response_request(excited, seen, from_Hz, to_Hz, step_Hz, patch_mm)
     loaded, _ = study.load(case, assignments, pressure_kPa)
     loaded, values = arguments.one_design(fitted, loaded, assignments, study.terminal)
     load = arguments.one_load(loaded, load_N, study.allow_unusual)

@@ -20,11 +20,17 @@ from .result import Column, CsvRow, Result, ResultPart, StudyInput, Table, csv_t
 
 Array = np.ndarray
 ResponseForm = Literal["receptance", "accelerance"]
-EXCITE, RESPOND = "tread:0deg:radial", "hub:fz,tread:0deg:radial"
 TO_HZ, STEP_HZ, PATCH_MM = 300.0, 0.5, 20.0  # defaults of the options
 ZERO_BY_SYMMETRY = 1e-10  # of the largest response of its kind
 MAX_BAND_HZ, MAX_RESPONSE_STEPS = 1000.0, 5000
 HUB_NODE, FIRST_TREAD_NODE = 1, 101  # numbers in universal files
+
+
+def default_points(load_N: float | None) -> dict[str, str]:
+    """Where the force and the response are if not given: below the hub, and under a load, whose
+    patch the road holds, above it."""
+    point = "tread:180deg:radial" if load_N else "tread:0deg:radial"
+    return {"excite": point, "respond": f"hub:fz,{point}"}
 
 
 def response_request(
@@ -143,7 +149,7 @@ class FrfResult(Result):
         points, unless they are given, and at its frequencies from ``from_Hz`` to ``to_Hz``. Raises
         InputError, EvaluationFailed."""
         known = read_measured_responses(measured, form, from_Hz, to_Hz) if measured else []
-        places = points_of(known) if known else {"excite": EXCITE, "respond": RESPOND}
+        places = points_of(known) if known else default_points(load_N)
         excite, respond = excite or places["excite"], respond or places["respond"]
         if known:
             f = known[0].frequency_Hz

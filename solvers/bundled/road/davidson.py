@@ -87,10 +87,16 @@ def basis_of(fields: Array, product: Operator, mass: Operator) -> Basis:
 
 
 def lowest(
-    product: Operator, mass: Operator, inverse: Operator, basis: Basis, count: int
+    product: Operator,
+    mass: Operator,
+    inverse: Operator,
+    basis: Basis,
+    count: int,
+    tolerance: float = EIGENVALUE_RTOL,
 ) -> tuple[Array, Array]:
     """The ``count`` lowest eigenvalues, ascending, and vectors (count, size), x^T M x = 1; the
-    ``basis`` grows until it has them, and a matrix near K may start from it.
+    ``basis`` grows until it has them, and a matrix near K may start from it; tolerance: of an
+    eigenvalue, relative.
 
     Operators take blocks (b, size); ``inverse``: about K^-1, symmetric.
     Raises RunFailed, unstable where K is not positive.
@@ -107,8 +113,8 @@ def lowest(
         if values[0] <= 0:
             raise RunFailed("unstable", NOT_STABLE)
         lowest = values[:count]
-        error[before - lowest > EIGENVALUE_RTOL * lowest] = np.inf  # the basis has a lower one
-        left = np.flatnonzero(error > EIGENVALUE_RTOL)
+        error[before - lowest > tolerance * lowest] = np.inf  # the basis has a lower one
+        left = np.flatnonzero(error > tolerance)
         if not len(left):
             return lowest, turn[:, :count].T @ basis.vectors
         # the lowest half first: what brings them on brings the others on as well
@@ -119,7 +125,7 @@ def lowest(
         # the residual in the norm of K^-1, squared: the eigenvalue's error, relative
         error[left] = np.einsum("cs,cs->c", residual, step) / lowest[left]
         before = lowest
-        step = step[error[left] > EIGENVALUE_RTOL]
+        step = step[error[left] > tolerance]
         if not len(step):
             continue
         if len(basis.vectors) + len(step) > MAX_BASIS_PER_MODE * count:
@@ -133,6 +139,6 @@ def lowest(
         H = np.block([[H, column[:-added]], [column[:-added].T, column[-added:]]])
     raise RunFailed(
         "crashed",
-        f"{count} modes of the pressed tyre did not converge: {(error > EIGENVALUE_RTOL).sum()} are"
+        f"{count} modes of the pressed tyre did not converge: {(error > tolerance).sum()} are"
         f" left, the worst off by {error.max():.1e}",
     )

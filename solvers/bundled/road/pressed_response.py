@@ -36,6 +36,7 @@ from .rim_stiffness import MOTION_PARITY, followed, rim_motions, turning_stiffne
 
 Array = np.ndarray
 MODES_UP_TO = 1.2  # times the highest frequency
+MODE_RTOL = 1e-7  # of an eigenvalue, omega^2
 INERTIA_ROUNDS = 2  # of static responses to the inertia of the ones before
 RIM_FOLLOWED_RTOL = 1e-10  # of forces that Psi leaves, which are missing in those on the hub
 REFINEMENTS = 2  # of static responses; what is left of an error counts by its square
@@ -43,6 +44,7 @@ SAMPLES_OF_PATCH = 8  # angles
 UNLOADED_MODES = 120  # to start from
 MIN_PARITY_MODES, FURTHER_MODES = 8, 10  # of a parity that are sought
 SNAPSHOTS = 40  # frequencies in the band
+NO_RESPONSE = 1e-12  # of the largest, round-off: a force on the tread gives about 1e-6 of it
 
 
 @dataclass(frozen=True)
@@ -142,19 +144,20 @@ class PressedResponse:
         for _ in range(REFINEMENTS):
             statics += inverse(rows - K(statics))
 
-        modes = self._modes(symmetry, K, M, inverse)
-        basis = davidson.basis_of(modes, K, M)
+        basis = self._modes(symmetry, K, M, inverse)
         newest = basis.add(statics, K, M)
-        damped = len(basis.vectors)
+        lossy = [operator(part.product) for _, _, part in self._parts]
+        damped = [part(basis.vectors) for part in lossy]
         for _ in range(INERTIA_ROUNDS):
             newest = basis.add(inverse(basis.inertias[-newest:]), K, M)
-        lossy = [operator(part.product) for _, _, part in self._parts]
         if lossy:
             losses = self._losses(self.highest_Hz / 2)
-            images = sum(
-                eta * part(basis.vectors[:damped]) for eta, part in zip(losses, lossy, strict=True)
-            )
+            images = sum(eta * image for eta, image in zip(losses, damped, strict=True))
             basis.add(inverse(images), K, M)
+        lossy_images = [
+            np.vstack([image, part(basis.vectors[len(image) :])])
+            for image, part in zip(damped, lossy, strict=True)
+        ]
 
         def with_rim(image: Callable[[Array], Array], of_basis: Array) -> Array:
             """A matrix (b + q, b + q) of the whole tyre."""
@@ -176,8 +179,8 @@ class PressedResponse:
             C,
             with_rim(self._mass, np.eye(len(basis.vectors))),
             [
-                with_rim(part.product, basis.vectors @ apply(basis.vectors).T)
-                for (_, _, part), apply in zip(self._parts, lossy, strict=True)
+                with_rim(part.product, basis.vectors @ images.T)
+                for (_, _, part), images in zip(self._parts, lossy_images, strict=True)
             ],
             np.hstack([np.reshape(moved, (len(tread), b)), own]),
         )
@@ -188,8 +191,8 @@ class PressedResponse:
         K: davidson.Operator,
         M: davidson.Operator,
         inverse: davidson.Operator,
-    ) -> Array:
-        """Modes (m, size) of a parity up to `MODES_UP_TO` times the highest frequency, and one
+    ) -> davidson.Basis:
+        """Basis of the modes of a parity up to `MODES_UP_TO` times the highest frequency, and one
         beyond."""
         limit = (2 * np.pi * MODES_UP_TO * self.highest_Hz) ** 2
         unloaded = sum(int((m.eigenvalues < limit).sum()) for m in self._unloaded)
@@ -199,9 +202,11 @@ class PressedResponse:
         ]
         basis, count = davidson.basis_of(np.array(start), K, M), max(MIN_PARITY_MODES, unloaded)
         while True:
-            values, modes = davidson.lowest(K, M, inverse, basis, count)
+            values, modes = davidson.lowest(K, M, inverse, basis, count, MODE_RTOL)
             if values[-1] > limit:
-                return np.asarray(modes[: np.searchsorted(values, limit) + 1])
+                kept = modes[: np.searchsorted(values, limit) + 1]
+                basis.cut(kept @ basis.inertias.T)
+                return basis
             count += FURTHER_MODES
 
     def _motion(self, symmetry: HalfTurn, angle: float, way: int) -> Array:
@@ -266,14 +271,17 @@ class PressedResponse:
             raise Refused(
                 f"matrices need at least {2 * kept} coordinates of modes, got {2 * count}"
             )
-        seen = []
+        responses = []
         for square in limit * np.linspace(0, 1, SNAPSHOTS) ** 2:
             Z = reduced.stiffness + 1j * loss - square * reduced.mass
             forces = np.hstack([reduced.tread[:, b:].T, -Z[b:, :b]])
-            q = (turn.T @ np.linalg.solve(Z[b:, b:], forces))[kept:]
-            seen += [q.real, q.imag]
+            responses.append((turn.T @ np.linalg.solve(Z[b:, b:], forces))[kept:])
         scale = np.sqrt(values[kept:, None])
-        more = np.linalg.svd(scale * np.hstack(seen), full_matrices=False)[0]
+        seen = scale * np.array(responses)
+        # a force on the tread and a motion of the hub count alike, whatever their units
+        size = np.sqrt((np.abs(seen) ** 2).sum((0, 1)))
+        seen /= np.maximum(size, NO_RESPONSE * size.max())
+        more = np.linalg.svd(np.hstack([*seen.real, *seen.imag]), full_matrices=False)[0]
         more = np.linalg.qr(more[:, : count - kept] / scale)[0]
         _, own = np.linalg.eigh(more.T @ (values[kept:, None] * more))
         T = np.zeros((len(loss), b + kept + more.shape[1]))
