@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from ..language.text import COMPLEX_STEP, Block, DeckError, Row
-from .deck.request import Request, response_points
+from .deck.request import Request
 from .deck.steps import Deck, DeckStep, Tangent
 from .modes.bordered import Bordered
 from .modes.cavity import GasCavity, read_cavity
@@ -170,16 +170,16 @@ class FrequencyStep:
         if self.step.output not in model.mesh.node_sets:
             raise DeckError(place, "a response needs a *NODE FILE with a set of the tread's nodes")
         tread = [model.mesh.index[n] for n in model.mesh.node_sets[self.step.output]]
-        patch = tread_patch(model.mesh.X, U, np.array(tread), wanted["patch_m"])
-        lowest, highest = wanted["lowest_Hz"], wanted["highest_Hz"]
-        frequencies = np.linspace(lowest, highest, wanted["lines"])
+        patch = tread_patch(model.mesh.X, U, np.array(tread), wanted.patch_m)
+        lowest, highest = wanted.lowest_Hz, wanted.highest_Hz
+        frequencies = np.linspace(lowest, highest, wanted.lines)
         response = Response(self.vibration, model, U, patch, highest, self.tyre.check)
-        points = response_points(wanted)
+        points = wanted.points()
         counts = len(response.harmonics), response.wanted
         receptance, hub = response.at(frequencies, *points)
         matrices = {}
-        if "modes" in wanted:
-            matrices = vars(superelement(response, wanted["modes"], points[1]))
+        if wanted.modes:
+            matrices = vars(superelement(response, wanted.modes, points[1]))
         return ResponseResult(frequencies, receptance, hub, patch.radius, *counts, matrices)
 
     def _static_factor(self) -> Factor:
@@ -301,7 +301,7 @@ def _sector_modes(
     )
     if model.mesh is not other.mesh:
         raise DeckError(place, "the sector's section job must have the same mesh")
-    sector = SpliceSector(np.radians(float(tyre.request.sector["width_deg"])), other)
+    sector = SpliceSector(np.radians(tyre.request.sector.width_deg), other)
     return sector_modes(
         vibration, tyre.U, pressures(model, step), model, sector, harmonics, count, tyre.check
     )

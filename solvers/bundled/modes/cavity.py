@@ -19,13 +19,12 @@ B dV / V. The twist of the inflated section is left out of exp(i n theta).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ...language.text import WHOLE_DECK, Block, DeckError
+from ..deck.request import Cavity
 from ..section import elements
 from ..section.elements import Lines
 from ..section.materials import Scalar, read_materials
@@ -49,20 +48,18 @@ class GasCavity:
     surfaces: list[Lines]
 
 
-def read_cavity(keywords: list[Block], mesh: DeckMesh, cavity: Mapping[str, Any]) -> GasCavity:
-    """The gas ``cavity["material"]`` inside ``cavity["surfaces"]``. Raises DeckError."""
-    name = str(cavity.get("material", "")).upper()
+def read_cavity(keywords: list[Block], mesh: DeckMesh, cavity: Cavity) -> GasCavity:
+    """The gas of a request. Raises DeckError."""
+    name = cavity.material.upper()
     material = read_materials(keywords).get(name)
-    surfaces = [str(surface).upper() for surface in cavity.get("surfaces", ())]
+    surfaces = [surface.upper() for surface in cavity.surfaces]
     if material is None or material.bulk_modulus is None or not np.real(material.density) > 0:
         raise DeckError(
             WHOLE_DECK, f"the cavity's material '{name}' has no *ACOUSTIC MEDIUM and *DENSITY"
         )
     missing = [surface for surface in surfaces if surface not in mesh.faces]
-    if missing or not surfaces:
-        raise DeckError(
-            WHOLE_DECK, f"the cavity needs surfaces that are defined, got {missing or 'none'}"
-        )
+    if missing:
+        raise DeckError(WHOLE_DECK, f"the cavity needs surfaces that are defined, got {missing}")
     return GasCavity(material.density, material.bulk_modulus, [mesh.faces[s] for s in surfaces])
 
 

@@ -26,7 +26,6 @@ import numpy as np
 
 from ...errors import Refused, RunFailed
 from ...language.text import WHOLE_DECK, DeckError
-from ..deck.request import response_points
 from ..modes.harmonics import Vibration, lowest_of_all
 from ..modes.response import tread_patch
 from ..section.band import Numbering
@@ -263,8 +262,8 @@ def _response(
     assert request is not None
     tyre = Revolved(wanted.model, work.tyre.loads, work.tyre.around)
     U = work.symmetry.spread(state.parts)
-    lowest, highest = request["lowest_Hz"], request["highest_Hz"]
-    excited, seen = response_points(request)
+    lowest, highest = request.lowest_Hz, request.highest_Hz
+    excited, seen = request.points()
     vibration = Vibration(wanted.model, inflated, tyre.loads, equations, 0.0)
     response = PressedResponse(
         tyre,
@@ -273,18 +272,18 @@ def _response(
         held(state.contact),
         work.tyre.residual(U),
         lowest_of_all(vibration, UNLOADED_MODES, work.check),
-        tread_patch(wanted.model.mesh.X, inflated, wanted.nodes, request["patch_m"]),
+        tread_patch(wanted.model.mesh.X, inflated, wanted.nodes, request.patch_m),
         [*excited, *seen],
         highest,
         work.check,
         work.release_factor() if wanted.model is work.tyre.model else None,
     )
-    frequencies = np.linspace(lowest, highest, request["lines"])
+    frequencies = np.linspace(lowest, highest, request.lines)
     harmonics = 1 + int(WAVE_BY_ELEMENTS / (2 * np.diff(angles).max()) + 1e-9)
     result = response.result(frequencies, len(excited), harmonics)
     arrays = {name: each for name, each in vars(result).items() if name != "matrices"}
-    if "modes" in request:
-        arrays |= vars(response.superelement(request["modes"], len(excited)))
+    if request.modes:
+        arrays |= vars(response.superelement(request.modes, len(excited)))
     return {f"{RESPONSE}{name}": np.asarray(each) for name, each in arrays.items()}
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ...language.text import Block, DeckError
+from ..deck.request import ResponseRequest
 from ..section.model import Model
 from ..section.parts.part import TyrePart
 
@@ -39,7 +39,7 @@ class ModeRequest:
     nodes: Array  # rows at which their shapes are wanted
     wheel_kg: float | None = None  # of a wheel that is free along the load
     # in place of modes: responses to a force on the tread, as `deck.request` has them
-    response: Mapping[str, Any] | None = None
+    response: ResponseRequest | None = None
 
 
 @dataclass(frozen=True)
