@@ -81,6 +81,11 @@ def test_a_spacing_at_a_radius_grows_with_the_radius(tmp_path: Path) -> None:
         ("CARCASS, 4.2E-07", "SOLID, 4.2E-07", "is a CGAX8R, no membrane"),
         ("CARCASS, 4.2E-07", "CARCASS, 0.0", "the area must be positive"),
         ("TYPE=MGAX2", "TYPE=SFMGAX2", "is a SFMGAX2"),
+        (
+            "\n1e-06\n*REBAR",
+            "\n1e-06\n*HOURGLASS STIFFNESS\n1\n*REBAR",
+            "not honoured of a *MEMBRANE",
+        ),
         ("\n1e-06\n*REBAR", "\n-1e-06\n*REBAR", "thickness"),
     ],
 )

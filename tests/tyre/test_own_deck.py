@@ -69,7 +69,7 @@ def test_what_abaqus_would_refuse(tmp_path: Path, capsys: pytest.CaptureFixture[
         main(["deck", "--check", str(path), "--json"])
     assert ended.value.code == 2
     out = json.loads(capsys.readouterr().out)
-    assert re.match(r"tyre.inp, line \d+: \*ELASTIC: must follow", out["refused"])
+    assert re.match(r"tyre.inp, line \d+: \*ELASTIC: must be under", out["refused"])
     assert [re.sub(r".*?: ", "", words, count=1) for words in out["calculix"]] == [
         "*ELEMENT: its axisymmetric elements (CAX) do not twist, as belts make a tyre do",
         "*ELEMENT: it has no rebar: cords are solids of a stiff direction there",

@@ -139,7 +139,7 @@ def _sentence(error: ValidationError) -> str:
         return f"is not JSON: {words}"
     loc = first["loc"]
     key = "".join(f"[{k}]" if isinstance(k, int) else f".{k}" for k in loc).lstrip(".")
-    row = ROWS.get(loc[0], "") if any(isinstance(k, int) for k in loc) else ""
+    row = ROWS.get(str(loc[0]), "") if any(isinstance(k, int) for k in loc) else ""
     if kind == "missing":
         return f"{key} is missing{row}"
     if kind == "unexpected_keyword_argument":

@@ -10,18 +10,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .numbers import plain_number
-from .text import Block, check_honoured, table
+from .text import Block, check_honoured, split_steps, table
 
 LOADS = ("DSLOAD", "DLOAD")
-OF_THE_MODEL = ("MATERIAL", "PARAMETER", "AMPLITUDE", "BOUNDARY")
-OWNERS = {  # of options: the keywords that they follow, and words for one that does not
-    "MATERIAL OPTION": (("MATERIAL",), "must follow a *MATERIAL"),
-    "REBAR LAYER": (
-        ("SURFACE SECTION", "MEMBRANE SECTION"),
-        "must follow a *SURFACE SECTION or *MEMBRANE SECTION",
-    ),
-    "HOURGLASS STIFFNESS": (("SOLID SECTION",), "must be directly under its *SOLID SECTION"),
-}
 
 
 @dataclass
@@ -40,47 +31,28 @@ class ClassifiedDeck:
 def classify(blocks: Sequence[Block]) -> ClassifiedDeck:
     """Blocks checked and classified. Raises OwnDeckError for what is not honoured."""
     deck = ClassifiedDeck()
-    steps: list[list[Block]] = []
-    step: list[Block] | None = None
+    model, steps = split_steps(blocks)
     opened: list[str] = []  # *PART, *ASSEMBLY and *INSTANCE that have not ended
-    after_a_step = False
     over: Block | None = None  # the *MATERIAL or section that options may follow
-    for block in blocks:
+    for block in model:
         name = block.name
-        if step is None and name == "STEP":
-            if opened:
-                raise block.refused("is inside a *PART or *ASSEMBLY that does not end")
-            step = []
-        if step is not None:
-            if name == "STEP" and step:
-                raise block.refused("is inside a step: *END STEP is missing")
-            step.append(block)
-            if name == "END STEP":
-                steps.append(step)
-                step, after_a_step = None, True
-            continue
         if name in table.OUTPUT_KEYWORDS:
             deck.passed.append(block)
             continue
-        if name in table.RULES and [*table.RULES[name].options_at] == ["deck step"]:
-            raise block.refused("is outside a step")
-        if after_a_step:
-            raise block.refused("is after a step: the model's keywords must be before *STEP")
         if name in table.CONTACT_KEYWORDS:
             deck.contact.append(block)
             continue
         check_honoured(block, "deck")
-        is_of_material = name in table.MATERIAL_OPTIONS
+        rule = table.RULES[name]
         deck.model.append(block)
-        owners, words = OWNERS.get("MATERIAL OPTION" if is_of_material else name, ((), ""))
-        if not owners:
+        if not rule.under:
             over = block
-        elif over is None or over.name not in owners:
-            raise block.refused(words)
+        elif over is None or over.name not in rule.under:
+            raise block.refused(f"must be under a *{' or *'.join(rule.under)}")
         else:
             deck.options.setdefault(over, []).append(block)
-        if name in ("PART", "ASSEMBLY") and opened:
-            raise block.refused("is inside another *PART or *ASSEMBLY")
+        if opened and "part" not in rule.level.split():
+            raise block.refused("belongs to the model, outside *PART and *ASSEMBLY")
         if name == "INSTANCE" and opened != ["ASSEMBLY"]:
             raise block.refused("must be in an *ASSEMBLY, not in another *INSTANCE")
         if name in ("PART", "ASSEMBLY", "INSTANCE"):
@@ -89,12 +61,8 @@ def classify(blocks: Sequence[Block]) -> ClassifiedDeck:
             if opened[-1:] != [name.removeprefix("END ")]:
                 raise block.refused("ends what did not begin, or not what began last")
             opened.pop()
-        elif opened and (is_of_material or name in OF_THE_MODEL):
-            raise block.refused("belongs to the model, outside *PART and *ASSEMBLY")
-    if step is not None:
-        raise step[0].refused("has no *END STEP: the deck is cut off")
     if opened:
-        raise blocks[-1].refused("is the last, but a *PART, *ASSEMBLY or *INSTANCE has no end")
+        raise model[-1].refused("is the last, but a *PART, *ASSEMBLY or *INSTANCE has no end")
     inflating = _last_that_raises_the_pressure(steps)
     for k, each in enumerate(steps[: len(steps) if inflating is None else inflating + 1]):
         _step(each, deck, is_inflation=k == inflating)

@@ -37,8 +37,8 @@ class OwnDeck:
     units: Units
     blocks: tuple[Block, ...]
     texts: Mapping[str, str]  # of its files, by name relative to its folder
-    _models: dict[tuple[Block, ...], DeckModel] = field(default_factory=dict, repr=False)
     _filled: dict[int, Block] = field(default_factory=dict, repr=False)
+    _models: dict[tuple[Block, ...], DeckModel] = field(default_factory=dict, repr=False)
 
     @cached_property
     def places(self) -> dict[str, tuple[int, int, int]]:
@@ -105,20 +105,15 @@ class OwnDeck:
             if place in changes:
                 block = numbers_of.replaced(block, changes[place])
             if place in self._marked:
-                block = self._same(place, numbers_of.filled(block, numbers, known))
+                block = numbers_of.filled(block, numbers, known)
+                last = self._filled.setdefault(place, block)
+                if block.identity == last.identity:
+                    block = last  # options and models know their blocks
+                self._filled[place] = block
             if block.name == "PARAMETER":
                 numbers_of.parameters(block, known)
             result.append(block)
         return result
-
-    def _same(self, place: int, block: Block) -> Block:
-        """A block, or the one that was there last where it has the same content."""
-        last = self._filled.get(place, block)
-        rows = [[row.fields for row in each.rows] for each in (block, last)]
-        if last.parameters != block.parameters or rows[0] != rows[1]:
-            last = block
-        self._filled[place] = last
-        return last
 
     def model(self, deck: ClassifiedDeck) -> DeckModel:
         """The section of classified blocks, remembered while the mesh's own stay the same."""

@@ -14,7 +14,7 @@ from ...errors import InputError
 from .numbers import DECK_MARK, plain_number
 from .own_deck import UNIT_LENGTH, UNIT_MASS, OwnDeck, Units, read_own_deck
 from .own_text import Setting, own_texts
-from .text import Block, OwnDeckError, Place, Row, named
+from .text import Block, OwnDeckError, Place, Row, named, split_steps
 
 JOB_FILE = re.compile(r"[A-Za-z0-9_\-]{1,60}\.inp", re.IGNORECASE)  # a file that names a job
 PRESSURE_MARK = "pressure"  # filled with the case's pressure
@@ -100,12 +100,7 @@ class OwnDecks:
     @cached_property
     def modes_step(self) -> list[Block]:
         """The step of the last deck that finds the modes, *STEP to *END STEP."""
-        steps: list[list[Block]] = []
-        for block in self.decks[-1].blocks:
-            if block.name == "STEP":
-                steps.append([])
-            if steps and (not steps[-1] or steps[-1][-1].name != "END STEP"):
-                steps[-1].append(block)
+        _, steps = split_steps(self.decks[-1].blocks)
         modal = [step for step in steps if any(block.name == "FREQUENCY" for block in step)]
         if len(modal) != 1:
             raise OwnDeckError(
@@ -113,8 +108,6 @@ class OwnDecks:
                 f"the last deck finds the modes: it needs one step with *FREQUENCY, it has"
                 f" {len(modal)}",
             )
-        if modal[0][-1].name != "END STEP":
-            raise modal[0][0].refused("has no *END STEP")
         return modal[0]
 
     @cached_property

@@ -163,6 +163,8 @@ class _Writer(DeckLines):
 
     def layers(self, section: Assigned, option: Block) -> list[RebarPly]:
         """Write a *REBAR LAYER of a section; returns its layers."""
+        if option.name != "REBAR LAYER":
+            raise option.refused(f"is not honoured of a *{section.block.name}")
         if not option.rows:
             raise option.refused(
                 "needs a data line: name, area, spacing, position, material, angle"

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 from .model import DeckModel
 from .numbers import written
@@ -67,13 +68,9 @@ def _tolerances(block: Block, length: float) -> str:
     return "".join(f", {name}={written(x * scale)}" for name, x, scale in numbers if x is not None)
 
 
+@lru_cache(maxsize=8)
 def solver_mesh(model: DeckModel, length: float) -> SolverMesh:
-    """The mesh of a model whose unit of length is so many m, remembered with it. Raises
-    OwnDeckError."""
-    known = getattr(model, "_flat", {})
-    if length in known:
-        mesh: SolverMesh = known[length]
-        return mesh
+    """The mesh of a model whose unit of length is so many m, remembered. Raises OwnDeckError."""
     number = {n: k for k, n in enumerate(sorted(model.nodes), start=1)}
     nodes = {number[n]: (length * r, length * z) for n, (r, z) in sorted(model.nodes.items())}
     write = DeckLines()
@@ -133,7 +130,7 @@ def solver_mesh(model: DeckModel, length: float) -> SolverMesh:
         for j, (row, _) in enumerate(each.lines, start=1):
             line(f"EMBEDDED_{k}_{j}", row.place)
     line(f"*RIGID BODY, REF NODE={REFERENCE_NODE}, TIE NSET=RIM", start)
-    made = SolverMesh(
+    return SolverMesh(
         nodes,
         solids,
         plies,
@@ -150,19 +147,24 @@ def solver_mesh(model: DeckModel, length: float) -> SolverMesh:
         tuple(write.lines),
         tuple(write.origins),
     )
-    object.__setattr__(model, "_flat", {**known, length: made})
-    return made
 
 
 def _around(boundary: Sequence[Face], inner: Sequence[int]) -> list[int]:
     """The boundary that the inner surface is part of, along that."""
-    following = {face[2][0]: face[2][1:] for face in boundary}
-    chain = [inner[0] if inner[0] in following else boundary[0][2][0]]
-    while len(chain) == 1 or chain[-1] != chain[0]:
-        if chain[-1] not in following or len(chain) > 3 * len(boundary):
-            break
-        chain += following[chain[-1]]
+    following = {face[2][0]: face[2] for face in boundary}
+    chain = _follow(inner[0] if inner[0] in following else boundary[0][2][0], following)
     return chain if chain[1] == inner[1] else chain[::-1]
+
+
+def _follow(start: int, following: Mapping[int, tuple[int, ...]]) -> list[int]:
+    """Nodes of the faces that begin where another ends, from a node to an end or once round."""
+    chain, seen = [start], {start}
+    while chain[-1] in following:
+        chain += following[chain[-1]][1:]
+        if chain[-1] in seen:
+            break
+        seen.add(chain[-1])
+    return chain
 
 
 def _chain(faces: Sequence[Face], nodes: Mapping[int, Point]) -> list[int]:
@@ -171,13 +173,7 @@ def _chain(faces: Sequence[Face], nodes: Mapping[int, Point]) -> list[int]:
     ends = {face[2][-1] for face in faces}
     best = list[int]()
     for start in [n for n in following if n not in ends] or [faces[0][2][0]]:
-        chain, seen = [start], {start}
-        while chain[-1] in following:
-            further = following[chain[-1]][1:]
-            chain += further
-            if further[-1] in seen:
-                break
-            seen.add(further[-1])
+        chain = _follow(start, following)
         if len(chain) > len(best):
             best = chain
     return best if nodes[best[0]][1] <= nodes[best[-1]][1] else best[::-1]

@@ -19,7 +19,8 @@ Block = language.Block
 Place = language.Place
 Row = language.Row
 is_label, names_of, number_from = language.is_label, language.names_of, language.number_from
-check_honoured, named = honour.check_honoured, spelling.named
+check_honoured, split_steps = honour.check_honoured, honour.split_steps
+named = spelling.named
 MAX_OWN_BYTES = 50_000_000  # of a deck and all that it includes
 
 
