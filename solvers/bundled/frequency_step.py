@@ -164,16 +164,24 @@ class FrequencyStep:
         )
         if wanted is None:
             return None
-        if is_nonuniform(self.tyre, self.step) or not self.vibration.plain or self.vibration.shift:
-            words = "a response needs a tyre that is the same all round, its rim held, without gas"
+        held, wheel = self.vibration, self.vibration.wheel
+        if is_nonuniform(self.tyre, self.step) or held.air:
+            words = "a response needs a tyre that is the same all round, without gas"
             raise DeckError(place, words)
+        if wheel or held.shift:
+            if wanted.modes:
+                raise DeckError(place, "matrices need a rim that is held")
+            acting = loads(model, self.step)
+            held = Vibration(model, U, acting, self.equations, 0.0)
+        if wheel and not all(wheel.stiffness.get(m) for m in wheel.free) and not wanted.lowest_Hz:
+            raise DeckError(place, "a free wheel has no response at 0 Hz: begin above it")
         if self.step.output not in model.mesh.node_sets:
             raise DeckError(place, "a response needs a *NODE FILE with a set of the tread's nodes")
         tread = [model.mesh.index[n] for n in model.mesh.node_sets[self.step.output]]
         patch = tread_patch(model.mesh.X, U, np.array(tread), wanted.patch_m)
         lowest, highest = wanted.lowest_Hz, wanted.highest_Hz
         frequencies = np.linspace(lowest, highest, wanted.lines)
-        response = Response(self.vibration, model, U, patch, highest, self.tyre.check)
+        response = Response(held, model, U, patch, highest, self.tyre.check, wheel)
         points = wanted.points()
         counts = len(response.harmonics), response.wanted
         receptance, hub = response.at(frequencies, *points)

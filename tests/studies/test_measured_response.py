@@ -136,7 +136,6 @@ def test_tables_that_are_refused(tmp_path: Path, rows: str, words: str) -> None:
 @pytest.mark.parametrize(
     ("function", "words"),
     [
-        (motion(1, 3), "the response at hub:fz must be a force or moment"),
         (motion(7, 1, FORCE, "force"), "tread:0deg:radial must be a motion"),
         (motion(7, 1, to=1), "the force must be on the tread, it is at hub:fx"),
         (motion(7, 4), "direction 4 of node 7 is along none of radial, tangential, lateral"),
@@ -147,6 +146,12 @@ def test_tables_that_are_refused(tmp_path: Path, rows: str, words: str) -> None:
 def test_functions_that_are_refused(tmp_path: Path, function: WrittenFunction, words: str) -> None:
     with pytest.raises(InputError, match=words):
         read_measured_responses(written(tmp_path / "m.uff", function), "receptance", 0.0, 100.0)
+
+
+def test_a_motion_of_the_hub_is_that_of_a_wheel_that_moves(tmp_path: Path) -> None:
+    path = written(tmp_path / "m.uff", motion(1, 3))
+    (each,) = read_measured_responses(path, "receptance", 0.0, 100.0)
+    assert str(each.respond) == "hub:z"
 
 
 def test_a_file_that_is_empty_is_named(tmp_path: Path) -> None:

@@ -15,17 +15,20 @@ from tyrecal.errors import InputError
 from tyrecal.measured.universal import read_universal
 from tyrecal.report.response import draw_responses
 from tyrecal.simulate.deck.tyre_design import TyreDesign
-from tyrecal.simulate.evaluate.evaluator import Evaluator
+from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.modes.label import paired_labels
 from tyrecal.studies.response import FrfResult, response_request
 from tyrecal.studies.response_points import read_points
 from tyrecal.studies.result import StudyInput
 from tyrecal.tyre.case import LoadedCase, start_values
+from tyrecal.tyre.case.parts import Spindle
 
 from ..conftest import CASES
 
 Array = np.ndarray
 CASE_FILE = Path(__file__).parents[2] / "cases" / "p235_75r17.yaml"
 PATCH_MM, RADIUS_m = 100.0, 0.3927
+FORCES = "tread:0deg:radial,tread:90deg:radial,tread:0deg:tangential,tread:0deg:lateral"
 BAND = {"from_Hz": 0.0, "to_Hz": 100.0, "step_Hz": 2.0, "patch_mm": PATCH_MM}
 
 
@@ -81,6 +84,76 @@ def test_a_quarter_turn_and_reciprocity(responses: FrfResult) -> None:
     peaks = responses.quantities()
     assert peaks["peak_Hz hub:fz tread:0deg:radial"] == pytest.approx(66.5, abs=1.5)
     assert peaks["peak hub:fz tread:0deg:radial"] == pytest.approx(1 / (2 * 0.0215), rel=0.15)
+
+
+def on_rim(case: LoadedCase, **rim: object) -> LoadedCase:
+    """The example on another rim."""
+    own = case.case.rim.model_copy(update=rim)
+    return replace(case, case=case.case.model_copy(update={"rim": own}))
+
+
+def accelerances(
+    case: LoadedCase, respond: str, from_Hz: float = 0.2, step_Hz: float = 60.0, steps: int = 1
+) -> FrfResult:
+    """Accelerances by forces on the tread, with waves up to 4."""
+    given = StudyInput(case, Evaluator(TyreDesign(case)), {"initial": start_values(case)})
+    band = {"from_Hz": from_Hz, "to_Hz": from_Hz + steps * step_Hz, "step_Hz": step_Hz}
+    options = {"excite": FORCES, "respond": respond, "patch_mm": 200.0, "form": "accelerance"}
+    return FrfResult.run(given, **band, **options)
+
+
+@pytest.mark.slow
+def test_a_free_wheel_moves_as_a_rigid_body_at_low_frequencies(case: LoadedCase) -> None:
+    """Its accelerance is 1 / (mass of tyre and wheel), times the share of the patch's force that
+    moves the whole; it is reciprocal."""
+    free = accelerances(on_rim(case, free=True), f"hub:x,hub:y,hub:z,{FORCES}")
+    evaluation = Evaluator(TyreDesign(case)).evaluate(Question({}))
+    mass = evaluation.mass_kg + case.case.rim.mass_kg
+    b = 0.1 / free.radius_m
+    share = np.sin(b) / b
+    low = lambda respond, excite: function(free, respond, excite)[0].real
+    assert low("hub:z", "tread:0deg:radial") == pytest.approx(-share / mass, rel=1e-4)
+    assert low("hub:x", "tread:90deg:radial") == pytest.approx(-share / mass, rel=1e-4)
+    assert low("hub:x", "tread:0deg:tangential") == pytest.approx(-share / mass, rel=1e-4)
+    assert low("hub:y", "tread:0deg:lateral") == pytest.approx(1 / mass, rel=1e-4)
+    assert free.wheel == "free" and "no force on the hub is blocked" in free.sentences()[0]
+    there = function(free, "tread:90deg:radial", "tread:0deg:lateral")
+    back = function(free, "tread:0deg:lateral", "tread:90deg:radial")
+    size = np.abs(function(free, "tread:0deg:radial", "tread:0deg:radial"))
+    np.testing.assert_allclose(there, back, rtol=0, atol=1e-9 * size.max())
+    one = function(free, "tread:0deg:tangential", "tread:90deg:radial")
+    other = function(free, "tread:90deg:radial", "tread:0deg:tangential")
+    np.testing.assert_allclose(one, other, rtol=0, atol=1e-9 * size.max())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("label", "respond", "excite"),
+    [("[1,0]", "hub:z", "tread:0deg:radial"), ("[1,1]", "hub:rx", "tread:0deg:lateral")],
+)
+def test_a_free_wheel_resonates_at_its_modes(
+    case: LoadedCase, label: str, respond: str, excite: str
+) -> None:
+    """Half the bandwidth away from a mode, the response falls by the square root of 2, within what
+    other modes add."""
+    free = on_rim(case, free=True)
+    modes = paired_labels(Evaluator(TyreDesign(free)).evaluate(Question({})).modes)
+    (mode,) = (each for each in modes if str(each.label) == label)
+    f, ratio = mode.frequency_Hz, mode.raw.damping_ratio
+    assert ratio
+    result = accelerances(free, respond, f * (1 - ratio), f * ratio, steps=2)
+    values = np.abs(function(result, respond, excite))
+    assert values[[0, 2]] / values[1] == pytest.approx(2**-0.5, rel=0.1)
+
+
+@pytest.mark.slow
+def test_on_very_stiff_springs_the_rim_is_held(case: LoadedCase) -> None:
+    stiffest = Spindle(**dict.fromkeys(Spindle.model_fields, 1e-14))
+    held, stiff = (accelerances(each, FORCES) for each in (case, on_rim(case, spindle=stiffest)))
+    assert stiff.wheel == "springs" and held.wheel == "held"
+    for each in held.functions:
+        other = function(stiff, each.respond, each.excite)
+        np.testing.assert_allclose(other, each.values, rtol=1e-6, atol=1e-9 * each.peak)
 
 
 def test_the_universal_file_reads_back(
@@ -210,12 +283,19 @@ def test_requests_that_are_refused(change: dict[str, float], words: str) -> None
 
 @pytest.mark.parametrize(
     ("setting", "words"),
-    [("rim.free=true", "a rim that moves"), ("splice.share=0.01", "couples harmonics")],
+    [
+        ("rim.free=true --load-N 4000", "a rim that moves"),
+        (
+            "rim.free=true --respond hub:fz",
+            "or hub:z with one of x, y, z, rx, ry, rz (the wheel moves)",
+        ),
+        ("splice.share=0.01", "couples harmonics"),
+    ],
 )
 def test_tyres_that_are_refused_before_anything_runs(
     setting: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    out = ["--set", setting, "--output", str(tmp_path / "out")]
+    out = ["--set", *setting.split(), "--output", str(tmp_path / "out")]
     with pytest.raises(SystemExit) as leave:
         main(["frf", str(CASES / "p235_75r17.yaml"), "--mesh", "coarse", *out])
     assert leave.value.code == 2

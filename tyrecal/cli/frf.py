@@ -24,8 +24,9 @@ from .parameters import FileOrFolder, Number, OneOf, option
     "--respond",
     default="",
     metavar="POINT,...",
-    help="Points of the response: of the tread, or of the hub fx, fy, fz, mx, my, mz (default:"
-    " hub:fz and the default of --excite, or those of --measured).",
+    help="Points of the response: of the tread, or of the hub fx, fy, fz, mx, my, mz; of one that"
+    " moves x, y, z, rx, ry, rz (default: hub:fz or hub:z and the default of --excite, or those of"
+    " --measured).",
 )
 @option(
     "--from-Hz",
@@ -33,7 +34,7 @@ from .parameters import FileOrFolder, Number, OneOf, option
     type=Number(),
     default=0.0,
     metavar="A",
-    help="Lowest frequency, Hz (default: 0).",
+    help="Lowest frequency, Hz (default: 0; of a free wheel the step).",
 )
 @option(
     "--to-Hz",
@@ -95,22 +96,24 @@ def command(
     pictures: bool,
     study: options.Study,
 ) -> int:
-    """Compute response functions of the tyre of CASE, its rim held, unloaded or on the road.
+    """Compute response functions of the tyre of CASE, unloaded on its rim, or on the road.
 
     Writes frf.json, .csv, .uff (universal file, data set 58) and .png: forces of the tyre on the
     hub, and motions of the tread, per newton on its tread. Hub: x forward, y left, z up. The angle
-    0 is below the hub, 90 behind it. Losses are the compounds' loss_factor. With --load-N the
-    contact patch sticks to the road, which bears its part of a force.
+    0 is below the hub, 90 behind it. Losses are the compounds' loss_factor. If the wheel is free
+    (rim.free) or on springs (rim.spindle), the hub moves instead, with rim.mass_kg. With --load-N
+    the rim is held, and the contact patch sticks to the road, which bears its part of a force.
 
     \b
     tyrecal frf cases/p235_75r17.yaml --excite tread:0deg:radial --respond hub:fz,hub:fx
     tyrecal frf cases/p235_75r17.yaml --respond tread:0deg:radial,tread:90deg:radial --to-Hz 200
     tyrecal frf cases/p235_75r17.yaml --load-N 4000 --excite tread:90deg:radial
+    tyrecal frf cases/p235_75r17.yaml --set rim.free=true --respond hub:z --form accelerance
     tyrecal frf my.yaml --measured hammer.uff --to-Hz 250
     """
     from ..studies.measured_response import read_measured_responses
     from ..studies.pressing_plan import PlannedState, plan_evaluations, plan_pressing
-    from ..studies.response import FrfResult, default_points, response_request
+    from ..studies.response import FrfResult, default_points, response_request, rim_moves
     from ..studies.result import StudyInput
 
     options.say_idle(study.terminal, study.jobs, "only one design is evaluated")
@@ -118,14 +121,15 @@ def command(
         raise click.UsageError("--step-Hz: the frequencies are those of --measured")
     if measured:
         read_measured_responses(measured, form, from_Hz, to_Hz)
-    points = default_points(load_N)
-    excited, seen = excite or points["excite"], respond or points["respond"]
-    response_request(excited, seen, from_Hz, to_Hz, step_Hz, patch_mm)
     loaded, _ = study.load(case, assignments, pressure_kPa)
     loaded, values = arguments.one_design(fitted, loaded, assignments, study.terminal)
     load = arguments.one_load(loaded, load_N, study.allow_unusual)
     evaluator = study.evaluator(loaded)
-    evaluator.needs_response()
+    evaluator.needs_response(rim_held=bool(load))
+    moves = rim_moves(evaluator)
+    points = default_points(load, moves)
+    excited, seen = excite or points["excite"], respond or points["respond"]
+    response_request(excited, seen, from_Hz, to_Hz, step_Hz, patch_mm, moves)
     if load:
         evaluator.needs_road(modes=True)
     designs = {"fitted" if fitted else "initial": values}

@@ -17,7 +17,14 @@ import numpy as np
 from ..errors import InputError
 from ..measured.universal import BLOCKED_FORCE, Function, Universal, is_universal, read_universal
 from ..tyre.number_table import NumberMarks, cells_under, read_text_table
-from .response_points import HUB_CHANNELS, TREAD_MOTIONS, TREAD_SYSTEM, ResponsePoint, read_points
+from .response_points import (
+    HUB_CHANNELS,
+    HUB_MOTIONS,
+    TREAD_MOTIONS,
+    TREAD_SYSTEM,
+    ResponsePoint,
+    read_points,
+)
 
 Array = np.ndarray
 HUB_RADIUS_m = 0.05  # about the axle, within which a node is the hub
@@ -60,9 +67,9 @@ def read_measured_responses(
     read = _read_universal if is_universal(path) else _read_table
     functions: list[MeasuredResponse] = []
     for place, each in read(path, form):
-        is_hub = each.respond.angle_deg is None
-        if is_hub != (each.form == BLOCKED_FORCE):
-            what = "a force or moment" if is_hub else "a motion"
+        is_force = each.respond.channel in HUB_CHANNELS
+        if is_force != (each.form == BLOCKED_FORCE):
+            what = "a force or moment" if is_force else "a motion"
             raise InputError(f"{place}: the response at {each.respond} must be {what}")
         inside = (each.frequency_Hz > 0) & (each.frequency_Hz >= from_Hz)
         inside &= each.frequency_Hz <= to_Hz
@@ -97,8 +104,10 @@ def _of_function(file: Universal, each: Function, form: str) -> MeasuredResponse
     excite, other = _point(file, each.reference, each.place)
     if excite.angle_deg is None:
         raise InputError(f"{each.place}: the force must be on the tread, it is at {excite}")
-    values = sign * other * SI_PER_UNIT[each.unit] * each.values
-    return MeasuredResponse(excite, respond, each.form or form, each.frequency_Hz, values)
+    values, form = sign * other * SI_PER_UNIT[each.unit] * each.values, each.form or form
+    if respond.angle_deg is None and form != BLOCKED_FORCE:
+        respond = ResponsePoint([*HUB_MOTIONS][[*HUB_CHANNELS].index(respond.channel)])
+    return MeasuredResponse(excite, respond, form, each.frequency_Hz, values)
 
 
 def _point(file: Universal, signal: tuple[int, int], place: str) -> tuple[ResponsePoint, int]:
@@ -176,7 +185,7 @@ def _of_rows(place: str, excite: str, respond: str, form: str, rows: Array) -> M
         (force,), (point,) = read_points(excite, hub=False), read_points(respond)
     except ValueError as error:
         raise InputError(f"{place}: {error}") from None
-    form = BLOCKED_FORCE if point.angle_deg is None else form
+    form = BLOCKED_FORCE if point.channel in HUB_CHANNELS else form
     if form not in (*ORDERS, BLOCKED_FORCE):
         raise InputError(f"{place}: quantity is '{form}', must be one of {', '.join(ORDERS)}")
     if np.any(np.diff(rows[0]) <= 0):

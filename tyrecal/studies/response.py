@@ -1,5 +1,6 @@
-"""Response functions: the force of the tyre on the hub, and motions of the tread, per force on it,
-next to measured ones. Points and directions are those of `response_points`."""
+"""Response functions: the force of the tyre on a hub that is held, or the motion of one that moves,
+and motions of the tread, per force on it, next to measured ones. Points and directions are those of
+`response_points`."""
 
 from __future__ import annotations
 
@@ -13,9 +14,19 @@ from pydantic import Field
 from ..errors import InputError
 from ..files import Json
 from ..measured.universal_text import WrittenFunction, function_set, universal_text
+from ..simulate.evaluate.evaluator import Evaluator
 from ..tyre.case import LoadedCase
+from ..tyre.state import is_free
 from .measured_response import MeasuredResponse, agreement, points_of, read_measured_responses
-from .response_points import HUB_CHANNELS, TREAD_MOTIONS, TREAD_SYSTEM, ResponsePoint, read_points
+from .response_points import (
+    HUB_CHANNELS,
+    HUB_MOTIONS,
+    HUB_PLACES,
+    TREAD_MOTIONS,
+    TREAD_SYSTEM,
+    ResponsePoint,
+    read_points,
+)
 from .result import Column, CsvRow, Result, ResultPart, StudyInput, Table, csv_text
 
 Array = np.ndarray
@@ -26,17 +37,28 @@ MAX_BAND_HZ, MAX_RESPONSE_STEPS = 1000.0, 5000
 HUB_NODE, FIRST_TREAD_NODE = 1, 101  # numbers in universal files
 
 
-def default_points(load_N: float | None) -> dict[str, str]:
+def default_points(load_N: float, moves: bool) -> dict[str, str]:
     """Where the force and the response are if not given: below the hub, and under a load, whose
-    patch the road holds, above it."""
+    patch the road holds, above it; ``moves``: the rim does."""
     point = "tread:180deg:radial" if load_N else "tread:0deg:radial"
-    return {"excite": point, "respond": f"hub:fz,{point}"}
+    return {"excite": point, "respond": f"hub:{'z' if moves else 'fz'},{point}"}
+
+
+def rim_moves(evaluator: Evaluator) -> bool:
+    """Whether the case's wheel is free or on springs while it vibrates."""
+    return "spindle" in evaluator.design.needs
 
 
 def response_request(
-    excite: str, respond: str, from_Hz: float, to_Hz: float, step_Hz: float, patch_mm: float
+    excite: str,
+    respond: str,
+    from_Hz: float,
+    to_Hz: float,
+    step_Hz: float,
+    patch_mm: float,
+    moves: bool = False,
 ) -> Json:
-    """The request to a solver. Raises InputError."""
+    """The request to a solver; moves: the rim does. Raises InputError."""
     lines = (to_Hz - from_Hz) / step_Hz if step_Hz > 0 else 0.0
     if not 0 <= from_Hz < to_Hz <= MAX_BAND_HZ or lines < 1 or abs(lines - round(lines)) > 1e-6:
         raise InputError(
@@ -54,7 +76,9 @@ def response_request(
         "lines": round(lines) + 1,
         "patch_m": patch_mm / 1e3,
         "excite": [[point.angle_deg, point.channel] for point in forces],
-        "respond": [[p.angle_deg, p.channel] for p in _of_tread(read_points(respond), forces)],
+        "respond": [
+            [p.angle_deg, p.channel] for p in _of_tread(read_points(respond, moves=moves), forces)
+        ],
     }
 
 
@@ -70,7 +94,7 @@ class ResponseFunctionEntry(ResultPart):
 
     excite: Annotated[str, Column("force at", "")]  # where the force acts, and its direction
     respond: Annotated[str, Column("response at", "")]  # where the response is, and its direction
-    # receptance, accelerance, blocked force or blocked moment
+    # receptance, accelerance, blocked force or blocked moment; of turns of the hub in rad
     quantity: Annotated[str, Column("quantity", "")]
     unit: Annotated[str, Column("unit", "")]  # unit of the function
     # magnitude at the lowest frequency
@@ -123,6 +147,8 @@ class FrfResult(Result):
     design: str  # name of the design: initial, fitted or set
     pressure_kPa: float
     load_N: float = 0.0  # load on the road, with the patch held; absent: unloaded
+    # what holds the rim; absent: held
+    wheel: Literal["held", "springs", "free"] = "held"
     patch_mm: float  # width of the patch of the tread on which the force acts
     radius_m: float  # radius of the tread's points
     harmonics: int  # harmonics in the sum
@@ -145,16 +171,20 @@ class FrfResult(Result):
         measured: Path | None = None,
         load_N: float = 0.0,
     ) -> FrfResult:
-        """The last design, rim held, at a load with the patch held. With a measured file, at its
-        points, unless they are given, and at its frequencies from ``from_Hz`` to ``to_Hz``. Raises
+        """The last design, on the case's rim, or at a load with rim and patch held. With a measured
+        file, at its points, unless they are given, and at its frequencies from ``from_Hz`` to
+        ``to_Hz``. A free wheel has no response at 0 Hz: then ``step_Hz`` is the first. Raises
         InputError, EvaluationFailed."""
         known = read_measured_responses(measured, form, from_Hz, to_Hz) if measured else []
-        places = points_of(known) if known else default_points(load_N)
+        moves = rim_moves(given.evaluator)
+        places = points_of(known) if known else default_points(load_N, moves)
         excite, respond = excite or places["excite"], respond or places["respond"]
         if known:
             f = known[0].frequency_Hz
             from_Hz, to_Hz, step_Hz = float(f[0]), float(f[-1]), float(np.ptp(f) / (len(f) - 1))
-        request = response_request(excite, respond, from_Hz, to_Hz, step_Hz, patch_mm)
+        elif is_free(given.case):
+            from_Hz = from_Hz or step_Hz
+        request = response_request(excite, respond, from_Hz, to_Hz, step_Hz, patch_mm, moves)
         name, values = [*given.designs.items()][-1]
         forces, seen = read_points(excite, hub=False), read_points(respond)
         tread = _of_tread(seen, forces)
@@ -180,10 +210,15 @@ class FrfResult(Result):
             harmonics=int(answer["harmonics"]),
             frequency_Hz=[float(f) for f in answer["frequency_Hz"]],
             functions=functions,
-            findings=ResponseFindings(words=_words(answer, load_N) + _compared_words(functions)),
+            findings=ResponseFindings(
+                words=_words(answer, load_N, moves) + _compared_words(functions)
+            ),
         )
         if load_N:
             functions_of_tyre = functions_of_tyre.model_copy(update={"load_N": load_N})
+        if moves:
+            wheel = "free" if is_free(given.case) else "springs"
+            functions_of_tyre = functions_of_tyre.model_copy(update={"wheel": wheel})
         text = functions_of_tyre.universal(given.case)
         files = [measured] if measured else []
         written = functions_of_tyre.with_files({"frf.uff": text})
@@ -220,7 +255,8 @@ class FrfResult(Result):
     def tables(self) -> list[Table]:
         more = COMPARED if self._is_compared else {}
         columns = [*ResponseFunctionEntry.columns().values(), *more.values()]
-        held = f"{self.load_N:g} N, rim and contact held" if self.load_N else "rim held"
+        rim = {"held": "rim held", "springs": "wheel on springs", "free": "wheel free"}
+        held = f"{self.load_N:g} N, rim and contact held" if self.load_N else rim[self.wheel]
         title = f"{self.design}, {self.pressure_kPa:g} kPa, {held}, patch {self.patch_mm:g} mm"
         rows = [
             [*each.cells(), *(column.cell(getattr(each, key)) for key, column in more.items())]
@@ -238,7 +274,7 @@ class FrfResult(Result):
 
         def signal(point: ResponsePoint) -> tuple[int, int]:
             if point.angle_deg is None:
-                return HUB_NODE, 1 + [*HUB_CHANNELS].index(point.channel)
+                return HUB_NODE, 1 + [*HUB_PLACES].index(point.channel) % len(HUB_CHANNELS)
             return numbers[point.angle_deg], 1 + TREAD_MOTIONS.index(point.channel)
 
         kinds = {"receptance": "displacement", "accelerance": "acceleration"}
@@ -269,16 +305,18 @@ def _entry(
     is_hub = point.angle_deg is None
     of_kind = np.asarray(answer["hub" if is_hub else "receptance"])
     if is_hub:
-        row, sign = HUB_CHANNELS[point.channel]
+        row, sign = HUB_PLACES[point.channel]
         values = sign * of_kind[row, e]
         is_force = point.channel[0] == "f"
         quantity, unit = ("blocked force", "N/N") if is_force else ("blocked moment", "N m/N")
+        if point.channel in HUB_MOTIONS:
+            quantity, unit = form, "rad/N" if point.channel[0] == "r" else "m/N"
     else:
         values, quantity, unit = of_kind[tread.index(point), e], form, "m/N"
     if np.abs(values).max() < ZERO_BY_SYMMETRY * np.abs(of_kind).max():
         values = 0 * values
     if quantity == "accelerance":
-        values, unit = -((2 * np.pi * frequencies) ** 2) * values, "m/s²/N"
+        values, unit = -((2 * np.pi * frequencies) ** 2) * values, unit.replace("/N", "/s²/N")
     size = np.abs(values)
     peak = int(size.argmax())
     return ResponseFunctionEntry(
@@ -303,7 +341,7 @@ def _compared_words(functions: Sequence[ResponseFunctionEntry]) -> list[str]:
     return [f"{len(known)} functions were measured: FRAC {span} (1: equal up to a factor)"]
 
 
-def _words(answer: Mapping[str, Any], load_N: float) -> list[str]:
+def _words(answer: Mapping[str, Any], load_N: float, moves: bool) -> list[str]:
     words = []
     if load_N:
         words.append(
@@ -315,6 +353,10 @@ def _words(answer: Mapping[str, Any], load_N: float) -> list[str]:
         words.append(
             "no compound has a loss factor, so peaks are as high as the frequency steps happen to"
             " meet them: add materials.NAME.loss_factor to the case (a Prony series adds no loss)"
+        )
+    if moves:
+        words.append(
+            "the wheel moves, so that no force on the hub is blocked: hub:x to hub:rz move"
         )
     if answer["harmonics"] < answer["harmonics_wanted"]:
         words.append(

@@ -1,4 +1,4 @@
-"""Response of the inflated tyre, its rim held, to a force on a patch of its tread.
+"""Response of the inflated tyre to a force on a patch of its tread, its rim held or in motion.
 
 A patch of half angle b about Theta_0 that is loaded evenly by a force F in all has the harmonics
 
@@ -13,7 +13,10 @@ the tyre on the hub is
 
     h(w) = T^H f + w^2 T^H M U
 
-because K T = 0 and K_k T = 0 on all that is free. Harmonics from 2 on exert none.
+because K T = 0 and K_k T = 0 on all that is free. Harmonics from 2 on exert none. A rim that moves
+by T q, on springs k or free, with a mass m of its own, has in place of that force
+
+    (k - w^2 m) q = h(w) + w^2 T^H M T q,    and -w^2 M T q in the tyre's equation.
 """
 
 from __future__ import annotations
@@ -30,6 +33,7 @@ from ..section.materials import Material
 from ..section.model import Model
 from .harmonics import Vibration
 from .reduction import PartOfStiffness, ResponseBasis
+from .wheel import MOTIONS, Wheel
 
 Array = np.ndarray
 SETTLES_UP_TO = 1.5  # times the highest frequency
@@ -43,7 +47,7 @@ class ResponseResult:
 
     frequency_Hz: Array
     receptance: Array  # m/N or rad/N
-    hub: Array  # N/N or N m/N
+    hub: Array  # N/N or N m/N; of a rim that moves m/N or rad/N
     radius_m: float  # of the inflated tread
     harmonics: int  # that were summed
     harmonics_wanted: int  # more than that where cords buckle in the shorter waves
@@ -83,8 +87,8 @@ def tread_patch(X: Array, U: Array, tread: Array, size: float) -> TreadPatch:
 
 class Response:
     """Reduced problems of all harmonics that the patch excites, of a model's ``vibration`` about
-    its inflated state U (n, 3); ``highest_Hz``: of the band; ``check`` may raise to stop. Raises
-    RunFailed."""
+    its inflated state U (n, 3), with the rim held; ``highest_Hz``: of the band; ``check`` may raise
+    to stop; ``wheel``: the rim's motions, None = held. Raises RunFailed."""
 
     def __init__(
         self,
@@ -94,8 +98,10 @@ class Response:
         patch: TreadPatch,
         highest_Hz: float,
         check: Callable[[], None],
+        wheel: Wheel | None = None,
     ):
         self.patch, self._vibration, self._model, self._U = patch, vibration, model, U
+        self._wheel = wheel
 
         def part(model: Model) -> PartOfStiffness:
             return PartOfStiffness(mechanics.tangents(model, U, [], harmonics=True), len(U))
@@ -144,7 +150,18 @@ class Response:
             moved.conj().T @ V,
             rigid,
             rigid_mass,
+            self._rim(n),
         )
+
+    def _rim(self, n: int) -> _Rim | None:
+        """The rim's free motions of a harmonic; None if it has none."""
+        names = self._wheel.motions(n) if self._wheel else []
+        if not self._wheel or not names:
+            return None
+        circle, wheel = np.pi if n else 2 * np.pi, self._wheel
+        own = [[of.get(m, 0.0) / circle for m in names] for of in (wheel.stiffness, wheel.inertia)]
+        stiffness, mass = np.real(own)
+        return _Rim([MOTIONS[n].index(m) for m in names], stiffness, mass)
 
     def _times(self, part: PartOfStiffness, V: Array, n: int) -> Array:
         return part.times(V, n, self._vibration.numbering, self._model.mesh.symmetry)
@@ -176,6 +193,8 @@ class Response:
         if n > 1:
             return np.zeros((0, 3)), np.zeros((vibration.numbering.size, 0)), np.zeros((0, 0))
         r, t, z = X[:, 0] + U[:, 0], U[:, 1], X[:, 1] + U[:, 2]
+        if self._wheel:
+            z = z - X[self._wheel.reference, 1]
         o, one = np.zeros(len(X)), np.ones(len(X))
         motions = [[o, o, one], [-t, r, o]]
         if n:
@@ -194,11 +213,12 @@ class Response:
     def at(
         self, frequencies_Hz: Array, excited: list[tuple[float, int]], seen: list[tuple[float, int]]
     ) -> tuple[Array, Array]:
-        """Receptances (seen, excited, f), m/N or rad/N, and forces on the hub (6, excited, f) per N
-        of force.
+        """Receptances (seen, excited, f), m/N or rad/N, and forces on the hub (6, excited, f), or
+        motions of a rim that moves, per N of force.
 
         excited, seen: angle (rad) and component of each point of the tread. Of the hub: force
-        along Theta = 0, along Theta = 90 degrees and along the axle, then moments about them.
+        along Theta = 0, along Theta = 90 degrees and along the axle, then moments about them; or
+        shifts and turns.
         """
         omega = 2 * np.pi * np.asarray(frequencies_Hz)
         losses = [each for each, _ in self._losses(frequencies_Hz)]
@@ -210,6 +230,8 @@ class Response:
             n, share = reduced.n, self.patch.share(reduced.n)
             moved, forces = reduced.at(omega, losses, tables)
             circle = np.pi if n else 2 * np.pi
+            if self._wheel:
+                forces = forces / circle if reduced.rim else 0 * forces
             for e, (angle, component) in enumerate(excited):
                 for s, (at, other) in enumerate(seen):
                     turned = _turned(moved[:, :, other, component], n * (at - angle))
@@ -226,6 +248,15 @@ class Response:
 
 
 @dataclass(frozen=True)
+class _Rim:
+    """The free motions of the rim in a harmonic, and what it adds to each, per radian."""
+
+    places: list[int]  # of its motions among T
+    stiffness: Array  # (q,)
+    mass: Array  # (q,)
+
+
+@dataclass(frozen=True)
 class _Reduced:
     """A harmonic on its basis, in which M is 1."""
 
@@ -237,9 +268,11 @@ class _Reduced:
     moved: Array  # T^H M (motions, basis)
     rigid: Array  # T^H of the patch's forces (motions, 3)
     rigid_mass: Array  # T^H M T (motions, motions)
+    rim: _Rim | None  # that moves in this harmonic
 
     def at(self, omega: Array, losses: list[Array], tables: list[Array]) -> tuple[Array, Array]:
-        """Two pairs (2, f, 3, 3) and (2, f, motions, 3): motion of the patch, force on the hub."""
+        """Two pairs (2, f, 3, 3) and (2, f, motions, 3): motion of the patch, force on the hub, or
+        motion of a rim that moves."""
         K = self.K - omega[:, None, None] ** 2 * np.eye(len(self.K))
         for table, part in zip(tables, self.tables, strict=True):
             K = K + table[:, None, None] * part
@@ -248,11 +281,34 @@ class _Reduced:
             loss = loss + eta[:, None, None] * part
         # The i of the response is not the i of exp(i n Theta): a number a + j b of both is known by
         # its values for j = i and j = -i.
-        both = np.stack([np.linalg.solve(K + i * loss, self.forces[None] + 0j) for i in (1j, -1j)])
+        forces, rim = self.forces, self.rim
+        if rim:
+            K, loss, forces = self._with_rim(rim, omega, K, loss)
+        both = np.stack([np.linalg.solve(K + i * loss, forces[None] + 0j) for i in (1j, -1j)])
         a, b = (both[0] + both[1]) / 2, (both[0] - both[1]) / 2j
+        motion = np.stack([forces.conj().T @ a, forces.conj().T @ b])
+        if rim:
+            hub = np.zeros((2, len(omega), len(self.rigid), 3), complex)
+            hub[:, :, rim.places] = np.stack([a, b])[:, :, : len(rim.places)]
+            return motion, hub
         hub = omega[:, None, None] ** 2 * np.stack([self.moved @ a, self.moved @ b])
         hub[0] += self.rigid
-        return np.stack([self.forces.conj().T @ a, self.forces.conj().T @ b]), hub
+        return motion, hub
+
+    def _with_rim(
+        self, rim: _Rim, omega: Array, K: Array, loss: Array
+    ) -> tuple[Array, Array, Array]:
+        """Dynamic stiffness K and losses (f, q + basis, q + basis), forces (q + basis, 3)."""
+        q, square = len(rim.places), omega[:, None, None] ** 2
+        whole = np.zeros((len(K), q + K.shape[1], q + K.shape[1]), complex)
+        mass = self.rigid_mass[np.ix_(rim.places, rim.places)] + np.diag(rim.mass)
+        whole[:, :q, :q] = np.diag(rim.stiffness) - square * mass
+        whole[:, :q, q:] = -square * self.moved[rim.places]
+        whole[:, q:, :q] = whole[:, :q, q:].conj().swapaxes(1, 2)
+        whole[:, q:, q:] = K
+        losses = np.zeros_like(whole)
+        losses[:, q:, q:] = loss
+        return whole, losses, np.vstack([self.rigid[rim.places], self.forces])
 
 
 def _coordinates(numbering: Coordinates, forces: Array, n: int) -> Array:

@@ -30,7 +30,7 @@ DIFFERENCE_STEP = 1e-4  # of a logarithm: best between truncation and most solve
 MODES_ON_TOP = 3  # times the time limit of a load, where modes are sought there too
 T = TypeVar("T")
 Array = np.ndarray
-RESPONDS_NOT = {"spindle", "frequency_modulus", "cavity", "coupled", "rotation"}  # needs of a tyre
+RESPONDS_NOT = {"frequency_modulus", "cavity", "coupled", "rotation"}  # needs of a tyre
 
 
 @dataclass(frozen=True)
@@ -151,9 +151,9 @@ class Evaluator:
     def respond(
         self, values: Mapping[str, float], request: Mapping[str, Any], load_N: float = 0.0
     ) -> ResponseAnswer:
-        """Responses of a design, unloaded or pressed on the road with ``load_N``, its rim and patch
-        held. Raises what `evaluate` and `press` do."""
-        self.needs_response()
+        """Responses of a design, unloaded on the case's rim, or pressed on the road with
+        ``load_N``, its rim and patch held. Raises what `evaluate` and `press` do."""
+        self.needs_response(rim_held=bool(load_N) or "modes" in request)
         if not load_N:
             result = self.evaluate(Question(values, response=request))
             return ResponseAnswer(result.pressure_kPa, result.response)
@@ -271,7 +271,7 @@ class Evaluator:
                 f" shows which one can ({capability})"
             )
 
-    def needs_response(self) -> None:
+    def needs_response(self, rim_held: bool = False) -> None:
         """Raises DeckRefused where the solver computes no responses, or none of such a tyre."""
         if "response" not in self.solver.capabilities:
             raise DeckRefused(
@@ -279,10 +279,11 @@ class Evaluator:
                 " shows which one can (response)"
             )
         for need, words in self.design.needs.items():
-            if need in RESPONDS_NOT:
+            if need in RESPONDS_NOT or (rim_held and need == "spindle"):
                 raise DeckRefused(
-                    "response functions are of a tyre that is the same all round, without gas, on a"
-                    f" rim that is held: the case has {words.partition(';')[0]}"
+                    "response functions are of a tyre that is the same all round, without gas; on"
+                    " the road and as matrices, on a rim that is held: the case has"
+                    f" {words.partition(';')[0]}"
                 )
 
     def refuse_lacking(self, design: Design) -> None:

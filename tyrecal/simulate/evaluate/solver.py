@@ -65,7 +65,8 @@ class Solver(Protocol):
         respond} of points [degrees, direction] of the tread: response {frequency_Hz (f,),
         receptance (respond, excite, f) in m/N, hub (6, excite, f) in N/N and N m/N, radius_m of
         the inflated tread, harmonics that were summed, harmonics_wanted for the patch's size}. Of
-        the hub: force along Theta = 0, along 90 degrees, along the axle, and moments about them.
+        the hub: force along Theta = 0, along 90 degrees, along the axle, and moments about them;
+        shifts in m/N and turns in rad/N of a rim that moves.
         With ``modes`` N in it also stiffness, mass and loss (d, d) on these six motions of the rim
         and at most N coordinates of modes with the rim held, and tread (respond, d).
 
