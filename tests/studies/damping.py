@@ -1,8 +1,8 @@
 """Does damping tell effects apart that frequencies confuse? Sealed trials, judged with and without.
 
     python -m tests.studies.damping make FOLDER [--trials 120] [--sound 60]
-    python -m tests.studies.damping answer FOLDER
-    python -m tests.studies.damping table
+    python -m tests.studies.damping answer FOLDER [--sets]
+    python -m tests.studies.damping table [--record damping_sound]
 
 The P235/75R17 (coarse mesh, section taken as drawn, three pressures, nine modes). Tyres: one effect
 of `KINDS` by another law than the catalogue's (`tests.blind.laws`), 20 to 100 % of its range, or
@@ -12,8 +12,8 @@ Loss: rate-independent and by stiffening add as a root of squares; 1 % less per 
 loss factor `LOSS` stated (15 %), or none stated, and the tyre's about `DRAWN_LOSS`, factor 2.
 
 ``make`` seals: the truth is in one file, its sha256 heads the record, before anything is answered.
-The judge: all single effects by `weigh_hypotheses`, then sets of them, too, on an expansion about the start with
-each effect at further sizes; what `diagnose` evaluates anew at re-fits is left out. The same
+The judge: all single effects by `weigh_hypotheses`, on an expansion about the start with each
+effect at further sizes; what `diagnose` evaluates anew at re-fits is left out. The same
 frequencies, with their noise, are judged three times: alone, with damping of either case. Damping
 moves no re-fit, so that it is added to the evidence of each, on the grids of the frequencies.
 A pair: the effect, and that effect of another kind which its frequencies are most like (`RIVALS`).
@@ -61,7 +61,7 @@ from ..effects.support import coarse
 Array = np.ndarray
 Row = dict[str, Any]
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
-TRUTH, RESULT = BENCHMARKS / "damping_truth.json", BENCHMARKS / "damping.jsonl"
+NAME = "damping"  # of a record: NAME.jsonl, NAME_truth.json
 PRESSURES_kPa = (160.0, 240.0, 320.0)
 NOISE, DAMPING_NOISE, SPLIT, SPREAD, SMALLEST = 0.002, 0.25, 0.003, 0.1, 0.2
 LOSS, LOSS_PER_KELVIN = 0.12, -0.01
@@ -249,7 +249,8 @@ def main() -> None:
 @click.argument("folder", type=Path)
 @click.option("--trials", default=120)
 @click.option("--sound", default=40)
-def make(folder: Path, trials: int, sound: int) -> None:
+@click.option("--record", default=NAME)
+def make(folder: Path, trials: int, sound: int, record: str) -> None:
     """Draw and compute trials, seal the truth. Resumed."""
     folder.mkdir(parents=True, exist_ok=True)
     seed_file = folder / "seed"
@@ -279,22 +280,27 @@ def make(folder: Path, trials: int, sound: int) -> None:
         (folder / f"trial_{place:03}.json").write_text(json.dumps(measured))
     text = json.dumps({"nonce": secrets.token_hex(32), "seed": seed, "trials": truths}, indent=0)
     (folder / "truth.json").write_text(text + "\n")
-    write({"sha256_of_truth": sha256((text + "\n").encode()).hexdigest(), "trials": len(truths)})
+    write(
+        record,
+        {"sha256_of_truth": sha256((text + "\n").encode()).hexdigest(), "trials": len(truths)},
+    )
 
 
 @main.command()
 @click.argument("folder", type=Path)
 @click.option("--store", type=Path)
-def answer(folder: Path, store: Path | None) -> None:
+@click.option("--record", default=NAME)
+@click.option("--sets", is_flag=True, help="Also sets of effects, 5 s of a core each.")
+def answer(folder: Path, store: Path | None, record: str, sets: bool) -> None:
     """Judge each trial that is not on record, a line each; at the end the truth is published."""
     case = study_case()
     problem = problem_of(model_of(case, store, True))
     problems = {WAYS[1]: problem, WAYS[2]: unstated(problem)}
-    if len(read()) == 1:
-        write({"rivals": rivals(problem)})
-    done = {(row["trial"], row["sets"]) for row in read() if "trial" in row}
-    every = range(read()[0]["trials"])
-    for k, sets in [*((k, False) for k in every), *((k, True) for k in every)]:
+    if len(read(record)) == 1:
+        write(record, {"rivals": rivals(problem)})
+    done = {(row["trial"], row["sets"]) for row in read(record) if "trial" in row}
+    every = range(read(record)[0]["trials"])
+    for k in every:
         if (k, sets) in done:
             continue
         measured = json.loads((folder / f"trial_{k:03}.json").read_text())
@@ -302,38 +308,39 @@ def answer(folder: Path, store: Path | None) -> None:
         row = {"trial": k, "sets": sets, WAYS[0]: told(problem, hypotheses)}
         for way, own in problems.items():
             row[way] = told(own, with_damping(own, hypotheses, measured[way]))
-        write(row)
-        if k == every[-1]:
-            reveal(folder)
+        write(record, row)
+    truth_file(record).write_text((folder / "truth.json").read_text())
+    tell(record)
 
 
-def reveal(folder: Path) -> None:
-    """Publish the truth, after all answers with single effects."""
-    TRUTH.write_text((folder / "truth.json").read_text())
-    tell()
+def truth_file(record: str) -> Path:
+    """The truth of a record, published when all is answered."""
+    return BENCHMARKS / f"{record}_truth.json"
 
 
-def read() -> list[Row]:
+def read(record: str) -> list[Row]:
     """All rows."""
-    return [json.loads(line) for line in RESULT.read_text(encoding="utf-8").splitlines()]
+    path = BENCHMARKS / f"{record}.jsonl"
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
 
 
-def write(row: Row) -> None:
+def write(record: str, row: Row) -> None:
     """Add a row."""
-    with RESULT.open("a", encoding="utf-8") as file:
+    with (BENCHMARKS / f"{record}.jsonl").open("a", encoding="utf-8") as file:
         file.write(json.dumps(row) + "\n")
 
 
 @main.command()
-def table() -> None:
+@click.option("--record", default=NAME)
+def table(record: str) -> None:
     """Print the table of the record."""
-    tell()
+    tell(record)
 
 
-def scored(sets: bool = False) -> dict[str, Row]:
+def scored(record: str = NAME, sets: bool = False) -> dict[str, Row]:
     """Counts by way: trials, right of the pair, top 1, named right and wrong, sound accused."""
-    head, other, *rows = read()
-    text = TRUTH.read_text(encoding="utf-8")
+    head, other, *rows = read(record)
+    text = truth_file(record).read_text(encoding="utf-8")
     assert sha256(text.encode()).hexdigest() == head["sha256_of_truth"]
     truths, result = json.loads(text)["trials"], {}
     for way in WAYS:
@@ -358,16 +365,16 @@ def scored(sets: bool = False) -> dict[str, Row]:
     return result
 
 
-def tell() -> None:
+def tell(record: str) -> None:
     """The tables: judged with single effects, and with sets of them."""
-    for sets in (False, True):
-        counts = scored(sets)
+    for sets in {row["sets"] for row in read(record)[2:]}:
+        counts = scored(record, sets)
         heads = list(counts[WAYS[0]])[:-1]
         print("|", " | ".join(["with sets" if sets else "single effects", *heads]), "|")
         print("|---" * (len(heads) + 1) + "|")
         for way, own in counts.items():
             print("|", " | ".join([way, *(str(own[key]) for key in heads)]), "|")
-        for id, rival in read()[1]["rivals"].items():
+        for id, rival in read(record)[1]["rivals"].items():
             each = [counts[way]["pairs"].get(id, [0, 0]) for way in WAYS]
             print(f"{id} or {rival}:", ", ".join(f"{right} of {all}" for right, all in each))
         print()
