@@ -94,7 +94,8 @@ def labels_result(case: LoadedCase, labelled: Labelled) -> LabelsResult:
         place = int(np.argmin(abs(np.array(kPa) - test.pressure_kPa)))
         modes = [each for each, i in zip(at.modes, at.states, strict=True) if i == place]
         shapes.append(correlate(test, CaseModes(modes)))
-    return LabelsResult(format=1, labels=labels_posterior(case, labelled), shapes=shapes)
+    content: Json = {"format": 1, "labels": labels_posterior(case, labelled)}
+    return LabelsResult.model_validate(content | ({"shapes": shapes} if shapes else {}))
 
 
 def _entry(label: Label | None) -> Json:
