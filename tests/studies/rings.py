@@ -33,6 +33,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -235,31 +236,33 @@ def labelled_with_case(
 
 
 def tables(records: Sequence[Json]) -> None:
-    """Print a line for each way, and for shapes and frequencies together each kind of test."""
+    """Print a line for each way, of all tests and of each kind."""
+    print("rings, way | tests | labels | right | stated | undecided | right of decided | stated")
     for way in WAYS:
         tell(way, records, way)
-    for rings in RINGS:
-        for name in ("r", "rtz"):
-            chosen = [r for r in records if (r["rings"], r["directions"]) == (rings, name)]
-            for way in WAYS:
-                tell(f"{rings} {name}, {way}", chosen, way)
+    for rings, name, way in product(RINGS, ("r", "rtz"), WAYS):
+        chosen = [r for r in records if (r["rings"], r["directions"]) == (rings, name)]
+        tell(f"{rings} {name}, {way}", chosen, way)
 
 
 def tell(title: str, records: Sequence[Json], way: str) -> None:
-    """Print how often labels are right, and how often that is stated."""
-    right = np.array(
-        [a == b for r in records for a, b in zip(r["true"], r[way]["labels"], strict=True)]
-    )
-    p = np.array([each for r in records for each in r[way]["p"]])
-    whole = [r["true"] == r[way]["labels"] for r in records]
+    """Print how often labels are right, and how often that is stated, over the tests with a way;
+    then the same of all labels of a test together, and the calibration error."""
+    labelled_tests = [r for r in records if way in r]
+    pairs = [zip(r["true"], r[way]["labels"], strict=True) for r in labelled_tests]
+    right = np.array([a == b for each in pairs for a, b in each])
+    p = np.array([each for r in labelled_tests for each in r[way]["p"]])
+    whole = np.array([r["true"] == r[way]["labels"] for r in labelled_tests])
+    stated = np.array([r[way]["together"] for r in labelled_tests])
     low, high = clopper_pearson(int(right.sum()), len(right))
     sure = p >= SURE_LABEL
     print(
-        f"{title} | {len(records)} | {len(right)} | {right.mean():.1%} ({low:.1%} to {high:.1%}) |"
-        f" {p.mean():.1%} | {np.mean(~sure):.1%} | {right[sure].mean():.2%} of {sure.sum()} |"
-        f" {p[sure].mean():.2%} | {np.mean(whole):.1%} |"
-        f" {np.mean([r[way]['together'] for r in records]):.1%} |"
-        f" {calibration_error(p, right):.3f} of {calibration_quantile(p):.3f}"
+        f"{title} | {len(whole)} | {len(right)} | {right.mean():.1%} ({low:.1%} to {high:.1%}) |"
+        f" {p.mean():.1%} | {np.mean(~sure):.1%} | {right[sure].mean():.1%} |"
+        f" {p[sure].mean():.1%}; whole tests {whole.mean():.1%}, stated {stated.mean():.1%};"
+        f" calibration error {calibration_error(p, right):.3f}, of a calibrated answerer"
+        f" {calibration_quantile(p):.3f}; decided and wrong: {np.sum(sure & ~right)}, expected"
+        f" {np.sum(1 - p[sure]):.1f}"
     )
 
 
@@ -268,11 +271,9 @@ def with_case(count: int = 200, seed: int = 1) -> None:
     lines = RESULT.read_text().splitlines() if RESULT.exists() else []
     records = [json.loads(line) for line in lines] + [{} for _ in range(count - len(lines))]
     with TemporaryDirectory() as folder:
-        for way in WAYS:
-            for number in range(count):
-                if way in records[number]:
-                    continue
-                records[number] |= labelled_with_case(number, seed, Path(folder), [way])
+        for ways, number in product((WAYS[:1], WAYS[1:]), range(count)):
+            if not records[number].keys() >= {*ways}:
+                records[number] |= labelled_with_case(number, seed, Path(folder), ways)
                 RESULT.write_text("".join(f"{json.dumps(each)}\n" for each in records if each))
     tables(records)
 
