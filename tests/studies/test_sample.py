@@ -19,6 +19,7 @@ from tyrecal.studies.sample.box import sample_box
 from tyrecal.studies.sample.predict import conditional
 from tyrecal.studies.sample.result import draws_csv, result
 from tyrecal.studies.sample.study import Sample, check, run, targets_as_readings
+from tyrecal.tyre.case.schema import Variable
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.state import SPRINGS
 from tyrecal.tyre.values import overridden
@@ -36,8 +37,9 @@ def test_a_tyre_on_two_rims_is_sampled_and_predicted_on_both() -> None:
     """The draws hold the start with one variable, one mode a rim and no scatter. [0,0] torsional
     is higher if the wheel hangs, and a wave that moves no rim is the same on both."""
     case = coarse()
-    alone = {"C10": case.case.variables["C10"]}
-    case = replace(case, case=case.case.model_copy(update={"variables": alone}))
+    loss = Variable(sets=["materials.rubber.loss_factor"], start=0.1, lower=0.01, upper=0.5)
+    chosen = {"C10": case.case.variables["C10"], "loss": loss}
+    case = replace(case, case=case.case.model_copy(update={"variables": chosen}))
     label, evaluator = Label(0, 0, "torsional"), Evaluator(TyreDesign(case))
     readings = []
     for rim in (None, "free"):
@@ -49,6 +51,7 @@ def test_a_tyre_on_two_rims_is_sampled_and_predicted_on_both() -> None:
         )
     sample = run(case, evaluator, readings, 2000, at_kPa=(240.0,))
     summary = result(sample, 0)
+    assert [*summary.variables] == ["C10"] and summary.left_out == ["loss"]
     assert summary.variables["C10"].low < 1e6 < summary.variables["C10"].high
     at = {(row.label, row.rim): row for row in summary.predicted}
     clamped, hung = at[label, None], at[label, "free"]

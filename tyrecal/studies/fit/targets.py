@@ -146,11 +146,16 @@ def read_mass_targets(case: LoadedCase) -> list[ValueTarget]:
     return [ValueTarget("mass_kg", mass.mass_kg, mass.sigma_kg, mass.weight)] if mass else []
 
 
+def is_loss_factor(path: str) -> bool:
+    """Whether a number of the case is a compound's loss factor, on which no frequency depends."""
+    return path.startswith("materials.") and ".loss_factor" in path
+
+
 def read_damping_targets(case: LoadedCase) -> list[ValueTarget]:
     """Damping ratios of the unloaded tyre, where a variable sets a loss factor: no other number
     is fitted to them."""
     paths = [path for variable in case.case.variables.values() for path in variable.sets]
-    if not any(path.startswith("materials.") and ".loss_factor" in path for path in paths):
+    if not any(map(is_loss_factor, paths)):
         return []
     return [
         ValueTarget(

@@ -151,6 +151,8 @@ class SampleResult(Result):
     optima: list[Optimum]  # designs that are likelier than those around them
     uncertain: list[str]  # uncertain numbers that no fit calibrates
     noise_Hz: float | None = None  # standard deviation of a frequency
+    # variables of loss factors alone, on which no frequency depends; absent: none
+    left_out: list[str] = Field(default=[])
 
     @classmethod
     def run(
@@ -276,6 +278,10 @@ class SampleResult(Result):
                 f"the targets state no sigma: {self.noise_Hz:.2f} Hz, as a fit leaves them, is"
                 " used instead"
             )
+        if self.left_out:
+            sentences.append(
+                f"left out, because no frequency depends on a loss factor: {', '.join(self.left_out)}"
+            )
         near = [each for each in self.optima if each.below < NEARLY]
         if len(near) > 1:
             sentences.append(
@@ -375,6 +381,7 @@ def result(sample: Sample, seed: int) -> SampleResult:
         ],
         uncertain=[source.words for source in sample.sources if source.words],
         noise_Hz=sample.noise_Hz,
+        **({"left_out": [*sample.left_out]} if sample.left_out else {}),
     ).with_files({"sample_draws.csv": draws_csv(sample)})
 
 

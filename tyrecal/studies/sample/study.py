@@ -16,12 +16,13 @@ from ...simulate.deck.decks_design import design_of
 from ...simulate.evaluate.evaluator import Evaluator
 from ...tyre.case import LoadedCase
 from ...tyre.case.parts import RimSupport
+from ...tyre.effects.edit import changed
 from ...tyre.state import AS_THE_CASE, SPRINGS, WHEEL_FREE, TyreState
 from ...tyre.values import set_values
 from ..difference_runs import runs_in_words
 from ..emulator import Emulator, emulator
 from ..fit.calibrate import noise_Hz
-from ..fit.targets import read_targets, rims_of
+from ..fit.targets import is_loss_factor, read_targets, rims_of
 from ..inference.check_units import check_units
 from ..inference.covariance import covariance
 from ..inference.inverse_problem import Assumed, places
@@ -69,6 +70,7 @@ class Sample:
     noise_Hz: float | None  # of targets that state none, as the fit leaves it
     # share by which the emulator's error makes the worst measured row's deviation larger
     widened: float = 0.0
+    left_out: tuple[str, ...] = ()  # variables that set loss factors alone
 
 
 def run(
@@ -90,6 +92,7 @@ def run(
     the start or the first box cannot be evaluated.
     """
     check(case, readings)
+    case, left_out = without_losses(case)
     stage(SAMPLE_STAGES[0])
     noise = None if readings is not None else noise_Hz(case, evaluator)
     if readings is None:
@@ -184,6 +187,7 @@ def run(
         float((posterior.stated_errors / spread).max()),
         noise,
         float((np.sqrt(np.diag(total)) / spread).max()) - 1,
+        left_out,
     )
 
 
@@ -191,6 +195,7 @@ def planned(
     case: LoadedCase, evaluator: Evaluator, readings: Sequence[Measurement] | None, jobs: int
 ) -> PressingPlan:
     """About how often the solver runs, before it does."""
+    case, _ = without_losses(case)
     rows = targets_as_readings(case, None) if readings is None else modal(readings)
     model = model_of(case, evaluator, rows)
     return estimate(model, _runs(model, len({None, *(row.rim for row in rows)})), jobs)
@@ -212,8 +217,10 @@ def whitening(sigma: Array) -> Array:
 def check(case: LoadedCase, readings: Sequence[Measurement] | None) -> None:
     """Raises InputError where nothing can be sampled, before anything is evaluated."""
     needs_emcee()
-    if not read_variables(case):
-        raise InputError("the case has no variables: there is nothing to sample")
+    if not read_variables(without_losses(case)[0]):
+        raise InputError(
+            "the case has no variables that move a frequency: there is nothing to sample"
+        )
     if PRESSURE_NAME in calibrated(case):
         raise InputError(
             "a variable of the case sets pressure_kPa, which the measurements state: take it out"
@@ -228,6 +235,15 @@ def check(case: LoadedCase, readings: Sequence[Measurement] | None) -> None:
             )
     if not (read_targets(case) if readings is None else modal(readings)):
         raise InputError("there is no frequency of the unloaded tyre to sample the variables by")
+
+
+def without_losses(case: LoadedCase) -> tuple[LoadedCase, tuple[str, ...]]:
+    """The case without the variables that set loss factors alone, and their names: frequencies, by
+    which variables are sampled, do not depend on them."""
+    every = case.case.variables
+    names = tuple(name for name, each in every.items() if all(map(is_loss_factor, each.sets)))
+    kept = {name: each for name, each in every.items() if name not in names}
+    return changed(case, variables=kept), names
 
 
 def measured_readings(case: LoadedCase, measured: Path | None = None) -> list[Measurement] | None:
