@@ -9,7 +9,7 @@ solvers diagnose them. FOLDER keeps the evaluations. One line of JSON a diagnosi
 verdict, probabilities, the runs and time that it announced, and what it took. The mesh is the
 case's coarse one, so that CalculiX is 2 % off the tyre that it judges; harmonics up to 2, two
 variables, three constants and three effects keep the runs few. With effects named, the first is
-planted, and they alone are candidates.
+planted (it may be "sound"), and they alone are candidates.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ def main() -> None:
     named = sys.argv[2:]
     for name in named[:1] or [*PLANTED, "sound"]:
         for solver in ("bundled", "calculix"):
-            candidates = named or list(PLANTED)
+            candidates = [each for each in named or PLANTED if each in PLANTED]
             done = [(e["planted"], e["candidates"], e["solver"]) for e in known()]
             if (name, candidates, solver) not in done:
                 entry = run(folder, name, solver, candidates)
