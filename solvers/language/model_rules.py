@@ -97,10 +97,8 @@ MODEL_RULES = f"""
   needs: MATERIAL|COMPOSITE
   deck: ELSET; MATERIAL; CONTROLS; ~ORIENTATION
   section: ELSET; MATERIAL; CONTROLS
-*HOURGLASS STIFFNESS (part)
-  lines 1: 4*number?
-  names: stiffness:stress
-  under: SOLID SECTION; MEMBRANE SECTION; SHELL SECTION
+*HOURGLASS STIFFNESS (part, under SOLID SECTION; MEMBRANE SECTION; SHELL SECTION)
+  lines 1: 4*number? as stiffness:stress
   deck|section:
   calculix: its hourglass control has no stiffness to set
 *SECTION CONTROLS (part model) NAME!=+controls; SECOND ORDER ACCURACY=YES|NO|;
@@ -113,8 +111,7 @@ MODEL_RULES = f"""
   calculix: {NO_REBAR}
 *MEMBRANE SECTION (part) ELSET!=elset; MATERIAL!=material; CONTROLS=controls; DENSITY=number;
     NODAL THICKNESS; MEMBRANE THICKNESS=name; ORIENTATION=orientation; POISSON=number
-  lines 0-1: number? integer?
-  names: thickness:length
+  lines 0-1: number? integer? as thickness:length
   alone: NODAL THICKNESS; MEMBRANE THICKNESS
   deck: ELSET; MATERIAL; ~POISSON=0.5
   section: ELSET; MATERIAL
@@ -126,10 +123,10 @@ MODEL_RULES = f"""
   if COMPOSITE: number? integer? name any...
   needs: MATERIAL|COMPOSITE
   instead: use SFMGAX elements with a *SURFACE SECTION and *REBAR LAYER
-*REBAR LAYER (part) GEOMETRY=CONSTANT|ANGULAR|LIFT EQUATION; ORIENTATION=orientation
+*REBAR LAYER (part, under SURFACE SECTION; MEMBRANE SECTION; SHELL SECTION)
+    GEOMETRY=CONSTANT|ANGULAR|LIFT EQUATION; ORIENTATION=orientation
   lines 1+: name 3*number? material number? integer? 2*number?
   names: _name, area:area, spacing:length, _position=0, _material, angle=0
-  under: SURFACE SECTION; MEMBRANE SECTION; SHELL SECTION
   deck|section: GEOMETRY=CONSTANT|ANGULAR
   calculix: {NO_REBAR}
 *REBAR (part) ELEMENT!=BEAM|SHELL|AXISHELL|MEMBRANE|AXIMEMBRANE|CONTINUUM; MATERIAL!=material;
@@ -157,25 +154,20 @@ MODEL_RULES = f"""
   lines 1+: 2*surface
   deck: ~NAME; ADJUST=YES|NO; ~TYPE; POSITION TOLERANCE
 *MASS (part) ELSET!=elset
-  lines 1: number
-  names: mass
+  lines 1: number as mass
   revolve: ELSET
 *ROTARY INERTIA (part) ELSET!=elset
-  lines 1: 6*number?
-  names: I11, I22, I33
+  lines 1: 6*number? as I11, I22, I33
   revolve: ELSET
 *SPRING (part) ELSET!=elset; ORIENTATION=orientation
-  lines 2+: integer? integer? / number number?
-  names: stiffness
+  lines 2+: integer? integer? / number number? as stiffness
   revolve: ELSET
 *MATERIAL (model) NAME!=+material
   deck|section: NAME
-*DENSITY (model, once a parent)
-  lines 1+: number number?
-  names: density:density
-  under: MATERIAL
+*DENSITY (model, once a parent, under MATERIAL)
+  lines 1+: number number? as density:density
   deck|section:
-*ELASTIC (model, once a parent)
+*ELASTIC (model, once a parent, under MATERIAL)
     TYPE=ISOTROPIC|ORTHOTROPIC|ANISOTROPIC|ENGINEERING CONSTANTS|LAMINA|TRACTION|COUPLED TRACTION|
     SHEAR|SHORT FIBER|BILAMINA;
     MODULI=LONG TERM|INSTANTANEOUS; DEPENDENCIES=integer; COMPRESSION FACTOR=number
@@ -184,22 +176,19 @@ MODEL_RULES = f"""
   names TYPE=ISOTROPIC: E:stress, nu=0
   names TYPE:
   names: E:stress, nu=0
-  under: MATERIAL
   deck|section: TYPE=ISOTROPIC; MODULI=LONG TERM
-*NO COMPRESSION (model, once a parent)
-  under: MATERIAL
+*NO COMPRESSION (model, once a parent, under MATERIAL)
   deck|section:
   calculix: its elastic law bears compression, and it passes over the keyword
-*HYPERELASTIC (model, once a parent) {ALL_LAWS}; N=1|2|3|4|5|6;
+*HYPERELASTIC (model, once a parent, under MATERIAL) {ALL_LAWS}; N=1|2|3|4|5|6;
     MODULI=LONG TERM|INSTANTANEOUS; TEST DATA INPUT; POISSON=number; BETA=any; PROPERTIES=integer;
     TYPE=any; DEPENDENCIES=integer
   lines 1+: 8*number?
   if TEST DATA INPUT, {", ".join(LAWS_NOT_READ)}:
   alone: {ALL_LAWS}
-  under: MATERIAL
   deck|section: {HONOURED_LAWS}; N; MODULI
   instead: {INSTEAD_OF_TESTS}
-*VISCOELASTIC (model, once a parent)
+*VISCOELASTIC (model, once a parent, under MATERIAL)
     TIME=PRONY|RELAXATION TEST DATA|CREEP TEST DATA|FREQUENCY DATA|USER;
     FREQUENCY=TABULAR|FORMULA|PRONY|CREEP TEST DATA|RELAXATION TEST DATA|USER; TYPE=any;
     PRELOAD=any; NONLINEAR; ERRTOL=number; NMAX=integer
@@ -210,17 +199,14 @@ MODEL_RULES = f"""
   names TIME=PRONY: g=0, k=0, tau
   names FREQUENCY=TABULAR: shear loss=0, shear storage=0, bulk loss=0, bulk storage=0, frequency
   needs: TIME|FREQUENCY|NONLINEAR
-  under: MATERIAL
   deck|section: TIME=PRONY; FREQUENCY=TABULAR
   calculix: its hyperelastic rubber does not relax
 *DAMPING (model part step, output, not judged) ALPHA=any; BETA=any; BAND LIMITED=any;
     COMPOSITE=number; STRUCTURAL=any; DEPENDENCIES=integer
   lines 0+: number...
   section: STRUCTURAL
-*ACOUSTIC MEDIUM (model) BULK MODULUS
-  lines 1+: number 2*number?
-  names: bulk modulus:stress
-  under: MATERIAL
+*ACOUSTIC MEDIUM (model, under MATERIAL) BULK MODULUS
+  lines 1+: number 2*number? as bulk modulus:stress
   section: ~BULK MODULUS
 *FLUID BEHAVIOR (model) NAME!=+fluid; USER
 *FLUID CAVITY (part model) NAME!=name; REF NODE!=node; BEHAVIOR=fluid; MIXTURE=name;
@@ -239,21 +225,18 @@ MODEL_RULES = f"""
 *SURFACE INTERACTION (part model, contact) NAME!=+interaction
   lines 0-1: number?
   revolve: NAME
-*SURFACE BEHAVIOR (part model, once a parent, contact)
+*SURFACE BEHAVIOR (part model, once a parent, contact, under SURFACE INTERACTION)
     PRESSURE-OVERCLOSURE=HARD|LINEAR|EXPONENTIAL|TABULAR; NO SEPARATION; PENALTY=LINEAR|NONLINEAR|;
     DIRECT; AUGMENTED LAGRANGE
   lines 0+: number...
   if PRESSURE-OVERCLOSURE=LINEAR: number
   names: stiffness
   alone: PENALTY; DIRECT; AUGMENTED LAGRANGE
-  under: SURFACE INTERACTION
   revolve: PRESSURE-OVERCLOSURE=LINEAR
-*FRICTION (part model, once a parent, contact) ELASTIC SLIP=number; SLIP TOLERANCE=number; ROUGH;
-    LAGRANGE
-  lines 0+: number 3*number?
-  names: coefficient
+*FRICTION (part model, once a parent, contact, under SURFACE INTERACTION) ELASTIC SLIP=number;
+    SLIP TOLERANCE=number; ROUGH; LAGRANGE
+  lines 0+: number 3*number? as coefficient
   alone: ELASTIC SLIP; SLIP TOLERANCE; ROUGH; LAGRANGE
-  under: SURFACE INTERACTION
   revolve: ELASTIC SLIP
 *CONTACT PAIR (model, contact) INTERACTION!=interaction; ADJUST=name; EXTENSION ZONE=number;
     GEOMETRIC CORRECTION=name; HCRIT=number; MIDFACE NODES=YES|NO; MINIMUM DISTANCE=YES|NO;
@@ -261,8 +244,7 @@ MODEL_RULES = f"""
     SLIDING TRANSITION=ELEMENT ORDER SMOOTHING|LINEAR SMOOTHING|QUADRATIC SMOOTHING;
     SUPPLEMENTARY CONSTRAINTS=SELECTIVE|YES|NO; TIED; TRACKING=PATH|STATE;
     TYPE=SURFACE TO SURFACE|NODE TO SURFACE
-  lines 1+: surface surface?
-  names: slave, master
+  lines 1+: surface surface? as slave, master
   revolve: INTERACTION; TYPE=SURFACE TO SURFACE
 *SYMMETRIC MODEL GENERATION (model, once a job) REVOLVE; REFLECT=LINE|PLANE; PERIODIC=name;
     NODE OFFSET=integer; ELEMENT OFFSET=integer; TRANSPORT; FILE NAME=name

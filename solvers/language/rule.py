@@ -2,10 +2,11 @@
 
 A record has its keywords, levels, notes and parameters, then lines that begin with a word:
 
-    *NAME, OTHER NAME (model part, once a job) NSET!=+nset; GENERATE; LINE=C|P
+    *NAME, OTHER NAME (model part, once a job, under A; B) NSET!=+nset; GENERATE; LINE=C|P
       lines 0-2: label 6*number? / node...   number of data lines (1+: one or more), their fields
       if GENERATE, LINE=P: 2*integer         fields with one of these parameters
-      names LINE=C: _node, area:area, nu=0   names, units and defaults of the fields
+      names LINE=C: _node, area:area, nu=0   names, units and defaults of the fields; without a
+                                             parameter also behind ``as`` in the line of the fields
       deck|section: GENERATE; ~LINE          options that are honoured there, see `PLACES`
 
 Levels: ``model``, ``step``, and ``part``: a part, an instance, the assembly, or a model without
@@ -22,7 +23,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 MANY = 10**9
 NEEDED = "!"  # behind a parameter that must be given
@@ -128,27 +129,26 @@ def _rule(level: str, notes: list[str], options: str, lines: dict[str, str]) -> 
         return {each: own[key] for key in own for each in key[len(word) + 1 :].split(", ")}
 
     rows, fields = next(iter(given("lines").items()), ("1+", ""))
+    fields, _, names = fields.partition(" as ")
     most = MANY if rows.endswith("+") else int(rows[-1])
-    parts = lambda word: _split(lines.get(word, ""), "; ")
+    words: dict[str, Any] = {word: lines.get(word, "") for word in ("instead", "calculix")}
+    for word in ("needs", "alone", "after", "within"):
+        words[word] = _split(lines.get(word, ""), "; ")
+    noted = lambda word: "".join(n.removeprefix(word) for n in notes if n.startswith(word))
     return KeywordRule(
         level,
         options,
         _split(fields, " / "),
         (int(rows[0]), most),
         given("if"),
-        given("names"),
+        {**given("names"), "": names} if names else given("names"),
         {key: text for key, text in lines.items() if {*key.split("|")} <= PLACES.keys()},
-        needs=parts("needs"),
-        alone=parts("alone"),
-        under=parts("under"),
-        after=parts("after"),
-        within=parts("within"),
-        once=next((note[7:] for note in notes if note.startswith("once a ")), ""),
+        under=_split(noted("under "), "; "),
+        once=noted("once a "),
         is_output="output" in notes,
         is_contact="contact" in notes,
         is_judged="not judged" not in notes,
-        instead=lines.get("instead", ""),
-        calculix=lines.get("calculix", ""),
+        **words,
     )
 
 

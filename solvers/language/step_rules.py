@@ -15,8 +15,7 @@ STEP_RULES = """
   section: WRITE; FREQUENCY
 *BOUNDARY (model step) OP=MOD|NEW; AMPLITUDE=amplitude; TYPE=DISPLACEMENT|VELOCITY|ACCELERATION;
     FIXED
-  lines 1+: node freedom integer? number?
-  names: node, first, last, value=0
+  lines 1+: node freedom integer? number? as node, first, last, value=0
   step: OP
   deck step: OP; AMPLITUDE
   deck|section|revolve:
@@ -27,25 +26,21 @@ STEP_RULES = """
   step: ~NAME; NLGEOM=YES|; ~INC; ~PERTURBATION
 *STATIC (step, once a step) LONG TERM; DIRECT=|NO STOP; STABILIZE=any; RIKS; FACTOR=number;
     ALLSDTOL=number; CONTINUE=YES|NO|
-  lines 0-2: 4*number?
-  names: first, period=1, least, most
+  lines 0-2: 4*number? as first, period=1, least, most
   deck step|step: LONG TERM; ~DIRECT=
 *FREQUENCY (step, once a step) EIGENSOLVER=LANCZOS|SUBSPACE|AMS; PROPERTY EVALUATION=number;
     NORMALIZATION=MASS|DISPLACEMENT; SIM=YES|NO|; ACOUSTIC COUPLING=ON|OFF|PROJECTION;
     RESIDUAL MODES; NUMBER INTERVAL=integer; BIAS=number
-  lines 1+: integer? 6*number?
-  names: modes, lowest, highest, shift
+  lines 1+: integer? 6*number? as modes, lowest, highest, shift
   step: EIGENSOLVER=LANCZOS; NORMALIZATION=MASS; PROPERTY EVALUATION; SIM=NO
 *COMPLEX FREQUENCY (step, once a step) PROPERTY EVALUATION=number; FRICTION DAMPING=YES|NO;
     NORMALIZATION=DISPLACEMENT|MODAL; UNSTABLE MODES ONLY=name; LEFT EIGENVECTORS;
     RIGHT EIGENVECTORS
-  lines 1: integer? 5*number?
-  names: modes
+  lines 1: integer? 5*number? as modes
   after: FREQUENCY
   step: PROPERTY EVALUATION
 *DSLOAD (step) OP=MOD|NEW; AMPLITUDE=amplitude; FOLLOWER=YES|NO|; CONSTANT RESULTANT=YES|NO|
-  lines 1+: surface name 7*number?
-  names: surface, load, pressure
+  lines 1+: surface name 7*number? as surface, load, pressure
   deck step: ~OP; AMPLITUDE
   step: OP=MOD
 *DLOAD (step) OP=MOD|NEW; AMPLITUDE=amplitude
@@ -54,8 +49,7 @@ STEP_RULES = """
   deck step: ~OP; AMPLITUDE
   step: OP=MOD
 *CLOAD (step) OP=MOD|NEW; AMPLITUDE=amplitude; FOLLOWER
-  lines 1+: node integer number
-  names: node, freedom, force
+  lines 1+: node integer number as node, freedom, force
   step: OP=MOD
   instead: delete it: only the inflation pressure acts
 *CONTACT CONTROLS (step, contact) SLAVE=surface; MASTER=surface; STABILIZE=any; RESET;
