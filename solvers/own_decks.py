@@ -8,6 +8,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from .rings import ring_modes
+
+Array = np.ndarray
 OWN_DECKS_FILE = "own_decks.json"
 
 
@@ -26,6 +31,25 @@ class DecksOfRun:
     def last(self) -> str:
         """The job that finds the modes."""
         return self.jobs[-1][0]
+
+
+def results(
+    run: DecksOfRun, mass: float | None, eigenvalues: Array, points: Array, shapes: Array
+) -> dict[str, Any]:
+    """Results as plain data: each mode a real shape on the crown's nodes, about y as the axle.
+
+    mass, points (k, 3) and shapes (m, k, 3), x, y, z, per root of a mass, in the decks' units.
+    """
+    places, modes = ring_modes(eigenvalues, run.length_m * points, shapes / np.sqrt(run.mass_kg))
+    return {
+        "pressure_Pa": run.pressure_Pa,
+        "mass_kg": mass and mass * run.mass_kg,
+        "modes": modes,
+        "gradients": {},
+        "nodes": np.empty(0, int),
+        "points": places,
+        "displacement": np.empty((0, 3)),
+    }
 
 
 def save(request: Mapping[str, Any], folder: Path) -> list[Path]:

@@ -12,7 +12,7 @@ from .. import own_decks
 from ..decks import WrittenDecks, save_texts
 from ..errors import Refused, RunFailed
 from ..process import program_version
-from ..rings import about_axle, ring_modes
+from ..rings import about_axle
 from .dat import DatTable, read_dat
 from .evidence import checked_modes
 from .launch import run_job
@@ -71,18 +71,9 @@ class Abaqus:
             masses = [each.mass for each in tables if each.mass is not None]
             table = DatTable(table.frequencies_Hz, masses[-1] if masses else None)
         raw_modes = checked_modes(folder / f"{run.last}.fil", run.modes, table)
-        points, vectors = run.length_m * raw_modes.coordinates, raw_modes.displacement
+        points = raw_modes.coordinates
+        shapes = raw_modes.displacement / np.sqrt(raw_modes.masses)[:, None, None]
         if own:
             points, turn = about_axle(points)
-            vectors = vectors @ turn.T
-        norms = np.sqrt(raw_modes.masses * run.mass_kg)[:, None, None]
-        places, modes = ring_modes(raw_modes.eigenvalues, points, vectors / norms)
-        return {
-            "pressure_Pa": run.pressure_Pa,
-            "mass_kg": table.mass and table.mass * run.mass_kg,
-            "modes": modes,
-            "gradients": {},
-            "nodes": np.empty(0, int),
-            "points": places,
-            "displacement": np.empty((0, 3)),
-        }
+            shapes = shapes @ turn.T
+        return own_decks.results(run, table.mass, raw_modes.eigenvalues, points, shapes)

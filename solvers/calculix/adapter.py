@@ -18,7 +18,7 @@ from .. import own_decks
 from ..decks import WrittenDecks, save_texts
 from ..errors import Refused, RunFailed
 from ..process import end_commands, program_version
-from ..rings import about_axle, ring_modes
+from ..rings import about_axle
 from .results import Fields, pairs, read_eigenvalues, read_fields, read_mass
 from .runner import clear, run_job
 from .slack import read_strips, refuse_slack
@@ -155,20 +155,10 @@ def _of_own_decks(folder: Path, own: own_decks.DecksOfRun) -> dict[str, Any]:
     displacements = {mode: values for mode, name, values in fields.blocks if name == "DISP"}
     if set(displacements) != set(range(1, len(eigenvalues) + 1)):
         raise RunFailed("no_results", f"{own.last}.frd lacks shapes of modes")
-    points, turn = about_axle(own.length_m * fields.points)
-    shapes = np.array([displacements[mode] for mode in sorted(displacements)]) / np.sqrt(
-        own.mass_kg
-    )
-    places, modes = ring_modes(eigenvalues, points, shapes @ turn.T)
-    return {
-        "pressure_Pa": own.pressure_Pa,
-        "mass_kg": own.mass_kg * sum(read_mass(table, name) for name in own.mass_sets),
-        "modes": modes,
-        "gradients": {},
-        "nodes": np.empty(0, int),
-        "points": places,
-        "displacement": np.empty((0, 3)),
-    }
+    points, turn = about_axle(fields.points)
+    shapes = np.array([displacements[mode] for mode in sorted(displacements)]) @ turn.T
+    mass = sum(read_mass(table, name) for name in own.mass_sets)
+    return own_decks.results(own, mass, eigenvalues, points, shapes)
 
 
 def _inflated(path: Path) -> tuple[Fields, Array]:
