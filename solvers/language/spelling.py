@@ -28,8 +28,8 @@ def named(text: str) -> str:
     return squeezed(text.strip('"'))
 
 
-def full(word: str, words: Iterable[str]) -> str:
-    """The one of ``words`` that is meant. Raises ValueError."""
+def full(word: str, words: Iterable[str], mark: str = "") -> str:
+    """The one of ``words`` that is meant; an error has ``mark`` before each. Raises ValueError."""
     short = squeezed(word)
     if not short:
         return ""
@@ -38,17 +38,15 @@ def full(word: str, words: Iterable[str]) -> str:
         return spellings[short]
     fitting = [each for key, each in spellings.items() if key.startswith(short)]
     if len(fitting) > 1:
-        raise ValueError(f"'{word.strip()}' may be {' or '.join(fitting)}: spell it out")
+        several = " or ".join(mark + each for each in fitting)
+        raise ValueError(f"'{word.strip()}' may be {several}: spell it out")
     return fitting[0] if fitting else " ".join(word.upper().split())
 
 
 @cache
 def full_keyword(word: str) -> str:
     """A keyword in full. Raises ValueError."""
-    try:
-        return full(word, KEYWORD_NAMES)
-    except ValueError as error:
-        raise ValueError(str(error).replace(" or ", " or *").replace("be ", "be *", 1)) from None
+    return full(word, KEYWORD_NAMES, "*")
 
 
 def full_parameters(keyword: str, given: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:

@@ -306,17 +306,12 @@ def read_keywords(text: str, job: str = "") -> list[Block]:
 
 
 def read_deck(path: Path) -> str:
-    """The text of a deck, or of a file next to it. Raises DeckError if it is no file of text, or
-    too large; OSError."""
+    """The text of a deck, or of a file next to it. Raises DeckError if it is no file, or too
+    large; OSError."""
     if path.exists() and not path.is_file():
         raise DeckError(WHOLE_DECK, f"{path.name} is not a regular file")
-    if path.stat().st_size > MAX_DECK_BYTES:
-        raise DeckError(WHOLE_DECK, f"{path.name} is larger than {MAX_DECK_BYTES / 1e6:g} MB")
-    content = path.read_bytes()
-    try:
-        return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
-    except UnicodeDecodeError:
-        raise DeckError(WHOLE_DECK, f"{path.name} is not text in UTF-8") from None
+    text = Reader(path.parent)._text(path.name, Place(path.name, 0))
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def seed(blocks: Sequence[Block], tangents: Sequence[tuple[int, int, float]]) -> list[Block]:

@@ -94,7 +94,7 @@ def test_a_turning_tyre_is_as_stiff_as_the_frequency_says() -> None:
             "modes",
             "*MODAL FILE\n",
             "*FILE FORMAT, ASCII\n*MODAL FILE\n",
-            r"modes.inp, line \d+: \*FILE FORMAT may be given once in a job",
+            r"modes.inp, line \d+: \*FILE FORMAT: may be given once in a job",
         ),
         (
             "inflate",

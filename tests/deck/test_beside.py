@@ -176,7 +176,7 @@ def test_decks_that_are_refused(tmp_path: Path, old: str, new: str, words: str) 
     [
         ('{"material": "RUBBER", "surfaces": ["CAVITY"]}', "no \\*ACOUSTIC MEDIUM"),
         ('{"material": "CAVITY_GAS", "surfaces": ["HOLE"]}', "HOLE"),
-        ('{"material": "CAVITY_GAS", "surfaces": []}', "list of surfaces"),
+        ('{"material": "CAVITY_GAS", "surfaces": []}', "surfaces is .., must have at least 1"),
     ],
 )
 def test_cavities_that_are_refused(tmp_path: Path, cavity: str, words: str) -> None:

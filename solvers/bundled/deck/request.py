@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from math import radians
@@ -146,7 +147,7 @@ def _sentence(error: ValidationError) -> str:
         shapes = {"cavity": Cavity, "sector": Sector, "response": ResponseRequest}
         shape = shapes.get(key.partition(".")[0], Request)
         words = f"no such key; there are {', '.join(each.name for each in fields(shape))}"
-    words = words.replace("Input should be", "must be")
+    words = re.sub(r"^(Input|List|Tuple|String) should", "must", words)
     return f"{key or 'the request'} is {json.dumps(first['input']):.60}, {words}{row}"
 
 

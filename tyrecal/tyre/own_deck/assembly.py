@@ -18,7 +18,6 @@ class Assembly:
     block comes with the prefix ("" outside instances) that the names in its data need."""
 
     root: Scope = field(default_factory=Scope)
-    taken: dict[str, set[int]] = field(default_factory=dict)  # numbers outside parts
     others: list[tuple[Block, str]] = field(default_factory=list)  # sections, rigid bodies, ...
     surfaces: dict[str, tuple[Block, str]] = field(default_factory=dict)
     instance_nodes: dict[int, tuple[str, int]] = field(default_factory=dict)  # name, own number
@@ -42,9 +41,10 @@ class DeckPart:
 
 def collect(blocks: Sequence[Block]) -> Assembly:
     """The deck's. Raises OwnDeckError."""
-    made, parts = Assembly(taken=_taken(blocks)), dict[str, DeckPart]()
+    made, parts = Assembly(), dict[str, DeckPart]()
     part: DeckPart | None = None
     instance: Block | None = None
+    later: list[Block] = []  # what waits for the numbers of all nodes and elements outside parts
     for block in blocks:
         if block.name == "PART":
             name = block.need("NAME")
@@ -58,10 +58,10 @@ def collect(blocks: Sequence[Block]) -> Assembly:
             if part is None:
                 raise block.refused(f"the part {block.get('PART')} is not defined above")
         elif block.name == "END INSTANCE" and instance:
-            _instance(made, parts, instance)
+            later.append(instance)
             instance = part = None
         elif part is not None:
-            if instance and part.instances:
+            if instance and any(each.get("PART") == instance.get("PART") for each in later):
                 raise block.refused("is in an *INSTANCE: give it in the *PART")
             if block.name in MESH_KEYWORDS:
                 read(part.scope, block)
@@ -69,23 +69,16 @@ def collect(blocks: Sequence[Block]) -> Assembly:
         elif block.name in MESH_KEYWORDS and not block.get("INSTANCE"):
             read(made.root, block)
         else:
+            later.append(block)
+    for block in later:
+        if block.name == "INSTANCE":
+            _instance(made, parts, block)
+        else:
             _other(made, block, "", parts)
     for each in parts.values():
         if not each.instances:
             raise each.block.refused("no *INSTANCE of it is in the assembly")
     return made
-
-
-def _taken(blocks: Sequence[Block]) -> dict[str, set[int]]:
-    """Numbers of the nodes and elements that are given outside parts and instances."""
-    taken: dict[str, set[int]] = {"node": set(), "element": set()}
-    inside = False
-    for block in blocks:
-        if block.name in ("PART", "INSTANCE", "END PART", "END INSTANCE"):
-            inside = not block.name.startswith("END")
-        elif block.name.lower() in taken and not inside:
-            taken[block.name.lower()] |= {row.integer(0) for row in block.rows}
-    return taken
 
 
 def _instance(made: Assembly, parts: dict[str, DeckPart], block: Block) -> None:
@@ -103,8 +96,7 @@ def _instance(made: Assembly, parts: dict[str, DeckPart], block: Block) -> None:
     pairs = [(root.nodes, own.nodes), (root.elements, own.elements)]
     new = []  # numbers of nodes and elements in the model
     for labels, of_part in pairs:
-        taken = made.taken[labels.what] | labels.keys()
-        more = max(taken) if taken & of_part.keys() else 0
+        more = max(labels) if labels.keys() & of_part.keys() else 0
         new.append({n: n + more for n in of_part})
     nodes, elements = new
     for n, (r, z) in own.nodes.items():

@@ -10,7 +10,7 @@ import numpy as np
 from .assembly import Assembly
 from .classify import ClassifiedDeck
 from .scope import Point, mirror_of, nearest
-from .surfaces import elements_of, is_rigid, rigid_nodes, surface_nodes
+from .surfaces import is_rigid, rigid_nodes, rigid_pieces, surface_nodes
 from .text import Block, Row
 
 MERGED = 1e-6  # of the section's size: nodes closer than this are one where they are tied
@@ -58,16 +58,12 @@ class Constraints:
         self.motions: dict[int, dict[int, float]] = {}
         sizes = np.array(list(self.root.nodes.values()) or [(0.0, 0.0)])
         self.near = MERGED * float(np.ptp(sizes, axis=0).max())
-        self._rules()
-        self._held()
-
-    def _rules(self) -> None:
-        """Rigid bodies, then what is tied or embedded."""
-        for block, prefix in self.made.of("RIGID BODY"):
+        for block, prefix in made.of("RIGID BODY"):
             self._rigid(block, prefix)
-        for block, prefix in self.made.of("TIE", "EMBEDDED ELEMENT"):
+        for block, prefix in made.of("TIE", "EMBEDDED ELEMENT"):
             (self._tie if block.name == "TIE" else self._embed)(block, prefix)
         self._choose_rim()
+        self._held()
 
     def _choose_rim(self) -> None:
         """The one rigid body that holds rubber; others only touch it."""
@@ -128,9 +124,8 @@ class Constraints:
         self, slaves: Sequence[int], surface: tuple[Block, str], block: Block, row: Row
     ) -> None:
         """Nodes on the rim's elements, or as far from them as they may be without being moved."""
-        ends = [e.nodes for e, _ in elements_of(self.made, *surface)]
-        pieces = np.array([[self.root.nodes[n] for n in pair] for pair in ends])
-        away, _ = nearest(np.array([self.root.nodes[n] for n in slaves]), pieces)
+        places = np.array([self.root.nodes[n] for n in slaves])
+        away, _ = nearest(places, rigid_pieces(self.made, *surface))
         given = block.number("POSITION TOLERANCE") or 0.0
         allowed = given if block.get("ADJUST") == "NO" else 0.0
         for n, distance in zip(slaves, away, strict=True):
@@ -188,28 +183,24 @@ class Constraints:
         half."""
         blocks = [b for b, _ in self.made.of("BOUNDARY")]
         blocks += [b for b in self.blocks.inflation if b.name == "BOUNDARY"]
-        fixed: dict[int, set[int]] = {}
+        fixed: dict[int, dict[int, tuple[Block, Row]]] = {}  # by node and degree of freedom
         for block in blocks:
             for row in block.rows:
                 nodes = self.root.nodes.members(row.name(0), block, row)
                 if nodes and self.motions.keys() >= set(nodes):
                     self._move(nodes, block, row)
                     continue
-                freedoms = _freedoms(block, row)
                 for n in nodes:
-                    fixed.setdefault(n, set()).update(freedoms)
-        if self.reference:
-            own = fixed.pop(self.reference[0], set())
-            if not {1, 2, 6} <= own:
-                block = next(b.block for b in self.bodies if b.reference == self.reference[0])
-                raise block.refused(
-                    f"*BOUNDARY must hold the rim's node {self.reference[0]} in 1, 2 and 6"
-                )
-        solid = {n for e in self.root.elements.values() for n in e.nodes}
-        for n, freedoms in fixed.items():
-            if n not in solid:
-                continue
-            point = self.root.nodes[n]
+                    held = fixed.setdefault(n, {})
+                    held |= dict.fromkeys(_freedoms(block, row) - held.keys(), (block, row))
+        if self.reference and not {1, 2, 6} <= fixed.pop(self.reference[0], {}).keys():
+            block = next(b.block for b in self.bodies if b.reference == self.reference[0])
+            raise block.refused(
+                f"*BOUNDARY must hold the rim's node {self.reference[0]} in 1, 2 and 6"
+            )
+        used = {n for e in self.root.elements.values() for n in e.nodes}
+        for n in [n for n in fixed if n in used]:
+            point, freedoms = self.root.nodes[n], fixed[n].keys()
             if {1, 2} <= freedoms and (5 in freedoms or n in self.rim):
                 self.rim[n] = None
             elif n in self.rim or (
@@ -217,7 +208,7 @@ class Constraints:
             ):
                 continue
             else:
-                block, row = self._where(n, blocks)
+                block, row = next(iter(fixed[n].values()))
                 hint = (
                     f"a half is made whole by {lines_of_the_other_half(point[1])}"
                     if freedoms <= HELD_BY_SYMMETRY
@@ -234,14 +225,6 @@ class Constraints:
         for n in nodes:
             for freedom in freedoms or _freedoms(block, row):
                 self.motions[n][freedom] = size
-
-    def _where(self, number: int, blocks: Sequence[Block]) -> tuple[Block, Row]:
-        return next(
-            (block, row)
-            for block in blocks
-            for row in block.rows
-            if number in self.root.nodes.members(row.name(0), block, row)
-        )
 
     def on_plane(self, point: Point) -> bool:
         assert self.made.reflect

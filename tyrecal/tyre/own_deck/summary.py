@@ -10,7 +10,7 @@ import numpy as np
 from ...files import Json
 from .own_deck import OwnDeck
 from .solver_deck import SolverDeck
-from .text import Block, names_of
+from .text import names_of
 
 
 def contents(deck: OwnDeck, flat: SolverDeck) -> Json:
@@ -61,14 +61,10 @@ LAWS = ("ELASTIC", "HYPERELASTIC", "VISCOELASTIC")
 
 def laws(flat: SolverDeck, material: str) -> list[str]:
     """The options of a material."""
-    options = (flat.blocks.options.get(b, ()) for b in flat.blocks.model if is_of(b, material))
-    laws = (b for own in options for b in own if b.name in LAWS)
+    blocks = flat.blocks
+    (block,) = (b for b in blocks.model if (b.name, b.get("NAME")) == ("MATERIAL", material))
+    laws = (b for b in blocks.options[block] if b.name in LAWS)
     return [", ".join((b.name.lower(), *map(str.lower, b.parameters))) for b in laws]
-
-
-def is_of(block: Block, material: str) -> bool:
-    """Whether a block defines a material."""
-    return block.name == "MATERIAL" and block.get("NAME") == material
 
 
 def step_name(name: str) -> str:
