@@ -17,21 +17,17 @@ MODEL_RULES = f"""
 *PART (model) NAME!=+part
   deck: NAME
   calculix: it has no parts and instances
-*END PART (part)
-  deck:
 *ASSEMBLY (model, once a job) NAME!=name
   deck: ~NAME
   calculix: it has no parts and instances
-*END ASSEMBLY (part)
-  deck:
 *INSTANCE (part) NAME!=name; PART!=part; NSET=+nset; ELSET=+elset; INSTANCE=name; LIBRARY=name
   lines 0+: number...
   deck: NAME; PART; NSET; ELSET
   calculix: it has no parts and instances
-*END INSTANCE (part)
+*END INSTANCE, END PART, END ASSEMBLY (part)
   deck:
 *NODE (part) NSET=+nset; SYSTEM=R|C|S
-  lines 1+: label 6*number?
+  lines 1+: label 6*number? as _number, _first, _second, _third
   deck: NSET; SYSTEM=R
   section: NSET
   revolve: ~NSET
@@ -257,8 +253,8 @@ MODEL_RULES = f"""
   deck: REFLECT=LINE
   revolve: REVOLVE
   calculix: it reflects and revolves nothing
-*SYMMETRIC RESULTS TRANSFER (model, once a job) STEP=integer; INC=integer; ITERATION=integer;
+*SYMMETRIC RESULTS TRANSFER (model, once a job, after SYMMETRIC MODEL GENERATION)
+    STEP=integer; INC=integer; ITERATION=integer;
     UNBALANCED STRESS=name
-  after: SYMMETRIC MODEL GENERATION
   revolve: STEP; INC
 """

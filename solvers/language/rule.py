@@ -132,9 +132,11 @@ def _rule(level: str, notes: list[str], options: str, lines: dict[str, str]) -> 
     fields, _, names = fields.partition(" as ")
     most = MANY if rows.endswith("+") else int(rows[-1])
     words: dict[str, Any] = {word: lines.get(word, "") for word in ("instead", "calculix")}
-    for word in ("needs", "alone", "after", "within"):
+    for word in ("needs", "alone"):
         words[word] = _split(lines.get(word, ""), "; ")
     noted = lambda word: "".join(n.removeprefix(word) for n in notes if n.startswith(word))
+    for word in ("under", "after", "within"):
+        words[word] = _split(noted(f"{word} "), "; ")
     return KeywordRule(
         level,
         options,
@@ -143,7 +145,6 @@ def _rule(level: str, notes: list[str], options: str, lines: dict[str, str]) -> 
         given("if"),
         {**given("names"), "": names} if names else given("names"),
         {key: text for key, text in lines.items() if {*key.split("|")} <= PLACES.keys()},
-        under=_split(noted("under "), "; "),
         once=noted("once a "),
         is_output="output" in notes,
         is_contact="contact" in notes,

@@ -33,11 +33,10 @@ STEP_RULES = """
     RESIDUAL MODES; NUMBER INTERVAL=integer; BIAS=number
   lines 1+: integer? 6*number? as modes, lowest, highest, shift
   step: EIGENSOLVER=LANCZOS; NORMALIZATION=MASS; PROPERTY EVALUATION; SIM=NO
-*COMPLEX FREQUENCY (step, once a step) PROPERTY EVALUATION=number; FRICTION DAMPING=YES|NO;
-    NORMALIZATION=DISPLACEMENT|MODAL; UNSTABLE MODES ONLY=name; LEFT EIGENVECTORS;
-    RIGHT EIGENVECTORS
+*COMPLEX FREQUENCY (step, once a step, after FREQUENCY) PROPERTY EVALUATION=number;
+    FRICTION DAMPING=YES|NO; NORMALIZATION=DISPLACEMENT|MODAL; UNSTABLE MODES ONLY=name;
+    LEFT EIGENVECTORS; RIGHT EIGENVECTORS
   lines 1: integer? 5*number? as modes
-  after: FREQUENCY
   step: PROPERTY EVALUATION
 *DSLOAD (step) OP=MOD|NEW; AMPLITUDE=amplitude; FOLLOWER=YES|NO|; CONSTANT RESULTANT=YES|NO|
   lines 1+: surface name 7*number? as surface, load, pressure
@@ -62,8 +61,7 @@ STEP_RULES = """
     LAST MODE=integer
   lines 0+: name...
   step: NSET; FREQUENCY
-*MODAL FILE (step, output) FREQUENCY=integer
-  within: FREQUENCY; BUCKLE; COMPLEX FREQUENCY
+*MODAL FILE (step, output, within FREQUENCY; BUCKLE; COMPLEX FREQUENCY) FREQUENCY=integer
   step:
 *CONTACT FILE (step, output) FREQUENCY=integer; SLAVE=surface; MASTER=surface; NSET=nset
   lines 0+: name...

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from ...language.text import WHOLE_DECK, Block, DeckError, Row, read_keywords, s
 from . import grammar
 
 PROCEDURES = ("STATIC", "FREQUENCY", "COMPLEX FREQUENCY")
+Numbers = dict[str, complex | float]
 Tangent = tuple[str, int, int, float]  # job, 1-based line, 0-based field, d number / d variable
 
 
@@ -20,15 +21,15 @@ class DeckStep:
 
     number: int  # in the job, from 1
     procedure: Block  # its keyword of ``PROCEDURES``
-    pressures: dict[str, complex | float]  # surface to the deck's number, Pa
     held: Sequence[Row]  # rows of *BOUNDARY
-    long_term: bool  # the static state is relaxed
     revolved: bool  # of the second job, in three dimensions
-    forces: Sequence[Row]  # rows of *CLOAD
-    output: str  # the node set of its *NODE FILE, or ""
-    centrifugal: dict[str, complex | float]  # element set to Omega^2 (rad2/s2) of *DLOAD's CENTRIF
-    spin: dict[str, complex | float]  # element set to Omega (rad/s) of its ROTDYNF
+    output: str = ""  # the node set of its *NODE FILE, or ""
     is_perturbation: bool = False  # a *STATIC that is linear about the end of the step before
+    long_term: bool = True  # the static state is relaxed
+    forces: Sequence[Row] = ()  # rows of *CLOAD
+    pressures: Numbers = field(default_factory=dict)  # surface to the deck's number, Pa
+    centrifugal: Numbers = field(default_factory=dict)  # element set to Omega^2 of *DLOAD's CENTRIF
+    spin: Numbers = field(default_factory=dict)  # element set to Omega (rad/s) of its ROTDYNF
 
     @property
     def pressure(self) -> float:
@@ -69,68 +70,53 @@ class Deck:
 def _steps(model: list[Block], blocks: list[list[Block]], revolved: bool) -> list[DeckStep]:
     """The steps of a deck, each with all supports and loads that act in it. Raises DeckError."""
     steps: list[DeckStep] = []
-    held: Sequence[Row] = [row for k in model if k.name == "BOUNDARY" for row in k.rows]
-    pressures: dict[str, complex | float] = {}
-    forces: Sequence[Row] = []
-    turning: dict[str, dict[str, complex | float]] = {"CENTRIF": {}, "ROTDYNF": {}}
-    long_term, on_road = True, any(k.name == "CONTACT PAIR" for k in model)
+    held = [row for k in model if k.name == "BOUNDARY" for row in k.rows]
+    on_road = any(k.name == "CONTACT PAIR" for k in model)
+    step = DeckStep(0, Block("", WHOLE_DECK, {}), held, revolved)  # before the first one
     for number, block in enumerate(blocks, start=1):
         procedure = _procedure(block, on_road)
-        is_perturbation = procedure.name == "STATIC" and "PERTURBATION" in block[0].parameters
+        output = next((k.get("NSET") for k in block if k.name == "NODE FILE"), "")
+        linear = procedure.name == "STATIC" and "PERTURBATION" in block[0].parameters
+        step = replace(
+            step, number=number, procedure=procedure, output=output, is_perturbation=linear
+        )
         for k in block:
             if k.name == "BOUNDARY":
-                held = k.rows if k.get("OP") == "NEW" else [*held, *k.rows]
+                step.held = k.rows if k.get("OP") == "NEW" else [*step.held, *k.rows]
             elif k.name == "CLOAD":
-                forces = k.rows
+                step.forces = k.rows
             elif k.name == "DSLOAD":
-                pressures = {**pressures, **_pressures(k)}
+                step.pressures = step.pressures | _pressures(k)
             elif k.name == "DLOAD":
-                turning = _turning(k, turning, revolved)
-        if procedure.name == "STATIC" and not is_perturbation:
-            long_term = "LONG TERM" in procedure.parameters
-        output = next((k.get("NSET") for k in block if k.name == "NODE FILE"), "")
-        steps.append(
-            DeckStep(
-                number,
-                procedure,
-                pressures,
-                held,
-                long_term,
-                revolved,
-                forces,
-                output,
-                turning["CENTRIF"],
-                turning["ROTDYNF"],
-                is_perturbation,
-            )
-        )
+                _turn(step, k)
+        if procedure.name == "STATIC" and not linear:
+            step.long_term = "LONG TERM" in procedure.parameters
+        steps.append(step)
     return steps
 
 
-def _pressures(k: Block) -> dict[str, complex | float]:
+def _pressures(k: Block) -> Numbers:
     """Pressure (Pa) by surface of a *DSLOAD. Raises DeckError."""
     pressures = {}
     for row in k.rows:
         if row.name(1) != "P":
-            raise DeckError(row.place, f"load type '{row.text(1)}' is not honoured, only P")
+            raise k.refused(f"the load '{row.text(1)}' is not honoured, only P", row)
         pressures[row.name(0)] = row.value(2)
     return pressures
 
 
-def _turning(
-    k: Block, before: dict[str, dict[str, complex | float]], revolved: bool
-) -> dict[str, dict[str, complex | float]]:
-    """Loads of a tyre that turns about its axle, by kind and element set."""
-    turning = {kind: dict(sets) for kind, sets in before.items()}
+def _turn(step: DeckStep, k: Block) -> None:
+    """Add the loads of a tyre that turns about its axle, of a *DLOAD. Raises DeckError."""
+    step.centrifugal, step.spin = dict(step.centrifugal), dict(step.spin)
+    kinds = {"CENTRIF": step.centrifugal} | ({"ROTDYNF": step.spin} if step.revolved else {})
     for row in k.rows:
         kind = row.name(1)
-        if kind not in (turning if revolved else ("CENTRIF",)):
-            raise DeckError(row.place, f"load type '{row.text(1)}' of *DLOAD is not honoured here")
+        if kind not in kinds:
+            raise k.refused(f"the load '{row.text(1)}' is not honoured here", row)
         axis = [row.value(i, 0.0) for i in range(3, 9)]
-        if axis != ([0.0, 0.0, 0.0, 0.0, 1.0, 0.0] if revolved else [0.0] * 6):
-            raise DeckError(row.place, "the tyre turns about its axle, 0, 0, 0 along 0, 1, 0")
-        turning[kind][row.name(0)] = row.value(2)
-    return turning
+        if axis != ([0.0, 0.0, 0.0, 0.0, 1.0, 0.0] if step.revolved else [0.0] * 6):
+            raise k.refused("the tyre turns about its axle, 0, 0, 0 along 0, 1, 0", row)
+        kinds[kind][row.name(0)] = row.value(2)
 
 
 def _procedure(block: list[Block], on_road: bool) -> Block:
@@ -138,19 +124,17 @@ def _procedure(block: list[Block], on_road: bool) -> Block:
     Raises DeckError."""
     procedures = [k for k in block if k.name in PROCEDURES]
     if len(procedures) != 1:
-        raise DeckError(
-            block[0].place, "a step needs one *STATIC, *FREQUENCY or *COMPLEX FREQUENCY"
-        )
+        raise block[0].refused("needs one *STATIC, *FREQUENCY or *COMPLEX FREQUENCY")
     procedure, given = procedures[0], block[0].parameters
     if procedure.name != "STATIC":
         return procedure
     if "PERTURBATION" in given and ("NLGEOM" in given or not on_road):
-        words = "a *STATIC step is no linear PERTURBATION, except without NLGEOM on a road"
-        raise DeckError(block[0].place, words)
+        words = "a *STATIC is no linear PERTURBATION, except without NLGEOM on a road"
+        raise block[0].refused(words)
     if "PERTURBATION" in given and (procedure.rows or procedure.parameters):
-        raise DeckError(procedure.place, "*STATIC takes no data and parameters in a PERTURBATION")
+        raise procedure.refused("takes no data and parameters in a PERTURBATION")
     if not {"NLGEOM", "PERTURBATION"} & given.keys():
-        raise DeckError(block[0].place, "a *STATIC step needs NLGEOM=YES")
+        raise block[0].refused("a *STATIC needs NLGEOM=YES")
     return procedure
 
 
@@ -161,37 +145,29 @@ def _check_transfer(section: list[Block], steps: list[DeckStep], revolve: list[B
         if needed not in blocks:
             place = revolve[0].place if revolve else WHOLE_DECK
             raise DeckError(place, f"a job that runs on another one needs *{needed}")
-    generation, transfer = (
-        blocks[f"SYMMETRIC {n}"] for n in ("MODEL GENERATION", "RESULTS TRANSFER")
-    )
+    generation = blocks["SYMMETRIC MODEL GENERATION"]
+    transfer = blocks["SYMMETRIC RESULTS TRANSFER"]
     if "REVOLVE" not in generation.parameters:
-        raise DeckError(generation.place, "the job must REVOLVE the section")
+        raise generation.refused("must REVOLVE the section")
     segments = [row.number(0) for row in generation.rows[2:]]
     if not abs(sum(segments) - 360.0) < 1e-6:
-        raise DeckError(generation.place, "the tyre is revolved by 360 degrees")
+        raise generation.refused("the tyre is revolved by 360 degrees")
     axis = [generation.rows[0].value(i, 0.0) for i in range(6)]
     if any(axis[:4]) or axis[5] or not np.real(axis[4]) > 0:
-        raise DeckError(
-            generation.place, "the tyre is revolved about the second axis, 0, 0, 0 to 0, 1, 0"
-        )
+        raise generation.refused("the tyre is revolved about the second axis, 0, 0, 0 to 0, 1, 0")
     if len(steps) != 1 or steps[0].procedure.name != "STATIC":
-        raise DeckError(transfer.place, "the first job must have one step, a *STATIC")
+        raise transfer.refused("the first job must have one step, a *STATIC")
     increments = _increments(steps[0].procedure)
     if (transfer.need("STEP"), transfer.need("INC")) != ("1", str(increments)):
-        raise DeckError(transfer.place, f"the first job ends with STEP=1, INC={increments}")
-    for k in section:
-        restated = (
-            r.get("TIE NSET") == k.need("TIE NSET") for r in revolve if r.name == "RIGID BODY"
-        )
-        if k.name == "RIGID BODY" and not any(restated):
-            raise DeckError(
-                transfer.place,
-                f"a revolve drops the *RIGID BODY of {k.need('TIE NSET')}: it must be restated",
-            )
+        raise transfer.refused(f"the first job ends with STEP=1, INC={increments}")
+    restated = {k.get("TIE NSET") for k in revolve if k.name == "RIGID BODY"}
+    for name in (k.need("TIE NSET") for k in section if k.name == "RIGID BODY"):
+        if name not in restated:
+            raise transfer.refused(f"drops the *RIGID BODY of {name}: it must be restated")
 
 
 def _increments(procedure: Block) -> int:
     if "DIRECT" not in procedure.parameters:
-        raise DeckError(procedure.place, "the increments must be fixed (DIRECT) for a transfer")
+        raise procedure.refused("the increments must be fixed (DIRECT) for a transfer")
     row = procedure.only_row()
     return int(np.ceil(np.real(row.value(1) / row.value(0)) - 1e-9))

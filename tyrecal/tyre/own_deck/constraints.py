@@ -10,7 +10,7 @@ import numpy as np
 from .assembly import Assembly
 from .classify import ClassifiedDeck
 from .scope import Point, mirror_of, nearest
-from .surfaces import is_rigid, rigid_nodes, rigid_pieces, surface_nodes
+from .surfaces import rigid_nodes, rigid_pieces, surface_nodes
 from .text import Block, Row
 
 MERGED = 1e-6  # of the section's size: nodes closer than this are one where they are tied
@@ -91,7 +91,8 @@ class Constraints:
             members = self.root.elements.members(prefix + elements, block)
             nodes |= dict.fromkeys(n for each in members for n in self.root.elements[each].nodes)
             for each, place in self.made.surfaces.items():
-                if is_rigid(self.made, *place) and nodes.keys() >= rigid_nodes(self.made, *place):
+                own = rigid_nodes(self.made, *place)
+                if own and nodes.keys() >= own:
                     surfaces.append(each)
         if profile := block.get("ANALYTICAL SURFACE"):
             surface, _ = self.made.surfaces.get(prefix + profile, (block, ""))
@@ -108,7 +109,7 @@ class Constraints:
             slaves = surface_nodes(self.made, prefix + row.name(0), block, row)
             name = prefix + row.name(1)
             surface = self.made.surfaces.get(name)
-            if surface and is_rigid(self.made, *surface):
+            if surface and rigid_nodes(self.made, *surface):
                 self._seat(slaves, surface, block, row)
                 self.seats.add(name)
                 continue

@@ -38,8 +38,6 @@ def _node(scope: Scope, block: Block) -> Iterator[int]:
         r, z = row.number(1, 0.0), row.number(2, 0.0)
         if any(row.fields[3:]) and row.number(3, 0.0):
             raise block.refused("a third coordinate is not honoured: a section is in r, z", row)
-        if any(row.fields[4:]):
-            raise block.refused(f"data '{row.fields[4]}' is not honoured", row)
         point = (
             (r, z) if (r0, z0, c, s) == (0, 0, 1, 0) else (r0 + c * r - s * z, z0 + s * r + c * z)
         )

@@ -150,16 +150,18 @@ def is_marked(block: Block) -> bool:
     return in_data or any("<" in value for value in block.parameters.values())
 
 
+def with_marks_filled(text: str, numbers: Numbers) -> str:
+    """A text with the numbers of those marks that have one."""
+    return DECK_MARK.sub(lambda m: written(numbers[m[1]]) if m[1] in numbers else m[0], text)
+
+
 def filled(block: Block, numbers: Numbers, parameters: Parameters) -> Block:
     """A block with the numbers of its marks and parameters."""
 
     def text(field: str) -> str:
+        field = with_marks_filled(field, numbers)
         if "{{" in field:
-            field = DECK_MARK.sub(
-                lambda m: written(numbers[m[1]]) if m[1] in numbers else m[0], field
-            )
-            if "{{" in field:
-                raise block.refused(f"the mark {field} has no number: give it in deck.numbers")
+            raise block.refused(f"the mark {field} has no number: give it in deck.numbers")
         return PARAMETER.sub(lambda m: _parameter(block, parameters, m[1]), field)
 
     rows = [Row(row.place, text(row.line)) if GIVEN.search(row.line) else row for row in block.rows]
@@ -203,11 +205,9 @@ def parameters(block: Block, known: Parameters) -> None:
             raise block.refused(f"'{text}' is not NAME = expression", row)
         try:
             value = _evaluate(ast.parse(expression, mode="eval").body, known)
-        except ZeroDivisionError:
-            raise block.refused(f"'{text}' divides by 0", row) from None
         except (RecursionError, MemoryError):
             raise block.refused(f"'{text}' is nested too deep", row) from None
-        except (ValueError, SyntaxError, KeyError, TypeError, OverflowError) as error:
+        except (ValueError, SyntaxError, KeyError, TypeError, ArithmeticError) as error:
             raise block.refused(f"'{text}' is not honoured: {error}", row) from None
         known[name.upper()] = value
 

@@ -22,11 +22,8 @@ UNIT_LENGTH = {"m": 1.0, "mm": 1e-3}  # of a unit of length, m
 UNIT_MASS = {"m": 1.0, "mm": 1e3}  # of a unit of mass, kg: mm, t, s, MPa
 # of tyres' materials: kg/m3, or t/mm3
 DENSITIES: dict[Units, tuple[float, float]] = {"m": (300.0, 2e4), "mm": (3e-10, 2e-8)}
-TOPOLOGY = {"PART", "ASSEMBLY", "SYMMETRIC MODEL GENERATION", "BOUNDARY", "DSLOAD", "DLOAD"}
-TOPOLOGY |= {
-    name for name, rule in table.RULES.items() if rule.is_judged and "part" in rule.level.split()
-}
-TOPOLOGY -= {"HOURGLASS STIFFNESS", "REBAR LAYER"}
+# keywords whose numbers change neither the mesh nor what holds or presses it
+OF_NO_MESH = {*table.MATERIAL_OPTIONS, "REBAR LAYER", "PARAMETER", "AMPLITUDE"}
 
 
 @dataclass(eq=False)
@@ -117,8 +114,8 @@ class OwnDeck:
 
     def model(self, deck: ClassifiedDeck) -> DeckModel:
         """The section of classified blocks, remembered while the mesh's own stay the same."""
-        mesh = (b for b in (*deck.model, *deck.inflation) if b.name in TOPOLOGY)
-        key = (*mesh, *deck.contact)
+        blocks = (*deck.model, *deck.inflation, *deck.contact)
+        key = tuple(block for block in blocks if block.name not in OF_NO_MESH)
         if key not in self._models:
             while len(self._models) > 3:
                 self._models.pop(next(iter(self._models)))

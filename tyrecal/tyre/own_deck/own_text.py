@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 
-from .numbers import DECK_MARK, assigned, written, written_as
+from .numbers import assigned, with_marks_filled, written, written_as
 from .own_deck import OwnDeck
 from .text import Row
 
@@ -27,12 +27,7 @@ def own_texts(
         own = lines[row.place.file]
         own[row.place.line - 1] = _with(own[row.place.line - 1], row, j, value)
     known = {name: numbers[name] for name in deck.marks if name in numbers}
-    return {
-        file: DECK_MARK.sub(
-            lambda m: written(known[m[1]]) if m[1] in known else m[0], "\n".join(own)
-        )
-        for file, own in lines.items()
-    }
+    return {file: with_marks_filled("\n".join(own), known) for file, own in lines.items()}
 
 
 def _with(line: str, row: Row, index: int, value: float) -> str:

@@ -80,17 +80,12 @@ def elements_of(made: Assembly, surface: Block, prefix: str) -> list[tuple[Eleme
     ]
 
 
-def is_rigid(made: Assembly, surface: Block, prefix: str) -> bool:
-    """Whether all elements of a surface are rigid lines (RAX2)."""
-    if surface.get("TYPE") in ("NODE", "SEGMENTS"):
-        return False
-    kinds = {element.kind for element, _ in elements_of(made, surface, prefix)}
-    return kinds == {"RAX2"}
-
-
 def rigid_nodes(made: Assembly, surface: Block, prefix: str) -> set[int]:
-    """Nodes of the elements of a rigid surface."""
-    return {n for element, _ in elements_of(made, surface, prefix) for n in element.nodes}
+    """Nodes of a surface all elements of which are rigid lines (RAX2), none of another surface."""
+    if surface.get("TYPE") in ("NODE", "SEGMENTS"):
+        return set()
+    elements = [element for element, _ in elements_of(made, surface, prefix)]
+    return {n for e in elements for n in e.nodes} if all(e.is_rigid for e in elements) else set()
 
 
 def rigid_pieces(made: Assembly, surface: Block, prefix: str) -> np.ndarray:
