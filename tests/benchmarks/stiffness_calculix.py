@@ -1,11 +1,17 @@
 """Stiffnesses of the pressed tyre, its patch held, by the bundled solver and by CalculiX.
 
-    python -m tests.benchmarks.stiffness_calculix FOLDER
+    python -m tests.benchmarks.stiffness_calculix FOLDER [half|whole]
 
-One mesh of 8 degrees at the patch, C3D20 and CGAX8, the section, cord law, straight sides and road
-alike (1e9 Pa/m across and along it). CalculiX gets the deflection that the bundled solver finds at
-3 kN, with so much friction that nothing slides. Then its road moves along, across and turns, one
-after the other, and back. The stiffnesses are those at a constant height of the axle.
+One mesh of 16/3 degrees at the patch, C3D20 and CGAX8, the section, cord law, straight sides and
+road alike (1e9 Pa/m across and along it). CalculiX gets the deflection that the bundled solver
+finds at 3 kN, with so much friction that nothing slides. The bundled solver's next loads show how
+the stiffness depends on the patch, which such a mesh gives another size by each program's contact.
+CalculiX's road turns (half: half of the
+tyre, which a half turn about the vertical makes whole), or moves along, back, across and back (all
+of it). The stiffnesses are those at a constant height of the axle.
+
+The moment is that of the forces at where the road's nodes then are. The road is an elastic block:
+where they were, the block's own stresses have a moment, of 9 kN m/rad at 1 mrad along a chord.
 """
 
 from __future__ import annotations
@@ -17,7 +23,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import re
 import sys
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from unittest.mock import patch
 
@@ -34,101 +40,139 @@ from tyrecal.studies.stiffness import LATERAL, LONGITUDINAL, TORSION
 from tyrecal.tyre.values import with_values
 
 Array = np.ndarray
-LOAD_N, LIMIT_S = 3000.0, 7200.0
-SHIFT_M, TURN_RAD = 2e-4, 1e-3
-ALONG = (2, 2, 2, 1)
-ANGLES = Angles(8.0, 16.0, 36.0, 2.0, whole=True)
-MESH = Mesh("C3D20", 8.0, ALONG, ANGLES)
+LOADS_N, LIMIT_S = (3000.0, 3400.0, 3800.0), 7200.0
+SHIFT_M, TURN_RAD = 2e-4, 2e-3
+ALONG = (4, 2, 2, 1)
+ANGLES = Angles(16 / 3, 16.0, 36.0, 2.0)
 ROAD = Road(friction=5.0, normal=1e9, stick=1e9)
-# time at which the road has moved, and its motion there: y (along), z (across), turn about x
-MOTIONS = {2: (SHIFT_M, 0.0, 0.0), 4: (0.0, SHIFT_M, 0.0), 6: (0.0, 0.0, TURN_RAD)}
+# time at which the road has moved, and its motion there: y (along), z (across), turn about x. Until
+# time 2 it rests, as CalculiX lets go by then what sank in before
+MOTIONS = {
+    "half": {3: (0.0, 0.0, TURN_RAD)},
+    "whole": {3: (SHIFT_M, 0.0, 0.0), 5: (0.0, SHIFT_M, 0.0)},
+}
+NAMES = {
+    "half": {"torsional, Nm/°": np.pi / 180},
+    "whole": {"longitudinal, N/mm": 1e-3, "lateral, N/mm": 1e-3},
+}
+AREAS = re.compile(
+    r"master set ROAD_FACE and time +(\S+)(?:(?! statistics).*\n)*?   area,.*\n\s*\n +(\S+)"
+)
 FORCES = re.compile(r"forces \(fx,fy,fz\) for set ROAD and time +(\S+)\s*\n\s*\n((?: .*\n){8})")
 
 
-def bundled() -> tuple[float, float, Array]:
-    """Deflection (m), force (N), and longitudinal, lateral and torsional stiffness."""
+@dataclass(frozen=True)
+class Row:
+    """A pressed tyre: m, N, m2, and stiffnesses by part of the tyre that CalculiX has."""
+
+    deflection_m: float
+    force_N: float
+    area_m2: float
+    stiffness: dict[str, Array]
+
+
+def bundled() -> list[Row]:
+    """The bundled solver's tyre at `LOADS_N`."""
     case = meshed(ALONG, (1, 1, 1, 1))
     case = with_values(case, {"road.stiffness_Pa_per_m": ROAD.normal})
-    half = replace(ANGLES, whole=False).sizes()
-    road = case.case.road.model_copy(update={"element_angles_deg": half})
+    road = case.case.road.model_copy(update={"element_angles_deg": ANGLES.sizes()})
     case = replace(case, case=case.case.model_copy(update={"road": road}))
     # the bundled solver's waves beyond the patch are finer than these elements anyway
     with common(), patch.object(tyre_design, "WAVES_OF_STIFFNESS", 0):
-        pressed = Evaluator(TyreDesign(case), "bundled").press({}, [LOAD_N], rim_stiffness=True)
-    (row,) = pressed.footprints
-    assert row.rim_reactions is not None
-    places = [LONGITUDINAL, LATERAL, TORSION]
-    return row.deflection_m, row.road_N, np.diag(row.rim_reactions)[places]
+        pressed = Evaluator(TyreDesign(case), "bundled").press({}, LOADS_N, rim_stiffness=True)
+    rows = []
+    for row in pressed.footprints:
+        assert row.rim_reactions is not None
+        own = np.diag(row.rim_reactions)
+        stiffness = {"half": own[[TORSION]], "whole": own[[LONGITUDINAL, LATERAL]]}
+        rows.append(Row(row.deflection_m, row.road_N, row.contact_area_m2, stiffness))
+    return rows
 
 
-def moving(text: str) -> str:
-    """The deck of one deflection, whose road then makes the motions."""
-    last = max(MOTIONS) + 1
+def places_at(road: Array, motion: tuple[float, float, float]) -> Array:
+    """Places y, z (8, 2), m, of the road's nodes after a motion."""
+    along, across, turn = motion
+    c, s = np.cos(turn), np.sin(turn)
+    return road @ np.array([[c, s], [-s, c]]) + [along, across]
+
+
+def road_nodes(text: str) -> tuple[list[str], Array]:
+    """Numbers of the road's nodes, and their places y, z (8, 2), m."""
     block = re.search(r"\*NODE, NSET=ROAD\n((?:\d.*\n){8})", text)
     assert block
-    tables, moved = [], []
-    for line in block[1].splitlines():
-        number, _, y, z = line.split(",")
+    lines = [line.split(",") for line in block[1].splitlines()]
+    return [number for number, *_ in lines], np.array([line[2:] for line in lines], float)
+
+
+def moving(text: str, motions: dict[int, tuple[float, float, float]]) -> str:
+    """The deck of one deflection, whose road then makes the motions."""
+    last = max(motions) + 1
+    numbers, road = road_nodes(text)
+    moved = {when: places_at(road, motion) - road for when, motion in motions.items()}
+    tables, bounds = "", ""
+    for k, number in enumerate(numbers):
         for dof in (2, 3):
-            at = {0: 0.0, 1: 0.0}
-            for when, (along, across, turn) in MOTIONS.items():
-                turned = -turn * float(z) if dof == 2 else turn * float(y)
-                at |= {when: turned + (along if dof == 2 else across), when + 1: 0.0}
+            at = dict.fromkeys(range(last + 1), 0.0)
+            at |= {when: float(shift[k, dof - 2]) for when, shift in moved.items()}
             rows = "\n".join(f"{when}, {value!r}" for when, value in at.items())
-            tables.append(f"*AMPLITUDE, NAME=A{number}_{dof}\n{rows}\n")
-            moved.append(f"*BOUNDARY, AMPLITUDE=A{number}_{dof}\n{number}, {dof}, {dof}, 1.0\n")
+            tables += f"*AMPLITUDE, NAME=A{number}_{dof}\n{rows}\n"
+            bounds += f"*BOUNDARY, AMPLITUDE=A{number}_{dof}\n{number}, {dof}, {dof}, 1.0\n"
     points = "\n".join(map(str, range(1, last + 1)))
     for before, after in {
         "*BOUNDARY\nROAD, 2, 3\n": "",
-        "*STEP, NLGEOM": "".join(tables) + "*STEP, NLGEOM",
+        "*STEP, NLGEOM": tables + "*STEP, NLGEOM",
         "1.0, 1.0, 2, 1.0": f"1.0, 1.0, {last}, 1.0",
         "*TIME POINTS, NAME=DEFLECTIONS\n1\n": f"*TIME POINTS, NAME=DEFLECTIONS\n{points}\n",
         "*STATIC\n0.1, 1,": f"*STATIC\n0.1, {last},",
+        "NSET=ROAD, TOTALS=ONLY,": "NSET=ROAD,",
+        "*NODE PRINT, NSET=RIM": bounds + "*NODE PRINT, NSET=RIM",
     }.items():
-        assert before in text
+        assert text.count(before) == 1
         text = text.replace(before, after)
     text, count = re.subn(r"(?m)^1, (-?\d.*)\n\*TIME", rf"1, \g<1>\n{last}, \g<1>\n*TIME", text)
     assert count == 1
-    text = text.replace("NSET=ROAD, TOTALS=ONLY,", "NSET=ROAD,")
-    return text.replace("*NODE PRINT, NSET=RIM", "".join(moved) + "*NODE PRINT, NSET=RIM", 1)
+    return text
 
 
-def calculix(deflection_m: float, folder: Path) -> tuple[float, Array]:
-    """Force (N), and longitudinal, lateral and torsional stiffness."""
-    run = Run(MESH, ROAD, 1.0, (deflection_m,))
-    deck(run, run.deflections_m, inflated_radius(run, folder / "free", LIMIT_S), folder)
+def calculix(deflection_m: float, part: str, folder: Path) -> Row:
+    """CalculiX's tyre: force before its road moves, area and stiffnesses as it does."""
+    angles = replace(ANGLES, whole=part == "whole")
+    run, motions = Run(Mesh("C3D20", ANGLES.fine, ALONG, angles), ROAD), MOTIONS[part]
+    deck(run, (deflection_m,), inflated_radius(run, folder / "free", LIMIT_S), folder)
     job = folder / "press.inp"
-    job.write_text(moving(job.read_text()))
+    job.write_text(moving(job.read_text(), motions))
     run_press(folder, ["ccx"], LIMIT_S)
-    block = re.search(r"\*NODE, NSET=ROAD\n((?:\d.*\n){8})", job.read_text())
-    assert block
-    places = np.array([line.split(",")[2:] for line in block[1].splitlines()], float)
-    at = {}
-    for when, rows in FORCES.findall((folder / "press.dat").read_text()):
-        f = np.array([row.split()[1:] for row in rows.splitlines()], float)
-        moment = (places[:, 0] * f[:, 2] - places[:, 1] * f[:, 1]).sum()
+    _, road = road_nodes(job.read_text())
+    copies, at = (1 if part == "whole" else 2), {}
+    text = (folder / "press.dat").read_text()
+    for when, rows in FORCES.findall(text):
+        f = copies * np.array([row.split()[1:] for row in rows.splitlines()], float)
+        y, z = places_at(road, motions.get(round(float(when)), (0.0, 0.0, 0.0))).T
+        moment = y @ f[:, 2] - z @ f[:, 1]
         at[round(float(when))] = np.array([f[:, 1].sum(), f[:, 2].sum(), moment, -f[:, 0].sum()])
-    moves = zip(MOTIONS.items(), (SHIFT_M, SHIFT_M, TURN_RAD), strict=True)
-    own = [
-        (at[when] - (at[when - 1] + at[when + 1]) / 2)[k] / size
-        for k, ((when, _), size) in enumerate(moves)
-    ]
-    return float(at[1][3]), np.array(own)
+    areas = {round(float(when)): copies * float(area) for when, area in AREAS.findall(text)}
+    own = []
+    for when, motion in motions.items():
+        (k,) = np.flatnonzero(motion)
+        change = at[when] - (at[when - 1] + at[when + 1]) / 2
+        own.append(change[k] / motion[k])
+    area = float(np.mean([areas[when] for when in motions]))
+    return Row(deflection_m, float(at[2][3]), area, {part: np.array(own)})
 
 
-def main(folder: Path) -> None:
-    deflection, force, ours = bundled()
-    print(f"bundled: {1e3 * deflection:.3f} mm, {force:.0f} N, {ours}", flush=True)
-    start = time.perf_counter()
-    judge_N, judge = calculix(deflection, folder)
-    print(f"CalculiX takes {time.perf_counter() - start:.0f} s")
-    print("| stiffness at the same deflection | CalculiX | bundled | difference |")
-    print("|---|---|---|---|")
-    print(f"| force, N | {judge_N:.0f} | {force:.0f} | {100 * (force / judge_N - 1):+.1f} % |")
-    names = ("longitudinal, N/mm", "lateral, N/mm", "torsional, Nm/°")
-    for name, a, b, scale in zip(names, judge, ours, (1e-3, 1e-3, np.pi / 180), strict=True):
-        print(f"| {name} | {a * scale:.1f} | {b * scale:.1f} | {100 * (b / a - 1):+.1f} % |")
+def main(folder: Path, *parts: str) -> None:
+    ours = bundled()
+    for part in parts or MOTIONS:
+        start = time.perf_counter()
+        judge = calculix(ours[0].deflection_m, part, folder / part)
+        print(f"CalculiX takes {time.perf_counter() - start:.0f} s for the {part} tyre")
+        print("| program | mm | N | cm2 |", " | ".join(NAMES[part]), "|")
+        print("|---" * (5 + len(NAMES[part]) - 1) + "|")
+        for name, row in [("CalculiX", judge), *(("bundled", row) for row in ours)]:
+            cells = [1e3 * row.deflection_m, row.force_N, 1e4 * row.area_m2]
+            cells += [*(row.stiffness[part] * [*NAMES[part].values()])]
+            print(f"| {name} |", " | ".join(f"{x:.1f}" for x in cells), "|", flush=True)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), *sys.argv[2:])

@@ -13,7 +13,7 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.store import Store
 from tyrecal.studies import matrices as exported
 from tyrecal.studies.matrices import matrix_files
-from tyrecal.studies.response import FrfResult
+from tyrecal.studies.response import FrfResult, default_points, read_points
 from tyrecal.studies.result import StudyInput
 from tyrecal.tyre.case import LoadedCase, start_values
 from tyrecal.tyre.effects.edit import with_part
@@ -85,3 +85,14 @@ def test_loads_are_refused_as_by_other_commands(capsys: pytest.CaptureFixture[st
     assert "must be a load above 0" in capsys.readouterr().err
     assert run("frf", case, "--load-N", "3e6") == 2
     assert run("export", case, "--format", "matrices", "--load-N", "3e6") == 2
+
+
+def test_the_default_force_is_away_from_the_patch() -> None:
+    """Unloaded it is below the hub; the road would hold that point."""
+    for load, angle in ((0.0, 0.0), (LOAD_N, 180.0)):
+        points = default_points(load)
+        (force,), (hub, seen) = (
+            read_points(points["excite"], hub=False),
+            read_points(points["respond"]),
+        )
+        assert force == seen and force.angle_deg == angle and hub.angle_deg is None

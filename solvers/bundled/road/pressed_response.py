@@ -4,10 +4,9 @@
                                              [0  V^T K V]       [V^T M Psi        1    ]
 
 Psi: fields that follow the six unit motions of the rim (`rim_stiffness`); C: its stiffness; V:
-modes with the rim held up to `MODES_UP_TO` times the highest frequency, static responses to the
-forces and to the inertia of Psi, to the inertia of these and so on, and to the losses of all that.
-The force of the tyre on a hub that is held is what x has of the forces less K + i L - omega^2 M
-times q; the road bears the rest.
+modes with the rim held, static responses to the forces and to the inertia of Psi, to the inertia of
+these and so on, and to the losses of all that. The force of the tyre on a hub that is held is what
+x has of the forces less K + i L - omega^2 M times q; the road bears the rest.
 
 Each parity of the half turn is a problem of its own. Modal masses are those of the whole tyre. The
 directions of the hub are those of `modes.response`.
@@ -25,7 +24,8 @@ from ...errors import Refused
 from ..modes.harmonics import HarmonicModes
 from ..modes.response import ResponseResult, TreadPatch
 from ..modes.superelement import Superelement
-from ..section.materials import Material
+from ..section.materials import LossFactor
+from ..section.parts.part import TyrePart
 from ..section.symmetry import HALF_TURN
 from ..solid3d.revolved import Revolved
 from . import davidson
@@ -95,13 +95,20 @@ class PressedResponse:
         self.highest_Hz = highest_Hz
         model = tyre.model
         tyre.residual(U)
-        self._parts: list[tuple[Material, int, Revolved]] = []
+        by_loss: dict[tuple[LossFactor, int], list[TyrePart]] = {}
         for k, material in enumerate(model.lossy):
+            assert material.loss
             for modulus in (0, 1):
-                if parts := model.material_parts(k, modulus):
-                    part = Revolved(replace(model, parts=parts), [], tyre.around)
-                    part.residual(U)
-                    self._parts.append((material, modulus, part))
+                # without a table both moduli have one loss factor
+                law = material.loss, modulus if material.loss.frequency_Hz else 0
+                by_loss.setdefault(law, []).extend(model.material_parts(k, modulus))
+        self._parts = [
+            (*law, Revolved(replace(model, parts=parts), [], tyre.around))
+            for law, parts in by_loss.items()
+            if parts
+        ]
+        for _, _, part in self._parts:
+            part.residual(U)
         self._mass = Inertia(model, tyre.around)
         self._turning = turning_stiffness(tyre, pressed, forces)
         self._motions = rim_motions(tyre, pressed)
@@ -109,7 +116,7 @@ class PressedResponse:
 
     def _losses(self, hertz: float) -> list[float]:
         at = np.array([hertz])
-        return [float(m.loss.at(at)[modulus][0]) for m, modulus, _ in self._parts if m.loss]
+        return [float(loss.at(at)[modulus][0]) for loss, modulus, _ in self._parts]
 
     def _of_parity(self, parity: int, factor: ContactUpdate | None) -> _OneParity:
         tyre, pressed, hold, check = self._tyre, self._pressed, self._hold, self._check
@@ -192,22 +199,20 @@ class PressedResponse:
         M: davidson.Operator,
         inverse: davidson.Operator,
     ) -> davidson.Basis:
-        """Basis of the modes of a parity up to `MODES_UP_TO` times the highest frequency, and one
-        beyond."""
-        limit = (2 * np.pi * MODES_UP_TO * self.highest_Hz) ** 2
-        unloaded = sum(int((m.eigenvalues < limit).sum()) for m in self._unloaded)
+        """Basis of a parity's modes in the band, and about those up to `MODES_UP_TO` times its end
+        and one beyond, as the search for the others leaves them."""
+        band = (2 * np.pi * self.highest_Hz) ** 2
         start = [
             (symmetry.parts(V) * symmetry.mask).ravel()
             for V in standing_waves(self._unloaded, symmetry)
         ]
+        unloaded = sum(int((m.eigenvalues < band).sum()) for m in self._unloaded)
         basis, count = davidson.basis_of(np.array(start), K, M), max(MIN_PARITY_MODES, unloaded)
-        while True:
-            values, modes = davidson.lowest(K, M, inverse, basis, count, MODE_RTOL)
-            if values[-1] > limit:
-                kept = modes[: np.searchsorted(values, limit) + 1]
-                basis.cut(kept @ basis.inertias.T)
-                return basis
+        while davidson.lowest(K, M, inverse, basis, count, MODE_RTOL)[0][-1] < band:
             count += FURTHER_MODES
+        values, turn = np.linalg.eigh(basis.vectors @ basis.images.T)
+        basis.cut(turn[:, : np.searchsorted(values, MODES_UP_TO**2 * band) + 1].T)
+        return basis
 
     def _motion(self, symmetry: HalfTurn, angle: float, way: int) -> Array:
         """Forces (k, n, 3) on half the tyre whose work on a field of the parity is the mean motion
