@@ -21,7 +21,8 @@ from .test_cli import run
 
 CASE = str(CASES / "p235_75r17.yaml")
 RESULTS = ("fit.json", "fit.csv", "fit_history.csv")
-COMMAND = [sys.executable, "-m", "tyrecal", "fit", CASE, "--no-pictures", "--quiet", "--output"]
+FIT = ["fit", CASE, "--mesh", "coarse", "--no-pictures", "--quiet", "--output"]
+COMMAND = [sys.executable, "-m", "tyrecal", *FIT]
 
 
 def record(out: Path) -> set[str]:
@@ -75,14 +76,14 @@ def test_two_at_once_in_one_folder(
     while not (tmp_path / "run.json").exists() and first.poll() is None:
         time.sleep(0.005)
     first.send_signal(signal.SIGSTOP)  # so that it cannot be done before the second begins
-    assert run("fit", CASE, "--output", str(tmp_path), "--no-pictures") == 2
+    assert run(*FIT, str(tmp_path)) == 2
     first.send_signal(signal.SIGCONT)
     message = capsys.readouterr().err
     assert f"process {first.pid}" in message and "tyrecal fit" in message
     assert message.count("\n") == 1 and "--output" in message
     assert first.wait() == 0
     assert (tmp_path / "fit.json").read_bytes() == (undisturbed / "fit.json").read_bytes()
-    assert run("fit", CASE, "--output", str(tmp_path), "--no-pictures") == 0  # it is free again
+    assert run(*FIT, str(tmp_path)) == 0  # it is free again
 
 
 @pytest.mark.slow
