@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled import job as jobs
-from tyrecal_solvers.bundled.deck.request import Request, Sector
+from tyrecal_solvers.bundled.deck.request import Request, SectorRequest
 from tyrecal_solvers.bundled.deck.steps import Deck
 from tyrecal_solvers.bundled.job import Job
 from tyrecal_solvers.bundled.modes.harmonics import Vibration
@@ -111,7 +111,7 @@ def test_a_splice_is_solved_on_half_where_the_sector_is_symmetric_too(
     texts = decks(CASE, stiffness_splice=0.5)
     sector = read_keywords(texts["splice.inp"])
     own = Deck({name: texts[f"{name}.inp"] for name in ("inflate", "modes")}, "modes", "inflate")
-    request = Request(harmonics=[0], sector=Sector("splice", 10.0))
+    request = Request(harmonics=[0], sector=SectorRequest("splice", 10.0))
     assert Job(own, request, sector=sector).tyre.half
     kept = jobs.keeps_half_turn
     lopsided = lambda mesh, filled, steps: filled != sector and kept(mesh, filled, steps)

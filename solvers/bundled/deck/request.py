@@ -46,7 +46,7 @@ class _Strict:
 
 
 @dataclass
-class Cavity(_Strict):
+class GasRequest(_Strict):
     """A gas in closed surfaces."""
 
     material: Name
@@ -54,7 +54,7 @@ class Cavity(_Strict):
 
 
 @dataclass
-class Sector(_Strict):
+class SectorRequest(_Strict):
     """A sector about Theta = 0 in which the tyre is that of another section job, of the same
     mesh."""
 
@@ -95,8 +95,8 @@ class Request(_Strict):
     # rubber with a table of moduli has, in each mode, that of the mode's own frequency, not of
     # PROPERTY EVALUATION
     own_frequency: bool = False
-    cavity: Cavity | None = None
-    sector: Sector | None = None
+    cavity: GasRequest | None = None
+    sector: SectorRequest | None = None
     response: ResponseRequest | None = None
 
 
@@ -144,14 +144,14 @@ def _sentence(error: ValidationError) -> str:
     if kind == "missing":
         return f"{key} is missing{row}"
     if kind == "unexpected_keyword_argument":
-        shapes = {"cavity": Cavity, "sector": Sector, "response": ResponseRequest}
+        shapes = {"cavity": GasRequest, "sector": SectorRequest, "response": ResponseRequest}
         shape = shapes.get(key.partition(".")[0], Request)
         words = f"no such key; there are {', '.join(each.name for each in fields(shape))}"
     words = re.sub(r"^(Input|List|Tuple|String) should", "must", words)
     return f"{key or 'the request'} is {json.dumps(first['input']):.60}, {words}{row}"
 
 
-def read_sector(folder: Path, sector: Sector) -> list[Block]:
+def read_sector(folder: Path, sector: SectorRequest) -> list[Block]:
     """The model blocks of the sector's section job, which by `grammar.check` may have only what is
     honoured in a section. Raises DeckError, OSError."""
     text = read_deck(folder / f"{sector.job}.inp")

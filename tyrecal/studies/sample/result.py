@@ -279,9 +279,8 @@ class SampleResult(Result):
                 " used instead"
             )
         if self.left_out:
-            sentences.append(
-                f"left out, because no frequency depends on a loss factor: {', '.join(self.left_out)}"
-            )
+            names = ", ".join(self.left_out)
+            sentences.append(f"left out, because no frequency depends on a loss factor: {names}")
         near = [each for each in self.optima if each.below < NEARLY]
         if len(near) > 1:
             sentences.append(
@@ -325,7 +324,7 @@ def result(sample: Sample, seed: int) -> SampleResult:
     drawn, names = sample.drawn, [v.name for v in sample.variables]
     chains, made, box = drawn.chains, drawn.posterior.emulators, drawn.posterior.box
     flat, thin = chains.flat, chains.thinned
-    return SampleResult(
+    result = SampleResult(
         format=1,
         seed=seed,
         variables={name: _variable(sample, j) for j, name in enumerate(names)},
@@ -381,8 +380,10 @@ def result(sample: Sample, seed: int) -> SampleResult:
         ],
         uncertain=[source.words for source in sample.sources if source.words],
         noise_Hz=sample.noise_Hz,
-        **({"left_out": [*sample.left_out]} if sample.left_out else {}),
-    ).with_files({"sample_draws.csv": draws_csv(sample)})
+    )
+    if sample.left_out:
+        result = result.model_copy(update={"left_out": [*sample.left_out]})
+    return result.with_files({"sample_draws.csv": draws_csv(sample)})
 
 
 def _shares(sample: Sample) -> list[VarianceShare]:
