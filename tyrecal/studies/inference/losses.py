@@ -44,11 +44,11 @@ def losses_in_words(case: LoadedCase) -> str:
     """Loss factors of a case as a diagnosis takes them."""
     compounds = {k: m for k, m in case.case.materials.items() if isinstance(m, Rubber)}
     assumed = ", ".join(name for name, m in compounds.items() if not m.loss_factor)
-    words = "loss factors as stated"
-    if assumed:
-        words += f", but {assumed}: none stated, {ASSUMED_LOSS:g} assumed within a factor of"
-        words += f" {exp(ASSUMED_LOSS_SD):.1f} (one standard deviation)"
-    return words
+    if not assumed:
+        known = "the case states them" if compounds else "the deck has them"
+        return f"loss factors as {known}"
+    factor = f"within a factor of {exp(ASSUMED_LOSS_SD):.1g} (one standard deviation)"
+    return f"loss factor {ASSUMED_LOSS:g} assumed of {assumed}, {factor}"
 
 
 def loss_deviations(case: LoadedCase) -> dict[str, Array]:
