@@ -25,7 +25,7 @@ shapes and judges them the same way, so it says what an import will do.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,8 +73,7 @@ class Labeller:
         self.covariance = [S for *_, S, _ in every]
         self.is_seen = np.array([seen >= MIN_SEEN for *_, seen in every])
         self._spectra = [np.linalg.eigh(S) for S in self.covariance]
-        is_alike = self._odds() < MIN_LN_ODDS
-        self._groups = [np.flatnonzero(row) for row in is_alike]  # each label, and its rivals
+        self._groups = groups_alike(self.covariance, self._spectra)
 
     def judge(self, shape: Array, below: Collection[Label] = ()) -> Judged:
         """The label of a real shape (k,), a signal each, with its probability.
@@ -113,19 +112,6 @@ class Labeller:
         """Prior (labels,), not normalised, given the labels ``below`` in the same file."""
         lower = [_lower(label) for label in self.labels]
         return np.array([1.0 if own in (None, *below) else WITHOUT_LOWER for own in lower])
-
-    def _odds(self) -> Array:
-        """Expected ln of the odds of label i against j on i's own shapes, (i, j):
-        (tr(Sj^-1 Si) - k + ln|Sj| - ln|Si|) / 2."""
-        k = len(self.sensors.points)
-        noise = ODDS_NOISE * np.eye(k)
-        odds = np.zeros((len(self.labels), len(self.labels)))
-        sizes = np.array([np.log(np.maximum(v, 0.0) + ODDS_NOISE).sum() for v, _ in self._spectra])
-        for j, rival in enumerate(self.covariance):
-            inverse = np.linalg.inv(rival + noise)
-            trace = [np.vdot(inverse, S) + ODDS_NOISE * np.trace(inverse) for S in self.covariance]
-            odds[:, j] = (np.array(trace) - k + sizes[j] - sizes) / 2
-        return odds
 
     def looks_like(self) -> dict[Label, list[Label]]:
         """For each label the other labels that its shapes look like on these sensors, the likeliest
@@ -167,6 +153,25 @@ class Labeller:
                 f" {min(a.c, b.c)} and {max(a.c, b.c)} waves look alike"
             )
         return f"sensors let {a.display} and {b.display} look alike: {_missing(self.sensors)}"
+
+
+def groups_alike(
+    covariance: Sequence[Array], spectra: Sequence[tuple[Array, Array]]
+) -> list[Array]:
+    """For each covariance, with its eigenvalues and -vectors, those that look like it: the expected
+    ln of the odds of i against j on i's own shapes is less than `MIN_LN_ODDS`,
+
+    (tr(Sj^-1 Si) - k + ln|Sj| - ln|Si|) / 2.
+    """
+    k = len(covariance[0])
+    noise = ODDS_NOISE * np.eye(k)
+    odds = np.zeros((len(covariance), len(covariance)))
+    sizes = np.array([np.log(np.maximum(v, 0.0) + ODDS_NOISE).sum() for v, _ in spectra])
+    for j, rival in enumerate(covariance):
+        inverse = np.linalg.inv(rival + noise)
+        trace = [np.vdot(inverse, S) + ODDS_NOISE * np.trace(inverse) for S in covariance]
+        odds[:, j] = (np.array(trace) - k + sizes[j] - sizes) / 2
+    return [np.flatnonzero(row < MIN_LN_ODDS) for row in odds]
 
 
 def ln_density(values: Array, vectors: Array, shapes: Array) -> Array:

@@ -7,7 +7,9 @@ sensors hardly see, are like no mode: two modes mixed, or noise alone. With S = 
 
     L = ln(((1 - e) p(u | S) + e p(u | I)) / p(u | I)),    e = SPOILT or 1/2
 
-is the ln of the odds of the mode against a frequency that is no mode of the tyre.
+is the ln of the odds of the mode against a frequency that is no mode of the tyre. Modes that these
+sensors cannot distinguish (`labels.groups_alike`) share their mean density, because what differs
+there are the errors of the model's shapes.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ import numpy as np
 
 from .case_modes import CaseModes
 from .covariance import label_covariances
-from .labels import label_of_column, ln_density
+from .labels import groups_alike, label_of_column, ln_density
 from .sensors import Sensors
 
 Array = np.ndarray
@@ -33,12 +35,17 @@ def ln_shape_odds(case: CaseModes, sensors: Sensors, shapes: Array) -> Array:
         label_of_column(c, column): S
         for c, column, S, _ in label_covariances(sensors, highest, case.half_width)
     }
-    by_chance = ln_density(np.ones(k), np.eye(k), shapes)
-    odds = np.zeros((shapes.shape[1], len(case.modes)))
-    for j, mode in enumerate(case.modes):
+    covariance = []
+    for mode in case.modes:
         same_c = [S for label, S in general.items() if label.c == mode.label.c]
         S = general[mode.label] if mode.label in general else np.mean(same_c, axis=0)
-        own = ln_density(*np.linalg.eigh(case.covariance(mode, sensors, S)), shapes) - by_chance
-        spoilt = SPOILT if case.is_seen(mode, sensors) else 0.5
-        odds[:, j] = np.logaddexp(np.log(1 - spoilt) + own, np.log(spoilt))
-    return odds
+        covariance.append(case.covariance(mode, sensors, S))
+    spectra = [np.linalg.eigh(S) for S in covariance]
+    by_chance = ln_density(np.ones(k), np.eye(k), shapes)
+    odds = np.array([ln_density(*spectrum, shapes) for spectrum in spectra]).T - by_chance[:, None]
+    groups = groups_alike(covariance, spectra)
+    for row in odds:
+        group = groups[int(np.argmax(row))]
+        row[group] = np.logaddexp.reduce(row[group]) - np.log(len(group))
+    spoilt = np.array([SPOILT if case.is_seen(mode, sensors) else 0.5 for mode in case.modes])
+    return np.logaddexp(np.log(1 - spoilt) + odds, np.log(spoilt))
