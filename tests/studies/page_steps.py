@@ -8,7 +8,6 @@ from __future__ import annotations
 import csv
 import itertools
 import re
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
@@ -88,7 +87,7 @@ def of_labels(content: Mapping[str, Any]) -> Figures:
 
 def of_diagnosis(content: Mapping[str, Any]) -> Figures:
     """diagnosis.json"""
-    part, gap = content["section_map"][0], content["gap"]
+    gap = content["gap"]
     effects = [p for key, p in content["probabilities"].items() if key not in ("none", "outside")]
     return {
         "rms %": gap["rms_percent"],
@@ -96,8 +95,6 @@ def of_diagnosis(content: Mapping[str, Any]) -> Figures:
         "none %": 100 * content["probabilities"]["none"],
         "outside %": 100 * content["probabilities"]["outside"],
         "effect %": 100 * max(effects, default=0.0),
-        "part %": part["stiffness_percent"],
-        "part sigma %": part["stiffness_sigma"],
     }
 
 
@@ -211,7 +208,6 @@ AT_240 = (
 )
 ROAD = f"tyrecal fit {REAL} --mesh coarse --method gauss-newton --no-pictures"
 PRESSED = f"--loads-N {','.join(map(str, LOADS_N))} --no-pictures"
-AT_SIZE = "--loads-N 2000,4000,6000 --no-pictures"
 STEPS = {
     "fit": Step(f"tyrecal fit {TYRE} --no-pictures", "fit.json", of_fit),
     "fit gauss-newton": Step(
@@ -246,24 +242,14 @@ STEPS = {
         "diagnosis.json",
         of_diagnosis,
     ),
-    "diagnosed, section exact": Step(
-        "tyrecal diagnose {exact} --set rim.free=true --measured {labels}/labelled.csv"
-        " --no-pictures",
-        "diagnosis.json",
-        of_diagnosis,
-    ),
-    "size code": Step(f"tyrecal footprint {{size}} {AT_SIZE}", "footprint.json", of_footprint),
-    "stiffnesses": Step(
-        "tyrecal fit {size} --mesh coarse --measured cases/205_60r15_two_pressures.csv --fix A_belt"
-        " --fix C10_tread --method gauss-newton --no-pictures",
+    "few": Step(
+        "tyrecal fit {size} --prior --mesh coarse --measured cases/205_60r15_few.csv --set"
+        " variables.C10_sidewall.percent=15 --set variables.C10_tread.percent=17 --method"
+        " gauss-newton --no-pictures",
         "fit.json",
         of_fit,
     ),
-    "predicted": Step(
-        f"tyrecal footprint {{size}} --fitted {{stiffnesses}}/fit.json --compare fitted {AT_SIZE}",
-        "footprint.json",
-        of_footprint,
-    ),
+    "public": Step("python -m tests.studies.real_prior {size} {few}/fit.json", "", of_table),
     "one effect": Step("python -m tests.studies.real_data", "", of_table),
     "both": Step(
         f"tyrecal fit {REAL} --measured cases/205_60r15_both.csv --no-pictures", "fit.json", of_fit
@@ -369,20 +355,6 @@ def from_size_code(folder: Path) -> Path:
     return case
 
 
-def with_exact_section(folder: Path) -> Path:
-    """A copy of the real tyre's case that states an exact section."""
-    shutil.copytree(ROOT / "cases", folder, ignore=_all_but_tables, dirs_exist_ok=True)
-    case = folder / "205_60r15.yaml"
-    text = (ROOT / REAL).read_text(encoding="utf-8")
-    assert "known_from: size_code" in text
-    case.write_text(text.replace("known_from: size_code", "known_from: exact"), encoding="utf-8")
-    return case
-
-
-def _all_but_tables(folder: str, names: list[str]) -> list[str]:
-    return [name for name in names if not name.endswith(".csv")]
-
-
 def rows_of(*quantities: str) -> Callable[[Path], Path]:
     """Writes the rows of some quantities of the MF-Swift set to a file."""
 
@@ -398,7 +370,6 @@ def rows_of(*quantities: str) -> Callable[[Path], Path]:
 
 SOURCES = {  # files that commands read, by their name there: what writes them to a folder
     "size": from_size_code,
-    "exact": with_exact_section,
     "four": rows_of("frequency"),
     "stiffness": rows_of("frequency", "vertical"),
     "area": rows_of("frequency", "vertical", "contact"),

@@ -108,23 +108,24 @@ def labelled(record: Record) -> list[list[float]]:
 
 EFFECTS = (  # rows of `real_data` in the order of the page
     "nothing",
-    "dynamic_stiffening 1",
-    "frequency_stiffening 0.1",
     "frequency_stiffening 0.2",
     "cap_ply 2e+06",
-    "tread_density -0.25",
     "tread_wear 0.25",
-    "belt_angle 3",
-    "belt_width 0.01",
     "sidewall_gauge 0.15",
-    "bead_filler 1",
-    "cavity_air 1",
-    "tread_modulus 5",
-    "tread_modulus 10",
     "tread_modulus 20",
 )
-# the public set of a 205/60R15 at 220 kPa, by load in N: N/mm, then length and width in mm
-PUBLIC_SET = {2000: (197.3, 87.4, 120.7), 4000: (209.7, 131.8, 141.1), 6000: (221.3, 169.1, 151.0)}
+PUBLIC_SET = (  # rows of `real_prior` in the order of the page
+    *(
+        f"{name} 220 kPa {load_N} N"
+        for name in ("vertical_stiffness_N_per_m", "contact_length_m", "contact_width_m")
+        for load_N in (2000, 4000, 6000)
+    ),
+    *(f"{label} 220 kPa 0 N" for label in ("[0,0] axial", "[0,0] torsional", "[1,1]")),
+    *(f"[{c},0] 160 kPa 0 N" for c in range(3, 9)),
+)
+PUBLIC_DAMPING = ("[1,0]", "[0,0] axial", "[1,1]", "[0,0] torsional")
+PUBLIC_RIM = tuple(f"{way}_N_per_m" for way in ("lateral", "longitudinal"))
+PUBLIC_RIM += ("torsional_Nm_per_rad",)
 MF_SWIFT = {  # deflection in mm and area in cm2, by load in N
     1000: (5.33, 59.0),
     2000: (10.48, 105.5),
@@ -133,18 +134,6 @@ MF_SWIFT = {  # deflection in mm and area in cm2, by load in N
     5000: (25.02, 221.9),
     6000: (29.59, 255.4),
 }
-
-
-def against_set(what: str, place: int, load_N: int) -> Callable[[Record], list[float]]:
-    """A figure of the public set, then of the tyre from its size code and of the fitted one, each
-    with its deviation from the set, %."""
-    public = PUBLIC_SET[load_N][place]
-
-    def figures(record: Record) -> list[float]:
-        values = [record[step][f"{what} at {load_N}"] for step in ("size code", "predicted")]
-        return [public, *(x for value in values for x in (value, 100 * value / public - 100))]
-
-    return figures
 
 
 def predicted(load_N: int) -> Callable[[Record], list[float]]:
@@ -374,12 +363,12 @@ TABLES: dict[str, Rows] = {
         )
     ),
     "public set": rows(
-        *(
-            against_set(what, place, load_N)
-            for place, what in enumerate(("N/mm", "length", "width"))
-            for load_N in PUBLIC_SET
-        )
+        *(of("public", *(f"3: {row} {k}" for k in (0, 1, 4, 5, 6))) for row in PUBLIC_SET)
     ),
+    "public damping": rows(
+        *(of("public", *(f"1: {row} {k}" for k in range(4))) for row in PUBLIC_DAMPING)
+    ),
+    "public rim": rows(*(of("public", *(f"2: {row} {k}" for k in range(3))) for row in PUBLIC_RIM)),
     "as built": rows(
         lambda record: None,
         *(
