@@ -237,7 +237,7 @@ WANTED: dict[str, Any] = {
 
 @pytest.mark.slow
 def test_half_and_whole_sections_respond_alike(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also the motion of a free wheel."""
+    """A free wheel and its tread move alike."""
     texts = Decks(TyreDesign(with_values(CASE, {"rim.free": True}))).texts("abaqus")
     texts["inflate.inp"] = texts["inflate.inp"].replace(
         "*DENSITY\n1100", "*DAMPING, STRUCTURAL=0.2\n*DENSITY\n1100"

@@ -324,7 +324,7 @@ def result(sample: Sample, seed: int) -> SampleResult:
     drawn, names = sample.drawn, [v.name for v in sample.variables]
     chains, made, box = drawn.chains, drawn.posterior.emulators, drawn.posterior.box
     flat, thin = chains.flat, chains.thinned
-    result = SampleResult(
+    summary = SampleResult(
         format=1,
         seed=seed,
         variables={name: _variable(sample, j) for j, name in enumerate(names)},
@@ -382,8 +382,8 @@ def result(sample: Sample, seed: int) -> SampleResult:
         noise_Hz=sample.noise_Hz,
     )
     if sample.left_out:
-        result = result.model_copy(update={"left_out": [*sample.left_out]})
-    return result.with_files({"sample_draws.csv": draws_csv(sample)})
+        summary = summary.model_copy(update={"left_out": [*sample.left_out]})
+    return summary.with_files({"sample_draws.csv": draws_csv(sample)})
 
 
 def _shares(sample: Sample) -> list[VarianceShare]:
