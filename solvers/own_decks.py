@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .decks import save_texts
 from .rings import ring_modes
 
 Array = np.ndarray
@@ -56,10 +57,8 @@ def save(request: Mapping[str, Any], folder: Path) -> list[Path]:
     """Write a request's data about own decks into a run folder; nothing where it has none."""
     if "own_decks" not in request:
         return []
-    path = folder / OWN_DECKS_FILE
     text = json.dumps(asdict(DecksOfRun(**request["own_decks"])), indent=1) + "\n"
-    path.write_text(text, encoding="utf-8", newline="")
-    return [path]
+    return save_texts({OWN_DECKS_FILE: text}, folder)
 
 
 def load(folder: Path) -> DecksOfRun | None:

@@ -44,7 +44,7 @@ class Abaqus:
     def write(self, decks: WrittenDecks, folder: Path) -> list[Path]:
         """Write the decks and, next to them, the case's options. Raises ``refusals``."""
         units = decks.request.get("own_deck", {})
-        paths = [read_options(decks.options, **units).save(folder)]
+        paths = read_options(decks.options, **units).save(folder)
         paths += (own := own_decks.save(decks.request, folder))
         paths += save_texts(decks.texts("own deck" if units else self.dialect), folder)
         if not own:

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from ..decks import save_texts
 from ..errors import Refused
 
 OPTIONS_FILE = "abaqus.json"
@@ -22,11 +23,9 @@ class Options:
     length_m: float = 1.0  # metres per unit of length of the decks
     mass_kg: float = 1.0  # kilograms per unit of mass of the decks
 
-    def save(self, folder: Path) -> Path:
+    def save(self, folder: Path) -> list[Path]:
         """Write them into a run folder."""
-        path = folder / OPTIONS_FILE
-        path.write_text(json.dumps(asdict(self), indent=1) + "\n", encoding="utf-8", newline="")
-        return path
+        return save_texts({OPTIONS_FILE: json.dumps(asdict(self), indent=1) + "\n"}, folder)
 
 
 def load(folder: Path) -> Options:

@@ -58,10 +58,8 @@ class CalculiX:
         """Write the decks and, next to them, how to run them. Raises Refused."""
         settings = _settings(decks.options)
         paths = own_decks.save(decks.request, folder)
-        paths += save_texts(decks.texts(self.dialect), folder)
-        paths.append(folder / SETTINGS)
-        paths[-1].write_text(json.dumps(settings), encoding="utf-8", newline="")
-        return paths
+        texts = {**decks.texts(self.dialect), SETTINGS: json.dumps(settings)}
+        return paths + save_texts(texts, folder)
 
     def run(self, folder: Path, time_limit_s: float) -> None:
         """Run every deck; ``time_limit_s`` is for all of them together. Raises RunFailed."""

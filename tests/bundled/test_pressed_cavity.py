@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.adapter import Bundled
-from tyrecal_solvers.bundled.deck.request import GasRequest, Request
+from tyrecal_solvers.bundled.deck.request import CavityRequest, Request
 from tyrecal_solvers.bundled.deck.steps import Deck
 from tyrecal_solvers.bundled.job import Job
 from tyrecal_solvers.bundled.road.pressed_cavity import cavity_modes
@@ -109,7 +109,7 @@ def test_a_tyre_on_the_road() -> None:
     falls, the split grows; without a gas there is none."""
     texts = Decks(FILLED, loads_N=LOADS).texts("abaqus")
     pair = {name: texts[f"{name}.inp"] for name in ("inflate", "press")}
-    cavity = GasRequest("CAVITY_GAS", ["CAVITY", "WELL"])
+    cavity = CavityRequest("CAVITY_GAS", ["CAVITY", "WELL"])
     result = Job(Deck(pair, "press", "inflate"), Request(cavity=cavity)).press()
     free, splits = result["cavity_Hz"], [0.0]
     assert free == pytest.approx(186.0, rel=0.01)

@@ -15,7 +15,7 @@ from functools import cache
 from typing import Any
 
 import pytest
-from tyrecal_solvers.bundled.deck.request import GasRequest, Request
+from tyrecal_solvers.bundled.deck.request import CavityRequest, Request
 from tyrecal_solvers.bundled.deck.steps import Deck
 from tyrecal_solvers.bundled.job import Job
 from tyrecal_solvers.errors import Refused, RunFailed
@@ -273,7 +273,11 @@ def pairs() -> Iterator[tuple[str, str, Request]]:
         edited(free, pressed),
         replace(plain, harmonics=[1], modes_per_harmonic=4),
     )
-    yield (section(*closed), REVOLVE, replace(plain, cavity=GasRequest("GAS", ["CAVITY", "WELL"])))
+    yield (
+        section(*closed),
+        REVOLVE,
+        replace(plain, cavity=CavityRequest("GAS", ["CAVITY", "WELL"])),
+    )
     waves = edited(
         REVOLVE, ("CAVITY, P, 2e4\n", "CAVITY, P, 2e4\n" + turning), (", PERTURBATION", "")
     )

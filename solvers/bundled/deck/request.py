@@ -46,7 +46,7 @@ class _Strict:
 
 
 @dataclass
-class GasRequest(_Strict):
+class CavityRequest(_Strict):
     """A gas in closed surfaces."""
 
     material: Name
@@ -95,7 +95,7 @@ class Request(_Strict):
     # rubber with a table of moduli has, in each mode, that of the mode's own frequency, not of
     # PROPERTY EVALUATION
     own_frequency: bool = False
-    cavity: GasRequest | None = None
+    cavity: CavityRequest | None = None
     sector: SectorRequest | None = None
     response: ResponseRequest | None = None
 
@@ -144,7 +144,7 @@ def _sentence(error: ValidationError) -> str:
     if kind == "missing":
         return f"{key} is missing{row}"
     if kind == "unexpected_keyword_argument":
-        shapes = {"cavity": GasRequest, "sector": SectorRequest, "response": ResponseRequest}
+        shapes = {"cavity": CavityRequest, "sector": SectorRequest, "response": ResponseRequest}
         shape = shapes.get(key.partition(".")[0], Request)
         words = f"no such key; there are {', '.join(each.name for each in fields(shape))}"
     words = re.sub(r"^(Input|List|Tuple|String) should", "must", words)

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ...decks import save_texts
 from ...errors import Refused
 
 Array = np.ndarray
@@ -44,9 +45,7 @@ def write_pressed_start(folder: Path, shape: PressedStart) -> str:
     np.savez(content, **{name: getattr(shape, name) for name in PRESSED_ARRAYS})
     (folder / PRESSED_FOLDER).mkdir()
     (folder / PRESSED_FILE).write_bytes(content.getvalue())
-    for name, text in shape.texts.items():
-        path = folder / PRESSED_FOLDER / name
-        path.write_text(text, encoding="utf-8", newline="")
+    save_texts(shape.texts, folder / PRESSED_FOLDER)
     return _last_line(PRESSED_FILE, _hash_pressed(content.getvalue(), shape.texts))
 
 

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...language.text import WHOLE_DECK, Block, DeckError
-from ..deck.request import GasRequest
+from ..deck.request import CavityRequest
 from ..section import elements
 from ..section.elements import Lines
 from ..section.materials import Scalar, read_materials
@@ -48,7 +48,7 @@ class GasCavity:
     surfaces: list[Lines]
 
 
-def read_cavity(keywords: list[Block], mesh: DeckMesh, cavity: GasRequest) -> GasCavity:
+def read_cavity(keywords: list[Block], mesh: DeckMesh, cavity: CavityRequest) -> GasCavity:
     """The gas of a request. Raises DeckError."""
     name = cavity.material.upper()
     material = read_materials(keywords).get(name)

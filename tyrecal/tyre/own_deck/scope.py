@@ -164,8 +164,7 @@ def corner_areas(element: Element, points: Mapping[int, Point]) -> np.ndarray:
     """Twice the area of the triangle at each corner of a solid: all positive, or it folds over."""
     X = np.array([points[n] for n in element.nodes[: CORNERS_OF[len(element.nodes)]]])
     along, back = np.roll(X, -1, 0) - X, np.roll(X, 1, 0) - X
-    area: np.ndarray = along[:, 0] * back[:, 1] - along[:, 1] * back[:, 0]
-    return area
+    return np.asarray(along[:, 0] * back[:, 1] - along[:, 1] * back[:, 0])
 
 
 def along_arc(a: np.ndarray, b: np.ndarray, centre: np.ndarray, share: float) -> np.ndarray:
@@ -173,8 +172,7 @@ def along_arc(a: np.ndarray, b: np.ndarray, centre: np.ndarray, share: float) ->
     u, v = a - centre, b - centre
     angle = np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v) * share
     cos, sin = np.cos(angle), np.sin(angle)
-    point: np.ndarray = centre + np.array([cos * u[0] - sin * u[1], sin * u[0] + cos * u[1]])
-    return point
+    return np.asarray(centre + np.array([cos * u[0] - sin * u[1], sin * u[0] + cos * u[1]]))
 
 
 def nearest(X: np.ndarray, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
