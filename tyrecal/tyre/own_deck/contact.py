@@ -130,8 +130,7 @@ class DeckContact:
             if not {1, 2} <= self.tied.motions.get(each.reference, {1: 0.0, 2: 0.0}).keys():
                 raise each.block.refused(
                     f"contact of {each.name} is not honoured, and the place of the rim is not"
-                    " known:"
-                    f" *BOUNDARY must hold or move its node {each.reference} in 1 and 2",
+                    f" known: *BOUNDARY must hold or move its node {each.reference} in 1 and 2",
                     each.row,
                 )
             if not len(touching):

@@ -171,9 +171,6 @@ def _chain(faces: Sequence[Face], nodes: Mapping[int, Point]) -> list[int]:
     """Nodes of the longest chain of faces, from -z to +z."""
     following = {face[2][0]: face[2] for face in faces}
     ends = {face[2][-1] for face in faces}
-    best = list[int]()
-    for start in [n for n in following if n not in ends] or [faces[0][2][0]]:
-        chain = _follow(start, following)
-        if len(chain) > len(best):
-            best = chain
+    starts = [n for n in following if n not in ends] or [faces[0][2][0]]
+    best = max((_follow(start, following) for start in starts), key=len)
     return best if nodes[best[0]][1] <= nodes[best[-1]][1] else best[::-1]
