@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from tyrecal_solvers.language.text import (
     WHOLE_DECK,
     DeckError,
     Place,
+    read_deck,
     read_keywords,
     seed,
 )
@@ -350,3 +352,9 @@ def test_seed_refuses_a_line_without_data(line: int) -> None:
     with pytest.raises(DeckError) as error:
         seed(read_keywords(SQUARE), [(line, 0, 1.0)])
     assert error.value.place.line == line
+
+
+def test_a_deck_may_have_letters_of_latin_1_and_any_line_ends(tmp_path: Path) -> None:
+    path = tmp_path / "inflate.inp"
+    path.write_bytes("*HEADING\r\nGröße\r*NODE\n".encode("latin-1"))
+    assert read_deck(path) == "*HEADING\nGröße\n*NODE\n"
