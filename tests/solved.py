@@ -1,20 +1,21 @@
 """Answers of the bundled solver, kept for a session: tests of what stands above it solve once.
 
 Tests of commands, fits and studies ask for the same few tyres again and again. ``solved_once``
-gives the files that the same decks had led to; counts of runs are the evaluator's, and stay. Tests
-of the solver itself, and of failures, do without: what fails is run again.
+gives the files that the same decks had led to, in any worker; counts of runs are the evaluator's,
+and stay. Tests of the solver itself, and of failures, do without: what fails is run again.
 """
 
 from __future__ import annotations
 
+import os
+import pickle
+from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
 
 import pytest
 from tyrecal_solvers.bundled.adapter import Bundled
 
-MOST = 256  # answers that are kept, of some 100 kB each
-_kept: dict[str, dict[str, bytes]] = {}
 _run = Bundled.run
 
 
@@ -22,18 +23,29 @@ def _files(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in sorted(folder.iterdir()) if path.is_file()}
 
 
-def _run_or_recall(solver: Bundled, folder: Path, time_limit_s: float) -> None:
-    given = _files(folder)
-    key = sha256(repr((time_limit_s, given)).encode()).hexdigest()
-    if key not in _kept:
-        _run(solver, folder, time_limit_s)
-        if len(_kept) >= MOST:
-            del _kept[next(iter(_kept))]
-        _kept[key] = {name: text for name, text in _files(folder).items() if name not in given}
-    for name, content in _kept[key].items():
-        (folder / name).write_bytes(content)
+def run_or_recall(kept: Path) -> Callable[[Bundled, Path, float], None]:
+    """`Bundled.run` with its answers in the folder ``kept``."""
+
+    def run(solver: Bundled, folder: Path, time_limit_s: float) -> None:
+        given = _files(folder)
+        path = kept / sha256(repr((time_limit_s, given)).encode()).hexdigest()
+        if not path.exists():
+            _run(solver, folder, time_limit_s)
+            answer = {name: text for name, text in _files(folder).items() if name not in given}
+            written = path.with_suffix(f".{os.getpid()}")
+            written.write_bytes(pickle.dumps(answer))
+            written.replace(path)  # another worker never sees half of it
+        for name, content in pickle.loads(path.read_bytes()).items():
+            (folder / name).write_bytes(content)
+
+    return run
 
 
 @pytest.fixture(autouse=True)
-def solved_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Bundled, "run", _run_or_recall)
+def solved_once(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> None:
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent  # all workers share it
+    kept = folder / "solved"
+    kept.mkdir(exist_ok=True)
+    monkeypatch.setattr(Bundled, "run", run_or_recall(kept))
