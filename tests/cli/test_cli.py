@@ -130,7 +130,8 @@ def test_fit_writes_the_same_bytes_twice(
 
 @pytest.mark.slow
 def test_fit_with_pictures(tmp_path: Path) -> None:
-    assert run("fit", CASE, "--output", str(tmp_path), "--quiet", "--fix", "C10") == 0
+    coarse = ["--mesh", "coarse", "--fix", "C10", "--quiet"]
+    assert run("fit", CASE, *coarse, "--output", str(tmp_path)) == 0
     names = {path.name for path in tmp_path.iterdir()}
     assert {"fit.json", "convergence.png", "fit_section.png", "fit_modes.png"} <= names
     modes = [name for name in names if name.startswith("fit_mode_")]
@@ -250,7 +251,7 @@ def test_a_folder_of_another_case_is_refused(
     case_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = str(tmp_path / "out")
-    assert run("modes", CASE, "--output", out, "--quiet") == 0
+    assert run("modes", CASE, "--mesh", "coarse", "--output", out, "--quiet") == 0
     before = (tmp_path / "out" / "modes.json").read_bytes()
     other = str(case_folder / "p235_75r17.yaml")
     assert run("modes", other, "--output", out, "--set", "A_belt=3e-7") == 2

@@ -105,7 +105,7 @@ def test_two_at_once_with_one_store(undisturbed: Path, tmp_path: Path) -> None:
 
 def test_the_lock_of_a_dead_process_holds_nobody(tmp_path: Path) -> None:
     (tmp_path / ".lock").write_text('{"pid": 1, "host": "x", "command": "fit", "started": "t"}\n')
-    assert run("modes", CASE, "--output", str(tmp_path), "--quiet") == 0
+    assert run("modes", CASE, "--mesh", "coarse", "--output", str(tmp_path), "--quiet") == 0
 
 
 def test_a_lock_whose_owner_has_not_written_yet(
@@ -186,7 +186,7 @@ def test_a_full_disc_under_the_results(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Path, "write_text", full)
-    arguments = ["fit", CASE, "--output", str(tmp_path), "--no-pictures"]
+    arguments = ["fit", CASE, "--mesh", "coarse", "--output", str(tmp_path), "--no-pictures"]
     assert run(*arguments) == 2
     message = capsys.readouterr().err
     assert "No space left on device" in message and "fit.csv" in message
@@ -200,11 +200,12 @@ def test_no_store_and_a_store_of_the_environment(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("TYRECAL_STORE", str(tmp_path / "shared"))
+    modes = ["modes", CASE, "--mesh", "coarse", "--quiet"]
     for name, runs in (("a", 1), ("b", 0)):
-        assert run("modes", CASE, "--output", str(tmp_path / name), "--quiet") == 0
+        assert run(*modes, "--output", str(tmp_path / name)) == 0
         assert facts(tmp_path / name, "modes")["solver_runs"] == runs
     assert (tmp_path / "a/modes.json").read_bytes() == (tmp_path / "b/modes.json").read_bytes()
-    assert run("modes", CASE, "--output", str(tmp_path / "a"), "--quiet", "--no-store") == 0
+    assert run(*modes, "--output", str(tmp_path / "a"), "--no-store") == 0
     assert facts(tmp_path / "a", "modes")["solver_runs"] == 1
     assert run("store", "--json") == 0
     summary = json.loads(capsys.readouterr().out)
