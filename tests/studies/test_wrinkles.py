@@ -17,11 +17,11 @@ def test_its_modes_do_not_hang_on_the_mesh_at_the_bead(holds: str) -> None:
     case = by_size("11R22.5")
     case = changed(case, rim=with_part(case.case.rim, holds=holds))
     moved = {}
-    for name, bears in (("slack", False), ("stiff", True)):
+    for bears in (False, True) if holds == "bead_surface" else (False,):
         tyre = with_compression(case, bears)
         coarse, fine = (frequencies(each, 500.0) for each in (tyre, finer(tyre, 2, 2)))
-        moved[name] = {label: fine[label] / coarse[label] - 1 for label in coarse if label in fine}
-    assert len(moved["slack"]) >= 9
-    assert max(map(abs, moved["slack"].values())) < 0.01
+        moved[bears] = {label: fine[label] / coarse[label] - 1 for label in coarse if label in fine}
+    assert len(moved[False]) >= 9
+    assert max(map(abs, moved[False].values())) < 0.01
     if holds == "bead_surface":
-        assert moved["stiff"][0, 0, "axial"] < -0.05
+        assert moved[True][0, 0, "axial"] < -0.05
