@@ -1,6 +1,6 @@
 """Installs tyrecal with the lowest versions that pyproject.toml states, and with the newest ones.
 
-With each it runs tests of the command line, README's fit, a diagnosis and the report:
+With each it runs tests of the command line, a fit, a diagnosis and the report:
 
     python -m tests.versions
 
@@ -122,9 +122,10 @@ def passes(name: str, python: Path, folder: Path) -> bool:
     tyrecal = [python, "-m", "tyrecal"]
     try:
         tests = run([python, "-m", "pytest", "-m", "quick", "-p", "no:cacheprovider", *TESTS])
-        run([*tyrecal, "fit", CASE, "--quiet"], folder)
-        effect = ["--effect", "spindle_tilt", "--mesh", "coarse", "--no-pictures", "--quiet"]
-        run([*tyrecal, "diagnose", CASE, "--measured", MEASURED, *effect], folder)
+        coarse = [CASE, "--mesh", "coarse", "--quiet"]
+        run([*tyrecal, "fit", *coarse], folder)
+        effect = ["--effect", "spindle_tilt", "--no-pictures"]
+        run([*tyrecal, "diagnose", *coarse, "--measured", MEASURED, *effect], folder)
         run([*tyrecal, "report", CASE.stem], folder)
     except subprocess.CalledProcessError as error:
         print(f"{name}: {error}\n{error.stdout}", flush=True)
