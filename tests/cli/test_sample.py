@@ -67,7 +67,7 @@ def test_a_sample_of_two_processes_in_files_and_the_same_bytes_from_the_record(
 def test_targets_without_a_sigma_have_that_of_the_fit(
     case_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """One variable, so that a few designs are enough."""
+    """A case of one variable needs few designs."""
     shared = ["--store", str(tmp_path / "store"), "--mesh", "coarse"]
     fit, out = tmp_path / "fit", tmp_path / "out"
     path = nearly_certain(case_folder / "p235_75r17.yaml")
