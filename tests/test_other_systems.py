@@ -14,7 +14,6 @@ from pathlib import Path
 
 import pytest
 
-from .cli.test_cli import run
 from .conftest import CASES
 
 BLOCKED = """
@@ -62,31 +61,25 @@ def results(folder: Path) -> dict[str, bytes]:
     ],
     ids=lambda each: each[0] if isinstance(each, list) else "",
 )
-def test_studies_with_what_windows_has(
-    command: list[str],
-    processes: int,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_studies_with_what_windows_has(command: list[str], processes: int, tmp_path: Path) -> None:
     for name in ("plain", "blocked", "site"):
         (tmp_path / name).mkdir()
     (tmp_path / "site" / "sitecustomize.py").write_text(BLOCKED)
     started = tmp_path / "started"
     blocked = {"PYTHONPATH": str(tmp_path / "site"), "BLOCKED": str(started)}
-    command = [*command, "--output", "out"]
-    done = subprocess.run(
-        [sys.executable, "-m", "tyrecal", *command],
-        env={**os.environ, **blocked},
-        cwd=tmp_path / "blocked",
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    assert "Traceback" not in done.stderr
-    monkeypatch.chdir(tmp_path / "plain")
-    assert run(*command) == 0
-    assert capsys.readouterr().out == done.stdout
+    outputs = []
+    for name, environment in (("plain", {}), ("blocked", blocked)):
+        done = subprocess.run(
+            [sys.executable, "-m", "tyrecal", *command, "--output", "out"],
+            env={**os.environ, **environment},
+            cwd=tmp_path / name,
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, done.stderr
+        assert "Traceback" not in done.stderr
+        outputs.append(done.stdout)
+    assert outputs[0] == outputs[1]
     without = results(tmp_path / "blocked" / "out")
     assert without == results(tmp_path / "plain" / "out") and len(without) >= 2
     assert len(started.read_text().split()) >= processes  # all of them went without
