@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from tyrecal_solvers.bundled import adapter
 from tyrecal_solvers.bundled import job as jobs
-from tyrecal_solvers.bundled.deck.request import Request
+from tyrecal_solvers.bundled.deck.request import CavityRequest, Request
 from tyrecal_solvers.bundled.deck.steps import Deck, Tangent
 from tyrecal_solvers.bundled.job import Job
 from tyrecal_solvers.bundled.modes import lanczos
@@ -129,6 +129,8 @@ def test_half_the_section_is_the_whole(effects: Any, both: Any) -> None:
     }
     design = TyreDesign(with_values(CASE, {f"effects.{name}": size for name, size in effects}))
     request = {key: v for key, v in design.request.items() if key in adapter.REQUEST_KEYS}
+    if "cavity" in request:
+        request["cavity"] = CavityRequest(**request["cavity"])
     agree(*both(own, sensitivities=slopes, **request))
 
 

@@ -282,6 +282,6 @@ def test_a_diagnosis_counts_modes_pressures_and_runs(changes: int, words: str) -
     rows.append(SimpleNamespace(label=None, pressure_kPa=0.0, rim=None))  # the mass
     observations = SimpleNamespace(rows=rows)
     problem = SimpleNamespace(observations=observations, changes=[None] * changes)
-    d: Any = SimpleNamespace(problem=problem)
+    d: Any = SimpleNamespace(problem=problem, damping_ratios=0)
     text = diagnosis._counted(d)
     assert text.endswith(words) and text.startswith("1 modes at 160, 240 kPa")
