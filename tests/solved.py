@@ -2,7 +2,7 @@
 
 Tests of commands, fits and studies ask for the same few tyres again and again. ``solved_once``
 gives the files that the same decks had led to, in any worker; counts of runs are the evaluator's,
-and stay. Tests of the solver itself, and of failures, do without: what fails is run again.
+and stay. Tests of the solver itself, and of failures, do without (`run_anew`): what fails is run again.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from tyrecal_solvers.bundled.adapter import Bundled
 
-_run = Bundled.run
+run_anew = Bundled.run
 
 
 def _files(folder: Path) -> dict[str, bytes]:
@@ -30,7 +30,7 @@ def run_or_recall(kept: Path) -> Callable[[Bundled, Path, float], None]:
         given = _files(folder)
         path = kept / sha256(repr((time_limit_s, given)).encode()).hexdigest()
         if not path.exists():
-            _run(solver, folder, time_limit_s)
+            run_anew(solver, folder, time_limit_s)
             answer = {name: text for name, text in _files(folder).items() if name not in given}
             written = path.with_suffix(f".{os.getpid()}")
             written.write_bytes(pickle.dumps(answer))

@@ -10,11 +10,13 @@ from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
+from tyrecal_solvers.bundled.adapter import Bundled
 
 from tyrecal import studies
 from tyrecal.cli.main import main
 
 from ..conftest import CASES
+from ..solved import run_anew
 
 CASE = str(CASES / "p235_75r17.yaml")
 
@@ -112,17 +114,14 @@ def test_modes_next_to_measurements(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 
 @pytest.mark.slow
-def test_fit_writes_the_same_bytes_twice(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_fit_writes_the_same_bytes_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Bundled, "run", run_anew)
+    words = ["fit", CASE, "--mesh", "coarse", "--no-pictures", "--no-store", "--output"]
     for name in ("one", "two"):
-        assert run("fit", CASE, "--output", str(tmp_path / name), "--no-pictures") == 0
-    assert "objective" in capsys.readouterr().out
+        assert run(*words, str(tmp_path / name)) == 0
     for file in ("fit.json", "fit.csv", "fit_history.csv"):
         assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes()
     fit = json.loads((tmp_path / "one" / "fit.json").read_text())
-    assert fit["objective_Hz"] == pytest.approx(3.115, abs=0.01)
-    assert fit["evaluations_to_0.05_Hz"] <= 25
     assert set(fit["variables"]) == {"A_belt", "A_carcass", "C10"}
     run_facts = json.loads((tmp_path / "one" / "run.json").read_text())["fit"]
     assert run_facts["command"] == "fit" and run_facts["solver"].startswith("bundled ")
