@@ -2,7 +2,7 @@
 
 Tests of commands, fits and studies ask for the same few tyres again and again. ``solved_once``
 gives the files that the same decks had led to, in any worker; counts of runs are the evaluator's,
-and stay. Tests of the solver itself, and of failures, do without (`run_anew`): what fails is run again.
+and stay. Tests of the solver itself, and of failures, do without: what fails is run again.
 """
 
 from __future__ import annotations

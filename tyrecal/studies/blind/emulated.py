@@ -60,18 +60,12 @@ class EmulatedEffect:
     added: tuple[Polynomial, ...]  # at each node: change of eta
     split: tuple[Polynomial, ...]  # at each node: distance of a pair's two modes, in ln f
     shape_uncertainty: Mapping[float, Array]  # (n,) by end of the range, see `Answer`
-    damping: tuple[Polynomial, ...] = ()  # at each node: change of ln of the damping ratios
 
     def slope(self, e: float, t: Array) -> Array:
         """d eta / d e (n,) at parameter e."""
         nodes = np.append(self.nodes, 0.0)
         weights = (lagrange(nodes, np.array([e])) @ derivatives(nodes))[0, :-1]
         return np.tensordot(weights, [p.at(t)[0] for p in self.added], 1)
-
-    def damping_at(self, e: float, t: Array) -> Array:
-        """Change of ln of the damping ratios (n,) at parameter e."""
-        weights = lagrange(np.append(self.nodes, 0.0), np.array([e]))[0, :-1]
-        return np.asarray(np.tensordot(weights, [p.at(t)[0] for p in self.damping], 1))
 
     def at(self, e: float, t: Array) -> tuple[Array, Array, Array]:
         """Added eta (n,), its slopes (n, v) by t, and split (n,) of pairs, at parameter e."""
@@ -94,8 +88,6 @@ class Emulated:
         constants: Polynomial,
         effects: Mapping[str, EmulatedEffect],
         couplings: Sequence[tuple[Array, Coupling | None]] = (),
-        damping: Polynomial | None = None,
-        losses: Array | None = None,
     ):
         self.model, self.reach = model, reach
         self.variables, self.sources = model.variables, model.sources
@@ -107,7 +99,7 @@ class Emulated:
         self.sloped: Collection[str] = {id for id in model.sloped if id in effects}
         self.sloped_at_0: Collection[str] = {id for id in model.sloped_at_0 if id in effects}
         self._plain, self._constants, self._effects = plain, constants, effects
-        self._couplings, self._damping, self._losses = couplings, damping, losses
+        self._couplings = couplings
 
     def answers(self, points: Sequence[Query]) -> list[Answer | Exception]:
         """Answers from the polynomials; from the model where an effect has none."""
@@ -137,20 +129,7 @@ class Emulated:
         by_effect = {
             id: self._effects[id].slope(point.effects.get(id, 0.0), t) for id in point.slopes
         }
-        damping = self._damping.at(t)[0] if self._damping else None
-        for id, e in point.effects.items() if damping is not None else ():
-            damping = damping + self._effects[id].damping_at(e, t)
-        return Answer(
-            straight,
-            slope,
-            split,
-            constants,
-            by_effect,
-            coupling,
-            uncertain,
-            damping=damping,
-            losses=self._losses,
-        )
+        return Answer(straight, slope, split, constants, by_effect, coupling, uncertain)
 
 
 def emulate(model: ResponseModel, reach: float = REACH) -> Emulated:
@@ -188,11 +167,7 @@ def emulate(model: ResponseModel, reach: float = REACH) -> Emulated:
         if emulated is not None:
             effects[id] = emulated
     couplings = [(boxed[i], plain[i].coupling) for i in sources]  # type: ignore[union-attr]
-    first, damping = plain[good[0]], None
-    assert isinstance(first, Answer)
-    if first.damping is not None:
-        damping = _values(up_to(count, 2), boxed[good], [plain[i].damping for i in good])  # type: ignore[misc,union-attr]
-    return Emulated(model, reach, fitted, constants, effects, couplings, damping, first.losses)
+    return Emulated(model, reach, fitted, constants, effects, couplings)
 
 
 def monomials(powers: Array, t: Array) -> Array:
@@ -219,7 +194,7 @@ def _effect(
     determined."""
     powers = up_to(len(boxed[0]), EFFECT_DEGREE)
     chosen = [i for i in range(EFFECT_DESIGNS) if isinstance(plain[i], Answer)]
-    nodes, added, split, damping = [], [], [], []
+    nodes, added, split = [], [], []
     for e in _node_values(span):
         answers = model.answers([Query(designs[i], {id: float(e)}) for i in chosen])
         both = [(i, a) for i, a in zip(chosen, answers, strict=True) if isinstance(a, Answer)]
@@ -233,9 +208,6 @@ def _effect(
         nodes.append(float(e))
         added.append(_fit(powers, where, differences, reach))
         split.append(_values(up_to(len(boxed[0]), 1), where, [a.split for _, a in both]))
-        if both[0][1].damping is not None:
-            more = [a.damping - plain[i].damping for i, a in both]  # type: ignore[operator,union-attr]
-            damping.append(_values(up_to(len(boxed[0]), 1), where, more))
     if not nodes:
         return None
     ends = [e for e in nodes if span.has_shape_uncertainty and e in (span.low, span.high)]
@@ -245,7 +217,7 @@ def _effect(
         for e, answer in zip(ends, at_ends, strict=True)
         if isinstance(answer, Answer) and answer.shape_uncertainty is not None
     }
-    return EmulatedEffect(np.array(nodes), tuple(added), tuple(split), known, tuple(damping))
+    return EmulatedEffect(np.array(nodes), tuple(added), tuple(split), known)
 
 
 def _node_values(span: EffectRange) -> list[float]:
