@@ -14,7 +14,7 @@ import pytest
 import pyuff
 
 from tyrecal.errors import InputError
-from tyrecal.measured.gather import readings_with_shapes
+from tyrecal.measured.readings import readings_with_shapes
 from tyrecal.measured.tables import read_measurements
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.inference.observations import observe

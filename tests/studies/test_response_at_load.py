@@ -90,9 +90,11 @@ def test_loads_are_refused_as_by_other_commands(capsys: pytest.CaptureFixture[st
 def test_the_default_force_is_away_from_the_patch() -> None:
     """Unloaded it is below the hub; the road would hold that point."""
     for load, angle in ((0.0, 0.0), (LOAD_N, 180.0)):
-        points = default_points(load)
+        points = default_points(load, moves=False)
         (force,), (hub, seen) = (
             read_points(points["excite"], hub=False),
             read_points(points["respond"]),
         )
         assert force == seen and force.angle_deg == angle and hub.angle_deg is None
+    (hub, _) = read_points(default_points(0.0, moves=True)["respond"], moves=True)
+    assert hub.channel == "z"

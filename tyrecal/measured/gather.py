@@ -10,7 +10,6 @@ from pathlib import Path
 from ..errors import InputError
 from ..files import Json, open_file
 from ..simulate.modes.label import Label
-from ..tyre.case import LoadedCase
 from ..tyre.state import TyreState
 from .arrangement import arrange
 from .formats import HEAD, PROPERTY_FILE, TYDEX, other_format
@@ -18,10 +17,9 @@ from .measurement import Measurement
 from .modal import Geometry, LabelledMode, Layout, ModalTest, measurements_of, read_modal_test
 from .repeats import FLOOR, combined, one_for_both
 from .sense import doubts
-from .shapes import SensorShapes, read_shapes, shapes_of
+from .shapes import SensorShapes, shapes_of
 from .slips import common_shifts, contradictions
 from .tables import read_table
-from .targets import readings_of
 from .tir import property_measurements
 from .tydex import tydex_measurements
 from .universal import Place, Universal, is_same_place, is_universal, read_universal
@@ -141,24 +139,6 @@ def unlabelled(
     gathered = gather([path], pressure_kPa, own, assumed=assumed)
     shapes = [each for run in gathered.runs for each in shapes_of(run, pressure_kPa)]
     return gathered.rows, shapes, gathered.notes
-
-
-def readings_with_shapes(
-    case: LoadedCase, path: Path
-) -> tuple[list[Measurement], list[SensorShapes]]:
-    """Measurements of a file, with or without labels, and the shapes measured with them: of a
-    universal file at the case's pressure `unlabelled`, else those that were imported with the file.
-
-    Raises InputError, OSError.
-    """
-    if not is_universal(path):
-        return readings_of(case, path, labelled=False), read_shapes(path)
-    try:
-        readings, shapes, _ = unlabelled(path, case.case.pressure_kPa)
-    except InputError as error:
-        way = "'tyrecal measured import --no-labels' has options for universal files"
-        raise InputError(f"{error}; {way}") from None
-    return readings, shapes
 
 
 def _without_labels(

@@ -10,8 +10,8 @@ import numpy as np
 
 from ...errors import InputError
 from ...files import Json
-from ...measured.gather import readings_with_shapes
 from ...measured.measurement import Measurement
+from ...measured.readings import readings_with_shapes
 from ...measured.targets import in_states, readings_of
 from ...simulate.evaluate.evaluator import Evaluator
 from ...tyre.case import LoadedCase
