@@ -15,6 +15,7 @@ from scipy.stats import multivariate_normal, norm
 from tyrecal.errors import InputError
 from tyrecal.measured.measurement import Measurement, measurements_csv
 from tyrecal.measured.tables import read_measurements
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.problem import Problem
@@ -156,14 +157,20 @@ def test_shapes_count_in_the_same_probability() -> None:
 
 @pytest.mark.numbers
 def test_expansions_go_on_until_the_design_is_found() -> None:
-    """ln f curves with x: the labels are those about the design that the frequencies lead to."""
+    """ln f curves with x: the labels are those about the design that the frequencies lead to, past
+    a first step to one that has no solution."""
     labels = tuple(Label(c, 0) for c in range(1, 6))
     base, slope = np.log([40.0, 50.0, 62.0, 76.0, 92.0]), np.array([1.0, 0.7, 0.4, 0.3, 0.2])
 
     def ln_f(x: Array) -> Array:
         return np.asarray(base + slope * (x + 0.3 * x**2))
 
+    failed = []
+
     def expand(x: Array) -> ModesNearDesign:
+        if x[0] > 0.92:
+            failed.append(x)
+            raise EvaluationFailed("unstable", "no solution")
         return ModesNearDesign(labels, np.zeros(5, int), ln_f(x), (slope * (1 + 0.6 * x))[:, None])
 
     y = ln_f(np.array([0.9]))
@@ -175,7 +182,7 @@ def test_expansions_go_on_until_the_design_is_found() -> None:
     prior = Prior(np.zeros(1), np.array([[0.5]]), np.array([-2.0]), np.array([2.0]))
     search = find_labels(expand, given, prior)
     assert search.settled and search.labels() == list(labels)
-    assert search.x == pytest.approx(0.9, abs=0.02)
+    assert search.x == pytest.approx(0.9, abs=0.02) and failed
 
 
 STATES = [TyreState(), TyreState(160.0, 0.0, "free")]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
+from itertools import islice
 from math import exp, log
 
 import numpy as np
@@ -512,7 +513,8 @@ class TyreModel:
         """Coupling by turned cords of modes that are near each other at x; other constants move
         modes, and couple hardly any. None where there are no such modes.
 
-        One step of each, at the lowest and the highest pressure.
+        One step of each, to the other side where that has no solution, at the lowest and the
+        highest pressure.
         """
         rows, count = self._between.rows, len(self.rows)
         places = {(label, state_of(w) if label else w): i for i, (label, w) in enumerate(rows)}
@@ -530,24 +532,26 @@ class TyreModel:
         }
         if not near or not turned:
             return None
-        own = {**self._plain, **self.values(x)}
-        stepped = [
-            {**own, **{k: own[k] + step for k, step in source.steps.items() if k in own}}
-            for source in turned.values()
-        ]
-        ends = self._between.ends
-        answers = iter(self._modes([self.in_state(s, each) for each in stepped for s in ends]))
+        own, ends = {**self._plain, **self.values(x)}, self._between.ends
+
+        def moved(source: Source, side: float) -> list[tuple[dict[str, float], tuple[str, ...]]]:
+            steps = {k: own[k] + side * step for k, step in source.steps.items() if k in own}
+            return [self.in_state(state, {**own, **steps}) for state in ends]
+
+        answers = iter(self._modes([each for s in turned.values() for each in moved(s, 1.0)]))
         square, rise = np.zeros(len(rows)), np.zeros(len(rows))
-        for k in turned:
+        for k, source in turned.items():
+            side, here = 1.0, list(islice(answers, len(ends)))
+            if not all(isinstance(answer, LabelledModes) for answer in here):
+                side, here = -1.0, self._modes(moved(source, -1.0))
             ln_f = eta.copy()
-            for state in ends:
-                answer = next(answers)
+            for state, answer in zip(ends, here, strict=True):
                 if not isinstance(answer, LabelledModes):
                     raise answer
                 for i, (label, where) in enumerate(rows):
                     if label and mates[i] >= 0 and state_of(where) == state:
                         ln_f[i] = log(answer.wanted[label].frequency_Hz)
-            slope = constants[:, k]
+            slope = side * constants[:, k]
             q, more = coupling(*(np.array([v, v[mates]]) for v in (eta, slope, ln_f)))
             square, rise = square + q**2, rise + q**2 * more
         square, rise = (self._between.straight(each) for each in (square, rise))

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.modes.label import Label, Mode
 from .tree import Frequencies, Labelings, Modes, labelings
 
@@ -20,6 +21,7 @@ Array = np.ndarray
 ROUNDS = 10  # of expansion and labelling
 MAX_EXPANSION_STEP = 0.5  # of a variable's coordinate, between expansions
 SAME_DESIGN = 0.01  # of its prior standard deviations
+HALVINGS = 4  # of a step to a design that has no solution
 
 
 @dataclass(frozen=True)
@@ -74,10 +76,11 @@ def find_labels(
     first: Array | None = None,
 ) -> LabelSearch:
     """Labelings of the measured frequencies; first: coordinates where the model is expanded first,
-    by default the prior's mean. Raises what ``expand`` does."""
+    by default the prior's mean. Raises what ``expand`` does there, and where designs nearer to the
+    last one fail, too."""
     x, seen = prior.mean if first is None else first, list[LabelSearch]()
     for round_ in range(1, ROUNDS + 1):
-        at = expand(x)
+        at, x = _expanded(expand, x, seen[-1].x) if seen else (expand(x), x)
         slopes = at.slopes
         modes = Modes(
             at.labels, at.states, at.ln_f - slopes @ (x - prior.mean), slopes @ prior.root
@@ -93,6 +96,18 @@ def find_labels(
         x = x + step
     last = seen[ROUNDS // 2 :]
     return replace(max(last, key=lambda each: each.labelings.probabilities[0]), settled=False)
+
+
+def _expanded(
+    expand: Callable[[Array], ModesNearDesign], x: Array, last: Array
+) -> tuple[ModesNearDesign, Array]:
+    """The model at x or, where x has no solution, nearer to the last design, and that place."""
+    for _ in range(HALVINGS):
+        try:
+            return expand(x), x
+        except EvaluationFailed:
+            x = (x + last) / 2
+    return expand(x), x
 
 
 def admissible(labels: Sequence[Label | None], states: Array, at: ModesNearDesign) -> Array:
