@@ -165,10 +165,10 @@ def test_expansions_go_on_until_the_design_is_found() -> None:
     def ln_f(x: Array) -> Array:
         return np.asarray(base + slope * (x + 0.3 * x**2))
 
-    failed = []
+    failed, limit = list[Array](), 0.92
 
     def expand(x: Array) -> ModesNearDesign:
-        if x[0] > 0.92:
+        if x[0] > limit:
             failed.append(x)
             raise EvaluationFailed("unstable", "no solution")
         return ModesNearDesign(labels, np.zeros(5, int), ln_f(x), (slope * (1 + 0.6 * x))[:, None])
@@ -183,6 +183,9 @@ def test_expansions_go_on_until_the_design_is_found() -> None:
     search = find_labels(expand, given, prior)
     assert search.settled and search.labels() == list(labels)
     assert search.x == pytest.approx(0.9, abs=0.02) and failed
+    limit = 0.01
+    search = find_labels(expand, given, prior)
+    assert not search.settled and search.x == 0.0 and search.rounds == 1
 
 
 STATES = [TyreState(), TyreState(160.0, 0.0, "free")]

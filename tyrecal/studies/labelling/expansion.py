@@ -76,11 +76,10 @@ def find_labels(
     first: Array | None = None,
 ) -> LabelSearch:
     """Labelings of the measured frequencies; first: coordinates where the model is expanded first,
-    by default the prior's mean. Raises what ``expand`` does there, and where designs nearer to the
-    last one fail, too."""
+    by default the prior's mean. Raises what ``expand`` does there."""
     x, seen = prior.mean if first is None else first, list[LabelSearch]()
+    at = expand(x)
     for round_ in range(1, ROUNDS + 1):
-        at, x = _expanded(expand, x, seen[-1].x) if seen else (expand(x), x)
         slopes = at.slopes
         modes = Modes(
             at.labels, at.states, at.ln_f - slopes @ (x - prior.mean), slopes @ prior.root
@@ -93,21 +92,25 @@ def find_labels(
         if near and (not seen or result.labels() == seen[-1].labels()):
             return result
         seen.append(result)
-        x = x + step
-    last = seen[ROUNDS // 2 :]
+        nearest = _expanded(expand, x + step, x) if round_ < ROUNDS else None
+        if nearest is None:
+            break
+        at, x = nearest
+    last = seen[len(seen) // 2 :]
     return replace(max(last, key=lambda each: each.labelings.probabilities[0]), settled=False)
 
 
 def _expanded(
     expand: Callable[[Array], ModesNearDesign], x: Array, last: Array
-) -> tuple[ModesNearDesign, Array]:
-    """The model at x or, where x has no solution, nearer to the last design, and that place."""
-    for _ in range(HALVINGS):
+) -> tuple[ModesNearDesign, Array] | None:
+    """The model at x or, where x has no solution, nearer to the last design, and that place; None:
+    there is none near that, either."""
+    for _ in range(1 + HALVINGS):
         try:
             return expand(x), x
         except EvaluationFailed:
             x = (x + last) / 2
-    return expand(x), x
+    return None
 
 
 def admissible(labels: Sequence[Label | None], states: Array, at: ModesNearDesign) -> Array:
