@@ -42,5 +42,8 @@ def test_the_page_states_the_counts_of_the_record() -> None:
     counts = [held[prior, name] for name in names]
     unsure = [f"{name}, said not to hold" for name in ("A_belt", "C10", "A_carcass")]
     counts += [held[tyre, name] for name in ("all modes", "[4,0]", "C10", *unsure)]
+    for size in ("205/60R15, --prior", "225/45R17, --prior"):
+        names = ["all modes", "A_belt", "A_carcass", "C10_sidewall", "C10_tread"]
+        counts += [held[size, name] for name in names]
     for count in counts:
         assert count in page, count
