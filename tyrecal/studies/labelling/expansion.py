@@ -21,7 +21,7 @@ Array = np.ndarray
 ROUNDS = 10  # of expansion and labelling
 MAX_EXPANSION_STEP = 0.5  # of a variable's coordinate, between expansions
 SAME_DESIGN = 0.01  # of its prior standard deviations
-HALVINGS = 4  # of a step to a design that has no solution
+MAX_STEPS_BACK = 4  # from a design that has no solution
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def _expanded(
 ) -> tuple[ModesNearDesign, Array] | None:
     """The model at x or, where x has no solution, nearer to the last design, and that place; None:
     there is none near that, either."""
-    for _ in range(1 + HALVINGS):
+    for _ in range(1 + MAX_STEPS_BACK):
         try:
             return expand(x), x
         except EvaluationFailed:
