@@ -92,6 +92,18 @@ def every_labeling(
         yield labeling, float(ln + np.logaddexp.reduce(views)), of_labelled
 
 
+def exact_sums(given: Frequencies, modes: Modes) -> tuple[dict[Any, float], dict[Any, float]]:
+    """Prior times evidence of every labeling, and the evidence of its labelled frequencies, over
+    all discrepancies."""
+    total: dict[Any, float] = {}
+    evidence: dict[Any, float] = {}
+    for tau in DISCREPANCIES:
+        for own, ln, of_labelled in every_labeling(given, modes, tau):
+            total[own] = total.get(own, 0.0) + np.exp(ln)
+            evidence[own] = evidence.get(own, 0.0) + np.exp(of_labelled)
+    return total, evidence
+
+
 @pytest.mark.numbers
 def test_every_labeling_has_the_probability_of_its_joint_density() -> None:
     """Three frequencies, one of a known mode, another that can be two: against all labelings."""
@@ -103,12 +115,7 @@ def test_every_labeling_has_the_probability_of_its_joint_density() -> None:
     y = np.log([51.0, 54.0, 74.0])
     given = Frequencies(y, np.full(3, 0.01), np.zeros(3, int), allowed, np.array([0, 0, 1], bool))
     result = labelings(given, modes)
-    total: dict[Any, float] = {}
-    evidence: dict[Any, float] = {}
-    for tau in DISCREPANCIES:
-        for own, ln, of_labelled in every_labeling(given, modes, tau):
-            total[own] = total.get(own, 0.0) + np.exp(ln)
-            evidence[own] = evidence.get(own, 0.0) + np.exp(of_labelled)
+    total, evidence = exact_sums(given, modes)
     whole = sum(total.values())
     by_modes = dict(zip(map(tuple, result.modes.tolist()), result.probabilities, strict=True))
     assert len(total) == 10
@@ -140,12 +147,7 @@ def test_shapes_count_in_the_same_probability() -> None:
     ln_shape = random.normal(size=(3, 4)) + np.array([[3.0, 0, 0, 0], [3.0, 0, 0, 0], [0] * 4])
     given = Frequencies(y, s, np.zeros(3, int), every, none, ln_shape)
     result = labelings(given, modes)
-    total: dict[Any, float] = {}
-    evidence: dict[Any, float] = {}
-    for tau in DISCREPANCIES:
-        for own, ln, of_labelled in every_labeling(given, modes, tau):
-            total[own] = total.get(own, 0.0) + np.exp(ln)
-            evidence[own] = evidence.get(own, 0.0) + np.exp(of_labelled)
+    total, evidence = exact_sums(given, modes)
     assert tuple(result.modes[0, :2]) == (0, 0)
     by_modes = dict(zip(map(tuple, result.modes.tolist()), result.probabilities, strict=True))
     for own, value in total.items():

@@ -259,20 +259,10 @@ def _about(
 ) -> InverseProblem:
     """Observations and the model in an expansion."""
     where, start, spread = places(observations, rows), model.start, model.spread
-    damping = places(observations.damping, rows)
-    return InverseProblem(
-        observations,
-        expansion,
-        model.ranges,
-        where,
-        start,
-        spread,
-        changes,
-        assumed,
-        {},
-        0,
-        damping,
+    problem = InverseProblem(
+        observations, expansion, model.ranges, where, start, spread, changes, assumed
     )
+    return replace(problem, damping_places=places(observations.damping, rows))
 
 
 def _fits(problem: InverseProblem) -> bool:
