@@ -17,11 +17,12 @@ from .contact import Round, ring
 
 Array = np.ndarray
 LENGTHS = np.radians([5.0] * 4 + [20.0] * 8)
+ETA = 0.2  # loss factor
 
 
 def soft_ring() -> Round:
     """A soft ring on a hub."""
-    return ring((0.08, 0.09, 0.1), 0.02, 2, support.Rubber(C10=2e5, D1=2.5e-7))
+    return ring((0.08, 0.09, 0.1), 0.02, 2, support.Rubber(C10=2e5, D1=2.5e-7, loss=ETA))
 
 
 def harmonic(work: Round, n: int, count: int = 2) -> HarmonicModes:

@@ -17,6 +17,7 @@ from tyrecal_solvers.bundled.road.loaded_modes import (
     standing_waves,
 )
 from tyrecal_solvers.bundled.road.multifrontal import Elimination
+from tyrecal_solvers.bundled.road.pressed_losses import PressedLosses
 from tyrecal_solvers.bundled.section.mechanics import mass
 from tyrecal_solvers.bundled.section.symmetry import HALF_TURN
 from tyrecal_solvers.bundled.solid3d.circumference import half_circle
@@ -26,7 +27,7 @@ from tyrecal_solvers.errors import RunFailed
 from ..chance import generator
 from . import support
 from .contact import Round
-from .soft_ring import LENGTHS, State, harmonic, held, modes, no_hold, press, soft_ring, start
+from .soft_ring import ETA, LENGTHS, State, harmonic, held, modes, no_hold, press, soft_ring, start
 
 pytestmark = pytest.mark.numbers
 Array = np.ndarray
@@ -309,3 +310,21 @@ def test_the_vibration_modulus_counts(tyre: Round, pressed: State) -> None:
     small = np.zeros_like(pressed.U)
     still, twice = ((w.residual(small), w.product(x))[1] for w in works)
     np.testing.assert_allclose(twice, 2 * still, atol=1e-9 * abs(still).max())
+
+
+def test_damping_is_half_the_loss_factor_times_the_slope_of_ln_omega_squared(
+    tyre: Round, pressed: State, lowest: LoadedModes
+) -> None:
+    """zeta = eta / 2 d ln lambda / d ln G at the fixed state, by central differences; the patch's
+    hold and the initial stress store the rest of the energy."""
+    rubber, *others = tyre.model.parts
+    squares = []
+    for step in (1e-4, -1e-4):
+        law = replace(rubber.law, shear_ratio=1 + step, bulk_ratio=1 + step)
+        stiffer = replace(tyre.model, parts=[replace(rubber, law=law), *others])
+        changed = replace(tyre, model=stiffer)
+        squares.append(modes(changed, pressed.U, pressed.hold, pressed.around, 10).eigenvalues)
+    slopes = np.log(squares[0] / squares[1]) / 2e-4
+    ratios = PressedLosses(tyre.tyre(pressed.around), pressed.U).damping_ratios(lowest)
+    np.testing.assert_allclose(ratios, ETA / 2 * slopes, rtol=1e-6)
+    assert np.ptp(ratios) > 1e-4 * ETA

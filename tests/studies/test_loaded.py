@@ -19,19 +19,21 @@ from tyrecal.simulate.modes.loaded import SYMMETRIES, Member
 from tyrecal.studies.loaded import Loaded, LoadedMode, LoadedTyre, _grip_mm, load_tyres
 from tyrecal.studies.loaded_result import findings, load_sweep_result, loaded_modes_result
 from tyrecal.tyre.load import load_case
+from tyrecal.tyre.values import with_values
 
 from ..evaluate.stand_in import CASE, StandIn
 from ..evaluate.test_foreign_records import of_footprints
 from .loaded import coarse_case
 
 LOADS = [0.0, 500.0, 1000.0]
+LOSS = 0.3
 
 
 @pytest.fixture(scope="module")
 def tyre(tmp_path_factory: pytest.TempPathFactory) -> LoadedTyre:
-    """A coarse tyre at three loads."""
+    """A coarse tyre whose rubber has losses, at three loads."""
     folder = tmp_path_factory.mktemp("coarse")
-    case = load_case(coarse_case(folder))
+    case = with_values(load_case(coarse_case(folder)), {"materials.rubber.loss_factor": LOSS})
     outcome = load_tyres(
         case, Evaluator(TyreDesign(case), store=Store(folder / "record")), {"initial": {}}, LOADS
     )
@@ -95,6 +97,21 @@ def test_results_as_files_hold_them(tyre: LoadedTyre) -> None:
     assert [row["load_N"] for row in sweep["rows"]] == LOADS and not sweep["failed"]
     assert sweep["rows"][0]["deflection_m"] == 0 < sweep["rows"][1]["deflection_m"]
     assert sweep["rows"][-1]["modes"] == one["modes"]
+
+
+@pytest.mark.slow
+def test_damping_is_at_most_half_the_loss_factor_and_stays_where_the_patch_is_a_node(
+    tyre: LoadedTyre,
+) -> None:
+    none, light, heavy = (
+        {mode.member: mode.damping_ratio or 0.0 for mode in each.modes} for each in tyre.loads
+    )
+    assert all(0 < ratio < LOSS / 2 for table in (none, light, heavy) for ratio in table.values())
+    before, after = hertz(tyre.loads[0]), hertz(tyre.loads[1])
+    still = [member for member in none if abs(after[member] / before[member] - 1) < 0.01]
+    assert still == [Member(Label(c, 1), "antisymmetric") for c in (1, 2)]
+    for member in still:
+        assert light[member] == pytest.approx(none[member], rel=0.03)
 
 
 def loaded(load_N: float, symmetric: float, antisymmetric: float, overlap: float = 0.9) -> Loaded:

@@ -37,6 +37,7 @@ class LoadedMode:
     shape: np.ndarray | None = field(default=None, compare=False, repr=False)
     sliding_Hz: float | None = None
     grip_mm: float | None = None
+    damping_ratio: float | None = None  # fraction of critical damping, of a patch that sticks
 
 
 @dataclass(frozen=True)
@@ -152,13 +153,18 @@ def _loaded_tyre(
     highest = max(float(f.max()) for f in hertz_there if f is not None)
     shapes: dict[Member, np.ndarray] = {}
     hertz: dict[Member, float] = {}
+    damping = {mode.label: mode.raw.damping_ratio for mode in unloaded.modes}
     for mode in unloaded.modes:
         if mode.label in wanted or mode.frequency_Hz < NEAR * highest:
             shapes |= (both := members(mode, where))
             hertz |= dict.fromkeys(both, mode.frequency_Hz)
     loads = _followed(pressed, where, wanted, shapes, hertz, case.case.road.friction)
     if with_zero:
-        named = (LoadedMode(x, f, 1.0, 1.0) for x, f in hertz.items() if x.label in wanted)
+        named = (
+            LoadedMode(member, f, 1.0, 1.0, damping_ratio=damping[member.label])
+            for member, f in hertz.items()
+            if member.label in wanted
+        )
         wave = () if pressed.cavity_Hz is None else (pressed.cavity_Hz,) * 2
         loads = [Loaded(0.0, 0.0, _by_frequency(named), cavity_Hz=wave), *loads]
     return LoadedTyre(
@@ -194,7 +200,7 @@ def _followed(
             loose = state(footprint.sliding_frequency_Hz, footprint.sliding_shape, where)
             there, _ = sliding.to(loose)
             slipping = np.where(there < 0, np.nan, loose.frequencies[there])
-        grip_mm = _grip_mm(footprint, friction)
+        grip_mm, damping = _grip_mm(footprint, friction), footprint.mode_damping_ratio
         loads.append(
             Loaded(
                 footprint.load_N,
@@ -208,6 +214,7 @@ def _followed(
                         here.shapes[place[i]],
                         None if np.isnan(slipping[i]) else float(slipping[i]),
                         None if grip_mm is None else float(grip_mm[place[i]]),
+                        None if damping is None else float(damping[place[i]]),
                     )
                     for i in chosen
                     if place[i] >= 0

@@ -71,7 +71,9 @@ class LoadSweep(Result):
     def csv(self) -> str:
         keys = ["design", "load_N", "deflection_m", "c", "m", "kind", "symmetry", "frequency_Hz"]
         rows = ({**row.model_dump(), **m} for row in self.rows for m in _csv_modes(row))
-        return csv_text([*keys, "overlap", "spanned", "sliding_Hz", "grip_mm"], rows)
+        keys += ["overlap", "spanned", "sliding_Hz", "grip_mm"]
+        keys += ["damping_ratio"] * any(m.damping_ratio for row in self.rows for m in row.modes)
+        return csv_text(keys, rows)
 
     def tables(self) -> list[Table]:
         return [self._table(design) for design in dict.fromkeys(row.design for row in self.rows)]
@@ -186,7 +188,7 @@ def load_sweep_result(
 
 def _entry(mode: LoadedMode) -> ModeEntry:
     label = mode.member.label
-    with_friction = {"sliding_Hz": mode.sliding_Hz, "grip_mm": mode.grip_mm}
+    known = {key: getattr(mode, key) for key in ("sliding_Hz", "grip_mm", "damping_ratio")}
     return ModeEntry(
         c=label.c,
         m=label.m,
@@ -196,7 +198,7 @@ def _entry(mode: LoadedMode) -> ModeEntry:
         symmetry=mode.member.symmetry,
         overlap=round(mode.overlap, 6),
         spanned=round(mode.spanned, 6),
-    ).model_copy(update={key: hertz for key, hertz in with_friction.items() if hertz is not None})
+    ).model_copy(update={key: number for key, number in known.items() if number is not None})
 
 
 def _cavity(loaded: Loaded) -> Json:

@@ -6,7 +6,8 @@ JOB.json: pressure_Pa, mass_kg, free_radius_m, failure, cause, ``footprints`` [l
 cavity's first wave, free and in ``footprints`` (fore-aft, vertical). JOB.npz: nodes, points, angles
 of the whole tyre, the displacement of the inflated one, and per footprint i the arrays of its patch
 and the displacement, as NAME_i; where modes were asked for: mode_frequency_Hz (m,), mode_shape
-(m, ring, node, 3) at mode_node, modal mass 1 kg; with friction the patch's forces along the road in
+(m, ring, node, 3) at mode_node, modal mass 1 kg; where a material has a loss factor
+mode_damping_ratio (m,); with friction the patch's forces along the road in
 these, mode_traction_N (m,), their sizes summed, and sliding_frequency_Hz, sliding_shape of the same
 tyre while nothing holds the patch along the road. Where a response was asked for in place of
 modes: response_NAME, the fields of `ResponseResult` and of `Superelement`.
@@ -41,6 +42,7 @@ from .contact_newton import ContactNewton, PressedState
 from .half_turn_symmetry import HalfTurn
 from .loaded_modes import SPARE, loaded_modes
 from .patch import patch
+from .pressed_losses import PressedLosses
 from .pressed_response import UNLOADED_MODES, PressedResponse
 from .rim_stiffness import reactions, rim_stiffness
 from .road_data import InflatedTangent, ModeRequest, RimRequest, RoadData
@@ -53,7 +55,7 @@ log = logging.getLogger("tyrecal_solvers")
 PATCH_ARRAYS = ("ring", "node", "along_m", "across_m", "pressure_Pa", "area_m2", "traction_Pa")
 RESPONSE = "response_"  # begins the names of arrays of a response
 MODE_ARRAYS = (
-    *("mode_frequency_Hz", "mode_node", "mode_shape"),
+    *("mode_frequency_Hz", "mode_node", "mode_shape", "mode_damping_ratio"),
     *("mode_traction_N", "sliding_frequency_Hz", "sliding_shape"),
 )
 
@@ -239,6 +241,8 @@ def _modes(
         whole = np.concatenate([shapes, turned[:, 1:-1][:, ::-1]], 1)
         arrays[f"{name}_frequency_Hz"] = np.sqrt(each.eigenvalues) / (2 * np.pi)
         arrays[f"{name}_shape"] = whole[:, :, wanted.nodes]
+    if wanted.model.lossy:
+        arrays["mode_damping_ratio"] = PressedLosses(tyre, U).damping_ratios(modes[0])
     if road.friction:
         arrays["mode_traction_N"] = np.array(
             [

@@ -15,7 +15,7 @@ directions of the hub are those of `modes.response`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -24,14 +24,13 @@ from ...errors import Refused
 from ..modes.harmonics import HarmonicModes
 from ..modes.response import ResponseResult, TreadPatch
 from ..modes.superelement import Superelement
-from ..section.materials import LossFactor
-from ..section.parts.part import TyrePart
 from ..section.symmetry import HALF_TURN
 from ..solid3d.revolved import Revolved
 from . import davidson
 from .contact_update import ContactUpdate
 from .half_turn_symmetry import HalfTurn
 from .loaded_modes import Inertia, factor_with_hold, forces_on, standing_waves
+from .pressed_losses import PressedLosses
 from .rim_stiffness import MOTION_PARITY, followed, rim_motions, turning_stiffness
 
 Array = np.ndarray
@@ -95,28 +94,11 @@ class PressedResponse:
         self.highest_Hz = highest_Hz
         model = tyre.model
         tyre.residual(U)
-        by_loss: dict[tuple[LossFactor, int], list[TyrePart]] = {}
-        for k, material in enumerate(model.lossy):
-            assert material.loss
-            for modulus in (0, 1):
-                # without a table both moduli have one loss factor
-                law = material.loss, modulus if material.loss.frequency_Hz else 0
-                by_loss.setdefault(law, []).extend(model.material_parts(k, modulus))
-        self._parts = [
-            (*law, Revolved(replace(model, parts=parts), [], tyre.around))
-            for law, parts in by_loss.items()
-            if parts
-        ]
-        for _, _, part in self._parts:
-            part.residual(U)
+        self._losses = PressedLosses(tyre, U)
         self._mass = Inertia(model, tyre.around)
         self._turning = turning_stiffness(tyre, pressed, forces)
         self._motions = rim_motions(tyre, pressed)
         self.reduced = [self._of_parity(1, factor), self._of_parity(-1, None)]
-
-    def _losses(self, hertz: float) -> list[float]:
-        at = np.array([hertz])
-        return [float(loss.at(at)[modulus][0]) for loss, modulus, _ in self._parts]
 
     def _of_parity(self, parity: int, factor: ContactUpdate | None) -> _OneParity:
         tyre, pressed, hold, check = self._tyre, self._pressed, self._hold, self._check
@@ -153,12 +135,12 @@ class PressedResponse:
 
         basis = self._modes(symmetry, K, M, inverse)
         newest = basis.add(statics, K, M)
-        lossy = [operator(part.product) for _, _, part in self._parts]
+        lossy = [operator(part.product) for part in self._losses.parts]
         damped = [part(basis.vectors) for part in lossy]
         for _ in range(INERTIA_ROUNDS):
             newest = basis.add(inverse(basis.inertias[-newest:]), K, M)
         if lossy:
-            losses = self._losses(self.highest_Hz / 2)
+            losses = self._losses.factors(self.highest_Hz / 2)
             images = sum(eta * image for eta, image in zip(losses, damped, strict=True))
             basis.add(inverse(images), K, M)
         lossy_images = [
@@ -187,7 +169,7 @@ class PressedResponse:
             with_rim(self._mass, np.eye(len(basis.vectors))),
             [
                 with_rim(part.product, basis.vectors @ images.T)
-                for (_, _, part), images in zip(self._parts, lossy_images, strict=True)
+                for part, images in zip(self._losses.parts, lossy_images, strict=True)
             ],
             np.hstack([np.reshape(moved, (len(tread), b)), own]),
         )
@@ -237,7 +219,7 @@ class PressedResponse:
         receptance = np.zeros((seen, excited, f), complex)
         hub = np.zeros((6, excited, f), complex)
         for i, hertz in enumerate(frequencies_Hz):
-            losses = self._losses(hertz)
+            losses = self._losses.factors(hertz)
             for reduced in self.reduced:
                 motion, force = reduced.at(2 * np.pi * hertz, losses)
                 receptance[:, :, i] += motion[excited:, :excited]
@@ -249,7 +231,7 @@ class PressedResponse:
         """Matrices on the rim's motions and at most ``count`` others, and motions of the points
         from ``first`` on. Raises Refused if the modes in the band are more."""
         limit = (2 * np.pi * self.highest_Hz) ** 2
-        losses = self._losses(self.highest_Hz / 2)
+        losses = self._losses.factors(self.highest_Hz / 2)
         own = [self._condensed(each, limit, losses, count // 2) for each in self.reduced]
         size = 6 + sum(len(each.mass) - len(each.places) for each in own)
         K, M, loss = (np.zeros((size, size)) for _ in range(3))

@@ -46,6 +46,7 @@ class Footprint:
     mode_frequency_Hz: of.HertzArray | None = None  # (m,); with friction these modes stick
     mode_node: of.WholeArray | None = None  # (j,) the only nodes of the shapes
     mode_shape: of.Shapes3D | None = None  # (m, ring, j, 3), as displacement
+    mode_damping_ratio: of.RealArray | None = None  # (m,) where a loss factor is known
     # (m,) the patch's forces along the road in each shape, their sizes summed
     mode_traction_N: of.RealArray | None = None
     sliding_frequency_Hz: of.HertzArray | None = None  # modes of a patch that slides freely

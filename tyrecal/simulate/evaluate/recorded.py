@@ -157,6 +157,9 @@ class _Pressed(_Tyre):
                     raise ValueError("of modes under load a part is missing")
                 if _shape(parts[2])[:3] != (*_shape(parts[0]), rings, *_shape(parts[1])):
                     raise ValueError("modes under load do not go together")
+            damped = each.mode_damping_ratio
+            if damped is not None and _shape(damped) != _shape(parts[0]):
+                raise ValueError("modes under load and their damping do not go together")
             # (m,), and of the modes of a sliding patch frequencies and shapes, as above
             free = (each.mode_traction_N, each.sliding_frequency_Hz, each.sliding_shape)
             if any(part is not None for part in free) and not (
