@@ -108,9 +108,6 @@ def command(
     if loads:
         pressed_to = [PlannedState(sum(load > 0 for load in loads), modes=True)]
         plan = plan_pressing(loaded, evaluator, pressed_to, len(designs), study.jobs)
-    lossy = any(getattr(m, "loss_factor", None) for m in loaded.case.materials.values())
-    if lossy and loads:
-        terminal.note("no damping is computed on the road: loss factors have no effect")
     if sweep is not None:
         run = study.run(loaded, "modes", evaluator, "sweep-load", plan=plan, load_N=loads)
         draw = pictures is not False
@@ -122,6 +119,7 @@ def command(
     result, evaluation, modes = studies.run(loaded, evaluator, values)
     if measured:
         result = result.compared(loaded)
+    lossy = any(getattr(m, "loss_factor", None) for m in loaded.case.materials.values())
     if lossy and all(mode.damping_ratio is None for mode in result.modes):
         name = evaluator.solver.name
         terminal.note(f"solver '{name}' computes no damping: loss factors have no effect")
