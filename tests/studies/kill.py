@@ -1,6 +1,9 @@
 """A fit that a signal meets at random moments; then the same command again.
 
-    python tests/studies/kill.py [rounds] [seed] [KILL|INT|TERM|HUP]
+    python tests/studies/kill.py [rounds] [seed] [KILL|INT|TERM|HUP] [-- CASE OPTION ...]
+
+CASE OPTION ...: arguments of the fit, default cases/p235_75r17.yaml. Where they are given, every
+other round has two processes, and every other pair of rounds two threads of the BLAS.
 
 Every round is a fit from nothing in a folder of its own, signalled once at a moment drawn over the
 whole run (drawn again where the fit had ended by then), and run again. Checked: result files byte
@@ -29,7 +32,6 @@ import time
 from pathlib import Path
 
 CASE = Path(__file__).parents[2] / "cases" / "p235_75r17.yaml"
-COMMAND = [sys.executable, "-m", "tyrecal", "fit", str(CASE), "--no-pictures", "--quiet"]
 STARTS = ["--mesh", "coarse", "--starts", "3", "--seed", "1"]
 RESULTS = ("fit.json", "fit.csv", "fit_history.csv")
 WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated", signal.SIGHUP: "hung up"}
@@ -37,10 +39,16 @@ SAID = r"\n{}: (nothing was c.*|nothing was computed.*|.*same command again to r
 GONE_S = 5.0  # within which the processes of one that was killed outright have ended
 
 
-def fit(out: Path, arguments: list[str]) -> subprocess.Popen[str]:
-    """A fit that writes to ``out``."""
-    command = [*COMMAND, *arguments, "--output", str(out)]
-    return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+def fit(out: Path, arguments: list[str], threads: int = 1) -> subprocess.Popen[str]:
+    """A fit that writes to ``out``, with so many ``threads`` of the BLAS."""
+    command = [sys.executable, "-m", "tyrecal", "fit", *arguments, "--output", str(out)]
+    return subprocess.Popen(
+        [*command, "--no-pictures", "--quiet"],
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env={**os.environ, "OPENBLAS_NUM_THREADS": f"{threads}"},
+    )
 
 
 def finished(out: Path) -> int:
@@ -98,24 +106,28 @@ def stopped(
         return moment, ", ".join(wrong)
 
 
-def main(rounds: int, seed: int, how: int) -> int:
+def main(rounds: int, seed: int, how: int, own: list[str]) -> int:
+    """Return 1 if a round went wrong; own: arguments of the fit."""
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores it
     chance, bad = random.Random(seed), 0
-    searching = STARTS if how in WORDS else []
+    searching = [*(own or [str(CASE)]), *(STARTS if how in WORDS else [])]
+    at_once = bool(own) or how in WORDS
     with tempfile.TemporaryDirectory() as place:
         plain = Path(place) / "plain"
         start = time.monotonic()
-        fit(plain, searching).communicate()
+        words = fit(plain, searching).communicate()[1]
+        if not (plain / "fit.json").exists():
+            sys.exit(words)
         seconds = time.monotonic() - start
         total = json.loads((plain / "run.json").read_text())["fit"]["solver_runs"]
         print(f"undisturbed: {seconds:.1f} s, {total} evaluations", flush=True)
         for number in range(1, rounds + 1):
             out = Path(place) / f"{number}"
-            arguments = [*searching, *(["--jobs", "2"] if searching and number % 2 else [])]
+            arguments = [*searching, *(["--jobs", "2"] if at_once and number % 2 else [])]
             to_all = how == signal.SIGINT or number // 2 % 2 == 0
             moment, wrong = stopped(out, arguments, how, to_all, chance, seconds)
             before = finished(out)
-            fit(out, arguments).communicate()
+            fit(out, arguments, 1 + (bool(own) and number // 2 % 2)).communicate()
             facts = json.loads((out / "run.json").read_text())["fit"]
             same = all((out / n).read_bytes() == (plain / n).read_bytes() for n in RESULTS)
             once = facts["solver_runs"] == total - before == total - facts["answered_from_record"]
@@ -134,6 +146,7 @@ def main(rounds: int, seed: int, how: int) -> int:
 
 
 if __name__ == "__main__":
-    given = sys.argv[1:]
+    at = sys.argv.index("--") if "--" in sys.argv else len(sys.argv)
+    given, own = sys.argv[1:at], sys.argv[at + 1 :]
     rounds, seed, how = given + ["20", "0", "KILL"][len(given) :]
-    sys.exit(main(int(rounds), int(seed), signal.Signals[f"SIG{how}"]))
+    sys.exit(main(int(rounds), int(seed), signal.Signals[f"SIG{how}"], own))
