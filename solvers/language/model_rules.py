@@ -14,16 +14,14 @@ MODEL_RULES = f"""
   lines 0+: text...
   section|revolve:
 *PREPRINT (model, output) ECHO=YES|NO|; MODEL=YES|NO|; HISTORY=YES|NO|; CONTACT=YES|NO|
-*PART (model) NAME!=+part
+*PART (model, in CalculiX it has no parts and instances) NAME!=+part
   deck: NAME
-  calculix: it has no parts and instances
-*ASSEMBLY (model, once a job) NAME!=name
+*ASSEMBLY (model, once a job, in CalculiX it has no parts and instances) NAME!=name
   deck: ~NAME
-  calculix: it has no parts and instances
-*INSTANCE (part) NAME!=name; PART!=part; NSET=+nset; ELSET=+elset; INSTANCE=name; LIBRARY=name
+*INSTANCE (part, in CalculiX it has no parts and instances) NAME!=name; PART!=part; NSET=+nset;
+    ELSET=+elset; INSTANCE=name; LIBRARY=name
   lines 0+: number...
   deck: NAME; PART; NSET; ELSET
-  calculix: it has no parts and instances
 *END INSTANCE, END PART, END ASSEMBLY (part)
   deck:
 *NODE (part) NSET=+nset; SYSTEM=R|C|S
@@ -31,24 +29,20 @@ MODEL_RULES = f"""
   deck: NSET; SYSTEM=R
   section: NSET
   revolve: ~NSET
-*SYSTEM (part)
+*SYSTEM (part, in CalculiX {NO_MESH})
   lines 0-2: 6*number?
   deck:
-  calculix: {NO_MESH}
-*NGEN (part) NSET=+nset; LINE=C|P
+*NGEN (part, in CalculiX {NO_MESH}) NSET=+nset; LINE=C|P
   lines 1+: 2*integer integer? integer? 6*number?
   deck: NSET; LINE=C
-  calculix: {NO_MESH}
-*NFILL (part) NSET=+nset; BIAS=number
+*NFILL (part, in CalculiX {NO_MESH}) NSET=+nset; BIAS=number
   lines 1+: 2*nset integer integer?
   deck: NSET; BIAS
-  calculix: {NO_MESH}
-*NCOPY (part) CHANGE NUMBER!=integer; OLD SET!=nset; NEW SET=+nset; SHIFT;
+*NCOPY (part, in CalculiX {NO_MESH}) CHANGE NUMBER!=integer; OLD SET!=nset; NEW SET=+nset; SHIFT;
     REFLECT=LINE|MIRROR|POINT; POLE; MULTIPLE=integer
   lines 0+: number...
   alone: SHIFT; REFLECT; POLE
   deck: CHANGE NUMBER; OLD SET; NEW SET; SHIFT; REFLECT=LINE; MULTIPLE
-  calculix: {NO_MESH}
 *NSET (part model) NSET!=+nset; ELSET=elset; GENERATE; UNSORTED; INTERNAL; INSTANCE=name
   lines 0+: node 15*node?
   if GENERATE: 2*integer integer?
@@ -58,13 +52,12 @@ MODEL_RULES = f"""
   lines 1+: label node...
   deck|section: TYPE; ELSET
   revolve: TYPE=SPRING1|MASS|ROTARYI; ELSET
-*ELGEN (part) ELSET=+elset
+*ELGEN (part, in CalculiX {NO_MESH}) ELSET=+elset
   lines 1+: 2*integer 7*integer?
   deck: ELSET
-  calculix: {NO_MESH}
-*ELCOPY (part) ELEMENT SHIFT!=integer; OLD SET!=elset; NEW SET=+elset; SHIFT NODES!=integer; REFLECT
+*ELCOPY (part, in CalculiX {NO_MESH}) ELEMENT SHIFT!=integer; OLD SET!=elset; NEW SET=+elset; SHIFT
+    NODES!=integer; REFLECT
   deck: ELEMENT SHIFT; OLD SET; NEW SET; SHIFT NODES; REFLECT
-  calculix: {NO_MESH}
 *ELSET (part model) ELSET!=+elset; GENERATE; UNSORTED; INTERNAL; INSTANCE=name
   lines 0+: element 15*element?
   if GENERATE: 2*integer integer?
@@ -93,25 +86,24 @@ MODEL_RULES = f"""
   needs: MATERIAL|COMPOSITE
   deck: ELSET; MATERIAL; CONTROLS; ~ORIENTATION
   section: ELSET; MATERIAL; CONTROLS
-*HOURGLASS STIFFNESS (part, under SOLID SECTION; MEMBRANE SECTION; SHELL SECTION)
+*HOURGLASS STIFFNESS (part, under SOLID SECTION; MEMBRANE SECTION; SHELL SECTION, in CalculiX its
+    hourglass control has no stiffness to set)
   lines 1: 4*number? as stiffness:stress
   deck|section:
-  calculix: its hourglass control has no stiffness to set
-*SECTION CONTROLS (part model) NAME!=+controls; SECOND ORDER ACCURACY=YES|NO|;
-    HOURGLASS=STIFFNESS|ENHANCED|VISCOUS|RELAX STIFFNESS|COMBINED
+*SECTION CONTROLS (part model, in CalculiX its hourglass control has no stiffness to set)
+    NAME!=+controls; SECOND ORDER ACCURACY=YES|NO|; HOURGLASS=STIFFNESS|ENHANCED|VISCOUS|RELAX
+    STIFFNESS|COMBINED
   lines 0-1: number...
   deck|section: NAME; HOURGLASS=STIFFNESS
-  calculix: its hourglass control has no stiffness to set
-*SURFACE SECTION (part) ELSET!=elset; DENSITY=number
+*SURFACE SECTION (part, in CalculiX {NO_REBAR}) ELSET!=elset; DENSITY=number
   deck|section: ELSET
-  calculix: {NO_REBAR}
-*MEMBRANE SECTION (part) ELSET!=elset; MATERIAL!=material; CONTROLS=controls; DENSITY=number;
-    NODAL THICKNESS; MEMBRANE THICKNESS=name; ORIENTATION=orientation; POISSON=number
+*MEMBRANE SECTION (part, in CalculiX {NO_REBAR}) ELSET!=elset; MATERIAL!=material;
+    CONTROLS=controls; DENSITY=number; NODAL THICKNESS; MEMBRANE THICKNESS=name;
+    ORIENTATION=orientation; POISSON=number
   lines 0-1: number? integer? as thickness:length
   alone: NODAL THICKNESS; MEMBRANE THICKNESS
   deck: ELSET; MATERIAL; ~POISSON=0.5
   section: ELSET; MATERIAL
-  calculix: {NO_REBAR}
 *SHELL SECTION (part) ELSET!=elset; MATERIAL=material; COMPOSITE; CONTROLS=controls; DENSITY=number;
     NODAL THICKNESS; OFFSET=any; ORIENTATION=orientation; POISSON=any;
     SECTION INTEGRATION=SIMPSON|GAUSS; SHELL THICKNESS=name; THICKNESS MODULUS=number
@@ -119,20 +111,19 @@ MODEL_RULES = f"""
   if COMPOSITE: number? integer? name any...
   needs: MATERIAL|COMPOSITE
   instead: use SFMGAX elements with a *SURFACE SECTION and *REBAR LAYER
-*REBAR LAYER (part, under SURFACE SECTION; MEMBRANE SECTION; SHELL SECTION)
+*REBAR LAYER (part, under SURFACE SECTION; MEMBRANE SECTION; SHELL SECTION, in CalculiX {NO_REBAR})
     GEOMETRY=CONSTANT|ANGULAR|LIFT EQUATION; ORIENTATION=orientation
   lines 1+: name 3*number? material number? integer? 2*number?
   names: _name, area:area, spacing:length, _position=0, _material, angle=0
   deck|section: GEOMETRY=CONSTANT|ANGULAR
-  calculix: {NO_REBAR}
-*REBAR (part) ELEMENT!=BEAM|SHELL|AXISHELL|MEMBRANE|AXIMEMBRANE|CONTINUUM; MATERIAL!=material;
-    NAME=name; GEOMETRY=ISOPARAMETRIC|SKEW; ISODIRECTION=integer; ORIENTATION=orientation; SINGLE
+*REBAR (part, in CalculiX {NO_REBAR}) ELEMENT!=BEAM|SHELL|AXISHELL|MEMBRANE|AXIMEMBRANE|CONTINUUM;
+    MATERIAL!=material; NAME=name; GEOMETRY=ISOPARAMETRIC|SKEW; ISODIRECTION=integer;
+    ORIENTATION=orientation; SINGLE
   lines 1+: element any...
   if ELEMENT=AXIMEMBRANE: element number 3*number?
   names: _elements, area:area, spacing:length=1, angle=0, radius:length=0
   deck: ELEMENT=AXIMEMBRANE; MATERIAL; NAME; ~GEOMETRY
   instead: lay cords in MGAX elements, or in SFMGAX with *REBAR LAYER
-  calculix: {NO_REBAR}
 *RIGID BODY (part) REF NODE!=node; TIE NSET=nset; PIN NSET=nset; ELSET=elset;
     ANALYTICAL SURFACE=surface; POSITION=INPUT|CENTER OF MASS
   lines 0+: number?
@@ -140,11 +131,10 @@ MODEL_RULES = f"""
   deck: REF NODE; TIE NSET; ELSET; ANALYTICAL SURFACE
   section: REF NODE; TIE NSET
   revolve: REF NODE; TIE NSET; ANALYTICAL SURFACE
-*EMBEDDED ELEMENT (part) HOST ELSET=elset; ROUNDOFF TOLERANCE=number; EXTERIOR TOLERANCE=number;
-    ABSOLUTE EXTERIOR TOLERANCE=number
+*EMBEDDED ELEMENT (part, in CalculiX it embeds no elements) HOST ELSET=elset; ROUNDOFF
+    TOLERANCE=number; EXTERIOR TOLERANCE=number; ABSOLUTE EXTERIOR TOLERANCE=number
   lines 1+: element 15*element?
   deck|section: HOST ELSET; ROUNDOFF TOLERANCE; EXTERIOR TOLERANCE; ABSOLUTE EXTERIOR TOLERANCE
-  calculix: it embeds no elements
 *TIE (part) NAME!=name; ADJUST=YES|NO|; POSITION TOLERANCE=number;
     TYPE=SURFACE TO SURFACE|NODE TO SURFACE
   lines 1+: 2*surface
@@ -173,9 +163,9 @@ MODEL_RULES = f"""
   names TYPE:
   names: E:stress, nu=0
   deck|section: TYPE=ISOTROPIC; MODULI=LONG TERM
-*NO COMPRESSION (model, once a parent, under MATERIAL)
+*NO COMPRESSION (model, once a parent, under MATERIAL, in CalculiX its elastic law bears compression
+    and it passes over the keyword)
   deck|section:
-  calculix: its elastic law bears compression, and it passes over the keyword
 *HYPERELASTIC (model, once a parent, under MATERIAL) {ALL_LAWS}; N=1|2|3|4|5|6;
     MODULI=LONG TERM|INSTANTANEOUS; TEST DATA INPUT; POISSON=number; BETA=any; PROPERTIES=integer;
     TYPE=any; DEPENDENCIES=integer
@@ -184,8 +174,8 @@ MODEL_RULES = f"""
   alone: {ALL_LAWS}
   deck|section: {HONOURED_LAWS}; N; MODULI
   instead: {INSTEAD_OF_TESTS}
-*VISCOELASTIC (model, once a parent, under MATERIAL)
-    TIME=PRONY|RELAXATION TEST DATA|CREEP TEST DATA|FREQUENCY DATA|USER;
+*VISCOELASTIC (model, once a parent, under MATERIAL, in CalculiX its hyperelastic rubber does not
+    relax) TIME=PRONY|RELAXATION TEST DATA|CREEP TEST DATA|FREQUENCY DATA|USER;
     FREQUENCY=TABULAR|FORMULA|PRONY|CREEP TEST DATA|RELAXATION TEST DATA|USER; TYPE=any;
     PRELOAD=any; NONLINEAR; ERRTOL=number; NMAX=integer
   lines 1+: 5*number?
@@ -196,7 +186,6 @@ MODEL_RULES = f"""
   names FREQUENCY=TABULAR: shear loss=0, shear storage=0, bulk loss=0, bulk storage=0, frequency
   needs: TIME|FREQUENCY|NONLINEAR
   deck|section: TIME=PRONY; FREQUENCY=TABULAR
-  calculix: its hyperelastic rubber does not relax
 *DAMPING (model part step, output, not judged) ALPHA=any; BETA=any; BAND LIMITED=any;
     COMPOSITE=number; STRUCTURAL=any; DEPENDENCIES=integer
   lines 0+: number...
@@ -242,8 +231,9 @@ MODEL_RULES = f"""
     TYPE=SURFACE TO SURFACE|NODE TO SURFACE
   lines 1+: surface surface? as slave, master
   revolve: INTERACTION; TYPE=SURFACE TO SURFACE
-*SYMMETRIC MODEL GENERATION (model, once a job) REVOLVE; REFLECT=LINE|PLANE; PERIODIC=name;
-    NODE OFFSET=integer; ELEMENT OFFSET=integer; TRANSPORT; FILE NAME=name
+*SYMMETRIC MODEL GENERATION (model, once a job, in CalculiX it reflects and revolves nothing)
+    REVOLVE; REFLECT=LINE|PLANE; PERIODIC=name; NODE OFFSET=integer; ELEMENT OFFSET=integer;
+    TRANSPORT; FILE NAME=name
   lines 1+: number...
   if REVOLVE: 6*number / 3*number / number integer? number? name?
   if REFLECT=LINE: 6*number
@@ -252,7 +242,6 @@ MODEL_RULES = f"""
   alone: REVOLVE; REFLECT; PERIODIC
   deck: REFLECT=LINE
   revolve: REVOLVE
-  calculix: it reflects and revolves nothing
 *SYMMETRIC RESULTS TRANSFER (model, once a job, after SYMMETRIC MODEL GENERATION)
     STEP=integer; INC=integer; ITERATION=integer;
     UNBALANCED STRESS=name

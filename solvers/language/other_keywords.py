@@ -14,9 +14,8 @@ OTHER_KEYWORDS = f"""
     SECTION FILE, FILTER, DIAGNOSTICS (model step, output, not judged)
 *INTEGRATED OUTPUT SECTION (model part, output, not judged)
 *CONDUCTIVITY, SPECIFIC HEAT (model, output, not judged)
-*PARAMETER (model part, not judged)
+*PARAMETER (model part, not judged, in CalculiX it has no parameters)
   deck:
-  calculix: it has no parameters
 *CAPACITY, MOLECULAR WEIGHT, PHYSICAL CONSTANTS (model, not judged)
 *COUPLING, KINEMATIC, DISTRIBUTING (part model, not judged)
 *MPC, EQUATION (part model, not judged)

@@ -2,7 +2,8 @@
 
 A record has its keywords, levels, notes and parameters, then lines that begin with a word:
 
-    *NAME, OTHER NAME (model part, once a job, under A; B) NSET!=+nset; GENERATE; LINE=C|P
+    *NAME, OTHER NAME (model part, once a job, under A; B, in CalculiX it has no sets)
+        NSET!=+nset; GENERATE; LINE=C|P
       lines 0-2: label 6*number? / node...   number of data lines (1+: one or more), their fields
       if GENERATE, LINE=P: 2*integer         fields with one of these parameters
       names LINE=C: _node, area:area, nu=0   names, units and defaults of the fields; without a
@@ -23,7 +24,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 MANY = 10**9
 NEEDED = "!"  # behind a parameter that must be given
@@ -131,12 +132,7 @@ def _rule(level: str, notes: list[str], options: str, lines: dict[str, str]) -> 
     rows, fields = next(iter(given("lines").items()), ("1+", ""))
     fields, _, names = fields.partition(" as ")
     most = MANY if rows.endswith("+") else int(rows[-1])
-    words: dict[str, Any] = {word: lines.get(word, "") for word in ("instead", "calculix")}
-    for word in ("needs", "alone"):
-        words[word] = _split(lines.get(word, ""), "; ")
     noted = lambda word: "".join(n.removeprefix(word) for n in notes if n.startswith(word))
-    for word in ("under", "after", "within"):
-        words[word] = _split(noted(f"{word} "), "; ")
     return KeywordRule(
         level,
         options,
@@ -145,11 +141,17 @@ def _rule(level: str, notes: list[str], options: str, lines: dict[str, str]) -> 
         given("if"),
         {**given("names"), "": names} if names else given("names"),
         {key: text for key, text in lines.items() if {*key.split("|")} <= PLACES.keys()},
+        needs=_split(lines.get("needs", ""), "; "),
+        alone=_split(lines.get("alone", ""), "; "),
+        under=_split(noted("under "), "; "),
+        after=_split(noted("after "), "; "),
+        within=_split(noted("within "), "; "),
         once=noted("once a "),
         is_output="output" in notes,
         is_contact="contact" in notes,
         is_judged="not judged" not in notes,
-        **words,
+        instead=lines.get("instead", ""),
+        calculix=noted("in CalculiX "),
     )
 
 

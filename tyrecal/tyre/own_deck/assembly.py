@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
-from .generation import MESH_KEYWORDS, members_of, read
+from .generation import MESH_KEYWORDS, members_of, read, shift_of
 from .scope import Members, MeshTable, Point, Scope
 from .text import Block
 
@@ -86,11 +86,7 @@ def _instance(made: Assembly, parts: dict[str, DeckPart], block: Block) -> None:
     name, part = block.need("NAME"), parts[block.need("PART")]
     if any(name in each.instances for each in parts.values()):
         raise block.refused(f"the instance {name} is defined twice")
-    dr = block.rows[0].number(0, 0.0) if block.rows else 0.0
-    dz = block.rows[0].number(1, 0.0) if block.rows else 0.0
-    if len(block.rows) > 2 or (len(block.rows) == 2 and block.rows[1].number(6, 0.0)):
-        raise block.refused("a rotation of an instance is not honoured")
-    made.shifts[f"{name}."] = dr, dz
+    made.shifts[f"{name}."] = dr, dz = shift_of(block)
     root, own = made.root, part.scope
     pairs: list[tuple[MeshTable[Any], MeshTable[Any]]]
     pairs = [(root.nodes, own.nodes), (root.elements, own.elements)]

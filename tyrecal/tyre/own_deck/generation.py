@@ -75,25 +75,17 @@ def _ngen(scope: Scope, block: Block) -> Iterator[int]:
         count = (last - first) // step
         a, b = np.array(scope.nodes[first]), np.array(scope.nodes[last])
         for k in range(1, count):
-            share = k / count
-            if block.get("LINE") == "C":
-                point = _on_arc(scope, block, row, a, b, share)
-            else:
-                point = _between(a, b, share)
-            scope.place(block, row, first + k * step, point)
-        yield from range(first, last + (1 if step > 0 else -1), step)
+            scope.place(block, row, first + k * step, _between(scope, block, row, a, b, k / count))
+        yield from range(first, last + step, step)
         if block.get("LINE") != "C" and any(row.fields[3:]):
             raise block.refused("a point of a curve needs LINE=C", row)
 
 
-def _between(a: np.ndarray, b: np.ndarray, share: float) -> Point:
-    r, z = a + share * (b - a)
-    return float(r), float(z)
-
-
-def _on_arc(
+def _between(
     scope: Scope, block: Block, row: Row, a: np.ndarray, b: np.ndarray, share: float
-) -> Point:
+) -> np.ndarray:
+    if block.get("LINE") != "C":
+        return a + share * (b - a)
     centre = scope.nodes.get(row.integer(3)) if row.text(3) else (row.number(4), row.number(5))
     if centre is None:
         raise block.refused(f"node {row.text(3)} is not defined above", row)
@@ -104,8 +96,7 @@ def _on_arc(
     radius, other = np.hypot(*u), np.hypot(*v)
     if abs(radius - other) > 1e-6 * radius or not radius:
         raise block.refused("the arc's ends are not equally far from its centre", row)
-    r, z = along_arc(a, b, c, share)
-    return float(r), float(z)
+    return along_arc(a, b, c, share)
 
 
 def _nfill(scope: Scope, block: Block) -> Iterator[int]:
@@ -115,30 +106,25 @@ def _nfill(scope: Scope, block: Block) -> Iterator[int]:
         raise block.refused("BIAS must be positive")
     for row in block.rows:
         sets = [scope.nodes.members(row.name(i), block, row) for i in (0, 1)]
-        pairs = [
-            members if _unsorted(scope, row.name(i)) else sorted(members)
-            for i, members in enumerate(sets)
-        ]
-        if len(pairs[0]) != len(pairs[1]):
-            raise block.refused(f"the sets have {len(pairs[0])} and {len(pairs[1])} nodes", row)
+        for i, members in enumerate(sets):
+            defined = scope.nodes.sets.get(row.name(i), ())
+            if not any("UNSORTED" in each.parameters for each, _ in defined):
+                members.sort()
+        if len(sets[0]) != len(sets[1]):
+            raise block.refused(f"the sets have {len(sets[0])} and {len(sets[1])} nodes", row)
         count, step = row.integer(2), row.integer(3, 1)
         if not 1 <= count <= MOST:
             raise block.refused(f"the number of intervals must be from 1 to {MOST}", row)
         lengths = bias ** -np.arange(count)  # each is bias times the one behind it
         shares = np.cumsum(lengths) / lengths.sum()
-        for first, last in zip(*pairs, strict=True):
-            if first + count * step != last:
-                raise block.refused(
-                    f"{count} steps of {step} do not lead from {first} to {last}", row
-                )
+        for first, last in zip(*sets, strict=True):
+            if not step or first + count * step != last:
+                words = f"{count} steps of {step} do not lead from {first} to {last}"
+                raise block.refused(words, row)
             a, b = np.array(scope.nodes[first]), np.array(scope.nodes[last])
             for k in range(1, count):
-                scope.place(block, row, first + k * step, _between(a, b, shares[k - 1]))
-            yield from range(first, last + (1 if step > 0 else -1), step)
-
-
-def _unsorted(scope: Scope, name: str) -> bool:
-    return any("UNSORTED" in block.parameters for block, _ in scope.nodes.sets.get(name, ()))
+                scope.place(block, row, first + k * step, a + shares[k - 1] * (b - a))
+            yield from range(first, last + step, step)
 
 
 def _ncopy(scope: Scope, block: Block) -> Iterator[int]:
@@ -152,11 +138,9 @@ def _ncopy(scope: Scope, block: Block) -> Iterator[int]:
         raise block.refused("needs SHIFT or REFLECT=LINE")
     move: Callable[[Point, int], Point]
     if "SHIFT" in block.parameters:
-        if not 1 <= len(block.rows) <= 2 or (len(block.rows) == 2 and block.rows[1].number(6, 0.0)):
-            raise block.refused("a shift is a line of displacements; a rotation is not honoured")
-        dr, dz = (block.rows[0].number(i, 0.0) for i in (0, 1))
-        if block.rows[0].number(2, 0.0):
-            raise block.refused("a shift out of the section is not honoured", block.rows[0])
+        if not block.rows:
+            raise block.refused("a shift is a line of displacements")
+        dr, dz = shift_of(block)
         move = lambda point, k: (point[0] + k * dr, point[1] + k * dz)
     else:
         mirror = mirror_of(block)
@@ -167,6 +151,17 @@ def _ncopy(scope: Scope, block: Block) -> Iterator[int]:
         for n in old:
             scope.place(block, None, n + k * shift, move(scope.nodes[n], k))
             yield n + k * shift
+
+
+def shift_of(block: Block) -> Point:
+    """Displacement on the first of the data lines, a second one has a rotation."""
+    rows = block.rows
+    if len(rows) > 2 or (len(rows) == 2 and rows[1].number(6, 0.0)):
+        raise block.refused("a rotation is not honoured")
+    dr, dz, beyond = (rows[0].number(i, 0.0) if rows else 0.0 for i in range(3))
+    if beyond:
+        raise block.refused("a shift out of the section is not honoured", rows[0])
+    return dr, dz
 
 
 def members_of(scope: Scope, block: Block) -> Members:
@@ -195,10 +190,7 @@ def _listed(labels: MeshTable, block: Block) -> list[int]:
         else:
             some = []
             for text in filter(None, row.fields):
-                if is_label(text):
-                    some.append(int(text))
-                else:
-                    some += labels.members(named(text), block, row)
+                some += [int(text)] if is_label(text) else labels.members(named(text), block, row)
         missing = [n for n in some if n not in labels]
         if missing:
             raise block.refused(f"{labels.what} {missing[0]} of the set is not defined", row)

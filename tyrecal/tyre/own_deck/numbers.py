@@ -11,6 +11,7 @@ import math
 import operator
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from .text import Block, Row, fields, named, number_from, table
@@ -26,7 +27,7 @@ Parameters = dict[str, int | float | str]  # of *PARAMETER, by their names in up
 def paths(blocks: Sequence[Block]) -> dict[str, tuple[int, int, int]]:
     """Path to block, row and field of the plain numbers of materials, layers and parameters."""
     places: dict[str, tuple[int, int, int]] = {}
-    material, section = "", ""
+    material = section = ""
     layers = [row.name(0) for b in blocks if b.name == "REBAR LAYER" for row in b.rows]
     rebars = [b.get("NAME") for b in blocks if b.name == "REBAR" for _ in b.rows]
     for place, block in enumerate(blocks):
@@ -37,28 +38,20 @@ def paths(blocks: Sequence[Block]) -> dict[str, tuple[int, int, int]]:
         elif block.name in ("SURFACE SECTION", "MEMBRANE SECTION"):
             section = f"section {block.get('ELSET')} / "
         elif block.name == "PARAMETER":
-            for i, row in enumerate(block.rows):
-                name, value = assigned(row)
+            for i, (name, value) in enumerate(map(assigned, block.rows)):
                 if plain_number(value):
                     places[f"parameter / {name}"] = place, i, -1
-            continue
         for (name, *_), i, j in fields.placed_fields(block) if block.name in IN_PATHS else ():
-            row = block.rows[i]
-            if not plain_number(row.text(j)):
-                continue
+            row, given = block.rows[i], block.get("NAME")
             if block.name == "REBAR LAYER":
-                own = row.name(0)
-                path = f"{section * (layers.count(own) > 1)}rebar {own} / {name}"
+                owner = f"{section * (layers.count(row.name(0)) > 1)}rebar {row.name(0)}"
             elif block.name == "REBAR":
-                own = block.get("NAME")
-                own += f" {row.name(0)}" * (rebars.count(own) > 1)
-                path = f"rebar {own} / {name}"
+                owner = f"rebar {given}" + f" {row.name(0)}" * (rebars.count(given) > 1)
             else:
                 is_table = len(block.rows) > 1 and block.name != "HYPERELASTIC"
-                line = f"row {i + 1} / " if is_table else ""
-                path = f"{material} / {block.name} / {line}{name}"
-            if path not in places:
-                places[path] = place, i, j
+                owner = f"{material} / {block.name}" + f" / row {i + 1}" * is_table
+            if plain_number(row.text(j)):
+                places.setdefault(f"{owner} / {name}", (place, i, j))
     return places
 
 
@@ -136,12 +129,18 @@ def written(value: float) -> str:
     return format(value, ".13g")
 
 
-def written_as(value: float, before: str) -> str:
-    """A *PARAMETER's number in place of ``before``: a real one stays real, because in expressions
-    the quotient of two whole numbers is whole."""
+def with_number(line: str, row: Row, index: int, value: float) -> str:
+    """The line of a row with a number at a field, -1: in NAME = value; the rest as it stands. A
+    real parameter stays real: in expressions the quotient of two whole numbers is whole."""
     text = written(value)
-    is_whole = text.lstrip("-").isdigit()
-    return f"{text}." if is_whole and not before.lstrip("+-").isdigit() else text
+    if index < 0:
+        name, _, rest = line.partition("=")
+        before = assigned(row)[1]
+        is_whole = text.lstrip("-").isdigit() and not before.lstrip("+-").isdigit()
+        return f"{name}={rest.replace(before, text + '.' * is_whole, 1)}"
+    fields = line.split(",")
+    fields[index] = re.sub(r"\S.*\S|\S", text, fields[index], count=1)
+    return ",".join(fields)
 
 
 def is_marked(block: Block) -> bool:
@@ -166,7 +165,7 @@ def filled(block: Block, numbers: Numbers, parameters: Parameters) -> Block:
 
     rows = [Row(row.place, text(row.line)) if GIVEN.search(row.line) else row for row in block.rows]
     values = {k: text(v) if "<" in v else v for k, v in block.parameters.items()}
-    return Block(block.name, block.place, values, rows)
+    return replace(block, parameters=values, rows=rows)
 
 
 def _parameter(block: Block, parameters: Parameters, name: str) -> str:
@@ -251,14 +250,8 @@ def replaced(block: Block, changes: Mapping[tuple[int, int], float]) -> Block:
     """A block with numbers at (row, field) set; field -1: the value of NAME = value."""
     rows = list(block.rows)
     for (i, j), value in changes.items():
-        fields = list(rows[i].fields)
-        if j < 0:
-            name, before = assigned(rows[i])
-            fields = [f"{name} = {written_as(value, before)}"]
-        else:
-            fields[j] = written(value)
-        rows[i] = Row(rows[i].place, ",".join(fields))
-    return Block(block.name, block.place, block.parameters, tuple(rows))
+        rows[i] = Row(rows[i].place, with_number(rows[i].line, rows[i], j, value))
+    return replace(block, rows=tuple(rows))
 
 
 def as_known(path: Any, known: Iterable[str]) -> Any:

@@ -99,9 +99,9 @@ class Scope:
         """Nodes of the solids."""
         return {n for e in self.elements.values() if e.is_solid for n in e.nodes}
 
-    def place(self, block: Block, row: Row | None, number: int, point: Point) -> None:
+    def place(self, block: Block, row: Row | None, number: int, place: Point | np.ndarray) -> None:
         """A new node."""
-        old = self.nodes.get(number)
+        point, old = (float(place[0]), float(place[1])), self.nodes.get(number)
         if old is not None and max(abs(old[0] - point[0]), abs(old[1] - point[1])) > 0:
             raise block.refused(f"node {number} is defined twice, at two places", row)
         if not max(map(abs, point)) < FARTHEST:
