@@ -54,21 +54,20 @@ class _Names:
 def findings(blocks: Sequence[Block], before: Sequence[Block] = ()) -> list[Finding]:
     """Faults in the keywords of a job, which may continue from the model of another, ``before``."""
     names = _Names()
-    for block in before:
-        if block.name in RULES:
-            list(_parameters(block, RULES[block.name], names))
-            list(_data(block, RULES[block.name], names))
+    _keywords(before, names)
     names.used.clear()
     names.bare.clear()
-    faults = [*_order(blocks, before)]
-    for block in blocks:
-        rule = RULES.get(block.name)
-        if rule and rule.is_judged:
-            faults += _parameters(block, rule, names)
-            faults += _data(block, rule, names)
+    faults = [*_order(blocks, before), *_keywords(blocks, names)]
     if BEGIN_END.keys().isdisjoint(block.name for block in (*before, *blocks)):
         faults += _unnamed(blocks, names)  # in parts, names have prefixes
     return faults
+
+
+def _keywords(blocks: Sequence[Block], names: _Names) -> list[Finding]:
+    """Findings about parameters and data."""
+    rules = [(block, RULES[block.name]) for block in blocks if block.name in RULES]
+    judged = [(block, rule) for block, rule in rules if rule.is_judged]
+    return [f for k in judged for f in (*_parameters(*k, names), *_data(*k, names))]
 
 
 def _order(blocks: Sequence[Block], before: Sequence[Block]) -> Iterator[Finding]:
@@ -164,20 +163,14 @@ def _data(block: Block, rule: KeywordRule, names: _Names) -> Iterator[Finding]:
         names.nodes |= {row.fields[0].strip() for row in block.rows}
     for i, row in enumerate(block.rows if lines else ()):
         kinds, rest = _form(lines[min(i, len(lines) - 1)])
-        fields = [text.strip() for text in row.fields]
-        while fields and not fields[-1]:
-            fields.pop()
-        if len(fields) > len(kinds) and not rest:
-            yield Finding(block, row, f"'{fields[len(kinds)]}' is more than its data line takes")
-        for j, (kind, may_lack) in enumerate(kinds):
-            text = fields[j] if j < len(fields) else ""
-            if text:
+        more = row.fields[len(kinds) :]
+        if any(more) and not rest:
+            yield Finding(block, row, f"'{more[0]}' is more than its data line takes")
+        for j, (kind, may_lack) in enumerate([*kinds, *[(rest, True)] * len(more) * bool(rest)]):
+            if text := row.text(j):
                 yield from _value(block, row, kind, text, names, "")
             elif not may_lack:
                 yield Finding(block, row, f"field {j + 1}, a {kind}, is missing")
-        for text in fields[len(kinds) :] if rest else ():
-            if text:
-                yield from _value(block, row, rest, text, names, "")
 
 
 def _value(

@@ -42,7 +42,8 @@ def read_fil(path: Path) -> ResultModes:
 
 
 def _modes(text: str) -> ResultModes:
-    """Eigenvalues, shapes and nodes from the records of a results file. Raises ValueError."""
+    """Eigenvalues, shapes and nodes from the records of a results file, modes by rising number.
+    Raises ValueError."""
     places: dict[int, list[float]] = {}
     mode_data: dict[int, tuple[float, float]] = {}
     shapes: dict[int, dict[int, list[float]]] = {}
@@ -64,20 +65,6 @@ def _modes(text: str) -> ResultModes:
             places.setdefault(int(a[0]), _vector(a))
     if is_open or last != END:
         raise ValueError("it is cut short: its last increment does not end")
-    return _arrays(places, mode_data, shapes)
-
-
-def _vector(a: list[Item]) -> list[float]:
-    return [float(value) for value in (*a[1:4], 0.0, 0.0)[:3]]
-
-
-def _arrays(
-    places: dict[int, list[float]],
-    mode_data: dict[int, tuple[float, float]],
-    shapes: dict[int, dict[int, list[float]]],
-) -> ResultModes:
-    """The same as arrays, modes by rising number. Raises ValueError if there are none, or nodes
-    differ."""
     if not mode_data:
         raise ValueError("it has no mode")
     order = sorted(mode_data)
@@ -97,3 +84,7 @@ def _arrays(
         np.array([places[n] for n in nodes]),
         np.array([list(shapes[n].values()) for n in order]),
     )
+
+
+def _vector(a: list[Item]) -> list[float]:
+    return [float(value) for value in (*a[1:4], 0.0, 0.0)[:3]]

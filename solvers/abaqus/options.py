@@ -30,8 +30,7 @@ class Options:
 
 def load(folder: Path) -> Options:
     """Options that were saved in a run folder. Raises OSError."""
-    saved = json.loads((folder / OPTIONS_FILE).read_text(encoding="utf-8"))
-    return Options(**{name: saved[name] for name in Options.__dataclass_fields__})
+    return Options(**json.loads((folder / OPTIONS_FILE).read_text(encoding="utf-8")))
 
 
 def read_options(given: Mapping[str, Any], **units: float) -> Options:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from .laws import LAW_CONSTANTS, LAWS_NOT_READ, MAX_ENERGY_ORDER, ON_A_LINE
 from .rule import Field
@@ -41,29 +41,21 @@ def constants_of(block: Block) -> list[str]:
     return LAW_CONSTANTS[law](order)
 
 
-def _constant(name: str) -> Field:
-    unit = {"C": "stress", "m": "stress", "D": "compliance"}.get(name[0], "")
-    return Field(name, unit, 0.0)
-
-
 def fields_of(block: Block) -> list[Field]:
     """The named data fields of each line of a block; of *HYPERELASTIC, of all lines together."""
     if block.name == "HYPERELASTIC":
-        return [_constant(name) for name in constants_of(block)]
+        units = {"C": "stress", "m": "stress", "D": "compliance"}
+        return [Field(name, units.get(name[0], ""), 0.0) for name in constants_of(block)]
     rule = RULES.get(block.name)
     return rule.fields_of(block.parameters) if rule else []
 
 
 def placed_fields(block: Block) -> Iterator[tuple[Field, int, int]]:
     """Each named number that a block gives: field, row and place in the row."""
-    fields: Sequence[Field] = fields_of(block)
-    if block.name == "HYPERELASTIC":
-        for k, field in enumerate(fields):
-            i, j = divmod(k, ON_A_LINE)
-            if i < len(block.rows) and block.rows[i].text(j):
-                yield field, i, j
-        return
+    fields = fields_of(block)
     for i, row in enumerate(block.rows):
-        for j, field in enumerate(fields):
+        of_all = block.name == "HYPERELASTIC"
+        own = fields[ON_A_LINE * i : ON_A_LINE * (i + 1)] if of_all else fields
+        for j, field in enumerate(own):
             if row.text(j) and not field.name.startswith("_"):
                 yield field, i, j

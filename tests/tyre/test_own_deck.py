@@ -286,7 +286,8 @@ def test_laws_and_elements_in_either_units(tmp_path: Path) -> None:
 
 def numbers_of(flat: SolverDeck) -> list[list[float]]:
     """Numbers in the data lines of the materials, and the nodes' coordinates."""
-    lines = flat.lines[flat.lines.index("*MATERIAL, NAME=RUBBER") :]
+    texts = flat.text.splitlines()
+    lines = texts[texts.index("*MATERIAL, NAME=RUBBER") :]
     rows = [line.split(",") for line in lines if not line.startswith("*")]
     nodes = [x for point in flat.mesh.nodes.values() for x in point]
     return [[float(x) for row in rows for x in row], nodes]

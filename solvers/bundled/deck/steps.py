@@ -63,8 +63,8 @@ class Deck:
             steps.append(_steps(model, blocks, place > 0))
         if len(models) > 1:
             _check_transfer(models[0], steps[0], models[1])
-        revolve = models[1] if len(models) > 1 else []
-        return models[0], revolve, [step for part in steps for step in part]
+        section, revolve, *_ = *models, []
+        return section, revolve, [step for part in steps for step in part]
 
 
 def _steps(model: list[Block], blocks: list[list[Block]], revolved: bool) -> list[DeckStep]:

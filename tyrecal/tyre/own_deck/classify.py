@@ -34,14 +34,8 @@ def classify(blocks: Sequence[Block]) -> ClassifiedDeck:
     model, steps = split_steps(blocks)
     opened: list[str] = []  # *PART, *ASSEMBLY and *INSTANCE that have not ended
     over: Block | None = None  # the *MATERIAL or section that options may follow
-    for block in model:
+    for block in _acting(model, deck):
         name = block.name
-        if name in table.OUTPUT_KEYWORDS:
-            deck.passed.append(block)
-            continue
-        if name in table.CONTACT_KEYWORDS:
-            deck.contact.append(block)
-            continue
         check_honoured(block, "deck")
         rule = table.RULES[name]
         deck.model.append(block)
@@ -72,6 +66,14 @@ def classify(blocks: Sequence[Block]) -> ClassifiedDeck:
         )
     deck.later = [each[0] for each in steps[inflating + 1 :]]
     return deck
+
+
+def _acting(blocks: Sequence[Block], deck: ClassifiedDeck) -> list[Block]:
+    """The blocks that are neither output nor contact; those are noted."""
+    deck.passed += [block for block in blocks if block.name in table.OUTPUT_KEYWORDS]
+    deck.contact += [block for block in blocks if block.name in table.CONTACT_KEYWORDS]
+    noted = table.OUTPUT_KEYWORDS | table.CONTACT_KEYWORDS
+    return [block for block in blocks if block.name not in noted]
 
 
 def _last_that_raises_the_pressure(steps: Sequence[Sequence[Block]]) -> int | None:
@@ -106,16 +108,10 @@ def _pressures(loads: Sequence[Block]) -> dict[tuple[str, str], float] | None:
 
 def _step(step: list[Block], deck: ClassifiedDeck, is_inflation: bool) -> None:
     """A step up to the one that inflates: of those before it, what they hold stays held."""
-    kept = []
-    for block in step:
-        if block.name in table.OUTPUT_KEYWORDS:
-            deck.passed.append(block)
-        elif block.name in table.CONTACT_KEYWORDS:
-            deck.contact.append(block)
-        else:
-            if is_inflation or block.name != "STATIC":  # how earlier steps go is no matter
-                check_honoured(block, "deck step")
-            kept.append(block)
+    kept = _acting(step, deck)
+    for block in kept:
+        if is_inflation or block.name != "STATIC":  # how earlier steps go is no matter
+            check_honoured(block, "deck step")
     held = [block for block in kept if block.name == "BOUNDARY"]
     if new := [block for block in held if block.get("OP") == "NEW"]:
         if len(new) < len(held):

@@ -84,9 +84,8 @@ class Constraints:
             raise block.refused(f"REF NODE={name} is {len(reference)} nodes, one is needed")
         if not {"TIE NSET", "ELSET", "ANALYTICAL SURFACE"} & block.parameters.keys():
             raise block.refused("needs TIE NSET=, ELSET= or ANALYTICAL SURFACE=")
-        nodes, surfaces = dict[int, None](), list[str]()
-        if tied := block.get("TIE NSET"):
-            nodes |= dict.fromkeys(self.root.nodes.members(prefix + tied, block))
+        tied, surfaces = block.get("TIE NSET"), list[str]()
+        nodes = dict.fromkeys(self.root.nodes.members(prefix + tied, block) if tied else ())
         if elements := block.get("ELSET"):
             members = self.root.elements.members(prefix + elements, block)
             nodes |= dict.fromkeys(n for each in members for n in self.root.elements[each].nodes)
@@ -109,34 +108,28 @@ class Constraints:
             slaves = surface_nodes(self.made, prefix + row.name(0), block, row)
             name = prefix + row.name(1)
             surface = self.made.surfaces.get(name)
-            if surface and rigid_nodes(self.made, *surface):
-                self._seat(slaves, surface, block, row)
-                self.seats.add(name)
+            if not (surface and rigid_nodes(self.made, *surface)):
+                masters = surface_nodes(self.made, name, block, row)
+                for n, distance in self._merge(slaves, masters).items():
+                    raise block.refused(
+                        f"node {n} is {distance:.3g} from the nearest node that it could be tied"
+                        " to: only nodes in the same place are, mesh both alike",
+                        row,
+                    )
                 continue
-            masters = surface_nodes(self.made, name, block, row)
-            for n, distance in self._merge(slaves, masters).items():
-                raise block.refused(
-                    f"node {n} is {distance:.3g} from the nearest node that it could be tied to:"
-                    " only nodes in the same place are, mesh both alike",
-                    row,
-                )
-
-    def _seat(
-        self, slaves: Sequence[int], surface: tuple[Block, str], block: Block, row: Row
-    ) -> None:
-        """Nodes on the rim's elements, or as far from them as they may be without being moved."""
-        places = np.array([self.root.nodes[n] for n in slaves])
-        away, _ = nearest(places, rigid_pieces(self.made, *surface))
-        given = block.number("POSITION TOLERANCE") or 0.0
-        allowed = given if block.get("ADJUST") == "NO" else 0.0
-        for n, distance in zip(slaves, away, strict=True):
-            if distance > max(allowed, self.near):
-                raise block.refused(
-                    f"node {n} is {distance:.3g} from the rim: ABAQUS leaves it free, or moves"
-                    " it there; with ADJUST=NO and a POSITION TOLERANCE as large it is held",
-                    row,
-                )
-        self.rim |= dict.fromkeys(slaves)
+            places = np.array([self.root.nodes[n] for n in slaves])
+            away, _ = nearest(places, rigid_pieces(self.made, *surface))
+            given = block.number("POSITION TOLERANCE") or 0.0
+            allowed = given if block.get("ADJUST") == "NO" else 0.0
+            for n, distance in zip(slaves, away, strict=True):
+                if distance > max(allowed, self.near):
+                    raise block.refused(
+                        f"node {n} is {distance:.3g} from the rim: ABAQUS leaves it free, or moves"
+                        " it there; with ADJUST=NO and a POSITION TOLERANCE as large it is held",
+                        row,
+                    )
+            self.rim |= dict.fromkeys(slaves)
+            self.seats.add(name)
 
     def _embed(self, block: Block, prefix: str) -> None:
         """Plies on nodes of their own: those where the rubber has nodes are the rubber's."""

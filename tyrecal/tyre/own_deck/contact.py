@@ -7,7 +7,7 @@ A bead is held if at least half of its nodes at the rim are. Lengths are in the 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,13 +15,13 @@ import numpy as np
 from .assembly import Assembly
 from .classify import ClassifiedDeck
 from .constraints import Constraints
-from .scope import FARTHEST, nearest
+from .scope import FARTHEST, label_lines, nearest
 from .surfaces import boundary_of, rigid_pieces, surface_nodes
 from .text import Block, Row
 
 TOUCHING = 0.01  # of the section's size: a node that near to the rim touches it
 PUSHED = 0.1  # of the section's size: how far a rim pushes nodes of a bead that it is mounted on
-NODES_ON_A_LINE, MAX_NAMES = 12, 100
+MAX_NAMES = 100
 MAX_DISTANCES = 5_000_000  # nodes times segments of a pair
 Array = np.ndarray
 
@@ -80,7 +80,7 @@ class DeckContact:
                 if not bodies:
                     raise block.refused("contact of the rubber with itself is not honoured")
                 for name in bodies:
-                    yield self._pair(block, None, "all free surfaces", list(nodes), name)
+                    yield self._pair(block, None, "all free surfaces", nodes, name)
             for row in block.rows if block.name == "CONTACT PAIR" else ():
                 slave, master = row.name(0), row.name(1)
                 if not any(master in body.surfaces for body in self.tied.bodies):
@@ -89,12 +89,11 @@ class DeckContact:
                         " a rim, *SURFACE of TYPE=SEGMENTS or RAX2 elements in a *RIGID BODY",
                         row,
                     )
-                yield self._pair(
-                    block, row, slave, surface_nodes(self.made, slave, block, row), master
-                )
+                members = surface_nodes(self.made, slave, block, row)
+                yield self._pair(block, row, slave, members, master)
 
     def _pair(
-        self, block: Block, row: Row | None, slave: str, nodes: Sequence[int], master: str
+        self, block: Block, row: Row | None, slave: str, nodes: Iterable[int], master: str
     ) -> Pair:
         """A pair, the rigid surface where it is at the end of the step that inflates."""
         body = next(body for body in self.tied.bodies if master in body.surfaces)
@@ -156,16 +155,11 @@ class DeckContact:
         """The lines that hold nodes, and where they belong."""
         names = ("SEATED", *(f"SEATED_{k}" for k in range(2, MAX_NAMES)))
         name = next(each for each in names if each not in self.root.nodes.sets)
-        of_instances: dict[str, list[int]] = {}
-        known = self.made.instance_nodes
-        for n in nodes:
-            instance, number = known.get(n, ("", n))
-            of_instances.setdefault(instance, []).append(number)
-        lines = []
-        for instance, numbers in of_instances.items():
+        lines, known = list[str](), self.made.instance_nodes
+        own = [known.get(n, ("", n)) for n in nodes]
+        for instance in dict.fromkeys(each for each, _ in own):
             lines.append(f"*NSET, NSET={name}" + f", INSTANCE={instance}" * bool(instance))
-            for k in range(0, len(numbers), NODES_ON_A_LINE):
-                lines.append(", ".join(map(str, numbers[k : k + NODES_ON_A_LINE])))
+            lines += label_lines([n for each, n in own if each == instance])
         where = "before *END ASSEMBLY" if known else "before the first *STEP"
         steps = [block for block in self.blocks.inflation if block.name == "BOUNDARY"]
         blocks = (*(block for block, _ in self.made.of("BOUNDARY")), *steps)
@@ -174,5 +168,5 @@ class DeckContact:
         held = [head, f"{name}, ENCASTRE"]
         if known or released:
             place = "before *END STEP of the step that inflates" if released else "before *STEP"
-            return "\n".join((f"{where}:", *lines, f"and {place}:", *held))
+            held.insert(0, f"and {place}:")
         return "\n".join((f"{where}:", *lines, *held))

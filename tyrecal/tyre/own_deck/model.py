@@ -82,7 +82,7 @@ class _Builder:
         elements = {k: e for k, e in self.root.elements.items() if not e.is_rigid}
         used = {n for e in elements.values() for n in e.nodes}
         boundary = boundary_of(self.root)
-        self._check_areas(used)
+        self._check_areas()
         if not self.made.reflect:
             self._check_whole(boundary)
         cavity = self._on_solids(pressed, boundary)
@@ -163,7 +163,7 @@ class _Builder:
             for name, defined in self.root.nodes.sets.items()
         }
 
-    def _check_areas(self, used: set[int]) -> None:
+    def _check_areas(self) -> None:
         """No element folds over, and none is on or beyond the axle."""
         points = self.root.nodes
         for number, element in self.root.elements.items():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -118,6 +118,11 @@ class Scope:
         if len(set(nodes)) < len(nodes):
             raise block.refused(f"element {number} has a node twice", row)
         self.elements.add(number, Element(kind, nodes, block, row), block, row)
+
+
+def label_lines(numbers: Sequence[int]) -> list[str]:
+    """Data lines of numbers of nodes or elements."""
+    return [", ".join(map(str, numbers[k : k + 12])) for k in range(0, len(numbers), 12)]
 
 
 def mirror_of(block: Block) -> Callable[[Point], Point]:

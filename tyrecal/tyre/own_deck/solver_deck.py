@@ -12,7 +12,7 @@ import numpy as np
 from .classify import ClassifiedDeck
 from .model import Assigned, DeckModel
 from .numbers import written
-from .solver_mesh import DeckLines, SolverMesh, solver_mesh
+from .solver_mesh import Line, SolverMesh, solver_mesh
 from .text import Block, Place, Row, fields
 
 
@@ -32,11 +32,10 @@ class RebarPly:
 
 @dataclass(frozen=True, eq=False)
 class SolverDeck:
-    """The flat deck without its step; ``origins``: of each line."""
+    """The flat deck without its step."""
 
     mesh: SolverMesh
-    lines: tuple[str, ...]
-    origins: tuple[Place, ...]
+    lines: tuple[Line, ...]
     materials: tuple[str, ...]  # of the solid sections, by their place
     sections: tuple[str, ...]  # their sets, likewise
     plies: tuple[RebarPly, ...]
@@ -60,7 +59,7 @@ class SolverDeck:
     @property
     def text(self) -> str:
         """The lines."""
-        return "\n".join(self.lines)
+        return "\n".join(text for text, _ in self.lines)
 
 
 def translate(deck: ClassifiedDeck, model: DeckModel, length: float, mass: float) -> SolverDeck:
@@ -68,11 +67,10 @@ def translate(deck: ClassifiedDeck, model: DeckModel, length: float, mass: float
     OwnDeckError."""
     mesh = solver_mesh(model, length)
     write = _Writer(deck, mesh, length, mass)
-    rubbers, plies = [], list[RebarPly]()
+    plies = list[RebarPly]()
     for k, section in enumerate(model.solids, start=1):
         block = section.block
         name = write.used(block, block.need("MATERIAL"))
-        rubbers.append(block.get("MATERIAL"))
         controls = block.get("CONTROLS")
         more = f", CONTROLS={controls}" if controls else ""
         write.line(f"*SOLID SECTION, ELSET=SOLID_{k}, MATERIAL={name}{more}", block.place)
@@ -103,8 +101,7 @@ def translate(deck: ClassifiedDeck, model: DeckModel, length: float, mass: float
     return SolverDeck(
         mesh,
         (*mesh.lines, *write.lines),
-        (*mesh.origins, *write.origins),
-        tuple(rubbers),
+        tuple(section.block.get("MATERIAL") for section in model.solids),
         tuple(section.name for section in model.solids),
         tuple(plies),
         row.number(i) * mass / length,  # units of mass / (length s^2) to Pa
@@ -114,24 +111,26 @@ def translate(deck: ClassifiedDeck, model: DeckModel, length: float, mass: float
     )
 
 
-class _Writer(DeckLines):
+class _Writer:
     """Lines with numbers in SI units, and the materials that they use."""
 
     def __init__(self, deck: ClassifiedDeck, mesh: SolverMesh, length: float, mass: float):
-        super().__init__()
         self.deck, self.mesh, self.length, self.mass = deck, mesh, length, mass
+        self.lines = list[Line]()
         self.defined = _materials(deck)
         self.names: dict[str, str] = {}  # in the flat deck, of those that are used
 
-    def scale(self, unit: str) -> float:
-        """The factor to SI units on a field of a kind of unit."""
-        L, M = fields.DIMENSIONS.get(unit, (0, 0))
-        return self.length**L * self.mass**M
+    def line(self, text: str, place: Place) -> None:
+        """Add a line."""
+        self.lines.append((text, place))
 
     def block(self, block: Block, head: str, angular: bool = False) -> None:
-        """A keyword line, and the block's data."""
+        """A keyword line, and the block's data in SI units."""
         self.line(head, block.place)
-        scales = {(i, j): self.scale(field.unit) for field, i, j in fields.placed_fields(block)}
+        scales = {}
+        for field, i, j in fields.placed_fields(block):
+            L, M = fields.DIMENSIONS.get(field.unit, (0, 0))
+            scales[i, j] = self.length**L * self.mass**M
         for i, row in enumerate(block.rows):
             texts = list(row.fields)
             for j, text in enumerate(texts):
@@ -166,16 +165,13 @@ class _Writer(DeckLines):
         if option.name != "REBAR LAYER":
             raise option.refused(f"is not honoured of a *{section.block.name}")
         if not option.rows:
-            raise option.refused(
-                "needs a data line: name, area, spacing, position, material, angle"
-            )
+            raise option.refused("needs a line: name, area, spacing, position, material, angle")
         angular = option.get("GEOMETRY") == "ANGULAR"
         rows, layers = [], []
         for row in option.rows:
             flat_name = self.used(option, row.name(4))
             if row.number(3, 0.0):
-                words = "the position of a layer in its surface element must be 0"
-                raise option.refused(words, row)
+                raise option.refused("the position of a layer in its element must be 0", row)
             for j, what in ((1, "area"), (2, "spacing")):
                 if not row.number(j) > 0:
                     raise option.refused(f"the {what} must be positive", row)

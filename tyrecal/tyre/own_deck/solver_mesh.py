@@ -8,16 +8,17 @@ from 1. A face is (solid, name of the face such as S3, its nodes in order).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 
 from .model import DeckModel
 from .numbers import written
-from .scope import Point
+from .scope import Point, label_lines
 from .surfaces import Face
 from .text import Block, OwnDeckError, Place
 
 REFERENCE_NODE = 900001
+Line = tuple[str, Place]  # of the flat deck, and the place in the user's that it comes from
 OVER_THE_BELT = 0.94  # of the largest radius: nodes of the outer surface beyond are the crown's
 
 
@@ -38,26 +39,7 @@ class SolverMesh:
     around: tuple[int, ...]  # nodes of the whole boundary, closed, from the inner surface's first
     reference: Point  # (r, z) of the rim's reference node
     element_at: dict[int, int]  # number of an element in the user's deck to the flat one
-    lines: tuple[str, ...]  # of the flat deck: its model, without materials and steps
-    origins: tuple[Place, ...]  # file and line of the user's deck that each line comes from
-
-
-@dataclass
-class DeckLines:
-    """Lines of a solver's deck, and the places in the user's that they come from."""
-
-    lines: list[str] = field(default_factory=list)
-    origins: list[Place] = field(default_factory=list)
-
-    def line(self, text: str, place: Place) -> None:
-        """Add a line."""
-        self.lines.append(text)
-        self.origins.append(place)
-
-    def numbers(self, numbers: Sequence[int], place: Place) -> None:
-        """Add data lines of labels."""
-        for k in range(0, len(numbers), 12):
-            self.line(", ".join(map(str, numbers[k : k + 12])), place)
+    lines: tuple[Line, ...]  # of the flat deck: its model, without materials and steps
 
 
 def _tolerances(block: Block, length: float) -> str:
@@ -73,8 +55,9 @@ def solver_mesh(model: DeckModel, length: float) -> SolverMesh:
     """The mesh of a model whose unit of length is so many m, remembered. Raises OwnDeckError."""
     number = {n: k for k, n in enumerate(sorted(model.nodes), start=1)}
     nodes = {number[n]: (length * r, length * z) for n, (r, z) in sorted(model.nodes.items())}
-    write = DeckLines()
-    line = write.line
+    lines = list[Line]()
+    line = lambda text, place: lines.append((text, place))
+    labels = lambda numbers, place: lines.extend((text, place) for text in label_lines(numbers))
     start = model.solids[0].block.place
     line("*NODE, NSET=TYRE", start)
     for n, (r, z) in nodes.items():
@@ -111,21 +94,21 @@ def solver_mesh(model: DeckModel, length: float) -> SolverMesh:
         raise OwnDeckError(start, "no free surface of the rubber is left for the tread")
     outer, inner = _chain(tread, nodes), _chain(cavity, nodes)
     line("*NSET, NSET=RIM", start)
-    write.numbers(rim, start)
+    labels(rim, start)
     most = max(nodes[n][0] for n in outer)
     crown = tuple(n for n in outer if nodes[n][0] > OVER_THE_BELT * most)
     line("*NSET, NSET=CROWN", start)
-    write.numbers(crown, start)
+    labels(crown, start)
     for name, faces in (("CAVITY", cavity), ("TREAD", tread)):
         line(f"*SURFACE, NAME={name}, TYPE=ELEMENT", start)
         for n, face, _ in faces:
             line(f"{n}, {face}", start)
     for k, each in enumerate(model.embedded, start=1):
         line(f"*ELSET, ELSET=HOSTS_{k}", each.block.place)
-        write.numbers([element_at[n] for n in each.hosts], each.block.place)
+        labels([element_at[n] for n in each.hosts], each.block.place)
         for j, (row, own_lines) in enumerate(each.lines, start=1):
             line(f"*ELSET, ELSET=EMBEDDED_{k}_{j}", row.place)
-            write.numbers([element_at[n] for n in own_lines], row.place)
+            labels([element_at[n] for n in own_lines], row.place)
         line(f"*EMBEDDED ELEMENT, HOST ELSET=HOSTS_{k}{_tolerances(each.block, length)}", start)
         for j, (row, _) in enumerate(each.lines, start=1):
             line(f"EMBEDDED_{k}_{j}", row.place)
@@ -144,8 +127,7 @@ def solver_mesh(model: DeckModel, length: float) -> SolverMesh:
         tuple(_around(boundary, inner)),
         reference,
         element_at,
-        tuple(write.lines),
-        tuple(write.origins),
+        tuple(lines),
     )
 
 

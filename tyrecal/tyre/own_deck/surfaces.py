@@ -3,10 +3,12 @@ deck's unit of length."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from .assembly import Assembly
-from .scope import Element, Scope, along_arc, faces_of
+from .scope import Scope, along_arc, faces_of
 from .text import Block, Row
 
 PIECES_OF_ARC = 16  # straight pieces for a circular or parabolic arc
@@ -25,25 +27,18 @@ def surface_faces(made: Assembly, name: str, block: Block, row: Row | None = Non
     if surface.get("TYPE") in ("NODE", "SEGMENTS"):
         raise surface.refused("a surface of nodes or segments has no faces: use TYPE=ELEMENT")
     faces: list[Face] = []
-    for line in surface.rows:
-        face = line.name(1)
-        if any(line.fields[2:]):
-            raise surface.refused(f"data '{line.fields[2]}' is not honoured", line)
-        members = made.root.elements.members(prefix + line.name(0), surface, line)
-        free = set(boundary_of(made.root)) if not face else set()
-        for n in members:
-            element = made.root.elements[n]
-            if not element.is_solid:
-                if face not in ("SPOS", "SNEG"):
-                    raise surface.refused(f"element {n} has the faces SPOS and SNEG", line)
-                nodes = element.nodes if face == "SNEG" else element.nodes[::-1]
-                faces.append((n, face, nodes))
-                continue
-            own = dict(faces_of(element))
-            if face and face not in own:
-                raise surface.refused(f"element {n} has no face {face}", line)
-            some = [face] if face else [f for f in own if (n, f, own[f]) in free]
-            faces += [(n, f, own[f]) for f in some]
+    free = set(boundary_of(made.root))
+    for n, face, line in elements_of(made, surface, prefix):
+        element = made.root.elements[n]
+        if not element.is_solid:
+            if face not in ("SPOS", "SNEG"):
+                raise surface.refused(f"element {n} has the faces SPOS and SNEG", line)
+            faces.append((n, face, element.nodes[:: 1 if face == "SNEG" else -1]))
+            continue
+        own = [(n, *each) for each in faces_of(element)]
+        if face and face not in [name for _, name, _ in own]:
+            raise surface.refused(f"element {n} has no face {face}", line)
+        faces += [each for each in own if each[1] == face or (not face and each in free)]
     if not faces:
         raise surface.refused(f"the surface {name} has no faces")
     return faces
@@ -71,20 +66,20 @@ def surface_nodes(made: Assembly, name: str, block: Block, row: Row) -> list[int
     return nodes
 
 
-def elements_of(made: Assembly, surface: Block, prefix: str) -> list[tuple[Element, str]]:
-    """Elements of a surface of elements, each with the face that is named ("": none)."""
-    return [
-        (made.root.elements[n], row.name(1))
-        for row in surface.rows
-        for n in made.root.elements.members(prefix + row.name(0), surface, row)
-    ]
+def elements_of(made: Assembly, surface: Block, prefix: str) -> Iterator[tuple[int, str, Row]]:
+    """Elements of a surface of elements, each with the face that its line names ("": none)."""
+    for row in surface.rows:
+        if any(row.fields[2:]):
+            raise surface.refused(f"data '{row.fields[2]}' is not honoured", row)
+        for n in made.root.elements.members(prefix + row.name(0), surface, row):
+            yield n, row.name(1), row
 
 
 def rigid_nodes(made: Assembly, surface: Block, prefix: str) -> set[int]:
     """Nodes of a surface all elements of which are rigid lines (RAX2), none of another surface."""
     if surface.get("TYPE") in ("NODE", "SEGMENTS"):
         return set()
-    elements = [element for element, _ in elements_of(made, surface, prefix)]
+    elements = [made.root.elements[n] for n, *_ in elements_of(made, surface, prefix)]
     return {n for e in elements for n in e.nodes} if all(e.is_rigid for e in elements) else set()
 
 
@@ -93,11 +88,13 @@ def rigid_pieces(made: Assembly, surface: Block, prefix: str) -> np.ndarray:
     touching body on the left. Raises OwnDeckError."""
     if surface.get("TYPE") == "SEGMENTS":
         profile = _profile(surface) + np.array(made.shifts.get(prefix, (0.0, 0.0)))
-        pieces = np.stack([profile[:-1], profile[1:]], axis=1)
-        return pieces[(pieces[:, 0] != pieces[:, 1]).any(1)]
-    members = elements_of(made, surface, prefix)
-    ends_of = [e.nodes[::-1] if face == "SNEG" else e.nodes for e, face in members]
-    return np.array([[made.root.nodes[end] for end in ends] for ends in ends_of])
+        lines = np.stack([profile[:-1], profile[1:]], axis=1)
+        return lines[(lines[:, 0] != lines[:, 1]).any(1)]
+    pieces = []
+    for n, face, _ in elements_of(made, surface, prefix):
+        ends = made.root.elements[n].nodes[:: -1 if face == "SNEG" else 1]
+        pieces.append([made.root.nodes[end] for end in ends])
+    return np.array(pieces)
 
 
 def _profile(surface: Block) -> np.ndarray:

@@ -169,11 +169,11 @@ def trial(flat: SolverDeck) -> float:
     if isinstance(outcome, float):
         return outcome
     line, words = outcome
-    raise OwnDeckError(_origin(flat, line - 1) or flat.origins[0], words)
+    raise OwnDeckError(_origin(flat, line - 1) or flat.lines[0][1], words)
 
 
 def _origin(flat: SolverDeck, line: int) -> Place | None:
-    return flat.origins[line] if 0 <= line < len(flat.origins) else None
+    return flat.lines[line][1] if 0 <= line < len(flat.lines) else None
 
 
 @lru_cache(maxsize=8)
