@@ -74,7 +74,9 @@ def test_a_linear_model_has_its_normal_posterior(count: int, monkeypatch: Any) -
     assert np.linalg.norm(there.gradient) < 1e-3
     C = S - K @ J @ S
     scatter, used = problem.scatter * problem.reference, problem.scale > 0
-    np.testing.assert_allclose(problem.errors(there, scatter, used)[0], C, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(
+        problem.covariance_by(there, scatter, used)[0], C, rtol=1e-6, atol=1e-12
+    )
     # the same by what the fit answers to the data and to what was known before
     B = problem.response(there)[0] * problem.reference
     parts = B @ sigma @ B.T + problem.left_of_prior(there)
@@ -87,7 +89,7 @@ def test_a_state_left_out_is_its_rows_left_out(monkeypatch: Any) -> None:
     problem, J, sigma = problem_with(9, monkeypatch)
     there = problem.evaluate(problem.mean)
     keep = np.arange(9) < 4
-    C, _ = problem.errors(there, np.empty(0), keep)
+    C, _ = problem.covariance_by(there, np.empty(0), keep)
     S, own = np.diag(problem.spread**2), sigma[:4, :4]
     J = J[:4]
     expected = S - S @ J.T @ np.linalg.solve(J @ S @ J.T + own, J @ S)

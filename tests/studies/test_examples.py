@@ -28,7 +28,7 @@ ENTRIES = {  # what other rooms, studies from outside and Python users begin wit
     "variable": ["DesignVariable", "read_variables"],
     "labelling.tree": ["labelings"],
     "modes": ["run"],
-    "pressing_plan": ["PressingPlan"],
+    "run_plan": ["RunPlan"],
     "pressure": ["sweep"],
     "pressure_range": ["PressureRange"],
     "result": ["Column", "Table"],

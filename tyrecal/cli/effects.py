@@ -64,7 +64,7 @@ def command(
     from ..report.table import shown
     from ..simulate.evaluate.solver import installed
     from ..studies.effects import CatalogueEntry, run
-    from ..studies.pressing_plan import PlannedState, plan_evaluations
+    from ..studies.run_plan import PlannedState, plan_evaluations
     from ..tyre.effects import IDS, catalogue
     from ..tyre.number_units import EFFECT_PATH, unit_of
     from ..tyre.state import pressure_name

@@ -137,7 +137,7 @@ def command(
             f"solver '{name}' gives no sensitivities: --method gauss-newton needs about a third of"
             " its runs"
         )
-    plan = calibration.pressing_plan(method, starts, study.jobs)
+    plan = calibration.run_plan(method, starts, study.jobs)
     run = study.run(loaded, "fit", evaluator, plan=plan)
     with terminal.progress("fit") as bar, reached(scheduler) as evaluator.scheduler:
         unit = "sigma" if calibration.measured else objective_unit(loaded)

@@ -53,7 +53,7 @@ def command(
     """
     from ..report.shape_data import patches_data
     from ..studies.footprint import run
-    from ..studies.pressing_plan import PlannedState, plan_pressing
+    from ..studies.run_plan import PlannedState, plan_runs
 
     terminal = study.terminal
     case, fitted, study = default_case(case, fitted, study)
@@ -71,7 +71,7 @@ def command(
     if len(designs) == 1:
         options.say_idle(terminal, study.jobs, "one design is pressed alone; --fitted adds another")
     pressed_to = [PlannedState(len(loads_N))]
-    plan = plan_pressing(loaded, evaluator, pressed_to, len(designs), study.jobs)
+    plan = plan_runs(loaded, evaluator, pressed_to, len(designs), study.jobs)
     output = study.run(loaded, "footprint", evaluator, plan=plan, load_N=loads_N)
     with terminal.progress("footprint") as bar:
         evaluator.on_progress = bar.at

@@ -112,9 +112,9 @@ def command(
     tyrecal frf my.yaml --measured hammer.uff --to-Hz 250
     """
     from ..studies.measured_response import read_measured_responses
-    from ..studies.pressing_plan import PlannedState, plan_evaluations, plan_pressing
     from ..studies.response import FrfResult, default_points, response_request, rim_moves
     from ..studies.result import StudyInput
+    from ..studies.run_plan import PlannedState, plan_evaluations, plan_runs
 
     options.say_idle(study.terminal, study.jobs, "only one design is evaluated")
     if measured and "--step-Hz" in options.given():
@@ -135,7 +135,7 @@ def command(
     designs = {"fitted" if fitted else "initial": values}
     plan = plan_evaluations(loaded, evaluator, [values])
     if load:
-        plan = plan_pressing(loaded, evaluator, [PlannedState(1, modes=True)])
+        plan = plan_runs(loaded, evaluator, [PlannedState(1, modes=True)])
     files = [measured] if measured else []
     output = study.run(loaded, "frf", evaluator, measured=files, plan=plan, load_N=load)
     given = StudyInput(loaded, evaluator, designs)

@@ -313,7 +313,7 @@ def _place_sensors(
 ) -> int:
     """Place ``count`` sensors for the modes [c,0] and [c,1] of a case."""
     from ..measured.case_modes import evaluate_case_modes
-    from ..studies.pressing_plan import plan_evaluations
+    from ..studies.run_plan import plan_evaluations
     from ..studies.sensors import place
 
     loaded, values = study.load(case, assignments)
@@ -383,7 +383,7 @@ def label_file(
     from ..studies.fit.result import FitResult
     from ..studies.labelling.label import fitted_prior, label
     from ..studies.labelling.result import labels_result
-    from ..studies.pressing_plan import DESIGNS_OF_LABELS, PlannedState, plan_pressing
+    from ..studies.run_plan import DESIGNS_OF_LABELS, PlannedState, plan_runs
 
     loaded, values = study.load(case, assignments)
     if is_universal(file):
@@ -408,7 +408,7 @@ def label_file(
     states = {each.state.of(loaded) for each in readings if not each.load_N}
     slopes = PlannedState(sensitivities=len(values))
     designs = DESIGNS_OF_LABELS
-    plan = plan_pressing(loaded, evaluator, [slopes] * len(states), designs, study.jobs, True)
+    plan = plan_runs(loaded, evaluator, [slopes] * len(states), designs, study.jobs, True)
     run = study.run(loaded, "measured label", evaluator, "labels", measured=[file], plan=plan)
     labelled = label(
         loaded, evaluator, readings, prior, fixed=fixed, jobs=study.jobs, shapes=shapes

@@ -72,7 +72,7 @@ def command(
     """
     from ..report.shape_data import tyre_data
     from ..studies import modes as studies
-    from ..studies.pressing_plan import PlannedState, plan_evaluations, plan_pressing
+    from ..studies.run_plan import PlannedState, plan_evaluations, plan_runs
     from ..tyre.effects.edit import changed, with_part
 
     loads = requested_loads(load_N, sweep)
@@ -107,7 +107,7 @@ def command(
     plan = plan_evaluations(loaded, evaluator, [values])
     if loads:
         pressed_to = [PlannedState(sum(load > 0 for load in loads), modes=True)]
-        plan = plan_pressing(loaded, evaluator, pressed_to, len(designs), study.jobs)
+        plan = plan_runs(loaded, evaluator, pressed_to, len(designs), study.jobs)
     if sweep is not None:
         run = study.run(loaded, "modes", evaluator, "sweep-load", plan=plan, load_N=loads)
         draw = pictures is not False

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 
     from ..simulate.evaluate.evaluator import Evaluator
     from ..simulate.evaluate.failure import EvaluationFailed
-    from ..studies.pressing_plan import PressingPlan
     from ..studies.result import Result
+    from ..studies.run_plan import RunPlan
     from ..tyre.case import LoadedCase
     from .output import Run
 
@@ -301,7 +301,7 @@ class Study:
         evaluator: Evaluator,
         study: str = "",
         measured: Sequence[Path] = (),
-        plan: PressingPlan | None = None,
+        plan: RunPlan | None = None,
         **state: Any,
     ) -> Run:
         """The command's run, with the record behind ``evaluator``; ``study``: where it is not
@@ -309,7 +309,7 @@ class Study:
         default of one. A dry run ends here, before anything is written. Raises InputError,
         OSError."""
         from ..simulate.provenance import provenance
-        from ..studies.pressing_plan import plan_evaluations
+        from ..studies.run_plan import plan_evaluations
         from ..tyre.case import start_values
         from .output import Run
 

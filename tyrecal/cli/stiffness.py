@@ -47,8 +47,8 @@ def command(
     tyrecal stiffness cases/205_60r15.yaml --loads-N 4000 --pressure-kPa 200,220,240 --jobs 2
     tyrecal stiffness cases/p235_75r17.yaml --fitted p235_75r17 --dry-run
     """
-    from ..studies.pressing_plan import PlannedState, plan_pressing
     from ..studies.pressure_result import FITTED
+    from ..studies.run_plan import PlannedState, plan_runs
     from ..studies.stiffness import run
 
     terminal = study.terminal
@@ -73,7 +73,7 @@ def command(
     if fitted:
         designs[FITTED] = arguments.fitted_values(fitted, loaded, terminal)
     pressed_to = [PlannedState(len(loads_N), rim_stiffness=True) for _ in kPa]
-    plan = plan_pressing(loaded, evaluator, pressed_to, len(designs), study.jobs)
+    plan = plan_runs(loaded, evaluator, pressed_to, len(designs), study.jobs)
     state = {"load_N": loads_N, "pressure_kPa": kPa}
     output = study.run(loaded, "stiffness", evaluator, plan=plan, **state)
     with terminal.progress("stiffness") as bar:

@@ -52,8 +52,8 @@ def command(
     tyrecal sweep my.yaml C10=8e5:1.2e6 A_belt=2e-7:4e-7 --latin-hypercube 200 --seed 1
     """
     from ..simulate.evaluate.cluster import reached
-    from ..studies.pressing_plan import plan_evaluations
     from ..studies.result import StudyInput
+    from ..studies.run_plan import plan_evaluations
     from ..studies.sweep import DEFAULT_POINTS, grid, read_ranges, swept_state
     from ..studies.sweep_result import run
     from ..tyre.state import pressure_name

@@ -50,8 +50,8 @@ def command(
     from ..simulate.evaluate.cluster import reached
     from ..studies.fit.prediction import read_responses
     from ..studies.fit.targets import read_targets
-    from ..studies.pressing_plan import plan_evaluations
     from ..studies.pressure_result import FITTED, run
+    from ..studies.run_plan import plan_evaluations
     from ..tyre.state import pressure_name, rim_of
 
     terminal = study.terminal

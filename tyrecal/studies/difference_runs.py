@@ -10,7 +10,7 @@ from dataclasses import replace
 from time import monotonic
 
 from ..simulate.evaluate.evaluator import Evaluator, Question
-from .pressing_plan import time_in_words
+from .run_plan import time_in_words
 
 
 def runs_in_words(

@@ -33,7 +33,7 @@ from ..inference.uncertainties import Source, calibrated, sources
 from ..labelling.label import label
 from ..labelling.result import labels_posterior
 from ..labels import Labels
-from ..pressing_plan import PlannedState, PressingPlan
+from ..run_plan import PlannedState, RunPlan
 from ..variable import read_variables
 from .calibrated import calibrated_variables
 from .diagnosis import Diagnosis, diagnose
@@ -192,7 +192,7 @@ def study(
 
 def planned(
     case: LoadedCase, evaluator: Evaluator, measured: Path, effects: Sequence[str], jobs: int
-) -> PressingPlan:
+) -> RunPlan:
     """About how often the solver runs, before it does."""
     readings = in_states(case, readings_with_shapes(case, measured)[0])
     model = model_of(case, evaluator, readings, effects)

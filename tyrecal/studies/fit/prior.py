@@ -102,7 +102,7 @@ class PriorProblem(Problem):
         return at is not None and abs(point.x - at).max() < SAME_WEIGHTS
 
     def response(self, point: Point) -> tuple[Array, Array]:
-        C, seen = self.errors(point, self.scatter, self.scale > 0)
+        C, seen = self.covariance_by(point, self.scatter, self.scale > 0)
         weighted = np.linalg.solve(self.covariance, self._counted(point.plain)[1])
         return C @ weighted.T / self.reference, seen
 
@@ -112,7 +112,7 @@ class PriorProblem(Problem):
         unseen = (np.eye(len(seen)) - seen) * self.spread
         return np.asarray(unseen @ unseen.T)
 
-    def errors(self, point: Point, sigma: Array, used: Array) -> tuple[Array, Array]:
+    def covariance_by(self, point: Point, sigma: Array, used: Array) -> tuple[Array, Array]:
         """C (v, v) of the targets ``used`` alone, with all that is uncertain, and which variables
         (v,) they determine: all, by the prior."""
         keep = used[self.scale > 0]

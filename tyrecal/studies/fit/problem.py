@@ -180,7 +180,7 @@ class Problem:
         counts = self.scale > 0
         return fit_response(point.jacobian[counts], self.scale[counts])
 
-    def errors(self, point: Point, sigma: Array, used: Array) -> tuple[Array, Array]:
+    def covariance_by(self, point: Point, sigma: Array, used: Array) -> tuple[Array, Array]:
         """Covariance (v, v) of the coordinates by the scatter ``sigma`` of the targets of a mask
         ``used`` (targets,), as if only these were fitted; which variables they determine (v,)."""
         return fit_covariance(point.jacobian[used], self.scale[used], sigma[used])

@@ -65,7 +65,8 @@ def state_reports(problem: Problem, point: Point, known: FitUncertainty) -> list
         here = np.array([each == state for each in own])
         rest = counts & ~here
         errors = _named(
-            problem, standard_errors(problem, point, *problem.errors(point, known.sigma, rest))
+            problem,
+            standard_errors(problem, point, *problem.covariance_by(point, known.sigma, rest)),
         )
         mean = float(np.mean(off[counts & here] ** 2)) if (counts & here).any() else np.nan
         rms = float(np.sqrt(mean)) if np.isfinite(mean) else None

@@ -25,7 +25,7 @@ from ...tyre.values import with_values
 from ..correlation import correlate
 from ..labelling.label import label, labelled_shapes
 from ..labelling.result import labels_posterior
-from ..pressing_plan import DESIGNS_OF_FIT, PlannedState, PressingPlan, plan_pressing
+from ..run_plan import DESIGNS_OF_FIT, PlannedState, RunPlan, plan_runs
 from .calibrate import Fit, FitNotify, calibrate, check, history_csv
 from .free import with_freed, without_freed
 from .prior import PriorProblem
@@ -98,7 +98,7 @@ class FitStudy:
             one_state = exact and len(problem.labels) == 1 and len(on_road) <= 1
         return one_state and self.evaluator.has_gradients
 
-    def pressing_plan(self, method: str, starts: int, jobs: int) -> PressingPlan:
+    def run_plan(self, method: str, starts: int, jobs: int) -> RunPlan:
         """Size, runs and likely time of the designs of a fit, in all states."""
         free = [name for name in self._plain.case.variables if name not in self.fixed]
         if self.needs_labels:
@@ -120,7 +120,7 @@ class FitStudy:
         ]
         designs = DESIGNS_OF_FIT[method] * starts
         at_once = starts if starts > 1 else sum(1 + each.neighbours for each in planned)
-        return plan_pressing(self.case, self.evaluator, planned, designs, min(jobs, at_once), True)
+        return plan_runs(self.case, self.evaluator, planned, designs, min(jobs, at_once), True)
 
     def run(
         self,
@@ -136,7 +136,7 @@ class FitStudy:
         Frequencies without labels are fitted with the likeliest ones, which are found anew about
         the design that was fitted, until they are the same. Raises what `label` and `calibrate` do.
         """
-        plan = self.pressing_plan(method, starts, jobs)
+        plan = self.run_plan(method, starts, jobs)
         jobs = plan.at_once if plan.on_road else jobs  # as the memory allows
 
         def calibrated() -> Fit:

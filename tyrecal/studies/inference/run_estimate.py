@@ -13,7 +13,7 @@ from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase
 from ...tyre.number_units import EFFECT_PATH
-from ..pressing_plan import PlannedState, PressingPlan, plan_pressing
+from ..run_plan import PlannedState, RunPlan, plan_runs
 from .effect_ranges import effect_ranges
 from .model import Query
 from .observations import Observable
@@ -41,13 +41,13 @@ def model_of(
 
 def estimate(
     model: TyreModel, runs: int, jobs: int, pressed: Sequence[PlannedState] = ()
-) -> PressingPlan:
+) -> RunPlan:
     """The plan of about so many runs on no road, and of two tyres in the states ``pressed``."""
     numbers = 0 if not model.evaluator.has_gradients else len(model.variables)
     alone = PlannedState(sensitivities=numbers)
     states = [alone] * -(-runs // 2) if pressed else [alone]
     designs = 2 if pressed else runs
-    return plan_pressing(model.case, model.evaluator, [*states, *pressed], designs, jobs, True)
+    return plan_runs(model.case, model.evaluator, [*states, *pressed], designs, jobs, True)
 
 
 def selection_runs(model: TyreModel) -> int:

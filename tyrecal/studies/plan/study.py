@@ -17,7 +17,7 @@ from ..diagnose.next_measurement import STEP_HOURS
 from ..inference.expansion import first_points
 from ..inference.run_estimate import estimate
 from ..inference.separability import APART, GRID_POINTS, VISIBLE, smallest
-from ..pressing_plan import PressingPlan
+from ..run_plan import RunPlan
 from ..sensors import SensorsResult, place
 from ..variable import read_variables
 from .chance import NONE, shares
@@ -127,7 +127,7 @@ def planned(
     sensors: int | None,
     pressures_kPa: Sequence[float],
     jobs: int,
-) -> PressingPlan:
+) -> RunPlan:
     """About how often the solver runs for a plan, before it does. Raises InputError."""
     model = offer(case, evaluator, labels_of(case), pressures_kPa).model(case, evaluator, jobs)
     runs = model.runs(first_points(model, model.start))

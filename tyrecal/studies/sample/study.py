@@ -32,7 +32,7 @@ from ..inference.plain_fit import plain_fit
 from ..inference.run_estimate import estimate, model_of, selection_runs
 from ..inference.tyre_model import TyreModel
 from ..inference.uncertainties import Source, calibrated, sources
-from ..pressing_plan import PressingPlan
+from ..run_plan import RunPlan
 from ..variable import DesignVariable, read_variables
 from .box import Draws, grow_box
 from .chains import needs_emcee
@@ -193,7 +193,7 @@ def run(
 
 def planned(
     case: LoadedCase, evaluator: Evaluator, readings: Sequence[Measurement] | None, jobs: int
-) -> PressingPlan:
+) -> RunPlan:
     """About how often the solver runs, before it does."""
     case, _ = without_losses(case)
     rows = targets_as_readings(case, None) if readings is None else modal(readings)

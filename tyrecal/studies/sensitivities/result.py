@@ -16,8 +16,8 @@ from ...tyre.case import LoadedCase
 from ...tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ..inference.run_estimate import model_of, selection_runs
 from ..inference.section_fields import known_from
-from ..pressing_plan import PlannedState, PressingPlan, plan_evaluations, plan_pressing
 from ..result import Cell, Column, CsvRow, Result, ResultPart, StudyInput, Table, csv_text
+from ..run_plan import PlannedState, RunPlan, plan_evaluations, plan_runs
 from .deviations import deviations, measured_values
 from .selection import CHANCE, Candidates, likeliest_shifts, select_numbers
 from .table import FREQUENCY_KIND, Sensitivity, kinds_of, loads_of, sensitivities
@@ -219,14 +219,14 @@ def loads_on_road(
 
 def planned(
     given: StudyInput, names: Sequence[str], loads_N: Sequence[float], measured: Path | None
-) -> PressingPlan:
+) -> RunPlan:
     """How often the solver runs, before it does; about how often, where a file of measurements is
     fitted before numbers are selected."""
     case, evaluator, values = given.case, given.evaluator, [*given.designs.values()][-1]
     plan = plan_evaluations(case, evaluator, [values], len(names), given.jobs)
     if loads_N:
         road = PlannedState(len(loads_N), sensitivities=len(names))
-        pressed = plan_pressing(case, evaluator, [*plan.states, road], 1, given.jobs)
+        pressed = plan_runs(case, evaluator, [*plan.states, road], 1, given.jobs)
         plan = replace(pressed, starts=plan.starts)
     if not measured:
         return plan

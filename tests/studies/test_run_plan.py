@@ -10,19 +10,19 @@ import pytest
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
-from tyrecal.studies import pressing_plan
-from tyrecal.studies.pressing_plan import (
+from tyrecal.studies import run_plan
+from tyrecal.studies.run_plan import (
     FIRST_LOAD_S,
     FURTHER_DESIGN_S,
     PlannedState,
-    PressingPlan,
-    plan_pressing,
+    RunPlan,
+    plan_runs,
 )
 from tyrecal.tyre.load import load_case
 
 from ..cli.test_cli import CASE, run
 
-PLAN = PressingPlan(nodes=1000, places_round=17, designs=2, states=(PlannedState(8),))
+PLAN = RunPlan(nodes=1000, places_round=17, designs=2, states=(PlannedState(8),))
 
 
 def test_its_numbers_by_hand() -> None:
@@ -60,10 +60,10 @@ def test_no_more_run_side_by_side_than_the_memory_holds(monkeypatch: pytest.Monk
     case = load_case(CASE)
     evaluator = Evaluator(TyreDesign(case))
     states = [PlannedState(1), PlannedState(1)]
-    one = plan_pressing(case, evaluator, states, designs=3).memory_bytes or 0.0
+    one = plan_runs(case, evaluator, states, designs=3).memory_bytes or 0.0
     for available, at_once in ((2.5 * one, 2), (0.5 * one, 1), (None, 6)):
-        monkeypatch.setattr(pressing_plan, "available_memory_bytes", lambda a=available: a)
-        assert plan_pressing(case, evaluator, states, 3, at_once=8).at_once == at_once
+        monkeypatch.setattr(run_plan, "available_memory_bytes", lambda a=available: a)
+        assert plan_runs(case, evaluator, states, 3, at_once=8).at_once == at_once
 
 
 def test_its_words() -> None:

@@ -40,10 +40,10 @@ class PlannedState:
 
 
 @dataclass(frozen=True)
-class PressingPlan:
+class RunPlan:
     """Size of the problem, number of runs, likely time and memory, on the road and without one.
 
-    >>> plan = PressingPlan(nodes=100, places_round=17, designs=1, states=())
+    >>> plan = RunPlan(nodes=100, places_round=17, designs=1, states=())
     >>> plan.section_unknowns
     300
     """
@@ -170,18 +170,18 @@ def time_in_words(seconds: float) -> str:
     return f"{seconds:.2g} s"
 
 
-def plan_pressing(
+def plan_runs(
     case: LoadedCase,
     evaluator: Evaluator,
     states: Sequence[PlannedState],
     designs: int = 1,
     at_once: int = 1,
     is_estimate: bool = False,
-) -> PressingPlan:
+) -> RunPlan:
     """The plan of ``designs`` tyres of a case that are each pressed in ``states``; decks in three
     dimensions, which are not, have no nodes of a section. At most ``at_once`` run side by side, and
     no more than the memory holds. Raises what the section's mesh does."""
-    plan = PressingPlan(
+    plan = RunPlan(
         nodes=design_of(case).section_nodes,
         places_round=2 * len(case.case.road.element_angles_deg) + 1,
         designs=designs,
@@ -201,12 +201,12 @@ def plan_evaluations(
     designs: Sequence[Mapping[str, float]],
     sensitivities: int = 0,
     at_once: int = 1,
-) -> PressingPlan:
+) -> RunPlan:
     """The plan of designs on no road, each with so many sensitivities: of their differences, where
     the solver gives none. The case's own design is evaluated first where others start from it."""
     exact = evaluator.has_gradients
     state = PlannedState(0, False, *((sensitivities, 0) if exact else (0, sensitivities)))
-    plan = plan_pressing(case, evaluator, [state], len(designs), at_once)
+    plan = plan_runs(case, evaluator, [state], len(designs), at_once)
     if evaluator.design.nominal is None or "start" not in evaluator.solver.capabilities:
         return plan
     # without the sensitivities of a design its run answers for the start, too
