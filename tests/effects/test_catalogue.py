@@ -17,7 +17,6 @@ from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
-from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.inference.effect_ranges import effect_ranges
 from tyrecal.tyre import effects
 from tyrecal.tyre.case import CaseError
@@ -27,6 +26,7 @@ from tyrecal.tyre.resolve import resolved
 from tyrecal.tyre.templates import TemplateFailed
 from tyrecal.tyre.values import with_values
 
+from ..calibrated import calibrate
 from ..conftest import ROOT
 from .support import CASE, CASES, START, coarse, data, decks, frequencies, slopes
 

@@ -18,13 +18,14 @@ from tyrecal.simulate.evaluate.executor import Here
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.results import Evaluation
 from tyrecal.studies.fit import calibrate as calibrate_module
-from tyrecal.studies.fit.calibrate import METHODS, calibrate
+from tyrecal.studies.fit.calibrate import METHODS
 from tyrecal.studies.fit.problem import objective
 from tyrecal.studies.fit.targets import Target
 from tyrecal.tyre.case import with_level
 from tyrecal.tyre.case.schema import Targets
 from tyrecal.tyre.load import load_case
 
+from ..calibrated import calibrate
 from ..conftest import CASES
 from .fake import LABELS, FakeEvaluator
 from .known_truth import CASE, POWERS, START, TARGETS, TRUTH, evaluator, with_targets

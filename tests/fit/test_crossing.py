@@ -8,12 +8,12 @@ from scipy.optimize import differential_evolution
 
 from tyrecal.simulate.evaluate.evaluator import Question
 from tyrecal.simulate.evaluate.results import Evaluation, HarmonicShape, RawMode
-from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.crossing import crossing, gap, order, pair_clarity
 from tyrecal.studies.fit.problem import Problem
 from tyrecal.studies.fit.search import AT_CROSSING
 from tyrecal.tyre.state import AS_THE_CASE
 
+from ..calibrated import calibrate
 from .fake import LABELS, POINTS, FakeEvaluator, shape
 from .known_truth import CASE, START, evaluator
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
-from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.differences import differences
 from tyrecal.studies.fit.problem import Problem
 from tyrecal.studies.variable import DesignVariable
 
+from ..calibrated import calibrate
 from .known_truth import CASE, START, START_X, evaluator
 
 

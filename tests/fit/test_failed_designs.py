@@ -11,8 +11,8 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.simulate.evaluate.results import Evaluation
-from tyrecal.studies.fit.calibrate import calibrate
 
+from ..calibrated import calibrate
 from .known_truth import CASE, START, TRUTH, evaluator
 
 

@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tyrecal.studies.fit.calibrate import calibrate, history_csv
+from tyrecal.studies.fit.calibrate import history_csv
 from tyrecal.studies.fit.problem import Problem
 from tyrecal.studies.fit.result import StartReport, fit_result
 
+from ..calibrated import calibrate
 from .fake import LABELS, FakeEvaluator
 from .known_truth import CASE, POWERS, START, START_X, TARGETS, TRUTH, evaluator
 

@@ -13,11 +13,11 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.simulate.modes.label import Label, paired_labels
-from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.problem import Problem, objective
 from tyrecal.studies.fit.targets import Target, objective_unit
 from tyrecal.studies.footprint import footprint_result, press
 
+from ..calibrated import calibrate
 from .pressed import (
     AREA,
     AREA_0,

@@ -13,7 +13,7 @@ import pytest
 from tyrecal.errors import InputError
 from tyrecal.measured.load import load_case
 from tyrecal.simulate.evaluate.evaluator import Question
-from tyrecal.studies.fit.calibrate import Fit, calibrate
+from tyrecal.studies.fit.calibrate import Fit
 from tyrecal.studies.fit.free import with_freed, without_freed
 from tyrecal.studies.fit.freed import freed_variables
 from tyrecal.studies.fit.result import FitResult
@@ -24,6 +24,7 @@ from tyrecal.tyre.case.identity import tyre_sha256
 from tyrecal.tyre.case.schema import TargetMode, Targets, Uncertainty
 from tyrecal.tyre.values import with_values
 
+from ..calibrated import calibrate
 from ..conftest import CASES
 from .fake import LABELS, FakeEvaluator
 

@@ -14,11 +14,11 @@ from tyrecal.report.html.comparison import _deviations
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.studies.diagnose.under_load import LoadedRow
-from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.problem import Problem
 from tyrecal.tyre.case.schema import TargetFootprint
 from tyrecal.tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 
+from ..calibrated import calibrate
 from . import pressed
 from .pressed import CASE, LENGTH, START, STIFFNESS_0, WIDTH, Elastic, case_with, evaluator, power
 

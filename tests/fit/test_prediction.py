@@ -12,7 +12,6 @@ from scipy.stats import norm
 from tyrecal.files import json_text
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
-from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.prediction import prediction_variance, read_responses
 from tyrecal.studies.pressure import PressureFindings
 from tyrecal.studies.pressure_result import PressureRow, PressureSweep, run
@@ -20,6 +19,7 @@ from tyrecal.studies.result import ModeEntry
 from tyrecal.tyre.case import start_values
 from tyrecal.tyre.case.schema import Uncertainty
 
+from ..calibrated import calibrate
 from ..chance import Chance
 from .test_total_error import ANGLE, coarse
 

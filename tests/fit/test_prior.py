@@ -16,7 +16,6 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import DeckRefused
 from tyrecal.studies.fit import model_errors
-from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.free import with_freed
 from tyrecal.studies.fit.freed import freed_variables
 from tyrecal.studies.fit.prior import PriorProblem
@@ -24,6 +23,7 @@ from tyrecal.studies.fit.uncertainty import uncertainty
 from tyrecal.studies.variable import read_variable
 from tyrecal.tyre.case.schema import TargetMode
 
+from ..calibrated import calibrate
 from ..chance import generator
 from ..conftest import CASES
 from .test_total_error import coarse

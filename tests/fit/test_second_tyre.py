@@ -10,10 +10,11 @@ import pytest
 from tyrecal.measured.tables import read_measurements
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
-from tyrecal.studies.fit.calibrate import Fit, calibrate
+from tyrecal.studies.fit.calibrate import Fit
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.load import load_case
 
+from ..calibrated import calibrate
 from ..conftest import CASES
 
 SET_B = {"axial": 41.47, "torsional": 67.73, "[1,1]": 53.46, "[1,0]": 76.63}  # Hz, other tyre

@@ -19,7 +19,7 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.results import Evaluation
 from tyrecal.simulate.modes.find import find_modes
-from tyrecal.studies.fit.calibrate import calibrate, check
+from tyrecal.studies.fit.calibrate import check
 from tyrecal.studies.fit.crossing import AXIAL, TORSIONAL, crossing, order, pair_clarity
 from tyrecal.studies.fit.problem import Problem
 from tyrecal.studies.fit.targets import target_labels
@@ -28,6 +28,7 @@ from tyrecal.tyre.case.schema import TargetMass, TargetMode, Targets, Variable
 from tyrecal.tyre.state import AS_THE_CASE, TyreState
 from tyrecal.tyre.values import with_values
 
+from ..calibrated import calibrate
 from . import pressed
 from .tyre_in_states import (
     CASE,

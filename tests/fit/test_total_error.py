@@ -9,7 +9,6 @@ import tyrecal
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.modes.find import LabelledModes, find_modes
-from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.problem import Problem
 from tyrecal.studies.fit.road import press
 from tyrecal.studies.fit.road_errors import road_changes
@@ -23,6 +22,7 @@ from tyrecal.tyre.case.schema import Uncertainty
 from tyrecal.tyre.effects.edit import changed, with_part
 from tyrecal.tyre.state import TyreState
 
+from ..calibrated import calibrate
 from ..conftest import CASES
 from .known_truth import CASE, evaluator
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.problem import Point, Problem
 from tyrecal.studies.fit.uncertainty import uncertainty
 from tyrecal.studies.variable import DesignVariable
 
+from ..calibrated import calibrate
 from ..chance import Chance, generator
 from .known_truth import CASE, POWERS, evaluator, with_targets
 

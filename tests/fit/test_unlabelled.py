@@ -17,7 +17,6 @@ from tyrecal.measured.measurement import Measurement, measurements_csv
 from tyrecal.measured.tables import read_measurements
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.problem import Problem
 from tyrecal.studies.fit.study import FitStudy
 from tyrecal.studies.labelling.expansion import ModesNearDesign, Prior, find_labels
@@ -40,6 +39,7 @@ from tyrecal.studies.labelling.tree import (
 from tyrecal.studies.labels import FOREIGN_WORDS
 from tyrecal.tyre.state import TyreState
 
+from ..calibrated import calibrate
 from ..chance import generator
 from .tyre_in_states import CASE, TRUTH, TyreInStates, case_with, measured
 

@@ -12,13 +12,14 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Question
 from tyrecal.simulate.evaluate.failure import DeckRefused
 from tyrecal.simulate.evaluate.results import Evaluation
-from tyrecal.studies.fit.calibrate import Fit, calibrate
+from tyrecal.studies.fit.calibrate import Fit
 from tyrecal.studies.fit.problem import Point, Problem
 from tyrecal.tyre.case import LoadedCase, start_values, with_level
 from tyrecal.tyre.case.schema import TargetMass, TargetMode, Targets
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.state import TyreState
 
+from ..calibrated import calibrate
 from ..chance import generator
 from ..conftest import CASES
 from .fake import LABELS, FakeEvaluator

@@ -19,13 +19,13 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.results import Evaluation
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.result import FitResult
 from tyrecal.studies.fit.targets import read_damping_targets
 from tyrecal.studies.result import StudyInput
 from tyrecal.tyre.case import start_values
 from tyrecal.tyre.case.schema import TargetMode, Targets
 
+from ..calibrated import calibrate
 from ..fit.fake import LABELS, FakeEvaluator
 
 CASE_FILE = Path(__file__).parents[2] / "cases" / "p235_75r17.yaml"

@@ -31,7 +31,6 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.modes.find import LabelledModes, find_modes
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.prediction import FitResponses, predicted_errors
 from tyrecal.studies.fit.result import FitResult
 from tyrecal.studies.inference.covariance import by_laws
@@ -46,6 +45,7 @@ from tyrecal.tyre.load import load_case
 from tyrecal.tyre.number_units import EFFECT_PATH
 from tyrecal.tyre.values import with_values
 
+from ..calibrated import calibrate
 from ..conftest import CASES
 from .wrinkles import by_size
 

@@ -20,13 +20,13 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.store import Store
 from tyrecal.simulate.modes.label import paired_labels
-from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.footprint import footprint_row
 from tyrecal.tyre.case import LoadedCase, start_values
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.resolve import resolved
 from tyrecal.tyre.values import with_values
 
+from ..calibrated import calibrate
 from ..conftest import CASES
 
 TRUTH = {"A_belt": 2.6e-7, "A_carcass": 2.5e-7, "C10": 7.0e5}

@@ -21,13 +21,14 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.modes.find import LabelledModes, find_modes
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.case.schema import Rubber, Solid
 from tyrecal.tyre.effects.edit import changed
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.state import TyreState
 from tyrecal.tyre.values import set_values
+
+from ..calibrated import calibrate
 
 CASE = load_case(CASES / "205_60r15.yaml")
 MEASURED = read_measurements(CASES / "205_60r15_vervoort.csv", labelled=False)

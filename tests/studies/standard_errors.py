@@ -33,13 +33,13 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.studies.diagnose import study as diagnosis
 from tyrecal.studies.diagnose.calibrated import calibrated_variables
-from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.problem import Point, Problem
 from tyrecal.studies.fit.total_error import TotalError, total_error
 from tyrecal.studies.fit.uncertainty import uncertainty
 from tyrecal.studies.sample.study import run as sample
 from tyrecal.tyre.case import LoadedCase
 
+from ..calibrated import calibrate
 from .fit_errors import QUANTILE_90, SIZES, case_of, drawn
 from .slips import table_of
 

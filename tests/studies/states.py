@@ -50,7 +50,6 @@ from tyrecal.simulate.evaluate.results import Evaluation, RawMode
 from tyrecal.simulate.modes.find import LabelledModes, find_modes
 from tyrecal.studies.emulator import Emulator, emulator, spread, up_to
 from tyrecal.studies.fit import problem as problem_module
-from tyrecal.studies.fit.calibrate import calibrate
 from tyrecal.studies.fit.problem import Problem
 from tyrecal.studies.fit.targets import target_labels
 from tyrecal.studies.fit.uncertainty import uncertainty
@@ -61,6 +60,8 @@ from tyrecal.tyre.case.schema import TargetFootprint, TargetMode, Targets
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.state import AS_THE_CASE, TyreState
 from tyrecal.tyre.values import set_values
+
+from ..calibrated import calibrate
 
 Array = np.ndarray
 Hertz = Mapping[TyreState, Sequence[float]]  # of `LABELS`

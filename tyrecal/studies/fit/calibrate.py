@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,10 +10,9 @@ import numpy as np
 from ...errors import InputError
 from ...files import Json
 from ...measured.measurement import Measurement
-from ...simulate.evaluate.evaluator import Counts, Evaluator
+from ...simulate.evaluate.evaluator import Counts
 from ...simulate.evaluate.executor import executor, in_order
 from ...simulate.evaluate.failure import EvaluationFailed
-from ...tyre.case import LoadedCase
 from ...tyre.case.schema import cannot_fit
 from ...tyre.state import pressure_name
 from ..far_off import far_off
@@ -22,11 +21,9 @@ from ..result import csv_text
 from . import gauss_newton, slsqp
 from .judge import measured_rows
 from .model_errors import needs_model_errors
-from .prior import PriorProblem
-from .problem import FitNotify, Point, Problem
+from .problem import Point, Problem
 from .result import FitResult, StartReport, fit_result
 from .search import AT_CROSSING, CONVERGED, Descend, is_converged, minimise
-from .targets import read_targets
 from .verdict import FIT_VERDICT_WORDS
 
 Array = np.ndarray
@@ -65,40 +62,29 @@ class Fit(Notebook):
 
 
 def calibrate(
-    case: LoadedCase,
-    evaluator: Evaluator,
+    problem: Problem,
     method: str = "slsqp",
-    fixed: Mapping[str, float] | None = None,
     starts: int = 1,
     seed: int = 0,
-    jobs: int = 1,
-    notify: FitNotify | None = None,
     finished: Callable[[int, int], None] = lambda done, starts: None,
     readings: Sequence[Measurement] = (),
-    prior: bool = False,
 ) -> Fit:
-    """Fit the case's free variables to its targets.
+    """Fit the problem's variables to its targets.
 
-    fixed: values of variables that are held. starts: the case's own start and ``starts - 1`` drawn
-    uniformly within the bounds, in the variables' coordinates; drawn starts that cannot be
-    evaluated are counted and replaced. jobs: processes for the drawn starts, and for the neighbours
-    of a point of the first one if the solver gives no sensitivities. notify is called for every
-    design of this process, finished for every start. readings: lines of the file that the targets
-    are from. prior: knowledge of the variables and of the model's errors that enters the fit
-    (`PriorProblem`). Raises what `check` does; EvaluationFailed if the case's own start cannot be
-    evaluated; InputError if a target is far off it.
+    starts: the case's own start and ``starts - 1`` drawn uniformly within the bounds, in the
+    variables' coordinates; drawn starts that cannot be evaluated are counted and replaced, and
+    ``problem.jobs`` of them run at a time. finished: called for every start. readings: lines of the
+    file that the targets are from. Raises what `check` does; EvaluationFailed if the case's own
+    start cannot be evaluated; InputError if a target is far off it.
 
-    >>> fixed = {"A_belt": 2.6e-7, "A_carcass": 6.9e-8}
-    >>> fit = calibrate(case, evaluator, method="gauss-newton", fixed=fixed)
+    >>> problem = Problem(case, evaluator, fixed={"A_belt": 2.6e-7, "A_carcass": 6.9e-8})
+    >>> fit = calibrate(problem, method="gauss-newton")
     >>> f"{fit.initial.objective:.1f} to {fit.fitted.objective:.1f} Hz"
     '17.4 to 3.7 Hz'
     """
-    kind = PriorProblem if prior else Problem
-    problem = kind(case, evaluator, fixed, notify, jobs)
     check(problem)
-    if prior:
-        noise = noise_Hz(case, evaluator, fixed, jobs)
-        problem = PriorProblem(case, evaluator, fixed, notify, jobs, noise)
+    if problem.spread is not None:
+        problem.noise_Hz = noise_Hz(problem)
     initial = problem.evaluate(problem.start())
     if not np.isfinite(initial.objective):
         raise InputError("the targets' weights and standard deviations leave no finite objective")
@@ -106,7 +92,7 @@ def calibrate(
     reports = [_run(problem, problem.start(), method)]
     replaced = 0
     if starts > 1:
-        more, replaced = _more_starts(problem, starts - 1, seed, jobs, method, finished)
+        more, replaced = _more_starts(problem, starts - 1, seed, method, finished)
         reports += more
     history = _joined([r.history for r in reports])
     result = fit_result(problem, initial, reports, history, replaced, method, readings)
@@ -114,18 +100,17 @@ def calibrate(
     return Fit(result, history, initial, fitted)
 
 
-def noise_Hz(
-    case: LoadedCase, evaluator: Evaluator, fixed: Mapping[str, float] | None = None, jobs: int = 1
-) -> float | None:
-    """Standard deviation, Hz, that a fit leaves to targets without one; None where all have one.
+def noise_Hz(problem: Problem) -> float | None:
+    """Standard deviation, Hz, that a fit without a prior leaves to targets without one; None where
+    all have one.
 
     Raises InputError where too few targets are left over to tell.
     """
-    if all(target.sigma for target in read_targets(case) if target.weight):
+    if all(target.sigma for target in problem.targets if target.weight):
         return None
-    problem, noise = Problem(case, evaluator, fixed), None
-    if not cannot_fit([t.weight for t in problem.measured], len(problem.variables)):
-        noise = calibrate(case, evaluator, fixed=fixed, jobs=jobs).found.noise_Hz
+    plain, noise = Problem(problem.case, problem.evaluator, problem.fixed, jobs=problem.jobs), None
+    if not cannot_fit([t.weight for t in plain.measured], len(plain.variables)):
+        noise = calibrate(plain).found.noise_Hz
     if noise is None:
         raise InputError(
             "the targets have no sigma_Hz, and are too few to estimate it from the residuals:"
@@ -200,12 +185,7 @@ def _tolerance(problem: Problem) -> float:
 
 
 def _more_starts(
-    problem: Problem,
-    count: int,
-    seed: int,
-    jobs: int,
-    method: str,
-    finished: Callable[[int, int], None],
+    problem: Problem, count: int, seed: int, method: str, finished: Callable[[int, int], None]
 ) -> tuple[list[StartReport], int]:
     """Searches from ``count`` random starts, and how many starts without a solution were
     replaced."""
@@ -217,7 +197,7 @@ def _more_starts(
         drawn = [
             generator.uniform(problem.lower, problem.upper) for _ in range(count - len(reports))
         ]
-        for answer in _run_all(problem, drawn, jobs, method):
+        for answer in _run_all(problem, drawn, method):
             if isinstance(answer, EvaluationFailed):
                 replaced += 1
             else:
@@ -232,15 +212,15 @@ def _more_starts(
 
 
 def _run_all(
-    problem: Problem, starts: list[Array], jobs: int, method: str
+    problem: Problem, starts: list[Array], method: str
 ) -> Iterator[StartReport | EvaluationFailed]:
     """Answers in the order of the starts; ``jobs`` at a time, or by the evaluator's scheduler."""
-    if jobs <= 1 and not problem.evaluator.scheduler:
+    if problem.jobs <= 1 and not problem.evaluator.scheduler:
         yield from (_start_here(problem, x, method) for x in starts)
         return
     evaluator = problem.evaluator.worker()
     tasks = [(problem.again(evaluator), x, method) for x in starts]
-    with executor(jobs, problem.evaluator.scheduler) as workers:
+    with executor(problem.jobs, problem.evaluator.scheduler) as workers:
         for answer in in_order(workers.each(_start_alone, tasks)):
             if isinstance(answer, EvaluationFailed):  # its process died
                 raise answer

@@ -55,22 +55,24 @@ class PriorProblem(Problem):
         fixed: Mapping[str, float] | None = None,
         notify: FitNotify | None = None,
         jobs: int = 1,
-        noise_Hz: float | None = None,
     ):
         super().__init__(case, evaluator, fixed, notify, jobs)
-        self.noise_Hz = noise_Hz
         knowledge = np.array([each.quantity == KNOWLEDGE for each in self.measured])
         self.scale = np.where(knowledge, 0.0, self.scale)  # it is in the spread
         counted = self.counted
         self.reference = np.array([each.value for each in counted])
-        sigma = np.array([each.sigma or noise_Hz or np.nan for each in counted])
-        weights = np.array([each.weight for each in counted])
-        self.scatter = sigma / self.reference / np.sqrt(weights)
         self.mean = self.start()
         self.spread: Array = np.array([v.spread for v in self.variables])
         self.weighed_at: Array | None = None
         self.model: ModelErrors | None = None  # at that design
         self.covariance = self.root = np.empty((0, 0))  # Sigma (n, n), and L^-1 with L L^T = Sigma
+
+    @property
+    def scatter(self) -> Array:
+        """Relative standard deviations (n,) of the targets that count, over sqrt(w)."""
+        counted = self.counted
+        sigma = np.array([each.sigma or self.noise_Hz or np.nan for each in counted])
+        return np.asarray(sigma / self.reference / np.sqrt([each.weight for each in counted]))
 
     def weigh(self, point: Point) -> None:
         """Take Sigma of the design ``point``."""
@@ -78,13 +80,6 @@ class PriorProblem(Problem):
         self.covariance = self.model.covariance(self.scatter)
         self.root = np.linalg.inv(np.linalg.cholesky(self.covariance))
         self.weighed_at = point.x
-
-    def again(self, evaluator: Evaluator, notify: FitNotify | None = None) -> PriorProblem:
-        """The same problem, with the same Sigma, on another evaluator."""
-        other = PriorProblem(self.case, evaluator, self.fixed, notify, noise_Hz=self.noise_Hz)
-        other.weighed_at, other.model = self.weighed_at, self.model
-        other.covariance, other.root = self.covariance, self.root
-        return other
 
     def evaluate(self, x: Array) -> PriorPoint:
         plain = super().evaluate(x)

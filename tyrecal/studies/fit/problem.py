@@ -17,7 +17,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -163,9 +165,13 @@ class Problem:
         """Targets that have a weight."""
         return [each for each, scale in zip(self.measured, self.scale, strict=True) if scale > 0]
 
-    def again(self, evaluator: Evaluator, notify: FitNotify | None = None) -> Problem:
-        """The same problem without any design, evaluated by another evaluator."""
-        return Problem(self.case, evaluator, self.fixed, notify)
+    def again(self, evaluator: Evaluator, notify: FitNotify | None = None) -> Self:
+        """The same problem, with its weights, without any design, evaluated by another
+        evaluator."""
+        other = copy(self)
+        other.evaluator, other.notify, other.jobs = evaluator, notify, 1
+        other.points, other.best = {}, None
+        return other
 
     def is_settled(self, point: Point) -> bool:
         """Whether the weights hold at ``point``: here they are the same everywhere."""

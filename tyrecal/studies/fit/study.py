@@ -26,10 +26,10 @@ from ..correlation import correlate
 from ..labelling.label import label, labelled_shapes
 from ..labelling.result import labels_posterior
 from ..run_plan import DESIGNS_OF_FIT, PlannedState, RunPlan, plan_runs
-from .calibrate import Fit, FitNotify, calibrate, check, history_csv
+from .calibrate import Fit, calibrate, check, history_csv
 from .free import with_freed, without_freed
 from .prior import PriorProblem
-from .problem import Problem
+from .problem import FitNotify, Problem
 from .targets import states_of
 
 MAX_FITS = 5  # to frequencies without labels
@@ -69,7 +69,7 @@ class FitStudy:
         self.case, self.left_out = self._plain, list[str]()
         if not self.needs_labels:
             self._set_targets(self.readings)
-            check(self._problem)
+            check(self._problem())
 
     def _set_targets(self, readings: Sequence[Measurement]) -> None:
         """Targets of the case, or ``readings`` of the measured file that have labels. Raises
@@ -81,10 +81,9 @@ class FitStudy:
             self.case, self.left_out = in_set_state(self._plain, self.fixed)
         self.evaluator.design = design_of(self.case)
 
-    @property
-    def _problem(self) -> Problem:
+    def _problem(self, notify: FitNotify | None = None, jobs: int = 1) -> Problem:
         kind = PriorProblem if self.prior else Problem
-        return kind(self.case, self.evaluator, self.fixed)
+        return kind(self.case, self.evaluator, self.fixed, notify, jobs)
 
     @property
     def evaluates_one_by_one(self) -> bool:
@@ -92,7 +91,7 @@ class FitStudy:
         if self.needs_labels:
             one_state = len({each.state.of(self._plain) for each in self.readings}) == 1
         else:
-            problem = self._problem
+            problem = self._problem()
             exact = problem.exact_on_road == len(problem.road)
             on_road = {each.state.unloaded for each in problem.road}
             one_state = exact and len(problem.labels) == 1 and len(on_road) <= 1
@@ -107,7 +106,7 @@ class FitStudy:
             states = {each.state.of(self._plain) for each in self.readings if not each.load_N}
             exact = False
         else:
-            problem = self._problem
+            problem = self._problem()
             places = {(each.state, bool(each.member)) for each in problem.road}
             states = {*problem.labels}
             exact = problem.exact_on_road > 0
@@ -140,19 +139,8 @@ class FitStudy:
         jobs = plan.at_once if plan.on_road else jobs  # as the memory allows
 
         def calibrated() -> Fit:
-            return calibrate(
-                self.case,
-                self.evaluator,
-                method,
-                self.fixed,
-                starts,
-                seed,
-                jobs,
-                notify,
-                finished,
-                self.used,
-                self.prior,
-            )
+            problem = self._problem(notify, jobs)
+            return calibrate(problem, method, starts, seed, finished, self.used)
 
         fit = self._fit_with_labels(calibrated, jobs) if self.needs_labels else calibrated()
         self._compare_shapes(fit)

@@ -22,6 +22,7 @@ from ...tyre.values import set_values
 from ..difference_runs import runs_in_words
 from ..emulator import Emulator, emulator
 from ..fit.calibrate import noise_Hz
+from ..fit.problem import Problem
 from ..fit.targets import is_loss_factor, read_targets, rims_of
 from ..inference.check_units import check_units
 from ..inference.covariance import covariance
@@ -94,7 +95,7 @@ def run(
     check(case, readings)
     case, left_out = without_losses(case)
     stage(SAMPLE_STAGES[0])
-    noise = None if readings is not None else noise_Hz(case, evaluator)
+    noise = None if readings is not None else noise_Hz(Problem(case, evaluator))
     if readings is None:
         readings = targets_as_readings(case, noise)
     observations = observe(modal(readings), split=Assumed().split)
