@@ -12,6 +12,7 @@ import numpy as np
 
 from ..evaluate.evaluator import Evaluator, Question
 from ..evaluate.failure import DeckRefused, EvaluationFailed
+from ..evaluate.neighbours import neighbours
 from ..evaluate.results import Evaluation
 from .label import Label, Mode, paired_labels
 from .match import margin, match
@@ -73,38 +74,37 @@ def _with_rates(
 
     step: a share of the value, of a linear variable or an effect of its range (`decks.steps`)."""
     designs = {place: each for place, each in answers.items() if isinstance(each, LabelledModes)}
-    pending = {
+    sides = {
         (place, name): evaluator.design.steps(name, questions[place].values[name], step)
         for place in designs
         for name in questions[place].gradients
     }
-    rates: dict[int, tuple[dict[str, Array], dict[str, float]]] = {p: ({}, {}) for p in designs}
-    while pending:
-        keys = list(pending)
-        values = [pending[key].pop(0) for key in keys]
-        neighbours = [
+
+    def ask(values: Mapping[tuple[int, str], float]) -> list[ModesAnswer]:
+        keys = list(values)
+        near = [
             replace(questions[place], values={**questions[place].values, name: value}, gradients=())
-            for (place, name), value in zip(keys, values, strict=True)
+            for (place, name), value in values.items()
         ]
-        of_neighbour: Wanted = lambda i, modes, keys=keys: _labels(wanted, keys[i][0], modes)  # type: ignore[misc]
-        for i, other in _find(evaluator, neighbours, of_neighbour, jobs):
-            place, name = keys[i]
-            centre, width = designs[place], values[i] - questions[place].values[name]
-            if isinstance(other, LabelledModes):
-                hertz = {mode.label: mode.frequency_Hz for mode in other.modes}
-                # Hz per unit at each mode's `position`; the rest of it is not read
-                rate = np.full(len(centre.evaluation.modes), np.nan)
-                for mode in centre.modes:
-                    rise = hertz.get(mode.label, np.nan) - mode.frequency_Hz
-                    rate[mode.position] = rise / width
-                rates[place][0][name] = rate
-                rise = other.evaluation.mass_kg - centre.evaluation.mass_kg
-                rates[place][1][name] = rise / width
-            elif pending[keys[i]] and not getattr(other, "denied", False):
-                continue  # on the other side; without a licence that would fail, too
-            else:
-                answers[place] = other
-            del pending[keys[i]]
+        of_neighbour: Wanted = lambda i, modes: _labels(wanted, keys[i][0], modes)
+        known = dict(_find(evaluator, near, of_neighbour, jobs))
+        return [known[i] for i in range(len(keys))]
+
+    rates: dict[int, tuple[dict[str, Array], dict[str, float]]] = {p: ({}, {}) for p in designs}
+    for (place, name), (value, other) in neighbours(sides, ask).items():
+        if not isinstance(other, LabelledModes):
+            answers[place] = other
+            continue
+        centre, width = designs[place], value - questions[place].values[name]
+        hertz = {mode.label: mode.frequency_Hz for mode in other.modes}
+        # Hz per unit at each mode's `position`; the rest of it is not read
+        rate = np.full(len(centre.evaluation.modes), np.nan)
+        for mode in centre.modes:
+            rise = hertz.get(mode.label, np.nan) - mode.frequency_Hz
+            rate[mode.position] = rise / width
+        rates[place][0][name] = rate
+        rise = other.evaluation.mass_kg - centre.evaluation.mass_kg
+        rates[place][1][name] = rise / width
     for place, (of_modes, of_mass) in rates.items():
         answer = answers[place]
         if isinstance(answer, LabelledModes):

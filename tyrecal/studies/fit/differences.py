@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
 from ...simulate.evaluate.failure import EvaluationFailed
+from ...simulate.evaluate.neighbours import neighbours
 from ..variable import DesignVariable
 
 Array = np.ndarray
@@ -28,36 +29,31 @@ def differences(
     One neighbour a variable: above, or below where that lies beyond the bound or has no solution.
     Raises EvaluationFailed where neither has one, or the design itself has none.
     """
-    columns: dict[int, Array] = {}
-    failures: dict[int, EvaluationFailed] = {}
-    sides = [_sides(v, values[v.name], step) for v in variables]
-    for side in (0, 1):
-        pending = [i for i, steps in enumerate(sides) if i not in columns and side < len(steps)]
-        if not pending:
-            break
-        designs = [
-            {**values, v.name: v.value(v.scaled(values[v.name]) + sides[i][side])}
-            for i, v in enumerate(variables)
-            if i in pending
-        ]
+    sides = {i: _sides(v, values[v.name], step) for i, v in enumerate(variables)}
+
+    def around(steps: Mapping[int, float]) -> Iterator[Array | EvaluationFailed]:
+        nonlocal centre
+        moved = [(variables[i], step) for i, step in steps.items()]
+        designs = [{**values, v.name: v.value(v.scaled(values[v.name]) + s)} for v, s in moved]
         answers = iter(ask(designs if centre is not None else [values, *designs]))
         if centre is None:
             first = next(answers)
             if isinstance(first, EvaluationFailed):
                 raise first
             centre = first
-        for i, answer in zip(pending, answers, strict=True):
-            if isinstance(answer, EvaluationFailed):
-                if answer.denied:
-                    raise answer
-                failures[i] = answer
-                continue
-            columns[i] = (answer - centre) / sides[i][side]
-    for i in range(len(variables)):
-        if i not in columns:
-            raise failures[i]
-    assert centre is not None  # a variable has room on one side at least
-    return centre, np.array([columns[i] for i in range(len(variables))]).T
+        for answer in answers:
+            if isinstance(answer, EvaluationFailed) and answer.denied:
+                raise answer
+            yield answer
+
+    known, columns = neighbours(sides, around), []
+    assert centre is not None
+    for i in sides:
+        step, answer = known[i]
+        if isinstance(answer, EvaluationFailed):
+            raise answer
+        columns.append((answer - centre) / step)
+    return centre, np.array(columns).T
 
 
 def _sides(variable: DesignVariable, value: float, step: float) -> list[float]:
