@@ -213,9 +213,40 @@ def test_what_lacks_a_key_or_is_replaced_is_left_out(tmp_path: Path) -> None:
     assert "[DEFLECTION_LOAD_CURVE] replaces it" in notes[0]
 
 
+def test_stiffness_of_a_curve_of_load_over_deflection(tmp_path: Path) -> None:
+    """The slope at the loads that the curve reaches, in the file's units, in place of
+    VERTICAL_STIFFNESS; d = F / k (1 - F / F0) is a cubic spline's own."""
+    k, F0 = 2e5, 4e4
+    loads = [0.0, 1000.0, 2500.0, 4000.0, 5000.0]
+    rows = "".join(f"{1e3 * F / k * (1 - F / F0):.9f}  {F} $ row\n" for F in loads)
+    text = PUBLIC.replace("'meter'", "'mm'").replace("= 0.3135", "= 313.5")
+    text += "[DEFLECTION_LOAD_CURVE]\n{pen   fz}\n" + rows + "[BOTTOMING_CURVE]\n{pen fz}\n0 0\n"
+    measured, _ = property_measurements(written(tmp_path, text.replace("= 220000", "= 0.22")))
+    slopes = {row.load_N: row.value for row in measured if row.quantity.startswith("vertical")}
+    assert slopes == pytest.approx({F: k / (1 - 2 * F / F0) for F in (2000.0, 4000.0)}, rel=1e-6)
+
+
+def test_a_word_in_place_of_a_number_is_as_if_the_key_were_absent(tmp_path: Path) -> None:
+    """A program wrote the unit of mass as its number; Q_RE0 is 0 where the radius was not fitted,
+    and no measurement needs it."""
+    text = PUBLIC.replace("MASS = 9.3", "MASS = kg").replace("Q_RE0 = 0.9974", "Q_RE0 = 0")
+    rows, _ = property_measurements(written(tmp_path, text))
+    assert len(rows) == 13 and "mass_kg" not in {row.quantity for row in rows}
+    rows, notes = property_measurements(
+        written(tmp_path, PUBLIC.replace("FNOMIN = 4000", "FNOMIN = none"))
+    )
+    assert len(rows) == 5 and "VERTICAL_STIFFNESS: left out, as it needs FNOMIN too" in notes[0]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
+        (
+            "[CONTACT_PATCH]",
+            "[DEFLECTION_LOAD_CURVE]\n0 0\n0.01 2000\n0.02 1900\n0.03 4000\n[CONTACT_PATCH]",
+            r"\[DEFLECTION_LOAD_CURVE\] must have 4 rows or more, rising in both columns",
+        ),
+        ("[CONTACT_PATCH]", "[DEFLECTION_LOAD_CURVE]\n0 0 1\n1 2\n", r"rows of two numbers"),
         ("Q_FZ2 = 15.4", "Q_FZ2 = 1.5.4", r"tyre.tir, line 31: Q_FZ2 is '1.5.4', must be a number"),
         ("Q_FZ2 = 15.4", "Q_FZ2 = 154", r"Q_FZ2 is 154, must be at most 67.49"),
         ("FNOMIN = 4000", "FNOMIN = 0", r"tyre.tir, line 28: FNOMIN is 0, must be greater than 0"),

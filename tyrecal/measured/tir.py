@@ -2,19 +2,23 @@
 
     [SECTION]
     KEY = value      $ comment (or !)
-    {pen fz}         a table; its rows are not read
+    {pen fz}         a table
 
-The files of programs differ: keys come in any order and case, some twice, vendors add sections of
-their own units. A key counts in its own section, in the units of [UNITS].
+The files of programs differ: keys come in any order and case, some twice, some with a word in place
+of a number, vendors add sections of their own units. A key counts in its own section, in the units
+of [UNITS]. Of the tables [DEFLECTION_LOAD_CURVE] is read, which replaces VERTICAL_STIFFNESS.
 """
 
 from __future__ import annotations
 
 import re
 from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite, nan, pi
 from pathlib import Path
+
+import numpy as np
 
 from ..errors import InputError
 from ..files import read_bytes
@@ -89,8 +93,10 @@ ON_ROAD = {  # a key, and the measured quantity that it and others give over the
     "Q_A1": ("contact_length_m", MFSwift.patch_length),
     "Q_RB1": ("contact_width_m", MFSwift.patch_width),
 }
-ABOVE_ZERO = ("UNLOADED_RADIUS", "WIDTH", "FNOMIN", "VERTICAL_STIFFNESS", "Q_RE0")
+ABOVE_ZERO = ("UNLOADED_RADIUS", "WIDTH", "FNOMIN", "VERTICAL_STIFFNESS")
 OTHER_STIFFNESSES = ("LONGITUDINAL_STIFFNESS", "LATERAL_STIFFNESS", "YAW_STIFFNESS")
+CURVE = "DEFLECTION_LOAD_CURVE"
+MIN_OF_CURVE = 4  # rows of a cubic spline
 KEY_AND_VALUE = re.compile(r"(\w+)\s*=\s*('[^']*'|\"[^\"]*\"|[^$!]*)")
 
 
@@ -104,6 +110,7 @@ class PropertyFile:
     is_SI: bool = True  # whether its units are those of SI
     # lines of each section as they are, by its name in capitals, without the section's own line
     sections: dict[str, list[str]] = field(default_factory=dict)
+    curve: np.ndarray | None = None  # (n, 2) deflection, m, and load, N, rising
 
     def place(self, key: str) -> str:
         """File, line and name of a key, for messages."""
@@ -111,8 +118,8 @@ class PropertyFile:
 
 
 def read_property_file(path: Path) -> PropertyFile:
-    """Raises InputError for a number that is none, a unit that is not known, and a key with two
-    values; OSError."""
+    """Raises InputError for a number that is none, a unit that is not known, a key with two values,
+    and a curve that does not rise; OSError."""
     sections: dict[str, list[str]] = {}
     units: dict[str, str] = {}
     texts: defaultdict[str, list[tuple[str, str, int]]] = defaultdict(list)
@@ -139,11 +146,10 @@ def read_property_file(path: Path) -> PropertyFile:
     keys, lines = dict[str, float](), dict[str, int]()
     for key, entries in texts.items():
         own, dimension = SECTION_OF[key]
-        entries = [each for each in entries if each[0] == own] or [
-            each for each in entries if each[1][:1] in "+-.0123456789"
-        ]
-        if not entries:
-            continue  # a word in another section, as a unit of mass
+        # a word without a digit is a unit, or stands for what was not measured
+        entries = [each for each in entries if re.search(r"\d", each[1])]
+        if not (entries := [each for each in entries if each[0] == own] or entries):
+            continue
         values = [_number(path, key, text, line) for _, text, line in entries]
         if len(set(values)) > 1:
             raise InputError(
@@ -154,7 +160,25 @@ def read_property_file(path: Path) -> PropertyFile:
         for sign, unit in re.findall(r"(^|[*/])([A-Z]+)", dimension):
             keys[key] *= factors.get(unit, 1.0) ** (-1 if sign == "/" else 1)
         lines[key] = entries[0][2]
-    return PropertyFile(path, MFSwift(keys), lines, {*factors.values()} == {1.0}, sections)
+    curve = _curve(path, sections.get(CURVE, ()), factors)
+    return PropertyFile(path, MFSwift(keys), lines, {*factors.values()} == {1.0}, sections, curve)
+
+
+def _curve(path: Path, lines: Sequence[str], factors: Mapping[str, float]) -> np.ndarray | None:
+    """Deflection, m, and load, N, of the rows of a table; None where it has none."""
+    rows = [re.split(r"[$!]", line)[0].split() for line in lines]
+    rows = [row for row in rows if row and re.match(r"[-+.\d]", row[0])]
+    if not rows:
+        return None
+    try:
+        curve = np.array(rows, float) * [factors.get(key, 1.0) for key in ("LENGTH", "FORCE")]
+    except ValueError:
+        raise InputError(f"{path}: [{CURVE}] must have rows of two numbers") from None
+    if len(curve) < MIN_OF_CURVE or (np.diff(curve, axis=0) <= 0).any():
+        raise InputError(
+            f"{path}: [{CURVE}] must have {MIN_OF_CURVE} rows or more, rising in both columns"
+        )
+    return curve
 
 
 def _unit(path: Path, name: str, text: str) -> float:
@@ -182,8 +206,9 @@ def property_measurements(
     """Measurements of a tyre property file, and notes on what is in it besides.
 
     Frequencies with damping ratios, and the mass; vertical stiffness, length and width of the patch
-    at half, once and one and a half times FNOMIN. All at NOMPRES (INFLPRES in old versions), or at
-    ``pressure_kPa`` where the file states none. Raises InputError; OSError.
+    at half, once and one and a half times FNOMIN, the stiffness of a curve as far as it goes. All
+    at NOMPRES (INFLPRES in old versions), or at ``pressure_kPa`` where the file states none. Raises
+    InputError; OSError.
     """
     file = read_property_file(path)
     keys, notes = dict(file.model.keys), list[str]()
@@ -194,8 +219,8 @@ def property_measurements(
                 " those of a tyre"
             )
             keys = {key: value for key, value in keys.items() if key not in template}
-    if "DEFLECTION_LOAD_CURVE" in file.sections and keys.pop("VERTICAL_STIFFNESS", 0):
-        notes.append(f"{path}: left out VERTICAL_STIFFNESS: [DEFLECTION_LOAD_CURVE] replaces it")
+    if CURVE in file.sections and keys.pop("VERTICAL_STIFFNESS", 0):
+        notes.append(f"{path}: left out VERTICAL_STIFFNESS: [{CURVE}] replaces it")
     for key in (each for each in ABOVE_ZERO if not keys.get(each, 1.0) > 0):
         raise InputError(f"{file.place(key)} is {keys[key]:g}, must be greater than 0")
     for key in (each.replace("FREQ", "DAMP") for each in FREQUENCY_LABELS):
@@ -204,6 +229,7 @@ def property_measurements(
     pressure = _pressure(file, pressure_kPa)
 
     def measured(key: str, quantity: str, value: float, load: float = 0.0) -> Measurement:
+        place = file.place(key) if key in file.lines else f"{path}, [{key}]"
         damping = keys.get(key.replace("FREQ", "DAMP")) if key in FREQUENCY_LABELS else None
         return Measurement(
             quantity,
@@ -213,7 +239,7 @@ def property_measurements(
             load,
             value,
             run=f"{path}",
-            place=file.place(key),
+            place=place,
             damping_ratio=damping or nan,
         )
 
@@ -228,6 +254,18 @@ def property_measurements(
                 break
             except ValueError as error:
                 raise InputError(f"{path}: {error}") from None
+    if "FNOMIN" not in keys:
+        left = [file.place(key) for key in ON_ROAD if key in keys]
+        notes += [f"{place}: left out, as it needs FNOMIN too" for place in left]
+    elif file.curve is not None:
+        from scipy.interpolate import CubicSpline  # slow to import
+
+        deflections, forces = file.curve.T
+        compliance = CubicSpline(forces, deflections).derivative()
+        for load in (share * keys["FNOMIN"] for share in SHARES_OF_NOMINAL):
+            if forces[0] <= load <= forces[-1]:
+                stiffness = 1 / float(compliance(load))
+                rows.append(measured(CURVE, "vertical_stiffness_N_per_m", stiffness, load))
     if "MASS" in keys:
         rows.append(measured("MASS", "mass_kg", keys["MASS"]))
     if not rows:
