@@ -154,9 +154,9 @@ def _data(block: Block, rule: KeywordRule, names: _Names) -> Iterator[Finding]:
     if block.parameters.get("OP") == "NEW":  # which takes all that there were away
         least = 0
     if not least <= len(block.rows) <= most:
-        bounds = f"{least}" if least == most else f"{least} to {most}" if most < 9 else f"{least}"
-        few = "at least " if len(block.rows) < least and most > 9 else ""
-        yield Finding(block, None, f"has {len(block.rows)} data lines, {few}{bounds} must be")
+        bounds = f"{least}" if least == most else f"{least} to {most}" if most < 9 else ""
+        bounds = bounds or f"at least {least}"
+        yield Finding(block, None, f"has {len(block.rows)} data lines, {bounds} must be")
     if block.name == "ELEMENT":
         yield from _elements(block, names)
     if block.name == "NODE":

@@ -6,6 +6,8 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..language.text import number_from
+
 _HEADER = re.compile(r"E I G E N V A L U E\s+O U T P U T")
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?"
 _ROW = re.compile(rf"^\s*(\d+)((?:\s+{_NUMBER}){{5}})\s*$")
@@ -29,7 +31,8 @@ def read_dat(path: Path) -> DatTable:
     headers = list(_HEADER.finditer(text))
     masses = _MASS.findall(text)
     return DatTable(
-        _rows(text[headers[-1].end() :]) if headers else {}, _number(masses[-1]) if masses else None
+        _rows(text[headers[-1].end() :]) if headers else {},
+        number_from(masses[-1]) if masses else None,
     )
 
 
@@ -39,11 +42,7 @@ def _rows(text: str) -> dict[int, float]:
     for line in text.splitlines():
         row = _ROW.match(line)
         if row and int(row[1]) == len(by_number) + 1:
-            by_number[int(row[1])] = _number(row[2].split()[2])
+            by_number[int(row[1])] = number_from(row[2].split()[2])
         elif by_number and line.strip():  # the next table, of participation factors
             break
     return by_number
-
-
-def _number(text: str) -> float:
-    return float(text.upper().replace("D", "E"))

@@ -111,8 +111,7 @@ class CalculiX:
         """Results as plain data, shapes on the section at Theta = 0. Raises RunFailed."""
         if own := own_decks.load(folder):
             return _of_own_decks(folder, own)
-        modes = []
-        jobs = _jobs(folder)
+        modes, jobs = [], _jobs(folder)
         if not jobs:
             raise RunFailed("no_results", "there are no decks in the folder")
         sectors = int(_find(r"\*CYCLIC SYMMETRY MODEL, *N=(\d+)", folder / SECTOR))
@@ -199,15 +198,12 @@ def _shapes(fields: Fields, count: int, n: int, sectors: int, job: str) -> list[
 
     At Theta = 0, x, y, z are r, theta, z. CalculiX normalises to one sector's mass.
     """
-    by_mode: dict[int, dict[str, Array]] = {}
-    for mode, name, values in fields.blocks:
-        by_mode.setdefault(mode, {})[name] = values
-    wanted = range(1, 2 * count, 2)
-    if any(set(by_mode.get(mode, ())) != {"DISP", "DISPI"} for mode in wanted):
-        raise RunFailed("no_results", f"{job}.frd lacks shapes of modes")
+    parts = {(mode, name): values for mode, name, values in fields.blocks}
     shapes = []
-    for mode in wanted:
-        shape = by_mode[mode]["DISP"] + 1j * by_mode[mode]["DISPI"]
+    for mode in range(1, 2 * count, 2):
+        if not {(mode, "DISP"), (mode, "DISPI")} <= parts.keys():
+            raise RunFailed("no_results", f"{job}.frd lacks shapes of modes")
+        shape = parts[mode, "DISP"] + 1j * parts[mode, "DISPI"]
         largest = shape.ravel()[abs(shape).argmax()]
         if not abs(largest) > 0:
             raise RunFailed("no_results", f"{job}.frd: the shape of mode {mode} is no shape")

@@ -34,10 +34,11 @@ def read_eigenvalues(path: Path, diameter: int | None, expected: int | None) -> 
     Raises RunFailed: ``no_results`` unless there are as many as asked, ``unstable`` where one is
     not positive.
     """
-    text = _text(path)
     which = "" if diameter is None else f" +{diameter}"
     row = re.compile(rf"^{which} +(\d+)((?: +\S+){{4}}) *$", re.M)
-    rows = [(int(m[1]), _number(m[2].split()[0], path)) for m in row.finditer(_table(text))]
+    last = _text(path).rpartition("E I G E N V A L U E   O U T P U T")[2]
+    table = last.partition("P A R T I C I P A T I O N")[0]
+    rows = [(int(m[1]), _number(m[2].split()[0], path)) for m in row.finditer(table)]
     count = len(rows) if expected is None else expected
     if not rows or [number for number, _ in rows] != list(range(1, count + 1)):
         raise RunFailed("no_results", f"{path.name} has {len(rows)} of {expected or 'any'} modes")
@@ -49,12 +50,6 @@ def read_eigenvalues(path: Path, diameter: int | None, expected: int | None) -> 
             "unstable", f"{path.name}: an eigenvalue is {values.min():g}: the state is unstable"
         )
     return values
-
-
-def _table(text: str) -> str:
-    """The last table of eigenvalues in a .dat file."""
-    table = text.rpartition("E I G E N V A L U E   O U T P U T")[2]
-    return table.partition("P A R T I C I P A T I O N")[0]
 
 
 def read_mass(path: Path, elements: str = "EVERYTHING") -> float:
@@ -100,25 +95,22 @@ def read_fields(path: Path, static: bool = True) -> Fields:
         elif line.startswith(" -4"):
             name = line.split()[1]
         elif line.startswith(" -1") and name:
-            kept.append((int(line[3:13]), _columns(line, path)))
+            numbers = [_number(line[i : i + 12], path) for i in (13, 25, 37)]
+            kept.append((int(line[3:13]), numbers))
         elif line.startswith(" -3"):
             if name == "nodes":
                 nodes = dict(kept)
             elif name.startswith("DISP") and (mode or static):
                 blocks.append((mode, name, dict(kept)))
             name, kept = "", []
-    numbers = [n for n in nodes if blocks and n in blocks[0][2]]
-    if not numbers or any(list(block) != numbers for _, _, block in blocks):
+    labels = [n for n in nodes if blocks and n in blocks[0][2]]
+    if not labels or any(list(block) != labels for _, _, block in blocks):
         raise RunFailed("no_results", f"{path.name}: nodes are missing")
     return Fields(
-        np.array(numbers),
-        np.array([nodes[n] for n in numbers]),
+        np.array(labels),
+        np.array([nodes[n] for n in labels]),
         [(mode, name, np.array(list(block.values()))) for mode, name, block in blocks],
     )
-
-
-def _columns(line: str, path: Path) -> list[float]:
-    return [_number(line[i : i + 12], path) for i in (13, 25, 37)]
 
 
 def _number(text: str, path: Path) -> float:

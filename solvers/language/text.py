@@ -19,6 +19,7 @@ from .spelling import full_keyword, full_parameters, named
 Number = TypeVar("Number", int, float)
 MAX_DECK_BYTES = 100_000_000  # of a deck and all that it includes
 MAX_KEYWORDS = 20_000  # of a deck and all that it includes; tyres have hundreds
+MAX_LABEL = 999_999_999  # number of a node or element, by the manual
 MAX_CHARACTERS = 4096  # with those that continue it; ABAQUS reads 256 of each
 DEEPEST_INCLUDE = 5  # files that include others
 COMPLEX_STEP = 1e-30  # so small that its square vanishes against every real part
@@ -52,9 +53,6 @@ class DeckError(Refused):
 WHOLE_DECK = Place("deck", 0)
 
 
-MAX_LABEL = 999_999_999  # number of a node or element, by the manual
-
-
 def _plain(text: str) -> str:
     """The text of a number. Raises ValueError for digits that Python reads and ABAQUS does not."""
     if "_" in text or not text.isascii():
@@ -64,7 +62,7 @@ def _plain(text: str) -> str:
 
 def number_from(text: str) -> float:
     """The number that a field states, its exponent with E or D. Raises ValueError."""
-    return float(_plain(text).replace("D", "E").replace("d", "e"))
+    return float(_plain(text).upper().replace("D", "E"))
 
 
 def is_label(text: str) -> bool:
@@ -325,8 +323,7 @@ def seed(blocks: Sequence[Block], tangents: Sequence[tuple[int, int, float]]) ->
         by_line.setdefault(line, {})[index] = value
     result = []
     for block in blocks:
-        first, last = (block.rows[i].place.line for i in (0, -1)) if block.rows else (1, 0)
-        if any(first <= line <= last for line in by_line):
+        if by_line.keys() & {row.place.line for row in block.rows}:
             rows = [replace(row, tangents=by_line.pop(row.place.line, None)) for row in block.rows]
             for row in rows:
                 if row.tangents and max(row.tangents) >= len(row.fields):

@@ -157,17 +157,14 @@ def _check_transfer(section: list[Block], steps: list[DeckStep], revolve: list[B
         raise generation.refused("the tyre is revolved about the second axis, 0, 0, 0 to 0, 1, 0")
     if len(steps) != 1 or steps[0].procedure.name != "STATIC":
         raise transfer.refused("the first job must have one step, a *STATIC")
-    increments = _increments(steps[0].procedure)
+    static = steps[0].procedure
+    if "DIRECT" not in static.parameters:
+        raise static.refused("the increments must be fixed (DIRECT) for a transfer")
+    row = static.only_row()
+    increments = int(np.ceil(np.real(row.value(1) / row.value(0)) - 1e-9))
     if (transfer.need("STEP"), transfer.need("INC")) != ("1", str(increments)):
         raise transfer.refused(f"the first job ends with STEP=1, INC={increments}")
     restated = {k.get("TIE NSET") for k in revolve if k.name == "RIGID BODY"}
     for name in (k.need("TIE NSET") for k in section if k.name == "RIGID BODY"):
         if name not in restated:
             raise transfer.refused(f"drops the *RIGID BODY of {name}: it must be restated")
-
-
-def _increments(procedure: Block) -> int:
-    if "DIRECT" not in procedure.parameters:
-        raise procedure.refused("the increments must be fixed (DIRECT) for a transfer")
-    row = procedure.only_row()
-    return int(np.ceil(np.real(row.value(1) / row.value(0)) - 1e-9))

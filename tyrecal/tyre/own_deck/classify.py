@@ -62,7 +62,7 @@ def classify(blocks: Sequence[Block]) -> ClassifiedDeck:
         _step(each, deck, is_inflation=k == inflating)
     if inflating is None:
         raise blocks[-1].refused(
-            "no *STATIC step of the deck inflates: one needs *DSLOAD or *DLOAD with a pressure"
+            "no *STATIC step inflates: give it a pressure by *DSLOAD or *DLOAD"
         )
     deck.later = [each[0] for each in steps[inflating + 1 :]]
     return deck

@@ -188,10 +188,9 @@ class Constraints:
                     held = fixed.setdefault(n, {})
                     held |= dict.fromkeys(_freedoms(block, row) - held.keys(), (block, row))
         if self.reference and not {1, 2, 6} <= fixed.pop(self.reference[0], {}).keys():
-            block = next(b.block for b in self.bodies if b.reference == self.reference[0])
-            raise block.refused(
-                f"*BOUNDARY must hold the rim's node {self.reference[0]} in 1, 2 and 6"
-            )
+            rim = self.reference[0]
+            block = next(b.block for b in self.bodies if b.reference == rim)
+            raise block.refused(f"*BOUNDARY must hold the rim's node {rim} in 1, 2 and 6")
         used = {n for e in self.root.elements.values() for n in e.nodes}
         for n in [n for n in fixed if n in used]:
             point, freedoms = self.root.nodes[n], fixed[n].keys()
@@ -203,11 +202,9 @@ class Constraints:
                 continue
             else:
                 block, row = next(iter(fixed[n].values()))
-                hint = (
-                    f"a half is made whole by {lines_of_the_other_half(point[1])}"
-                    if freedoms <= HELD_BY_SYMMETRY
-                    else "a rim holds 1, 2 and 5 (ENCASTRE)"
-                )
+                hint = "a rim holds 1, 2 and 5 (ENCASTRE)"
+                if freedoms <= HELD_BY_SYMMETRY:
+                    hint = f"a half is made whole by {lines_of_the_other_half(point[1])}"
                 raise block.refused(f"node {n} is held in {sorted(freedoms)} only: {hint}", row)
 
     def _move(self, nodes: Sequence[int], block: Block, row: Row) -> None:

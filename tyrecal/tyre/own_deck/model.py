@@ -143,8 +143,7 @@ class _Builder:
         for block, prefix in self.made.of("REBAR"):
             for row in block.rows:
                 for n in self.root.elements.members(prefix + row.name(0), block, row):
-                    if not self.root.elements[n].kind.startswith("MGAX"):
-                        kind = self.root.elements[n].kind
+                    if not (kind := self.root.elements[n].kind).startswith("MGAX"):
                         raise block.refused(f"element {n} is a {kind}, no membrane", row)
                     lines.setdefault(n, []).append((block, row))
         for ply in plies:
@@ -186,11 +185,9 @@ class _Builder:
             cut = [face for face in boundary if at_z.issuperset(face[2])]
             if cut and max(points[n][0] for _, _, nodes in cut for n in nodes) > AT_CROWN * crown:
                 element = self.root.elements[cut[0][0]]
-                raise element.block.refused(
-                    f"element {cut[0][0]}: the section ends in a cut through the crown at z ="
-                    f" {z + 0.0:g}, it is half a tyre; add {lines_of_the_other_half(z)}",
-                    element.row,
-                )
+                what = "the section ends in a cut through the crown, it is half a tyre"
+                words = f"element {cut[0][0]}: {what}; add {lines_of_the_other_half(z)}"
+                raise element.block.refused(words, element.row)
 
     def _pressure(self) -> tuple[list[Face], str, tuple[tuple[Block, Row, int], ...]]:
         """Faces under the step's pressure, and where its value stands."""
@@ -222,8 +219,8 @@ class _Builder:
             raise places[1][0].refused("one pressure is honoured, the same on all", places[1][1])
         if not values.pop() > 0:
             raise places[0][0].refused("the pressure must be positive", places[0][1])
-        names = dict.fromkeys(row.name(0) for _, row, _ in places)
-        return faces, " and ".join(names), tuple(places)
+        names = " and ".join(dict.fromkeys(row.name(0) for _, row, _ in places))
+        return faces, names, tuple(places)
 
     def _on_solids(self, pressed: list[Face], boundary: Sequence[Face]) -> tuple[Face, ...]:
         """The free faces of solids that a pressure acts on, those under plies among them."""
@@ -231,18 +228,15 @@ class _Builder:
         surface = self.blocks.inflation[0]
         faces: dict[int, Face] = {}
         for n, face, raw in pressed:
-            nodes = tuple(self.tied.same.get(each, each) for each in raw)
-            own = free.get(frozenset((nodes[0], nodes[-1])))
-            element = self.root.elements[n]
+            start, end = (self.tied.same.get(each, each) for each in (raw[0], raw[-1]))
+            own = free.get(frozenset((start, end)))
             if own is None:
-                raise surface.refused(
-                    f"the pressure acts on face {face} of element {n}, which is no free surface"
-                )
-            if (own[2][0], own[2][-1]) != (nodes[0], nodes[-1]):
-                raise element.block.refused(
-                    f"element {n}: the pressure on its face {face} comes from the rubber's side",
-                    element.row,
-                )
+                words = f"the pressure acts on face {face} of element {n}, which is no free surface"
+                raise surface.refused(words)
+            if (own[2][0], own[2][-1]) != (start, end):
+                element = self.root.elements[n]
+                words = f"element {n}: the pressure on its face {face} comes from the rubber's side"
+                raise element.block.refused(words, element.row)
             if id(own) in faces:
                 raise surface.refused(f"the pressure acts twice on face {face} of element {n}")
             faces[id(own)] = own

@@ -264,9 +264,5 @@ def as_known(path: Any, known: Iterable[str]) -> Any:
 
 def canonical(path: str, known: Iterable[str]) -> str | None:
     """The path of ``known`` that is meant, ignoring case and blanks."""
-    wanted = _key(path)
-    return next((each for each in known if _key(each) == wanted), None)
-
-
-def _key(path: str) -> tuple[str, ...]:
-    return tuple(named(word) for word in path.split("/"))
+    words = lambda each: [named(word) for word in each.split("/")]
+    return next((each for each in known if words(each) == words(path)), None)

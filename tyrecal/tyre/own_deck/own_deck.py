@@ -154,6 +154,4 @@ def recognised(blocks: Sequence[Block]) -> Units:
         if values and not others:
             return units
     block = (min(outside.values(), key=len) or blocks)[0]  # the odd one
-    raise block.refused(
-        "the units cannot be inferred from the densities: give --units m or --units mm"
-    )
+    raise block.refused("the units cannot be inferred from the densities: give --units m or mm")

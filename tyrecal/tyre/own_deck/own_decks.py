@@ -103,11 +103,8 @@ class OwnDecks:
         _, steps = split_steps(self.decks[-1].blocks)
         modal = [step for step in steps if any(block.name == "FREQUENCY" for block in step)]
         if len(modal) != 1:
-            raise OwnDeckError(
-                Place(self.path.name, 1),
-                f"the last deck finds the modes: it needs one step with *FREQUENCY, it has"
-                f" {len(modal)}",
-            )
+            words = "the last deck finds the modes: it needs one step with *FREQUENCY, it has"
+            raise OwnDeckError(Place(self.path.name, 1), f"{words} {len(modal)}")
         return modal[0]
 
     @cached_property
@@ -134,11 +131,9 @@ class OwnDecks:
         loads = [(deck, *place) for deck in self.decks for place in _pressures(deck.blocks, ends)]
         largest = max((abs(value) for *_, value in loads), default=0.0)
         if not largest:
-            raise OwnDeckError(
-                Place(self.decks[0].path.name, 1),
-                "no pressure is found in *DSLOAD, *DLOAD, or *BOUNDARY of the degree of freedom"
-                f" {PRESSURE_DOF}: {MARK_IT}",
-            )
+            words = "no pressure is found in *DSLOAD, *DLOAD, or *BOUNDARY of the degree of freedom"
+            place = Place(self.decks[0].path.name, 1)
+            raise OwnDeckError(place, f"{words} {PRESSURE_DOF}: {MARK_IT}")
         return [(deck, row, i, value / largest) for deck, row, i, value in loads if value]
 
     @property

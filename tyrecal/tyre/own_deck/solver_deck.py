@@ -47,9 +47,8 @@ class SolverDeck:
     @property
     def set_names(self) -> list[str]:
         """Names of the element sets, rubber first."""
-        count = len(self.model.solids), len(self.model.plies)
-        words = zip(("SOLID", "PLY"), count, strict=True)
-        return [f"{word}_{k + 1}" for word, n in words for k in range(n)]
+        groups = {"SOLID": self.model.solids, "PLY": self.model.plies}
+        return [f"{word}_{k + 1}" for word, group in groups.items() for k in range(len(group))]
 
     @property
     def static_moduli(self) -> str:
@@ -71,8 +70,7 @@ def translate(deck: ClassifiedDeck, model: DeckModel, length: float, mass: float
     for k, section in enumerate(model.solids, start=1):
         block = section.block
         name = write.used(block, block.need("MATERIAL"))
-        controls = block.get("CONTROLS")
-        more = f", CONTROLS={controls}" if controls else ""
+        more = f", CONTROLS={controls}" if (controls := block.get("CONTROLS")) else ""
         write.line(f"*SOLID SECTION, ELSET=SOLID_{k}, MATERIAL={name}{more}", block.place)
         for option in deck.options.get(block, ()):
             write.block(option, "*HOURGLASS STIFFNESS")
@@ -204,12 +202,11 @@ def _materials(deck: ClassifiedDeck) -> dict[str, Block]:
             if name in by_name:
                 raise block.refused(f"the material {name} is defined twice")
             by_name[name] = block
-            given = set[str]()
-            for option in deck.options.get(block, ()):
-                if option.name in given:
+            options = deck.options.get(block, [])
+            for k, option in enumerate(options):
+                if option.name in (each.name for each in options[:k]):
                     raise option.refused(f"is given twice under {name}")
                 fields.fields_of(option)
-                given.add(option.name)
     return by_name
 
 

@@ -45,9 +45,9 @@ class SolverMesh:
 def _tolerances(block: Block, length: float) -> str:
     """Tolerances of an *EMBEDDED ELEMENT that are given, m."""
     units = {"ROUNDOFF": 1.0, "EXTERIOR": 1.0, "ABSOLUTE EXTERIOR": length}
-    given = ((f"{word} TOLERANCE", scale) for word, scale in units.items())
-    numbers = ((name, block.number(name), scale) for name, scale in given)
-    return "".join(f", {name}={written(x * scale)}" for name, x, scale in numbers if x is not None)
+    numbers = {word: block.number(f"{word} TOLERANCE") for word in units}
+    given = {word: written(x * units[word]) for word, x in numbers.items() if x is not None}
+    return "".join(f", {word} TOLERANCE={text}" for word, text in given.items())
 
 
 @lru_cache(maxsize=8)
@@ -67,8 +67,9 @@ def solver_mesh(model: DeckModel, length: float) -> SolverMesh:
     line("*NODE, NSET=RIM_REFERENCE", start)
     line(f"{REFERENCE_NODE}, {reference[0]!r}, {reference[1]!r}", start)
     element_at = {n: k for k, n in enumerate(sorted(model.elements), start=1)}
-    solids, plies, section_of = {}, {}, {}
-    for word, group in (("SOLID", model.solids), ("PLY", model.plies)):
+    solids, plies = dict[int, tuple[int, ...]](), dict[int, tuple[int, ...]]()
+    section_of: dict[int, int] = {}
+    for word, group, nodes_of in (("SOLID", model.solids, solids), ("PLY", model.plies, plies)):
         for k, section in enumerate(group, start=1):
             kinds: dict[str, list[int]] = {}
             for n in section.elements:
@@ -78,11 +79,9 @@ def solver_mesh(model: DeckModel, length: float) -> SolverMesh:
                 line(f"*ELEMENT, TYPE={kind}, ELSET={word}_{k}", first.block.place)
                 for n in members:
                     element = model.elements[n]
-                    own = tuple(number[each] for each in element.nodes)
+                    own = nodes_of[element_at[n]] = tuple(number[each] for each in element.nodes)
                     if word == "SOLID":
-                        solids[element_at[n]], section_of[element_at[n]] = own, k - 1
-                    else:
-                        plies[element_at[n]] = own
+                        section_of[element_at[n]] = k - 1
                     line(", ".join(map(str, (element_at[n], *own))), element.row.place)
     rim = tuple(sorted(number[n] for n in model.rim))
     renumbered = lambda face: (element_at[face[0]], face[1], tuple(number[n] for n in face[2]))

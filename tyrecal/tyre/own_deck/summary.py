@@ -102,14 +102,11 @@ def words(content: Json, mass_kg: float) -> Iterator[str]:
         f"crown: {crown['nodes']} nodes of the outer surface, {2e3 * crown['half_width_m']:.1f} mm"
         f" wide, radius {1e3 * crown['radius_m']:.1f} mm"
     )
-    if content["marks"]:
-        yield f"marks: {', '.join(content['marks'])}"
-    if content["left_out"]:
-        yield f"left out: {'; '.join(content['left_out'])}"
-    if content["passed_over"]:
-        yield f"ignored, because they change no result: *{', *'.join(content['passed_over'])}"
-    if content["later_steps"]:
-        yield (
-            "left out, because they come after the inflation: steps"
-            f" {', '.join(content['later_steps'])}"
-        )
+    for key, start, between in (
+        ("marks", "marks: ", ", "),
+        ("left_out", "left out: ", "; "),
+        ("passed_over", "ignored, because they change no result: *", ", *"),
+        ("later_steps", "left out, because they come after the inflation: steps ", ", "),
+    ):
+        if content[key]:
+            yield start + between.join(content[key])
