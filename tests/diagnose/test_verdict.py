@@ -68,6 +68,28 @@ def test_words_say_whether_there_is_a_gap() -> None:
     assert judged(0.5, 0.05).words.startswith("there may be a gap")
 
 
+def test_an_undecided_verdict_states_its_reason() -> None:
+    """Next to a sure effect that is what keeps it from being named: the probability of no effect,
+    whether it fits or not, its size, or few data; else that no effect is sure."""
+    sure = judged(0.99, 0.0, rows=4), judged(0.9, 0.08), judged(0.9, 0.08, p_value=0.001)
+    at_bound = replace(explained(0.5, 20, 3), ends={"a0": (-3.0, -1.0)})
+    ends = Fitted(*(each[[0, 2, 1]] for each in at_bound.fitted))  # rising up to its end
+    values = {"a0": np.array([-1.0, -2.0, -3.0])}
+    at_bound = replace(at_bound, key="a0", fitted=ends, values=values)
+    share = {"a0": 0.99, "none": 0.0, "outside": 0.01}
+    bounded = decide([at_bound, replace(at_bound, key="outside", values={})], share, 20, 3)
+    others = judged(0.5, 0.04), judged(0.5, 0.1), judged(0.35, 0.25, 0.4)
+    none = {"none": 0.2} | {f"e{i}": 0.1 for i in range(7)} | {"outside": 0.1}
+    h = replace(explained(0.5, 20, 3), key="e0")
+    every = [*sure, bounded, *others, decide([h], none, 20, 3)]
+    assert {each.kind for each in every} == {"undecided"}
+    reasons = [each.words.partition("; " if "nearest" in each.words else ": ")[2] for each in every]
+    assert all(len(reason) > 20 for reason in reasons) and len(set(reasons)) == 6
+    assert all(each.best and each.best in each.words for each in (*sure, bounded))
+    assert all("0.08" in each.words for each in sure[1:]) and "bound" in bounded.words
+    assert all("0.7" in each.words for each in others) and "0.20" in every[-1].words
+
+
 def test_candidates_hold_nine_tenths() -> None:
     assert judged(0.5, 0.4, 0.0).candidates == ("a", "none")
     assert judged(0.5, 0.39, 0.0).candidates == ("a", "none", "b")

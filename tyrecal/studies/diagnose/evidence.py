@@ -94,14 +94,20 @@ class Hypothesis:
 
     @property
     def at_bound(self) -> list[str]:
-        """Effects whose best parameter is the last one of the grid, so that a larger size would
-        fit better."""
-        bounded = []
+        """Effects that would fit better, by more than chance, at a size beyond the grid's end: by
+        the parabola through ln Z there, the best size is `COVERAGE` standard deviations beyond."""
+        bounded, ln = [], self.fitted.ln_evidence
         for id, values in self.values.items():
             e = values[self.best]
             low, high = self.ends.get(id, (values.min(), values.max()))
             if low < high and ((e == high and e > 0) or (e == low and e < 0)):
-                bounded.append(id)
+                inwards = np.unique(abs(e - values))
+                profile = np.array([ln[abs(e - values) == each].max() for each in inwards])
+                near = (profile > profile[0] - COVERAGE) | (np.arange(len(profile)) < 3)
+                parabola = np.polyfit(inwards[near], profile[near], 2) if near.sum() > 2 else [0, 0]
+                bend, slope = parabola[:2]
+                if bend >= 0 or -slope > COVERAGE * np.sqrt(-2 * bend):
+                    bounded.append(id)
         return bounded
 
     def shares(self, p: Array) -> dict[str, float]:

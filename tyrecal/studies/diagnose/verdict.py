@@ -74,7 +74,10 @@ def decide(
         return verdict(UNDECIDED, "cannot tell: there are no more data than design variables")
     if best and sure and check > CHECK and none < RULED_OUT:
         if at_bound := [id for id in by_key[best].at_bound if holds(sure, id)]:
-            words = f"there is a gap; {best} comes nearest{_with_at_bound(at_bound)}"
+            words = (
+                f"there is a gap; {best} comes nearest{_with_at_bound(at_bound)}: a size beyond it"
+                " would fit better, so that its probability does not name it"
+            )
             return verdict(UNDECIDED, words)
         if rows - variables - len(by_key[best].values) < 2:
             words = f"there is a gap; {best} comes nearest, but with so few data others would, too"
@@ -91,7 +94,19 @@ def decide(
     if order[0] == NONE and none > before(hypotheses).get(NONE, PRIOR_NONE):
         return verdict(NO_GAP, no_gap_words(none))
     gap = "there is a gap" if none < RULED_OUT else "there may be a gap"
-    return verdict(UNDECIDED, f"{gap}, its cause is undecided")
+    words = f"{gap}, its cause is undecided: {_why_undecided(probabilities, sure, check)}"
+    return verdict(UNDECIDED, words)
+
+
+def _why_undecided(probabilities: Mapping[str, float], sure: str | None, check: float) -> str:
+    """Reason why the probabilities decide nothing."""
+    none = probabilities[NONE]
+    if sure and none >= RULED_OUT:
+        but = "does not fit, and" if check <= CHECK else "fits, but"
+        return f"{sure} {but} no effect at all still has a probability of {none:.2f}"
+    if none > max(p for key, p in probabilities.items() if key != NONE):
+        return f"no effect at all is likeliest, {none:.2f}, but no likelier than before the data"
+    return f"no effect has a probability of {SURE:g}"
 
 
 def no_gap_words(none: float) -> str:
