@@ -9,7 +9,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.store import Store
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.blind.maker import Computed, SolverMaker
+from tyrecal.studies.blind.maker import Computed, Maker
 from tyrecal.studies.blind.outside import OUTSIDE_FAMILIES
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.effects.edit import with_part
@@ -19,7 +19,7 @@ from .laws import other_laws
 FINER = 1.2  # times as many elements along the section as the case's own mesh
 
 
-class OtherMaker(SolverMaker):
+class OtherMaker(Maker):
     """A solver on a finer mesh, with other laws than the catalogue's."""
 
     def compute(self, case: LoadedCase, labels: list[Label]) -> Computed:

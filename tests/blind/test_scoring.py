@@ -173,16 +173,16 @@ def ruler() -> Ruler:
 def test_lambda_and_distances_in_closed_form() -> None:
     places, counts = np.arange(4), np.full(4, 2)
     shift, none = np.array([0.02, 0, 0, 0]), np.zeros(4)
-    hard = difficulty(ruler(), RULES, "a", np.zeros(1), places, counts, shift, none)
+    hard = difficulty(ruler(), RULES, "a", np.zeros(1), places, counts, (shift, none))
     sigma2 = RULES.noise**2 / 2
     # a free mean takes a quarter of it: |g - mean g|^2 = g^2 (1 - 1/4)
     assert hard.lam == pytest.approx(0.02**2 * 0.75 / sigma2, rel=1e-3)
     # g - e b, least over e: e = -1/3 is out of range, so e = 0
     assert hard.nearest == pytest.approx(hard.lam, rel=1e-3)
     assert hard.group == ("a",) and hard.equivalent == pytest.approx(1.0)
-    half = difficulty(ruler(), RULES, "a", np.zeros(1), places, counts, shift / 2, none)
+    half = difficulty(ruler(), RULES, "a", np.zeros(1), places, counts, (shift / 2, none))
     assert half.lam == pytest.approx(hard.lam / 4) and half.equivalent == pytest.approx(0.5)
-    weak = difficulty(ruler(), RULES, "a", np.zeros(1), places, counts, shift / 20, none)
+    weak = difficulty(ruler(), RULES, "a", np.zeros(1), places, counts, (shift / 20, none))
     assert weak.group == ("a", "b")
 
 
@@ -197,7 +197,7 @@ def test_splits_count_where_both_members_were_measured() -> None:
     tau2 = 2 * RULES.noise**2 + RULES.split**2
     for counts, seen in (([2, 2, 2, 2], 2), ([2, 2, 2, 1], 1), ([1, 2, 2, 1], 0)):
         hard = difficulty(
-            ruler(), RULES, "a", np.zeros(1), places, np.array(counts), np.zeros(4), split
+            ruler(), RULES, "a", np.zeros(1), places, np.array(counts), (np.zeros(4), split)
         )
         assert hard.lam == pytest.approx(seen * 1e-4 / tau2)
 

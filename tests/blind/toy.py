@@ -9,7 +9,7 @@ import numpy as np
 
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.blind.laws import EffectLaw
-from tyrecal.studies.blind.maker import Computed
+from tyrecal.studies.blind.maker import Computed, Maker
 from tyrecal.studies.blind.protocol import Protocol
 from tyrecal.studies.inference.model import Answer, Query
 from tyrecal.tyre.case import LoadedCase, number_at, start_values
@@ -48,15 +48,14 @@ class Scale(Toy):
         )
 
 
-class ToyMaker:
+class ToyMaker(Maker):
     """Laws write their id and size into the case's name; families stretch one mode."""
 
-    about = "a toy"
-
     def __init__(self, scale: Scale) -> None:
+        laws = {id: EffectLaw(0.0, 1.0, _named(id)) for id in scale.g}
+        outside = {"odd_mode": EffectLaw(0.0, 1.0, _named("odd_mode"))}
+        super().__init__("a toy", "", laws, outside)
         self.scale = scale
-        self.laws = {id: EffectLaw(0.0, 1.0, _named(id)) for id in scale.g}
-        self.outside = {"odd_mode": EffectLaw(0.0, 1.0, _named("odd_mode"))}
 
     def compute(self, case: LoadedCase, labels: list[Label]) -> Computed:
         x = np.array([log(number_at(case, path)) for path in NUMBERS])

@@ -31,7 +31,7 @@ from tyrecal.simulate.evaluate.store import Store
 from tyrecal.studies.blind.answer import answer, case_of, rows_of, tyre_model
 from tyrecal.studies.blind.emulated import emulate
 from tyrecal.studies.blind.protocol import read_protocol
-from tyrecal.studies.blind.score import Scored, rescored, score
+from tyrecal.studies.blind.score import Scored, score
 from tyrecal.studies.blind.seal import ANSWERS, check_answers
 from tyrecal.studies.blind.tables import summary
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE
@@ -117,7 +117,8 @@ def compared(study: str, folder: Path) -> dict[str, list[Scored]]:
     for origin in ORIGINS:
         trials = folder / origin / "trials"
         if (trials / ANSWERS).exists():
-            by_origin[origin] = rescored(recorded, sealed, check_answers(trials))
+            check_answers(trials)
+            by_origin[origin] = score(recorded, sealed, trials / "answers")
     common = set.intersection(*({t.id for t in those} for those in by_origin.values()))
     return {name: [t for t in those if t.id in common] for name, those in by_origin.items()}
 

@@ -43,7 +43,7 @@ from tyrecal.studies.blind.answer import rows_of, tyre_model
 from tyrecal.studies.blind.draw import Truth, draw, tyre
 from tyrecal.studies.blind.laws import EffectLaw
 from tyrecal.studies.blind.make import make
-from tyrecal.studies.blind.maker import Computed
+from tyrecal.studies.blind.maker import Computed, Maker
 from tyrecal.studies.blind.outside import OUTSIDE_FAMILIES
 from tyrecal.studies.blind.protocol import Protocol
 from tyrecal.studies.blind.ruler import measure
@@ -262,20 +262,17 @@ def fitted(runs: Runs) -> dict[str, Array]:
     }
 
 
-class EmulatedCalculix:
-    """A `tyrecal.studies.blind.maker.Maker`: CalculiX C3D20R, as this module emulates it."""
-
-    about = (
-        "CalculiX 2.20 (C3D20R, St Venant-Kirchhoff cords, plies of 0.2 mm, another mesh) by an"
-        " emulator, effects by other laws than the catalogue's"
-    )
+class EmulatedCalculix(Maker):
+    """CalculiX C3D20R, as this module emulates it."""
 
     def __init__(self) -> None:
+        about = (
+            "CalculiX 2.20 (C3D20R, St Venant-Kirchhoff cords, plies of 0.2 mm, another mesh) by an"
+            " emulator, effects by other laws than the catalogue's"
+        )
         known = other_laws(frozenset({"modes"}))
-        self.laws: dict[str, EffectLaw] = {
-            id: law for id, law in known.items() if id not in LEFT_OUT
-        }
-        self.outside = OUTSIDE_FAMILIES
+        laws = {id: law for id, law in known.items() if id not in LEFT_OUT}
+        super().__init__(about, "", laws, OUTSIDE_FAMILIES)
         self._fitted = fitted(usual(recorded("train"))[0])
 
     def compute(self, case: LoadedCase, labels: list[Label]) -> Computed:

@@ -143,7 +143,7 @@ def seen(
     labels = [ruler.rows[i][0] for i in places]
     counts = np.array([2 if label and label.c else 1 for label in labels])
     d = np.log([*truth.variables.values()]) - ruler.x0
-    return difficulty(ruler, protocol, truth.law, d, places, counts, shift, split).lam
+    return difficulty(ruler, protocol, truth.law, d, places, counts, (shift, split)).lam
 
 
 def evident(trial: Trial, protocol: Protocol, ruler: Ruler | None) -> bool:

@@ -16,7 +16,9 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.pool import process_pool
+from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.blind.answer import rows_of, tyre_model
+from tyrecal.studies.blind.draw import Truth
 from tyrecal.studies.blind.make import (
     MAX_TRIES,
     Trial,
@@ -24,7 +26,6 @@ from tyrecal.studies.blind.make import (
     kept_seed,
     labels_of,
     plain_trial,
-    read_trial,
     sealed_trial,
     write_trials,
 )
@@ -154,6 +155,17 @@ def _made(
             last = failure
         each = drawn_anew(each, protocol, case, group, tries, ruler)
     raise InputError(f"no tyre of kind {each.kind} was found: {last}")
+
+
+def read_trial(content: dict[str, Any], labels: list[Label]) -> Trial:
+    """The trial that `plain_trial` wrote."""
+    tables: dict[str, dict[float, Computed]] = {"with_effect": {}, "without": {}}
+    for key, table in tables.items():
+        for entry in content.pop(key):
+            ln_f = {label: tuple(entry["ln_f"][str(label)]) for label in labels}
+            table[entry["pressure_kPa"]] = Computed(ln_f, entry["ln_mass"])
+    tries = content.pop("tries")
+    return Trial(Truth(**content), tries, **tables)
 
 
 def shifts(trial: Trial, members: Members) -> dict[str, Any]:

@@ -42,8 +42,8 @@ def powers(ruler: Ruler, protocol: Protocol) -> list[Power]:
     for id, signature in ruler.signatures.items():
         sizes, shift, split = signature.grid(start, places)
         hard = [
-            difficulty(ruler, protocol, id, start, places, counts, g, s)
-            for g, s in zip(shift, split, strict=True)
+            difficulty(ruler, protocol, id, start, places, counts, moved)
+            for moved in zip(shift, split, strict=True)
         ]
         lengths = np.array([each.lam for each in hard])
         far = hard[int(np.argmax(lengths))]

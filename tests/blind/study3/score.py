@@ -143,11 +143,11 @@ def one(
     hard = {}
     effects = tuple(sorted(truth["effects"])) if truth["kind"] != "outside" else ()
     for id in effects:
-        shift, split = moved_by(id, truth, ruler, places, labels)
-        hard[id] = difficulty(ruler, protocol, id, d, places, counts, shift, split)
+        moved = moved_by(id, truth, ruler, places, labels)
+        hard[id] = difficulty(ruler, protocol, id, d, places, counts, moved)
     if truth["kind"] == "outside":
-        shift, split = true_shift(truth, ruler, places, labels)
-        hard["outside"] = difficulty(ruler, protocol, "outside", d, places, counts, shift, split)
+        moved = true_shift(truth, ruler, places, labels)
+        hard["outside"] = difficulty(ruler, protocol, "outside", d, places, counts, moved)
     diagnosis, out = answer["diagnosis"], answer["held_out"]
     p, named = diagnosis["probabilities"], diagnosis["effect"]
     sizes = diagnosis["parameters"] if named else {}
@@ -178,8 +178,8 @@ def one(
     )
     again = weighed_again(p, answer.get("further", Assumed.further), further(protocol.counts))
     if len(effects) > 1:
-        moved, split = true_shift(truth, ruler, places, labels)
-        whole = difficulty(ruler, protocol, effects[0], d, places, counts, moved, split)
+        moved = true_shift(truth, ruler, places, labels)
+        whole = difficulty(ruler, protocol, effects[0], d, places, counts, moved)
         score = replace(score, together=whole.lam)
     score = replace(
         weighed(score, p),

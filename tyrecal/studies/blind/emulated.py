@@ -6,12 +6,13 @@ effect, 0 if it is absent. About the centre x0, with t = (x - x0) / reach, |t| <
 
     eta(x, e) = sum_k a_k q_k(t) + sum over effects of sum_j L_j(e) sum_k b_jk q_k(t)
 
-q_k: monomials; their coefficients a_k and b_jk (n,) are fitted by least squares to values and
-Jacobians at designs of a Halton sequence. L_j: Lagrange's polynomials of the effect's nodes, 0
-among them. Changes by the sources of error (`ResponseModel.sources`) are emulated in the same way.
-Two quantities hardly change with x: the coupling of near modes (`Coupling`) is that of the nearest
-design, and the shift by an effect's uncertain shape (`Query.shape_uncertainty`) is that of the
-centre. Beyond the box the model goes straight on, with the slopes at its nearest point.
+q_k: products of Legendre's polynomials, as in `emulator`; their coefficients a_k and b_jk (n,) are
+fitted by least squares to values and Jacobians at designs of a Halton sequence. L_j: Lagrange's
+polynomials of the effect's nodes, 0 among them. Changes by the sources of error
+(`ResponseModel.sources`) are emulated in the same way. Two quantities hardly change with x: the
+coupling of near modes (`Coupling`) is that of the nearest design, and the shift by an effect's
+uncertain shape (`Query.shape_uncertainty`) is that of the centre. Beyond the box the model goes
+straight on, with the slopes at its nearest point.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
-from ..emulator import up_to
+from ..emulator import products, up_to
 from ..inference.expansion import derivatives, lagrange
 from ..inference.model import Answer, Coupling, EffectRange, Query, ResponseModel
 
@@ -43,13 +44,14 @@ MIN_SCALE = 1e-5  # of ln f: smallest residual from which weights fall, far belo
 class Polynomial:
     """Polynomial in the design variables t."""
 
-    powers: Array  # (k, v) of each of k monomials in each variable
-    coefficients: Array  # (k, n) of each monomial in each row
+    degrees: Array  # (k, v) of each of k products of polynomials in each variable
+    coefficients: Array  # (k, n) of each product in each row
 
     def at(self, t: Array) -> tuple[Array, Array]:
         """Values (n,) and slopes (n, v) at t (v,)."""
-        slope = (slopes(self.powers, t) @ self.coefficients).T
-        return monomials(self.powers, t) @ self.coefficients, slope
+        slopes = [products(self.degrees, t[None], j)[0] for j in range(len(t))]
+        values = products(self.degrees, t[None])[0] @ self.coefficients
+        return values, (np.array(slopes) @ self.coefficients).T
 
 
 @dataclass(frozen=True)
@@ -151,10 +153,10 @@ def emulate(model: ResponseModel, reach: float = REACH) -> Emulated:
     ]
     plain = model.answers(queries)
     good = [i for i, answer in enumerate(plain) if isinstance(answer, Answer)]
-    powers = up_to(count, PLAIN_DEGREE)
-    if len(good) * (1 + count) < len(powers):
+    degrees = up_to(count, PLAIN_DEGREE)
+    if len(good) * (1 + count) < len(degrees):
         raise next(a for a in plain if isinstance(a, Exception))
-    fitted = _fit(powers, boxed[good], [plain[i] for i in good], reach)  # type: ignore[misc]
+    fitted = _fit(degrees, boxed[good], [plain[i] for i in good], reach)  # type: ignore[misc]
     sources = [i for i in good if i < SOURCE_DESIGNS]
     constants = _values(
         up_to(count, SOURCE_DEGREE),
@@ -170,17 +172,6 @@ def emulate(model: ResponseModel, reach: float = REACH) -> Emulated:
     return Emulated(model, reach, fitted, constants, effects, couplings)
 
 
-def monomials(powers: Array, t: Array) -> Array:
-    """Monomials q_k(t) (k,) at t (v,); powers (k, v)."""
-    return np.prod(t[None, :] ** powers, axis=1)
-
-
-def slopes(powers: Array, t: Array) -> Array:
-    """Slopes d q_k / d t (v, k) of the monomials at t (v,); powers (k, v)."""
-    lower = [np.maximum(powers - unit, 0) for unit in np.eye(len(t), dtype=int)]
-    return np.array([p * monomials(low, t) for p, low in zip(powers.T, lower, strict=True)])
-
-
 def _effect(
     model: ResponseModel,
     id: str,
@@ -192,13 +183,13 @@ def _effect(
 ) -> EmulatedEffect | None:
     """The emulated effect; None if so few designs have an answer that no polynomial is
     determined."""
-    powers = up_to(len(boxed[0]), EFFECT_DEGREE)
+    degrees = up_to(len(boxed[0]), EFFECT_DEGREE)
     chosen = [i for i in range(EFFECT_DESIGNS) if isinstance(plain[i], Answer)]
     nodes, added, split = [], [], []
     for e in _node_values(span):
         answers = model.answers([Query(designs[i], {id: float(e)}) for i in chosen])
         both = [(i, a) for i, a in zip(chosen, answers, strict=True) if isinstance(a, Answer)]
-        if len(both) * (1 + len(boxed[0])) < len(powers):
+        if len(both) * (1 + len(boxed[0])) < len(degrees):
             continue
         differences = [
             Answer(a.eta - plain[i].eta, a.jacobian - plain[i].jacobian, a.split)  # type: ignore[union-attr]
@@ -206,7 +197,7 @@ def _effect(
         ]
         where = boxed[[i for i, _ in both]]
         nodes.append(float(e))
-        added.append(_fit(powers, where, differences, reach))
+        added.append(_fit(degrees, where, differences, reach))
         split.append(_values(up_to(len(boxed[0]), 1), where, [a.split for _, a in both]))
     if not nodes:
         return None
@@ -227,13 +218,15 @@ def _node_values(span: EffectRange) -> list[float]:
     return [f * far for f in ONE_SIDED_SHARES]
 
 
-def _fit(powers: Array, t: Array, answers: Sequence[Answer], reach: float) -> Polynomial:
+def _fit(degrees: Array, t: Array, answers: Sequence[Answer], reach: float) -> Polynomial:
     """Least squares of values and slopes by t, equations that lie far off weighing less (Huber's
     estimator): close to a limit point, where cords of a stiff tyre buckle, slopes grow without
     bound."""
-    rows = [monomials(powers, each)[None] for each in t] + [slopes(powers, each) for each in t]
-    values = [a.eta[None] for a in answers] + [reach * a.jacobian.T for a in answers]
-    A, b = np.concatenate(rows), np.concatenate(values)
+    slopes = [products(degrees, t, j) for j in range(t.shape[1])]
+    A = np.concatenate([products(degrees, t), *slopes])
+    values = np.array([a.eta for a in answers])
+    rises = np.array([reach * a.jacobian for a in answers])
+    b = np.concatenate([values, *np.moveaxis(rises, 2, 0)])
     coefficients = np.linalg.lstsq(A, b, None)[0]
     for _ in range(REWEIGHTED):
         off = abs(b - A @ coefficients)
@@ -243,10 +236,9 @@ def _fit(powers: Array, t: Array, answers: Sequence[Answer], reach: float) -> Po
         coefficients = np.array(
             [np.linalg.lstsq(A * w[:, None], c * w, None)[0] for w, c in columns]
         ).T
-    return Polynomial(powers, coefficients)
+    return Polynomial(degrees, coefficients)
 
 
-def _values(powers: Array, t: Array, values: Sequence[Array]) -> Polynomial:
-    rows = np.array([monomials(powers, each) for each in t])
-    coefficients, *_ = np.linalg.lstsq(rows, np.array(values), None)
-    return Polynomial(powers, coefficients)
+def _values(degrees: Array, t: Array, values: Sequence[Array]) -> Polynomial:
+    coefficients, *_ = np.linalg.lstsq(products(degrees, t), np.array(values), None)
+    return Polynomial(degrees, coefficients)

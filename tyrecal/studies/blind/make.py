@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import secrets
 import shutil
@@ -10,10 +9,8 @@ from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from hashlib import sha256
 from math import exp
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -57,7 +54,7 @@ def make(
     case: LoadedCase,
     protocol: Protocol,
     maker: Maker,
-    ruler: Callable[[], Mapping[str, Any]],
+    ruler: Callable[[], Json],
     jobs: int = 1,
     seed: int | None = None,
     on_progress: Callable[[int, int], None] = lambda done, all: None,
@@ -65,8 +62,9 @@ def make(
     """Make trials in ``folder`` and their truth in ``sealed``; returns the seal's sha256.
 
     ruler: measures what tells how hard a trial is (`ruler.measure`), before anything is drawn;
-    seed: None = a secret one, kept in ``sealed`` so that the same call goes on where it was
-    stopped. Raises InputError where the folder holds trials already, or the truth would lie in it.
+    seed: None = a secret one, kept in ``sealed`` so that the same call draws the same tyres again,
+    whose runs are in the maker's store. Raises InputError where the folder holds trials already,
+    or the truth would lie in it.
     """
     if (folder / SEAL).exists():
         raise InputError(f"{folder} has sealed trials already; make others in another folder")
@@ -74,13 +72,13 @@ def make(
         raise InputError(f"the truth must not be in {folder}, the folder of the trials")
     make_folder(folder)
     make_folder(sealed)
-    for path in (*folder.rglob("*"), sealed / "made", sealed / "record"):
+    for path in (*folder.rglob("*"), sealed / "record"):
         refuse_link(path)
     write_ruler(folder, ruler())
     seed = kept_seed(sealed, seed)
     own_sources, _ = sources(case)
     truths = draw(protocol, case, own_sources, maker.laws, maker.outside, seed)
-    work = partial(_resumed, sealed, protocol, case, maker)
+    work = partial(_make, protocol, case, maker)
     trials: list[Trial] = []
     with process_pool(jobs) if jobs > 1 else nullcontext() as pool:
         for trial in (pool.map if pool else map)(work, truths):
@@ -124,20 +122,6 @@ def values(trial: Trial, protocol: Protocol) -> dict[float, dict[Label, tuple[fl
     if trial.truth.swapped:
         _swap(read, labels, random)
     return read
-
-
-def _resumed(
-    sealed: Path, protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth
-) -> Trial:
-    """The trial as it was made before it was stopped, or made now."""
-    question = json.dumps([asdict(truth), asdict(protocol), maker.about], sort_keys=True)
-    path = sealed / "made" / f"{sha256(question.encode()).hexdigest()[:16]}.json"
-    if path.exists():
-        return read_trial(read_json(path), labels_of(case))
-    make_folder(path.parent)
-    trial = _make(protocol, case, maker, truth)
-    write_json(path, plain_trial(trial))
-    return trial
 
 
 def _make(protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth) -> Trial:
@@ -232,17 +216,6 @@ def plain_trial(trial: Trial) -> Json:
             for p, each in computed.items()
         ]
     return {**asdict(trial.truth), "tries": trial.tries, **tables}
-
-
-def read_trial(content: Json, labels: list[Label]) -> Trial:
-    """The trial that `plain_trial` wrote."""
-    tables: dict[str, dict[float, Computed]] = {"with_effect": {}, "without": {}}
-    for key, table in tables.items():
-        for entry in content.pop(key):
-            ln_f = {label: tuple(entry["ln_f"][str(label)]) for label in labels}
-            table[entry["pressure_kPa"]] = Computed(ln_f, entry["ln_mass"])
-    tries = content.pop("tries")
-    return Trial(Truth(**content), tries, **tables)
 
 
 def sealed_trial(trial: Trial, protocol: Protocol) -> Json:

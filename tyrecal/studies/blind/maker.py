@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import log
-from typing import Protocol
 
 from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator, Question
@@ -25,37 +24,19 @@ class Computed:
     ln_mass: float  # in kg
 
 
-class Maker(Protocol):
-    """Makes data."""
+@dataclass
+class Maker:
+    """An installed solver that makes data."""
 
-    @property
-    def about(self) -> str:
-        """Description of the maker for the protocol."""
-
-    @property
-    def laws(self) -> Mapping[str, EffectLaw]:
-        """Laws of effects, by id."""
-
-    @property
-    def outside(self) -> Mapping[str, EffectLaw]:
-        """Laws of families that the catalogue does not hold, by name."""
-
-    def compute(self, case: LoadedCase, labels: list[Label]) -> Computed:
-        """The tyre as it stands in ``case``. Raises EvaluationFailed; ValueError."""
-
-
-@dataclass(frozen=True)
-class SolverMaker:
-    """An installed solver."""
-
-    about: str
-    solver: str
-    laws: Mapping[str, EffectLaw]
-    outside: Mapping[str, EffectLaw]
+    about: str  # description for the protocol
+    solver: str  # its name
+    laws: Mapping[str, EffectLaw]  # of effects, by id
+    outside: Mapping[str, EffectLaw]  # of families that the catalogue does not hold, by name
     store: Store | None = None
 
     def compute(self, case: LoadedCase, labels: list[Label]) -> Computed:
-        """Raises EvaluationFailed, also where a label is lost."""
+        """The tyre as ``case`` has it. Raises EvaluationFailed, also where a label is lost;
+        ValueError."""
         evaluator = Evaluator(TyreDesign(case), self.solver, store=self.store)
         ((_, labelled),) = find_modes(evaluator, [Question({})], labels)
         if not isinstance(labelled, LabelledModes):
@@ -69,10 +50,10 @@ class SolverMaker:
         return Computed(ln_f, log(labelled.evaluation.mass_kg))
 
 
-def bundled_maker(case: LoadedCase, store: Store | None = None) -> SolverMaker:
+def bundled_maker(case: LoadedCase, store: Store | None = None) -> Maker:
     """The diagnosis' own model, mesh and laws."""
     laws = catalogue_laws(
         case, frozenset(Evaluator(TyreDesign(case), "bundled").solver.capabilities)
     )
     about = "bundled solver, the diagnosis' own mesh and the catalogue's laws: an inverse crime"
-    return SolverMaker(about, "bundled", laws, OUTSIDE_FAMILIES, store)
+    return Maker(about, "bundled", laws, OUTSIDE_FAMILIES, store)

@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -144,11 +143,11 @@ def difficulty(
     d: Array,
     places: Array,
     counts: Array,
-    shift: Array,
-    split: Array,
+    moved: tuple[Array, Array],
 ) -> Difficulty:
-    """Difficulty of a true effect that shifts the measured rows ``places`` by ``shift`` (n,), and
-    pairs apart by ``split`` (n,); d: the trial's design minus x0."""
+    """Difficulty of a true effect by how it moved the measured rows ``places``: its shift of ln f
+    (n,), and the distance that it adds to pairs (n,); d: the trial's design minus x0."""
+    shift, split = moved
     P = ruler.projection(d, places, ruler.sigma(places, counts, protocol))
     tau2 = 2 * protocol.noise**2 + protocol.split**2
     pairs = counts == 2
@@ -205,7 +204,7 @@ def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> Json:
             }
     return {
         "format": 1,
-        "rows": [[_words(label), p] for label, p in rows],
+        "rows": [["mass" if label is None else str(label), p] for label, p in rows],
         "x0": x0.tolist(),
         "spread": np.asarray(model.spread).tolist(),
         "eta": first.eta.tolist(),
@@ -219,9 +218,9 @@ def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> Json:
     }
 
 
-def write_ruler(folder: Path, content: Mapping[str, Any]) -> None:
+def write_ruler(folder: Path, content: Json) -> None:
     """Write the ruler next to the trials, open to all."""
-    write_json(folder / RULER_FILE, dict(content))
+    write_json(folder / RULER_FILE, content)
 
 
 def read_ruler(folder: Path, labels: Sequence[Label]) -> Ruler:
@@ -232,7 +231,7 @@ def read_ruler(folder: Path, labels: Sequence[Label]) -> Ruler:
         raise InputError(f"{folder / RULER_FILE}: not a ruler of these trials ({error})") from None
 
 
-def ruler_of(content: Mapping[str, Any], labels: Sequence[Label]) -> Ruler:
+def ruler_of(content: Json, labels: Sequence[Label]) -> Ruler:
     """The ruler from the data of `measure`. Raises KeyError, ValueError, TypeError where they are
     none."""
     known: dict[str, Label | None] = {str(label): label for label in labels}
@@ -242,25 +241,17 @@ def ruler_of(content: Mapping[str, Any], labels: Sequence[Label]) -> Ruler:
         id: EffectShifts(*(np.array(each[key], float) for key in SIGNATURE))
         for id, each in content["signatures"].items()
     }
-    rows = tuple((known[name], float(p)) for name, p in content["rows"])
-    laws = float(content.get("material_laws", 0.0))  # none in rulers of earlier studies
-    shared = bool(content.get("laws_shared"))
-    length = float(content.get("laws_length", EARLIER_LAWS_LENGTH))
     return Ruler(
-        rows,
+        tuple((known[name], float(p)) for name, p in content["rows"]),
         **numbers,
         signatures=signatures,
-        material_laws=laws,
-        laws_shared=shared,
-        laws_length=length,
+        material_laws=float(content.get("material_laws", 0.0)),  # none in rulers of earlier studies
+        laws_shared=bool(content.get("laws_shared")),
+        laws_length=float(content.get("laws_length", EARLIER_LAWS_LENGTH)),
     )
 
 
-def _words(label: Label | None) -> str:
-    return "mass" if label is None else str(label)
-
-
-def _rounded(values: Array) -> list[Any]:
+def _rounded(values: Array) -> list:
     """Nine decimals: 1e-7 % of a frequency."""
     return np.round(values, 9).tolist()
 

@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from math import log
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -76,14 +75,10 @@ class Scored:
         return kept
 
 
-def score(folder: Path, sealed: Path) -> list[Scored]:
-    """Scores of all trials of a study. Raises InputError."""
-    return rescored(folder, sealed, sorted((folder / "answers").glob("*.json")))
-
-
-def rescored(folder: Path, sealed: Path, answers: Sequence[Path]) -> list[Scored]:
-    """Scores of answers from another folder to trials of this one. Raises InputError."""
-    content, answered = open_truth(folder, sealed), {path.stem: path for path in answers}
+def score(folder: Path, sealed: Path, answers: Path | None = None) -> list[Scored]:
+    """Scores of all trials of a study; answers: another folder of them. Raises InputError."""
+    paths = (answers or folder / "answers").glob("*.json")
+    content, answered = open_truth(folder, sealed), {path.stem: path for path in paths}
     protocol = read_protocol(folder)
     labels = labels_of(case_of(folder))
     ruler = read_ruler(folder, labels)
@@ -102,8 +97,8 @@ def rescored(folder: Path, sealed: Path, answers: Sequence[Path]) -> list[Scored
 
 
 def scored(
-    truth: Mapping[str, Any],
-    answer: Mapping[str, Any],
+    truth: Json,
+    answer: Json,
     readings: Sequence[Measurement],
     ruler: Ruler,
     protocol: Protocol,
@@ -115,8 +110,8 @@ def scored(
     key = truth["law"] if truth["kind"] == "effect" else truth["kind"]
     rated = Difficulty(0.0, 0.0, (key,), None)
     if truth["kind"] != "none":
-        shift, split = true_shift(truth, ruler, places, labels)
-        rated = difficulty(ruler, protocol, truth["law"], d, places, counts, shift, split)
+        moved = true_shift(truth, ruler, places, labels)
+        rated = difficulty(ruler, protocol, truth["law"], d, places, counts, moved)
     group = rated.group if truth["kind"] == "effect" else (key,)
     diagnosis = answer["diagnosis"]
     p = diagnosis["probabilities"]
@@ -164,7 +159,7 @@ def means(readings: Sequence[Measurement], ruler: Ruler) -> tuple[Array, Array, 
 
 
 def true_shift(
-    truth: Mapping[str, Any], ruler: Ruler, places: Array, labels: Sequence[Label]
+    truth: Json, ruler: Ruler, places: Array, labels: Sequence[Label]
 ) -> tuple[Array, Array]:
     """Shift of ln f by the true effect (n,), and by how much it moves pairs apart (n,), from the
     maker's runs without noise."""
