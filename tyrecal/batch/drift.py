@@ -10,7 +10,7 @@ wins; ``cases``, name to study to quantity to number. A number x has drifted fro
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -73,7 +73,7 @@ def numbers_of(reports: Sequence[Report]) -> Figures:
     return {name: studies for name, studies in kept.items() if studies}
 
 
-def baseline_of(reports: Sequence[Report], before: Mapping[str, Any] | None) -> Json:
+def baseline_of(reports: Sequence[Report], before: Json | None) -> Json:
     """A new baseline, with the tolerances of the one ``before``, and of what that did not have."""
     cases = numbers_of(reports)
     tolerances = dict(before["tolerances"] if before else DEFAULTS)
@@ -115,7 +115,7 @@ def read_baseline(path: Path) -> Json:
     return content
 
 
-def compare(reports: Sequence[Report], baseline: Mapping[str, Any]) -> Json:
+def compare(reports: Sequence[Report], baseline: Json) -> Json:
     """Drift of reports from a baseline: ``compared`` numbers; ``drifted``, the worst first, each
     with case, study, quantity, ``baseline``, ``value`` (None where it is gone), ``allowed``
     (absolute); ``missing_cases``, ``new_cases``; ``missing_studies``, ``new_studies`` [case/study];
@@ -164,7 +164,7 @@ def compare(reports: Sequence[Report], baseline: Mapping[str, Any]) -> Json:
     }
 
 
-def _badness(drift: Mapping[str, Any]) -> float:
+def _badness(drift: Json) -> float:
     """How many times over what is allowed."""
     if drift["value"] is None:
         return float("inf")
@@ -172,7 +172,7 @@ def _badness(drift: Mapping[str, Any]) -> float:
     return change / drift["allowed"] if drift["allowed"] else float("inf")
 
 
-def _named(tolerances: Mapping[str, Any], study: str, quantity: str) -> str:
+def _named(tolerances: Json, study: str, quantity: str) -> str:
     """Name of the tolerance of a quantity, empty where there is none."""
     names = (f"{study}/{quantity}", f"{study}/{quantity.partition(' ')[0]}")
     return next((name for name in names if name in tolerances), "")

@@ -9,8 +9,7 @@ library such as junitparser, which writes any element and holds to neither schem
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from ..files import Json
@@ -21,10 +20,10 @@ OUTCOMES = {"error": "error", "failed": "failure", "skipped": "skipped"}
 UNPRINTABLE = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # in XML 1.0
 
 
-def junit(reports: Sequence[Report], drift: Mapping[str, Any] | None, started: str) -> str:
+def junit(reports: Sequence[Report], drift: Json | None, started: str) -> str:
     """The file's text. started: ISO 8601, for cases that never began."""
     suites = Element("testsuites")
-    drifted: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    drifted: dict[tuple[str, str], list[Json]] = {}
     for each in drift["drifted"] if drift else ():
         drifted.setdefault((each["case"], each["study"]), []).append(each)
     for number, report in enumerate([*reports, *_missing(drift)]):
@@ -73,13 +72,13 @@ def junit(reports: Sequence[Report], drift: Mapping[str, Any] | None, started: s
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(suites, "unicode") + "\n"
 
 
-def _missing(drift: Mapping[str, Any] | None) -> list[Report]:
+def _missing(drift: Json | None) -> list[Report]:
     """Suites for cases that only the baseline has."""
     names = drift["missing_cases"] if drift else ()
     return [{"name": name, "studies": {"baseline": SKIPPED}, "facts": {}} for name in names]
 
 
-def _unlike(drift: Mapping[str, Any] | None, case: str) -> tuple[list[str], list[str]]:
+def _unlike(drift: Json | None, case: str) -> tuple[list[str], list[str]]:
     """Studies of a case that only the baseline has, and lines about what only one side has."""
     if not drift:
         return [], []
@@ -96,9 +95,7 @@ def _unlike(drift: Mapping[str, Any] | None, case: str) -> tuple[list[str], list
     return missing, lines
 
 
-def _outcome(
-    entry: Mapping[str, Any], drifted: Sequence[Mapping[str, Any]] | None
-) -> tuple[str, str, str, str]:
+def _outcome(entry: Json, drifted: Sequence[Json] | None) -> tuple[str, str, str, str]:
     """(element, type, message, text) of a test; the element is empty where all is well."""
     if entry["status"] != "good":
         words = entry["words"] or ""
@@ -109,7 +106,7 @@ def _outcome(
     return "", "", "", ""
 
 
-def drift_line(drift: Mapping[str, Any]) -> str:
+def drift_line(drift: Json) -> str:
     """A number that drifted, in words."""
     if drift["value"] is None:
         return f"{drift['quantity']}: {drift['baseline']:.6g} is gone"

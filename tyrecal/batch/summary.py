@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from ..files import Json
 from .case import Report
@@ -14,9 +13,7 @@ from .case import Report
 VERDICTS = ("error", "failed", "drifted", "good")
 
 
-def summary(
-    studies: Sequence[str], reports: Sequence[Report], drift: Mapping[str, Any] | None
-) -> Json:
+def summary(studies: Sequence[str], reports: Sequence[Report], drift: Json | None) -> Json:
     """Results only: ``studies``; ``counts`` of cases by verdict; ``cases``, each with its
     ``verdict``, provenance and studies; ``baseline``, as `drift.compare` says, or None."""
     drifted = {each["case"] for each in drift["drifted"]} if drift else set()

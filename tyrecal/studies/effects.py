@@ -10,6 +10,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from ..files import Json
 from ..simulate.evaluate.evaluator import Evaluator
 from ..simulate.evaluate.failure import EvaluationFailed
 from ..simulate.modes.label import Label
@@ -158,7 +159,7 @@ class Effects(Result):
     def content(self) -> Any:
         return [each.model_dump(exclude_unset=True) for each in self.rows]
 
-    def stamped(self, provenance: Mapping[str, Any]) -> Self:
+    def stamped(self, provenance: Json) -> Self:
         of = Provenance.model_validate(provenance)
         rows = [each.model_copy(update={"provenance": of}) for each in self.rows]
         return self.model_copy(update={"provenance": of, "rows": rows})

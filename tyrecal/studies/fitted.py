@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from ..errors import InputError
 from ..files import Json, read_json
@@ -80,7 +79,7 @@ def as_fitted(path: Path, case: LoadedCase) -> LoadedCase:
     return overridden(case, read_fitted(path, case)[0])
 
 
-def as_set(case: LoadedCase, settings: Mapping[str, Any], mesh: str | None) -> LoadedCase:
+def as_set(case: LoadedCase, settings: Json, mesh: str | None) -> LoadedCase:
     """The case on a mesh level with what a command set, except for variables. Raises as
     `overridden` does."""
     if mesh is not None:
@@ -110,7 +109,7 @@ def read_result(
     return loaded, result
 
 
-def _difference(theirs: Mapping[str, Any], case: LoadedCase) -> str:
+def _difference(theirs: Json, case: LoadedCase) -> str:
     """Difference between the tyre of the fit and that of the case, as far as it is known."""
     ours = case.overrides
     differences = []
@@ -130,14 +129,14 @@ def _difference(theirs: Mapping[str, Any], case: LoadedCase) -> str:
     )
 
 
-def _made_otherwise(of: Mapping[str, Any], case: LoadedCase) -> list[str]:
+def _made_otherwise(of: Json, case: LoadedCase) -> list[str]:
     mesh = case.case.mesh.level
     if of.get("mesh") == mesh:
         return []
     return [f"the fit was made on the mesh '{of.get('mesh')}', this study uses '{mesh}'"]
 
 
-def is_good(fit: Mapping[str, Any]) -> bool:
+def is_good(fit: Json) -> bool:
     """Whether a fit, the content of fit.json, converged, and its variables left their starts."""
     return bool(fit["converged"] and fit["moved"])
 

@@ -265,7 +265,7 @@ def _split(label: Label, tables: Mapping[float, Mapping[Any, float]]) -> Json:
     }
 
 
-def _splitting(splits: Sequence[Mapping[str, Any]]) -> list[str]:
+def _splitting(splits: Sequence[Json]) -> list[str]:
     """Which doublets' splits grow with the load."""
     if not any(len(each["split_Hz"]) > 1 for each in splits):
         return []

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -187,7 +186,7 @@ def _family(name: str, rises: Mapping[Label, float]) -> Json:
     }
 
 
-def _words(findings: Mapping[str, Any], labels: Sequence[Label]) -> list[str]:
+def _words(findings: Json, labels: Sequence[Label]) -> list[str]:
     names = {str(label): label.display for label in labels}
     modes = list(zip(names.values(), findings["modes"], strict=True))
     span = f"from {findings['from_kPa']:g} to {findings['to_kPa']:g} kPa"

@@ -209,7 +209,7 @@ class Result(Notebook, ResultPart):
         """Content of the JSON file."""
         return self.model_dump(exclude_unset=True, by_alias=True)
 
-    def stamped(self, provenance: Mapping[str, Any]) -> Self:
+    def stamped(self, provenance: Json) -> Self:
         """The result with what it is of."""
         return self.model_copy(update={"provenance": Provenance.model_validate(provenance)})
 
@@ -377,7 +377,7 @@ def in_lines(words: str) -> str:
     return words.replace(", ", "\n")
 
 
-def csv_text(keys: Sequence[str], rows: Iterable[Mapping[str, Any]], end: str = "\n") -> str:
+def csv_text(keys: Sequence[str], rows: Iterable[CsvRow], end: str = "\n") -> str:
     """Rows as CSV, all digits."""
     text = io.StringIO(newline="")
     writer = csv.DictWriter(text, keys, restval="", extrasaction="ignore", lineterminator=end)

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
 from math import isfinite, prod
-from typing import Any
 
 from ..errors import InputError
+from ..files import Json
 from ..simulate.evaluate.evaluator import Evaluator, Question
 from ..simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from ..simulate.modes.find import LabelledModes, find_modes
@@ -117,7 +117,7 @@ def _about_variables(case: LoadedCase) -> list[SweptRange]:
     return ranges
 
 
-def swept_state(case: LoadedCase, ranges: Sequence[SweptRange]) -> dict[str, Any]:
+def swept_state(case: LoadedCase, ranges: Sequence[SweptRange]) -> Json:
     """Part of the state, for `provenance`, that the sweep sets: the ends of the pressure."""
     swept = {each.name: [each.low, each.high] for each in ranges}
     name = pressure_name(case)

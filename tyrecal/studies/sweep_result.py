@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
 from ..errors import InputError
+from ..files import Json
 from ..simulate.evaluate.failure import EvaluationFailed
 from ..simulate.modes.find import LabelledModes
 from ..simulate.modes.label import Label, labelled
@@ -168,7 +169,7 @@ def run(
 ) -> SweepResult:
     """The last design over a grid or, if ``sampled``, ``count`` points (0: ten for each number).
     Raises DeckRefused; the first failure where every point fails."""
-    facts: dict[str, Any] = {}
+    facts: Json = {}
     if sampled:
         points, discrepancy = latin_hypercube(swept, count or DEFAULT_POINTS * len(swept), seed)
         facts = {"seed": seed, "discrepancy": discrepancy}
@@ -265,7 +266,7 @@ def _mode(label: Label, swept: Sequence[SweptRange], rows: Sequence[SweptPoint])
 
 
 def _words(
-    swept: Sequence[SweptRange], modes: Sequence[SweptMode], count: int, facts: dict[str, Any]
+    swept: Sequence[SweptRange], modes: Sequence[SweptMode], count: int, facts: Json
 ) -> list[str]:
     spans = ", ".join(f"{each.name} from {each.low:g} to {each.high:g}" for each in swept)
     how = (
