@@ -31,6 +31,7 @@ from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.values import with_values
 
+from ..benchmarks.blind.benchmark import archive, packed
 from ..chance import Chance, generator
 from ..studies.judge import tyre_told
 from ..studies.judge_section import LINES
@@ -393,12 +394,11 @@ def test_the_mass_is_that_of_the_section_s_own_integral(tmp_path: Path, fenics: 
 
 
 @pytest.mark.parametrize("name", seals())
-def test_recorded_trials_are_those_that_were_sealed(name: str, tmp_path: Path) -> None:
+def test_recorded_trials_are_those_that_were_sealed(name: str) -> None:
     """The truth has its hash, and a trial for each file that is answered."""
-    unpack(name, tmp_path / "trials", tmp_path / "truth")
-    truth = (tmp_path / "truth" / TRUTH).read_bytes()
-    assert sha256(truth).hexdigest() == read_json(tmp_path / "trials" / SEAL)["sha256"]
-    trials = {path.stem for path in (tmp_path / "trials" / "trials").glob("*.csv")}
+    ((_, truth),) = archive("truth", f"{name}/")
+    assert sha256(truth.encode()).hexdigest() == seals()[name]["truth"]
+    trials = {Path(path).stem for path in packed("trials")[0] if path.startswith(f"{name}/trials/")}
     assert trials == {trial["id"] for trial in json.loads(truth)["trials"]}
 
 

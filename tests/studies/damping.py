@@ -231,13 +231,17 @@ def with_damping(
 
 
 def told(problem: InverseProblem, hypotheses: list[Hypothesis]) -> Row:
-    """Verdict and probabilities."""
+    """Verdict, likeliest explanation, and probabilities of `KINDS`."""
     p = probabilities(hypotheses)
     verdict = decide(hypotheses, p, len(problem.places), len(problem.centre))
     ids = [id for ids in KINDS.values() for id in ids]
-    kept = {key: round(each, 5) for key, each in p.items() if each > 1e-3}
     each = {id: float(f"{max(present(p, [id]), 1e-12):.3g}") for id in ids}
-    return {"verdict": verdict.kind, "named": verdict.key, "p": kept, "each": each}
+    return {
+        "verdict": verdict.kind,
+        "named": verdict.key,
+        "top": max(p, key=p.__getitem__),
+        "each": each,
+    }
 
 
 @click.group()
@@ -358,7 +362,7 @@ def scored(record: str = NAME, sets: bool = False) -> dict[str, Row]:
             pairs.setdefault(id, [0, 0])
             pairs[id][0] += right
             pairs[id][1] += 1
-            count["top"] += max(own["p"], key=own["p"].get) == id
+            count["top"] += own["top"] == id
             count["named"] += own["named"] == id
             count["wrong"] += own["named"] is not None and id not in own["named"].split("+")
         result[way] = {**count, "pairs": pairs}

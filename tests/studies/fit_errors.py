@@ -169,15 +169,21 @@ def line_of(case: LoadedCase, random: np.random.Generator, prior: bool) -> dict[
             continue
         off = np.log(v.value / tyre.truth[name]) * v.value
         ratios = [off / v.standard_error, off / v.standard_error_total]
-        variables[name if v.total_holds else name + NOT_HELD] = ratios
+        variables[name if v.total_holds else name + NOT_HELD] = [shortened(x) for x in ratios]
     modes = {}
     if not any(v.at_bound for v in fit.variables.values()):
         predicted = predictions(measured, evaluator, fit)
         modes = {
-            str(label): float(np.log(computed / f)) / error
+            str(label): shortened(float(np.log(computed / f)) / error)
             for label, f, (computed, error) in zip(LABELS, own, predicted, strict=True)
         }
-    return {"chi2_per_dof": fit.chi2_per_dof, "variables": variables, "modes": modes}
+    chi2 = fit.chi2_per_dof and shortened(fit.chi2_per_dof)
+    return {"chi2_per_dof": chi2, "variables": variables, "modes": modes}
+
+
+def shortened(x: float) -> float:
+    """Four digits, of which the table has three."""
+    return float(f"{x:.4g}")
 
 
 def table(lines: Sequence[dict[str, Any]]) -> Iterator[str]:

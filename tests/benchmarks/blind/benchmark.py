@@ -14,10 +14,13 @@ from __future__ import annotations
 
 import csv
 import json
+import lzma
+import re
 import sys
-import tarfile
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+from itertools import pairwise
 from math import comb, log
 from pathlib import Path
 
@@ -35,15 +38,54 @@ FIGURES = (
 SPREAD = 0.5  # standard deviation of ln of a variable before the test
 SIZES = 41  # of an effect, between the given ones
 Row = Mapping[str, str]
+# marks in the text of packed files: a file, a number in full precision, places of a decimal number
+FILE, NEW, PLACES = "\x03", "\x01", "\x10"
+DECIMAL = re.compile("[\x11-\x1f]")
+MARK = re.compile("\x01|\x02([0-9]+);|[\x11-\x1f]")  # \x02: a number that was there, so many back
+
+
+@cache
+def packed(kind: str) -> tuple[dict[str, tuple[str, int, int]], np.ndarray, np.ndarray]:
+    """Files of a kind as `tests/blind/archive.py` packs them: by path the text with marks for its
+    numbers, and how many numbers of both kinds are before it; then these numbers."""
+    content = lzma.decompress((HERE / f"{kind}.xz").read_bytes())
+    head, _, content = content.partition(b"\n")
+    ends = np.cumsum([0, *(int(size) for size in head.split())])
+    text, *planes = (content[a:b] for a, b in pairwise(ends))
+    bytes_ = [np.frombuffer(each, np.uint8).reshape(8, -1).T.tobytes() for each in planes]
+    files, i, j = {}, 0, 0
+    for part in text.decode().split(FILE)[1:]:
+        path, _, body = part.partition("\n")
+        files[path] = body, i, j
+        i += body.count(NEW)
+        j += len(DECIMAL.findall(body))
+    return files, np.frombuffer(bytes_[0], ">f8"), np.frombuffer(bytes_[1], ">i8")
 
 
 def archive(kind: str, start: str = "") -> Iterator[tuple[str, str]]:
     """Path and text of each packed file."""
-    with tarfile.open(HERE / f"{kind}.tar.xz") as packed:
-        for member in packed:
-            stream = packed.extractfile(member) if member.isfile() else None
-            if stream and member.name.startswith(start):
-                yield member.name, stream.read().decode()
+    files, doubles, decimals = packed(kind)
+    for path, (body, i, j) in files.items():
+        if path.startswith(start):
+            yield path, unpacked(body, doubles, decimals, i, j)
+
+
+def unpacked(body: str, doubles: np.ndarray, decimals: np.ndarray, i: int, j: int) -> str:
+    """The text with its numbers, of which its first ones are ``doubles[i]`` and ``decimals[j]``."""
+
+    def number(mark: re.Match[str]) -> str:
+        nonlocal i, j
+        if mark[1]:
+            return repr(float(doubles[i - int(mark[1])]))
+        if mark[0] == NEW:
+            i += 1
+            return repr(float(doubles[i - 1]))
+        value, places = int(decimals[j]), ord(mark[0]) - ord(PLACES)
+        j += 1
+        digits = str(abs(value)).rjust(places + 1, "0")
+        return f"{'-' * (value < 0)}{digits[:-places]}.{digits[-places:]}"
+
+    return MARK.sub(number, body)
 
 
 def read(path: Path) -> list[dict[str, str]]:
