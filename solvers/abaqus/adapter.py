@@ -59,10 +59,8 @@ class Abaqus:
             time_limit_s -= run_job(job, before or None, self.command, options, folder, left)
 
     def read(self, folder: Path) -> dict[str, Any]:
-        """Results as plain data: each mode a real shape on the crown's nodes.
-
-        Raises RunFailed where the results are stale, not whole, or no result.
-        """
+        """Results as plain data: each mode a real shape on the crown's nodes. Raises RunFailed
+        where the results are stale, not whole, or no result."""
         own = own_decks.load(folder)
         run = own or section_jobs(folder)
         table = read_dat(folder / f"{run.last}.dat")

@@ -160,11 +160,9 @@ def _of_own_decks(folder: Path, own: own_decks.DecksOfRun) -> dict[str, Any]:
 
 def _inflated(path: Path) -> tuple[Fields, Array]:
     """The inflated state, and which of its nodes (k,) are at Theta = 0, whose x, y, z are r, theta,
-    z.
-
-    Raises RunFailed (``unstable``) where other nodes do not move as those do: reduced integration
-    lets an element's middle buckle between its faces, which had moved frequencies by up to 5 %.
-    """
+    z. Raises RunFailed (``unstable``) where other nodes do not move as those do: reduced
+    integration lets an element's middle buckle between its faces, which had moved frequencies by up
+    to 5 %."""
     from scipy.spatial import KDTree
 
     fields = read_fields(path)

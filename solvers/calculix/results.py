@@ -29,11 +29,8 @@ class Fields:
 
 def read_eigenvalues(path: Path, diameter: int | None, expected: int | None) -> Array:
     """omega^2 (expected,) in 1/s2, ascending, from the .dat, of a nodal diameter of a sector; None:
-    of a whole tyre, or as many as there are.
-
-    Raises RunFailed: ``no_results`` unless there are as many as asked, ``unstable`` where one is
-    not positive.
-    """
+    of a whole tyre, or as many as there are. Raises RunFailed: ``no_results`` unless there are as
+    many as asked, ``unstable`` where one is not positive."""
     which = "" if diameter is None else f" +{diameter}"
     row = re.compile(rf"^{which} +(\d+)((?: +\S+){{4}}) *$", re.M)
     last = _text(path).rpartition("E I G E N V A L U E   O U T P U T")[2]
@@ -71,12 +68,10 @@ def pairs(eigenvalues: Array, name: str) -> Array:
 
 
 def read_fields(path: Path, static: bool = True) -> Fields:
-    """A whole .frd file, or that of modes alone in it.
+    """A whole .frd file, or that of modes alone in it. Raises RunFailed (``no_results``) where it
+    is cut, doubled or empty.
 
-    Raises RunFailed (``no_results``) where it is cut, doubled or empty.
-
-    Columns have a fixed width and may touch.
-    """
+    Columns have a fixed width and may touch."""
     lines = _text(path).splitlines()
     if not lines or lines[-1].strip() != "9999":
         raise RunFailed("no_results", f"{path.name} is cut off")

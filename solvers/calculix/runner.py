@@ -22,11 +22,9 @@ def run_job(
 ) -> None:
     """Run ``job``.inp of ``folder`` to its end; the results and ``job``.log are next to it.
 
-    ``inputs``: other files that it reads. One thread: two are slower, and results of one are
-    the same to the last bit. Where ccx could not cope with the folder's path it runs elsewhere.
-
-    Raises RunFailed: ``timed_out``, ``no_equilibrium``, ``crashed``.
-    """
+    ``inputs``: other files that it reads. One thread: two are slower, and results of one are the
+    same to the last bit. Where ccx could not cope with the folder's path it runs elsewhere. Raises
+    RunFailed: ``timed_out``, ``no_equilibrium``, ``crashed``."""
     clear(folder, job)
     if _is_safe(folder):
         _run(folder, job, command, time_limit_s)

@@ -32,9 +32,7 @@ def law_of(block: Block) -> tuple[str, int]:
 
 def constants_of(block: Block) -> list[str]:
     """Names of the constants of a *HYPERELASTIC in their order; none if they are not on its lines.
-
-    Raises the error of its place.
-    """
+    Raises the error of its place."""
     if {"TEST DATA INPUT", *LAWS_NOT_READ} & block.parameters.keys():
         return []
     law, order = law_of(block)

@@ -11,10 +11,8 @@ from .text import Block
 
 
 def split_steps(blocks: Iterable[Block]) -> tuple[list[Block], list[list[Block]]]:
-    """The blocks of the model, and those of each step from *STEP to *END STEP.
-
-    Raises the error of a block's place.
-    """
+    """The blocks of the model, and those of each step from *STEP to *END STEP. Raises the error of
+    a block's place."""
     model: list[Block] = []
     steps: list[list[Block]] = []
     is_inside = False

@@ -1,7 +1,4 @@
-"""Keywords that are known by name alone: their parameters and data are not checked.
-
-`rule` explains the notation.
-"""
+"""Keywords known by name alone, parameters and data unchecked; `rule` explains the notation."""
 
 from __future__ import annotations
 

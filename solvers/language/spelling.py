@@ -54,15 +54,9 @@ def full_parameters(keyword: str, given: Iterable[tuple[str, str]]) -> Iterator[
     rule = RULES.get(keyword)
     known = rule.parameters if rule else {}
     for key, value in given:
-        name = _full_parameter(keyword, key)
+        name = full(key, (*known, *EVERYWHERE))
         words = known.get(name, "any")
         if words.islower():  # a kind of value, such as a number or a name
             yield name, value
         else:
             yield name, full(value.strip('"'), words.split("|"))
-
-
-@cache
-def _full_parameter(keyword: str, word: str) -> str:
-    rule = RULES.get(keyword)
-    return full(word, (*(rule.parameters if rule else ()), *EVERYWHERE))

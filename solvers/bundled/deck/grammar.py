@@ -9,15 +9,11 @@ from ...language.text import Block
 
 def check(keywords: list[Block], revolve: bool) -> tuple[list[Block], list[list[Block]]]:
     """Split a job into its model and its steps, refusing what is not honoured. revolve: the job
-    revolves a section job, else it is one.
-
-    Raises DeckError naming the keyword or parameter and its line.
-    """
+    revolves a section job, else it is one. Raises DeckError naming the keyword or parameter and its
+    line."""
     model, steps = split_steps(keywords)
-    for place, blocks in (
-        ("revolve" if revolve else "section", model),
-        *(("step", s) for s in steps),
-    ):
+    places = ["revolve" if revolve else "section", *["step"] * len(steps)]
+    for place, blocks in zip(places, (model, *steps), strict=True):
         for block in blocks:
             check_honoured(block, place)
     formats = [keyword for keyword in keywords if keyword.name == "FILE FORMAT"]

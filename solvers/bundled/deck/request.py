@@ -115,20 +115,20 @@ def read_request(path: Path, jobs: Sequence[str]) -> Request:
         request = TypeAdapter(Request).validate_json(read_deck(path))
     except ValidationError as error:
         raise Refused(f"{path.name}: {_sentence(error)}") from None
-    known, sector, response = [*jobs], request.sector, request.response
+    wrong, known, sector, response = [], [*jobs], request.sector, request.response
     if sector:
         known.append(sector.job)
         if Path(sector.job).name != sector.job or not (path.parent / f"{sector.job}.inp").is_file():
-            words = f"sector.job is {sector.job}, must be a job with its deck in the same folder"
-            raise Refused(f"{path.name}: {words}")
+            right = "must be a job with its deck in the same folder"
+            wrong.append(f"sector.job is {sector.job}, {right}")
     if response and not response.lowest_Hz < response.highest_Hz:
-        words = f"response.highest_Hz is {response.highest_Hz}, must be above lowest_Hz"
-        raise Refused(f"{path.name}: {words}")
+        wrong.append(f"response.highest_Hz is {response.highest_Hz}, must be above lowest_Hz")
     for variable, rows in request.sensitivities.items():
-        for i, (job, *_) in enumerate(rows):
-            if job not in known:
-                words = f"sensitivities.{variable}[{i}][0] is {job}, must be a job: "
-                raise Refused(f"{path.name}: {words}{' or '.join(known)}")
+        for i in (i for i, (job, *_) in enumerate(rows) if job not in known):
+            right = f"must be a job: {' or '.join(known)}"
+            wrong.append(f"sensitivities.{variable}[{i}][0] is {rows[i][0]}, {right}")
+    if wrong:
+        raise Refused(f"{path.name}: {wrong[0]}")
     return request
 
 

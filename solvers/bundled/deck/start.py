@@ -26,9 +26,7 @@ COMMENT = re.compile(r"^\*\* Newton's method starts from (\S+), SHA-256 ([0-9a-f
 
 @dataclass(frozen=True)
 class PressedStart:
-    """State of another tyre of the same mesh on the road, which is a good start: its decks by file,
-    deck numbers (n,), displacements (n, 3) before any load and (ring, n, 3) on the road, of rings
-    all round, m."""
+    """State of another tyre of the same mesh on the road, which is a good start."""
 
     texts: Mapping[str, str]  # its decks, file name to text
     nodes: Array  # (n,) deck numbers
@@ -50,10 +48,8 @@ def write_pressed_start(folder: Path, shape: PressedStart) -> str:
 
 
 def read_pressed_start(folder: Path, text: str) -> PressedStart | None:
-    """The tyre on the road that a deck's ``text`` names, None where it names none.
-
-    Raises Refused where it is not there, or another one is; OSError.
-    """
+    """The tyre on the road that a deck's ``text`` names, None where it names none. Raises Refused
+    where it is not there, or another one is; OSError."""
     named = COMMENT.search(text)
     if not named:
         return None
@@ -80,10 +76,8 @@ def write_start(folder: Path, shape: Array) -> str:
 
 
 def read_start(folder: Path, text: str) -> Array | None:
-    """The shape (n, 4) that a deck's ``text`` names, None where it names none.
-
-    Raises Refused where it is not there, or another one is; OSError.
-    """
+    """The shape (n, 4) that a deck's ``text`` names, None where it names none. Raises Refused where
+    it is not there, or another one is; OSError."""
     comment = COMMENT.search(text)
     if not comment:
         return None

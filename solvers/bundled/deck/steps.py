@@ -38,10 +38,7 @@ class DeckStep:
 
 
 class Deck:
-    """A section job, and the job that revolves it or None, as keyword blocks.
-
-    Raises DeckError.
-    """
+    """A section job, and the job that revolves it or None, as keyword blocks. Raises DeckError."""
 
     def __init__(self, texts: dict[str, str], job: str, oldjob: str | None):
         self.jobs = [oldjob, job] if oldjob else [job]
@@ -141,12 +138,12 @@ def _procedure(block: list[Block], on_road: bool) -> Block:
 def _check_transfer(section: list[Block], steps: list[DeckStep], revolve: list[Block]) -> None:
     """The revolve job takes over the end of the section job's only step, and holds its rim."""
     blocks = {k.name: k for k in revolve}
-    for needed in ("SYMMETRIC MODEL GENERATION", "SYMMETRIC RESULTS TRANSFER"):
+    names = "SYMMETRIC MODEL GENERATION", "SYMMETRIC RESULTS TRANSFER"
+    for needed in names:
         if needed not in blocks:
             place = revolve[0].place if revolve else WHOLE_DECK
             raise DeckError(place, f"a job that runs on another one needs *{needed}")
-    generation = blocks["SYMMETRIC MODEL GENERATION"]
-    transfer = blocks["SYMMETRIC RESULTS TRANSFER"]
+    generation, transfer = (blocks[name] for name in names)
     if "REVOLVE" not in generation.parameters:
         raise generation.refused("must REVOLVE the section")
     segments = [row.number(0) for row in generation.rows[2:]]

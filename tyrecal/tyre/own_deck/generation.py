@@ -9,6 +9,7 @@ import numpy as np
 from .scope import (
     BEGINNINGS,
     MOST,
+    Array,
     Members,
     MeshTable,
     Point,
@@ -81,9 +82,8 @@ def _ngen(scope: Scope, block: Block) -> Iterator[int]:
             raise block.refused("a point of a curve needs LINE=C", row)
 
 
-def _between(
-    scope: Scope, block: Block, row: Row, a: np.ndarray, b: np.ndarray, share: float
-) -> np.ndarray:
+def _between(scope: Scope, block: Block, row: Row, a: Array, b: Array, share: float) -> Array:
+    """The point at a share of a straight line, or of an arc, from a to b."""
     if block.get("LINE") != "C":
         return a + share * (b - a)
     centre = scope.nodes.get(row.integer(3)) if row.text(3) else (row.number(4), row.number(5))

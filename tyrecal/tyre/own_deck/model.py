@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from .assembly import Assembly, collect
 from .classify import LOADS, ClassifiedDeck
 from .constraints import Constraints, EmbeddedElements, lines_of_the_other_half
@@ -249,19 +247,15 @@ class _Builder:
         assert self.made.reflect
         root, mirror = self.root, mirror_of(self.made.reflect)
         used = {n for e in root.elements.values() for n in e.nodes}
+        there = {n: mirror(root.nodes[n]) for n in used}
         shift = max(root.nodes)
         image = {n: n if self.tied.on_plane(root.nodes[n]) else n + shift for n in used}
         if all(n != m for n, m in image.items()):
             raise self.made.reflect.refused("no node is on the line: the halves do not meet")
-        sides = {
-            np.sign(round((mirror(root.nodes[n])[1] - root.nodes[n][1]) / self.tied.near))
-            for n in used
-        } - {0}
-        if len(sides) > 1:
+        steps = [round((there[n][1] - root.nodes[n][1]) / self.tied.near) for n in used]
+        if min(steps) < 0 < max(steps):
             raise self.made.reflect.refused("nodes are on both sides of the line: it is no half")
-        for n, m in image.items():
-            if n != m:
-                root.nodes[m] = mirror(root.nodes[n])
+        root.nodes |= {m: there[n] for n, m in image.items() if n != m}
         further = max(root.elements)
         both_faces = list(pressed)
         for number, element in list(root.elements.items()):

@@ -1,7 +1,5 @@
 """The numbers of a deck that may be set: by a mark `{{ NAME }}` in its text, or by a path that
-names the place, as in `material RUBBER / HYPERELASTIC / C10`.
-
-Values stand in the deck's own units.
+names the place, as in `material RUBBER / HYPERELASTIC / C10`; values are in the deck's own units.
 """
 
 from __future__ import annotations

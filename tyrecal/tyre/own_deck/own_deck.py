@@ -123,9 +123,8 @@ class OwnDeck:
         return self._models[key]
 
     def flat(self, numbers: Mapping[str, float], gauges: Gauges = ()) -> SolverDeck:
-        """The flat deck with numbers set and ``gauges`` of its parts, in SI units.
-
-        Raises OwnDeckError."""
+        """The flat deck with numbers set and ``gauges`` of its parts, in SI units. Raises
+        OwnDeckError."""
         deck = classify(self.with_numbers(numbers))
         model = thickened(self.model(deck), gauges) if gauges else self.model(deck)
         return translate(deck, model, UNIT_LENGTH[self.units], UNIT_MASS[self.units])

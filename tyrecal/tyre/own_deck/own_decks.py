@@ -20,7 +20,6 @@ JOB_FILE = re.compile(r"[A-Za-z0-9_\-]{1,60}\.inp", re.IGNORECASE)  # a file tha
 PRESSURE_MARK = "pressure"  # filled with the case's pressure
 MARK_IT = f"write {{{{ {PRESSURE_MARK} }}}} in its place"
 PRESSURE_DOF = "8"  # of a fluid cavity's reference node
-NAMES_OF_SETS = ("NSET", "NEW SET")
 NO_PRESSURE = "HP", "NU"  # in the names of loads that differ from place to place
 OF_VOLUMES = re.compile(r"C3D|CCL|DC3D|(SF)?M(3D|CL)|S\d")  # types of elements in 3-D
 CONTINUES = {"SYMMETRIC MODEL GENERATION", "SYMMETRIC RESULTS TRANSFER", "IMPORT"}
@@ -78,7 +77,6 @@ class OwnDecks:
     @cached_property
     def jobs(self) -> list[tuple[str, str]]:
         """Each job and the one before it that it goes on from, "" where it is whole by itself.
-
         Raises OwnDeckError where the first goes on from a job that is not among them."""
         jobs: list[tuple[str, str]] = []
         for deck in self.decks:
@@ -127,7 +125,8 @@ class OwnDecks:
         """
         if any(PRESSURE_MARK in deck.marks for deck in self.decks):
             return []
-        ends = _ends_of_amplitudes(self.blocks)
+        tables = (b for b in self.blocks if b.name == "AMPLITUDE" and b.rows)
+        ends = {b.get("NAME"): [*filter(None, b.rows[-1].fields), ""][-2] for b in tables}
         loads = [(deck, *place) for deck in self.decks for place in _pressures(deck.blocks, ends)]
         largest = max((abs(value) for *_, value in loads), default=0.0)
         if not largest:
@@ -177,7 +176,7 @@ class OwnDecks:
     @property
     def node_sets(self) -> list[str]:
         """Names of all node sets."""
-        given = (block.get(key) for block in self.blocks for key in NAMES_OF_SETS)
+        given = (block.get(key) for block in self.blocks for key in ("NSET", "NEW SET"))
         return list(dict.fromkeys(name for name in given if name))
 
 
@@ -192,17 +191,11 @@ def _restarts(block: Block) -> bool:
     return block.name == "RESTART" and "READ" in block.parameters
 
 
-def _ends_of_amplitudes(blocks: Sequence[Block]) -> dict[str, str]:
-    """The last value of each *AMPLITUDE, as it stands."""
-    tables = (block for block in blocks if block.name == "AMPLITUDE" and block.rows)
-    return {b.get("NAME"): [*filter(None, b.rows[-1].fields), ""][-2] for b in tables}
-
-
 def _pressures(
     blocks: Sequence[Block], ends: Mapping[str, str]
 ) -> Iterator[tuple[Row, int, float]]:
-    """Row, field and number of each pressure. Raises OwnDeckError where that is not the pressure
-    that acts at a step's end."""
+    """Row, field and number of each pressure; ``ends``: last values of amplitudes, as they stand.
+    Raises OwnDeckError where that is not the pressure that acts at a step's end."""
     for block in blocks:
         for row in block.rows:
             kind = row.name(1)

@@ -10,6 +10,7 @@ import numpy as np
 
 from .text import Block, Row, is_label, language
 
+Array = np.ndarray
 Point = tuple[float, float]  # r, z in the deck's unit of length
 Members = Callable[[], list[int]]
 Content = TypeVar("Content")
@@ -99,7 +100,7 @@ class Scope:
         """Nodes of the solids."""
         return {n for e in self.elements.values() if e.is_solid for n in e.nodes}
 
-    def place(self, block: Block, row: Row | None, number: int, place: Point | np.ndarray) -> None:
+    def place(self, block: Block, row: Row | None, number: int, place: Point | Array) -> None:
         """A new node."""
         point, old = (float(place[0]), float(place[1])), self.nodes.get(number)
         if old is not None and max(abs(old[0] - point[0]), abs(old[1] - point[1])) > 0:
@@ -165,14 +166,14 @@ def faces_of(element: Element) -> Iterator[tuple[str, tuple[int, ...]]]:
         yield f"S{i + 1}", (ends[0], *middle, ends[1])
 
 
-def corner_areas(element: Element, points: Mapping[int, Point]) -> np.ndarray:
+def corner_areas(element: Element, points: Mapping[int, Point]) -> Array:
     """Twice the area of the triangle at each corner of a solid: all positive, or it folds over."""
     X = np.array([points[n] for n in element.nodes[: CORNERS_OF[len(element.nodes)]]])
     along, back = np.roll(X, -1, 0) - X, np.roll(X, 1, 0) - X
     return np.asarray(along[:, 0] * back[:, 1] - along[:, 1] * back[:, 0])
 
 
-def along_arc(a: np.ndarray, b: np.ndarray, centre: np.ndarray, share: float) -> np.ndarray:
+def along_arc(a: Array, b: Array, centre: Array, share: float) -> Array:
     """The point at a share of the shorter arc from a to b."""
     u, v = a - centre, b - centre
     angle = np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v) * share
@@ -180,7 +181,7 @@ def along_arc(a: np.ndarray, b: np.ndarray, centre: np.ndarray, share: float) ->
     return np.asarray(centre + np.array([cos * u[0] - sin * u[1], sin * u[0] + cos * u[1]]))
 
 
-def nearest(X: np.ndarray, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def nearest(X: Array, pieces: Array) -> tuple[Array, Array]:
     """Distance (n,) of points X (n, 2) to the nearest piece (k, 2, 2), from start to end, and unit
     normal (n, 2) there, to the right of the piece; of an end that pieces share, their normals'
     mean."""

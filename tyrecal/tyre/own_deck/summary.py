@@ -12,12 +12,16 @@ from .own_deck import OwnDeck
 from .solver_deck import SolverDeck
 from .text import names_of
 
+LAWS = ("ELASTIC", "HYPERELASTIC", "VISCOELASTIC")
+
 
 def contents(deck: OwnDeck, flat: SolverDeck) -> Json:
     """The data."""
     mesh, model = flat.mesh, flat.model
     crown = np.array([mesh.nodes[n] for n in mesh.crown])
     held = np.array([mesh.nodes[n] for n in mesh.rim])
+    steps = flat.blocks.inflation[0], *flat.blocks.later
+    inflation, *later = (step.parameters.get("NAME") or "without a name" for step in steps)
     return {
         "units": deck.units,
         "nodes": len(mesh.nodes),
@@ -41,7 +45,7 @@ def contents(deck: OwnDeck, flat: SolverDeck) -> Json:
         "rim": {"nodes": len(mesh.rim), "radius_m": float(held[:, 0].max())},
         "cavity": {"surface": model.cavity_name, "faces": len(mesh.cavity)},
         "pressure_kPa": flat.pressure_Pa / 1e3,
-        "inflation_step": step_name(flat.blocks.inflation[0].parameters.get("NAME", "")),
+        "inflation_step": inflation,
         "static_moduli": flat.static_moduli,
         "crown": {
             "nodes": len(crown),
@@ -52,11 +56,8 @@ def contents(deck: OwnDeck, flat: SolverDeck) -> Json:
         "marks": list(deck.marks),
         "left_out": list(model.left_out),
         "passed_over": names_of(flat.blocks.passed),
-        "later_steps": [step_name(block.parameters.get("NAME", "")) for block in flat.blocks.later],
+        "later_steps": later,
     }
-
-
-LAWS = ("ELASTIC", "HYPERELASTIC", "VISCOELASTIC")
 
 
 def laws(flat: SolverDeck, material: str) -> list[str]:
@@ -65,11 +66,6 @@ def laws(flat: SolverDeck, material: str) -> list[str]:
     (block,) = (b for b in blocks.model if (b.name, b.get("NAME")) == ("MATERIAL", material))
     laws = (b for b in blocks.options[block] if b.name in LAWS)
     return [", ".join((b.name.lower(), *map(str.lower, b.parameters))) for b in laws]
-
-
-def step_name(name: str) -> str:
-    """A step's name, for words."""
-    return name or "without a name"
 
 
 def words(content: Json, mass_kg: float) -> Iterator[str]:
