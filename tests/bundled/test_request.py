@@ -42,6 +42,12 @@ def refusal(folder: Path, request: Any, capsys: pytest.CaptureFixture[str]) -> s
     return captured.err
 
 
+def response(point: list[Any]) -> dict[str, Any]:
+    """A request of one, to a force at a point: Theta in degrees and a direction."""
+    band = {"lowest_Hz": 10.0, "highest_Hz": 200.0, "lines": 5, "patch_m": 0.02, "modes": None}
+    return {**band, "excite": [point], "respond": [[180.0, "lateral"]]}
+
+
 @pytest.mark.parametrize(
     ("request_", "words"),
     [
@@ -84,6 +90,7 @@ def refusal(folder: Path, request: Any, capsys: pytest.CaptureFixture[str]) -> s
         ),
         ({"cavity": {"material": "A", "surfaces": 1}}, "cavity.surfaces is 1, must be a valid"),
         ({"cavity": {"material": "A", "surfaces": [None]}}, "cavity.surfaces[0] is null"),
+        ({"response": response([0.0, "radial", 0.1])}, "a point is [angle in degrees, direction]"),
         ({"sector": {"job": "inflate"}}, "sector.width_deg is missing"),
         ({"sector": {"job": "nix", "width_deg": 1}}, "sector.job is nix, must be a job"),
         (
@@ -120,6 +127,9 @@ def test_a_wrong_request_is_one_sentence(
         ({"sensitivities": {"A": [["modes", 1, 0, 1.1e300]]}}, False),
         ({"sensitivities": {"A": [["modes", 1, 0, True]]}}, False),
         ({"sensitivities": {"A": [["modes", 1, 0, 1.0, 1.0]]}}, False),
+        ({"response": response([0.0, "radial"])}, True),
+        ({"response": response([0.0, "radial", 0.1])}, False),
+        ({"response": response([0.0])}, False),
         ({"own_frequency": True}, True),
         ({"cavity": None}, True),
         ({"cavity": {"material": "AIR", "surfaces": ["A", "B"]}}, True),

@@ -247,6 +247,48 @@ def test_half_a_tyre_is_named_with_the_lines_that_make_it_whole(held: str, tmp_p
     assert read_own_deck(path).flat({}).text == whole
 
 
+def test_a_half_is_mirrored_in_the_model_not_in_a_part(tmp_path: Path) -> None:
+    path, whole = tmp_path / "tyre.inp", own_decks.half()
+    path.write_text(whole)
+    flat = read_own_deck(path).flat({})
+    head, mirror, rest = re.split(r"(\*SYMMETRIC.*\n.*\n)", whole)
+    sections, step = rest[: rest.index("*MATERIAL")], rest[rest.index("*MATERIAL") :]
+    step = re.sub("^(900001|MIDDLE|CAVITY),", r"I.\1,", step, flags=re.M)
+    part = head.replace("*HEADING\na tyre\n", "*PART, NAME=P\n")
+    end = "*END PART\n*ASSEMBLY, NAME=A\n*INSTANCE, NAME=I, PART=P\n*END INSTANCE\n*END ASSEMBLY\n"
+    path.write_text(part + sections + end + mirror + step)
+    assert read_own_deck(path).flat({}).text == flat.text
+    path.write_text(part + mirror + sections + end + step)
+    line = 1 + part.count("\n")
+    with pytest.raises(OwnDeckError, match=rf"line {line}: \*SYMMETRIC MODEL GENERATION: belongs"):
+        read_own_deck(path).flat({})
+
+
+@pytest.mark.parametrize(
+    ("more", "refused"),
+    [("", ""), (", 0.", ""), (", 0.5", "third"), (", 0., 0.5", r"'0\.5' is not")],
+)
+def test_a_node_has_two_coordinates(more: str, refused: str, tmp_path: Path) -> None:
+    """A third one of 0, as of CAE, is the same node; one that is not, or a fourth, is refused."""
+    path, text = tmp_path / "tyre.inp", own_decks.plain()
+    path.write_text(text)
+    whole = read_own_deck(path).flat({}).text
+    path.write_text(re.sub("^(1003, .*)$", rf"\g<1>{more}", text, count=1, flags=re.M))
+    line = 1 + text[: text.index("\n1003, ")].count("\n") + 1
+    if refused:
+        with pytest.raises(OwnDeckError, match=rf"line {line}: \*NODE: .*{refused}"):
+            read_own_deck(path).flat({})
+    else:
+        assert read_own_deck(path).flat({}).text == whole
+
+
+def test_nodes_are_not_filled_in_steps_of_0(tmp_path: Path) -> None:
+    path, text = tmp_path / "tyre.inp", own_decks.plain()
+    path.write_text(text.replace("*RIGID BODY", "*NFILL\nRIM, RIM, 5, 0\n*RIGID BODY"))
+    with pytest.raises(OwnDeckError, match=r"\*NFILL: 5 steps of 0"):
+        read_own_deck(path).flat({})
+
+
 def test_what_a_step_releases_is_free(tmp_path: Path) -> None:
     """By OP=NEW, in the step that inflates or in one before."""
     text = own_decks.plain()
