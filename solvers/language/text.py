@@ -40,10 +40,8 @@ class Place(NamedTuple):
 
 
 class DeckError(Refused):
-    """A deck that cannot be honoured, or is none; the sentence begins with file and line.
-
-    place: its line is 0 where no single line is to blame.
-    """
+    """A deck that cannot be honoured, or is none; the sentence begins with file and line. The line
+    of ``place`` is 0 where no single line is to blame."""
 
     def __init__(self, place: Place, message: str):
         super().__init__(f"{place}: {message}")
@@ -72,14 +70,11 @@ def is_label(text: str) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """A data line, including the lines that continue it.
-
-    tangents: by a field's index, d number / d variable if a slope is computed.
-    """
+    """A data line, including the lines that continue it."""
 
     place: Place
     line: str
-    tangents: Mapping[int, float] | None = None
+    tangents: Mapping[int, float] | None = None  # by field: d number / d variable of a slope
 
     @cached_property
     def fields(self) -> tuple[str, ...]:

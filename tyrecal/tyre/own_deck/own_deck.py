@@ -143,8 +143,7 @@ def recognised(blocks: Sequence[Block]) -> Units:
     """The units that the densities are in. Raises OwnDeckError where these do not determine
     them."""
     rows = [(b, b.rows[0]) for b in blocks if b.name == "DENSITY" and b.rows]
-    plain = [(b, row) for b, row in rows if not numbers_of.GIVEN.search(row.text(0))]
-    values = [(b, row.number(0)) for b, row in plain]
+    values = [(b, row.number(0)) for b, row in rows if not numbers_of.GIVEN.search(row.text(0))]
     outside = {
         units: [b for b, value in values if not low <= value <= high]
         for units, (low, high) in DENSITIES.items()

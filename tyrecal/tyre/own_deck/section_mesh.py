@@ -94,7 +94,6 @@ def section_mesh(flat: SolverDeck) -> OwnDeckMesh:
     """The mesh of a flat deck."""
     mesh = flat.mesh
     number = {name: k for k, name in enumerate(dict.fromkeys(flat.materials))}
-    lines = {ply.set_name: ply.elements for ply in flat.plies}
     return OwnDeckMesh(
         quadratic=any(len(nodes) in (6, 8) for nodes in mesh.solids.values()),
         nodes=mesh.nodes,
@@ -102,7 +101,7 @@ def section_mesh(flat: SolverDeck) -> OwnDeckMesh:
         cells={
             n: (flat.materials[k], number[flat.materials[k]]) for n, k in mesh.section_of.items()
         },
-        cords={set_name: {n: mesh.plies[n] for n in own} for set_name, own in lines.items()},
+        cords={ply.set_name: {n: mesh.plies[n] for n in ply.elements} for ply in flat.plies},
         rim=list(mesh.rim),
         inner=[face[0] for face in mesh.cavity],
         outer=[face[0] for face in mesh.tread],

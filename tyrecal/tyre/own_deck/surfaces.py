@@ -17,10 +17,8 @@ Face = tuple[int, str, tuple[int, ...]]
 
 
 def surface_faces(made: Assembly, name: str, block: Block, row: Row | None = None) -> list[Face]:
-    """Faces of a surface. A ply (a line element) is its own face, SPOS or SNEG.
-
-    ``block`` and ``row`` use the surface: an error names their place. Raises OwnDeckError.
-    """
+    """Faces of a surface; a ply (a line element) is its own face, SPOS or SNEG. Raises OwnDeckError
+    at ``block`` and ``row``, which use the surface."""
     if name not in made.surfaces:
         raise block.refused(f"the surface {name} is not defined", row)
     surface, prefix = made.surfaces[name]
