@@ -38,6 +38,7 @@ from tyrecal.studies.inference.form_error import form_error
 from tyrecal.studies.inference.observations import Observable, Observations
 from tyrecal.studies.inference.tyre_model import TyreModel
 from tyrecal.studies.inference.uncertainties import sources
+from tyrecal.studies.result import StudyInput
 from tyrecal.studies.sample.box import sample_box
 from tyrecal.studies.sample.posterior import Posterior
 from tyrecal.studies.sample.predict import conditional
@@ -170,7 +171,7 @@ def cost(times: int) -> None:
 
         Evaluator.answer_all = timed  # type: ignore[assignment,method-assign]
         began = time.process_time()
-        sample = run(CASE, evaluator, readings, 100_000)
+        sample = run(StudyInput(CASE, evaluator, {}), readings, 100_000)
         rest = time.process_time() - began - spent
         Evaluator.answer_all = answer_all  # type: ignore[method-assign]
         began = time.process_time()

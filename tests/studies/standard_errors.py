@@ -36,6 +36,7 @@ from tyrecal.studies.diagnose.calibrated import calibrated_variables
 from tyrecal.studies.fit.problem import Point, Problem
 from tyrecal.studies.fit.total_error import TotalError, total_error
 from tyrecal.studies.fit.uncertainty import uncertainty
+from tyrecal.studies.result import StudyInput
 from tyrecal.studies.sample.study import run as sample
 from tyrecal.tyre.case import LoadedCase
 
@@ -90,7 +91,7 @@ def compared(J: Array, scatter: Array, sigma: Array, total: Array) -> BothErrors
 
 def sampled_errors(case: LoadedCase, seed: int) -> tuple[Array, Array]:
     """Standard deviations (v,) of x by `sample`: linear, and of its draws."""
-    result = sample(case, Evaluator(TyreDesign(case)), None, DRAWS, seed)
+    result = sample(StudyInput(case, Evaluator(TyreDesign(case)), {}), None, DRAWS, seed)
     low, high = np.quantile(result.drawn.chains.flat, [0.05, 0.95], axis=0)
     return np.sqrt(np.diag(result.drawn.covariance)), (high - low) / (2 * QUANTILE_90)
 

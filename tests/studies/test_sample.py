@@ -15,6 +15,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.modes.label import Label, labelled
 from tyrecal.studies.inference.observations import Observable, Observations
+from tyrecal.studies.result import StudyInput
 from tyrecal.studies.sample.box import sample_box
 from tyrecal.studies.sample.predict import conditional
 from tyrecal.studies.sample.result import draws_csv, result
@@ -49,7 +50,7 @@ def test_a_tyre_on_two_rims_is_sampled_and_predicted_on_both() -> None:
         readings.append(
             Measurement("frequency_Hz", label, "", 240.0, 0.0, hertz, 0.005 * hertz, rim=rim)
         )
-    sample = run(case, evaluator, readings, 2000, at_kPa=(240.0,))
+    sample = run(StudyInput(case, evaluator, {}), readings, 2000, at_kPa=(240.0,))
     summary = result(sample, 0)
     assert [*summary.variables] == ["C10"] and summary.left_out == ["loss"]
     assert summary.variables["C10"].low < 1e6 < summary.variables["C10"].high

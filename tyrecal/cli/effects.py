@@ -65,6 +65,7 @@ def command(
     from ..simulate.evaluate.solver import installed
     from ..studies.effects import CatalogueEntry, run
     from ..studies.run_plan import PlannedState, plan_evaluations
+    from ..studies.signature import Plain
     from ..tyre.effects import IDS, catalogue
     from ..tyre.number_units import EFFECT_PATH, unit_of
     from ..tyre.state import pressure_name
@@ -122,9 +123,8 @@ def command(
         terminal.note(runs_in_words(evaluator, values, runs, study.jobs))
     with terminal.progress("effects") as bar:
         evaluator.on_progress = bar.at
-        result, signatures = run(
-            loaded, evaluator, values, kPa, able, size, study.jobs, study.notify
-        )
+        plain = Plain(loaded, evaluator, values, kPa, study.jobs)
+        result, signatures = run(plain, able, size, study.jobs, study.notify)
     figures = {}
     if pictures:
         from ..report.signature import draw_signature

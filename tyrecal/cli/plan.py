@@ -76,18 +76,17 @@ def command(
     """
     from ..studies.plan.result import PLAN_STAGES
     from ..studies.plan.study import plan, planned
+    from ..studies.result import StudyInput
 
     loaded, _ = study.load(case, assignments)
     evaluator = study.evaluator(loaded)
     runs = planned(loaded, evaluator, sensors, pressures, study.jobs)
     run = study.run(loaded, "plan", evaluator, plan=runs)
-    given = dict(map(_step, steps))
+    given, step_hours = StudyInput(loaded, evaluator, {}, jobs=study.jobs), dict(map(_step, steps))
     with study.terminal.progress("plan", PLAN_STAGES) as bar:
         evaluator.on_progress = bar.at
-        noise, jobs = noise_percent / 100, study.jobs
-        result = plan(
-            loaded, evaluator, hours, sensors, pressures, noise, given, jobs, stage=bar.begin
-        )
+        noise = noise_percent / 100
+        result = plan(given, hours, sensors, pressures, noise, step_hours, bar.begin)
     if not pictures:
         return study.present(run, result, {})
     from ..report.plan import figures

@@ -64,6 +64,7 @@ def command(
     tyrecal sample my.yaml --measured measured.csv --at-kPa 180 --at-kPa 260 --jobs 2
     """
     from ..report.table import shown
+    from ..studies.result import StudyInput
     from ..studies.sample.chains import needs_emcee
     from ..studies.sample.result import result
     from ..studies.sample.study import (
@@ -94,8 +95,8 @@ def command(
     output = study.run(loaded, "sample", evaluator, measured=files, plan=plan, **states)
     with terminal.progress("sample", SAMPLE_STAGES) as bar:
         evaluator.on_progress = bar.at
-        run_options = study.jobs, bar.begin, terminal.note
-        sample = run(loaded, evaluator, readings, draws, seed, at_kPa, *run_options)
+        given = StudyInput(loaded, evaluator, {}, jobs=study.jobs)
+        sample = run(given, readings, draws, seed, at_kPa, bar.begin, terminal.note)
     summary = output.write(result(sample, seed))
     if pictures:
         from ..report.sample import figures

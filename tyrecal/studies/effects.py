@@ -11,7 +11,6 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ..files import Json
-from ..simulate.evaluate.evaluator import Evaluator
 from ..simulate.evaluate.failure import EvaluationFailed
 from ..simulate.modes.label import Label
 from ..tyre.case import LoadedCase
@@ -233,29 +232,26 @@ class Effects(Result):
 
 
 def run(
-    case: LoadedCase,
-    evaluator: Evaluator,
-    values: Mapping[str, float],
-    pressures_kPa: Sequence[float],
+    plain: Plain,
     entries: Sequence[CatalogueEntry],
     size: float | None = None,
     jobs: int = 1,
     notify: Notify = silent,
 ) -> tuple[Effects, list[Signature]]:
-    """Each effect on the tyre of ``values``: the result, and what it is made of.
+    """Each effect on the ``plain`` tyre: the result, and what it is made of.
 
-    size: of all, None: each at the end of its range (`stated_size`). Raises what
-    ``Evaluator.evaluate`` does for the plain tyre.
+    size: of all, None: each at the end of its range (`stated_size`).
     """
-    plain = Plain(case, evaluator, values, pressures_kPa, jobs)
-    sizes = {each.id: stated_size(each.id, case) if size is None else size for each in entries}
+    sizes = {
+        each.id: stated_size(each.id, plain.case) if size is None else size for each in entries
+    }
     rows, failed, signatures = [], [], []
     for entry, signature in zip(entries, plain.signatures(sizes, jobs), strict=True):
         if isinstance(signature, EvaluationFailed):
             failed.append(Failed(design=entry.id, cause=signature.cause, words=signature.words))
             notify(entry.id, signature)
             continue
-        rows.append(_effect_result(entry, signature, values))
+        rows.append(_effect_result(entry, signature, plain.values))
         signatures.append(signature)
         notify(entry.id, None)
     return Effects(rows=rows, failed=failed), signatures

@@ -101,16 +101,8 @@ class PlanResult(Result):
         step_hours: Mapping[str, float] | None = None,
     ) -> PlanResult:
         """Plan a test of the case, of at most so many hours, with so many sensors."""
-        result: PlanResult = named(PLAN)(
-            given.case,
-            given.evaluator,
-            hours,
-            sensors,
-            pressures_kPa,
-            noise_percent / 100,
-            step_hours or {},
-            given.jobs,
-        )
+        noise, hours_by_step = noise_percent / 100, step_hours or {}
+        result: PlanResult = named(PLAN)(given, hours, sensors, pressures_kPa, noise, hours_by_step)
         return given.stamped(result)
 
     @property

@@ -17,6 +17,7 @@ from ..diagnose.next_measurement import STEP_HOURS
 from ..inference.expansion import first_points
 from ..inference.run_estimate import estimate
 from ..inference.separability import APART, GRID_POINTS, VISIBLE, smallest
+from ..result import StudyInput
 from ..run_plan import RunPlan
 from ..sensors import SensorsResult, place
 from ..variable import read_variables
@@ -40,17 +41,16 @@ SENSOR_AXES = "rtz"  # that planned sensors measure
 
 
 def plan(
-    case: LoadedCase,
-    evaluator: Evaluator,
+    given: StudyInput,
     hours: float | None,
     sensors: int | None,
     pressures_kPa: Sequence[float],
     noise: float,
     step_hours: Mapping[str, float],
-    jobs: int = 1,
     stage: Callable[[str], None] = lambda stage: None,
 ) -> PlanResult:
     """The plan of a case; see `PlanResult.run`. Raises InputError, EvaluationFailed."""
+    case, evaluator = given.case, given.evaluator
     for name in step_hours:
         if name not in STEP_HOURS:
             raise InputError(f"'{name}' is no step{suggestion(name, STEP_HOURS)}")
@@ -61,7 +61,7 @@ def plan(
     seen = [label for label in labels if label not in confused]
     if not seen:
         raise InputError(f"{sensors} sensors distinguish none of the modes: give more --sensors")
-    lab = laboratory(case, evaluator, seen, pressures_kPa, noise, steps, jobs)
+    lab = laboratory(case, evaluator, seen, pressures_kPa, noise, steps, given.jobs)
     stage(PLAN_STAGES[1])
     linear, limit = lab.linear, np.inf if hours is None else hours
     done = order(lab, linear.draw(TRIED_TYRES, np.random.default_rng(0)), limit)

@@ -167,7 +167,7 @@ class SampleResult(Result):
         """Draw the variables under the case's targets, or under a file of measurements."""
         case, file = given.case, measured or given.case.measured
         readings = measured_readings(case, file)
-        drawn = run(case, given.evaluator, readings, draws, seed, at_kPa, given.jobs)
+        drawn = run(given, readings, draws, seed, at_kPa)
         files = [file] if file else []
         return given.stamped(result(drawn, seed), measured=files, **states_sampled(case, readings))
 

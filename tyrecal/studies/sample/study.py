@@ -33,6 +33,7 @@ from ..inference.plain_fit import plain_fit
 from ..inference.run_estimate import estimate, model_of, selection_runs
 from ..inference.tyre_model import TyreModel
 from ..inference.uncertainties import Source, calibrated, sources
+from ..result import StudyInput
 from ..run_plan import RunPlan
 from ..variable import DesignVariable, read_variables
 from .box import Draws, grow_box
@@ -75,13 +76,11 @@ class Sample:
 
 
 def run(
-    case: LoadedCase,
-    evaluator: Evaluator,
+    given: StudyInput,
     readings: Sequence[Measurement] | None,
     draws: int,
     seed: int = 0,
     at_kPa: Sequence[float] = (),
-    jobs: int = 1,
     stage: Callable[[str], None] = lambda stage: None,
     say: Callable[[str], None] = lambda words: None,
 ) -> Sample:
@@ -92,8 +91,9 @@ def run(
     takes where the solver gives no exact sensitivities. Raises InputError; EvaluationFailed where
     the start or the first box cannot be evaluated.
     """
-    check(case, readings)
-    case, left_out = without_losses(case)
+    check(given.case, readings)
+    case, left_out = without_losses(given.case)
+    evaluator, jobs = given.evaluator, given.jobs
     stage(SAMPLE_STAGES[0])
     noise = None if readings is not None else noise_Hz(Problem(case, evaluator))
     if readings is None:
@@ -169,7 +169,7 @@ def run(
     there = _answer(TyreModel(case, evaluator, asked_of, own_sources, {}, jobs), best)
     total = sigma + posterior.emulator_covariance
     assert there.constants is not None
-    given = conditional(
+    under_data = conditional(
         observations.rows, total, constants, rows, there.constants, model.material_laws
     )
     at = rows_of(rows, states, known_in)
@@ -183,8 +183,8 @@ def run(
         tuple(own_sources),
         drawn,
         rows,
-        given.drawn(posterior.ln_f(thin, at), off, seed),
-        given.sigma(J, other, drawn.covariance),
+        under_data.drawn(posterior.ln_f(thin, at), off, seed),
+        under_data.sigma(J, other, drawn.covariance),
         float((posterior.stated_errors / spread).max()),
         noise,
         float((np.sqrt(np.diag(total)) / spread).max()) - 1,
