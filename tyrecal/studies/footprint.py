@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated
 
 from pydantic import Field
@@ -25,6 +25,7 @@ from .result import (
     Table,
     csv_text,
     not_reached,
+    notify_loads,
     silent,
 )
 
@@ -37,7 +38,7 @@ def press(
     designs: Mapping[str, Mapping[str, float]],
     loads_N: Sequence[float],
     jobs: int = 1,
-    notify: Callable[[str, PressOutcome], None] = lambda design, outcome: None,
+    notify: Notify = silent,
 ) -> dict[str, PressOutcome]:
     """Every design (name to values of the variables) at rising loads, or why not even at the
     first one; those after the first begin from its state on the road. Raises DeckRefused and what
@@ -48,7 +49,7 @@ def press(
     outcomes = evaluator.press_all(questions, jobs)
     for design, outcome in zip(designs, outcomes, strict=True):
         by_design[design] = outcome
-        notify(design, outcome)
+        notify_loads(notify, design, loads_N, *progress(outcome))
     return by_design
 
 
@@ -136,14 +137,7 @@ def run(
 ) -> tuple[FootprintResult, dict[str, Pressed], dict[str, SectionMesh]]:
     """Every design at rising loads: the result, and what was reached, with the sections' meshes.
     Raises as ``press`` does; the result has no rows where no design bore the first load."""
-
-    def notify_outcome(design: str, outcome: PressOutcome) -> None:
-        reached, failure = progress(outcome)
-        if failure:
-            notify(f"{design}, {loads_N[reached]:g} N", failure)
-        notify(f"{design}: {reached} loads", None)
-
-    outcomes = press(evaluator, designs, loads_N, jobs, notify_outcome)
+    outcomes = press(evaluator, designs, loads_N, jobs, notify)
     pressed = {name: each for name, each in outcomes.items() if isinstance(each, Pressed)}
     meshes = {name: TyreDesign(case, designs[name]).tyre.mesh for name in pressed}
     return footprint_result(designs, loads_N, outcomes, meshes), pressed, meshes

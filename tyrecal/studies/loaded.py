@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,6 +15,7 @@ from ..simulate.modes.label import Label, Mode
 from ..simulate.modes.loaded import Member, ModesAtLoad, Rings, follow, members, rings, state
 from ..tyre.case import LoadedCase
 from .fit.targets import target_labels
+from .result import Notify, notify_loads, silent
 
 EXTRA_HARMONICS = 3  # harmonics beyond the case's that may stand among its modes
 EXTRA_MODES = 6  # modes at a load beyond as many as stand for [0,0] to [c,1]
@@ -78,7 +79,7 @@ def load_tyres(
     designs: Mapping[str, Mapping[str, float]],
     loads_N: Sequence[float],
     jobs: int = 1,
-    notify: Callable[[str, LoadOutcome], None] = lambda design, outcome: None,
+    notify: Notify = silent,
     labels: Sequence[Label] = (),
 ) -> dict[str, LoadOutcome]:
     """Every design (name to values of the variables) at rising loads, one above 0 at least, or why
@@ -101,7 +102,7 @@ def load_tyres(
             if isinstance(free, EvaluationFailed)
             else _loaded_tyre(case, free, next(answers), 0.0 in loads_N)
         )
-        notify(name, outcomes[name])
+        notify_loads(notify, name, loads, *progress(outcomes[name]))
     return outcomes
 
 

@@ -127,17 +127,8 @@ def run(
     notify: Notify = silent,
 ) -> LoadSweep:
     """Every design at rising loads. Raises as ``load_tyres`` does."""
-    above = [load for load in loads_N if load]
-
-    def notify_outcome(design: str, outcome: LoadOutcome) -> None:
-        reached, failure = progress(outcome)
-        if failure:
-            notify(f"{design}, {above[reached]:g} N", failure)
-        notify(f"{design}: {reached} loads", None)
-
-    return load_sweep_result(
-        designs, loads_N, load_tyres(case, evaluator, designs, loads_N, jobs, notify_outcome)
-    )
+    outcomes = load_tyres(case, evaluator, designs, loads_N, jobs, notify)
+    return load_sweep_result(designs, loads_N, outcomes)
 
 
 def loaded_modes_result(values: Mapping[str, float], tyre: LoadedTyre) -> ModesResult:

@@ -291,6 +291,19 @@ def silent(words: str, failure: EvaluationFailed | None) -> None:
     """Report no progress of a study."""
 
 
+def notify_loads(
+    notify: Notify,
+    design: str,
+    loads_N: Sequence[float],
+    reached: int,
+    failure: EvaluationFailed | None,
+) -> None:
+    """Report how many loads a design reached, and why no more."""
+    if failure:
+        notify(f"{design}, {loads_N[reached]:g} N", failure)
+    notify(f"{design}: {reached} loads", None)
+
+
 def not_reached(
     loads_N: Sequence[float], progress: Mapping[str, tuple[int, EvaluationFailed | None]]
 ) -> list[Failed]:
