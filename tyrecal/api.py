@@ -193,18 +193,18 @@ def sweep_pressure(
     160 kPa: 31.1 Hz
     240 kPa: 37.0 Hz
     """
-    from .studies.pressure import Failure, sweep
+    from .studies.pressure import sweep
+
+    def stop_at_failure(words: str, failure: EvaluationFailed | None) -> None:
+        if failure:
+            raise failure
 
     case = _case(case)
     design, jobs = _design(case, values), _count("jobs", jobs, 1)
     pressures = _pressures(case, "pressures_kPa", pressures_kPa, allow_unusual)
     evaluator = _evaluator(case, solver, record)
-    states = []
-    for outcome in sweep(case, evaluator, {"": design}, pressures, jobs):
-        if isinstance(outcome, Failure):
-            raise outcome.failed
-        states.append(outcome)
-    return states
+    outcomes = sweep(case, evaluator, {"": design}, pressures, jobs, stop_at_failure)
+    return [each for each in outcomes if isinstance(each, State)]
 
 
 def evaluate_footprint(

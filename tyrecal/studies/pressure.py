@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -17,7 +17,7 @@ from ..simulate.modes.follow import follow
 from ..simulate.modes.label import FAMILIES, Label, Mode, labelled
 from ..tyre.case import LoadedCase
 from ..tyre.state import pressure_name
-from .result import ResultPart
+from .result import Failed, Notify, ResultPart, silent
 from .sweep import evaluate_points
 
 BENT = "concave", "convex"
@@ -45,16 +45,7 @@ class State:
         return {mode.label: mode.frequency_Hz for mode in self.modes}
 
 
-@dataclass(frozen=True)
-class Failure:
-    """A pressure at which a design could not be evaluated."""
-
-    design: str
-    pressure_kPa: float
-    failed: EvaluationFailed
-
-
-SweepOutcome = State | Failure
+SweepOutcome = State | Failed
 
 
 def sweep(
@@ -63,7 +54,7 @@ def sweep(
     designs: Mapping[str, Mapping[str, float]],
     pressures_kPa: Sequence[float],
     jobs: int = 1,
-    notify: Callable[[SweepOutcome], None] = lambda outcome: None,
+    notify: Notify = silent,
 ) -> list[SweepOutcome]:
     """Every design (name to values of the variables) at every pressure, in that order. Raises what
     `evaluate_points` does; an evaluation that fails is an outcome.
@@ -80,20 +71,22 @@ def sweep(
 
     def use(place: int, design: str, answer: LabelledModes | EvaluationFailed) -> None:
         pressure = pressures_kPa[place % len(points)]
-        outcomes[place] = _outcome(design, pressure, answer, name)
-        notify(outcomes[place])
+        if isinstance(answer, EvaluationFailed):
+            cause, words = answer.cause, answer.words
+            failed = Failed(design=design, pressure_kPa=pressure, cause=cause, words=words)
+            outcomes[place] = failed
+            notify(failed.place, answer)
+            return
+        state = outcomes[place] = _state(design, pressure, answer, name)
+        notify(f"{design}, {pressure:g} kPa: {len(state.modes)} modes", None)
 
     evaluate_points(case, evaluator, designs, points, use, gradients, jobs)
     return [outcomes[place] for place in sorted(outcomes)]
 
 
-def _outcome(
-    design: str, pressure_kPa: float, answer: LabelledModes | EvaluationFailed, name: str
-) -> SweepOutcome:
+def _state(design: str, pressure_kPa: float, answer: LabelledModes, name: str) -> State:
     """The tyre at one pressure: its modes, with exact slopes by the pressure if the solver has
     them."""
-    if isinstance(answer, EvaluationFailed):
-        return Failure(design, pressure_kPa, answer)
     modes = labelled(answer.evaluation)
     gradient = answer.evaluation.gradients.get(name)
     exact = None

@@ -13,7 +13,7 @@ from ..simulate.evaluate.failure import EvaluationFailed
 from ..simulate.modes.label import Label
 from ..tyre.case import LoadedCase
 from .modes import mode_entry
-from .pressure import Failure, PressureFindings, State, SweepOutcome, findings, sweep
+from .pressure import PressureFindings, State, SweepOutcome, findings, sweep
 from .pressure_range import PressureRange
 from .result import (
     NAME_COLUMNS,
@@ -171,15 +171,7 @@ def run(
 ) -> PressureSweep:
     """Every design at every pressure; with ``fit`` the standard errors of the design "fitted".
     Raises as ``sweep`` does, and the first failure where no pressure could be evaluated."""
-
-    def notify_outcome(outcome: SweepOutcome) -> None:
-        place = f"{outcome.design}, {outcome.pressure_kPa:g} kPa"
-        if isinstance(outcome, Failure):
-            notify(place, outcome.failed)
-        else:
-            notify(f"{place}: {len(outcome.modes)} modes", None)
-
-    outcomes = sweep(case, evaluator, designs, pressures_kPa, jobs, notify_outcome)
+    outcomes = sweep(case, evaluator, designs, pressures_kPa, jobs, notify)
     result = sweep_result(case, designs, outcomes)
     if fit and fit.responses and FITTED in designs:
         return _with_errors(result, case, evaluator, fit, jobs)
@@ -227,16 +219,7 @@ def sweep_result(
         slopes="exact" if all(s.slopes is not None for s in states) else "differences",
         designs={name: dict(values) for name, values in designs.items()},
         rows=[row for each in by_design for row in _rows(each, labels)],
-        failed=[
-            Failed(
-                design=each.design,
-                pressure_kPa=each.pressure_kPa,
-                cause=each.failed.cause,
-                words=each.failed.words,
-            )
-            for each in outcomes
-            if isinstance(each, Failure)
-        ],
+        failed=[each for each in outcomes if isinstance(each, Failed)],
         findings=[findings(each, labels) for each in by_design if len(each) > 1],
     )
 
