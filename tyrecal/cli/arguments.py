@@ -87,11 +87,15 @@ def parse_numbers(option: str, text: str, unit: str = "", count: int = 0) -> lis
 
 def parse_loads(text: str, option: str = "--loads-N", zero: bool = False) -> list[float]:
     """Rising loads, N. zero: the first may be 0. Raises click.UsageError."""
+    return checked_loads(parse_numbers(option, text, "N"), option, zero)
+
+
+def checked_loads(loads: list[float], option: str, zero: bool = False) -> list[float]:
+    """The loads, N, if they rise and each is possible. Raises click.UsageError."""
     from itertools import pairwise
 
     from ..tyre.case.schema import MAX_CASE_LOAD_N, MIN_CASE_LOAD_N
 
-    loads = parse_numbers(option, text, "N")
     for place, load in enumerate(loads):
         if not (MIN_CASE_LOAD_N <= load <= MAX_CASE_LOAD_N or (zero and load == place == 0)):
             raise click.UsageError(
@@ -115,7 +119,7 @@ def one_load(loaded: Any, load_N: float | None, allowed: bool) -> float:
     """The load of --load-N, N; 0: none was given. Raises click.UsageError."""
     if load_N is None:
         return 0.0
-    loads = parse_loads(repr(load_N), "--load-N")
+    loads = checked_loads([load_N], "--load-N")
     refuse_unusual_loads(loaded, "--load-N", loads, allowed)
     return loads[0]
 

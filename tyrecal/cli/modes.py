@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from . import arguments, options
-from .arguments import parse_loads
+from .arguments import checked_loads, parse_loads
 from .main import EXIT_SOLVER
 from .options import Study
 from .parameters import FileOrFolder, option
@@ -151,7 +151,7 @@ def requested_loads(load_N: float | None, sweep: str | None) -> list[float]:
         if loads == [0.0]:
             raise click.UsageError("--sweep-load needs a load above 0")
         return loads
-    return [] if load_N is None else parse_loads(repr(load_N), "--load-N")
+    return [] if load_N is None else checked_loads([load_N], "--load-N")
 
 
 def write_modes_at_load(

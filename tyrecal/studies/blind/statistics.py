@@ -11,11 +11,11 @@ Array = np.ndarray
 BINS, SIMULATIONS = 10, 2000  # of stated probabilities, 0 to 1; draws of the quantile
 
 
-def clopper_pearson(right: int, count: int, level: float = 0.95) -> tuple[float, float]:
-    """Two-sided exact interval of a binomial share (Clopper and Pearson 1934); (0, 1) of none."""
+def clopper_pearson(right: int, count: int) -> tuple[float, float]:
+    """Exact 95 % interval of a binomial share (Clopper and Pearson 1934); (0, 1) of none."""
     if not count:
         return 0.0, 1.0
-    interval = binomtest(right, count).proportion_ci(level)
+    interval = binomtest(right, count).proportion_ci(0.95)
     return float(interval.low), float(interval.high)
 
 
@@ -31,9 +31,9 @@ def _calibration_errors(stated: Array, right: Array) -> Array:
     return np.asarray(abs((right - stated) @ in_bin).sum(1) / max(len(stated), 1))
 
 
-def calibration_quantile(stated: Array, quantile: float = 0.95, seed: int = 0) -> float:
+def calibration_quantile(stated: Array, quantile: float = 0.95) -> float:
     """Quantile of the ECE of as many trials whose stated probabilities are exactly right."""
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     drawn = random.random((SIMULATIONS, len(stated))) < stated
     return float(np.quantile(_calibration_errors(stated, drawn), quantile))
 

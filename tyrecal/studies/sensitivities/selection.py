@@ -127,19 +127,19 @@ class Candidates:
         return {j: self.fit([*others, j])[0] for j in self.left(freed)}
 
 
-def select_numbers(candidates: Candidates, chance: float = CHANCE) -> SelectedNumbers:
-    """Free numbers until a gain is no better than ``chance``."""
+def select_numbers(candidates: Candidates) -> SelectedNumbers:
+    """Free numbers until a gain is no better than `CHANCE`."""
     freed: list[int] = []
     tried = list[set[int]]()
     while True:
         place, p_value = candidates.best(freed)
-        if place is None or p_value > chance:
+        if place is None or p_value > CHANCE:
             break
         freed = _exchanged(candidates, [*freed, place])
         while len(freed) > 1:
             idle = {k: candidates.gain_beyond(freed, k)[1] for k in freed}
             worst = max(idle, key=lambda k: idle[k])
-            if idle[worst] <= chance:
+            if idle[worst] <= CHANCE:
                 break
             freed.remove(worst)
         if set(freed) in tried:  # taken out as often as it is freed
