@@ -5,7 +5,7 @@ what a test asserts holds for any seed. What holds for most draws only is a clai
 number or distribution: a test takes the fixture ``chance`` and claims through it. Each claim fails
 falsely with a probability of RATE at most; the test's docstring states their sum, ``False
 failures: 2e-7.``, which is checked when the test ends. ``python -m tests.chance`` lists all, and
-``tests/test_chance.py`` holds their sum against LIMIT.
+``tests/test_selection.py`` holds their sum against LIMIT.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Default selection of `pytest`, and the report of what it left out, and why."""
+"""Default selection of `pytest`, and the report of what it left out, and why.
+
+Claims about draws: each test states how often it fails falsely, and all together stay rare.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,13 @@ import re
 import subprocess
 import sys
 import tomllib
+from math import comb
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from .chance import LIMIT, RATE, Chance, budget, generator
 from .conftest import ROOT
 from .selection import LEFT_OUT
 
@@ -102,3 +108,49 @@ def test_every_area_is_in_the_quick_set(request: pytest.FixtureRequest) -> None:
         if item.get_closest_marker("quick")
     }
     assert quick == areas
+
+
+@pytest.mark.numbers
+def test_all_claims_together_fail_falsely_once_in_ten_thousand_runs() -> None:
+    rates = budget()
+    silent = [name for name, rate in rates.items() if rate < RATE]
+    assert rates and not silent, f"no rate in the docstring of {silent}"
+    assert sum(rates.values()) <= LIMIT
+
+
+@pytest.mark.numbers
+def test_a_claim_that_is_false_is_refused() -> None:
+    for claim in (
+        lambda c: c.often(c.random.random(100) < 0.5, 0.9),
+        lambda c: c.often(c.random.random(100) < 0.5, 0.0, 0.1),
+        lambda c: c.distributed(c.random.random(400) ** 2, "uniform"),
+        lambda c: c.zero_on_average(c.random.random(400) - 0.2, 1.0, 400 / 12),
+        lambda c: c.mean(c.random.random(400), 0.7, 0.8),
+        lambda c: c.scatter(c.random.normal(size=200), 1.6),
+        lambda c: c.normal(c.random.normal(size=20) + 20),
+    ):
+        with pytest.raises(AssertionError):
+            claim(Chance("false"))
+
+
+@pytest.mark.numbers
+def test_binomial_bounds_are_missed_at_the_rate() -> None:
+    """The least number of hits that is let pass, by summing the distribution."""
+    for count, low in ((20, 0.95), (300, 0.89)):
+        passes = [k for k in range(count + 1) if _holds(count, k, low)]
+        below = sum(comb(count, k) * low**k * (1 - low) ** (count - k) for k in range(min(passes)))
+        assert below <= RATE
+
+
+def _holds(count: int, hits: int, low: float) -> bool:
+    try:
+        Chance("").often(np.arange(count) < hits, low)
+    except AssertionError:
+        return False
+    return True
+
+
+@pytest.mark.numbers
+def test_draws_hang_on_seed_and_key_alone() -> None:
+    assert generator("a", 1).random() == generator("a", 1).random()
+    assert generator("a", 1).random() != generator("a", 2).random()

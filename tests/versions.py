@@ -32,7 +32,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 TESTS = [
     "tests/cli/test_cli.py",
     "tests/cli/test_conventions.py",
-    "tests/cli/test_suggestions.py",
+    "tests/cli/test_mistakes.py",
     "tests/cli/test_default_case.py",
     "tests/case/test_bad_cases.py",  # what Pydantic refuses, and does not
     "tests/report/test_pictures.py",  # what Matplotlib leaves out

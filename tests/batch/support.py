@@ -1,12 +1,21 @@
-"""Variations of the shipped case on a mesh as coarse as can be."""
+"""Variations of the shipped case on a mesh as coarse as can be.
+
+Reports as `run_case` makes them, for what only reads them.
+Record every run of the solver with its process; a Dask worker loads this module first.
+"""
 
 from __future__ import annotations
 
+import os
 import shutil
+import time
 from pathlib import Path
+from typing import Any
 
 import pytest
+from tyrecal_solvers.bundled.adapter import Bundled
 
+from tyrecal.simulate.evaluate.store import key_of
 from tyrecal.tyre.effects import catalogue
 
 from ..conftest import CASES
@@ -68,3 +77,39 @@ def nearly_certain(path: Path) -> Path:
 def poison(path: Path) -> None:
     """Let the tyre spin so fast, 280 rad/s, that it is not stable; its usual values end at 300."""
     path.write_text(path.read_text() + "\nspin_rad_per_s: 280.0\n")
+
+
+def entry(
+    status: str = "good", cause: str | None = None, words: str | None = None, **quantities: float
+) -> dict[str, Any]:
+    """A study's entry."""
+    return {"status": status, "cause": cause, "words": words, "quantities": quantities}
+
+
+def report(name: str, **studies: dict[str, Any]) -> dict[str, Any]:
+    """A case's report; a second a study."""
+    facts = {
+        "started": "2026-01-02T03:04:05+00:00",
+        "host": "node-1",
+        "solver": "bundled 1.0.0",
+        "seconds": dict.fromkeys(studies, 1.0),
+        "solver_runs": 9,
+        "answered_from_record": 0,
+    }
+    return {"name": name, "provenance": {}, "studies": studies, "facts": facts}
+
+
+DELAY_S = 0.05  # so that a run can be interrupted
+
+
+def dask_setup(worker: Any) -> None:
+    """Called by the worker."""
+    plain, log = Bundled.run, Path(os.environ["RUNS"])
+
+    def run(self: Bundled, folder: Path, time_limit_s: float) -> None:
+        with log.open("a") as file:
+            file.write(f"{os.getpid()} {key_of(folder, self)}\n")
+        time.sleep(DELAY_S)
+        plain(self, folder, time_limit_s)
+
+    Bundled.run = run  # type: ignore[method-assign]

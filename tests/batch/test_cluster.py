@@ -59,7 +59,7 @@ class Machines:
     def add_worker(self) -> None:
         options = ["--nthreads", "1", "--no-nanny", "--no-dashboard", "--memory-limit", "0"]
         options += ["--host", "127.0.0.1", "--local-directory", str(self.folder)]
-        options += ["--preload", "tests.batch.counting"]
+        options += ["--preload", "tests.batch.support"]
         self.workers.append(self._start("worker", self.address, *options))
 
     def _start(self, *command: str) -> subprocess.Popen[bytes]:

@@ -21,7 +21,7 @@ from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
-from tests.solvers.press_results import read_press, run_press
+from tests.solvers.press_deck import read_press, run_press
 from tests.studies.calculix import common
 from tests.studies.footprint_calculix import (
     A6,

@@ -29,8 +29,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from tests.solvers.press_deck import Angles, Road
-from tests.solvers.press_results import run_press
+from tests.solvers.press_deck import Angles, Road, run_press
 from tests.studies.calculix import common
 from tests.studies.footprint_calculix import Mesh, Run, deck, inflated_radius, meshed
 from tyrecal.simulate.deck import tyre_design

@@ -1,4 +1,7 @@
-"""Rubber that stiffens with frequency: laws, tangents, self-consistent modes, slopes."""
+"""Rubber that stiffens with frequency: laws, tangents, self-consistent modes, slopes.
+
+Several materials, of several laws, in one section: masses, states, modes and slopes.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tyrecal_solvers.bundled import job as jobs
 from tyrecal_solvers.bundled.deck import grammar
-from tyrecal_solvers.bundled.modes import harmonics
+from tyrecal_solvers.bundled.deck.request import Request
+from tyrecal_solvers.bundled.deck.steps import Deck, Tangent
+from tyrecal_solvers.bundled.job import Job
+from tyrecal_solvers.bundled.modes import harmonics, lanczos
 from tyrecal_solvers.bundled.modes.frequency_dependent import SelfConsistent
+from tyrecal_solvers.bundled.results import StepResult
 from tyrecal_solvers.bundled.section import model
 from tyrecal_solvers.bundled.section.laws.mooney_rivlin import MooneyRivlin
 from tyrecal_solvers.bundled.section.materials import ModulusTable, read_materials
@@ -22,11 +30,9 @@ from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.values import with_values
 
 from ..chance import generator
-from ..effects.support import CASE, START, frequencies
+from ..effects.support import CASE, START, decks, frequencies
 from . import support
 from .support import Rubber
-
-pytestmark = pytest.mark.numbers
 
 Array = np.ndarray
 BETA, REFERENCE = 0.15, 60.0
@@ -34,6 +40,7 @@ TABLE = np.array([1.0, 8.0, 1000.0])
 POWER = ModulusTable(tuple(TABLE), tuple((TABLE / REFERENCE) ** BETA))
 
 
+@pytest.mark.numbers
 @pytest.mark.parametrize("f", [1.0, 3.7, 8.0, 60.0, 999.0])
 def test_a_table_of_a_power_law_is_the_power_law(f: float) -> None:
     assert POWER.ratio(f) == pytest.approx((f / REFERENCE) ** BETA, rel=1e-14)
@@ -41,11 +48,13 @@ def test_a_table_of_a_power_law_is_the_power_law(f: float) -> None:
         assert POWER.slope(f) == pytest.approx(BETA, rel=1e-12)
 
 
+@pytest.mark.numbers
 def test_constant_beyond_the_table() -> None:
     assert POWER.ratio(0.1) == POWER.ratio(1.0) and POWER.slope(0.1) == 0.0
     assert POWER.ratio(1e5) == POWER.ratio(1e3) and POWER.slope(1e5) == 0.0
 
 
+@pytest.mark.numbers
 def test_the_tangent_is_linear_in_the_ratio() -> None:
     """A(rho) = A(1) + (rho - 1) dA, dA without the initial stress."""
     rng = generator(0)
@@ -73,6 +82,7 @@ def tube(law: ModulusTable | None, component: int = 1) -> harmonics.HasModes:
     return SelfConsistent(vibration, [law]) if law else vibration
 
 
+@pytest.mark.numbers
 def test_one_spring_in_closed_form() -> None:
     """omega^2 = omega0^2 (f / f_ref)^beta: f = (f0 f_ref^(-beta/2))^(1 / (1 - beta/2)), for
     every mode, to 1e-10."""
@@ -85,6 +95,7 @@ def test_one_spring_in_closed_form() -> None:
     assert support.hertz(alone.eigenvalues) == pytest.approx(exact[:1], rel=1e-10)
 
 
+@pytest.mark.numbers
 def test_waves_that_only_shear_in_closed_form() -> None:
     """The same of waves round the tube that move along the axle alone."""
     f0, frequencies = (support.hertz(tube(law, 2).modes(3, 2).eigenvalues) for law in (None, POWER))
@@ -92,6 +103,7 @@ def test_waves_that_only_shear_in_closed_form() -> None:
     np.testing.assert_allclose(frequencies, exact, rtol=1e-10)
 
 
+@pytest.mark.numbers
 def test_a_law_that_settles_nowhere_is_a_failure() -> None:
     """A modulus that jumps down faster than the frequency rises has no fixed point to find."""
     f0 = float(support.hertz(tube(None).modes(0, 1).eigenvalues)[0])
@@ -102,6 +114,7 @@ def test_a_law_that_settles_nowhere_is_a_failure() -> None:
             tube(law).modes(0, 1)
 
 
+@pytest.mark.numbers
 def test_nothing_where_the_ratio_is_one() -> None:
     flat = ModulusTable((1.0, 1000.0), (1.0, 1.0))
     np.testing.assert_allclose(
@@ -109,6 +122,7 @@ def test_nothing_where_the_ratio_is_one() -> None:
     )
 
 
+@pytest.mark.numbers
 def test_the_inflated_state_and_the_other_rubbers_stay() -> None:
     """dK acts only where the law does."""
     m = support.model_of(support.tyre((3, 2, 2, 1)).deck)
@@ -118,6 +132,7 @@ def test_the_inflated_state_and_the_other_rubbers_stay() -> None:
     assert not any(law.C10.any() or law.inverse_D1.any() for law in laws)
 
 
+@pytest.mark.numbers
 def test_each_rubber_has_its_own_table_or_none() -> None:
     """Three rubbers, two with tables: what grows with either is its own shear modulus alone."""
     b = support.block((0.1, 0.4, 3), (0.0, 0.1, 1), False)
@@ -142,6 +157,7 @@ def test_each_rubber_has_its_own_table_or_none() -> None:
     assert (law.bulk_ratio == 1).all()
 
 
+@pytest.mark.numbers
 @pytest.mark.slow
 def test_self_consistent_as_by_hand_through_the_door() -> None:
     """Each mode of beta = 0.15 about 20 Hz is that of one modulus for all modes, (f / 20)^beta
@@ -159,6 +175,7 @@ def test_self_consistent_as_by_hand_through_the_door() -> None:
         assert direct[label] == pytest.approx(f, rel=1e-8)
 
 
+@pytest.mark.numbers
 def test_a_tilt_about_the_reference_and_no_level() -> None:
     plain, tilted = frequencies(), frequencies(frequency_stiffening=0.1)
     assert list(plain) == list(tilted)  # labels, in order
@@ -166,6 +183,7 @@ def test_a_tilt_about_the_reference_and_no_level() -> None:
         assert (tilted[label] > f) == (f > REFERENCE)
 
 
+@pytest.mark.numbers
 @pytest.mark.slow
 def test_slopes_carry_the_implicit_term() -> None:
     """d f / d C10, where the modulus follows the frequency that C10 moves, and by the exponent."""
@@ -185,6 +203,7 @@ def test_slopes_carry_the_implicit_term() -> None:
         np.testing.assert_allclose(exact[name], central, rtol=3e-6, atol=3e-6 * scale)
 
 
+@pytest.mark.numbers
 def test_labels_and_multiplicities_as_before() -> None:
     answer = Evaluator(TyreDesign(CASE)).evaluate(
         Question({**START, "effects.frequency_stiffening": 0.1})
@@ -195,6 +214,7 @@ def test_labels_and_multiplicities_as_before() -> None:
     assert catalogue()["frequency_stiffening"].needs == "frequency_modulus"
 
 
+@pytest.mark.numbers
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
@@ -208,3 +228,103 @@ def test_tables_that_are_none(rows: str, words: str) -> None:
     text = f"*MATERIAL, NAME=GUM\n*VISCOELASTIC, FREQUENCY=TABULAR\n{rows}\n"
     with pytest.raises(DeckError, match=words):
         read_materials(read_keywords(text))
+
+
+COMPOUNDS = {  # name: law, constants, density
+    "SIDEWALL": ("*HYPERELASTIC, YEOH", "400000., -50000., 20000., 1.E-7, 2.E-7", 1120.0),
+    "SKIM": ("*HYPERELASTIC, NEO HOOKE", "1200000., 5.E-8", 1130.0),
+    "TREAD": ("*HYPERELASTIC, ARRUDA-BOYCE", "1100000., 3., 8.E-8", 1150.0),
+    "APEX": ("*HYPERELASTIC, OGDEN, N=2", "3.E6, 2., -2.E5, -2., 3.E-8", 1200.0),
+    "WIRE": ("*ELASTIC", "5.E9, 0.3", 4000.0),
+}
+STEP = 1e-2  # in ln of a number
+PLACES = {
+    "SIDEWALL": "REGION_LOWER_SIDEWALL",
+    "SKIM": "REGION_UPPER_SIDEWALL",
+    "TREAD": "REGION_CROWN",
+    "APEX": "FILLER",
+    "WIRE": "CORE",
+}
+
+
+def compounded() -> dict[str, str]:
+    """The coarse tyre's decks, each region of another stuff and half of the bead of wire."""
+    written = decks(CASE)
+    text = written["inflate.inp"]
+    one = "*SOLID SECTION, ELSET=SOLID_1, MATERIAL=RUBBER\n"
+    beads = "*ELSET, ELSET=CORE\n1002, 1003, 20002, 20003\n"
+    beads += "*ELSET, ELSET=FILLER\n1001, 1004, 20001, 20004\n"
+    sections = [f"*SOLID SECTION, ELSET={e}, MATERIAL={m}\n" for m, e in PLACES.items()]
+    materials = [
+        f"*MATERIAL, NAME={name}\n{law}\n{numbers}\n*DENSITY\n{density}\n"
+        for name, (law, numbers, density) in COMPOUNDS.items()
+    ]
+    assert text.count(one) == 1
+    inflate = text.replace(one, beads + "".join([*sections, *materials]))
+    return {"inflate": inflate, "modes": written["modes.inp"]}
+
+
+def run(pair: dict[str, str], **request: object) -> StepResult:
+    whole_request = Request(harmonics=[0, 1, 2], modes_per_harmonic=2, **request)  # type: ignore[arg-type]
+    return Job(Deck(pair, "modes", "inflate"), whole_request).run()[-1]
+
+
+def test_each_element_has_its_own_stuff() -> None:
+    """A part for each law; each region's mass is its volume times its own density."""
+    job = Job(Deck(compounded(), "modes", "inflate"), Request())
+    plain = Job(
+        Deck({**compounded(), "inflate": decks(CASE)["inflate.inp"]}, "modes", "inflate"), Request()
+    )
+    solids, before = job.model.parts[:-1], plain.model.parts[0]
+    assert [type(part.law).__name__ for part in solids] == [
+        "ReducedPolynomial",
+        "MooneyRivlin",
+        "ArrudaBoyce",
+        "Ogden",
+        "LinearElastic",
+    ]
+    assert sum(len(part.connectivity) for part in solids) == len(before.connectivity)
+    mass = {tuple(row): m.sum() for row, m in zip(before.connectivity, before.mass, strict=True)}
+    for part, (_, _, density) in zip(solids, COMPOUNDS.values(), strict=True):
+        for row, own in zip(part.connectivity, part.mass, strict=True):
+            assert own.sum() == pytest.approx(mass[tuple(row)] * density / 1100.0, rel=1e-12)
+
+
+def test_half_the_section_is_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    half = run(compounded())
+    monkeypatch.setattr(jobs, "keeps_half_turn", lambda *_: False)
+    whole = run(compounded())
+    np.testing.assert_allclose(half.U, whole.U, atol=1e-11 * abs(whole.U).max())
+    for mine, its in zip(half.modes, whole.modes, strict=True):
+        np.testing.assert_allclose(mine.eigenvalues, its.eigenvalues, rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_slopes_by_numbers_of_each_law(monkeypatch: pytest.MonkeyPatch) -> None:
+    """d lambda / d ln of a constant of each against differences of fourth order, whose round-off is
+    1e-10 of lambda over their step."""
+    monkeypatch.setattr(lanczos, "INVERSE_RTOL", 1e-12)  # slopes are as good as shapes
+    pair = compounded()
+    lines = pair["inflate"].splitlines()
+    places = {name: lines.index(numbers) for name, (_, numbers, _) in COMPOUNDS.items()}
+    fields = dict.fromkeys(COMPOUNDS, 0) | {"TREAD": 1, "APEX": 1}
+    values = {name: float(lines[places[name]].split(",")[fields[name]]) for name in COMPOUNDS}
+    tangents: dict[str, list[Tangent]] = {
+        name: [("inflate", places[name] + 1, fields[name], values[name])] for name in COMPOUNDS
+    }
+    result = run(pair, sensitivities=tangents)
+    highest = max(each.eigenvalues.max() for each in result.modes)
+    for name in COMPOUNDS:
+        eigenvalues = []
+        for step in (-2, -1, 1, 2):
+            own, numbers = list(lines), lines[places[name]].split(",")
+            numbers[fields[name]] = repr(values[name] * (1 + step * STEP))
+            own[places[name]] = ",".join(numbers)
+            moved = run({**pair, "inflate": "\n".join(own) + "\n"})
+            eigenvalues.append(np.concatenate([each.eigenvalues for each in moved.modes]))
+        wanted = (eigenvalues[0] - 8 * eigenvalues[1] + 8 * eigenvalues[2] - eigenvalues[3]) / (
+            12 * STEP
+        )
+        got = np.concatenate(result.rates[name])
+        noise = 1e-10 * highest / STEP
+        np.testing.assert_allclose(got, wanted, atol=1e-6 * abs(wanted).max() + noise)

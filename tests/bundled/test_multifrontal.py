@@ -1,14 +1,22 @@
-"""The preconditioner: how near it is to the inverse of the tangent stiffness."""
+"""The preconditioner: how near it is to the inverse of the tangent stiffness.
+
+Sparse matrices and narrow orders against SciPy's, which are compiled in other packages.
+Too little memory ends the bundled solver at once.
+"""
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
 
 import numpy as np
 import pytest
-from scipy.sparse import bsr_matrix, csr_matrix
+from scipy.sparse import bsr_matrix, csr_array, csr_matrix
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 from tyrecal_solvers.bundled.road.half_turn_symmetry import HalfTurn
 from tyrecal_solvers.bundled.road.multifrontal import Elimination, Factor
+from tyrecal_solvers.bundled.section.sparse import assembled, narrow_order
 from tyrecal_solvers.bundled.solid3d.circumference import half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
 from tyrecal_solvers.errors import Indefinite
@@ -17,8 +25,6 @@ from ..chance import generator
 from . import support
 from .conftest import Inflated
 from .contact import ring
-
-pytestmark = pytest.mark.numbers
 
 Array = np.ndarray
 LENGTHS = np.array([0.05, 0.05, 0.1, 0.3, 0.6, 0.9, np.pi - 2.0])
@@ -93,6 +99,7 @@ def road_blocks(work: Inflated, stiffness: float, sideways: float) -> Array:
     return blocks
 
 
+@pytest.mark.numbers
 @pytest.mark.parametrize("waves", [0, 3], ids=["elements", "waves"])
 @pytest.mark.parametrize(
     "parity", [1, pytest.param(-1, marks=pytest.mark.slow)], ids=["kept", "reversed"]
@@ -106,6 +113,7 @@ def test_few_iterations_on_the_inflated_tyre(inflated: Inflated, parity: int, wa
     assert used <= 8
 
 
+@pytest.mark.numbers
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("stiffness", "sideways"),
@@ -126,6 +134,7 @@ def test_contact_is_part_of_it(inflated: Inflated, stiffness: float, sideways: f
     assert conjugate_gradients(problem.product, without.solve, b)[1] > used + 10
 
 
+@pytest.mark.numbers
 @pytest.mark.slow
 def test_approximate_inverse_is_symmetric(inflated: Inflated) -> None:
     """The inverse is symmetric to single precision, and positive; held components stay at rest."""
@@ -140,6 +149,7 @@ def test_approximate_inverse_is_symmetric(inflated: Inflated) -> None:
         assert not Mx[~problem.symmetry.mask].any()
 
 
+@pytest.mark.numbers
 @pytest.mark.parametrize("quadratic", [True, False], ids=["Q8", "Q4"])
 def test_exact_without_cords(quadratic: bool) -> None:
     """A section without a bias has no coupling to drop: the inverse, to single precision, also
@@ -159,6 +169,7 @@ def test_exact_without_cords(quadratic: bool) -> None:
         np.testing.assert_allclose(back, x, atol=2e-3 * abs(x).max())
 
 
+@pytest.mark.numbers
 def test_boxes_side_by_side_do_not_couple() -> None:
     """Every free unknown goes once, and what a front leaves goes later; boxes that are no part of
     each other share no unknown but of those that hold both; each cell is put together once."""
@@ -192,6 +203,7 @@ def test_boxes_side_by_side_do_not_couple() -> None:
     assert sorted(cells) == list(np.ndindex(2, 4, len(LENGTHS)))
 
 
+@pytest.mark.numbers
 def test_linear_elements_with_cords(inflated: Inflated) -> None:
     """Four-node rubber with hourglass stiffness, two-node cords; long elements round the tyre, for
     so coarse a section in these is unstable in short waves (harmonics n >= 28)."""
@@ -204,6 +216,7 @@ def test_linear_elements_with_cords(inflated: Inflated) -> None:
     assert conjugate_gradients(problem.product, problem.factor.solve, b)[1] <= 8
 
 
+@pytest.mark.numbers
 def test_two_layers_on_one_line() -> None:
     """Layers that share their nodes, at +20 and -20 degrees, of different stiffness: each image
     in the mirror is the same layer's."""
@@ -222,7 +235,68 @@ def test_two_layers_on_one_line() -> None:
     assert conjugate_gradients(problem.product, problem.factor.solve, right)[1] <= 8
 
 
+@pytest.mark.numbers
 def test_an_unstable_state_is_told(inflated: Inflated) -> None:
     """A road that pulls harder than the tyre is stiff."""
     with pytest.raises(Indefinite):
         Problem(inflated, contact=-road_blocks(inflated, 1e7, 0.1))
+
+
+NODES = 30
+
+
+def drawn(kind: type) -> tuple[csr_array, Array]:
+    """Elements of three nodes each, some twice, and the same matrix with all its zeros."""
+    random = generator("sparse", kind.__name__)
+    c = np.array([random.choice(NODES, 3, replace=False) for _ in range(40)])
+    c[-1] = c[0]
+    matrices = random.normal(size=(40, 3, 3)).astype(kind)
+    if kind is complex:
+        matrices[:20] += 1j * random.normal(size=(20, 3, 3))
+    full = np.zeros((NODES, NODES), kind)
+    for nodes, own in zip(c, matrices, strict=True):
+        full[np.ix_(nodes, nodes)] += own
+    return assembled([(c[:25], matrices[:25]), (c[25:], matrices[25:])], NODES), full
+
+
+@pytest.mark.parametrize("kind", [float, complex])
+def test_a_sparse_matrix_is_the_full_one(kind: type) -> None:
+    got, full = drawn(kind)
+    assert support.full(got) == pytest.approx(full, rel=1e-12, abs=1e-12)
+    assert got.nnz == np.count_nonzero(full)
+
+
+def test_neighbours_stand_nearly_as_near_as_scipy_puts_them() -> None:
+    """A strip of quadrilaterals with its nodes numbered at random, where ties are broken otherwise;
+    nothing is left out, loose nodes neither."""
+    random = generator("order")
+    shuffled = random.permutation(41 * 4 + 2)[: 41 * 4].reshape(41, 4)
+    corners = [shuffled[:-1, :-1], shuffled[1:, :-1], shuffled[1:, 1:], shuffled[:-1, 1:]]
+    c = np.stack([each.ravel() for each in corners], 1)
+    pairs = np.stack([np.repeat(c, 4, 1).ravel(), np.tile(c, (1, 4)).ravel()], 1)
+    n = 41 * 4 + 2
+    graph = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), (n, n))
+    widths = []
+    for order in (narrow_order(pairs, n), reverse_cuthill_mckee(graph, symmetric_mode=True)):
+        assert sorted(order) == list(range(n))
+        place = np.argsort(order)
+        widths.append(abs(np.diff(place[pairs])).max())
+    assert widths[0] <= 1.5 * widths[1] < 12
+
+
+STARVED = """
+import resource
+import numpy, scipy.linalg
+size = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+resource.setrlimit(resource.RLIMIT_AS, (size + 20_000_000, hard))  # a buffer has 32 MB
+from tyrecal_solvers.bundled.section import lapack_memory
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="sizes of processes are read from /proc")
+def test_no_memory_for_the_buffers_of_lapack_is_an_error() -> None:
+    """OpenBLAS itself tries for ever, so that a fit would not end."""
+    command = [sys.executable, "-c", STARVED]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 1 and "MemoryError" in done.stderr, done.stderr

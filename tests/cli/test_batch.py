@@ -20,8 +20,15 @@ from tyrecal.cli.progress import seconds_left
 from tyrecal.studies import STUDIES, result_types
 from tyrecal.studies.result import Result
 
-from ..batch.data import entry, report
-from ..batch.support import few_effects, measured_elsewhere, nearly_certain, poison, vary
+from ..batch.support import (
+    entry,
+    few_effects,
+    measured_elsewhere,
+    nearly_certain,
+    poison,
+    report,
+    vary,
+)
 from ..conftest import ROOT
 from .test_after_a_good_fit import contents, unmoved
 from .test_cli import run

@@ -1,7 +1,13 @@
-"""Mistakes as people type them: what is said, and that nothing is written."""
+"""Mistakes as people type them: what is said, and that nothing is written.
+
+Wrong cases through the command line: exit code 2, one sentence each, nothing written.
+A slip of the hand is told what was probably meant, always in the same words.
+"""
 
 from __future__ import annotations
 
+import json
+import os
 import shutil
 from pathlib import Path
 
@@ -9,6 +15,7 @@ import pytest
 
 from tyrecal.studies.far_off import far_off
 
+from ..case import bad_cases
 from ..conftest import CASES
 from .test_cli import CASE, run
 
@@ -137,3 +144,106 @@ def test_numbers_that_are_set_are_listed(
     ]
     assert "--set" not in printed.out
     assert run(*deck, "--quiet") == 0 and not capsys.readouterr().err
+
+
+def snapshot(folder: Path) -> dict[str, bytes]:
+    return {str(p): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+LARGE = {"many_values", "deep_nest"}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] * (name in LARGE))
+        for name in sorted(bad_cases.BAD)
+    ],
+)
+def test_a_wrong_case(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = bad_cases.write(name, tmp_path)
+    before, here = snapshot(tmp_path), set(os.listdir())  # noqa: PTH208
+    # one command for each case: all of them read it as any study does
+    command = ("validate", "fit", "modes")[sorted(bad_cases.BAD).index(name) % 3]
+    assert run(command, str(path)) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    lines = printed.err.splitlines()
+    assert lines and all(line.startswith("error: ") for line in lines)
+    assert "Traceback" not in printed.err
+    assert snapshot(tmp_path) == before
+    assert set(os.listdir()) == here  # noqa: PTH208
+
+
+SLIPS = {  # what was typed: what is told
+    "mode": "no command 'mode'; did you mean 'modes'?",
+    "sweeep": "no command 'sweeep'; did you mean 'sweep'?",
+    "pressure": "no command 'pressure'; did you mean 'sweep-pressure'?",
+    "Diagnoze": "no command 'Diagnoze'; did you mean 'diagnose'?",
+    "xyzzy": "no command 'xyzzy'; known: init, validate,",
+    "modes --jbs 2 x.yaml": "no option '--jbs'; did you mean '--jobs'? (see 'tyrecal modes",
+    "modes --xyzzy x.yaml": "no option '--xyzzy' (see 'tyrecal modes --help')\n",
+    "modes": "Missing argument 'CASE'.",
+    "modes nothere.yaml": "nothere.yaml: there is no such file\n",
+    f"modes {CASES / 'p235_75r1.yaml'}": f"no such file; did you mean '{CASE}'?",
+    f"validate {CASES / 'p235_75r17'}": f"no such file; did you mean '{CASE}'?",
+    f"modes {CASES}": f"{CASES}: is a folder, must be a case file\n",
+    f"sweep-pressure {CASE} --fitted nothere.json": "--fitted nothere.json: there is no such file",
+    f"sweep-pressure {CASE} --fitted {CASES}": f"no fit.json in the folder '{CASES}'",
+}
+
+
+@pytest.mark.parametrize("typed", SLIPS)
+def test_a_slip(
+    typed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One line that begins with "error: "."""
+    monkeypatch.chdir(tmp_path)
+    assert run(*typed.split()) == 2
+    printed = capsys.readouterr()
+    (message,) = printed.err.splitlines()
+    assert message.startswith("error: ") and SLIPS[typed] in f"{message}\n"
+    assert not printed.out
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_long_folder_makes_no_two_names_alike(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Neighbouring files are compared by their names alone, however much of the path is the
+    same."""
+    folder = tmp_path / ("a" * 60)
+    (folder / "cases").mkdir(parents=True)
+    (folder / ".pre-commit-config.yaml").write_text("repos: []\n")
+    assert run("modes", f"{folder / 'cases'}") == 2
+    assert (
+        capsys.readouterr().err == f"error: {folder / 'cases'}: is a folder, must be a case file\n"
+    )
+
+
+@pytest.mark.parametrize("typed", [["help"], ["help", "fit"]])
+def test_help_is_help(typed: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(*typed) == 0
+    help_text = capsys.readouterr().out
+    assert run(*typed[1:], "--help") == 0
+    assert capsys.readouterr().out.split() == help_text.split()
+
+
+@pytest.mark.slow
+def test_a_results_folder_is_no_case_but_its_fit_is_known(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`modes my` where my.yaml has results in the folder my; `--fitted my` is its fit.json."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("p235_75r17.yaml", "p235_75r17.csv"):
+        (tmp_path / name).write_bytes((CASES / name).read_bytes())
+    assert run("fit", "p235_75r17.yaml", "--mesh", "coarse", "--no-pictures", "--quiet") == 0
+    assert run("modes", "p235_75r17") == 2
+    assert "is a folder, must be a case file; did you mean 'p235_75r17.yaml'?" in (
+        capsys.readouterr().err
+    )
+    swept = ["--steps", "2", "--mesh", "coarse", "--no-pictures", "--json", "--no-store"]
+    for fitted in ("p235_75r17", "p235_75r17/fit.json"):
+        assert run("sweep-pressure", "p235_75r17.yaml", "--fitted", fitted, *swept) == 0
+        rows = json.loads(capsys.readouterr().out)["rows"]
+        assert {row["design"] for row in rows} == {"initial", "fitted"}

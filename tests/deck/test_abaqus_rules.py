@@ -1,14 +1,20 @@
 """Places that ABAQUS' manual requires for keywords: kept by decks of every kind, and by the bundled
-solver, which refuses them elsewhere."""
+solver, which refuses them elsewhere.
+
+Keywords of our decks against ABAQUS' manual, and mutants of them.
+"""
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from tyrecal_solvers.abaqus.check import findings
 from tyrecal_solvers.bundled.job import run
+from tyrecal_solvers.language.table import RULES
 from tyrecal_solvers.language.text import Block, DeckError, read_keywords
 
 from tyrecal.simulate.deck.decks import Decks
@@ -16,9 +22,10 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.values import with_values
 
-from ..conftest import CASES
+from ..conftest import CASES, ROOT
 from ..effects.support import CASE as COARSE
 from ..effects.support import frequencies
+from . import abaqus_decks, abaqus_mutants
 
 CASE = load_case(CASES / "p235_75r17.yaml")
 FOUR_NODES = replace(  # of a kind that needs hourglass control
@@ -114,3 +121,48 @@ def test_the_bundled_solver_refuses_them_elsewhere(
         (tmp_path / name).write_text(text)
     with pytest.raises(DeckError, match=words):
         run(tmp_path, "modes", "inflate")
+
+
+def said(keywords: list[Block], before: list[Block]) -> list[str]:
+    """Findings in words."""
+    return [f"*{finding.block.name} {finding.words}" for finding in findings(keywords, before)]
+
+
+@pytest.mark.slow
+def test_every_deck_of_every_combination_of_options() -> None:
+    """The grammar accepts each section deck, and the jobs that continue one with all the names
+    they use."""
+    count = 0
+    for text in abaqus_decks.inflations():
+        assert not said(read_keywords(text), []), text
+        count += 1
+    first = read_keywords(text)
+    for text in (*abaqus_decks.modes(), *abaqus_decks.presses()):
+        assert not said(read_keywords(text), first), text
+        count += 1
+    assert count == 384 + 192 + 32
+
+
+def test_the_grammar_has_every_keyword_and_option_of_the_templates() -> None:
+    """Keywords and options are taken from the templates' texts, whatever their conditions."""
+    for path in (ROOT / "templates" / "abaqus").glob("*.j2"):
+        text = re.sub(r"\{%.*?%\}", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+        for name, rest in re.findall(r"^\*([A-Z][A-Z ]+)(.*)$", text, re.MULTILINE):
+            assert name in RULES, path
+            for option in re.findall(r", ([A-Z][A-Z\- ]*)", rest):
+                assert option in RULES[name].parameters, f"{path}: *{name}, {option}"
+
+
+def test_what_the_grammar_does_not_know_is_a_doubt() -> None:
+    """An unknown keyword and the options after it are not refused, because ABAQUS has more
+    keywords."""
+    text = next(abaqus_decks.inflations())
+    for old, new in (("*DENSITY", "*PLASTIC\n1.0E6, 0.0\n*DENSITY"), ("*STATIC", "*DYNAMITE")):
+        faults = findings(read_keywords(text.replace(old, new, 1)))
+        assert faults and not any(each.sure for each in faults)
+
+
+def test_mutants_of_our_decks_are_caught(request: pytest.FixtureRequest) -> None:
+    """The grammar catches all of them."""
+    mutants = abaqus_mutants.draw(60, request.config.getoption("--seed"))
+    assert not [(kind, lines) for kind, caught, lines in mutants if not caught]

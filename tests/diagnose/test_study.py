@@ -1,8 +1,12 @@
-"""Refusals of a study before anything is judged, and changes of a run as they are written."""
+"""Refusals of a study before anything is judged, and changes of a run as they are written.
+
+An effect is added to a case's file.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,11 +16,16 @@ import pytest
 from tyrecal.errors import InputError
 from tyrecal.simulate.evaluate.failure import DeckRefused
 from tyrecal.simulate.modes.label import Label
+from tyrecal.studies.diagnose.add import add
 from tyrecal.studies.diagnose.study import parse_change
 from tyrecal.studies.inference.check_units import check_units
 from tyrecal.studies.inference.inverse_problem import Toggle
 from tyrecal.studies.inference.model import Answer
 from tyrecal.studies.inference.observations import Observable, Observations
+from tyrecal.tyre.case.editor import EDITOR_LINE
+from tyrecal.tyre.load import load_case
+
+from ..case.test_guard import SLIPS
 
 
 @pytest.mark.parametrize(
@@ -86,3 +95,26 @@ def test_a_model_without_an_answer_says_why_before_anything_is_judged() -> None:
     # what is as in the case, or a factor, is no other tyre
     check([answer], replace(switched, value=0.02), replace(switched, times=True))
     assert asked_for == [[{}], *[[{}, {"point_mass": pytest.approx(0.03)}]] * 2, [{}]]
+
+
+def test_an_effect_is_added_with_the_files_comments_kept(case_folder: Path) -> None:
+    old = case_folder / "p235_75r17.yaml"
+    new = add(old, {"bead_filler": 1.5})
+    added = [line for line in new.read_text().splitlines() if line not in old.read_text()]
+    apart = "effects:", EDITOR_LINE.strip()
+    assert [word for line in added if (word := line.strip()) not in apart] == ["bead_filler: 1.5"]
+    assert "# Table 1 of the paper" in new.read_text()
+    with pytest.raises(InputError):
+        add(old, {"bead_filler": 1.5})
+    with pytest.raises(ValueError, match="no 'nothing'"):
+        add(old, {"nothing": 1.5})
+
+
+def test_an_effect_is_added_to_a_case_whose_numbers_are_unusual(case_folder: Path) -> None:
+    """Its user was told of them already."""
+    path = case_folder / "p235_75r17.yaml"
+    old, new, *_ = next(iter(SLIPS.values()))
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    assert load_case(add(path, {"bead_filler": 1.5}), allow_unusual=True).case.effects

@@ -25,7 +25,7 @@ from tyrecal.tyre.case import LoadedCase, start_values
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.state import TyreState
 
-from .test_pressed_slopes import small_case
+from .test_pressed import small_case
 
 LOADS = [1500.0]
 

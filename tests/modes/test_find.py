@@ -1,8 +1,13 @@
-"""Labelled modes of designs: a label that is not among the first modes is asked for again."""
+"""Labelled modes of designs: a label that is not among the first modes is asked for again.
+
+Labels of the real tyre against frequencies that another program named on a fine mesh.
+"""
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,10 +16,12 @@ from tyrecal.simulate.deck.decks import steps
 from tyrecal.simulate.evaluate.evaluator import Question
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.simulate.modes.find import MORE_MODES, LabelledModes, find_modes
-from tyrecal.simulate.modes.label import Label, labelled
+from tyrecal.simulate.modes.label import Label, label_modes, labelled
+from tyrecal.simulate.modes.match import margin, match
 
 from ..fit.fake import LABELS, FakeEvaluator
 from ..fit.known_truth import CASE, POWERS, START, TARGETS
+from ..studies.labels import evaluate
 
 
 class FewModes(FakeEvaluator):
@@ -141,3 +148,22 @@ def test_modes_rise_in_frequency() -> None:
     evaluator = FakeEvaluator(TARGETS, POWERS, START)
     hertz = [mode.frequency_Hz for mode in labelled(evaluator.evaluate(Question(START)))]
     assert hertz == sorted(hertz) and len(hertz) == len(LABELS)
+
+
+REFERENCE = Path(__file__).parents[1] / "data" / "reference.json"
+
+
+def label(key):
+    c, m, *kind = key.split(",")
+    return Label(int(c), int(m), *kind)
+
+
+@pytest.mark.parametrize("number", [0, 1, 2])
+def test_the_nine_modes_of_the_paper_have_the_reference_frequencies(number):
+    point = json.loads(REFERENCE.read_text())["sections"]["p235_75r17"][number]
+    values = {name: point[name] for name in ("A_belt", "A_carcass", "C10")}
+    modes = label_modes(evaluate(values, point["pressure_kPa"], 2))
+    expected = {label(key): hertz for key, hertz in point["modes"].items()}
+    matched = match(modes, list(expected))
+    assert {k: v.frequency_Hz for k, v in matched.items()} == pytest.approx(expected, rel=6e-3)
+    assert margin(matched) > 0.8

@@ -1,23 +1,31 @@
-"""A planned test: chances against the diagnosis itself, the order, and widths in closed form."""
+"""A planned test: chances against the diagnosis itself, the order, and widths in closed form.
+
+tyrecal plan: files and words; its old name; what it refuses.
+Campaigns on record, judged by the diagnosis, against what the plan promised.
+"""
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tyrecal.studies.diagnose.next_measurement import COST_HOURS, STEP_HOURS, cost_hours
 from tyrecal.studies.diagnose.several import probabilities, weigh_hypotheses
+from tyrecal.studies.inference.effect_ranges import effect_ranges
 from tyrecal.studies.plan.chance import FOUND, NONE, LinearDiagnosis, shares
 from tyrecal.studies.plan.laboratory import Item, Laboratory
 from tyrecal.studies.plan.order import order
 from tyrecal.studies.plan.study import _widths
 
 from ..chance import generator
+from ..cli.test_cli import run
+from ..cli.test_diagnose import coarse  # noqa: F401  the main case with a coarse mesh
 from ..diagnose.toy import flat, problem
-
-pytestmark = pytest.mark.numbers
+from ..studies.planned import cost, groups, of_judge, promised, read
 
 
 def laboratory(noise: float = 0.001, size: float = 0.02) -> Laboratory:
@@ -29,6 +37,7 @@ def laboratory(noise: float = 0.001, size: float = 0.02) -> Laboratory:
     return Laboratory(base, item, menu, 240.0, False)
 
 
+@pytest.mark.numbers
 def test_probabilities_are_those_of_the_diagnosis() -> None:
     """A tyre that is linear, without scatter by chance: the same integrals by the same rule."""
     lab = laboratory()
@@ -44,6 +53,7 @@ def test_probabilities_are_those_of_the_diagnosis() -> None:
         assert dict(zip(linear.keys, stated, strict=True)) == pytest.approx(wanted, abs=0.03)
 
 
+@pytest.mark.numbers
 def test_a_pair_that_an_effect_holds_apart_shows_it() -> None:
     """Its distance is a row of its own, with the scatter of both members and the tyre's own."""
     toy = flat(effects=1, size=0.0)
@@ -63,6 +73,7 @@ def test_a_pair_that_an_effect_holds_apart_shows_it() -> None:
     assert np.diag(shown.sigma)[n:] == pytest.approx(np.full(n, own + 0.003**2))
 
 
+@pytest.mark.numbers
 def test_no_measurement_finds_nothing_and_more_find_more() -> None:
     """Sizes far above all scatter are found with certainty, and a sound tyre is not accused."""
     lab = laboratory(noise=5e-4, size=0.05)
@@ -73,6 +84,7 @@ def test_no_measurement_finds_nothing_and_more_find_more() -> None:
     assert every[NONE] == 1 and all(every[id] > FOUND for id in every)
 
 
+@pytest.mark.numbers
 def test_the_order_keeps_within_the_hours_and_gains_with_each_step() -> None:
     lab = laboratory(size=0.006)
     tyres = lab.linear.draw(12, generator(2))
@@ -89,6 +101,7 @@ def test_the_order_keeps_within_the_hours_and_gains_with_each_step() -> None:
     assert chances[1] == max(singles.values())
 
 
+@pytest.mark.numbers
 def test_pressures_are_a_step_apart_unless_a_user_names_them() -> None:
     lab = laboratory()
     lab.menu["200 kPa"] = Item("", 1.0, 200.0)  # type: ignore[index]
@@ -96,6 +109,7 @@ def test_pressures_are_a_step_apart_unless_a_user_names_them() -> None:
     assert "200 kPa" in replace(lab, any_pressure=True).offered(["240 kPa"])
 
 
+@pytest.mark.numbers
 def test_widths_are_those_of_the_linear_fit() -> None:
     """(J^T Sigma^-1 J + Sx^-2)^-1 for the variables; J Sx^2 J^T + the model's error before."""
     lab = laboratory()
@@ -114,9 +128,91 @@ def test_widths_are_those_of_the_linear_fit() -> None:
     assert (again < scatter).all()  # of the tyre itself, without that of a measurement
 
 
+@pytest.mark.numbers
 def test_one_model_of_costs() -> None:
     """A step that is dearer makes all dearer that need it, and nothing else."""
     dearer = cost_hours({**STEP_HOURS, "mount": STEP_HOURS["mount"] + 1})
     changed = {name for name, hours in dearer.items() if hours != COST_HOURS[name]}
     assert changed == {"mount", "clamp", "toggle"}
     assert all(dearer[name] == COST_HOURS[name] + 1 for name in changed)
+
+
+EFFECTS = ["spindle_lateral", "cavity_air"]
+
+
+@pytest.mark.slow
+def test_a_plan_in_files_and_by_its_old_name(
+    coarse: Path,  # noqa: F811
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    only = lambda case, evaluator, ids=None: effect_ranges(case, evaluator, EFFECTS)
+    monkeypatch.setattr("tyrecal.studies.plan.laboratory.effect_ranges", only)
+    out, store = tmp_path / "out", ["--store", str(tmp_path / "store")]
+    given = ["--pressure-kPa", "160", "--pressure-kPa", "240", "--hours", "3", *store]
+    assert run("plan", str(coarse), *given, "--sensors", "9", "--output", str(out), "--report") == 0
+    plan = json.loads((out / "plan.json").read_text())
+    assert {each["id"] for each in plan["effects"]} == {*EFFECTS}
+    assert plan["steps"][-1]["total_hours"] <= 3 and len(plan["sensors"]) == 9
+    for each in plan["effects"]:
+        assert len(each["chance"]) == len(plan["steps"])
+        assert each["largest_lambda"] >= 25 or each["named_from"] is None
+    assert all(0 < v["after_percent"] < v["before_percent"] for v in plan["variables"])
+    page = (out / "plan.md").read_text()
+    assert all(step["what"] in page for step in plan["steps"]) and "## Sensors" in page
+    assert 'id="plan"' in (out / "report.html").read_text() or (out / "plan_chances.png").exists()
+    capsys.readouterr()
+    old = tmp_path / "old"
+    assert run("blind", "power", str(coarse), *given, "--output", str(old)) == 0
+    assert "tyrecal plan" in capsys.readouterr().err
+    assert not json.loads((old / "plan.json").read_text()).get("sensors")
+    short = ["--hours", "0.5", *store, "--output", str(tmp_path / "short")]
+    assert run("plan", str(coarse), *given[:4], *short) == 2
+    assert "one set of functions takes 1 h" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (["--step-hours", "mounting=2"], "'mounting' is no step; did you mean 'mount'?"),
+        (["--step-hours", "mount"], "must be STEP=HOURS"),
+        (["--step-hours", "mount=-1"], "must be STEP=HOURS"),
+    ],
+)
+def test_what_it_refuses(
+    coarse: Path,  # noqa: F811
+    tmp_path: Path,
+    given: list[str],
+    words: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert run("plan", str(coarse), "--output", str(tmp_path / "out"), *given) == 2
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "out" / "plan.json").exists()
+
+
+JUDGES = "linear", "evidence"
+
+
+@pytest.mark.parametrize("judge", JUDGES)
+def test_effects_are_found_as_often_as_promised(judge: str) -> None:
+    rows = read()
+    for share, stated, error in promised(rows, of_judge(rows, judge)[0]).values():
+        assert abs(share - stated) <= 3 * error
+
+
+@pytest.mark.parametrize("judge", JUDGES)
+def test_a_plan_reaches_a_verdict_sooner_than_the_list(judge: str) -> None:
+    """By how much is in PLAN.md."""
+    rows = read()
+    for of in groups(of_judge(rows, judge)[0]).values():
+        listed, own = (cost(of, way, rows[0]["list_hours"]) for way in ("list", "plan"))
+        assert own.mean() < listed.mean() and np.median(own) <= np.median(listed)
+
+
+def test_no_sound_tyre_is_accused() -> None:
+    rows = read()
+    for judge in JUDGES:
+        sound = of_judge(rows, judge)[1]
+        assert sound and not [row for row in sound if row["accused"] >= 0.9]

@@ -1,4 +1,7 @@
-"""Data kept for the page: the same shapes, section and patches, from fewer numbers."""
+"""Data kept for the page: the same shapes, section and patches, from fewer numbers.
+
+The table of measured modes.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +11,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
+from tyrecal.measured.labels import Judged
+from tyrecal.measured.modal import LabelledMode, ModalTest
+from tyrecal.measured.sensors import MeasuredMode, Sensors
 from tyrecal.report.html.shapes import packed
+from tyrecal.report.measured import measured_table
 from tyrecal.report.revolve import motion, placed, swept
 from tyrecal.report.shape_data import Shapes, patches_data, section_data, tyre_data
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate import evaluator as door_module
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.results import HarmonicShape
-from tyrecal.simulate.modes.label import Mode, paired_labels
+from tyrecal.simulate.modes.label import Label, Mode, paired_labels
 from tyrecal.studies.footprint import press
 from tyrecal.studies.patch import patch_of
 from tyrecal.tyre.case import start_values
@@ -142,3 +150,21 @@ def test_patches_keep_all_that_touches(tyre, monkeypatch: pytest.MonkeyPatch) ->
 def test_kept_data_is_small(tyre, tmp_path: Path) -> None:
     case, evaluation, modes = tyre
     assert len(json.dumps(tyre_data(case, evaluation, modes))) < 100_000
+
+
+def run_of(name: str) -> ModalTest:
+    """A test with one mode, [2,1] at 66.1 Hz."""
+    sensors = Sensors(np.zeros((1, 3)), np.eye(3)[:1])
+    label = Label(2, 1)
+    judged = Judged(label, {label: 1.0}, f"like {label}")
+    mode = MeasuredMode(66.1, np.ones(1), 0.02, 0.1)
+    return ModalTest(name, (LabelledMode(mode, sensors, np.ones(1), 1.0, judged, "", "1"),))
+
+
+@pytest.mark.parametrize("name", ["[run].uff", "[bold].uff", "run [2].uff"])
+def test_names_are_no_markup(name: str) -> None:
+    """File names and labels in square brackets stand there as they are."""
+    console = Console(width=100)
+    with console.capture() as text:
+        console.print(measured_table([run_of(name)]))
+    assert name in text.get() and "[2,1] member 1" in text.get() and "like [2,1]" in text.get()

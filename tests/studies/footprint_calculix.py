@@ -41,8 +41,7 @@ from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.values import with_values
 
-from ..solvers.press_deck import Angles, Road, press_texts
-from ..solvers.press_results import read_press, read_radius, run_press
+from ..solvers.press_deck import Angles, Road, press_texts, read_press, read_radius, run_press
 from .calculix import common
 from .tread_gap import FINE, GAUSS, area_of_gap, areas_below, areas_of_gap, outside, sunk_in
 

@@ -1,4 +1,7 @@
-"""The posterior of a box and its draws: closed forms, all optima, what draws are worth."""
+"""The posterior of a box and its draws: closed forms, all optima, what draws are worth.
+
+Shares of the variance: a closed form, a grid, and scipy's estimate from samples.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,8 @@ import pytest
 from scipy.signal import lfilter
 
 from tyrecal.errors import InputError
+from tyrecal.studies import variance_shares as module
+from tyrecal.studies.emulator import fitted, spread, up_to
 from tyrecal.studies.inference.observations import Observable
 from tyrecal.studies.sample.box import sample_box
 from tyrecal.studies.sample.chains import (
@@ -23,6 +28,7 @@ from tyrecal.studies.sample.chains import (
 )
 from tyrecal.studies.sample.posterior import Posterior, optima
 from tyrecal.studies.sample.study import rows_of
+from tyrecal.studies.variance_shares import variance_shares
 from tyrecal.tyre.state import TyreState
 
 from ..chance import Chance, generator
@@ -38,6 +44,7 @@ from .known_posteriors import (
     posterior,
     two_valleys,
 )
+from .test_emulator import MODES, made, meeting, polynomial
 
 pytestmark = pytest.mark.numbers
 
@@ -190,3 +197,45 @@ def test_a_missing_emcee_is_told_in_one_sentence(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setitem(sys.modules, "emcee", None)
     with pytest.raises(InputError, match=r"needs the package emcee.*pip install '\.\[sample]"):
         needs_emcee()
+
+
+def test_shares_of_a_polynomial_are_those_of_its_terms() -> None:
+    """ln f = 4 + 0.3 P1(s) + 0.1 P2(s) + 0.2 P1(t) + 0.05 P1(s) P1(t), and one that is constant;
+    a product of P_i and P_j has the mean square 1 / (2 i + 1) / (2 j + 1)."""
+    degrees = up_to(2, 2)
+    terms = {(0, 0): 4.0, (1, 0): 0.3, (2, 0): 0.1, (0, 1): 0.2, (1, 1): 0.05}
+    a = np.zeros((len(degrees), 2))
+    a[:, 0] = [terms.get(tuple(each), 0.0) for each in degrees.tolist()]
+    a[0, 1] = 3.0
+    centre, half = generator("box").normal(size=2), np.array([0.3, 2.0])
+    emulated = fitted((), MODES, centre, half, polynomial(degrees, a, spread(9, 2), centre, half))
+    first, total, variance = variance_shares(emulated)
+    s, t, both = 0.3**2 / 3 + 0.1**2 / 5, 0.2**2 / 3, 0.05**2 / 9
+    assert variance[0] == pytest.approx(s + t + both)
+    assert first[0] == pytest.approx(np.array([s, t]) / (s + t + both))
+    assert total[0] == pytest.approx(np.array([s + both, t + both]) / (s + t + both))
+    assert variance[1] < 1e-20
+
+
+def test_the_grid_gives_the_shares_of_the_coefficients() -> None:
+    emulated = made(meeting())
+    assert emulated.pair is not None
+    first, total, variance = variance_shares(emulated)
+    for place in {*range(len(emulated.labels))} - {*emulated.pair}:
+        one, whole, scale = module._on_a_grid(emulated, place)
+        assert scale == pytest.approx(variance[place])
+        assert one / scale == pytest.approx(first[place], abs=1e-6)
+        assert whole / scale == pytest.approx(total[place], abs=1e-6)
+
+
+@pytest.mark.slow
+def test_shares_are_within_0_01_of_those_of_samples() -> None:
+    """The two [0,0] modes cross in the box, where a polynomial would be far off."""
+    from scipy.stats import sobol_indices, uniform
+
+    emulated = made(meeting())
+    ends = [uniform(low, high - low) for low, high in emulated.box]
+    drawn = sobol_indices(func=lambda x: emulated.ln_f(x.T).T, n=2**11, dists=ends, rng=1)
+    first, total, _ = variance_shares(emulated)
+    assert abs(first - drawn.first_order).max() < 0.01
+    assert abs(total - drawn.total_order).max() < 0.01

@@ -1,4 +1,7 @@
-"""The pressure sweep's own arithmetic, on tyres whose answers are known."""
+"""The pressure sweep's own arithmetic, on tyres whose answers are known.
+
+Pressures of a sweep without ends: round the case's own.
+"""
 
 from __future__ import annotations
 
@@ -8,19 +11,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tyrecal.errors import InputError
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode
 from tyrecal.simulate.modes.label import Label, label_modes
-from tyrecal.studies.fitted import InputError, read_fitted
+from tyrecal.studies.fitted import read_fitted
 from tyrecal.studies.pressure import State, findings, sweep
+from tyrecal.studies.pressure_range import PressureRange
 from tyrecal.studies.pressure_result import slopes, sweep_result
 from tyrecal.tyre.case import start_values
 from tyrecal.tyre.case.identity import tyre_sha256
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.state import pressure_name
+from tyrecal.tyre.values import with_values
 
 from ..conftest import CASES
+from ..evaluate.stand_in import CASE
 from ..fit.fake import LABELS, shape
 
 P = [100.0, 130.0, 200.0, 320.0]
@@ -186,3 +193,20 @@ def test_a_file_that_is_no_fit_of_this_case(change: dict, words: str, tmp_path: 
     assert "\n" not in str(refused.value)
     path.write_text(json.dumps(right))
     assert read_fitted(path, case) == ({"A_belt": 2e-7, "A_carcass": 4e-7, "C10": 1e6}, [])
+
+
+@pytest.mark.parametrize(("own", "ends"), [(240, (100, 320)), (850, (350, 1130))])
+def test_default_ends_follow_the_case(own: float, ends: tuple[float, float]) -> None:
+    case = with_values(CASE, {"pressure_kPa": own})
+    pressures = PressureRange(None, None, 12).on(case)
+    assert (pressures[0], pressures[-1], len(pressures)) == (*ends, 12)
+    assert pressures == sorted(pressures) and pressures[0] < own < pressures[-1]
+
+
+def test_an_end_that_is_given_counts() -> None:
+    assert PressureRange(200.0, None, 4).on(CASE) == [200, 240, 280, 320]
+    assert PressureRange(None, 110.0, 3).on(CASE) == [100, 105, 110]
+    with pytest.raises(
+        InputError, match=r"100 must be less than --to-kPa 90 \(default: 100 to 320"
+    ):
+        PressureRange(None, 90.0, 3).on(CASE)

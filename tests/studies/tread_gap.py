@@ -13,8 +13,7 @@ from tyrecal_solvers.calculix.results import read_fields
 
 from tyrecal.simulate.evaluate.pressed import Footprint, Pressed
 
-from ..solvers.press_deck import OUTER_NODES
-from ..solvers.press_results import read_press
+from ..solvers.press_deck import OUTER_NODES, read_press
 
 Array = np.ndarray
 GAUSS = np.polynomial.legendre.leggauss(3)
