@@ -28,6 +28,7 @@ from ..studies.mac_pairing import SIGNALS, draw_pairing, draw_sensors
 from .tyres import measured, modes, shape_of
 
 pytestmark = pytest.mark.numbers
+KINDS = "axial", "torsional"
 
 
 def test_the_chance_level_is_exceeded_by_one_random_shape_in_twenty(chance: Chance) -> None:
@@ -174,6 +175,27 @@ def test_modes_that_sensors_cannot_distinguish_are_as_likely() -> None:
     shape = real_part(measured(mode, sensors, nodes, generator("alike"), 0.03))[0]
     (odds,) = ln_shape_odds(case, sensors, shape[:, None])
     assert odds[labels.index(Label(3, 0))] == odds[labels.index(Label(3, 1))] == odds.max() > 5
+
+
+@pytest.mark.parametrize("kind", ["axial", "torsional"])
+def test_a_shape_that_sensors_hardly_see_is_no_evidence(kind: str) -> None:
+    """Of [0,0] radial sensors see a hundredth: mostly what is mixed into it, here a tenth of the
+    other mode. So [0,0] lateral and torsional are as likely."""
+    sensors, nodes = on_rings((-0.8, 0.1, 0.9), "r")
+    both = {k: modes()[[m.label for m in modes()].index(Label(0, 0, k))] for k in KINDS}
+    other = both[KINDS[kind == KINDS[0]]]
+    own, mixed = (np.asarray(shape_of(each).amplitude) for each in (both[kind], other))
+    u = (own + 0.1 * mixed * np.linalg.norm(own) / np.linalg.norm(mixed))[nodes, 0].real
+    u = u + 0.03 * np.sqrt(np.mean(u**2)) * generator("weak").standard_normal(len(u))
+    (odds,) = ln_shape_odds(CaseModes(modes()), sensors, u[:, None])
+    assert odds[modes().index(both[kind])] == odds[modes().index(other)] == odds.max()
+
+
+def test_errors_of_places_matter_where_a_motion_is_small_and_steep() -> None:
+    """Near the crown [3,1], antisymmetric, changes its sign, and [3,0] hardly changes."""
+    sensors, case = on_rings((0.15,), "r")[0], CaseModes(modes())
+    noise = {mode.label: case.noise_by_place(mode, sensors) for mode in modes()}
+    assert noise[Label(3, 0)] < 1e-3 and noise[Label(3, 1)] > 5 * noise[Label(3, 0)]
 
 
 def test_a_random_shape_is_like_a_mode_by_chance_alone(chance: Chance) -> None:

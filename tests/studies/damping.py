@@ -12,8 +12,9 @@ Loss: rate-independent and by stiffening add as a root of squares; 1 % less per 
 loss factor `LOSS` stated (15 %), or none stated, and the tyre's about `DRAWN_LOSS`, factor 2.
 
 ``make`` seals: the truth is in one file, its sha256 heads the record, before anything is answered.
-The judge: all single effects by `weigh_hypotheses`, on an expansion about the start with each
-effect at further sizes; what `diagnose` evaluates anew at re-fits is left out. The same
+The judge: all single effects by `weigh_hypotheses`, each at further sizes, carried to the plain fit
+with near modes coupled as `diagnose` does; what it evaluates anew at re-fits is left out. The rows
+without "coupled" are by an earlier judge: about the start, near modes not coupled. The same
 frequencies, with their noise, are judged three times: alone, with damping of either case. Damping
 moves no re-fit, so that it is added to the evidence of each, on the grids of the frequencies.
 A pair: the effect, and that effect of another kind which its frequencies are most like (`RIVALS`).
@@ -45,11 +46,12 @@ from tyrecal.studies.fit.targets import target_labels
 from tyrecal.studies.inference.covariance import model_form
 from tyrecal.studies.inference.damping import DAMPING_FORM
 from tyrecal.studies.inference.effect_ranges import effect_ranges
-from tyrecal.studies.inference.expansion import MIDDLE, expand, refined
+from tyrecal.studies.inference.expansion import MIDDLE, carried, expand, refined
 from tyrecal.studies.inference.inverse_problem import InverseProblem
 from tyrecal.studies.inference.losses import ASSUMED_LOSS, ASSUMED_LOSS_SD, STATED_LOSS_SD
 from tyrecal.studies.inference.model import Answer, Query
 from tyrecal.studies.inference.observations import DampingRatios, Observable, Observations
+from tyrecal.studies.inference.plain_fit import plain_fit
 from tyrecal.studies.inference.tyre_model import TyreModel
 from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.tyre.case import LoadedCase, start_values
@@ -92,7 +94,7 @@ def model_of(case: LoadedCase, store: Path | None, every: bool) -> TyreModel:
 
 def problem_of(model: TyreModel) -> InverseProblem:
     """The problem without data, about the start, each effect at further sizes."""
-    expansion = replace(expand(model, model.start), coupling=None)
+    expansion = expand(model, model.start)
     for share in MIDDLE[1:]:
         sizes = {
             id: share * max(nodes.reach, key=abs)
@@ -200,6 +202,13 @@ def rivals(problem: InverseProblem) -> dict[str, str]:
     }
 
 
+def about_fit(problem: InverseProblem, model: TyreModel, measured: Row) -> InverseProblem:
+    """The problem about the plain tyre that fits the measured frequencies."""
+    seen, known = replace(problem.observations, y=np.array(measured["y"])), problem.expansion
+    x0 = plain_fit(model, seen, problem.places, known=known)
+    return replace(problem, expansion=carried(known, model, x0))
+
+
 def judged(problem: InverseProblem, measured: Row, sets: bool) -> list[Hypothesis]:
     """All hypotheses by frequencies; sets: of two and three effects, too."""
     seen = problem.observations
@@ -298,8 +307,8 @@ def make(folder: Path, trials: int, sound: int, record: str) -> None:
 def answer(folder: Path, store: Path | None, record: str, sets: bool) -> None:
     """Judge each trial that is not on record, a line each; at the end the truth is published."""
     case = study_case()
-    problem = problem_of(model_of(case, store, True))
-    problems = {WAYS[1]: problem, WAYS[2]: unstated(problem)}
+    model = model_of(case, store, True)
+    problem = problem_of(model)
     if len(read(record)) == 1:
         write(record, {"rivals": rivals(problem)})
     done = {(row["trial"], row["sets"]) for row in read(record) if "trial" in row}
@@ -308,9 +317,10 @@ def answer(folder: Path, store: Path | None, record: str, sets: bool) -> None:
         if (k, sets) in done:
             continue
         measured = json.loads((folder / f"trial_{k:03}.json").read_text())
-        hypotheses = judged(problem, measured, sets)
-        row = {"trial": k, "sets": sets, WAYS[0]: told(problem, hypotheses)}
-        for way, own in problems.items():
+        there = about_fit(problem, model, measured)
+        hypotheses = judged(there, measured, sets)
+        row = {"trial": k, "sets": sets, "coupled": True, WAYS[0]: told(there, hypotheses)}
+        for way, own in {WAYS[1]: there, WAYS[2]: unstated(there)}.items():
             row[way] = told(own, with_damping(own, hypotheses, measured[way]))
         write(record, row)
     truth_file(record).write_text((folder / "truth.json").read_text())

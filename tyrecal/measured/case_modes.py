@@ -1,8 +1,9 @@
 """The modes of a case at sensors; ``shape_likelihood`` compares measured shapes with them.
 
 A mode's shape at the sensors is most of the covariance of its signals. A case that is not
-calibrated has errors in its shapes: `SHAPE_OFF`, the weight of its label's covariance without a
-case.
+calibrated has errors in its shapes, and sensors are not quite where they are noted. Both are in
+proportion to the mode's motion over the whole section, of which the sensors may see little: then
+errors are most of what they see, and the shape is no evidence.
 """
 
 from __future__ import annotations
@@ -26,7 +27,11 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 
-SHAPE_OFF = 0.05  # mean square error of a shape of the case over its mean square
+# mean square error of a shape of the case over its mean square: weight of its label's covariance
+# without a case
+SHAPE_OFF = 0.05
+PLACE_OFF_m = 0.003  # standard deviation of a sensor's place, by judgement
+NEIGHBOURS = 12  # nodes about a sensor, by which a motion's slope over the section is judged
 MAX_OFF_TYRE = 0.03  # m, largest distance of a sensor from the case's tyre
 PER_HARMONIC = 4  # modes evaluated of each harmonic c: m = 0 to 3
 
@@ -50,8 +55,12 @@ class CaseModes:
         tyre.
         """
         u = self.signals(mode, sensors)
-        whole = float(np.sum(u**2)) / len(u)
-        return (u @ u.T / whole + SHAPE_OFF * S) / (1 + SHAPE_OFF) if whole else S
+        off = self._shape_error(mode, u)
+        return (u @ u.T + off * S) / (np.sum(u**2) / len(u) + off)
+
+    def _shape_error(self, mode: Mode, u: Array) -> float:
+        """Mean square error of signals u (k, 2) by the case's shape."""
+        return SHAPE_OFF * max(float(np.sum(u**2)) / len(u), _mean_square(mode))
 
     @property
     def points(self) -> Array:
@@ -78,11 +87,23 @@ class CaseModes:
         u = np.sum(turned * sensors.directions, axis=1)
         return np.column_stack([u.real, u.imag] if shape.n else [u.real])
 
+    def noise_by_place(self, mode: Mode, sensors: Sensors) -> float:
+        """Variance of the signals over that of `covariance`, because a sensor's place is not quite
+        the noted one, nor that of the nearest node."""
+        R, _, Z = sensors.points.T
+        distance, nodes = KDTree(self.points).query(np.column_stack([R, Z]), NEIGHBOURS)
+        near = np.einsum("kni,ki->kn", _shape(mode).amplitude[nodes], sensors.directions)
+        apart = np.linalg.norm(self.points[nodes[:, 1:]] - self.points[nodes[:, :1]], axis=2)
+        steepest = np.max(np.abs(near[:, 1:] - near[:, :1]) / apart, axis=1)
+        off = np.mean((steepest * np.hypot(PLACE_OFF_m, distance[:, 0])) ** 2)
+        u = self.signals(mode, sensors)
+        return float(off / (np.sum(u**2) / len(u) + self._shape_error(mode, u)))
+
     def is_seen(self, mode: Mode, sensors: Sensors) -> bool:
         """Whether the mean square of a mode's signals at the sensors is at least `MIN_SEEN` of that
         of its motion in each direction over the section. Raises InputError as `signals` does."""
-        u, amplitude = self.signals(mode, sensors), _shape(mode).amplitude
-        return bool(np.sum(u**2) / len(u) >= MIN_SEEN * np.mean(np.abs(amplitude) ** 2))
+        u = self.signals(mode, sensors)
+        return bool(np.sum(u**2) / len(u) >= MIN_SEEN * _mean_square(mode))
 
 
 def evaluate_case_modes(
@@ -114,6 +135,11 @@ def require_harmonic_shapes(modes: Sequence[Mode], solver: str) -> None:
             f"solver '{solver}' gives no shape for each number of waves; compare measured shapes"
             " with --solver bundled"
         )
+
+
+def _mean_square(mode: Mode) -> float:
+    """Mean square of a mode's motion in each direction over the section."""
+    return float(np.mean(np.abs(_shape(mode).amplitude) ** 2))
 
 
 def _shape(mode: Mode) -> HarmonicShape:

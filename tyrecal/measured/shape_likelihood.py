@@ -9,7 +9,8 @@ sensors hardly see, are like no mode: two modes mixed, or noise alone. With S = 
 
 is the ln of the odds of the mode against a frequency that is no mode of the tyre. Modes that these
 sensors cannot distinguish (`labels.groups_alike`) share their mean density, because what differs
-there are the errors of the model's shapes.
+there are the errors of the model's shapes. So all modes of a harmonic get the largest of their
+errors by the sensors' places: where that of one is small and steep, no clean shape refutes it.
 """
 
 from __future__ import annotations
@@ -35,11 +36,15 @@ def ln_shape_odds(case: CaseModes, sensors: Sensors, shapes: Array) -> Array:
         label_of_column(c, column): S
         for c, column, S, _ in label_covariances(sensors, highest, case.half_width)
     }
-    covariance = []
+    covariance, noise = [], dict[int, float]()
+    for mode in case.modes:
+        c, off = mode.label.c, case.noise_by_place(mode, sensors)
+        noise[c] = max(off, noise.get(c, 0.0))
     for mode in case.modes:
         same_c = [S for label, S in general.items() if label.c == mode.label.c]
         S = general[mode.label] if mode.label in general else np.mean(same_c, axis=0)
-        covariance.append(case.covariance(mode, sensors, S))
+        off = noise[mode.label.c]
+        covariance.append((case.covariance(mode, sensors, S) + off * np.eye(k)) / (1 + off))
     spectra = [np.linalg.eigh(S) for S in covariance]
     by_chance = ln_density(np.ones(k), np.eye(k), shapes)
     odds = np.array([ln_density(*spectrum, shapes) for spectrum in spectra]).T - by_chance[:, None]
