@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -278,11 +279,7 @@ def _effect_result(
                 pressure_kPa=pressure,
                 modes=[
                     EffectMode(
-                        c=label.c,
-                        m=label.m,
-                        kind=label.kind,
-                        before_percent=change(before),
-                        after_percent=change(after),
+                        **asdict(label), before_percent=change(before), after_percent=change(after)
                     )
                     for label, before, after in zip(signature.labels, *percents, strict=True)
                 ],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from itertools import pairwise
 from typing import Any
 
@@ -181,9 +182,7 @@ def _entry(mode: LoadedMode) -> ModeEntry:
     label = mode.member.label
     known = {key: getattr(mode, key) for key in ("sliding_Hz", "grip_mm", "damping_ratio")}
     return ModeEntry(
-        c=label.c,
-        m=label.m,
-        kind=label.kind,
+        **asdict(label),
         frequency_Hz=mode.frequency_Hz,
         multiplicity=1,
         symmetry=mode.member.symmetry,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -116,7 +116,7 @@ def findings(states: Sequence[State], labels: Sequence[Label]) -> PressureFindin
     """Findings on one design's states by rising pressure, two at least."""
     p = np.array([state.pressure_kPa for state in states])
     table = {label: np.array([s.frequencies[label] for s in states]) for label in labels}
-    modes = [{"c": x.c, "m": x.m, "kind": x.kind, **_curve(p, table[x])} for x in labels]
+    modes = [{**asdict(x), **_curve(p, table[x])} for x in labels]
     rises = {label: float(f[-1] - f[0]) for label, f in table.items()}
     families = [_family(name, rises) for name in FAMILIES]
     steps = [

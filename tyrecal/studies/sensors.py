@@ -3,6 +3,7 @@ sensors.json."""
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -100,9 +101,7 @@ def place(
         ],
         modes=[
             SensedMode(
-                c=mode.label.c,
-                m=mode.label.m,
-                kind=mode.label.kind,
+                **asdict(mode.label),
                 frequency_Hz=mode.frequency_Hz,
                 labelled=float(share),
                 shift_percent=100 * float(shift.mean()),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Annotated, Literal
 
 import numpy as np
@@ -250,9 +251,7 @@ def _mode(label: Label, swept: Sequence[SweptRange], rows: Sequence[SweptPoint])
     left = np.mean((hertz - plane @ change) ** 2)
     share_explained = float(1 - left / scatter) if scatter > 1e-18 * hertz.mean() ** 2 else 1.0
     return SweptMode(
-        c=label.c,
-        m=label.m,
-        kind=label.kind,
+        **asdict(label),
         frequency_Hz=float(hertz.mean()),
         lowest_Hz=float(hertz.min()),
         highest_Hz=float(hertz.max()),

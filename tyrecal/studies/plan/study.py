@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 
 import numpy as np
 
@@ -103,9 +104,7 @@ def plan(
         ],
         modes=[
             PlannedMode(
-                c=label.c,
-                m=label.m,
-                kind=label.kind,
+                **asdict(label),
                 frequency_Hz=float(np.exp(ln_f)),
                 before_percent=100 * before,
                 after_percent=100 * after,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from math import ceil
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -396,9 +397,7 @@ def _shares(sample: Sample) -> list[VarianceShare]:
     by_name = lambda shares: dict(zip(names, shares.tolist(), strict=True))
     return [
         VarianceShare(
-            c=label.c,
-            m=label.m,
-            kind=label.kind,
+            **asdict(label),
             frequency_Hz=float(hertz[i]),
             deviation_percent=float(100 * np.sqrt(variance[i])),
             first=by_name(first[i]),
