@@ -404,8 +404,8 @@ def test_recorded_trials_are_those_that_were_sealed(name: str) -> None:
 
 @pytest.mark.slow
 def test_the_tables_on_record_are_what_the_scorer_says(tmp_path: Path) -> None:
-    """The tables of every ninth series; `python -m tests.blind.study3 score` gives them all."""
-    series = sorted({group.series for group in GROUPS})[::9]
+    """The tables of three series; `python -m tests.blind.study3 score` gives them all."""
+    series = sorted({group.series for group in GROUPS})[9::3]
     names = {group.name for group in GROUPS if group.series in series}
     for name in names & seals().keys():
         unpack(name, tmp_path / "all" / name, tmp_path / "all-truth" / name)

@@ -74,17 +74,14 @@ def kinds(tmp_path_factory: pytest.TempPathFactory) -> Kinds:
     return Kinds(tmp_path_factory.mktemp("mutated") / "inputs")
 
 
-SLOW = {"folders", "records", "requests", "cases", "universal"}
-
-
-@pytest.mark.parametrize(
-    "kind", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in NAMES]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", NAMES)
 def test_no_mutated_input_breaks_anything(kind: str, kinds: Kinds) -> None:
     results = list(trials(kinds, kind, list(range(12)), seed=2))
     assert [each for each in results if each["fault"]] == [] and len(results) == 12
 
 
+@pytest.mark.slow
 def test_a_fault_is_seen(kinds: Kinds, monkeypatch: pytest.MonkeyPatch) -> None:
     """A change outside, a traceback, and an end without a word are told from what is right."""
 
