@@ -117,7 +117,7 @@ def test_what_a_worker_that_had_to_be_killed_leaves_goes_too(
         (tmp_path / "out" / "runs" / "run-left").mkdir(parents=True)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("tyrecal.studies.pressure._outcome", meanwhile)
+    monkeypatch.setattr("tyrecal.studies.pressure._state", meanwhile)
     assert run(*SWEEP[1:], "--steps", "2", "--output", str(tmp_path / "out")) == 130
     assert not (tmp_path / "out" / "runs").exists()
 

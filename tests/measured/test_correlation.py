@@ -179,7 +179,7 @@ def test_modes_that_sensors_cannot_distinguish_are_as_likely() -> None:
 
 @pytest.mark.parametrize("kind", ["axial", "torsional"])
 def test_a_shape_that_sensors_hardly_see_is_no_evidence(kind: str) -> None:
-    """Of [0,0] radial sensors see a hundredth: mostly what is mixed into it, here a tenth of the
+    """Radial sensors see a hundredth of [0,0], mostly what is mixed into it, here a tenth of the
     other mode. So [0,0] lateral and torsional are as likely."""
     sensors, nodes = on_rings((-0.8, 0.1, 0.9), "r")
     both = {k: modes()[[m.label for m in modes()].index(Label(0, 0, k))] for k in KINDS}
