@@ -263,7 +263,7 @@ def test_formats(kind: str, tmp_path: Path) -> None:
     assert {"10", "100", "0.1"} <= {*labels} and not any("$" in text for text in labels)
     if kind == "svg":
         text = contents[0].decode()
-        assert ">0.01<" in text and "mathdefault" not in text
+        assert ">10<" in text and "mathdefault" not in text
     assert "mathdefault" not in svg(over_decades(), "", "a")
 
 
