@@ -3,9 +3,6 @@ and road bear, small matrices."""
 
 from __future__ import annotations
 
-import threading
-import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,32 +62,13 @@ def on_road(work: Round) -> State:
     return State(stand.tyre.around, U, state, stick.held(state.contact))
 
 
-def responding(work: Round, state: State, check: Callable[[], None] = lambda: None) -> Pressed:
+def responding(work: Round, state: State) -> Pressed:
     outer = np.flatnonzero(abs(work.model.mesh.X[:, 0] - 0.1) < 1e-9)
     patch = TreadPatch(0.03, 0.1, outer, np.full(len(outer), 1 / len(outer)))
     tyre, symmetry = work.tyre(state.around), work.symmetry(state.around)
     forces = tyre.residual(state.U)
     given = symmetry, state.U, state.hold, forces, start(work), patch, POINTS * 2, HIGHEST_HZ
-    return Pressed(work, state, tyre, patch, PressedResponse(tyre, *given, check))
-
-
-def test_an_interruption_ends_both_parities(pressed: Pressed) -> None:
-    """It reaches the main thread alone; the other thread ends at its next look."""
-    looks: list[str] = []
-    interrupted = threading.Event()
-
-    def check() -> None:
-        if threading.current_thread() is threading.main_thread():
-            interrupted.set()
-            raise KeyboardInterrupt
-        interrupted.wait(60)
-        time.sleep(0.1)
-        looks.append("after it")
-
-    threads = threading.active_count()
-    with pytest.raises(KeyboardInterrupt):
-        responding(pressed.ring, pressed.state, check)
-    assert len(looks) < 10 and threading.active_count() == threads
+    return Pressed(work, state, tyre, patch, PressedResponse(tyre, *given, lambda: None))
 
 
 class Equations:

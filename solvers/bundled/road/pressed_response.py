@@ -15,14 +15,12 @@ directions of the hub are those of `modes.response`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from threading import Event
 
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from ...errors import Refused, RunFailed
+from ...errors import Refused
 from ..modes.harmonics import HarmonicModes
 from ..modes.response import ResponseResult, TreadPatch
 from ..modes.superelement import Superelement
@@ -100,24 +98,7 @@ class PressedResponse:
         self._mass = Inertia(model, tyre.around)
         self._turning = turning_stiffness(tyre, pressed, forces)
         self._motions = rim_motions(tyre, pressed)
-        self.reduced = self._side_by_side(factor)
-
-    def _side_by_side(self, factor: ContactUpdate | None) -> list[_OneParity]:
-        """Both parities, each in a thread: neither changes what the other reads."""
-        ended, check = Event(), self._check
-
-        def go_on() -> None:
-            if ended.is_set():
-                raise RunFailed("crashed", "the other parity has ended")
-            check()
-
-        self._check = go_on
-        with ThreadPoolExecutor(1) as pool:
-            reversed_ = pool.submit(self._of_parity, -1, None)
-            try:
-                return [self._of_parity(1, factor), reversed_.result()]
-            finally:
-                ended.set()
+        self.reduced = [self._of_parity(1, factor), self._of_parity(-1, None)]
 
     def _of_parity(self, parity: int, factor: ContactUpdate | None) -> _OneParity:
         tyre, pressed, hold, check = self._tyre, self._pressed, self._hold, self._check
