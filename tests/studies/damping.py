@@ -13,8 +13,7 @@ loss factor `LOSS` stated (15 %), or none stated, and the tyre's about `DRAWN_LO
 
 ``make`` seals: the truth is in one file, its sha256 heads the record, before anything is answered.
 The judge: all single effects by `weigh_hypotheses`, each at further sizes, carried to the plain fit
-with near modes coupled as `diagnose` does; what it evaluates anew at re-fits is left out. The rows
-without "coupled" are by an earlier judge: about the start, near modes not coupled. The same
+with near modes coupled as `diagnose` does; what it evaluates anew at re-fits is left out. The same
 frequencies, with their noise, are judged three times: alone, with damping of either case. Damping
 moves no re-fit, so that it is added to the evidence of each, on the grids of the frequencies.
 A pair: the effect, and that effect of another kind which its frequencies are most like (`RIVALS`).
@@ -319,7 +318,7 @@ def answer(folder: Path, store: Path | None, record: str, sets: bool) -> None:
         measured = json.loads((folder / f"trial_{k:03}.json").read_text())
         there = about_fit(problem, model, measured)
         hypotheses = judged(there, measured, sets)
-        row = {"trial": k, "sets": sets, "coupled": True, WAYS[0]: told(there, hypotheses)}
+        row = {"trial": k, "sets": sets, WAYS[0]: told(there, hypotheses)}
         for way, own in {WAYS[1]: there, WAYS[2]: unstated(there)}.items():
             row[way] = told(own, with_damping(own, hypotheses, measured[way]))
         write(record, row)
