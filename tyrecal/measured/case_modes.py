@@ -32,6 +32,7 @@ Array = np.ndarray
 SHAPE_OFF = 0.05
 PLACE_OFF_m = 0.003  # standard deviation of a sensor's place, by judgement
 NEIGHBOURS = 12  # nodes about a sensor, by which a motion's slope over the section is judged
+SAME_PLACE_m = 1e-9  # nodes that are nearer to each other are one
 MAX_OFF_TYRE = 0.03  # m, largest distance of a sensor from the case's tyre
 PER_HARMONIC = 4  # modes evaluated of each harmonic c: m = 0 to 3
 
@@ -91,10 +92,13 @@ class CaseModes:
         """Variance of the signals over that of `covariance`, because a sensor's place is not quite
         the noted one, nor that of the nearest node."""
         R, _, Z = sensors.points.T
-        distance, nodes = KDTree(self.points).query(np.column_stack([R, Z]), NEIGHBOURS)
+        count = min(NEIGHBOURS, len(self.points))
+        distance, nodes = KDTree(self.points).query(np.column_stack([R, Z]), count)
         near = np.einsum("kni,ki->kn", _shape(mode).amplitude[nodes], sensors.directions)
         apart = np.linalg.norm(self.points[nodes[:, 1:]] - self.points[nodes[:, :1]], axis=2)
-        steepest = np.max(np.abs(near[:, 1:] - near[:, :1]) / apart, axis=1)
+        # nodes in the same place move alike
+        slopes = np.abs(near[:, 1:] - near[:, :1]) / np.maximum(apart, SAME_PLACE_m)
+        steepest = np.max(slopes, axis=1)
         off = np.mean((steepest * np.hypot(PLACE_OFF_m, distance[:, 0])) ** 2)
         u = self.signals(mode, sensors)
         return float(off / (np.sum(u**2) / len(u) + self._shape_error(mode, u)))
