@@ -1,6 +1,7 @@
 """Standard errors that a fit states, tested over drawn tyres.
 
     python -m tests.studies.fit_errors [--prior] [COUNT] [SEED] [SIZE ...] >> fit_errors.jsonl
+    python -m tests.studies.fit_errors --few [COUNT] [SEED] [SIZE ...] >> fit_errors.jsonl
     python -m tests.studies.fit_errors fit_errors.jsonl
 
 Each tyre is drawn as its case states what is uncertain: fields of the section, constants, material
@@ -8,7 +9,9 @@ laws, and 0.3 % of scatter of each frequency at two pressures. Its variables are
 of the start, coarse mesh. `fit`, or `fit --prior`, is then given the case as it is. A line of JSON
 is printed for each tyre: (fitted - truth) over standard_error and over standard_error_total of each
 variable, apart where the fit says that the total does not hold, and (predicted - true) over the
-stated error of each mode at the case's own pressure, which was not measured. The second command
+stated error of each mode at the case's own pressure, which was not measured. With `--few`, which
+is `--prior` with 1 to 6 of these 18 frequencies in turn, the case knows its variables to 15 %, and
+the tyre's are drawn so. The last command
 prints by size and variable or mode how often the 90 % interval, +- 1.645 errors, holds the truth,
 and the root mean squares; a record may be of several runs.
 
@@ -38,6 +41,7 @@ from tyrecal.studies.inference.form_error import MATERIAL_LAWS
 from tyrecal.studies.inference.observations import Observable
 from tyrecal.studies.inference.section_fields import fields, with_fields
 from tyrecal.studies.inference.uncertainties import sources, values_of
+from tyrecal.studies.variable import read_variable
 from tyrecal.tyre.case import LoadedCase, start_values, with_level
 from tyrecal.tyre.case.schema import TargetMode, Targets
 from tyrecal.tyre.effects.edit import changed
@@ -51,6 +55,7 @@ from .wrinkles import by_size
 
 SIZES = ("P235/75R17", "205/60R15", "225/45R17")
 NOISE, WITHIN, SHARES, QUANTILE_90 = 0.003, 0.2, (0.85, 1.15), 1.645
+FEW, KNOWN_PERCENT = 6, 15.0
 NOT_HELD = ", said not to hold"
 LABELS = [
     *(Label(0, 0, kind) for kind in ("axial", "torsional")),
@@ -89,10 +94,22 @@ class DrawnTyre:
         return frequencies(self.case, {}, [p + self.pressure_off for p in pressures_kPa])
 
 
-def drawn_tyre(case: LoadedCase, random: np.random.Generator) -> DrawnTyre:
-    """A tyre of a case, off it as its case states what is uncertain."""
-    start = start_values(case)
-    truth = {name: v * float(np.exp(random.uniform(-WITHIN, WITHIN))) for name, v in start.items()}
+def knowing(case: LoadedCase) -> LoadedCase:
+    """The case, its variables known to `KNOWN_PERCENT`."""
+    known = {"percent": KNOWN_PERCENT}
+    own = {name: each.model_copy(update=known) for name, each in case.case.variables.items()}
+    return changed(case, variables=own)
+
+
+def drawn_tyre(case: LoadedCase, random: np.random.Generator, few: bool = False) -> DrawnTyre:
+    """A tyre of a case, off it as its case states what is uncertain; with ``few`` its variables,
+    too."""
+    truth = {
+        name: value * float(np.exp(random.uniform(-WITHIN, WITHIN)))
+        if not few
+        else value * float(np.exp(read_variable(case, name).spread * random.normal()))
+        for name, value in start_values(case).items()
+    }
     known, _ = sources(case)
     own, off = values_of(case, known), dict[str, float]()
     pressure_off = 0.0
@@ -156,11 +173,17 @@ def predictions(
     return list(zip(frequencies(case, values, [nominal]), errors.tolist(), strict=True))
 
 
-def line_of(case: LoadedCase, random: np.random.Generator, prior: bool) -> dict[str, Any]:
-    """Errors of one drawn tyre's fit over those that it states. Raises EvaluationFailed, or
-    ValueError for a tyre that cannot be drawn."""
-    tyre = drawn_tyre(case, random)
+def line_of(
+    case: LoadedCase, random: np.random.Generator, prior: bool, few: int = 0
+) -> dict[str, Any]:
+    """Errors of one drawn tyre's fit, to ``few`` frequencies if not 0, over those that it states.
+    Raises EvaluationFailed, or ValueError for a tyre that cannot be drawn."""
+    tyre = drawn_tyre(case, random, few > 0)
     measured, own = measured_and_own(case, tyre, random)
+    if few:
+        rows = random.choice(len(measured.case.targets.modes), few, replace=False)
+        modes = [measured.case.targets.modes[i] for i in sorted(rows)]
+        measured = changed(measured, targets=Targets(modes=modes))
     evaluator = Evaluator(TyreDesign(measured))
     fit = calibrate(measured, evaluator, "gauss-newton", prior=prior).found
     variables = {}
@@ -170,15 +193,15 @@ def line_of(case: LoadedCase, random: np.random.Generator, prior: bool) -> dict[
         off = np.log(v.value / tyre.truth[name]) * v.value
         ratios = [off / v.standard_error, off / v.standard_error_total]
         variables[name if v.total_holds else name + NOT_HELD] = [shortened(x) for x in ratios]
-    modes = {}
-    if not any(v.at_bound for v in fit.variables.values()):
+    held = {}
+    if not few and not any(v.at_bound for v in fit.variables.values()):
         predicted = predictions(measured, evaluator, fit)
-        modes = {
+        held = {
             str(label): shortened(float(np.log(computed / f)) / error)
             for label, f, (computed, error) in zip(LABELS, own, predicted, strict=True)
         }
     chi2 = fit.chi2_per_dof and shortened(fit.chi2_per_dof)
-    return {"chi2_per_dof": chi2, "variables": variables, "modes": modes}
+    return {"chi2_per_dof": chi2, "variables": variables, "modes": held}
 
 
 def shortened(x: float) -> float:
@@ -190,7 +213,9 @@ def table(lines: Sequence[dict[str, Any]]) -> Iterator[str]:
     """The table of results."""
     yield "| size | variable or mode | held in 90 % | rms by scatter | rms by total |"
     yield "|---" * 5 + "|"
-    kind = lambda line: line["size"] + ", --prior" * bool(line.get("prior"))
+    kind = lambda line: (
+        line["size"] + ", --prior" * bool(line.get("prior")) + ", few" * bool(line.get("few"))
+    )
     for size in dict.fromkeys(map(kind, lines)):
         own = [line for line in lines if kind(line) == size]
         rows: dict[str, list[tuple[float, float]]] = {}
@@ -212,19 +237,22 @@ def table(lines: Sequence[dict[str, Any]]) -> Iterator[str]:
         yield f"{size}: {len(own)} tyres, chi2/dof {chi2:.2f} on average"
 
 
-def main(count: int, seed: int, sizes: Sequence[str], prior: bool) -> None:
+def main(count: int, seed: int, sizes: Sequence[str], prior: bool, is_few: bool) -> None:
     """Print the lines, and the table to stderr."""
     lines = []
     for size in sizes:
         case, random = case_of(size), np.random.default_rng([seed, SIZES.index(size)])
+        case = knowing(case) if is_few else case
         done = 0
         while done < count:
+            few = is_few * (1 + done % FEW)
             try:
-                line = line_of(case, random, prior)
+                line = line_of(case, random, prior, few)
             except (EvaluationFailed, ValueError):  # the next tyre is drawn
                 continue
             done += 1
             own = {"size": size, "seed": seed, "number": done, **({"prior": True} if prior else {})}
+            own |= {"few": few} if few else {}
             lines.append({**own, **line})
             print(json.dumps(lines[-1]), flush=True)
     print("\n".join(table(lines)), file=sys.stderr)
@@ -234,7 +262,8 @@ if __name__ == "__main__":
     if sys.argv[1:] and Path(sys.argv[1]).is_file():
         print("\n".join(table([json.loads(x) for x in Path(sys.argv[1]).read_text().splitlines()])))
     else:
-        words = [word for word in sys.argv[1:] if word != "--prior"]
+        words = [word for word in sys.argv[1:] if not word.startswith("--")]
+        is_few = "--few" in sys.argv
         given = [int(x) for x in words[:2]]
         count, seed = [*given, *(100, 1)[len(given) :]]
-        main(count, seed, words[2:] or SIZES, "--prior" in sys.argv)
+        main(count, seed, words[2:] or SIZES, is_few or "--prior" in sys.argv, is_few)

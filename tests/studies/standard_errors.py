@@ -1,6 +1,8 @@
 """Standard errors of `fit` against those of `sample` and `diagnose` of the same drawn tyres.
 
     python -m tests.studies.standard_errors [COUNT] [SEED] [SAMPLED] [DIAGNOSED] [SIZE ...]
+    python -m tests.studies.standard_errors --prior COUNT SEED SAMPLED [SIZE ...] >> record.jsonl
+    python -m tests.studies.standard_errors record.jsonl
 
 Tyres as in `fit_errors`, COUNT of each size, with SAMPLED and DIAGNOSED of them. The fit weighs
 residuals by their scatter alone, R = (J^T S^-1 J)^-1 J^T S^-1, and `sample` and `diagnose` by the
@@ -14,16 +16,23 @@ then of single tyres by how much `sample` (linear, and a 90 % interval over 3.29
 depart from the error by Sigma. That of `diagnose` also knows how far a variable may be off its
 start (`DesignVariable.spread`), which is part of the error it is compared with. Totals are as long
 as chi2 per degree of freedom is below 1; else `fit` scales them.
+
+`fit --prior` weighs by the whole covariance and by what is known before, as the other two do. Its
+lines have for each variable its total over the standard error of `diagnose`, and of the tyres that
+are sampled over that of `sample`, linear and by draws (a 90 % interval over 3.29); `clear` where
+the interval keeps a tenth of the range from both bounds. The third command counts a record.
 """
 
 from __future__ import annotations
 
+import json
 import sys
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
@@ -37,6 +46,8 @@ from tyrecal.studies.fit.problem import Point, Problem
 from tyrecal.studies.fit.total_error import TotalError, total_error
 from tyrecal.studies.fit.uncertainty import uncertainty
 from tyrecal.studies.result import StudyInput
+from tyrecal.studies.sample.result import SampledVariable
+from tyrecal.studies.sample.result import result as sample_result
 from tyrecal.studies.sample.study import run as sample
 from tyrecal.tyre.case import LoadedCase
 
@@ -98,12 +109,79 @@ def sampled_errors(case: LoadedCase, seed: int) -> tuple[Array, Array]:
 
 def diagnosed_errors(case: LoadedCase) -> Array:
     """Standard deviations (v,) of ln of each variable by `diagnose`, without an effect."""
+    return np.array([each["standard_error"] / each["value"] for each in diagnosed(case).values()])
+
+
+def diagnosed(case: LoadedCase) -> dict[str, Any]:
+    """Entries of each variable as `diagnose` calibrates it, without an effect."""
     with TemporaryDirectory() as folder:
         file = Path(folder, "measured.csv")
         file.write_text(measurements_csv(table_of(case)))
         made = diagnosis.study(case, Evaluator(TyreDesign(case)), file, effects=list(CHEAPEST))
-    own = calibrated_variables(made.diagnosis, made.model)["without"].values()
-    return np.array([each["standard_error"] / each["value"] for each in own])
+    return calibrated_variables(made.diagnosis, made.model)["without"]
+
+
+def prior_line(case: LoadedCase, seed: int, sampled: bool) -> dict[str, Any]:
+    """Totals of a fit with what is known before over the errors of the others, by variable."""
+    fit = calibrate(case, Evaluator(TyreDesign(case)), "gauss-newton", prior=True).found
+    given = StudyInput(case, Evaluator(TyreDesign(case)), {})
+    draws = sample_result(sample(given, None, DRAWS, seed), seed).variables if sampled else {}
+    line: dict[str, Any] = {"chi2_per_dof": fit.chi2_per_dof, "variables": {}}
+    for name, other in diagnosed(case).items():
+        own = fit.variables[name]
+        total = own.standard_error_total or np.nan
+        ratios = {"at_bound": own.at_bound, "diagnose": total / other["standard_error"]}
+        if name in draws:
+            of = draws[name]
+            ratios |= {"linear": total / of.standard_error, "clear": is_clear(of)}
+            ratios["draws"] = total / ((of.high - of.low) / (2 * QUANTILE_90))
+        line["variables"][name] = {k: v if k in FLAGS else round(v, 4) for k, v in ratios.items()}
+    return line
+
+
+FLAGS = ("at_bound", "clear")
+
+
+def is_clear(variable: SampledVariable) -> bool:
+    """Whether its 90 % interval keeps a tenth of its range from both bounds."""
+    margin = (variable.upper - variable.lower) / 10
+    return variable.lower + margin < variable.low and variable.high < variable.upper - margin
+
+
+def prior_lines(count: int, seed: int, sampled: int, sizes: Sequence[str]) -> None:
+    """Print the lines of the fits with what is known before, and their table to stderr."""
+    lines = []
+    for size in sizes:
+        case, random = case_of(size), np.random.default_rng([seed, SIZES.index(size), 5])
+        number = 0
+        while number < count:
+            try:
+                line = prior_line(drawn(case, random)[0], number + 1, number < sampled)
+            except (EvaluationFailed, ValueError):  # the next tyre is drawn
+                continue
+            number += 1
+            lines.append({"size": size, "seed": seed, "number": number, **line})
+            print(json.dumps(lines[-1]), flush=True)
+    print("\n".join(prior_table(lines)), file=sys.stderr)
+
+
+def prior_table(lines: Sequence[dict[str, Any]]) -> Iterator[str]:
+    """How many of the ratios are within 5 % (by draws 15 %) of 1, and the farthest."""
+    yield "| total of `fit --prior` over the error of | within | variables | farthest |"
+    yield "|---" * 4 + "|"
+    own = [each for line in lines for each in line["variables"].values() if not each["at_bound"]]
+    for name, limit, need in (
+        ("diagnose", 0.05, None),
+        ("linear", 0.05, None),
+        ("draws", 0.15, True),
+        ("draws", 0.15, False),
+    ):
+        ratios = [e[name] for e in own if name in e and (need is None or e["clear"] is need)]
+        if ratios:
+            where = {None: "", True: ", clear of bounds", False: ", next to a bound"}[need]
+            within = sum(abs(ratio - 1) <= limit for ratio in ratios)
+            farthest = max(ratios, key=lambda ratio: abs(np.log(ratio)))
+            yield f"| {name}{where} | {limit:.0%} | {within} of {len(ratios)} | {farthest:.2f} |"
 
 
 def main(count: int, seed: int, sampled: int, diagnosed: int, sizes: Sequence[str]) -> None:
@@ -147,6 +225,12 @@ def main(count: int, seed: int, sampled: int, diagnosed: int, sizes: Sequence[st
 
 
 if __name__ == "__main__":
-    given = [int(x) for x in sys.argv[1:5]]
-    count, seed, sampled, diagnosed = [*given, *(10, 1, 3, 3)[len(given) :]]
-    main(count, seed, sampled, diagnosed, sys.argv[5:] or SIZES)
+    if sys.argv[1:2] == ["--prior"]:
+        numbers = [int(x) for x in sys.argv[2:5]]
+        prior_lines(numbers[0], numbers[1], numbers[2], sys.argv[5:] or SIZES)
+    elif sys.argv[1:] and Path(sys.argv[1]).is_file():
+        record = Path(sys.argv[1]).read_text().splitlines()
+        print("\n".join(prior_table([json.loads(line) for line in record])))
+    else:
+        numbers = [int(x) for x in sys.argv[1:5]]
+        main(*[*numbers, *(10, 1, 3, 3)[len(numbers) :]], sys.argv[5:] or SIZES)  # type: ignore
