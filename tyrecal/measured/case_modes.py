@@ -28,12 +28,12 @@ if TYPE_CHECKING:
 Array = np.ndarray
 
 # mean square error of a shape of the case over its mean square: weight of its label's covariance
-# without a case
+# without a case; by judgement
 SHAPE_OFF = 0.05
 PLACE_OFF_m = 0.003  # standard deviation of a sensor's place, by judgement
 NEIGHBOURS = 12  # nodes about a sensor, by which a motion's slope over the section is judged
 SAME_PLACE_m = 1e-9  # nodes that are nearer to each other are one
-MAX_OFF_TYRE = 0.03  # m, largest distance of a sensor from the case's tyre
+MAX_OFF_TYRE = 0.03  # m, largest distance of a sensor from the nearest node in R, Z
 PER_HARMONIC = 4  # modes evaluated of each harmonic c: m = 0 to 3
 
 
@@ -60,7 +60,7 @@ class CaseModes:
         return (u @ u.T + off * S) / (np.sum(u**2) / len(u) + off)
 
     def _shape_error(self, mode: Mode, u: Array) -> float:
-        """Mean square error of signals u (k, 2) by the case's shape."""
+        """Mean square error of `signals` u by the case's shape, modes of a doublet together."""
         return SHAPE_OFF * max(float(np.sum(u**2)) / len(u), _mean_square(mode))
 
     @property
@@ -94,6 +94,7 @@ class CaseModes:
         R, _, Z = sensors.points.T
         count = min(NEIGHBOURS, len(self.points))
         distance, nodes = KDTree(self.points).query(np.column_stack([R, Z]), count)
+        # (k, n): motion of n nodes, the nearest first, along a sensor's direction
         near = np.einsum("kni,ki->kn", _shape(mode).amplitude[nodes], sensors.directions)
         apart = np.linalg.norm(self.points[nodes[:, 1:]] - self.points[nodes[:, :1]], axis=2)
         # nodes in the same place move alike
@@ -142,7 +143,7 @@ def require_harmonic_shapes(modes: Sequence[Mode], solver: str) -> None:
 
 
 def _mean_square(mode: Mode) -> float:
-    """Mean square of a mode's motion in each direction over the section."""
+    """Mean over nodes and components of a mode's squared motion, both modes of a doublet added."""
     return float(np.mean(np.abs(_shape(mode).amplitude) ** 2))
 
 

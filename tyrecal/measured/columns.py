@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from .. import units
 from ..errors import InputError
 
-HEADINGS = {
+HEADINGS = {  # headings of each meaning, as `_heading` returns their names
     "frequency_Hz": "frequency freq f fn eigenfrequency natural_frequency resonance_frequency"
     " frequenz eigenfrequenz frequence frequence_propre",
     "contact_area_m2": "contact_area area footprint_area kontaktflache aufstandsflache",
@@ -51,6 +51,7 @@ ENDING = re.compile(
 )
 LENGTH_ENDING = re.compile(r"^(.+)[\s_](m|mm|cm|in|inch)$")  # 'mode m' ends in no unit
 DAMPING_RATIO_OF = {"damping_ratio": 1.0, "loss_factor": 0.5}  # damping ratio per unit of each
+# headings whose numbers are fractions where they state no unit
 FRACTIONS = {"damping_ratio", "modal_damping_ratio", *HEADINGS["loss_factor"].split()}
 TABLES = {"pressure": units.PRESSURE, "load": units.LOAD, **units.QUANTITIES}
 TABLES |= dict.fromkeys(DAMPING_RATIO_OF, units.DAMPING_UNITS)
@@ -146,6 +147,7 @@ def _column(index: int, heading: str, meaning: str, unit: str) -> TableColumn:
         }
         if not factors:
             raise InputError(": unknown unit")
+        # quantities that have one unit in common have all the same units and factors
         return TableColumn(index, next(iter(factors.values())), of=tuple(factors))
     if meaning == "value" and unit:
         raise InputError(": values are in the unit of their quantity, as Hz of frequency_Hz")

@@ -44,7 +44,8 @@ class CoordinateSystem:
         return np.asarray(x @ self.axes + self.origin)
 
     def directions(self, place: Array) -> Array:
-        """Unit vectors (3, 3) of the directions 1, 2, 3 at a global place, a row each."""
+        """Unit vectors (3, 3) of the directions 1, 2, 3 (x, y, z, or r, theta, z of this system) at
+        a global place, a row each."""
         if self.kind == CARTESIAN:
             return self.axes
         x, y, _ = self.axes @ (place - self.origin)
@@ -58,7 +59,8 @@ WORLD = CoordinateSystem(CARTESIAN, np.eye(3), np.zeros(3))
 
 def read_systems(kind: int, lines: Sequence[str]) -> dict[int, CoordinateSystem]:
     """Coordinate systems, by number, of a data set of type ``kind``, 18 or 2420, given its lines
-    after the type. Raises InputError, a phrase that names the fault."""
+    after the type. Raises InputError, a phrase that names the fault; ValueError or IndexError where
+    a line is damaged, for `universal` to name."""
     return _systems_18(lines) if kind == 18 else _systems_2420(lines)
 
 

@@ -71,8 +71,8 @@ def sensor_agreement(measured: Array, computed: Array) -> tuple[Array, Array]:
     """COMAC and ECOMAC (k,) of each signal over paired shapes in the columns of ``measured`` and
     ``computed``, which are of unit length and of the same sign.
 
-    COMAC is 1 where a signal agrees except for its gain and sign. ECOMAC, 0 to 1, is the mean
-    distance over 2, so that it shows a wrong gain or sign too.
+    COMAC is 1 where a signal agrees except for its gain and sign, or is 0 in all shapes of either.
+    ECOMAC, 0 to 1, is the mean distance over 2, so that it shows a wrong gain or sign too.
     """
     a, b = measured, computed
     size = np.sum(a**2, axis=1) * np.sum(b**2, axis=1)

@@ -9,8 +9,9 @@ middle plane for even m, antisymmetric for odd m. The others are small, not abse
 
 a, b, w: SAME_PARITY, OTHER_PARITY, OTHER_WAVES. own, same, other (k, k): covariances of unit
 motions of the label's order, of the other orders of its parity, and of the other parity; all: of
-every c; |A|: the mean of the diagonal. So no order has cleaner shapes than another. A belt's half
-width is known from a case, or not: then S is the mean over HALF_WIDTHS of the radius.
+every c; |A|: the mean of the diagonal, at least MIN_SEEN of that of the three together. So no order
+has cleaner shapes than another. A belt's half width is known from a case, or not: then S is the
+mean over HALF_WIDTHS of the radius. The numbers are by judgement.
 
 A column is the index of an order among the five of a harmonic in `modes.label`: COLUMNS has the
 motions of each, PARITY whether it is even (0) or odd (1). DEGREE is the highest polynomial, BELT
@@ -83,11 +84,12 @@ def _unit(S: Array) -> Array:
 
 
 def _motions(sensors: Sensors, c: int, half_width: float) -> Array:
-    """B (k, terms): belt polynomials, then sidewall ones, by component; cosines, then sines."""
+    """B (k, terms): belt polynomials, then sidewall ones, each of r, theta, z in turn; all these
+    times cosines, then times sines."""
     R, angle, Z = sensors.points.T
     belt = R / R.max() > BELT
     across = legvander(np.clip(Z / half_width, -1, 1), DEGREE) * belt[:, None]
-    height = (R - R.min()) / (np.ptp(R) or 1.0) * 2 - 1
+    height = (R - R.min()) / (np.ptp(R) or 1.0) * 2 - 1  # -1 to 1 from the least radius on
     up = legvander(height, HEIGHTS) * ~belt[:, None]
     side = np.hstack([up, up * np.sign(Z)[:, None]])  # alike on both sides, then opposite
     motions = [part * sensors.directions[:, [k]] for part in (across, side) for k in range(3)]

@@ -52,7 +52,8 @@ def gather(
 
     pressure_kPa: of files that do not state theirs; layout: axle, centre, directions and band of
     the universal files; floor: of the value, the least sigma of a mean; assumed: of the value, the
-    standard deviation of one run that states none; leave_out: names of channels, see ``arrange``;
+    standard deviation of one run that states none (0: unknown); leave_out: names of channels, see
+    ``arrange``;
     keep_going: leave out repeats that contradict each other.
     Frequencies without labels come last. Raises InputError, where repeats contradict each other
     too; OSError.

@@ -34,7 +34,7 @@ def sensors_of(
     cylindrical: bool = False,
     axes: Mapping[int, Array] | None = None,
 ) -> Sensors:
-    """Sensors of signals (node, direction 1 to 3).
+    """Sensors of signals (node, direction 1 to 3, negative: against it).
 
     nodes: coordinates in m; axle: x, y or z (default: the axis along which all nodes
     spread least); centre: of the wheel, in m; cylindrical: directions 1, 2, 3 are radial,

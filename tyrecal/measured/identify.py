@@ -67,7 +67,7 @@ class Identified:
 def identify(measured: Responses, low_Hz: float, high_Hz: float) -> Identified:
     """Modes between two frequencies.
 
-    Raises InputError where the functions hold no mode, or lie at uneven frequencies.
+    Raises InputError where the functions hold no mode, fewer than 50 lines or uneven ones.
     """
     above_0 = measured.frequency_Hz > 0  # at 0 Hz sensors show no motion, or drift
     f, points = measured.frequency_Hz[above_0], measured.points
@@ -184,7 +184,7 @@ def _modes(poles: list[Array], low_Hz: float, high_Hz: float) -> Array:
 
 def _jackknife(again: list[Array], frequencies: Array) -> Array:
     """Standard deviation of each frequency (modes,), Hz, from the modes (modes, 3) found without
-    each group; NaN if fewer than three of these sets have the mode."""
+    each group; NaN, not known, if fewer than three of these sets have the mode."""
     nearest = np.full((len(again), len(frequencies)), np.nan)
     for j, modes in enumerate(again):
         for i, hertz in enumerate(frequencies):

@@ -110,8 +110,9 @@ class Labeller:
 
     def _prior(self, below: Collection[Label]) -> Array:
         """Prior (labels,), not normalised, given the labels ``below`` in the same file."""
-        lower = [_lower(label) for label in self.labels]
-        return np.array([1.0 if own in (None, *below) else WITHOUT_LOWER for own in lower])
+        lower_labels = [_lower(label) for label in self.labels]
+        expected = (None, *below)
+        return np.array([1.0 if lower in expected else WITHOUT_LOWER for lower in lower_labels])
 
     def looks_like(self) -> dict[Label, list[Label]]:
         """For each label the other labels that its shapes look like on these sensors, the likeliest

@@ -34,7 +34,8 @@ def judged(
 
 
 def _with_own_file(loaded: LoadedCase, to_fit: bool = False) -> LoadedCase:
-    """`with_own_file`; to_fit: where a fit can use it. Raises CaseError."""
+    """`with_own_file`; to_fit: check also what a fit checks (`with_measured`), if all frequencies
+    have labels. Raises CaseError."""
     path = loaded.measured
     if path is None:
         return loaded

@@ -15,12 +15,12 @@ from ..units import PRESSURE
 
 CSV_COLUMNS = ("quantity", "c", "m", "kind", "member", "pressure_kPa", "load_N", "value", "sigma")
 RIM_COLUMN = "rim"  # written only if a value was measured on another rim than the case's
-AS_CASE = "case"
+AS_CASE = "case"  # cell of the rim of a value that was measured on the case's
 PRESSURE_USUAL = Usual(20, 2000, "kPa", PRESSURE)
 DAMPING_RATIO = "damping_ratio"  # a row of its own in a CSV, read as part of its mode's frequency
 OF_A_MODE = ("frequency_Hz", DAMPING_RATIO)
-DAMPING_SIGMA = 0.25  # of a damping ratio that states none
-SHARES_OF_NOMINAL = (0.5, 1.0, 1.5)  # of that load, where a curve over the load is read
+DAMPING_SIGMA = 0.25  # sigma over the value of a damping ratio that states none
+SHARES_OF_NOMINAL = (0.5, 1.0, 1.5)  # of the nominal load: where a file's curves are evaluated
 MIN_CARRIED, MAX_CARRIED = 0.05, 3.0  # contact area times pressure over the load
 MeasurementKey = tuple[str, Label | None, str, float, float, RimSupport | None]
 

@@ -20,8 +20,9 @@ FREQUENCIES = ("FREQ_LONG", "FREQ_LAT", "FREQ_YAW", "FREQ_WINDUP")
 
 @dataclass(frozen=True)
 class MFSwift:
-    """A tyre by its keys, SI. A method raises KeyError for a key that it lacks; keys of influences,
-    such as PFZ1, are 0 where absent. Loads in N, lengths in m."""
+    """A tyre by its keys, SI. A method raises KeyError for a key that it lacks, and those that need
+    the deflection ValueError for a Q_FZ2 that is too large; keys of influences, such as PFZ1, are 0
+    where absent. Loads in N, lengths in m."""
 
     keys: Mapping[str, float]
 
@@ -55,7 +56,7 @@ class MFSwift:
         return self.keys["FNOMIN"] * (1 + self.influence("PFZ1") * dp) * slope / R0
 
     def _curve(self) -> tuple[float, float]:
-        """q_Fz1 and q_Fz2."""
+        """q_Fz1 and q_Fz2 of F_z / FNOMIN = q_Fz1 x + q_Fz2 x², x being deflection over radius."""
         k, square = self.keys, self.influence("Q_FZ2")
         ratio = k["VERTICAL_STIFFNESS"] * k["UNLOADED_RADIUS"] / k["FNOMIN"]
         if ratio**2 < 4 * square:
@@ -102,12 +103,12 @@ class MFSwift:
 
     def yaw(self, load: Number, dp: Number = 0.0) -> Number:
         """Torsional stiffness about the vertical, N m/rad; no key states its change with the
-        load."""
+        load, so 0 * load only gives the result its shape."""
         return self.keys["YAW_STIFFNESS"] * (1 + self.influence("PCMZ1") * dp) + 0 * load
 
     def springs(self) -> dict[str, float]:
         """Stiffness between rim and rigid belt, (2 pi f)² times its inertia: ``x`` (also vertical),
-        ``y`` in N/m; ``yaw``, ``windup`` in N m/rad."""
+        ``y`` in N/m; ``yaw``, ``windup`` in N m/rad. BELT_IXX is the inertia about z, too."""
         inertias = ("BELT_MASS", "BELT_MASS", "BELT_IXX", "BELT_IYY")
         pairs = zip(("x", "y", "yaw", "windup"), FREQUENCIES, inertias, strict=True)
         return {
@@ -118,7 +119,7 @@ class MFSwift:
     def residual_springs(self) -> dict[str, float]:
         """Springs between belt and patch with which the whole has the static stiffnesses, at FNOMIN
         and NOMPRES: ``x``, ``y``, ``z`` in N/m, ``yaw`` in N m/rad. One that is negative means that
-        the belt's springs alone are too soft."""
+        the belt's springs alone are too soft. The lever from axle to patch turns the belt."""
         k, belt = self.keys, self.springs()
         square = (self.free_radius - float(self.deflection(k["FNOMIN"]))) ** 2  # of the lever, m2
         left = {

@@ -21,7 +21,7 @@ NOISE_WORDS = {
     *("mode", "modes", "mod", "modus", "modo", "moda", "eigenform", "eigenmode", "shape", "forma"),
     *("forme", "de", "di", "del", "der", "des", "von", "of", "the", "tyre", "tire", "belt"),
 }
-MODE_NAMES = {
+MODE_NAMES = {  # r0, l0, t0: radial, lateral, torsional with so many waves
     "[0,0] axial": "lateral axial laterale axiale lateralmode axialmode lateralschwingung l0"
     " lateral_translation axial_translation",
     "[0,0] torsional": "torsional torsion torsionale torsione torsionsmode torsionsschwingung t0"
@@ -72,6 +72,7 @@ def label_parts(text: str, aliases: Mapping[str, str]) -> tuple[str, str, str] |
     text = DOUBLET.sub("", text)
     if match := BRACKETED_LABEL.match(text) or LETTERED.match(text):
         c, m, rest = (*match.groups(), "")[:3]
+        # a name after the numbers gives the kind if it means the same label
         named = {_named(rest)} - {None} or {_named(word) for word in rest.split()}
         if len(named) == 1 and (parts := named.pop()) and parts[:2] == (c, m):
             return parts

@@ -24,7 +24,7 @@ Array = np.ndarray
 
 ANGLE_STEPS = 48  # candidates round the tyre
 NEAR_HULL_m = 1e-3  # distance from the section's convex hull up to which a node is outside
-DRAWN_TESTS = 100
+DRAWN_TESTS = 100  # of `labelled_in_tests`
 # standard deviations of noise over a mode's root mean square signal, and of a place, m
 DRAWN_NOISE_SHARE, DRAWN_OFF_m = 0.05, 0.002
 
@@ -47,6 +47,7 @@ def place_sensors(case: CaseModes, modes: Sequence[Mode], count: int, axes: str)
     Phi = np.hstack([case.signals(mode, sensors) for mode in seen])
     Phi /= np.sqrt(np.mean(Phi**2, axis=0))
     blocks = Phi.reshape(len(places), len(axes), -1)
+    # (1 + Phi^T Phi)^-1 of the sensors chosen, by Woodbury's identity
     inverse, chosen = np.eye(Phi.shape[1]), list[int]()
     while len(chosen) < count:
         images = blocks @ inverse

@@ -5,8 +5,9 @@ with the waves c along a smooth curve for each m. As a normal distribution of ln
 
     ln f = a + ln F(label) + o_m + g ln(c / 2) + t_label + (s + s_label) ln(p / mean p) + noise
 
-F are the rounded frequencies of two passenger tyres; a is free, the others have the standard
-deviations below; [0,0] torsional has an s of its own. A doubt is a change of the data, two
+F are the rounded frequencies of two passenger tyres; o_m is common to an m, also to both [0,0];
+mean p is geometric. a is free, the others have the standard deviations below, by judgement; [0,0]
+torsional has an s with a mean and deviation of its own. A doubt is a change of the data, two
 pressures or two labels exchanged or one value left out, that makes them far more probable. Where
 the next change is nearly as probable, it is named too. These are questions to the user: nothing is
 changed here. `measured import` and `fit` report them; the pattern must never enter a fit.
@@ -33,7 +34,8 @@ USUAL_HZ = {  # by m, from c = 1
     1: (45, 78, 118, 148, 168, 186, 202, 216, 231),
 }
 ZERO_HZ = {"axial": 37, "torsional": 44}
-FREE_HZ = {(0, "axial"): 45, (0, "torsional"): 74, (1, 0): 81, (1, 1): 73}  # c, kind or m
+# by c, and kind or m: of a tyre on a free rim, where these differ
+FREE_HZ = {(0, "axial"): 45, (0, "torsional"): 74, (1, 0): 81, (1, 1): 73}
 SCALE_SD, OFFSET_SD, GROWTH_SD = 2.0, 0.06, 0.08  # of a, o_m, g
 SHAPE_SD = {0: 0.12, 1: 0.05}  # of t_label by c
 SHAPE_SD_ELSE, SHAPE_SD_FREE = 0.02, 0.2  # with more waves; on a free rim with fewer
@@ -41,7 +43,7 @@ RISE, RISE_SD, OWN_RISE_SD = 0.35, 0.08, 0.05  # of s and s_label
 # of [0,0] torsional, in which cords carry nearly all: computed for tyres of ten sizes
 TORSIONAL_RISE, TORSIONAL_RISE_SD = 0.24, 0.08
 MIN_NOISE = 0.003  # of ln f
-EXCHANGED, OFF = 16.0, 25.0  # chi-squared that a doubt takes away
+EXCHANGED, OFF = 16.0, 25.0  # chi-squared that a doubt takes away, at least: 4² and 5²
 NEXT_SLIP = 6.0  # chi-squared between a slip and the next likely: below, both are named
 MAX_DOUBTS = 5  # sentences
 
@@ -69,13 +71,15 @@ def _of_one_rim(rows: list[Measurement]) -> Iterator[str]:
         base = deviation @ weight @ deviation
 
         def gain(order: Sequence[int]) -> float:
-            """Chi-squared that values in another order take away."""
+            """Chi-squared that values in another order take away: row k has the value of row
+            order[k]."""
             moved = deviation + np.log([rows[i].value for i in order])  # noqa: B023
             moved -= np.log([row.value for row in rows])  # noqa: B023
             return float(base - moved @ weight @ moved)  # noqa: B023
 
         best, following = _likeliest_exchanges(rows, gain)
         weighted = weight @ deviation
+        # chi-squared that leaving out each value takes away
         single = weighted**2 / np.diag(weight)
         second, worst = map(int, np.argsort(single)[-2:])
         if best[0] > EXCHANGED and best[0] > single[worst]:

@@ -10,7 +10,7 @@ sensors hardly see, are like no mode: two modes mixed, or noise alone. With S = 
 is the ln of the odds of the mode against a frequency that is no mode of the tyre. Modes that these
 sensors cannot distinguish (`labels.groups_alike`) share their mean density, because what differs
 there are the errors of the model's shapes. So all modes of a harmonic get the largest of their
-errors by the sensors' places: where that of one is small and steep, no clean shape refutes it.
+errors by the sensors' places: a mode that is small and steep at them is refuted by no clean shape.
 """
 
 from __future__ import annotations

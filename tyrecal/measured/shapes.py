@@ -67,8 +67,8 @@ class SensorShapes(BaseModel):
         return Sensors(np.array(self.points), np.array(self.directions), tuple(self.signals))
 
     def nearest(self, hertz: Array, kPa: Array) -> dict[int, int]:
-        """The mode that is nearest to each of n frequencies (n,), measured at pressures (n,), place
-        by place; none farther than `SAME_MODE`, or measured at another pressure."""
+        """Index of the mode nearest to each of n frequencies (n,), measured at pressures (n,), by
+        the frequency's index; none farther than `SAME_MODE`, or measured at another pressure."""
         off = abs(np.divide.outer(hertz, [mode.frequency_Hz for mode in self.modes]) - 1)
         off[abs(kPa - self.pressure_kPa) > SAME_PRESSURE_kPa] = np.inf
         return {i: j for i, j in enumerate(off.argmin(1).tolist()) if off[i, j] < SAME_MODE}

@@ -115,7 +115,7 @@ def _of_quantity(values: list[Measurement]) -> list[Contradiction]:
     for each in values:
         groups.setdefault(each.key, []).append(each)
     repeated = [runs for runs in groups.values() if len(runs) > 1]
-    half_step = _step([each.value for each in values]) / 2
+    half_step = _step([each.value for each in values]) / 2  # rounding of what is written
     largest = MAX_REPEAT_STEP.get(values[0].quantity, MAX_REPEAT_STEP_ELSE)
     # a group of two is one comparison
     comparisons = sum(len(runs) if len(runs) > 2 else 1 for runs in repeated)
@@ -138,7 +138,7 @@ def _of_quantity(values: list[Measurement]) -> list[Contradiction]:
         rest, left = max(0.0, squares - own), freedom - 1
         floor = max(MIN_SCATTER, half_step / max(each.value for each in worst))
         usual = np.sqrt(rest / left) if left else 0.0
-        limit = np.inf
+        limit = np.inf  # of t_i s
         if left:
             tail = FALSE_REPORTS / 2 / comparisons
             limit = float(student.isf(tail, left)) * max(usual, floor)

@@ -196,7 +196,8 @@ def in_states(case: LoadedCase, readings: Sequence[Measurement]) -> list[Measure
 
 
 def _modes(case: LoadedCase, readings: Sequence[Measurement]) -> list[TargetMode]:
-    """Targets of modes; frequency and sigma of a pair are those of its members' mean."""
+    """Targets of modes; frequency and sigma of a pair are those of its members' mean, their errors
+    being independent."""
     groups: dict[tuple[Label, str, TyreState], list[Measurement]] = {}
     for each in readings:
         if each.label:

@@ -14,7 +14,7 @@ import numpy as np
 from .coordinates import CYLINDRICAL, CoordinateSystem
 
 Array = np.ndarray
-QUANTITIES_58 = {  # code, exponents of length, force and temperature, label, unit
+QUANTITIES_58 = {  # code of the data type, exponents of length, force, temperature, label, unit
     "displacement": (8, 1, 0, 0, "Displacement", "m"),
     "acceleration": (12, 1, 0, 0, "Acceleration", "m/s2"),
     "force": (9, 0, 1, 0, "Reaction force", "N"),
@@ -60,6 +60,7 @@ def universal_text(
     that move along r, theta, z of a cylindrical ``system``."""
     cylindrical = {*in_system}
     header = [_text(title), "NONE", "tyrecal", *["NONE"] * 4]
+    # code of SI, relative temperatures; factors of length, force, temperature, and its offset
     units = (
         f"{1:10d}{'SI: m, N':<20}{2:10d}\n{_double(1)}{_double(1)}{_double(1)}\n{_double(273.15)}"
     )
@@ -85,8 +86,9 @@ def line_set(number: int, nodes: Sequence[int]) -> str:
 def shape_set(title: str, number: int, each: WrittenShape, nodes: Iterable[int]) -> str:
     """A normal mode, data set 55, with a viscous damping ratio."""
     lines = [_text(each.name), _text(title), "NONE", "NONE", "NONE"]
+    # structural, normal mode, 3 freedoms, displacement, real, 3 values a node
     lines += ["".join(f"{code:10d}" for code in (1, 2, 2, 8, 2, 3))]
-    lines += [f"{2:10d}{4:10d}{1:10d}{number:10d}"]
+    lines += [f"{2:10d}{4:10d}{1:10d}{number:10d}"]  # 2 integers, 4 reals; load case, mode
     lines += [_singles([each.frequency_Hz, each.modal_mass_kg, each.damping_ratio, 0.0])]
     for node, motion in zip(nodes, each.displacement, strict=True):
         lines += [f"{node:10d}", _singles(motion)]
@@ -98,6 +100,7 @@ def function_set(title: str, each: WrittenFunction, frequency_Hz: Array) -> str:
     ends = "".join(f" {'NONE':<10}{n:10d}{d:4d}" for n, d in (each.response, each.reference))
     step = (frequency_Hz[-1] - frequency_Hz[0]) / (len(frequency_Hz) - 1)
     lines = [_text(each.name), _text(title), "NONE", "NONE", "NONE"]
+    # 4: frequency-response function, 6: complex of double precision, 1: even spacing
     lines += [f"{4:5d}{0:10d}{1:5d}{0:10d}{ends}"]
     lines += [f"{6:10d}{len(frequency_Hz):10d}{1:10d}{frequency_Hz[0]:13.5E}{step:13.5E}{0:13.5E}"]
     for quantity in ("frequency", each.quantity, "excitation", "none"):

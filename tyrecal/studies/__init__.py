@@ -117,7 +117,7 @@ def study_class(name: str) -> type[Result]:
 
 def result_types() -> dict[str, type[Result]]:
     """Types of results by the name of the study, those from outside last; one that cannot be loaded
-    is named and left out.
+    is left out, with a warning in the log.
 
     >>> list(result_types())[:3]
     ['fit', 'modes', 'sweep-pressure']

@@ -25,7 +25,7 @@ class ShapePair(ResultPart):
     """A measured shape and the mode of the design that it is most like."""
 
     measured: str  # label of the measured shape
-    member: str  # of a doublet: a or b
+    member: str  # 1 or 2 if both modes of a doublet were measured, else empty
     frequency_Hz: float  # measured
     computed: str | None  # None if the sensors see no mode
     mac: float  # of the shape with that mode, 0 to 1
@@ -109,7 +109,8 @@ class ShapeCorrelation(ResultPart):
 
 
 def correlate(test: SensorShapes, case: CaseModes) -> ShapeCorrelation:
-    """Shapes of a test against those of the modes of a case, up to `COMPARED_UP_TO`.
+    """Shapes of a test against those of the modes of a case at the test's pressure (the caller sees
+    to that), up to `COMPARED_UP_TO`.
 
     Raises InputError if a sensor is not on the tyre.
     """

@@ -42,8 +42,8 @@ def case_files(case: LoadedCase) -> Files:
 
 
 def settings_left_out(case: LoadedCase) -> list[str]:
-    """Settings of a case `as_fitted` that `case_files` does not write, as they are given: those of
-    the state."""
+    """Settings (`--set`) of a case `as_fitted` that `case_files` does not write, as they are given:
+    those of the state."""
     return [
         f"{name}={as_written(value)}"
         for name, value in case.overrides.items()

@@ -130,6 +130,7 @@ def _difference(theirs: Json, case: LoadedCase) -> str:
 
 
 def _made_otherwise(of: Json, case: LoadedCase) -> list[str]:
+    """Sentences on what differs between a provenance ``of`` a fit and the case."""
     mesh = case.case.mesh.level
     if of.get("mesh") == mesh:
         return []

@@ -29,7 +29,8 @@ from .result import (
     silent,
 )
 
-USUAL_SHARE = (0.8, 1.6)  # mean contact pressure over the inflation, of a passenger car
+# mean contact pressure over the inflation, of a passenger car, by judgement
+USUAL_SHARE = (0.8, 1.6)
 PressOutcome = Pressed | EvaluationFailed
 
 
@@ -170,6 +171,7 @@ def footprint_result(
 def footprint_row(pressed: Pressed, footprint: Footprint, mesh: SectionMesh) -> dict[str, float]:
     """Numbers of one load: areas in m2, lengths in m, pressures in Pa, stiffness in N/m."""
     patch = patch_of(pressed, footprint, mesh)
+    # the solver's own where it places the patch's edge between nodes
     area = footprint.contact_area_m2 or float(footprint.area_m2.sum())
     return {
         "load_N": footprint.load_N,

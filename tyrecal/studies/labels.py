@@ -44,7 +44,7 @@ class LabelledFrequency(LabelProbability):
     sigma_Hz: PositiveNumber | None  # standard deviation; null: not stated
     pressure_kPa: float
     rim: str
-    expected_Hz: float | None = None  # frequency of the mode at the expected variables
+    expected_Hz: float | None = None  # frequency of the mode at the variables' prior mean
     rivals: list[LabelProbability]  # other labels
 
     @property

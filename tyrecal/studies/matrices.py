@@ -37,7 +37,8 @@ MATRIX_POINTS = ",".join(
 FIRST_MODE_NODE, NODE_DOFS = 1001, 6  # of ABAQUS: each node has the coordinates of six modes
 TERMS_PER_LINE = 4  # of an equation
 MATRIX_NAMES = ("stiffness", "mass", "loss", "tread")
-NEAR_NOTHING = 1e-13  # of the largest entry of a row, below which an entry is round-off
+# of the geometric mean of the largest entries in its row and column, below which one is round-off
+NEAR_NOTHING = 1e-13
 
 README = """\
 Matrices of the tyre '{name}' at {pressure:g} kPa, {state}, by {solver}: {size} coordinates
@@ -83,6 +84,7 @@ def matrix_files(
     most ``modes`` coordinates of modes. Raises InputError, DeckRefused, EvaluationFailed,
     ValueError."""
     chosen = read_points(points)
+    # excite, respond, from, to, step: of two frequencies, whose middle is that of the losses
     request = response_request(points, points, 0.0, MATRIX_BAND_Hz, MATRIX_BAND_Hz, MATRIX_PATCH_mm)
     evaluator = Evaluator(design_of(case), solver)
     values = TyreState(pressure_kPa).design(case, start_values(case))
@@ -131,7 +133,7 @@ def _on_iso_axes(matrices: Mapping[str, Array]) -> dict[str, Array]:
     """Matrices whose first six coordinates are motions along and about x, y, z."""
     size = len(matrices["mass"])
     turn = np.eye(size)
-    turn[:6, :6] = 0.0
+    turn[:6, :6] = 0.0  # then columns: x, y, z, rx, ry, rz in the solver's places
     for k, (place, sign) in enumerate(HUB_CHANNELS.values()):
         turn[place, k] = sign
     square = {name: turn.T @ matrices[name] @ turn for name in MATRIX_NAMES[:3]}

@@ -53,7 +53,7 @@ class MeasuredResponse:
 
     def as_form(self, form: str) -> Array:
         """The values (f,) as receptance, mobility or accelerance; a force stays one."""
-        if self.respond.angle_deg is None:
+        if self.respond.angle_deg is None:  # at the hub
             return self.values
         power = ORDERS[form] - ORDERS[self.form]
         return np.asarray(self.values * (2j * np.pi * self.frequency_Hz) ** power)
@@ -133,7 +133,7 @@ def _point(file: Universal, signal: tuple[int, int], place: str) -> tuple[Respon
             f"{place}: node {node} is {1e3 * abs(at[1]):.0f} mm off the tyre's middle plane,"
             f" y must be at most {1e3 * MAX_OFF_MIDDLE_m:.0f} mm: responses are computed there"
         )
-    angle = round(float(np.degrees(np.arctan2(-x, -z))), 3) % 360
+    angle = round(float(np.degrees(np.arctan2(-x, -z))), 3) % 360  # 0 below the hub, 90 behind
     return ResponsePoint(TREAD_MOTIONS[channel], angle), sign
 
 

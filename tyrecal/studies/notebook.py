@@ -85,6 +85,7 @@ def _html(table: Any) -> str:
 
 
 def _cell(cell: Any) -> str:
+    """A cell of a `Table`: nothing, a text, or a value with its change in per cent."""
     if cell is None or isinstance(cell, str):
         return f"<td>{escape(cell or '')}</td>"
     return f"<td>{escape(f'{cell.value} {cell.percent:+z.2f}'.strip())}</td>"

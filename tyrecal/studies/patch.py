@@ -53,7 +53,7 @@ class Patch:
 
 
 def patch_of(pressed: Pressed, footprint: Footprint, mesh: SectionMesh) -> Patch:
-    """The patch at one load on the section's mesh."""
+    """The patch at one load on the section's mesh; the angle 0 is below the axle."""
     order = np.argsort((pressed.angles + np.pi) % (2 * np.pi))
     row = {int(node): i for i, node in enumerate(pressed.nodes)}
     line = [row[node] for node in mesh.outer_nodes]

@@ -88,7 +88,7 @@ def _state(design: str, pressure_kPa: float, answer: LabelledModes, name: str) -
     """The tyre at one pressure: its modes, with exact slopes by the pressure if the solver has
     them."""
     modes = labelled(answer.evaluation)
-    gradient = answer.evaluation.gradients.get(name)
+    gradient = answer.evaluation.gradients.get(name)  # Hz per kPa
     exact = None
     if gradient is not None:
         scale = {m.label: pressure_kPa / m.frequency_Hz for m in modes}

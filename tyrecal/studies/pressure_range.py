@@ -15,7 +15,7 @@ WITHOUT_PRESSURE = (100.0, 320.0)  # kPa, of a case that states 0
 
 @dataclass(frozen=True)
 class PressureRange:
-    """Ends in kPa, None: the default for the case's own pressure; and how many pressures.
+    """Ends in kPa, None: the default for the case's own pressure; number of pressures, 2 or more.
 
     >>> PressureRange(low=200, high=None, steps=3).on(case)
     [200.0, 260.0, 320.0]

@@ -18,7 +18,8 @@ from ..measured.coordinates import CYLINDRICAL, CoordinateSystem
 
 TREAD_POINT = re.compile(r"tread:([+-]?\d+(?:\.\d+)?)deg:(radial|tangential|lateral)")
 TREAD_MOTIONS = "radial", "tangential", "lateral"
-HUB_CHANNELS = {  # place among the solver's forces and moments, and the sign of it
+# place among the solver's forces and moments along and about down, backwards, left, and its sign
+HUB_CHANNELS = {
     **{"fx": (1, -1), "fy": (2, 1), "fz": (0, -1)},
     **{"mx": (4, -1), "my": (5, 1), "mz": (3, -1)},
 }

@@ -90,6 +90,7 @@ class Plain:
             [[e.gradients[name][m[label].position] for name in self.names] for label in self.labels]
             for e, m in zip(evaluations, modes, strict=True)
         ]
+        # (pressure, label, variable) d ln f by a step
         self.jacobian = np.array(slopes) * self.steps / self.hertz[:, :, None]
 
     def signature(self, id: str, value: float) -> Signature:

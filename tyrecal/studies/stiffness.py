@@ -205,6 +205,7 @@ def _row(
         torsional_Nm_per_rad=float(held[TORSION, TORSION]),
         vertical_sliding_N_per_m=patch["vertical_stiffness_N_per_m"],
         loaded_radius_m=pressed.free_radius_m - footprint.deflection_m,
+        # no force along the road: held[LONGITUDINAL] . (dx, dspin) = 0 as the wheel begins to roll
         rolling_radius_m=abs(float(held[LONGITUDINAL, SPIN] / held[LONGITUDINAL, LONGITUDINAL])),
         deflection_m=footprint.deflection_m,
         length_m=patch["length_m"],

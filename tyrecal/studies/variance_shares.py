@@ -26,7 +26,8 @@ def variance_shares(emulator: Emulator) -> tuple[Array, Array, Array]:
     """First-order shares (n, v), total shares (n, v) and variances of ln f (n,) of the labels, by
     the coordinates; shares are 0 where nothing varies."""
     norm = 1 / np.prod(2 * emulator.degrees + 1, axis=1)
-    part = emulator.coefficients[:, :-1].T ** 2 * norm  # (n, k) of the variance
+    # (n, k) parts of the variance; the last column is the distance of the two [0, 0]
+    part = emulator.coefficients[:, :-1].T ** 2 * norm
     active = emulator.degrees > 0  # (k, v)
     alone = active & (active.sum(1) == 1)[:, None]
     variance = part @ active.any(1)

@@ -152,7 +152,8 @@ def places_at(rows: Sequence[ModelRow], pressure_kPa: float) -> np.ndarray:
 def _by_label(
     diagnosis: Diagnosis, rows: Sequence[ModelRow], places: np.ndarray, each: Sequence[Any]
 ) -> Json:
-    """Values by the laboratory's own labels."""
+    """Values, one for each place, by the laboratory's own labels: the diagnosis may have exchanged
+    two."""
     by_label = {str(rows[i][0]): value for i, value in zip(places, each, strict=True)}
     if diagnosis.exchanged:
         a, b = map(str, diagnosis.exchanged)

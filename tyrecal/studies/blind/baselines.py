@@ -30,8 +30,10 @@ def guesses(ruler: Ruler, y: Array, places: Array, sigma: Array) -> dict[str, st
     P = ruler.projection(d, places, sigma)
     chi2 = float(r @ P @ r)
     near, aic, odds = {}, {NONE: chi2 + 2 * len(d)}, {NONE: np.log(PRIOR_NONE) - chi2 / 2}
+    # P = root^T root, with a ridge against rounding
     root = np.linalg.cholesky(P + 1e-9 * np.trace(P) / len(P) * np.eye(len(P))).T
     residual = root @ r
+    # ln of each effect's prior
     share = np.log((1 - PRIOR_NONE) / max(1, len(ruler.signatures)))
     for id, signature in ruler.signatures.items():
         _, g, _ = signature.grid(d, places)

@@ -26,7 +26,7 @@ class Truth:
     id: str  # random
     kind: str  # effect, none or outside
     law: str  # id of the effect, or name of the family outside the catalogue, "" for none
-    size: float  # its parameter
+    size: float  # its parameter, in the unit of the law
     variables: dict[str, float]  # by name, in their own units
     constants: dict[str, float]  # in standard deviations
     scatter: int  # seed of noise, missing values, splits of pairs and order of their modes
@@ -87,7 +87,7 @@ def tyre(
     plain = {**values_of(case, list(sources)), "pressure_kPa": pressure_kPa}
     values: dict[str, float] = dict(truth.variables)
     for source in sources:
-        for path, step in source.steps.items():
+        for path, step in source.steps.items():  # by one standard deviation
             known = values.get(path, 0.0 if path.startswith(EFFECT_PATH) else plain[path])
             values[path] = known + truth.constants[source.name] * step
     values.setdefault("pressure_kPa", pressure_kPa)

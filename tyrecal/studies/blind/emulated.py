@@ -33,6 +33,7 @@ Array = np.ndarray
 REACH = 0.8
 PLAIN_DEGREE, EFFECT_DEGREE, SOURCE_DEGREE = 4, 3, 2  # of polynomials in the variables
 PLAIN_DESIGNS, EFFECT_DESIGNS, SOURCE_DESIGNS = 20, 10, 12
+# nodes of an effect, of each end of its range
 ONE_SIDED_SHARES, TWO_SIDED_SHARES = (0.1, 0.4, 0.75, 1.0), (0.5, 1.0)
 SEED = 1
 REWEIGHTED = 12  # iterations of Huber's estimator
@@ -152,12 +153,14 @@ def emulate(model: ResponseModel, reach: float = REACH) -> Emulated:
         for i, x in enumerate(designs)
     ]
     plain = model.answers(queries)
+    # each answer gives a value and v slopes for each row
     good = [i for i, answer in enumerate(plain) if isinstance(answer, Answer)]
     degrees = up_to(count, PLAIN_DEGREE)
     if len(good) * (1 + count) < len(degrees):
         raise next(a for a in plain if isinstance(a, Exception))
     fitted = _fit(degrees, boxed[good], [plain[i] for i in good], reach)  # type: ignore[misc]
     sources = [i for i in good if i < SOURCE_DESIGNS]
+    # of each row, and in it of each source of error
     constants = _values(
         up_to(count, SOURCE_DEGREE),
         boxed[sources],
@@ -240,5 +243,6 @@ def _fit(degrees: Array, t: Array, answers: Sequence[Answer], reach: float) -> P
 
 
 def _values(degrees: Array, t: Array, values: Sequence[Array]) -> Polynomial:
+    """Least squares of values alone."""
     coefficients, *_ = np.linalg.lstsq(products(degrees, t), np.array(values), None)
     return Polynomial(degrees, coefficients)

@@ -19,7 +19,7 @@ Frequencies = Mapping[Label, tuple[float, float]]
 class EffectLaw:
     """How an effect, or what no catalogue holds, enters the tyre by one parameter."""
 
-    low: float  # of the parameter's range
+    low: float  # of the parameter's range, in its unit; 0: the range is on one side
     high: float
     add: Callable[[LoadedCase, float], LoadedCase]  # pure; ValueError where the tyre cannot be
     # what a laboratory reads, by pressure, of what is there and the parameter; None: just that

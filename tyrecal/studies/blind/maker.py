@@ -35,8 +35,8 @@ class Maker:
     store: Store | None = None
 
     def compute(self, case: LoadedCase, labels: list[Label]) -> Computed:
-        """The tyre as ``case`` has it. Raises EvaluationFailed, also where a label is lost;
-        ValueError."""
+        """The tyre as ``case`` has it. Raises EvaluationFailed, also where a label is lost, and
+        ValueError where no such tyre can be."""
         evaluator = Evaluator(TyreDesign(case), self.solver, store=self.store)
         ((_, labelled),) = find_modes(evaluator, [Question({})], labels)
         if not isinstance(labelled, LabelledModes):

@@ -59,9 +59,9 @@ def stand_resonance(computed: Mapping[float, Frequencies], e: float) -> Mapping[
     return {p: {**ln_f, vertical: (stand, stand)} for p, ln_f in computed.items()}
 
 
-OUTSIDE_FAMILIES = {
+OUTSIDE_FAMILIES = {  # ranges are by judgement
     "thick_cushion": EffectLaw(0.0, 3.0, thick_cushion),
-    "bias_carcass": EffectLaw(0.0, 20.0, bias_carcass),
+    "bias_carcass": EffectLaw(0.0, 20.0, bias_carcass),  # degrees
     "tension_stiffening": EffectLaw(-1.0, 1.0, tension_stiffening),
     "stand_resonance": EffectLaw(-0.15, 0.15, untouched, stand_resonance),
 }

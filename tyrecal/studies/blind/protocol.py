@@ -22,9 +22,10 @@ class Protocol:
     spread: float = 0.4  # design variables: start exp(U(-ln(1 + spread), ln(1 + spread)))
     given_kPa: tuple[float, ...] = (160.0, 240.0, 320.0)
     held_out_kPa: float = 200.0
-    noise: float = 0.002  # of every value, relative
-    mass: float = 0.005  # of the weighed mass, relative
-    split: float = 0.003  # of a doublet, relative: each tyre's own at all pressures
+    noise: float = 0.002  # standard deviation of every frequency, relative
+    mass: float = 0.005  # standard deviation of the weighed mass, relative
+    # standard deviation of a doublet's split, relative, that each tyre has at all pressures
+    split: float = 0.003
     missing: int = 2  # values a pressure, at most
     swapped: float = 0.05  # share of trials in which two labels are exchanged
     smallest: float = 0.2  # least size, as a share of an effect's range

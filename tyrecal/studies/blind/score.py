@@ -145,7 +145,8 @@ def scored(
 
 
 def means(readings: Sequence[Measurement], ruler: Ruler) -> tuple[Array, Array, Array]:
-    """Per row, (n,) each: mean of ln f over its members, index in the ruler, number of members."""
+    """Per row, (n,) each: mean of ln f, or ln mass, over its members, index in the ruler, number of
+    members."""
     logarithms: dict[tuple[Label | None, float], list[float]] = {}
     for each in readings:
         pressure = each.pressure_kPa if each.label else 0.0

@@ -11,6 +11,7 @@ from ...files import Json
 from .score import Scored
 from .statistics import brier, calibration_error, calibration_quantile, clopper_pearson
 
+# ranges of `Scored.band`, and of lambda
 DIFFICULTY_BANDS = ((0.0, 4.0), (4.0, 10.0), (10.0, 25.0), (25.0, float("inf")))
 DETECTED = 10.0  # band from which an effect counts as detectable
 
@@ -24,6 +25,7 @@ def summary(trials: Sequence[Scored]) -> Json:
     detected = [t for t in effects if t.band >= DETECTED]
     stated = np.array([t.probabilities[t.ranked[0]] for t in trials])
     right = np.array([t.ranked[0] == t.truth for t in trials], float)
+    # held-out shrinkage where there is no effect, by chance
     placebo = float(np.quantile([t.shrinkage for t in none], 0.95)) if none else None
     proven = [t for t in detected if t.verdict == "named"]
     parameters = [t.parameter_held for t in trials if t.parameter_held is not None]

@@ -1,4 +1,4 @@
-"""Design variables as a diagnosis calibrates them, without an effect and with the one it likes."""
+"""Design variables as a diagnosis calibrates them, without an effect and with the likeliest."""
 
 from __future__ import annotations
 
@@ -28,13 +28,14 @@ def calibrated_variables(diagnosis: Diagnosis, model: TyreModel) -> Json:
 def _calibrated(diagnosis: Diagnosis, model: TyreModel, key: str) -> dict[str, Json]:
     """Value, standard error and unit of each variable under the hypothesis ``key``."""
     hypothesis = diagnosis.hypothesis(key)
-    p, d = hypothesis.posterior, hypothesis.fitted.d
+    p, d = hypothesis.posterior, hypothesis.fitted.d  # (q,), (q, v)
     apart = d - p @ d
+    # mean of the covariances, and covariance of the means, over the parameters
     covariance = np.tensordot(p, hypothesis.fitted.covariance, 1) + (p[:, None] * apart).T @ apart
     x = diagnosis.problem.expansion.x0 + d[hypothesis.best]
     values = model.values(x)
     above, below = (model.values(x + step) for step in (SLOPE_STEP, -SLOPE_STEP))
-    scatter = np.sqrt(np.diag(covariance)).tolist()
+    scatter = np.sqrt(np.diag(covariance)).tolist()  # of x
     return {
         name: {
             "value": values[name],

@@ -2,7 +2,8 @@
 
 A laboratory reads the order of a mode from its shape at few sensors. Two modes of like frequency
 that took each other's label make a gap that no tyre has; every hypothesis would answer for it. So
-the reading is inferred with them: P(reading) times the sum over hypotheses of prior times evidence.
+the reading, the file with two labels exchanged or none, is inferred with them: P(reading) times the
+sum over hypotheses of prior times evidence.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ from .evidence import NONE, OUTSIDE, Hypothesis, refit
 from .several import weigh_hypotheses
 
 Array = np.ndarray
-SWAP_PROBABILITY = 0.05  # of laboratories' files, two of their labels
-MAX_SWAP_DISTANCE = 0.30  # relative distance of modes that could be taken for one another
+SWAP_PROBABILITY = 0.05  # share of laboratories' files in which two labels are exchanged
+MAX_SWAP_DISTANCE = 0.30  # distance in ln f of modes that could be taken for one another
 MIN_GAIN = 3.0  # in ln of evidence without effects, from which a reading is worth a closer look
 
 

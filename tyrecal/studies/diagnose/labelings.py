@@ -5,7 +5,7 @@
 y_a: the frequencies with the labels of a, less those that are foreign under it; Z: `evidence`, by
 one covariance for all. So a labeling that an effect makes likelier counts under that effect. P(a):
 what of the tree's weight of a is not its own evidence of y_a (`labelling.tree`): modes that were
-missed, foreign frequencies, the views, about the plain tyre. Labelings are looked for about that
+missed, foreign frequencies, the `VIEWS`, about the plain tyre. Labelings are looked for about that
 too, its modes off smoothly; those that have `MIN_READING_PROBABILITY` are weighed, the first
 `MAX_READINGS`.
 """
@@ -66,7 +66,7 @@ def with_probabilities(labelled: Labelled, p: Sequence[float]) -> Labelled:
 
 
 def shares(readings: Sequence[Reading], per_reading: Sequence[Sequence[Hypothesis]]) -> Array:
-    """P(a | y) (a,) by the hypotheses under each reading."""
+    """P(a | y) by the hypotheses under each reading, one each."""
     ln = np.array(
         [
             own.ln_prior + np.logaddexp.reduce([h.ln_evidence + np.log(h.prior) for h in here])

@@ -70,7 +70,7 @@ class LinearFit:
         ln += self.ln_label + problem.only(keep).splits.ln_likelihood(self.split[:, keep])
         if problem.damping:
             ln += self.ln_damping
-        return ln, whole - (taken**2).sum(1)
+        return ln, whole - (taken**2).sum(1)  # taken: x of the likeliest fit, over its spread
 
 
 def lines(
@@ -112,7 +112,8 @@ def perturbed_evidence(
     among: Mapping[int, float] | None = None,
     extra: Array | None = None,
 ) -> tuple[Array, Array]:
-    """ln Z, and chi2 of the likeliest way in which near modes are coupled, (q,)."""
+    """ln Z, and chi2 of the likeliest way in which near modes are coupled, (q,). among: as of
+    `several.coupled_most`."""
     ln, chi2 = map(np.array, zip(*(line.ln_evidence(other, extra) for line in known), strict=True))
     if known[0].place is None:
         return ln[0], chi2[0]

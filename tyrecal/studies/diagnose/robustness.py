@@ -97,6 +97,7 @@ def _variants(
     count = len(problem.places)
     for words, power in _priors(verdict):
         for factor, times in FACTORS.items():
+            # `probabilities` makes them sum to 1
             changed = [replace(h, prior=h.prior * factor ** power(h)) for h in kept]
             yield f"the prior of {words} {times} as large", changed, count
     changes = list(_changes(problem, sources))

@@ -46,6 +46,7 @@ def section_posterior(
     result = []
     for kind in FIELD_KINDS:
         own = [i for i, field in enumerate(known) if field.kind == kind]
+        # (fields, stations), or of compounds (fields, parts): `SectionField.values`
         values = np.array([known[i].values for i in own])
         unit, scale = FIELD_UNITS.get(kind, ("%", 100.0))
         for place, i in places.get(kind, compounds).items() if own else ():

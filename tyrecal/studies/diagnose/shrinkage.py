@@ -167,8 +167,8 @@ def _placebo(problem: InverseProblem, hold: Array, random: np.random.Generator) 
     information = np.diag(problem.spread**-2.0)
 
     def fitted(shift: Array, tilt: Array, error: Array | float) -> tuple[Array, Array]:
-        """ln evidence up to a constant, and held-out errors, of all placebos with an effect of this
-        shift (n,), tilt (n, v) and covariance of its error (n, n)."""
+        """ln evidence up to a constant, and held-out errors, of the k placebos with an effect of
+        this shift (n,), tilt (n, v) and covariance of its error (n, n)."""
         Je = J + tilt
         S = (sigma + error)[np.ix_(keep, keep)]
         inverse = np.linalg.inv(S)

@@ -20,8 +20,8 @@ from ..footprint import footprint_row
 from ..inference.tyre_model import asked_for
 from ..loaded import load_tyres
 
-LoadedKey = tuple[str, Member | None, float]  # quantity, mode, load in N
-Values = Mapping[str, float]
+LoadedKey = tuple[str, Member | None, float]  # a "place" here: quantity, mode, load in N
+Values = Mapping[str, float]  # numbers of the case by variable or path
 
 
 @dataclass(frozen=True)

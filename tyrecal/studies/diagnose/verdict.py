@@ -48,7 +48,7 @@ class Verdict:
 def decide(
     hypotheses: Sequence[Hypothesis], probabilities: Mapping[str, float], rows: int, variables: int
 ) -> Verdict:
-    """The verdict by fixed rules.
+    """The verdict by fixed rules; rows, variables: their numbers.
 
     named: the largest set of effects that are present with p >= 0.7, alone or with others, if
     chi2 of the likeliest fit with them has p > 0.01, p(none) < 0.05, two degrees of freedom are

@@ -24,8 +24,9 @@ WHEEL = ("mass_kg", "polar_inertia_kg_m2", "diametral_inertia_kg_m2")
 
 
 def other_states(problem: Problem, point: Point, keep: Array) -> list[Shift]:
-    """Shifts of the rows ``keep`` of what was measured; none where the solver gives no exact
-    sensitivities. An alternative that cannot be evaluated is left out. Raises DeckRefused."""
+    """Shifts of the rows of a mask ``keep`` (n,) of what was measured; none where the solver gives
+    no exact sensitivities. An alternative that cannot be evaluated is left out. Raises
+    DeckRefused."""
     states = [state for state, labels in problem.labels.items() if labels]
     if problem.difference_step is not None or not states:
         return []
@@ -46,7 +47,7 @@ def other_states(problem: Problem, point: Point, keep: Array) -> list[Shift]:
         if not isinstance(answer, LabelledModes):
             continue
         for name in names:
-            slopes = values[name] * answer.evaluation.gradients[name]
+            slopes = values[name] * answer.evaluation.gradients[name]  # d f / d ln number, Hz
             by_label = {
                 label: float(slopes[mode.position]) / mode.frequency_Hz
                 for label, mode in answer.wanted.items()
@@ -69,7 +70,8 @@ def _column(problem: Problem, state: TyreState, by_label: Mapping[Label, float])
 
 
 def _pressures(problem: Problem, rates: Mapping[tuple[TyreState, str], Array]) -> Iterator[Shift]:
-    """Each state at another pressure; the variables can take the place of the only one."""
+    """Each state at another pressure, if there are several: the variables can take the place of the
+    only one."""
     states = [state for state, name in rates if name == PRESSURE_PATH]
     several = len({state.with_defaults(problem.case).pressure_kPa for state in states}) > 1
     for (state, name), column in rates.items():

@@ -82,6 +82,6 @@ def crossing(problem: Problem, points: Iterable[Point], near: Point) -> Crossing
     targets = [(t.state, t.label) for t in problem.targets]
     i, j = (targets.index((state, label)) for label in PAIR)
     J = point.plain.jacobian
-    slopes = J[i] / problem.scale[i] - J[j] / problem.scale[j]
+    slopes = J[i] / problem.scale[i] - J[j] / problem.scale[j]  # scale: residual per Hz
     clarity = pair_clarity(point, state)
     return Crossing(point.x, gap(point, state) * clarity, slopes / clarity, state)

@@ -35,7 +35,8 @@ def foreseen(J: Array, r: Array, C: Array, d: Array) -> Array:
 
 
 def curved_step(J: Array, r: Array, C: Array, damping: float, G: Array, h: Array) -> Array:
-    """d (v,) of the least |r(x + d)|^2 + mu |d|^2 tr(J^T J) / v where G d >= h; ``damping``: mu.
+    """d (v,) of the least |r(x + d)|^2 + mu |d|^2 tr(J^T J) / v where G d >= h, as of
+    `search.room_to_move`; ``damping``: mu.
 
     By Newton's method on the model, each step halved until the model falls, and Gauss and Newton's
     where its Hessian is not positive definite."""

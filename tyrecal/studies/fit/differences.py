@@ -24,8 +24,8 @@ def differences(
 ) -> tuple[Array, Array]:
     """Quantities q (q,) of a design and their slopes d q / d x (q, variables).
 
-    ask: the quantities of designs, in their order, or why there are none; centre: those of the
-    design itself, which is asked for together with its neighbours where they are not known.
+    step: of a coordinate x; ask: the quantities of designs, in their order, or why there are none;
+    centre: those of the design itself, evaluated with its neighbours if not known (None).
     One neighbour a variable: above, or below where that lies beyond the bound or has no solution.
     Raises EvaluationFailed where neither has one, or the design itself has none.
     """
@@ -42,7 +42,7 @@ def differences(
                 raise first
             centre = first
         for answer in answers:
-            if isinstance(answer, EvaluationFailed) and answer.denied:
+            if isinstance(answer, EvaluationFailed) and answer.denied:  # without a licence
                 raise answer
             yield answer
 

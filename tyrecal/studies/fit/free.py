@@ -2,8 +2,8 @@
 
 Each is bounded by three of its standard deviations. What is known of it stays a value like those
 that were measured, so that the fit weighs both: q = 1 + 0.01 (x - x0) / s, known to be 1 with a
-standard deviation of 0.01. Its residual is (x - x0) / s, the number's shift from what is known, x0,
-over the standard deviation s of that; 1 and 0.01 make it a target above 0 in any unit.
+standard deviation of 0.01. Its residual is (x - x0) / s, x the number itself, x0 what is known of
+it and s the standard deviation of that; 1 and 0.01 make it a target above 0 in any unit.
 """
 
 from __future__ import annotations

@@ -88,6 +88,7 @@ def measured_rows(problem: Problem, readings: Sequence[Measurement] = ()) -> lis
     reading of each; without readings the case file."""
     case, places = problem.case, dict[tuple[object, ...], str]()
     for each in readings:
+        # without a load both members of a pair are one target
         key = (each.quantity, each.label, each.load_N and each.member, each.state.of(case))
         places.setdefault(key, each.place)
     rows = []

@@ -24,16 +24,15 @@ Array = np.ndarray
 class ModelErrors:
     """Possible errors of the n values that count.
 
-    by_constants (n, k): changes of ln q by one standard deviation of each of ``known``; laws:
-    standard deviation of each part of what material laws do; road (n,): that of values on the road
-    by the model itself.
+    Values other than unloaded modes are rows without a label.
     """
 
     rows: tuple[Observable, ...]
     known: list[Source]
-    by_constants: Array  # (n, k)
-    laws: float  # of ln f
-    road: Array  # (n,) of ln q
+    by_constants: Array  # (n, k) changes of ln q by one standard deviation of each of ``known``
+    # standard deviation of ln f by each part of the error of material laws (`form_error`)
+    laws: float
+    road: Array  # (n,) standard deviation of ln q, on the road, by the model itself; else 0
 
     @property
     def form(self) -> Array:

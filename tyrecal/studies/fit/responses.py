@@ -53,8 +53,8 @@ def linear_answer(
     jobs: int = 1,
 ) -> tuple[Array, Array, float]:
     """Sensitivities d ln q / d x (n, v) of rows at the design ``values``, changes of ln q (n, k) by
-    one standard deviation of each source of error, and the standard deviation of each part of what
-    material laws do. Raises DeckRefused, EvaluationFailed."""
+    one standard deviation of each source of error, and the standard deviation of ln f by each part
+    of the error of material laws (`form_error`). Raises DeckRefused, EvaluationFailed."""
     distinct = list(dict.fromkeys(row.row for row in rows))
     model = TyreModel(case, evaluator, distinct, known, {}, jobs)
     own = (read_variable(case, name) for name in model.variables)

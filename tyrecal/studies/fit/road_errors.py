@@ -1,4 +1,5 @@
-"""Changes of values on the road by each source of error: stiffnesses, areas, lengths, widths."""
+"""Changes of the r values on the road by each source of error: stiffnesses, areas, lengths,
+widths."""
 
 from __future__ import annotations
 
@@ -86,6 +87,7 @@ def _by_part(
 ) -> dict[str, Array]:
     """d q / d ln stiffness and density (r, parts) of each part of rubber."""
     split, parts = split_by_region(case)
+    # by path: 1 or, of the compressibility D1, -1: the power to which stiffness has the number
     signs = {m: case.kind.moduli(split.case, m) for m in parts}
     rubbers = [m for m in parts if len(signs[m]) > 1]  # C10, C01, D1; a cord has E alone
     paths = [path for m in rubbers for path in signs[m]]

@@ -162,7 +162,7 @@ def _designs_beyond(
         return
     side = np.sign(gap(point, edge.state))
     H = point.jacobian.T @ point.jacobian
-    H[np.diag_indices(len(H))] += 1e-3 * np.trace(H) / len(H)
+    H[np.diag_indices(len(H))] += 1e-3 * np.trace(H) / len(H)  # so that it can be inverted
     direction = np.linalg.solve(H, edge.slopes)
     rise = float(edge.slopes @ direction)
     if rise < 1e-12 * (edge.slopes @ edge.slopes + 1e-300):

@@ -94,7 +94,7 @@ def next_states(problem: Problem, point: Point, known: FitUncertainty) -> list[N
         if not isinstance(answer, LabelledModes):
             continue
         hertz = np.array([answer.wanted[t.label].frequency_Hz for t, _ in like])
-        scattered = hertz * [relative for _, relative in like]
+        scattered = hertz * [relative for _, relative in like]  # sigma, Hz
         weight = np.sqrt([t.multiplicity for t, _ in like]) / scattered
         rows = weight[:, None] * problem.slopes(
             {state: answer}, [Target(t.label, 0.0, state=state) for t, _ in like], point.values

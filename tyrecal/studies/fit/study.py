@@ -65,7 +65,7 @@ class FitStudy:
         file = self.measured
         self.readings, self.shapes = readings_with_shapes(self._plain, file) if file else ([], [])
         self.needs_labels = any(each.is_unlabelled for each in self.readings)
-        self.used: Sequence[Measurement] = ()  # readings that are targets
+        self.used: Sequence[Measurement] = ()  # readings that targets are made of
         self.case, self.left_out = self._plain, list[str]()
         if not self.needs_labels:
             self._set_targets(self.readings)
@@ -112,6 +112,7 @@ class FitStudy:
             exact = problem.exact_on_road > 0
         loads = Counter((state.unloaded, modal) for state, modal in places)
         slopes = (len(free), 0) if self.evaluator.has_gradients else (0, len(free))
+        # loads, modes at loads, variables with exact sensitivities, neighbours for differences
         planned = [PlannedState(0, False, *slopes) for _ in states]
         planned += [
             PlannedState(count, modal, *((len(free), 0) if exact and not modal else (0, len(free))))

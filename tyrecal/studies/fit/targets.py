@@ -130,7 +130,7 @@ def read_road_targets(case: LoadedCase) -> list[ValueTarget]:
         ValueTarget(
             "frequency_Hz",
             t.frequency_Hz,
-            t.sigma_Hz or 1.0,
+            t.sigma_Hz or 1.0,  # as in equation (1) of `problem`
             t.weight,
             TyreState(t.pressure_kPa, t.load_N, t.rim).of(case),
             Member(Label(t.c, t.m, t.kind), t.symmetry or ""),

@@ -80,6 +80,7 @@ class Between:
             width = self.ln_p[self.high] - self.ln_p[self.low]
             t = (self.ln_p - self.ln_p[self.low]) / np.where(self.inner, width, 1.0)
             rise = chord[self.high] - chord[self.low]
+            # Hermite's cubic less its chord is t (1 - t) bent
             bent = (rate[self.low] * width - rise) * (1 - t) - (rate[self.high] * width - rise) * t
             shift = shift + np.where(self.inner, t * (1 - t) * bent, 0.0)
         return replace(

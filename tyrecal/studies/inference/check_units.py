@@ -23,8 +23,9 @@ def check_units(
     runs: Sequence[str],
     changes: Sequence[Toggle] = (),
 ) -> None:
-    """Raise InputError if a measured value is not even near the model at its start, or if the model
-    has no answer with an effect that a toggled run switched.
+    """Raise InputError if a measured value is not even near the model at its start (`far_off`), or
+    if the model has no answer with an effect that a toggled run switched; what the model answered
+    where it has none without.
 
     runs: names of the files, by number of the run; changes: the effect switched in each.
     """

@@ -30,7 +30,7 @@ class Toggle:
     """Change of one effect in a toggled run."""
 
     id: str  # of the effect
-    value: float  # that it was set to, or times which it was
+    value: float  # that it was set to or, if ``times``, the factor on what it was
     times: bool = False
     base: float = 0.0  # what the case has of it, from which the parameter counts
 

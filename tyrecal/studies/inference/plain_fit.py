@@ -56,7 +56,7 @@ def plain_fit(
             step = np.linalg.solve(J.T @ inverse @ J + information, slope)
             step *= min(1.0, MAX_STEP / max(abs(step).max(), 1e-300))
             if abs(step).max() < CLOSE_ENOUGH:
-                return x  # which was asked: one step on there may be no solution
+                return x  # which was evaluated: one step on there may be no solution
             for halvings in range(6):
                 trial = x + step / 2**halvings
                 reply = evaluate(trial)

@@ -90,7 +90,7 @@ def regions(model: Parted, x: Array) -> list[SectionPart]:
             slope = {p: gradients[p][place] * design[p] / f for p in numbers}
             columns[0, i] = sum(sign * slope[path] for path, sign in signs[material].items())
             columns[1, i] = slope[density[material]]
-        rubber = len(signs[material]) > 1
+        rubber = len(signs[material]) > 1  # a cord has one modulus
         result.append(SectionPart(name, columns[0], columns[1], material, rubber))
     return result
 

@@ -42,7 +42,8 @@ def model_of(
 def estimate(
     model: TyreModel, runs: int, jobs: int, pressed: Sequence[PlannedState] = ()
 ) -> RunPlan:
-    """The plan of about so many runs on no road, and of two tyres in the states ``pressed``."""
+    """The plan of about so many runs on no road, and of two tyres in the states ``pressed``, to
+    each of which half of the runs are then counted."""
     numbers = 0 if not model.evaluator.has_gradients else len(model.variables)
     alone = PlannedState(sensitivities=numbers)
     states = [alone] * -(-runs // 2) if pressed else [alone]

@@ -40,7 +40,8 @@ class SectionDesign(TyreDesign):
         return SectionDesign(self.case, self.fields, values, self.plain)
 
     def neighbour(self, name: str, side: int) -> tuple[TyreDesign, float]:
-        """Neighbour of the design, as of a number of the case."""
+        """Neighbour of the design, as of a number of the case, and its step: of a field in standard
+        deviations."""
         if name not in self.fields:
             return super().neighbour(name, side)
         amount = side * FIELD_STEP

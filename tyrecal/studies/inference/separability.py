@@ -34,8 +34,8 @@ class Separability:
     smallest: Mapping[str, float | None]  # the parameter with lambda = 10; None beyond the range
 
     def groups(self, among: Sequence[str] | None = None) -> list[list[str]]:
-        """Ids that these data cannot separate: linked by delta^2 < 9 from either side, both of
-        them detectable."""
+        """Ids that these data cannot separate: linked by delta^2 < 9 from either side, each with
+        lambda >= 9."""
         ids = [id for id in self.ids if among is None or id in among]
         place = {id: i for i, id in enumerate(self.ids)}
         distances = np.minimum(self.distances, self.distances.T)

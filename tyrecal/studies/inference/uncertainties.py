@@ -15,8 +15,8 @@ from .section_fields import SectionField, fields, known_from, words
 DENSITY_PERCENT, MODULUS_PERCENT, SPACING_PERCENT, GAUGE_PERCENT = 1.5, 3.0, 1.0, 3.0
 ANGLE_deg, PRESSURE_kPa = 1.0, 1.0
 RIM_WIDTH = EFFECT_PATH + "rim_width"
-# standard deviation, m, of the distance between the places where the rim holds the beads, by build
-# and rim width; by judgement, 2.5 mm on each side between makers of one size
+# standard deviation, m, of the distance between the places where the rim holds the beads, by the
+# section's origin (`known_from`); by judgement, 2.5 mm on each side between makers of one size
 BEAD_SEAT_DISTANCE = {"exact": 0.0, "measured": 0.5e-3, "drawing": 1e-3, "size_code": 5e-3}
 
 

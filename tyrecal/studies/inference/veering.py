@@ -116,6 +116,7 @@ class Veering:
         """d ln f of coupled by ln f of uncoupled modes (n, n), at the measured ln f ``y`` (n,)."""
         own, part = np.ones(len(y)), np.zeros(len(y))
         apart = (np.exp(2 * (y - self.scale)) - np.exp(2 * (y[self.partner] - self.scale))) / 2
+        # delta / D, D being half the distance of the measured modes
         r = np.sqrt(1 - np.minimum(zeta * self.size / np.maximum(abs(apart), 1e-300), 1.0) ** 2)
         both = (self.size > 0) & (self.partner >= 0)
         own[both], part[both] = (1 + r[both]) / 2, (1 - r[both]) / 2
@@ -138,6 +139,7 @@ def veering(
     seen = {key: i for i, key in enumerate(zip(places.tolist(), runs, strict=True))}
     for i, (place, run) in enumerate(seen):
         mate, q = int(coupling.partner[place]), float(coupling.size[place])
+        # |delta| at x0; a relative shift of lambda is twice that of ln f
         apart = abs(np.sinh(eta[place] - eta[mate]))
         if mate < 0 or np.hypot(apart, 3 * q) - apart < 2 * NEGLIGIBLE_SHIFT:
             continue

@@ -38,7 +38,7 @@ def labels_posterior(case: LoadedCase, labelled: Labelled) -> Labels:
         state = reading.state.of(case).with_defaults(case)
         j = int(all_labelings.modes[0, i])
         expected = places.get((at.labels[j], at.states[j])) if j >= 0 else None
-        others = [
+        others = [  # -1, no mode, is the last column
             n
             for n in np.argsort(-all_labelings.each[i], kind="stable")
             if n != j % all_labelings.each.shape[1]

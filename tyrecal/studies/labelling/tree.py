@@ -13,7 +13,7 @@ frequency after the other, each conditions z for the next (Kalman, J. Basic Engi
 
     a mode within the band is measured with probability 1 - MISSED; the band ends at the highest
     measured frequency, above which a mode costs nothing
-    only the modes of one family are, where the shaker or the sensors see one direction (Views)
+    only the modes of one family are, where the shaker or the sensors see one direction (VIEWS)
     foreign ones are FOREIGN on average (Poisson), anywhere in the band: FOREIGN / width each
 
 Where shapes were measured, too, that of a frequency is one more factor: p(shape | mode) over
@@ -170,7 +170,7 @@ def _families(labels: Sequence[Label]) -> Array:
 def _tree(measured: Frequencies, modes: Modes, tau: float) -> tuple[Array, Array, Array, Array]:
     """Labelings (b, m) of the branches, ln of prior times evidence (b,), ln of the evidence of
     their labelled frequencies (b,) and the means of z (b, k): k = v + l variables and discrepancies
-    of labels."""
+    of l different labels, these over `discrepancy`'s root. P (b, k, k): covariance of z."""
     different = list(dict.fromkeys(modes.labels))
     own = np.array([different.index(label) for label in modes.labels])
     root = np.linalg.cholesky(discrepancy(different, tau))

@@ -111,6 +111,7 @@ class LinearDiagnosis:
         for k, id in enumerate(ids, 2):
             e, ln_weights = grid(self.problem.expansion.nodes[id])
             own, R = self.shifts(id, e)
+            # a size that the case states as possible is no effect: key 0, none
             within = abs(e) <= COVERAGE * self.problem.ranges[id].prior_sd
             key.append(np.where(within, 0, k))
             ln.append(np.log(prior) + ln_weights)

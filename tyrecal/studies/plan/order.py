@@ -42,7 +42,7 @@ def _next(
     """The next item, "" if none is worth its hours."""
     fits = lambda *more: lab.hours([*done, *more]) <= hours
     left = [name for name in lab.offered(done) if fits(name)]
-    if not done:
+    if not done:  # a set of response functions, which alone has a pressure
         left = [name for name in left if lab.menu[name].pressure_kPa is not None]
     gain = lambda *more: chance([*done, *more]) - chance(done)
     steps: dict[tuple[str, ...], float] = {(name,): gain(name) for name in left}

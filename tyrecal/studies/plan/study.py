@@ -75,7 +75,7 @@ def plan(
     sound = [each.pop(NONE) for each in chances]
     widths = [_widths(lab, part) for part in ([], *parts)]
     rms = [float(np.sqrt(np.mean(f**2))) for _, f in widths[1:]]
-    eta = lab.problem.observations.y[lab.item == "mount"]
+    eta = lab.problem.observations.y[lab.item == "mount"]  # has each mode at the case's pressure
     result = PlanResult(
         format=1,
         noise_percent=100 * noise,

@@ -57,7 +57,7 @@ def edge_probability(posterior: Posterior, bounds: Array, seed: int) -> Array:
     """Forecast of `shares_at_edge` (v, 2) of the posterior's draws by importance sampling: draws of
     Student's t about the likely optima, each weighted by the posterior's density over theirs."""
     best, height = posterior.optima
-    best = best[height > height[0] - LIKELY]
+    best = best[height > height[0] - LIKELY]  # (o, v); the n draws x are `PROBES` in all
     size, count = best.shape[1], -(-PROBES // len(best))
     random = np.random.default_rng([seed, 2])
     roots = np.linalg.cholesky(posterior.information(best) + _flat(posterior.box))  # (o, v, v)

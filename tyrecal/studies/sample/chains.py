@@ -129,6 +129,7 @@ def walk(
                 state = self.update(state, moved, accepted, own)
             return state, accepted
 
+    # one move in ten is a whole difference of two walkers, which leads from optimum to optimum
     moves = [(Together(), 0.9), (Together(gamma0=1.0), 0.1)]
     sampler = emcee.EnsembleSampler(number, size, density, moves=moves, vectorize=True)
     # its own looks at every value by itself, which takes longer than the density

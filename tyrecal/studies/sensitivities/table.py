@@ -186,7 +186,7 @@ def _without_sensitivity(
 def _unloaded(
     answer: LabelledModes, kinds: Sequence[str], names: Sequence[str]
 ) -> tuple[dict[str, float], Array]:
-    """Frequencies and mass by name, and d q / d x (q, x)."""
+    """Frequencies and mass by name, and d q / d x (quantities, numbers)."""
     evaluation = answer.evaluation
     quantities, slopes = dict[str, float](), list[list[float]]()
     modes: dict[Label, Mode] = {mode.label: mode for mode in labelled(evaluation)}
@@ -208,7 +208,7 @@ def _on_the_road(
     loads_N: Sequence[float],
     jobs: int,
 ) -> tuple[dict[str, float], Array]:
-    """Quantities under each load by name, and d q / d x (q, x)."""
+    """Quantities under each load by name, and d q / d x (quantities, numbers)."""
     evaluator.needs_road()
     if "footprint_gradients" not in evaluator.solver.capabilities:
         raise DeckRefused(
