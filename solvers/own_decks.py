@@ -39,7 +39,8 @@ def results(
 ) -> dict[str, Any]:
     """Results as plain data: each mode a real shape on the crown's nodes, about y as the axle.
 
-    mass, points (k, 3) and shapes (m, k, 3), x, y, z, per root of a mass, in the decks' units.
+    mass (None: not known), points (k, 3) and shapes (m, k, 3), x, y, z, per root of a mass, in the
+    decks' units.
     """
     places, modes = ring_modes(eigenvalues, run.length_m * points, shapes / np.sqrt(run.mass_kg))
     return {

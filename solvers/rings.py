@@ -14,7 +14,7 @@ import numpy as np
 from .errors import RunFailed
 
 Array = np.ndarray
-WIDEST_GAP = np.pi / 2  # between neighbours round the axle
+WIDEST_GAP = np.pi / 2  # between neighbours round the axle, rad
 FLAT = 1e-9  # of the radius: a line across the axle
 
 
@@ -23,7 +23,7 @@ def about_axle(points: Array) -> tuple[Array, Array]:
     (3, 3) that vectors take with them.
 
     The axle is the direction in which the crown is narrowest, through the centre (a, b) of the
-    circle x^2 + z^2 = 2 a x + 2 b z + c that fits it best.
+    circle x^2 + z^2 = 2 a x + 2 b z + c that fits it best; its sense is arbitrary.
     """
     middle = points.mean(0)
     _, _, (first, _, axle) = np.linalg.svd(points - middle, full_matrices=False)

@@ -43,7 +43,7 @@ class Abaqus:
 
     def write(self, decks: WrittenDecks, folder: Path) -> list[Path]:
         """Write the decks and, next to them, the case's options. Raises ``refusals``."""
-        units = decks.request.get("own_deck", {})
+        units = decks.request.get("own_deck", {})  # length_m, mass_kg
         paths = read_options(decks.options, **units).save(folder)
         paths += (own := own_decks.save(decks.request, folder))
         paths += save_texts(decks.texts("own deck" if units else self.dialect), folder)
@@ -54,13 +54,13 @@ class Abaqus:
     def run(self, folder: Path, time_limit_s: float) -> None:
         """Run all jobs, ``time_limit_s`` for them together. Raises ``failures``."""
         options, run = load(folder), own_decks.load(folder) or section_jobs(folder)
-        for job, before in run.jobs:
+        for job, before in run.jobs:  # before: the job that it continues, or ""
             left = max(time_limit_s, 0.0)
             time_limit_s -= run_job(job, before or None, self.command, options, folder, left)
 
     def read(self, folder: Path) -> dict[str, Any]:
-        """Results as plain data: each mode a real shape on the crown's nodes. Raises RunFailed
-        where the results are stale, not whole, or no result."""
+        """Results as plain data: each mode a real shape of unit modal mass on the crown's
+        nodes. Raises RunFailed where the results are stale, not whole, or no result."""
         own = own_decks.load(folder)
         run = own or section_jobs(folder)
         table = read_dat(folder / f"{run.last}.dat")
@@ -71,7 +71,7 @@ class Abaqus:
         raw_modes = checked_modes(folder / f"{run.last}.fil", run.modes, table)
         points = raw_modes.coordinates
         shapes = raw_modes.displacement / np.sqrt(raw_modes.masses)[:, None, None]
-        if own:
+        if own:  # whose axle may be anywhere
             points, turn = about_axle(points)
             shapes = shapes @ turn.T
         return own_decks.results(run, table.mass, raw_modes.eigenvalues, points, shapes)

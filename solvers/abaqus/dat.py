@@ -42,7 +42,7 @@ def _rows(text: str) -> dict[int, float]:
     for line in text.splitlines():
         row = _ROW.match(line)
         if row and int(row[1]) == len(by_number) + 1:
-            by_number[int(row[1])] = number_from(row[2].split()[2])
+            by_number[int(row[1])] = number_from(row[2].split()[2])  # cycles/time
         elif by_number and line.strip():  # the next table, of participation factors
             break
     return by_number

@@ -1,4 +1,5 @@
-"""Whether what a run left is its result: new, whole, complete, sound, and twice the same."""
+"""Whether what a run left is its result: new, whole, complete, sound, and the same in
+.fil and .dat."""
 
 from __future__ import annotations
 
@@ -10,13 +11,13 @@ from ..errors import RunFailed
 from .dat import DatTable
 from .fil import SIM, ResultModes, read_fil
 
-# largest relative difference of a frequency between .fil and .dat: five digits
+# largest relative difference of a frequency between .fil and .dat, which prints about five digits
 PRINTED_RTOL = 1e-3
 
 
 def checked_modes(path: Path, expected: int | None, table: DatTable) -> ResultModes:
-    """Modes of the results file at ``path``; ``expected`` of them, those of the .dat's table.
-    Raises RunFailed: ``no_results``, or ``unstable`` for a negative eigenvalue."""
+    """Modes of the results file at ``path``; ``expected`` of them (None: any number), those of the
+    .dat's table. Raises RunFailed: ``no_results``, or ``unstable`` for a negative eigenvalue."""
     dat = path.with_suffix(".dat").name
     if not path.exists():
         printed = f"{dat} lists {len(table.frequencies_Hz)} frequencies, but "

@@ -1,7 +1,8 @@
 """The ASCII results file (.fil): modes with their shapes.
 
-Keys of records read here: 1901 node, 1980 mode, 101 U, 107 COORD, 2000 and 2001 start and end of
-an increment; nodal records after a 1980 belong to its mode.
+Keys of records read here: 1901 node, 101 U and 107 COORD (node number, components), 1980 mode
+(number, omega^2, generalised mass), 2000 and 2001 start and end of an increment; nodal records
+after a 1980 belong to its mode.
 """
 
 from __future__ import annotations
@@ -87,4 +88,5 @@ def _modes(text: str) -> ResultModes:
 
 
 def _vector(a: list[Item]) -> list[float]:
+    """x, y, z of a nodal record; a component that is not there is 0."""
     return [float(value) for value in (*a[1:4], 0.0, 0.0)[:3]]

@@ -28,8 +28,8 @@ def run_job(
     folder: Path,
     time_limit_s: float,
 ) -> float:
-    """Run ``job`` (on top of ``oldjob``) by ``program`` in ``folder``; the seconds that its last
-    attempt took.
+    """Run ``job`` (continuing ``oldjob``, if any) by ``program`` in ``folder``; the seconds that
+    its last attempt took.
 
     Output goes to JOB.out. A denied licence is asked for again, after waits that double, until
     ``options.licence_wait_s`` are over; waiting does not count towards ``time_limit_s``.

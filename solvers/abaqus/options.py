@@ -34,7 +34,7 @@ def load(folder: Path) -> Options:
 
 
 def read_options(given: Mapping[str, Any], **units: float) -> Options:
-    """Options of a case, and the units of a user's deck. Raises Refused."""
+    """Options of a case; units: ``length_m`` and ``mass_kg`` of a user's deck. Raises Refused."""
     smallest = {"licence_wait_s": 0.0, "licence_first_wait_s": 1e-3}
     unknown = sorted(set(given) - set(smallest))
     if unknown:

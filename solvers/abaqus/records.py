@@ -2,8 +2,8 @@
 
 Written from the format in the ABAQUS manual, chapter "Results file output format". A record is
 ``*`` and items: ``I`` + width (2 characters) + digits, ``D`` + 22 characters, ``A`` + 8. The first
-item is the record's length in words, itself included, the second its key. Items run on across
-line ends; after an increment's end the line is filled with blanks and a blank line follows.
+item is the record's length in words (items), itself included, the second its key. Items run on
+across line ends; after an increment's end the line is filled with blanks and a blank line follows.
 """
 
 from __future__ import annotations

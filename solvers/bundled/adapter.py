@@ -14,19 +14,19 @@ from . import VERSION
 from .deck.start import PressedStart, write_pressed_start, write_start
 
 JOB, PRESS, OLDJOB = "modes", "press", "inflate"
-# of the tool's request, as in `request.Request`
 RESPONSE_ARRAYS = (
-    *("frequency_Hz", "receptance", "hub"),
-    *("stiffness", "mass", "loss", "tread"),  # where matrices were requested
+    *("frequency_Hz", "receptance", "hub"),  # as `modes.response.ResponseResult` has them
+    *("stiffness", "mass", "loss", "tread"),  # `modes.superelement.Superelement`, if requested
 )
+# of the tool's request, as in `request.Request`
 REQUEST_KEYS = ("own_frequency", "cavity", "sector", "response")
 
 
 class RoadDecks(WrittenDecks, Protocol):
     """Decks with loads on the road, with places of the variables in them, and with a start."""
 
-    loads_N: tuple[float, ...]
-    start: np.ndarray | None
+    loads_N: tuple[float, ...]  # empty: no road
+    start: np.ndarray | None  # as `write_start` takes it
     pressed_start: PressedStart | None
 
     def tangents(self, dialect: str) -> dict[str, list[tuple[str, int, int, float]]]:
@@ -112,7 +112,8 @@ class Bundled:
                 for name in RESPONSE_ARRAYS
                 if f"response_{name}_{step['step']}" in arrays
             }
-        # modes of the file by place; the two that a doublet has split into count as one
+        # modes of the file by place; the two that a doublet has split into count as one: its
+        # frequency, damping and sensitivities are their means
         members: dict[object, list[int]] = {}
         for i, mode in enumerate(step["modes"]):
             doublet = (mode["n"], mode["doublet"]) if "doublet" in mode else i

@@ -38,7 +38,7 @@ class StepResult:
     modes: list[HarmonicModes]  # by harmonic
     # by variable and harmonic: d lambda / d variable (m,) of its modes, lambda = (2 pi f)^2
     rates: dict[str, list[Array]]
-    U: Array  # (k, 3) displacements by the load, m
+    U: Array  # (k, 3) displacements r, theta, z of the inflated state, m
     factorisations: int  # number of them until the equilibrium
     # by variable: d mass / d variable, kg
     mass_rates: dict[str, float] = field(default_factory=dict)
@@ -72,7 +72,7 @@ def write(stem: Path, model: Model, results: list[StepResult]) -> None:
             if members is not None:
                 line |= {"doublet": j // 2, "member": int(members[j])}
             lines.append(line)
-        rates = {
+        rates = {  # lambda = (2 pi f)^2: d lambda = 8 pi^2 f df
             variable: [float(per[i][j] / (8 * np.pi**2 * _hertz(value))) for value, i, j in order]
             for variable, per in result.rates.items()
         }

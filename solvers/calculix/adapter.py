@@ -194,7 +194,8 @@ def _version(command: tuple[str, ...]) -> str:
 def _shapes(fields: Fields, count: int, n: int, sectors: int, job: str) -> list[Array]:
     """Amplitudes (nodes, 3), complex, of each pair's first mode, mass-normalised to the tyre.
 
-    At Theta = 0, x, y, z are r, theta, z. CalculiX normalises to one sector's mass.
+    At Theta = 0, x, y, z are r, theta, z. CalculiX normalises to one sector's mass, and lists each
+    mode of every diameter twice.
     """
     parts = {(mode, name): values for mode, name, values in fields.blocks}
     shapes = []

@@ -18,7 +18,7 @@ from . import grammar
 
 MAX_HARMONIC, MAX_MODES = 999, 999  # harmonic; modes of one
 MAX_RESPONSE_LINES = 20_000  # of a response
-TREAD_DIRECTIONS = "radial", "tangential", "lateral"  # components of displacements
+TREAD_DIRECTIONS = "radial", "tangential", "lateral"  # components 0, 1, 2 of displacements
 
 
 def _each_once(harmonics: list[int]) -> list[int]:
@@ -92,8 +92,8 @@ class Request(_Strict):
     )
     modes_per_harmonic: Modes = 2
     sensitivities: dict[str, list[Slope]] = field(default_factory=dict)  # by variable
-    # rubber with a table of moduli has, in each mode, that of the mode's own frequency, not of
-    # PROPERTY EVALUATION
+    # rubber with a table of moduli has, in each mode, that of the mode's own frequency, not of the
+    # frequency that PROPERTY EVALUATION of *FREQUENCY states
     own_frequency: bool = False
     cavity: CavityRequest | None = None
     sector: SectorRequest | None = None

@@ -30,8 +30,10 @@ class PressedStart:
 
     texts: Mapping[str, str]  # its decks, file name to text
     nodes: Array  # (n,) deck numbers
-    inflated: Array  # (n, 3) displacements before any load, m
-    displacement: Array  # (ring, n, 3) displacements on the road, of rings all round, m
+    inflated: Array  # (n, 3) displacements r, theta, z before any load, m
+    # (ring, n, 3) the same on the road, of rings all round from the road on: `HalfCircle.angles`,
+    # then the angles between pi and 2 pi
+    displacement: Array
     load_N: float
     deflection_m: float
     sha256: str = ""  # names it once it is written
@@ -67,8 +69,8 @@ def read_pressed_start(folder: Path, text: str) -> PressedStart | None:
 
 
 def write_start(folder: Path, shape: Array) -> str:
-    """Write ``shape`` (n, 4), node number and displacement in m, next to the deck; returns the
-    deck's last line. Raises OSError."""
+    """Write ``shape`` (n, 4), node number and displacement r, theta, z in m, next to the deck;
+    returns the deck's last line. Raises OSError."""
     content = io.BytesIO()
     np.save(content, np.ascontiguousarray(shape, dtype="<f8"), allow_pickle=False)
     (folder / FILE).write_bytes(content.getvalue())

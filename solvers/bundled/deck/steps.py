@@ -21,12 +21,12 @@ class DeckStep:
 
     number: int  # in the job, from 1
     procedure: Block  # its keyword of ``PROCEDURES``
-    held: Sequence[Row]  # rows of *BOUNDARY
+    held: Sequence[Row]  # rows of *BOUNDARY: node or set, first and last freedom, value
     revolved: bool  # of the second job, in three dimensions
     output: str = ""  # the node set of its *NODE FILE, or ""
     is_perturbation: bool = False  # a *STATIC that is linear about the end of the step before
     long_term: bool = True  # the static state is relaxed
-    forces: Sequence[Row] = ()  # rows of *CLOAD
+    forces: Sequence[Row] = ()  # rows of the last *CLOAD
     pressures: Numbers = field(default_factory=dict)  # surface to the deck's number, Pa
     centrifugal: Numbers = field(default_factory=dict)  # element set to Omega^2 of *DLOAD's CENTRIF
     spin: Numbers = field(default_factory=dict)  # element set to Omega (rad/s) of its ROTDYNF
@@ -110,7 +110,7 @@ def _turn(step: DeckStep, k: Block) -> None:
         kind = row.name(1)
         if kind not in kinds:
             raise k.refused(f"the load '{row.text(1)}' is not honoured here", row)
-        axis = [row.value(i, 0.0) for i in range(3, 9)]
+        axis = [row.value(i, 0.0) for i in range(3, 9)]  # a point of it, its direction
         if axis != ([0.0, 0.0, 0.0, 0.0, 1.0, 0.0] if step.revolved else [0.0] * 6):
             raise k.refused("the tyre turns about its axle, 0, 0, 0 along 0, 1, 0", row)
         kinds[kind][row.name(0)] = row.value(2)
@@ -146,6 +146,7 @@ def _check_transfer(section: list[Block], steps: list[DeckStep], revolve: list[B
     generation, transfer = (blocks[name] for name in names)
     if "REVOLVE" not in generation.parameters:
         raise generation.refused("must REVOLVE the section")
+    # rows: two points of the axis; a point of the section; each segment's degrees, elements, bias
     segments = [row.number(0) for row in generation.rows[2:]]
     if not abs(sum(segments) - 360.0) < 1e-6:
         raise generation.refused("the tyre is revolved by 360 degrees")
@@ -157,7 +158,7 @@ def _check_transfer(section: list[Block], steps: list[DeckStep], revolve: list[B
     static = steps[0].procedure
     if "DIRECT" not in static.parameters:
         raise static.refused("the increments must be fixed (DIRECT) for a transfer")
-    row = static.only_row()
+    row = static.only_row()  # first increment, period
     increments = int(np.ceil(np.real(row.value(1) / row.value(0)) - 1e-9))
     if (transfer.need("STEP"), transfer.need("INC")) != ("1", str(increments)):
         raise transfer.refused(f"the first job ends with STEP=1, INC={increments}")

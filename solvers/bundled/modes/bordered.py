@@ -6,7 +6,8 @@ cavity's air.
     [.   .   .   H^T] [w]   [b]        that the air's stiffness, a full matrix on all nodes of
     [C   Cq  H   -Q ] [s]   [0]        its wall, leaves the band as it is
 
-    Kx = K T of the rim's nodes, Kq = T* K T + the wheel's own springs; the same for the mass.
+    *: conjugate transpose. Kx = K T of the rim's nodes, Kq = T* K T + the wheel's own springs; the
+    same for the mass.
     C u, Cq q: volume that the wall and the rim sweep, weighted by the terms of the pressure.
     H, Q: stiffness 1/rho int grad . grad and compressibility 1/B int of the air's pressure terms;
     w* H w is the kinetic energy of the flow, so H is its mass, too.

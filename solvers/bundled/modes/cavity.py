@@ -3,13 +3,13 @@
 Its pressure is p = sum_k P_k psi_k(r, z) exp(i n theta), psi_k monomials of (r, z) up to the degree
 MONOMIAL_DEGREE: exact for plane waves round a thin torus and for air that a rigid wheel carries
 along; for the flow across the section, whose own waves are above 700 Hz, right to 3e-5 of the
-tyre's frequencies. Weakly,
+tyre's frequencies (`tests/bundled/test_cavity.py`). Weakly,
 
     Q P'' + H P = -C u'',    Q = 1/B int psi psi dV,  H = 1/rho int grad psi . grad psi dV,
                              C u = int psi u . n dA   (volume that the wall sweeps, weighted)
 
-rho, B: the air's density and bulk modulus (Morand and Ohayon, Fluid Structure Interaction, ch. 8).
-With P = -Q^-1 (C u + H w) it is symmetric:
+(here n: unit normal out of the air). rho, B: the air's density and bulk modulus (Morand and Ohayon,
+Fluid Structure Interaction, ch. 8). With P = -Q^-1 (C u + H w) it is symmetric:
 
     stiffness  (C u + H w)^T Q^-1 (C u + H w),   mass  w^T H w
 
@@ -65,7 +65,7 @@ def read_cavity(keywords: list[Block], mesh: DeckMesh, cavity: CavityRequest) ->
 
 @dataclass(frozen=True)
 class GasCoupling:
-    """Matrices of a harmonic, per radian."""
+    """Matrices of a harmonic, per radian, on the k terms of the pressure."""
 
     C: Array  # (k, nodes, 3), m2
     H: Array  # (k, k), m4/kg

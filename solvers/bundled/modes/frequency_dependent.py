@@ -29,7 +29,7 @@ MAX_SETTLING = 40  # iterations of a mode at its own modulus
 
 
 class SelfConsistent:
-    """Modes of a vibration whose rubber follows the ``tables``."""
+    """Modes of a vibration whose rubber follows the ``tables``, one for each law l."""
 
     def __init__(self, vibration: Vibration, tables: list[ModulusTable]):
         self.vibration, self.tables = vibration, tables

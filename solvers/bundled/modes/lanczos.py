@@ -26,10 +26,11 @@ def lowest(
     count: int,
     shift: float,
 ) -> tuple[Array, Array]:
-    """The ``count`` eigenvalues nearest above ``shift`` and their M-normalised vectors.
+    """The ``count`` lowest eigenvalues, all above ``shift``, and their M-normalised vectors.
 
-    solve(b): (K - shift M)^-1 b; mass(x): M x; start (size, b): first block.
-    Returns eigenvalues (count,) ascending and vectors (size, count). Raises RunFailed.
+    solve(b), by a Cholesky factor, so that no eigenvalue is below: (K - shift M)^-1 b; mass(x): M
+    x; start (size, b): first block. Returns eigenvalues (count,) ascending and vectors (size,
+    count). Raises RunFailed.
     """
     size = start.shape[0]
     count = min(count, size)
@@ -72,13 +73,13 @@ def _bordered(matrix: Array, column: Array) -> Array:
 
 
 def _orthonormal(block: Array, image: Array) -> tuple[Array, Array, Array]:
-    """Block (n, b) and its image M block made M-orthonormal in itself, and the Gram matrix (b, b)
-    before.
+    """Block (size, b) and its image M block made M-orthonormal in itself, and the Gram matrix (b,
+    b) before.
 
     Directions that depend on the others drop out.
     """
     gram = block.conj().T @ image
     values, vectors = np.linalg.eigh(gram)
-    keep = values > 1e-26 * abs(values[-1])
+    keep = values > 1e-26 * abs(values[-1])  # squared lengths
     turn = vectors[:, keep] / np.sqrt(values[keep])
     return block @ turn, image @ turn, gram

@@ -46,7 +46,8 @@ class PartOfStiffness:
 
 
 class ResponseBasis:
-    """Fields V (size, k) of harmonic n, in coordinates: V^H M V = 1; ``K`` (k, k) is V^H K(n) V."""
+    """Fields V (size, k) of harmonic n, in coordinates: V^H M V = 1; ``K`` (k, k), 1/s2:
+    V^H K(n) V."""
 
     def __init__(self, vibration: Vibration, n: int, forces: Array):
         """forces (size, p), in coordinates. Raises RunFailed."""

@@ -75,7 +75,7 @@ def eigenvalue_rates(
                 denominator = denominator - own_change
     M = mechanics.mass(model)
     total -= eigenvalues * _energies(M, fields).sum(1)
-    if spins:  # centrifugal: -Omega^2 M in r and theta, of all parts at once
+    if spins:  # centrifugal: -Omega^2 M in r and theta, of all parts at once, as Omega is one
         total -= _energies(spins[0].spin2 * M, fields) @ np.diag(IN_PLANE)
     total *= copies
     if rim_and_air:
@@ -85,13 +85,13 @@ def eigenvalue_rates(
 
 @dataclass(frozen=True)
 class RimAndAir:
-    """Rim and air with the tangent of a number p, and the amplitudes of their motions in each mode:
-    of the q motions of the rim and of the w terms of the air's flow."""
+    """Rim and air with the tangent of a number p, and the amplitudes of their motions in each
+    mode."""
 
     wheel: Wheel | None
     air: GasCavity | None
-    rim: list[Array]
-    flow: list[Array]
+    rim: list[Array]  # of each mode (q,), of the q motions of the rim
+    flow: list[Array]  # of each mode (w,), of the w terms of the air's flow, kg/m
 
     def carried(self, X: Array, fields: ModeShapes) -> ModeShapes:
         """The modes with the rim's nodes where p's tangent takes them."""
@@ -135,7 +135,8 @@ class RimAndAir:
 
 
 def _energies(M: csr_array, fields: ModeShapes) -> Array:
-    """u^T M u (m, 3) per mode and component; of real shapes only p's tangent, imaginary."""
+    """u^H M u (m, 3) per mode and component. Where shapes carry no tangent of p, only the part that
+    does, which is imaginary: that of M, or zero."""
     if not (fields.complex or np.iscomplexobj(M)):
         return np.zeros((len(fields.modes), 3), complex)
     if not fields.complex:

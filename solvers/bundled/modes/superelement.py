@@ -25,12 +25,14 @@ Array = np.ndarray
 MOVE_RIM_UP_TO = 2.5  # times the highest frequency: modes that are kept of harmonics 0 and 1
 ADDS_NOTHING = 1e-3  # singular value, over the largest, below which a static response adds nothing
 RIM_AXES = 0.0, np.pi / 2  # angles of the axes across the axle
-RIM_PLACES = {0: (2, 5), 1: (0, 3)}  # places of the first coordinate of each motion of a harmonic
+# places of the first coordinate of each motion of a harmonic: axial, spin; radial, tilt (`wheel`)
+RIM_PLACES = {0: (2, 5), 1: (0, 3)}
 
 
 @dataclass(frozen=True)
 class Superelement:
-    """Matrices (d, d), d coordinates, in N/m and kg, and motions (p, d) of p points of tread."""
+    """Matrices (d, d), d coordinates, in N/m and kg (of turns in N m and kg m2), and motions (p, d)
+    of p points of tread per unit of each coordinate."""
 
     stiffness: Array
     mass: Array
@@ -46,7 +48,7 @@ def superelement(
     rest, then the lowest of the others. points: angle (rad) and component (0, 1, 2: r, theta, z) of
     each. Raises Refused if the rim needs more."""
     limit = (2 * np.pi * response.highest_Hz) ** 2
-    blocks = [_Block(response, k, points) for k in range(len(response.harmonics))]
+    blocks = [_Block(response, k, points) for k in range(len(response.harmonics))]  # 0, 1, ...
     parts = [block.with_static_shapes(limit) for block in blocks[:2]]
     left = count - sum(len(part.stiffness) for part in parts)
     if left < 0:
@@ -101,7 +103,7 @@ class _Block:
             [share * np.exp(1j * self.n * angle) * self._motion[way] for angle, way in points]
         )
         # the rim's motion along an axis has the amplitude exp(-i angle); here its conjugate
-        self._turns = np.zeros((6, len(reduced.moved)), complex)
+        self._turns = np.zeros((6, len(reduced.moved)), complex)  # by axis and motion
         for motion_place, place in enumerate(RIM_PLACES.get(self.n, ())):
             for axis, angle in enumerate(RIM_AXES if self.n else RIM_AXES[:1]):
                 self._turns[place + axis, motion_place] = np.exp(1j * angle)

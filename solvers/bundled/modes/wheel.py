@@ -5,9 +5,10 @@ Amplitudes q of u = Re[T q exp(i n Theta)] at the rim's nodes, d = x - reference
     n = 0   axial   T = (0, 0, 1)          spin about the axle      T = (0, r, 0)
     n = 1   radial  T = (1, i, 0)          tilt about a diameter    T = i (d_z, i d_z, -r)
 
-Higher harmonics leave it at rest. A rotation w moves a node by w x d + w x (w x d) / 2; the second
-part works against the forces f (N per radian) that hold the rim in the inflated state, which adds
-the stiffness -sum r f_r to the spin and -sum (r f_r + 2 d_z f_z) to the tilt.
+Radial is a shift along Theta = 0, tilt a turn about it. Higher harmonics leave it at rest. A
+rotation w moves a node by w x d + w x (w x d) / 2; the second part works against the forces f (N
+per radian) that hold the rim in the inflated state, which adds the stiffness -sum r f_r to the spin
+and -sum (r f_r + 2 d_z f_z) to the tilt.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ from ..section.materials import Scalar
 from ..section.mesh import DeckMesh
 
 Array = np.ndarray
-FREEDOMS = {"axial": (2,), "spin": (5,), "radial": (1, 3), "tilt": (4, 6)}  # 2: along the axle
+# ABAQUS's degrees of freedom: 1 to 3 along the deck's axes, 2 the axle, 4 to 6 about them
+FREEDOMS = {"axial": (2,), "spin": (5,), "radial": (1, 3), "tilt": (4, 6)}
 MOTIONS = {0: ("axial", "spin"), 1: ("radial", "tilt")}
 
 

@@ -70,14 +70,14 @@ class Whirl:
         return self.omega - self.n * self.spin
 
     def forms(self) -> tuple[Array, Array, Array, Array]:
-        """The forms as in `HarmonicModes.forms`, for the eigenvalues lambda = omega^2."""
+        """As `HarmonicModes.forms`, for the eigenvalues lambda = omega^2."""
         modes = len(self.omega)
         return np.full(modes, self.n), self.shapes, np.arange(modes), self.omega**2
 
     def rates(self, forms: Array, change: SeededTyre) -> Array:
         """d lambda (m,) of lambda = `fixed`^2, from omega' = U^H (K' + omega C' - omega^2 M') U /
-        (2 omega - U^H C U)."""
-        faster = np.imag(change.spin) / COMPLEX_STEP
+        (2 omega - U^H C U); forms (m,): U^H (K' - omega^2 M') U."""
+        faster = np.imag(change.spin) / COMPLEX_STEP  # Omega'
         by_spin = self.coriolis * faster / self.spin
         for connectivity, M in mass_matrices(change.model):
             if np.iscomplexobj(M):
@@ -100,7 +100,7 @@ def _basis(vibration: Vibration, spin: float, n: int, count: int) -> HarmonicFam
     factor, numbering = vibration.factor(n), vibration.numbering
     modes = vibration.modes(n, count, factor)
     vectors = numbering.gather(np.moveaxis(modes.shapes, 0, -1))
-    images = vibration.times_mass(vectors) * modes.eigenvalues
+    images = vibration.times_mass(vectors) * modes.eigenvalues  # K times the vectors
     newest = vectors
     for _ in range(CORIOLIS_ROUNDS):
         forces = [vibration.times_mass(_turned(vibration, newest))]
@@ -115,7 +115,7 @@ def _basis(vibration: Vibration, spin: float, n: int, count: int) -> HarmonicFam
 
 
 def _turned(vibration: Vibration, x: Array) -> Array:
-    """i e_z x u for (size, b), or without i where fields are real."""
+    """i e_z x u for (size, b); without i where fields are real, to which `_coriolis` adds it."""
     full = vibration.numbering.spread(x)
     i = 1j if np.iscomplexobj(full) else 1.0
     return vibration.numbering.gather(np.einsum("ij,njb->nib", i * SPIN_AXIS, full))

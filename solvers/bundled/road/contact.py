@@ -7,10 +7,11 @@ c = cos theta, s = sin theta of a point's reference angle its depth and its plac
 
     pressure = k <d - H>,   traction = mu pressure min(|slip| / e, 1) slip / |slip|
 
-with the overclosure's stiffness k and the elastic slip e, integrated over the part of the tread
-where d > H (`tread`). Slip counts from where a point stood when the last load had been reached,
-plus the elastic slip that it had then. A point that the road was a gap g away from then, at H0,
-met it on its way to H, and slips from there on:
+The traction is that on the road; x is along the tread, z across it. With the overclosure's
+stiffness k and the elastic slip e, integrated over the part of the tread where d > H (`tread`).
+Slip counts from where a point stood when the last load had been reached, plus the elastic slip that
+it had then. A point that the road was a gap g away from then, at H0, met it on its way to H, and
+slips from there on:
 
     slip = (1 - g / (H0 - H)) (x - x0)
 """
@@ -182,6 +183,7 @@ class Contact:
         friction, the potential of the forces."""
         over = np.maximum(self.positions[..., 0] - self.height, 0.0)
         e, (length, _, sticking) = self.road.elastic_slip, self._slip
+        # work on unit normal force; over the share, so that its slope by ``moved`` is the traction
         path = np.where(sticking, length**2 / (2 * e), length - e / 2)
         path = np.divide(path, self.share, out=np.zeros_like(path), where=self.share > 0)
         work = self.road.friction * float((self.pressed * path).sum())
@@ -244,6 +246,6 @@ def flat_road(
 ) -> FlatRoad:
     """The road that just touches a tread displaced by U (k, n, 3), all round alike. X (n, 2): R, Z
     of the section, m."""
-    height = float((X[tread.nodes, 0] + U[0, tread.nodes, 0]).max())
+    height = float((X[tread.nodes, 0] + U[0, tread.nodes, 0]).max())  # at angle 0
     elastic = np.zeros((len(tread.begin), *tread.ds.shape, SLIP_SAMPLES, 2))
     return FlatRoad(tread, stiffness, friction, elastic_slip, U, elastic, height)

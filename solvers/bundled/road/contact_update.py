@@ -32,7 +32,8 @@ class ContactUpdate:
         self.factor = factor
         # column of Y of each dof, -1: none
         self._column = np.full(factor.order.symmetry.mask.size, -1)
-        # rows of Y in each front of the factor: one list for each time that columns were formed
+        # rows of Y in each front of the factor (`multifrontal`): one list for each time that
+        # columns were formed
         self._blocks: list[list[Array]] = []
         self._compliance = np.zeros((0, 0))  # Y^T Y, m/N
         self._active = np.zeros(0, int)  # columns of Y whose contact has changed
@@ -53,7 +54,7 @@ class ContactUpdate:
         self._form(dofs)
         self._active = self._column[dofs]
         size = len(dofs)
-        self._D = change[dofs][:, dofs].toarray()
+        self._D = change[dofs][:, dofs].toarray()  # D of the dofs that change, N/m
         if size:
             compliance = self._compliance[np.ix_(self._active, self._active)]
             self._small = lu_factor(np.eye(size) + self._D @ compliance, check_finite=False)

@@ -17,7 +17,7 @@ Array = np.ndarray
 Operator = Callable[[Array], Array]
 EIGENVALUE_RTOL = 1e-8  # of an eigenvalue, relative; a frequency's is half of it
 MAX_BASIS_PER_MODE = 8  # times the wanted pairs, before the basis is cut down to its best half
-MAX_BLOCKS = 120
+MAX_BLOCKS = 120  # iterations, each of which adds a block
 NOT_STABLE = "the pressed tyre is not stable: its stiffness is not positive"
 MIN_LENGTH2 = 1e-10  # of a direction's squared length, below which it is in the basis already
 
@@ -95,10 +95,11 @@ def lowest(
     tolerance: float = EIGENVALUE_RTOL,
 ) -> tuple[Array, Array]:
     """The ``count`` lowest eigenvalues, ascending, and vectors (count, size), x^T M x = 1; the
-    ``basis`` grows until it has them, and a matrix near K may start from it; tolerance: of an
-    eigenvalue, relative.
+    ``basis`` grows until it has them, and may start the search for another K once its images are
+    changed; tolerance: of an eigenvalue, relative.
 
-    Operators take blocks (b, size); ``inverse``: about K^-1, symmetric.
+    Operators take blocks (b, size): ``product``: K x, ``mass``: M x, ``inverse``: about K^-1 x,
+    symmetric.
     Raises RunFailed, unstable where K is not positive.
     """
     while len(basis.vectors) < count:  # a small start grows by inverse iteration

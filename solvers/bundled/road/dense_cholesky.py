@@ -1,4 +1,4 @@
-"""Cholesky factors of dense blocks, and their triangles' inverses applied.
+"""Cholesky factors of dense blocks in single precision, and their triangles' inverses applied.
 
 Triangles are halved down to small ones, of which the inverses are kept, so that all that takes time
 is products.

@@ -3,8 +3,8 @@
 The section in columns of elements, from the bead to the middle of the tread, times the pieces round
 the tyre: a rectangle of cells, of which only neighbours couple. A box of cells is cut where fewest
 unknowns lie between the halves; those go last, and the halves by themselves before (George, SIAM J.
-Numer. Anal. 10, 345, 1973). Where no cords run at a bias the fold's two parts are boxes of
-their own.
+Numer. Anal. 10, 345, 1973). Where no cords run at a bias the two parts of a field (`HalfTurn`) are
+boxes of their own.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .half_turn_symmetry import HalfTurn
 
 Array = np.ndarray
 MAX_UNDIVIDED = 200  # unknowns inside a box that is not cut any more
-Range = tuple[int, int]
+Range = tuple[int, int]  # of columns or pieces: the first, and the one after the last
 
 
 @dataclass(frozen=True)
@@ -63,11 +63,11 @@ class Dissection:
         flat = np.arange(mask.size).reshape(mask.shape)[:, :, self.along]
         self._flat = np.ascontiguousarray(flat)
         pieces = [np.arange(p.functions.start, p.functions.stop) for p in symmetry.around.pieces]
-        self._functions = _ranges(pieces, symmetry.mask.shape[1])
+        self._functions = _ranges(pieces, symmetry.mask.shape[1])  # as ``_nodes`` of the columns
 
     def fronts(self, coupled: int) -> list[Front]:
-        """Fronts in the order of elimination; from the column ``coupled`` on the parts go
-        together."""
+        """Fronts in the order of elimination; from the column ``coupled`` on, the first of which
+        cords at a bias couple the parts, these go together."""
         fronts: list[Front] = []
         columns, pieces = len(self.columns), len(self.symmetry.around.pieces)
         self._cut(fronts, (0, 1), (0, columns), (0, pieces), coupled)
@@ -76,7 +76,8 @@ class Dissection:
     def _cut(
         self, fronts: list[Front], parts: tuple[int, ...], columns: Range, pieces: Range, first: int
     ) -> list[int]:
-        """Add a box's fronts; places of its last, of each part by itself or of both."""
+        """Add a box's fronts; places of its last, of each part by itself or of both. first: the
+        column ``coupled``."""
         again = lambda c, p: self._cut(fronts, parts, c, p, first)
         if len(parts) == 2 and columns[1] <= first:
             return [i for part in parts for i in self._cut(fronts, (part,), columns, pieces, first)]

@@ -33,7 +33,7 @@ class HalfTurn:
 
     The parts a and b live on the q nodes with z >= 0, and each has f of the k functions round the
     tyre ``around``. free (n, 3): components that are not held; parity: p; ``other`` (n,): mirror
-    image of each node; ``mask``: entries of the parts that are free. Raises Refused.
+    image of each node; ``mask`` (2, f, q, 3): entries of the parts that are free. Raises Refused.
     """
 
     def __init__(self, mesh: DeckMesh, free: Array, around: HalfCircle, parity: int = 1):
@@ -51,6 +51,7 @@ class HalfTurn:
         # rows of the k functions that a part's component has (part, component, f)
         self._rows = np.where(ODD[..., None], around.odd, around.even)
         mask = np.tile(free[self.nodes], (2, len(around.even), 1, 1))
+        # functions at the angles 0 and pi, where what is odd is zero
         planes = np.flatnonzero(abs(np.sin(around.angles)) < SAME_ANGLE)
         for part, odd in zip(mask, ODD, strict=True):
             part[np.ix_(planes, np.arange(len(self.nodes)), odd)] = False

@@ -2,10 +2,10 @@
 
     K = tangent of the tyre + hold,   M = kron(N^T w N, M_section)
 
-N (s, k) and w (s,), rad: functions of the angle and weights at Gauss stations (`Circumference`);
-M_section: mass per radian. Fields (k, n, 3) have k functions of the angle, n nodes of the section
-and the components r, theta, z in the frame of the reference angle, so the mass does not depend on
-the angle. ``around.turn(j)`` is exp(i j theta) in these functions, (k,).
+hold: see `stick`; N (s, k) and w (s,), rad: functions of the angle and weights at Gauss stations
+(`Circumference`); M_section: mass per radian. Fields (k, n, 3) have k functions of the angle, n
+nodes of the section and the components r, theta, z in the frame of the reference angle, so the mass
+does not depend on the angle. ``around.turn(j)`` is exp(i j theta) in these functions, (k,).
 
 The pressed tyre is unchanged by a half turn about the vertical. So each mode is unchanged (parity
 1) or changes its sign (parity -1), and the two kinds are computed apart (`HalfTurn`, which states

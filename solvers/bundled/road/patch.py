@@ -34,9 +34,9 @@ def patch(contact: Contact, X: Array, rings: Array) -> HalfPatch:
     """The patch of a contact, on nodes at the angles ``rings`` (k,) from 0 on. X (n, 2): R, Z of
     the section, m."""
     tread, points = contact.road.tread, contact.points
-    size = points.area * points.densities(contact.U)
+    size = points.area * points.densities(contact.U)  # deformed area of each point, m2
     local = np.concatenate([contact.normal[..., None], contact.traction], -1)
-    before = np.searchsorted(rings, points.angle, "right") - 1
+    before = np.searchsorted(rings, points.angle, "right") - 1  # the ring before each point
     beyond = (points.angle - rings[before]) / (rings[before + 1] - rings[before])
     # the lines lie at Gauss points of the line elements
     across = _hats(gauss(len(tread.M), 1)[0], tread.nodes.shape[1])[:, None]  # (j, 1, a)
@@ -73,6 +73,7 @@ def _roots(over: Array, z: Array) -> Array:
     their nodes: two or three, so that they are linear or quadratic between."""
     if over.shape[1] == 2:
         over, z = (np.stack([f[:, 0], f.mean(1), f[:, 1]], 1) for f in (over, z))
+    # c + b xi + a xi^2 through three nodes; its roots are 2 c / steep and steep / (2 a)
     parabola = lambda f: (f[:, 1], (f[:, 2] - f[:, 0]) / 2, (f[:, 0] - 2 * f[:, 1] + f[:, 2]) / 2)
     c, b, a = parabola(over)
     steep = -b - np.copysign(np.sqrt(np.maximum(b * b - 4 * a * c, 0.0)), b)

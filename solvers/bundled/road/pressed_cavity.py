@@ -6,9 +6,10 @@ Air between rigid walls as they stand, p = sum P_km psi_m(r, z) T_k(phi), psi_m 
     H P = omega^2 Q P,   Q = 1/B int p p dV,   H = 1/rho int grad p . grad p dV
 
 (Rayleigh and Ritz; Morse and Ingard, Theoretical Acoustics, 9.1.) Of a thin torus with the area
-A(phi) of its section this is Webster's equation (A p')' + (omega R / c)^2 A p = 0: the even wave,
-with its pressure at the patch, pushes the wheel up and down, the odd one fore and aft; with
-A = A0 (1 + a cos 2 phi) they have c / (2 pi R) (1 -+ a / 2). Narrow at the patch, a < 0.
+A(phi) of its section this is Webster's equation (A p')' + (omega R / c)^2 A p = 0 (R: the torus'
+radius, c: speed of sound): the even wave, with its pressure at the patch, pushes the wheel up and
+down, the odd one fore and aft; with A = A0 (1 + a cos 2 phi) they have c / (2 pi R) (1 -+ a / 2),
+the upper sign for the even one. Narrow at the patch, a < 0.
 """
 
 from __future__ import annotations
@@ -61,7 +62,8 @@ def cavity_modes(air: GasCavity, X: Array, displacement: Array, angles: Array) -
 
 
 def _wall(X: Array, connectivity: Array, U: Array, U_around: Array) -> tuple[Array, Array]:
-    """Places x (s, p, 3) of the wall in the frame of the stations, and n dA / dTheta there."""
+    """Places x (s, p, 3) of the wall in the frame of the stations, and n dA / dTheta there,
+    n out of the air."""
     lines = elements.lines(X, connectivity, POINTS_ALONG)
     at = lambda rows, u: np.einsum("ega,seai->segi", rows, u[:, connectivity])
     N = np.broadcast_to(lines.N, lines.slope.shape)

@@ -2,7 +2,8 @@
 
     zeta_r = 1/2 sum_k eta_k(f_r) phi_r^T K_k phi_r / omega_r^2,   phi_r^T M phi_r = 1
 
-K_k: the part of the tangent at U that is proportional to a compound's moduli (`modes.damping`).
+zeta_r: damping ratio of mode r; eta_k: loss factors; K_k: the part of the tangent at U that is
+proportional to a compound's shear or bulk modulus (`modes.damping`).
 Initial stress, pressure, and what holds the patch have no losses.
 """
 
@@ -28,7 +29,7 @@ class PressedLosses:
         by_loss: dict[tuple[LossFactor, int], list[TyrePart]] = {}
         for k, material in enumerate(model.lossy):
             assert material.loss
-            for modulus in (0, 1):
+            for modulus in (0, 1):  # shear, bulk
                 # without a table both moduli have one loss factor
                 law = material.loss, modulus if material.loss.frequency_Hz else 0
                 by_loss.setdefault(law, []).extend(model.material_parts(k, modulus))

@@ -36,6 +36,7 @@ def begin(start: PressedStart, read: ReadTyre, work: ContactNewton, numbers: Arr
     mesh, or one that is not stable, is passed over. Raises DeckError."""
     around, rings = work.symmetry.around, len(work.symmetry.around.angles)
     same_mesh = np.array_equal(start.nodes, numbers)
+    # with waves the far side has no rings of nodes to compare
     if around.waves.size or not same_mesh or len(start.displacement) != 2 * (rings - 1):
         return
     pressed = start.displacement[:rings]

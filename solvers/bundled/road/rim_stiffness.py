@@ -3,11 +3,12 @@
     C = K_bb - K_bf K_ff^-1 K_fb + G
 
 b: six motions of the rim, f: the tyre's free displacements, K: tangent of tyre and hold (`stick`).
-G is of turns w alone, which move a node of the rim at x by w x x + w x (w x x) / 2. The second part
-works against the forces f that hold the rim. And the tyre's -p V counts caps of radius r at the
-cavity's open ends z, which the rim closes: about a diameter they turn with it. So
+G is of turns w alone, which move a node of the rim, at d from the wheel's centre, by w x d + w x (w
+x d) / 2. The second part works against the forces f that hold the rim. And the tyre's -p V
+(`parts.pressure`) counts caps of radius r at the cavity's open ends z, which the rim closes: about
+a diameter they turn with it. So
 
-    G = sum f . (w x (w x x)),   and about a diameter  - sum p pi r^2 |z|  in addition
+    G = sum f . (w x (w x d)),   and about a diameter  - sum p pi r^2 |z|  in addition
 
 Without a road nothing that the rim does costs anything, then.
 
@@ -36,12 +37,12 @@ Array = np.ndarray
 MOTION_PARITY = np.array(
     [1, -1, -1, 1, -1, -1]
 )  # of shifts down, along, across, and turns about these
-# matrices (3, 3) of w x x for unit turns w about the three axes, by the last index
+# matrices (3, 3) of w x d for unit turns w about the three axes, by the last index
 TURN = np.cross(np.eye(3)[:, None], np.eye(3)[None], axis=-1).transpose(1, 2, 0) * -1.0
 UNIT_MOTIONS = [(axis, 0 * axis) for axis in np.eye(3)] + [(0 * axis, axis) for axis in np.eye(3)]
 SAMPLES = 8  # angles, which tell harmonics 0 to 2 apart
 RIM_RTOL = 1e-6  # residual of the displacements; a stiffness is off by its square
-MAX_RIM_RESIDUAL = 1e-3
+MAX_RIM_RESIDUAL = 1e-3  # above it there is no result
 MAX_RIM_GMRES = 60  # iterations
 # the deck's axes 1, 2, 3 in those of the road: down, across (the axle), against along
 ROAD_OF_DECK = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])

@@ -27,16 +27,16 @@ class RoadData:
     stiffness: complex | float  # of the overclosure, Pa/m
     friction: complex | float
     elastic_slip: float  # m
-    lengths: Array  # of the elements round half the tyre, rad
+    lengths: Array  # of the elements round half the tyre, from the road to the top, rad
 
 
 @dataclass(frozen=True)
 class ModeRequest:
     """Modes wanted at a load."""
 
-    model: Model
+    model: Model  # with the moduli of the vibration
     count: int
-    nodes: Array  # rows at which their shapes are wanted
+    nodes: Array  # (k,) rows of the section at which their shapes are wanted
     wheel_kg: float | None = None  # of a wheel that is free along the load
     # in place of modes: responses to a force on the tread, as `deck.request` has them
     response: ResponseRequest | None = None
@@ -114,7 +114,7 @@ def _half_lengths(model: list[Block]) -> Array:
     """Lengths (rad) of the elements from the road's side to the top."""
     generation = next(k for k in model if k.name == "SYMMETRIC MODEL GENERATION")
     lengths: list[float] = []
-    for row in generation.rows[2:]:
+    for row in generation.rows[2:]:  # of each segment: degrees, elements, bias
         count = row.integer(1)
         if row.value(2, 1.0) != 1.0:
             raise DeckError(row.place, "a bias of the elements' lengths is not honoured")

@@ -6,7 +6,7 @@ those of the load before, from where slip counts, and p is a number of the deck:
     K dy/dp = -(dr/dp + dr/dy0 dy0/dp),    K = dr/dy
 
 from the inflated tyre on, whose dU/dp is that of vibrations (`modes.sensitivity`). The vertical
-stiffness is 2 / rise, rise = e . s with K s = e, the unit of half the road's force, so that
+stiffness is 2 / rise, N/m, rise = e . s with K s = e, a unit of half the road's force, so that
 
     d rise/dp = -w . (dK/dp s),    K^T w = e
 
@@ -82,6 +82,7 @@ class _Path:
         self.X, self.dX = np.real(X), np.imag(X) / COMPLEX_STEP
         nodes = road.tread.nodes.ravel()
         crown = nodes[np.argmax(self.X[nodes, 0] + road.U[0, nodes, 0])]
+        # derivatives, as U and ``elastic`` are: per unit of the number
         self.free_radius = self.height = float(self.dX[crown, 0] + own.U[crown, 0])
         self.U = np.multiply.outer(around.turn(0).real, own.U)
         self.elastic = 0 * road.elastic
@@ -106,7 +107,8 @@ class _Path:
     def rates(
         self, work: ContactNewton, state: PressedState, unit: tuple[Array, float], rings: Array
     ) -> Values:
-        """d / dp of a footprint's numbers; unit: w on the fields and on the road's height."""
+        """d / dp of a footprint's numbers; unit: w on the fields (k, n, 3) and on the road's
+        height, m/N."""
         W, lift = unit
         S, rise = work.symmetry.spread(state.unit[0]), state.unit[1]
         step, contacts = self._beside(state.contact)
@@ -147,8 +149,8 @@ class _Path:
 def _solved(
     work: ContactNewton, tangent: Tangent, force: Array, lacking: float
 ) -> tuple[Array, float]:
-    """Derivatives of the parts and of the road's height by a number whose force is ``force``.
-    Raises NoEquilibrium."""
+    """Derivatives of the parts and of the road's height by a number that adds ``force`` (2, f, q,
+    3) to the parts and ``lacking`` to half the road's force, N. Raises NoEquilibrium."""
     parts, rise, left = work.solve_closely(tangent, force, lacking, SMOOTH_RTOL)
     if left > SMOOTH_RTOL:
         raise NoEquilibrium(f"a derivative was not found in {MAX_GMRES} iterations")

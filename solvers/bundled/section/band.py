@@ -36,7 +36,7 @@ class Numbering:
         nodes = min(orders, key=lambda order: _largest_distance(pairs, order))
         if end is not None:
             there = np.flatnonzero(end[nodes[touching[nodes]]])
-            if 2 * there.sum() < len(there) * touching.sum():  # nearer to the first node
+            if 2 * there.sum() < len(there) * touching.sum():  # on average nearer to the first node
                 nodes = nodes[::-1]
         flat = (3 * nodes[:, None] + np.arange(3)).ravel()
         self.order = flat[free.ravel()[flat]]
@@ -70,7 +70,8 @@ class Numbering:
         return self._scatter[key]
 
     def assemble(self, parts: list[tuple[Array, Array]]) -> Array:
-        """Lower band (bandwidth + 1, size), Fortran order, of (connectivity, matrices) parts."""
+        """Lower band (bandwidth + 1, size), Fortran order, of parts: connectivity (e, a), matrices
+        (e, 3a, 3a)."""
         length = (self.bandwidth + 1) * self.size
         band = np.zeros(length)
         for connectivity, matrices in parts:

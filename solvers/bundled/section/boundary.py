@@ -16,7 +16,7 @@ from .symmetry import MirrorHalf
 FILLED = ("SOLID SECTION", "SURFACE SECTION", "MEMBRANE SECTION")
 Array = np.ndarray
 SECTION_DOFS = {1: 0, 2: 2, 5: 1}  # ABAQUS's r, z, twist to our components r, theta, z
-REVOLVED_DOF = {2: 2}  # the axle is the revolved model's second axis
+REVOLVED_DOF = {2: 2}  # the axle; axes 1 and 3 are no fixed mix of r and theta round the tyre
 REVOLVED_DOFS = {1: 0, 2: 1, 3: 2}  # of a row that holds all three, whatever their order
 
 

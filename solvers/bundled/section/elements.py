@@ -47,7 +47,8 @@ def solids(
 ) -> Solids:
     """Operators of solids of one type; with one Gauss point the hourglass vectors, too.
 
-    X (n, 2): R, Z of all nodes in m; share (e, 1): of each that counts. Raises Inverted.
+    X (n, 2): R, Z of all nodes in m; share (e, 1): of each that counts (`Whole.share`). Raises
+    Inverted.
     """
     rule, mass_rule = kind.rule(kind.points), kind.rule(kind.mass_points)
     R, weights, gradient = _map(X, connectivity, rule)
@@ -92,7 +93,8 @@ def _map(X: Array, connectivity: Array, rule: shapes.Rule) -> tuple[Array, Array
 def _hourglass(corners: Array, gradient: Array, weights: Array) -> Array:
     """Hourglass vectors of Flanagan and Belytschko (1981), (e, 4), blind to linear fields.
 
-    Scaled by sqrt(R dA sum |grad N|^2), so that an energy per radian is k (gamma . u_i)^2 / 2.
+    Scaled by sqrt(R dA sum |grad N|^2), so that an energy per radian is k (gamma . u_i)^2 / 2, k in
+    Pa.
     """
     h = np.array([1.0, -1.0, 1.0, -1.0])
     gamma = (h - np.einsum("a,eaj,ebj->eb", h, corners, gradient)) / 4

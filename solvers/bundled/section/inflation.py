@@ -157,7 +157,8 @@ def _by_stiffness(solve: _Solver, start: Array, check: Callable[[], None]) -> Ar
 
 
 def _by_pressure(solve: _Solver, start: Array, check: Callable[[], None]) -> Array:
-    """U (n, 3) inflated in adaptive load steps, which show how far the tyre can be inflated."""
+    """U (n, 3) inflated in adaptive load steps, which show how far the tyre can be inflated. Raises
+    NoEquilibrium."""
     U, reached, step = start, 0.0, 0.25
     while reached < 1.0:
         check()
@@ -229,7 +230,7 @@ def _newton(
                     break
                 lower = mechanics.potential(model, trial, loads)
                 energy = mechanics.potential(model, U, loads) if energy is None else energy
-            if lower <= energy + 1e-4 * length * slope:
+            if lower <= energy + 1e-4 * length * slope:  # Armijo's condition
                 break
             length /= 2
             if length < 1e-4:

@@ -59,6 +59,7 @@ class KeptFields:
         self.free = np.zeros(free.size, bool)  # mask (n, 3) of the free components, of both sides
         self.free[self._order] = True
         self.free = self.free.reshape(free.shape) | self.free.reshape(free.shape)[symmetry.other]
+        # columns of the band's array that hold the corner
         self._columns = -(-(self._near + m) * m // (inner.bandwidth + 1))
 
     def assemble(self, parts: OfElements) -> Array:

@@ -48,7 +48,8 @@ def agreed_spin(model: Model, step: DeckStep) -> float:
 def _uniform(
     model: Model, step: DeckStep, sets: dict[str, complex | float], load: str
 ) -> complex | float:
-    """The magnitude of a load that all of the tyre bears, 0 where there is none."""
+    """The magnitude of a load that all of the tyre bears, 0 where there is none. Raises
+    DeckError."""
     if not sets:
         return 0.0
     place, elements = step.procedure.place, model.mesh.element_sets

@@ -1,6 +1,7 @@
 """Potential, residual, tangents and mass of the section, per radian: sums over its parts.
 
-State U (n, 3) in m: displacements in the frame of the reference angle (see `elements`).
+State U (n, 3) in m: displacements in the frame of the reference angle (see `elements`). Of half a
+model the sums are half of the tyre's (`symmetry`), except `total_mass`.
 """
 
 from __future__ import annotations

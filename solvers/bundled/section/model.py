@@ -16,6 +16,7 @@ from .parts.elastic import Elastic
 from .parts.part import SectionJob, TyrePart
 
 READERS = (rubber.read, membrane.read, cords.read)  # take materials by `SectionJob.material`
+# keywords that assign no properties to elements
 NO_SECTIONS = {*OF_THE_MESH, "MATERIAL", *MATERIAL_READERS}
 
 

@@ -35,7 +35,7 @@ class PointElements:
 
     def rates(self, eigenvalues: Array, at: Array) -> Array:
         """sum of (k' - lambda m') p^2 per mode (m,), ' by what the numbers' tangent is of;
-        at (d, m): p of each component and mode."""
+        at (d, m): p, the mean displacement of each component in each mode."""
         k, m = np.imag(self.stiffness) / COMPLEX_STEP, np.imag(self.mass) / COMPLEX_STEP
         return np.asarray(k @ at**2 - eigenvalues * (m @ at**2))
 

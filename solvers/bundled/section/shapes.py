@@ -145,7 +145,8 @@ TYPES = {
     "CGAX4": ElementType(4, partial(quad, 4), 2, 2, FACES_LINEAR, 1),  # as ABAQUS integrates it
     "CGAX4H": ElementType(4, partial(quad, 4), 2, 2, FACES_LINEAR, 1, hybrid=True),
     "CGAX6": ElementType(6, partial(triangle, 6), 3, 7, FACES_TRIANGLE_QUADRATIC),
-    # linear in three points, the pressure would lock: 10 % and 0.05 % of a thick tube, two across
+    # with three pressures it would lock: a thick tube of two elements across is off by 10 %, with
+    # one by 0.05 %
     "CGAX6H": ElementType(6, partial(triangle, 6), 3, 7, FACES_TRIANGLE_QUADRATIC, 1, hybrid=True),
     "CGAX3": ElementType(3, partial(triangle, 3), 1, 7, FACES_TRIANGLE),
     "CGAX3H": ElementType(3, partial(triangle, 3), 1, 7, FACES_TRIANGLE, 1, hybrid=True),

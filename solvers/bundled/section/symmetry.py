@@ -25,7 +25,7 @@ import numpy as np
 from ...errors import Refused
 
 Array = np.ndarray
-MIRROR_SIGNS = np.array([1.0, 1.0, -1.0])
+MIRROR_SIGNS = np.array([1.0, 1.0, -1.0])  # in the middle plane z = 0: r, theta, z
 HALF_TURN = np.array([1.0, -1.0, -1.0])  # about the vertical: r, theta, z
 SAME_PLACE = 1e-6  # m
 EXACT = 1e-12  # m, the last digits of a deck

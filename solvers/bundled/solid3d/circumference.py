@@ -20,7 +20,8 @@ import numpy as np
 Array = np.ndarray
 MAX_NEAR_LENGTH = np.radians(10.0)  # of elements near the patch
 FARTHEST_ELEMENT = np.radians(45.0)  # from its middle, but for the last one
-WAVE_BY_ELEMENTS = 2 * np.pi / 7.5  # highest harmonic that elements hold, times their length, rad
+# highest harmonic that elements hold, times their length, rad: 7.5 elements to a wave
+WAVE_BY_ELEMENTS = 2 * np.pi / 7.5
 MORE_WAVES = 5  # than a mode's own, for a pressed tyre mixes them
 MIN_WAVES = 4 + MORE_WAVES  # functions of the angle
 SPARE_WAVE_POINTS = 8  # Gauss points of the waves beyond those that their products need

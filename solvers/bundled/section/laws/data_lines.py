@@ -76,6 +76,7 @@ def _numbers(k: Block, names: list[str]) -> list[Scalar]:
     numbers: list[Scalar] = []
     for i in range(len(names)):
         row = k.rows[min(i // ON_A_LINE, len(k.rows) - 1)]
+        # beyond the last line: a field that no line has, so 0
         place = i % ON_A_LINE if i // ON_A_LINE < len(k.rows) else ON_A_LINE
         numbers.append(row.value(place, 0.0))
     return numbers

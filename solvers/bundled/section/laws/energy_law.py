@@ -20,8 +20,8 @@ class EnergyLaw(ABC):
     """Energy W of a row z: J/m3 of rubber, J/m2 of cords, as the rows' integration weights are
     volumes or areas."""
 
-    # whether `tangent` multiplies by its ``weights`` itself, which saves a pass over 81 numbers a
-    # point; else its caller does
+    # whether `tangent` is given the weights at stations too, which saves a pass over 81 numbers a
+    # point; else `ElasticAtStations` multiplies its result
     weighted_tangent: ClassVar[bool] = False
 
     @abstractmethod

@@ -51,7 +51,7 @@ class Hyperelastic(EnergyLaw):
     @property
     @abstractmethod
     def shear_modulus(self) -> Array:
-        """G of small strains, Pa."""
+        """Shear modulus of small strains, Pa."""
 
     @abstractmethod
     def volume(self, J: Array) -> tuple[Array, Array, Array]:
@@ -150,7 +150,7 @@ class Hyperelastic(EnergyLaw):
 
     @property
     def bulk_over_shear(self) -> Array:
-        """K / G of small strains, (p,) or (1,)."""
+        """Bulk over shear modulus of small strains, (p,) or (1,)."""
         return np.asarray((self.volume(np.ones(1))[2] / self.shear_modulus).real)
 
     def eased(self, ratio: float) -> Self:

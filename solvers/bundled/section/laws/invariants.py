@@ -3,6 +3,8 @@
 Wbar(I1bar, I2bar),   I1bar = J^(-2/3) I1,   I2bar = J^(-4/3) I2
 
 dI1bar/dF = J^(-2/3) (2 F - 2/3 I1 G),   dI2bar/dF = J^(-4/3) (2 (I1 F - F C) - 4/3 I2 G)
+
+C = F^T F, G = F^-T.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Mooney and Rivlin's law, and neo-Hooke's, which is C01 = 0:
 
-Wbar = C10 (I1bar - 3) + C01 (I2bar - 3),   U = (J - 1)^2 / D1,   G = 2 (C10 + C01)
+Wbar = C10 (I1bar - 3) + C01 (I2bar - 3),   U = (J - 1)^2 / D1;   shear modulus 2 (C10 + C01)
 """
 
 from __future__ import annotations

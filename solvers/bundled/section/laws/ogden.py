@@ -1,7 +1,7 @@
 """Ogden's law (1972) to third order, of the stretches lambda_a J^(-1/3) = y_a:
 
     Wbar = sum over i of 2 mu_i / alpha_i^2 (y_1^alpha_i + y_2^alpha_i + y_3^alpha_i - 3)
-    U = sum over i of (J - 1)^(2i) / D_i,   G = sum of mu_i
+    U = sum over i of (J - 1)^(2i) / D_i;   shear modulus: sum of mu_i
 
 With x_a = lambda_a^2, s_a = 2 dWbar/dx_a (`principal`), Y_a = y_a^alpha and Y its mean,
 
@@ -70,7 +70,8 @@ class Ogden(PrincipalLaw):
             at_a, at_b, middle = Y[:, :, None], Y[:, None, :], mean[..., None]
             rate = q * (one - 1 / 3) * at_a - q / 3 * (at_b - middle) - one * (at_a - middle)
             normal = normal + (4 * mu / alpha)[..., None] * rate / (a * b)
-            power = over(np.expm1((q - 1) * np.log1p(d)), d, q - 1)  # of x^(q - 1), b apart
+            # (x_a^(q - 1) - x_b^(q - 1)) / (x_a - x_b) over x_b^(q - 2)
+            power = over(np.expm1((q - 1) * np.log1p(d)), d, q - 1)
             shear = shear + (2 * mu / alpha)[..., None] * (at_b * power / b**2 + middle / (a * b))
         return np.asarray(normal), np.asarray(shear)
 

@@ -18,10 +18,8 @@ from .energy_law import EnergyLaw
 from .hyperelastic import Hyperelastic
 
 Array = np.ndarray
-MAX_THICKNESS_STEPS, STRESS_SETTLED = (
-    40,
-    1e-13,
-)  # of Newton's method for d, relative to the modulus
+MAX_THICKNESS_STEPS = 40  # of Newton's method for d
+STRESS_SETTLED = 1e-13  # stress across the membrane over the bulk modulus, at which it ends
 MIN_AREA_RATIO = 0.2  # over the reference area
 
 
@@ -38,7 +36,7 @@ class PlaneStress(EnergyLaw):
         static = replace(self.bulk, shear_ratio=None, bulk_ratio=None)
         p, q = z[:, :3], z[:, 3:]
         normal = np.cross(p, q)
-        d = normal / (normal * normal).sum(-1, keepdims=True)
+        d = normal / (normal * normal).sum(-1, keepdims=True)  # J = 1 to begin with
         size = np.max(np.abs(static.bulk_over_shear * static.shear_modulus))
         for _ in range(MAX_THICKNESS_STEPS):
             F = np.stack([p, q, d], -1).reshape(-1, 9)

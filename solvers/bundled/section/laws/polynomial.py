@@ -1,7 +1,7 @@
 """The polynomial law of second order in I1bar - 3 and I2bar - 3 (Rivlin and Saunders, 1951):
 
 Wbar = sum of C_ij (I1bar - 3)^i (I2bar - 3)^j, i + j = 1, 2
-U = (J - 1)^2 / D1 + (J - 1)^4 / D2,   G = 2 (C10 + C01)
+U = (J - 1)^2 / D1 + (J - 1)^4 / D2;   shear modulus 2 (C10 + C01)
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ import numpy as np
 from .hyperelastic import Hyperelastic
 
 Array = np.ndarray
-STRETCH_STEP = 1e-5  # of F: its square is left, and round-off over it
+STRETCH_STEP = 1e-5  # of F, of a difference: its error is the step's square and round-off over it
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """The reduced polynomial law to third order, which is Yeoh's (1993):
 
-Wbar = sum of C_i0 (I1bar - 3)^i, U = sum of (J - 1)^(2i) / D_i, i = 1, 2, 3;   G = 2 C10
+Wbar = sum of C_i0 (I1bar - 3)^i, U = sum of (J - 1)^(2i) / D_i, i = 1, 2, 3;   shear modulus 2 C10
 """
 
 from __future__ import annotations

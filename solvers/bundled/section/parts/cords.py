@@ -5,6 +5,8 @@ A cord along the reference unit vector a is carried to q = F a, its stretch is l
     W = E A / (2 s) ln^2(lambda)            per reference area of the layer, J/m2
     dW/dq = W' t,  d2W/dqdq = (W'' - W'/lambda) t t^T + (W'/lambda) 1,   t = q / lambda
 
+E, A, s: modulus, area and spacing of the cords; ' is d/dlambda.
+
 One that bears no compression has W = 0 below lambda = 1: the least energy of a layer that may
 wrinkle as finely as it likes (Pipkin, IMA J. Appl. Math. 36, 1986, on relaxed energies). The second
 derivative of that energy jumps at lambda = 1. In a coarse mesh the frequencies of a tyre jump by up
@@ -46,7 +48,7 @@ class LogarithmicCord(EnergyLaw):
         if np.all(self.compressed):
             return borne
         w, x = TRANSITION, (strain + TRANSITION) / (2 * TRANSITION)
-        taut = borne + w**2 / 10 if order == 0 else borne
+        taut = borne + w**2 / 10 if order == 0 else borne  # continuous at x = 1
         integrals = (w**2 * x**4 * (1 - 0.4 * x), w * x**3 * (2 - x), x**2 * (3 - 2 * x))
         tightening = np.where(x.real > 0, integrals[order], 0.0)
         return np.where(self.compressed, borne, np.where(x.real < 1, tightening, taut))
@@ -140,8 +142,9 @@ def stretch(q: Array) -> Array:
 def cord_rows(lines: Lines, cos: Array | float, sin: Array | float) -> Rows:
     """Rows q = a + B0 u + B1 du/dTheta: the vector along a deformed cord, per unit of its length.
 
-    cos, sin: of the cord's angle from the meridian, per element (e,) or one for all. Along the
-    cord, cos d/ds along the meridian and sin/R d/dTheta add up."""
+    cos, sin: of the cord's angle from the meridian, in the order of the line's nodes, towards
+    Theta, per element (e,) or one for all. Along the cord, cos d/ds along the meridian and sin/R
+    d/dTheta add up."""
     cos, sin = (np.broadcast_to(np.asarray(x).reshape(-1, 1), lines.R.shape) for x in (cos, sin))
     direction = np.stack([cos * lines.tangent[..., 0], sin, cos * lines.tangent[..., 1]], -1)
     along = cos[..., None] * lines.slope

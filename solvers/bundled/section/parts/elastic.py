@@ -35,7 +35,7 @@ class Elastic(TyrePart):
 
     def at(self, U: Array) -> Array:
         """z (e * g, k)."""
-        e, g, k, d = self.rows.B0.shape
+        e, g, k, d = self.rows.B0.shape  # d = 3a
         u = U[self.connectivity].reshape(e, d, 1)
         z = real_times(self.rows.B0.reshape(e, g * k, d), u).reshape(e, g, k)
         return (z + self.rows.rest).reshape(e * g, k)

@@ -5,9 +5,10 @@ Per radian, with x = (x_r, x_theta, x_z) in the cylindrical frame of the referen
 
     V = 1/2 int (x_r, x_theta, 0) . (x' x Dx) ds
 
-The gauge (x_r, x_theta, 0)/2 makes the second variation symmetric also at open ends. There the
-force of -p V is the follower pressure's and a thrust p r^2 / 2 per radian along the axle, as on a
-closed cap, which does nothing where the end is held along the axle. Without it the second
+s runs along the faces of counter-clockwise elements, on the inner surface from z > 0 to z < 0, so
+that V > 0. The gauge (x_r, x_theta, 0)/2 makes the second variation symmetric also at open ends.
+There the force of -p V is the follower pressure's and a thrust p r^2 / 2 per radian along the axle,
+as on a closed cap, which does nothing where the end is held along the axle. Without it the second
 variation has p r (dr Dz - Dr dz) / 2 of two displacements, which is not symmetric: so no other end
 is honoured (`boundary.check_open_ends`).
 """
