@@ -5,7 +5,8 @@ case could not be read; ``studies``, each with
 
 * ``status``: ``good``; ``failed``, finished but not as it should (a fit that did not converge, a
   load that was not reached); ``error``, there is no result; ``skipped``, see `studies.study`;
-* ``cause`` and ``words``, or None; ``quantities``, name to number; of a diagnosis its ``verdict``,
+* ``cause`` (`EvaluationFailed`, `_failed`) and ``words``, or None; ``quantities``, name to number;
+of a diagnosis its ``verdict``,
   and the ``effect`` that it names or None;
 
 and ``facts``, which are volatile: seconds by study and of a core, when, where, which solver, how
@@ -54,7 +55,8 @@ from ..tyre.values import unusual_value, with_values
 from .studies import Asked, Studied, StudyOutcome, study
 
 FINISHED = "finished.json"  # in a case's folder: what was asked, and the answer
-ENDED = ("good", "failed")
+ENDED = ("good", "failed")  # statuses of studies with a result
+# causes that may be gone the next time: with one of them nothing is kept in `FINISHED`
 AGAIN = {"crashed", "timed_out", "no_results", "licence", "unavailable", "disc", "internal"}
 Report = Json
 
@@ -70,7 +72,7 @@ class CaseTask:
     asked: Asked
     solver: str = ""
     mesh: str = ""  # level, empty for the case's own
-    record: Path | None = None  # of evaluations
+    record: Path | None = None  # the evaluation store; None: none is used
     command: tuple[str, ...] = ()  # of the solver
     allow_unusual: bool = False
 

@@ -20,7 +20,9 @@ from ..files import Json, read_json
 from ..tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from .case import Report
 
-DEFAULTS = {  # of a baseline that is written for the first time; people edit them
+# by study and first word of a name in its `Result.quantities`, which WHERE follows; of a baseline
+# that is written for the first time: people edit them
+DEFAULTS = {
     "fit/objective": {"relative": 1e-3, "absolute": 0.01},
     "fit/mass_kg": {"relative": 1e-3},
     "fit/variable": {"relative": 0.01},  # the valley is flat: frequencies say more

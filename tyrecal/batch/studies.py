@@ -55,7 +55,7 @@ def study(name: str, state: Studied) -> StudyOutcome:
     result = kind.run(state.given, **options)
     result.pass_on(state.given)
     state.no_fit = state.no_fit and not kind.fits
-    failed = getattr(result, "failed", ())
+    failed = getattr(result, "failed", ())  # states not reached; without any row there is no result
     if failed and not getattr(result, "rows", True):
         raise EvaluationFailed(failed[0].cause, failed[0].words)
     conclusion, short = result.conclusion(), result.shortfall()

@@ -137,6 +137,7 @@ def make(
     evaluator = Evaluator(TyreDesign(case), "bundled", store=store)
 
     def ruler() -> Json:
+        """How hard each trial is, see `blind.ruler`."""
         return measure(tyre_model(case, evaluator, protocol, jobs), rows_of(case, protocol))
 
     with terminal.progress("make trials") as bar:

@@ -150,7 +150,7 @@ def command(
         raise click.UsageError("--without leaves no effect to consider")
     changes = [(path, parse_change(text)) for path, text in toggled]
     for _, change in [] if study.allow_unusual else changes:
-        if not change.times:
+        if not change.times:  # EFFECT=VALUE, not EFFECT*FACTOR
             option, name = f"--toggled {change.id}={change.value:g}", f"effects.{change.id}"
             arguments.refuse_unusual(loaded, option, name, change.value, allowed=False)
     first_guess = arguments.fitted_values(fitted, loaded, terminal) if fitted else None

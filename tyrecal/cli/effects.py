@@ -107,6 +107,7 @@ def command(
     able = [each for each in entries if name or adapter.name in each.solvers]
     designs = [{**values, pressure_name(loaded): p} for p in kPa]
     plan = plan_evaluations(loaded, evaluator, designs, len(values), study.jobs)
+    # in addition to the plain tyre at each pressure, each effect
     plan = replace(plan, states=(*plan.states, *[PlannedState()] * len(able)))
     output = study.run(loaded, "effects", evaluator, plan=plan, pressure_kPa=kPa)
     if name and not terminal.as_json:

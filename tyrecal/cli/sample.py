@@ -107,6 +107,7 @@ def command(
     for table in summary.tables():
         terminal.show(shown(table))
     terminal.say("\n".join(summary.sentences()))
+    # of readings only frequencies without a load are used
     if left_out := len(readings or ()) - len(modal(readings or ())):
         terminal.note(f"{measured}: {left_out} values are no frequencies of the unloaded tyre")
     doubts = summary.doubts()

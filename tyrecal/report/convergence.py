@@ -108,7 +108,8 @@ def _summary(objective: np.ndarray, unit: str) -> str:
 
 @in_house_style
 def draw_deviations(modes: Sequence[FittedMode]) -> Figure:
-    """Draw deviations in % from the targets before and after the fit, one row per mode."""
+    """Draw deviations in %, frequency over target less 1, before and after the fit, one row per
+    mode."""
     words = "Deviations of frequencies from their targets before and after the fit"
     figure = new_figure(5.2, 0.9 + 0.26 * len(modes), caption=words)
     axes = figure.add_subplot()
@@ -144,7 +145,7 @@ def draw_states(fit: FitResult) -> Figure:
     for axes, state in zip(grid, states, strict=True):
         own = [mode for mode in fit.modes if mode.state == state]
         rows = [names.index(name(mode)) for mode in own]
-        bars = [100 * (mode.sigma_Hz or 0.0) / mode.target_Hz for mode in own]
+        bars = [100 * (mode.sigma_Hz or 0.0) / mode.target_Hz for mode in own]  # None: not stated
         axes.axvline(0, color=GREY, lw=0.8)
         axes.errorbar(
             [mode.deviation_percent for mode in own],

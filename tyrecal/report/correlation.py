@@ -1,4 +1,5 @@
-"""MAC and AutoMAC as heat maps."""
+"""MAC and AutoMAC as heat maps, a row a measured mode. The chance level is the lead of the best MAC
+over the next that chance reaches with so many sensors (`measured.correlation`)."""
 
 from __future__ import annotations
 

@@ -14,14 +14,14 @@ from ..studies.diagnose.diagnosis import Diagnosis
 from ..studies.diagnose.evidence import NONE, OUTSIDE
 from ..studies.diagnose.gap import family
 from ..studies.diagnose.several import before
-from ..studies.diagnose.verdict import no_gap_words
+from ..studies.diagnose.verdict import SURE, no_gap_words
 from ..studies.inference.observations import Observable
 from .figure import COLOURS, GREY, headline, in_house_style, new_figure
 from .section import draw_section_map
 from .shape_data import DiagnosisSection
 
 Array = np.ndarray
-SHOWN_FAMILIES = ("[0,0]", "in-plane", "lateral")
+SHOWN_FAMILIES = ("[0,0]", "in-plane", "lateral")  # as `gap.family` names them
 MAX_SHOWN = 12  # explanations
 MIN_SHOWN_PROBABILITY = 0.005  # of one that is shown
 PROBABILITY_TITLES = {
@@ -55,9 +55,9 @@ def draw_residuals(
     after: Array | None = None,
     effect: str = "",
 ) -> Figure:
-    """Residuals of the plain fit over the harmonic, a column a family, a colour a state; hollow
-    (``after``) with the likeliest ``effect`` in the model. Bars (``spread``): one standard
-    deviation without a gap."""
+    """Residuals (n,) of the plain fit, ln of measured over model, over the harmonic, a column a
+    family, a colour a state; hollow (``after``) with the likeliest ``effect`` in the model. Bars
+    (``spread``): one standard deviation without a gap. Of ``rows`` only those of run 0."""
     states = sorted(dict.fromkeys((row.pressure_kPa, row.rim or "") for row in rows if row.label))
     shown = [name for name in SHOWN_FAMILIES if any(family(row) == name for row in rows)]
     caption = (
@@ -110,7 +110,8 @@ def draw_residuals(
 
 @in_house_style
 def draw_probabilities(d: Diagnosis) -> Figure:
-    """The likeliest explanations as bars, before (a mark) and after the data."""
+    """Probabilities of the likeliest explanations: bars after the data, marks before (the
+    prior)."""
     order = sorted(d.hypotheses, key=lambda h: -d.probabilities[h.key])[:MAX_SHOWN]
     order = [
         h
@@ -127,7 +128,7 @@ def draw_probabilities(d: Diagnosis) -> Figure:
     axes.plot(prior, place, "|", color="black", ms=13, mew=1.5, label="prior")
     for y, value, least in zip(place, p, prior, strict=True):
         axes.text(max(value, least) + 0.01, y, f"{value:.2f}", va="center", fontsize=8)
-    axes.axvline(0.7, color=GREY, lw=0.8, ls=":", label="named from here on, alone or summed")
+    axes.axvline(SURE, color=GREY, lw=0.8, ls=":", label="named from here on, alone or summed")
     axes.set_yticks(place, [fill(_short(d, h.key), 2 * MAX_LETTERS) for h in order])
     axes.set_xlim(0, max(1.0, 1.1 * max(p)))
     axes.set_xlabel("probability")
@@ -176,7 +177,7 @@ def _after(d: Diagnosis) -> Array | None:
     if d.leading is None:
         return None
     h = d.hypothesis(d.leading)
-    i = h.best
+    i = h.best  # in the grid of sizes
     problem = replace(d.problem, zeta=float(h.fitted.zeta[i]))
     eta = problem.predicted({id: e[[i]] for id, e in h.values.items()}, h.fitted.d[[i]])
     return np.asarray(problem.observations.y - eta[0])

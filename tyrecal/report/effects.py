@@ -31,7 +31,7 @@ def effects_table(effects: Sequence[CatalogueEntry]) -> Table:
 def effect_text(entry: CatalogueEntry) -> str:
     """Full description of one effect: paragraphs, then a list of its properties."""
     unit = f" {entry.unit}" if entry.unit else ""
-    size = max(entry.high, entry.low, key=abs)  # the example in "case file"
+    size = max(entry.high, entry.low, key=abs)  # the example in "case file": the farther end
     rows = {
         "parameter": f"{entry.symbol}, {entry.low:.4g} to {entry.high:.4g}{unit}; 0: absent",
         "case file": f"effects: {{{entry.id}: {size:.4g}}}",

@@ -34,7 +34,8 @@ MARKERS = "os^Dv<>P"
 # variables of the page's style sheet, which has a light, a dark and a printed shade of each colour
 THEMED = {colour.lower(): f"var(--s{k})" for k, colour in enumerate(COLOURS)}
 THEMED |= {colour.lower(): f"var(--r{k})" for k, colour in enumerate(RUBBER)}
-GREYS = {0x28: "ink", 0x60: "soft", 0xB0: "edge", 0xFE: "line", 0xFF: "panel"}  # by highest level
+# variable by highest level, 0 (black) to 255, of a grey
+GREYS = {0x28: "ink", 0x60: "soft", 0xB0: "edge", 0xFE: "line", 0xFF: "panel"}
 
 in_house_style = rc_context(
     {
@@ -144,7 +145,7 @@ def svg(figure: Figure, words: str, key: str) -> Markup:
     body = re.sub(r">\s+<", "><", text[text.index('<g id="figure_1">') :])
     used = dict.fromkeys(re.findall(r'(?:url\(|href=")#([\w-]+)', body))
     ids = {id: f"{key}-{number}" for number, id in enumerate(used)}
-    width, height = 72 * figure.get_size_inches()
+    width, height = 72 * figure.get_size_inches()  # pt; a pixel is 3/4 pt
     head = Markup(
         '<svg viewBox="0 0 {:g} {:g}" role="img" aria-label="{}"'
         ' style="min-width:{:.0f}px;max-width:{:.0f}px">'

@@ -79,7 +79,7 @@ def sigma_Hz(fit: FitResult, mode: FittedMode) -> float | None:
     if not fit.states:
         for each in fit.responses:
             if each.label == mode.label and each.load_N == mode.load_N:
-                return each.scatter * mode.target_Hz
+                return each.scatter * mode.target_Hz  # scatter: relative
     return fit.noise_Hz
 
 
@@ -140,7 +140,7 @@ def _draw_within(axes: Axes, row: int, v: FittedVariable) -> None:
 @in_house_style
 def draw_correlations(fit: FitResult) -> Figure | None:
     """Correlations of the variables and, beside them, the singular values of the residuals'
-    sensitivities; None with fewer than two variables."""
+    sensitivities to x (as in `studies`); None with fewer than two variables."""
     names, values = list(fit.correlations), fit.singular_values
     if len(names) < 2:
         return None

@@ -22,7 +22,7 @@ DESIGN_STYLES: dict[str, dict[str, Any]] = {
     "initial": {"ls": (0, (4, 2)), "marker": "o", "mfc": "white"},
     "fitted": {"ls": "-", "marker": "s"},
 }
-CURVES = {  # key of a row: words, unit over SI
+CURVES = {  # key of a row: words with the unit, factor from SI to it
     "area_m2": ("contact area, cm²", 1e4),
     "deflection_m": ("deflection, mm", 1e3),
     "vertical_stiffness_N_per_m": ("vertical stiffness, N/mm", 1e-3),

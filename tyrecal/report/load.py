@@ -60,6 +60,7 @@ def draw_load_sweep(rows: Sequence[LoadRow]) -> Figure:
     grid[0, 0].set_ylim(bottom=0)
     for line, curves in zip(grid, designs.values(), strict=True):
         for axes, name in zip(line, shown, strict=True):
+            # Hz, kN and label at each line's end
             ends = [(c[1][-1], c[0][-1], k[0]) for k, c in curves.items() if k[0].family == name]
             name_lines(axes, ends, GAP)
     for symmetry, style in MEMBER_STYLES.items():

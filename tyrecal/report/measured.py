@@ -159,8 +159,8 @@ def _draw_shape(axes: Axes, labelled: LabelledMode) -> None:
     """Draw one component of the belt's motion, as a radial displacement of its sensors."""
     from .figure import COLOURS, GREY
 
-    R, angle, _ = labelled.sensors.points.T
-    belt = R / R.max() > BELT  # sensors on the belt and not on a sidewall
+    R, angle, _ = labelled.sensors.points.T  # m, rad
+    belt = R / R.max() > BELT  # sensors on the belt and not on a sidewall, as in `label`
     along = labelled.sensors.directions  # (k, 3) unit vectors in COMPONENTS
     rows = [np.flatnonzero(belt & (np.abs(along[:, k]) > MIN_COSINE)) for k in range(3)]
     motion = [labelled.shape[rows[k]] * np.sign(along[rows[k], k]) for k in range(3)]

@@ -89,7 +89,8 @@ def _ticks(v: SampledVariable) -> list[float]:
 
 
 def _alone(axes: Axes, v: SampledVariable, name: str) -> None:
-    """Draw the shares of one variable's draws, and the normal density of the linear error."""
+    """Draw the shares of one variable's draws in equal steps of its box, and those of a normal
+    density with the linear error."""
     edges, share = _edges(v, len(v.density)), np.array(v.density)
     axes.stairs(share, edges, color=DRAWN_COLOUR, fill=True, alpha=0.3)
     axes.stairs(share, edges, color=DRAWN_COLOUR, lw=1.2, label="draws")

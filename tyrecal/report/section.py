@@ -24,15 +24,12 @@ from .table import MINUS, map_resolution
 Array = np.ndarray
 
 LETTERS = 110  # of all columns of the legend
-AXES_WIDTH, LINE_HEIGHT, REST = (
-    8.4,
-    0.2,
-    1.05,
-)  # inches: of the drawing, of a line of text, of all else
+AXES_WIDTH, LINE_HEIGHT = 8.4, 0.2  # inches: of the drawing, of a line of text
+REST = 1.05  # inches: height of all else
 DETAIL = 4.0  # magnification of the belt's edge
 CORD_COLOURS = (*COLOURS, "#8C6D31")  # a truck has seven layers
 EVIDENCE_COLOURS = LinearSegmentedColormap.from_list("evidence", ["#EDEDED", "#F5C98A", "#D55E00"])
-FULL_COLOUR = 5.0  # ln evidence
+FULL_COLOUR = 5.0  # ln evidence from which on a part has the last colour
 MAP_WIDTH = 7.4  # inches: of the map of parts
 MAX_BARS = 12  # parts with a bar
 AXIS_LABELS = {"xlabel": "z along the axle, mm", "ylabel": "r from the axle, mm"}
@@ -206,6 +203,7 @@ def _signed(value: float, digits: int) -> str:
 
 
 def _points(flat: Sequence[float]) -> Array:
+    """Points (n, 2): z, r in mm."""
     return np.reshape(flat, (-1, 2))
 
 

@@ -27,6 +27,7 @@ MAX_MOTION = 0.12  # displacement in the picture over the tyre's radius
 LINE_WIDTH = 0.009  # inches: meridians in bold
 NEARER = 0.1  # inches: these, to the viewer, so that only other parts of the tyre hide them
 VIEW, HALF = 1.3, 1.45  # half a view's width: over the tyre's radius, and in inches
+# of the viewer: above the plane of x and y (y: axle), and in it from x towards y
 ELEVATION, AZIMUTH = np.radians([22.0, -55.0])
 
 
@@ -69,7 +70,7 @@ def _key(
     left, right, low, high = 5.9, 8.3, 0.3, 0.38
     shades = np.linspace(0, 1, 65)
     x, y = np.meshgrid(left + shades * (right - left), [low, high])
-    cells = np.arange(64)[:, None] + [0, 1, 66, 65]
+    cells = np.arange(64)[:, None] + [0, 1, 66, 65]  # corners in two rows of 65 points
     colours = COLOUR_MAP(np.tile(shades, 2))
     sheet.add(TriMesh(Triangulation(x.ravel(), y.ravel(), _halves(cells)), facecolors=colours))
     words: dict[str, Any] = {"fontsize": 8, "color": "0.3"}
@@ -117,7 +118,7 @@ def _surface(mode: Mode, mesh: SectionMesh) -> _Surface:
     if mode.label.c:
         # of all members of the pair the one whose crest stands at the top, out of Theta's direction
         quarter = motion(mode.raw, nodes, angles, np.pi / 2)
-        top = 3 * ANGLES // 4
+        top = 3 * ANGLES // 4  # z = -R sin Theta is largest
         a, b = u[:, top, 1:], quarter[:, top, 1:]
         k = np.argmax((a**2 + b**2).sum(-1))
         phase = np.arctan2(2 * a[k] @ b[k], a[k] @ a[k] - b[k] @ b[k]) / 2

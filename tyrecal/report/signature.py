@@ -33,7 +33,7 @@ def _signature(effect: EffectResult) -> Signature:
     ]
     before, after = np.array(changes, float)  # None becomes NaN
     pressures = tuple(row.pressure_kPa for row in effect.rows)
-    absorbed, mass_kg = effect.absorbed, effect.mass_kg
+    absorbed, mass_kg = effect.absorbed, effect.mass_kg  # a share; None: nothing to absorb
     return Signature(
         effect.id, effect.value, pressures, labels, before, after, absorbed, {}, mass_kg
     )

@@ -31,7 +31,7 @@ def draw_stiffness(rows: Sequence[StiffnessRow]) -> Figure:
         style = {"color": COLOURS[pressures.index(kPa) % len(COLOURS)], "ms": 4.5, "lw": 1.4}
         style |= DESIGN_STYLES.get(design, {}) | {"label": f"{design}, {kPa:g} kPa"}
         for axes, key in zip(grid, STIFFNESSES, strict=True):
-            scale = StiffnessRow.columns()[key].per_unit
+            scale = StiffnessRow.columns()[key].per_unit  # from SI to the unit of the axis
             load = [row.load_N / 1e3 for row in own]
             axes.plot(load, [scale * getattr(row, key) for row in own], **style)
     for axes, key in zip(grid, STIFFNESSES, strict=True):

@@ -21,11 +21,14 @@ MAX_RELATIVE_ERROR = 0.5  # standard error over the value, above which a variabl
 SAME_RATIO = 1.02  # of an objective, or a variable, up to which two fits are one
 MAX_OFF = 30.0  # % after a fit: no tyre is that far from its model
 MIN_FREQUENCY_HZ = 1.0  # no mode of a tyre is below
+MIN_LABEL_MARGIN = 0.3  # clarity of a label, below which the user must look
+MIN_SINGULAR_RATIO = 1e-3  # smallest over largest, below which the data leave a combination open
 EMPTY_CELL = "-"
 
 
 def nearness(modes: Sequence[Mapping[str, Any]]) -> str:
-    """How near the fitted frequencies (``modes`` of fit.json) come to their targets."""
+    """How near the fitted frequencies (``modes`` of fit.json) come to their targets; in the rms the
+    two modes of a pair count as two."""
     near = [mode for mode in modes if abs(mode["deviation_percent"]) <= CLOSE]
     worst = max(modes, key=lambda mode: abs(mode["deviation_percent"]))
     twice = [mode["deviation_percent"] for mode in modes for _ in range(mode["multiplicity"])]
@@ -134,7 +137,7 @@ def fit_doubts(result: Mapping[str, Any]) -> list[str]:
         doubts.append(f"{designs} could not be evaluated; the search stepped back")
     if error := result.get("next_states_error"):
         doubts.append(f"which state to measure next could not be evaluated: {error}")
-    if result["label_margin"] < 0.3:
+    if result["label_margin"] < MIN_LABEL_MARGIN:
         doubts.append(
             f"a mode is hard to name (margin {result['label_margin']:.2f} of 1): two modes have"
             " met; look at their pictures"
@@ -151,7 +154,7 @@ def fit_doubts(result: Mapping[str, Any]) -> list[str]:
             " right labels, at this pressure?"
         )
     values = result["singular_values"]
-    if not result.get("prior") and values and values[-1] < 1e-3 * values[0]:
+    if not result.get("prior") and values and values[-1] < MIN_SINGULAR_RATIO * values[0]:
         doubts.append("the data do not determine all variables: see singular_values in fit.json")
     if labels := result.get("labels"):
         doubts += Labels(**labels).doubts()

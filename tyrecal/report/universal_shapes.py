@@ -71,7 +71,7 @@ def _text(
     cos, sin = np.cos(points[:, 1]), np.sin(points[:, 1])
 
     def along_axes(vectors: Array) -> Array:
-        r, theta, z = vectors.T
+        r, theta, z = vectors.T  # then along r, theta, z at the angle 0
         turned = np.column_stack([r * cos - theta * sin, r * sin + theta * cos, z])
         return np.asarray(turned @ TREAD_SYSTEM.axes)
 

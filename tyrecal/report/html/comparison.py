@@ -144,6 +144,7 @@ def _worst(fit: FitResult) -> str:
 
 
 def _aim(mode: FittedMode) -> tuple[str, str]:
+    """Name, and what is added in small letters, of a mode's row."""
     return mode.named()[0].removesuffix(" ×2"), ", ".join(
         filter(None, (mode.label.motion, mode.state))
     )

@@ -68,7 +68,7 @@ def _key_figure(d: DiagnosisResult) -> KeyFigure:
     """The effect that the model lacks, or the verdict."""
     name, p = max(d.probabilities.items(), key=lambda item: item[1])
     value = verdict_words(d).split(":")[0]
-    if d.effect:
+    if d.effect:  # alone or with others
         name, p = d.effect, present(d.probabilities, d.effect.split("+"))
         value = d.effect.replace("_", " ").replace("+", " and ")
     more = f"{EXPLANATION_WORDS.get(name, name)}: probability {p:.2f}"

@@ -66,8 +66,9 @@ def packed(shapes: Shapes) -> Json:
     """Data that `viewer.js` reads: points and modes; a surface round the section's outside that the
     script sweeps, or the loaded tyre's as it is.
 
-    Places are over the largest radius, angles over a full turn: all are from -1 to 1. Raises
-    ValueError where lists that belong together differ in length.
+    Places are over the largest distance from the tyre's centre, angles over a full turn, shapes
+    over their largest component: all are from -1 to 1. Raises ValueError where lists that belong
+    together differ in length.
     """
     return _loaded(shapes) if shapes.load_N else _swept(shapes)
 
@@ -98,7 +99,7 @@ def _loaded(shapes: Shapes) -> Json:
     angles, place = np.array(shapes.angles, float), np.array(shapes.surface_m, float)
     if place.ndim != 3 or place.shape[::2] != (len(angles), 3):
         raise ValueError("points")
-    place = place.copy()
+    place = place.copy()  # (ring, point, 3): r, theta, z, m
     place[..., 2] -= (place[..., 2].max() + place[..., 2].min()) / 2
     radius = float(np.linalg.norm(place, axis=-1).max())
     modes = []
