@@ -13,18 +13,20 @@ from __future__ import annotations
 import re
 import subprocess
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from tyrecal.tyre.case import with_level
+from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.tyre.case import LoadedCase, with_level
 from tyrecal.tyre.effects.edit import changed, with_part
 from tyrecal.tyre.load import load_case
 
 from ..conftest import CASES
 from ..solvers.press_deck import Angles, press_texts
 from ..solvers.test_press_deck import coarse_case
-from . import wrinkles
+from . import sizes_calculix, wrinkles
 from .belts import COMMANDS, counts, failures, with_belts
 from .calculix import ROOT
 from .fenics import on_common
@@ -48,6 +50,20 @@ def test_working_belts_are_turned_to_their_own_sides(size: str) -> None:
         kept = layer.angle_deg
         new = (66.0 if kept < 90 else 114.0) if name in working else kept
         assert angles[name] == pytest.approx(new)
+
+
+def test_a_tyre_on_calculix_has_deviations_or_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The case goes to the comparison with static moduli; a failed run gives its words."""
+
+    def compare(case: LoadedCase, _: None) -> list[SimpleNamespace]:
+        assert case.case.analysis.vibration_frequency_Hz is None
+        if case.case.pressure_kPa > 500:
+            raise EvaluationFailed("unstable", "carcass in crown")
+        return [SimpleNamespace(common=0.25), SimpleNamespace(common=-0.5)]
+
+    monkeypatch.setattr(sizes_calculix.calculix, "compare", compare)
+    assert sizes_calculix.outcome("205/60R15") == "0.250 -0.500"
+    assert sizes_calculix.outcome("11R22.5") == "unstable: carcass in crown"
 
 
 @pytest.mark.slow
