@@ -20,7 +20,7 @@ from ..tyre.load import load_case
 
 def owner(folder: Path, path: Path, loaded: LoadedCase | None = None) -> dict[str, str]:
     """The part of an entry that names the owner of the results in ``folder``: the case at ``path``,
-    or a batch, whose path is the folder itself. Raises OSError."""
+    ``loaded`` if it is valid, or a batch, whose path is the folder itself. Raises OSError."""
     try:
         relative = os.path.relpath(path.resolve(), folder.resolve())
     except ValueError:  # on another drive of Windows
@@ -38,9 +38,8 @@ def named_case(entry: Mapping[str, Any], folder: Path) -> Path | None:
 
 
 def belongs_to(entries: Sequence[Mapping[str, Any]], folder: Path, path: Path) -> bool:
-    """Whether ``folder``, with these entries, is of the case, or batch, at ``path``.
-
-    Raises OSError."""
+    """Whether ``folder``, with these entries, is of the case, or batch, at ``path``: by the file
+    if any is still there, else by the tyre, else by the file's name. Raises OSError."""
     named = [(entry, file) for entry in entries if (file := named_case(entry, folder))]
     there = [file for _, file in named if file.exists()]
     if there:

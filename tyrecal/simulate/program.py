@@ -56,7 +56,7 @@ def _split_for_windows(text: str) -> list[str]:
                 word += '"'
             if len(slashes) % 2 == 0:
                 quoted = not quoted
-            begun, ended = True, not (len(slashes) % 2 or quoted)
+            begun, ended = True, not (len(slashes) % 2 or quoted)  # begun: a word, perhaps empty
             continue
         word, begun, ended = word + slashes, begun or bool(slashes), False
         if character and (quoted or character not in " \t"):
@@ -105,6 +105,7 @@ def program_identity(command: Sequence[str]) -> list[str]:
 
 @lru_cache
 def _file_hash(path: Path, changed: int, size: int) -> str:
+    """SHA-256 of a file, in hexadecimal; its time and size are only keys of the cache."""
     digest = sha256()
     with open_file(path) as file:
         while piece := file.read(PIECE_BYTES):

@@ -30,8 +30,8 @@ def provenance(
 ) -> Json:
     """The block ``provenance`` of a result file.
 
-    pressure_kPa, rim (default: the case's), load_N: of the study, several where it has several;
-    measured files in the order of the command. Raises OSError.
+    pressure_kPa, rim (words of `TyreState`; default: the case's), load_N: of the study, several
+    where it has several; measured files in the order of the command. Raises OSError.
     """
     c = case.case
     files = list(measured)
@@ -56,7 +56,7 @@ def provenance(
 
 
 def stamped(content: Any, block: Json) -> Any:
-    """A result with its provenance, behind its format; each entry of a list has it."""
+    """A result with its provenance after its key ``format``; each entry of a list has it."""
     if isinstance(content, list):
         return [stamped(each, block) for each in content]
     head = {"format": content["format"]} if "format" in content else {}

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
 SETTINGS_VARIABLE = "TYRECAL_SETTINGS"  # variable that names another settings file; empty: none
-COMMAND = "TYRECAL_SOLVER_COMMAND"  # of whichever solver is used
+COMMAND = "TYRECAL_SOLVER_COMMAND"  # variable with the command of the solver that is used
 SettingsModel = TypeVar("SettingsModel", bound="BaseModel")
 
 
@@ -62,7 +62,8 @@ def settings() -> Any:
 
 @lru_cache(maxsize=1)
 def _read(path: Path | None, changed: float) -> Any:
-    """The settings of a file, checked. Raises InputError."""
+    """The settings of a file, checked; ``changed``, its time, only makes another key of the cache.
+    Raises InputError."""
     from pydantic import BaseModel, ConfigDict, Field
 
     from ..tyre.case.parts import Name

@@ -16,12 +16,13 @@ from .abaqus import claimed, deck_name, solid_claims
 from .sector import INNER_FACE, Division, PlyStrip, Sector, build_sector
 
 ELEMENT_TYPES = ("C3D20R", "C3D20", "C3D8")
-PLY_THICKNESS_M = 2e-4
-# Of each of the case's sectors: with C3D20R of 6 degrees, 40 mm at the crown, CalculiX found no
-# inflated state for rubber of half the paper's C10.
+PLY_THICKNESS_M = 2e-4  # of a ply's solid: chosen, E A / (s t) makes up for it
+# CalculiX's sectors in each of the case's: with C3D20R of 6 degrees, 40 mm at the crown, it found
+# no inflated state for rubber of half the C10 of Bekakos et al. (2016).
 PARTS = 3
 FILLER = 1e-6  # of a ply's stiffness, isotropic, so that its tensor is not singular
-PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # CalculiX's order of components
+# CalculiX's order of components: r r, theta theta, z z, r theta, r z, theta z
+PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 def calculix_context(tyre: Tyre) -> TemplateNames:
@@ -77,6 +78,7 @@ def calculix_context(tyre: Tyre) -> TemplateNames:
         "node_sets": [("SECTION", sector.section), ("BEHIND", sector.behind), ("RIM", sector.rim)]
         + ([("BETWEEN", [node for node, _ in sector.between])] if sector.between else []),
         "between": sector.between,
+        # cosine and sine of the turn, -pi / sectors about z, from a sector's face to its middle
         "half_turn": (float(np.cos(np.pi / sectors)), -float(np.sin(np.pi / sectors))),
         "inner_face": INNER_FACE,
         "solids": _solids(tyre, sector, numbers),
@@ -88,8 +90,8 @@ def calculix_context(tyre: Tyre) -> TemplateNames:
 
 
 def _solids(tyre: Tyre, sector: Sector, numbers: dict[int, int]) -> list[TemplateNames]:
-    """Bricks by compound: name of the set, of the material, and rows of element and node
-    numbers."""
+    """Bricks by the last entry of ``solids`` that has their region and row: name of the set, of the
+    material, and rows of element and node numbers."""
     case = tyre.case
     claims, rows = solid_claims(case), tuple(case.mesh.levels[case.mesh.level].rows)
     blocks: dict[int, list[tuple[int, ...]]] = {}
@@ -109,7 +111,8 @@ def _solids(tyre: Tyre, sector: Sector, numbers: dict[int, int]) -> list[Templat
 
 
 def _rubbers(case: Case) -> list[TemplateNames]:
-    """Constants in the static state: CalculiX has no viscoelasticity for hyperelastic rubber."""
+    """Constants, Pa and 1/Pa, of the static state, relaxed (times 1 - sum g) or instantaneous:
+    CalculiX has no viscoelasticity for hyperelastic rubber."""
     rubbers = []
     for name, m in case.materials.items():
         if m.kind != "rubber":
@@ -132,8 +135,8 @@ def _rubbers(case: Case) -> list[TemplateNames]:
 
 
 def _plies(case: Case, sector: Sector) -> list[TemplateNames]:
-    """One material a layer and strip: stiffness E A / (s t) along the cords, their mass,
-    t being the strip's own."""
+    """One material a layer and strip: stiffness E A / (s t) along the cords, their mass; s the
+    cords' spacing, t the strip's own thickness; angles from the meridian."""
     plies, number = [], len(sector.bricks)
     for name, layer in case.rebar_layers.items():
         cord: Any = case.materials[layer.material]
@@ -160,7 +163,7 @@ def _plies(case: Case, sector: Sector) -> list[TemplateNames]:
 
 def _taut(sector: Sector, strip: PlyStrip, name: str, layer: RebarLayer) -> str:
     """JSON of a ply whose cords bear no compression, as the solver's adapter reads it to refuse a
-    state that compresses them."""
+    state that compresses them. ``ends``: the two nodes at each end of the strip."""
     a, b, c, d = sector.bricks[strip.element][:4]
     return json.dumps(
         {
@@ -174,7 +177,8 @@ def _taut(sector: Sector, strip: PlyStrip, name: str, layer: RebarLayer) -> str:
 
 
 def _tensor(stiffness: float, along: np.ndarray) -> list[float]:
-    """The 21 components of ``stiffness`` (Pa) f f f f in r, theta, z, with the filler."""
+    """The 21 components of ``stiffness`` (Pa) times f f f f, f the unit vector ``along`` in r,
+    theta, z, with the filler: D1111, D1122, D2222, D1133, ... as CalculiX reads them."""
     components = []
     for column, (k, m) in enumerate(PAIRS):
         for i, j in PAIRS[: column + 1]:

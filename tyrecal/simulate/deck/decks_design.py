@@ -1,5 +1,5 @@
-"""The design of a case whose tyre stands in decks in three dimensions: their texts as the user has
-them, but for marks, numbers, the pressure, and what the labels of modes need printed."""
+"""The design of a case whose tyre is in decks in three dimensions: their texts as the user has
+them, except marks, numbers, the pressure, and what the labels of modes need printed."""
 
 from __future__ import annotations
 
@@ -51,7 +51,9 @@ class DecksDesign:
 
     @property
     def request(self) -> dict[str, Any]:
-        """How the decks are run, and what their answer is in; they ask for modes themselves."""
+        """How the decks are run, and SI units per unit of their answer; they request modes
+        themselves: ``modes`` of them, or None where a range of frequencies decides. ``jobs``: pairs
+        of a deck and the one that it continues (`OwnDecks.jobs`)."""
         units = self.decks.units
         return {
             "modes_per_harmonic": self.case.case.analysis.modes_per_harmonic,
@@ -92,7 +94,7 @@ class DecksDesign:
         evaluator.refuse_lacking(self)
 
     def remarks(self, evaluator: DesignEvaluator) -> Iterator[str]:
-        """The lines that are added for the solver. Raises as `check` does."""
+        """The lines added for the solver, one sentence, in words. Raises as `check` does."""
         evaluator.refuse_lacking(self)
         yield added_words(self.decks, evaluator.solver.dialect)
 
@@ -131,7 +133,8 @@ def design_of(case: LoadedCase, values: Mapping[str, float] | None = None) -> De
 
 
 def output_lines(decks: OwnDecks, dialect: str) -> Added:
-    """Lines that are added to the decks, so that the modes' shapes and the mass can be read.
+    """Lines that are added to the decks, so that the modes' shapes and the mass can be read; none
+    in another dialect than abaqus and calculix.
 
     Raises OwnDeckError where the step of the modes asks for other shapes.
     """
@@ -185,7 +188,7 @@ def _calculix(decks: OwnDecks) -> Added:
     return {decks.modes_step[-1].place: [line for each in masses for line in each]}
 
 
-# by dialect: what is printed of the crown's nodes, and what else
+# by dialect: fields printed at the nodes of `OwnDecks.crown`, and a function of all other lines
 OUTPUT: dict[str, tuple[tuple[str, ...], Callable[[OwnDecks], Added] | None]] = {
     "abaqus": (("U", "COORD"), _abaqus),
     "calculix": (("U",), _calculix),

@@ -14,14 +14,15 @@ from ...tyre.own_deck.text import Block, named
 from ...tyre.resolve import Tyre
 from ...tyre.templates import TemplateFailed
 
-BEFORE = 3  # lines of the inflation's template before the mesh: heading, its text, *RESTART
+# lines of templates/abaqus/inflate.inp.j2 before the mesh: heading, its text, *RESTART
+BEFORE = 3
 PLACE = re.compile(r"^inflate\.inp, line (\d+): ")
 
 
 def own_jobs(tyre: Tyre) -> tuple[dict[str, str], dict[str, Any]]:
     """Texts of the job that inflates, which is the user's deck, and of what it includes; and what
-    the job that revolves it takes over: its step, node, sets, surfaces and pressure, in the deck's
-    own units. Raises TemplateFailed."""
+    the job that revolves it takes over, in the deck's own units: its step, from 1, the rim's
+    reference node and place, sets, surfaces and pressure. Raises TemplateFailed."""
     kind, flat, c = tyre.written.kind, tyre.flat, tyre.case
     deck = kind.deck
     _refuse_unrevolved(tyre)
@@ -91,7 +92,7 @@ def _refuse_unrevolved(tyre: Tyre) -> None:
 
 def asked_by_abaqus(blocks: Sequence[Block], before: Sequence[Block] = ()) -> dict[str, list[str]]:
     """Sentences, with file and line, on what ABAQUS ``refuses`` by its manual of a user's deck,
-    which goes on from the model of others, and on what is ``unknown`` to our grammar of it."""
+    which goes on from the model of ``before``, and on what is ``unknown`` to our grammar of it."""
     check = import_module("tyrecal_solvers.abaqus.check")
     sentences: dict[str, list[str]] = {"refuses": [], "unknown": []}
     for each in check.findings(blocks, before):
@@ -107,7 +108,8 @@ def lacking_in_calculix(blocks: Sequence[Block]) -> list[str]:
 
 
 def explained(tyre: Tyre, words: str, header_lines: int) -> str:
-    """A solver's refusal with the line of the user's deck in place of that of the flat one."""
+    """A solver's refusal with the line of the user's deck in place of that of the flat one, which
+    comes after ``header_lines`` comments and `BEFORE`; -1: no line."""
     match = PLACE.match(words)
     line = int(match[1]) - header_lines - BEFORE - 1 if match else -1
     place = tyre.written.kind.place_of_line(tyre, line)

@@ -39,9 +39,10 @@ class PlyStrip:
 class Sector:
     """Bricks of one sector."""
 
-    nodes: list[tuple[int, float, float, float]]  # number, x, y, z in m
-    bricks: dict[int, tuple[int, ...]]  # section element to nodes (8 or 20)
-    # section element to its row in the mesh without plies, a ply's being that inside it
+    nodes: list[tuple[int, float, float, float]]  # number; x (r at Theta = 0), y, z in m
+    bricks: dict[int, tuple[int, ...]]  # section element to nodes (8 or 20, in ABAQUS' order)
+    # section element to its row in the mesh without plies, from 0 at the inner surface; a ply's is
+    # that inside it
     rows: dict[int, int]
     regions: dict[int, str]  # section element to its region
     strips: dict[str, list[PlyStrip]]  # per line, from -z to +z
@@ -101,7 +102,7 @@ def build_sector(
 
 
 def with_plies(section: Section, thickness: float) -> Section:
-    """The section with each cord line as two, half a ply's thickness to either side of it."""
+    """The section with each cord line as two, half a ply's thickness inside (-) and outside (+)."""
     points, names = [section.points[0]], [section.names[0]]
     for name, line in zip(section.names[1:-1], section.points[1:-1], strict=True):
         offset = thickness / 2 * _normals(line)
@@ -112,7 +113,8 @@ def with_plies(section: Section, thickness: float) -> Section:
 
 
 def _normals(line: Array) -> Array:
-    """Unit normals outwards (station, 2); NaN where the line is absent."""
+    """Unit normals (station, 2) outwards, (1, 0) at a crown from which stations go to z > 0; NaN
+    where the line is absent or has a single point."""
     normals = np.full_like(line, np.nan)
     have = np.flatnonzero(~np.isnan(line).any(1))
     for run in np.split(have, np.flatnonzero(np.diff(have) > 1) + 1):
@@ -123,9 +125,9 @@ def _normals(line: Array) -> Array:
         if mirrored:
             p = np.concatenate([p[1:2] * [1, -1], p])
         length = length_along(p)
-        slope = np.gradient(p, length, axis=0)[int(mirrored) :]
-        slope /= np.linalg.norm(slope, axis=1)[:, None]
-        normals[run] = np.stack([slope[:, 1], -slope[:, 0]], -1)
+        tangent = np.gradient(p, length, axis=0)[int(mirrored) :]
+        tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+        normals[run] = np.stack([tangent[:, 1], -tangent[:, 0]], -1)
     return normals
 
 
@@ -144,7 +146,7 @@ def _strip(mesh: SectionMesh, number: int) -> PlyStrip:
 
 
 def _moment(corner: Array) -> float:
-    """Integral of r over a quadrilateral of corners (4, 2), by its two triangles."""
+    """Integral of r, m3, over a quadrilateral of corners (4, 2): its volume per radian."""
     total = 0.0
     for a, b, c in (corner[[0, 1, 2]], corner[[0, 2, 3]]):
         (p, q), (s, t) = b - a, c - a
@@ -153,7 +155,7 @@ def _moment(corner: Array) -> float:
 
 
 def _extruded(mesh: SectionMesh, angle: float, quadratic: bool) -> dict[str, Any]:
-    """Nodes, bricks and sets of the sector, its nodes numbered without gaps from 1."""
+    """The other fields of `Sector`, its nodes numbered without gaps from 1; ``angle`` in rad."""
     points: dict[Corner, tuple[float, float]] = {(n,): rz for n, rz in mesh.nodes.items()}
     sides: dict[int, list[Corner]] = {number: [] for number in mesh.solids}
     for number, corners in mesh.solids.items():

@@ -21,7 +21,7 @@ from typing import IO
 
 from ...tyre.templates import TemplateFailed, TemplateNames, environment, render
 
-CPU_S, WALL_S = 5, 60.0  # of one template; shipped ones take a tenth of a second
+CPU_S, WALL_S = 5, 60.0  # s of a core, and in all, per template; shipped ones take 0.1 s
 MEMORY = 2_000_000_000  # bytes of address space, where the system limits it
 MAX_TEXT_BYTES = 50_000_000  # bytes of text
 GOOD, BAD = b"+", b"-"  # first byte of a reply: the text is the deck, or the error
@@ -33,7 +33,7 @@ _own = threading.local()
 class TemplateProcess:
     """Templates of a dialect (abaqus or calculix), the user's own in ``folder`` before the tool's.
 
-    It has the two members of a Jinja environment that `deck` uses.
+    It has the two members of a Jinja environment that `tyre_design` uses.
     """
 
     auto_reload = True  # templates are read anew for each deck

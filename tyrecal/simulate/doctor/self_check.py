@@ -32,7 +32,7 @@ def self_check(solver: str = "bundled") -> Json:
 
     Keys: ``solver``, ``ok``, ``seconds``, ``tolerance_percent``, ``mass_kg``, ``modes`` [{label,
     frequency_Hz, recorded_Hz, deviation_percent}] and ``problem``, the reason if the solver gave no
-    results, else None. Raises InputError.
+    results, else None. Raises InputError if no solver has this name.
     """
     from ...tyre.load import load_case
     from ..deck.tyre_design import TyreDesign

@@ -17,10 +17,10 @@ from ..evaluate.results import Evaluation
 from ..modes.label import in_words, labelled
 from .self_check import CASE
 
-# between the carcass cords of the second pair, 1 mm apart at a radius of 0.3 m; in degrees, says
+# between the carcass cords of the folder angular, 1 mm apart at a radius of 0.3 m; in degrees, says
 # the manual, times the distance from the axle
 FANNED_DEG = 0.19
-READINGS: dict[str, Json] = {  # of *REBAR LAYER, GEOMETRY=ANGULAR, by what it would mean
+READINGS: dict[str, Json] = {  # keys of a layer that mean what ABAQUS might read in FANNED_DEG
     "manual": {"geometry": "angular", "spacing_m": None, "spacing_deg": FANNED_DEG},
     "one spacing": {"spacing_m": 1e-3},
     "radians": {"geometry": "angular", "spacing_m": None, "spacing_deg": degrees(FANNED_DEG)},
@@ -77,7 +77,7 @@ def write_selftest(folder: Path) -> list[Path]:
     answer = _answer(plain)
     answers = {each: _answer(_with_carcass(plain, how)) for each, how in READINGS.items()}
     last_label = str(labelled(answer)[-1].label)
-    # as many as the deck requests, whose modes come in pairs; modes of n = 0 leave some to spare
+    # as many as the deck requests, two a pair; single modes, n = 0, leave some to spare
     count = 2 * plain.case.analysis.modes_per_harmonic * (plain.case.analysis.highest_harmonic + 1)
     page = PAGE.format(
         modes=count,
@@ -118,7 +118,7 @@ def _table(answers: dict[str, Evaluation]) -> str:
 
 
 def _with_carcass(case: LoadedCase, update: Json) -> LoadedCase:
-    """The tyre with other numbers of its carcass."""
+    """The tyre with the keys ``update`` of its layer carcass."""
     layers = dict(case.case.rebar_layers)
     layers["carcass"] = layers["carcass"].model_copy(update=update)
     return replace(case, case=case.case.model_copy(update={"rebar_layers": layers}))

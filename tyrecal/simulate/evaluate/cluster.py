@@ -71,7 +71,7 @@ class Cluster:
 
 
 def _at_worker(function: Callable[[Any], Any], expected: str, task: Any) -> Any:
-    """``function`` as it runs elsewhere too: the same sources, one BLAS thread."""
+    """``function`` as it runs elsewhere too: sources of the hash ``expected``, one BLAS thread."""
     if sources() != expected:
         raise SolverUnavailable("a worker has another edition of tyrecal: install the same on all")
     with threadpool_limits(1):
@@ -108,6 +108,7 @@ class QueueSettings(BaseModel):
     workers: Annotated[int, Field(ge=1, le=100_000)]
     cores: Annotated[int, Field(ge=1, le=1024)] = 1  # of one job, a worker each
     memory: Annotated[str, Field(pattern=r"^[0-9.]+ *[kMGT]i?B$")] = "2GB"  # of one job, e.g. "8GB"
+    # of one job, [days-]hours:minutes:seconds
     walltime: Annotated[str, Field(pattern=r"^([0-9]+-)?[0-9]+:[0-9]{2}:[0-9]{2}$")] = "01:00:00"
     queue: str | None = None
     account: str | None = None
@@ -148,7 +149,7 @@ def jobs_of(settings: QueueSettings) -> Any:
         "python": settings.python,
         "log_directory": settings.log_directory,
         "job_name": "tyrecal",
-        "death_timeout": 600,
+        "death_timeout": 600,  # s without a scheduler, after which a worker ends
         "job_extra_directives": settings.directives,
         "job_script_prologue": [
             *(f"export {name}=1" for name in THREAD_VARIABLES),

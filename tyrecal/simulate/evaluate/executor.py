@@ -23,8 +23,8 @@ class Executor(Protocol):
     ) -> Generator[tuple[int, Any], None, None]:
         """(place of a task, ``function`` of it or EvaluationFailed), as they finish.
 
-        A task whose process died with it has crashed. Raises what ``function`` raises. Closed
-        early, it ends what is under way where it can.
+        A task whose process died with it has crashed: EvaluationFailed. Raises what ``function``
+        raises. Closed early, it ends what is under way where it can.
         """
 
 
@@ -60,7 +60,8 @@ class Processes:
 def _until_one_dies(
     function: Callable[[Any], Any], waiting: list[Task], jobs: int
 ) -> Generator[tuple[int, Any], None, list[Task]]:
-    """Does tasks off the end of ``waiting``, yields answers; returns what a death left undone."""
+    """Does tasks off the end of ``waiting``, yields answers; returns the tasks under way when a
+    process died: its death ends them all."""
     under_way: dict[Future[Any], Task] = {}
     lost: list[Task] = []
     with _pool(jobs, lost) as pool:
@@ -82,7 +83,7 @@ def _until_one_dies(
     return lost
 
 
-_idle: dict[int, Pool] = {}
+_idle: dict[int, Pool] = {}  # by number of processes
 _at_work: set[Pool] = set()
 _of_parent: list[Pool] = []  # kept: collected, they would write to the parent's pipes
 

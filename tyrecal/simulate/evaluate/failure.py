@@ -11,8 +11,9 @@ from ...files import printable
 class EvaluationFailed(TyrecalError):
     """The solver could not evaluate a design.
 
-    cause: ``no_equilibrium``, ``unstable``, ``timed_out``, ``crashed``, ``no_results``,
-    ``licence``, ``lost_label`` or ``refused`` (values that the case cannot have);
+    cause: ``no_equilibrium``, ``unstable`` (not a minimum of energy), ``timed_out``, ``crashed``,
+    ``no_results`` (missing or wrong ones), ``licence`` (none was free), ``lost_label`` (no mode
+    has a wanted label) or ``refused`` (values that the case cannot have);
     words: the solver's own last words, on one line; folder: where the run is kept, or None.
     """
 

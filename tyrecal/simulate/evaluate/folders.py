@@ -21,7 +21,8 @@ def fresh(parent: Path | None) -> Path:
 
 
 def keep(folder: Path, outcome: str) -> Path:
-    """Leave the folder, and write in it how the run ended: a word of ``outcome``."""
+    """Leave the folder, and write in it how the run ended: a failure's words, or
+    ``finished``."""
     with contextlib.suppress(OSError):
         (folder / OUTCOME).write_text(outcome + "\n", encoding="utf-8")
     return folder

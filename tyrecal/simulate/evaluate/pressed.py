@@ -27,17 +27,20 @@ class Footprint:
 
     load_N: of.PositiveFinite
     road_N: of.Finite  # resultant of the contact pressure
-    rim_N: Annotated[Array, of.shaped(of.REAL, 3)]  # reaction: down, then along y (axle) and z
-    deflection_m: of.Finite  # of the axle since the tyre was free
+    # (3,) of the rim on the tyre: down, along the axle, along the road
+    rim_N: Annotated[Array, of.shaped(of.REAL, 3)]
+    deflection_m: of.Finite  # of the axle towards the road since the tyre was free
     stiffness_N_per_m: of.Finite  # tangent d force / d deflection
     ring: of.WholeArray  # (p,) place among the angles
     node: of.WholeArray  # (p,) deck number
-    along_m: of.RealArray  # (p,) in the road's plane
-    across_m: of.RealArray  # (p,) in the road's plane
+    along_m: of.RealArray  # (p,) place on the road, from below the axle backwards (Theta > 0)
+    across_m: of.RealArray  # (p,) place along the axle, z
     pressure_Pa: of.RealArray  # (p,)
     area_m2: of.RealArray  # (p,) that the node stands for
-    traction_Pa: Annotated[Array, of.shaped(of.REAL, None, 2)]  # (p, 2) along and across
-    displacement: of.Field3D  # (ring, node, 3): r, theta, z at the reference angle, m
+    # (p, 2) along and across, of the tyre on the road
+    traction_Pa: Annotated[Array, of.shaped(of.REAL, None, 2)]
+    # (ring, node, 3): r, theta, z of the undeformed point, from its uninflated place, m
+    displacement: of.Field3D
     # this and the next two: of a solver that places the patch's edge between nodes, else None;
     # nodes next to the patch then have a share of it, too
     contact_area_m2: of.PositiveFinite | None = None

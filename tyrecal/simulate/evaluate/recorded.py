@@ -47,17 +47,17 @@ class _Mode(_Part):
 
     frequency_Hz: of.Hertz
     multiplicity: Annotated[Any, of.shaped("iu", least=0, most=2)]  # 1, or 2: both of a pair
-    n: Annotated[Any, of.shaped("iu", least=-1)] = 0  # harmonic of the amplitude, from 0
+    n: Annotated[Any, of.shaped("iu", least=-1)] = 0  # harmonic of the amplitude: 0, 1, ...
     # (points, 3) along r, theta, z
     amplitude: Annotated[Any, of.shaped("c" + of.REAL, None, 3)] = None
     # (points, 3) along r, theta, z; NaN where the solver does not give it
     displacement: Annotated[Any, of.shaped(of.REAL, None, 3, nan=True)] = None
-    members: of.HertzPair | None = None
+    members: of.HertzPair | None = None  # of a pair that is split, see `RawMode`
     damping_ratio: of.Finite | None = None
 
     @property
     def points(self) -> int:
-        """Number of points that the shape is known at."""
+        """Number of points that the shape is known at, -1 without a shape."""
         shape = self.displacement if self.amplitude is None else self.amplitude
         return -1 if shape is None else len(shape)
 
@@ -93,7 +93,8 @@ class _Response(_Part):
     radius_m: of.PositiveFinite  # of the inflated tread
     harmonics: Annotated[Any, of.shaped("iu", least=0)]  # that were summed
     harmonics_wanted: Annotated[Any, of.shaped("iu", least=0)]  # for the patch's size
-    # the first three (d, d), d coordinates: motions of the rim, then modes; tread (respond, d)
+    # (d, d), d coordinates: motions of the rim, then modes; loss is the imaginary part of the
+    # stiffness; tread (respond, d): motion of a point per coordinate
     stiffness: Annotated[Any, of.shaped("f", None, None)] = None
     mass: Annotated[Any, of.shaped("f", None, None)] = None
     loss: Annotated[Any, of.shaped("f", None, None)] = None
@@ -103,7 +104,7 @@ class _Response(_Part):
 class _Modes(_Tyre):
     modes: Annotated[list[_Mode], Field(min_length=1)]
     gradients: dict[str, of.RealArray]
-    displacement: of.Vectors
+    displacement: of.Vectors  # by the inflation, m; (0, 3) where the solver does not give it
     mass_gradients: dict[str, of.Finite] = Field(default_factory=dict)
     response: _Response | None = None
 
@@ -172,7 +173,8 @@ class _Pressed(_Tyre):
 
 
 def check(content: Any) -> None:
-    """Whether ``content`` is what `Evaluator` records. Raises Damaged."""
+    """Raises Damaged if ``content`` is not what `Evaluator` records: a failure's fields, or
+    ``answer`` and what `Solver.read` gave."""
     kind: type[_Part] = _Failure
     if isinstance(content, dict) and "answer" in content:
         content = content["answer"]

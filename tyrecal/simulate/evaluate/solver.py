@@ -27,7 +27,7 @@ class Solver(Protocol):
     ``footprint``, ``footprint_gradients``, ``loaded_modes``, ``rim_stiffness``, ``response``, and
     what effects need (`Effect.needs`): ``vibration_modulus``, a modulus in the frequency step other
     than in the static one, and those of `resolve.CAPABILITIES`; ``own_decks``: it runs a user's in
-    three dimensions;
+    three dimensions.
     A solver without ``gradients`` may have ``difference_step``, the step of a logarithm that suits
     its digits, for sensitivities by differences.
     A solver that starts a program has ``command`` too, a list of its words, which is the user's to
@@ -61,14 +61,16 @@ class Solver(Protocol):
         Hz]. Where a loss factor is known, each mode has its damping_ratio, a fraction of critical
         damping.
 
-        Where ``decks.request`` has a response {lowest_Hz, highest_Hz, lines, patch_m, excite,
-        respond} of points [degrees, direction] of the tread: response {frequency_Hz (f,),
-        receptance (respond, excite, f) in m/N, hub (6, excite, f) in N/N and N m/N, radius_m of
-        the inflated tread, harmonics that were summed, harmonics_wanted for the patch's size}. Of
-        the hub: force along Theta = 0, along 90 degrees, along the axle, and moments about them;
-        shifts in m/N and turns in rad/N of a rim that moves.
-        With ``modes`` N in it also stiffness, mass and loss (d, d) on these six motions of the rim
-        and at most N coordinates of modes with the rim held, and tread (respond, d).
+        Where ``decks.request`` has a response {lowest_Hz, highest_Hz, lines (of frequency), patch_m
+        (width under the force), excite, respond} of points [degrees, radial, tangential or
+        lateral] of the tread: response {frequency_Hz (f,), receptance (respond, excite,
+        f) in m/N, hub (6, excite, f) in N/N and N m/N, radius_m of the inflated tread, harmonics
+        that were summed, harmonics_wanted for the patch's size}. Of the hub: force of the tyre on
+        it along Theta = 0, along 90 degrees, along the axle, and moments about them; shifts in m/N
+        and turns in rad/N of a rim that moves.
+        With ``modes`` N in it also stiffness, mass and loss (d, d), the imaginary stiffness, on
+        these six motions of the rim and at most N coordinates of modes with the rim held, and tread
+        (respond, d).
 
         A solver in three dimensions gives each mode {frequency_Hz, multiplicity 1, displacement
         (k, 3)} at ``points`` (k, 3), as in `RingShape`; pairs are joined by the tool.

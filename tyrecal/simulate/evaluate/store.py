@@ -37,8 +37,8 @@ from .record import DIGEST, Damaged, pack, unpack
 from .recorded import check
 from .solver import Solver
 
-FORMAT = "2"
-MAX_STORE_BYTES = 2_000_000_000
+FORMAT = "2"  # part of each key: another one makes all older records unknown
+MAX_STORE_BYTES = 2_000_000_000  # bytes that `prune` leaves
 MAX_RECORD_BYTES = 500_000_000  # bytes of one record
 LEFTOVER_S = 3600.0  # age of a half-written file whose writer must be dead
 log = logging.getLogger("tyrecal")
@@ -107,7 +107,7 @@ class Store:
         return self.folder / key[:2] / f"{key}.record"
 
     def read(self, key: str) -> Any:
-        """Read the content that was recorded, or None."""
+        """The content that was recorded; None if it is absent or damaged."""
         path = self.path(key)
         try:
             refuse_link(path.parent)
@@ -124,7 +124,7 @@ class Store:
     def write(self, key: str, about: Json, content: Any) -> None:
         """Record ``content`` (see `pack`) whole or not at all; warns once if it cannot.
 
-        about: facts on the evaluation for people, such as case and solver.
+        about: facts for people: ``solver``, ``version`` and, of a failure, its ``cause``.
         """
         path = self.path(key)
         try:

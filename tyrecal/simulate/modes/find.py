@@ -18,7 +18,8 @@ from .label import Label, Mode, paired_labels
 from .match import margin, match
 
 Array = np.ndarray
-MORE_MODES = (4, 8)  # per harmonic, if a label is not among the modes first computed
+# per harmonic, one after the other, if a label is not among the modes first computed
+MORE_MODES = (4, 8)
 # labels that are wanted of a question, from its index and its modes
 Wanted = Callable[[int, Sequence[Mode]], Sequence[Label]]
 
@@ -69,8 +70,9 @@ def _with_rates(
     step: float,
 ) -> dict[int, ModesAnswer]:
     """The answers with the sensitivities that the questions name, by one neighbour for each number:
-    above, or below where that has no solution; all neighbours of a side at once. NaN for modes
-    whose label the neighbour lacks. If both have no solution, the failure is the answer.
+    above, or below where that has no solution (the order of `decks.steps`); all neighbours of a
+    side at once. NaN for modes whose label the neighbour lacks. If both have no solution, the
+    failure is the answer.
 
     step: a share of the value, of a linear variable or an effect of its range (`decks.steps`)."""
     designs = {place: each for place, each in answers.items() if isinstance(each, LabelledModes)}
@@ -97,7 +99,7 @@ def _with_rates(
             continue
         centre, width = designs[place], value - questions[place].values[name]
         hertz = {mode.label: mode.frequency_Hz for mode in other.modes}
-        # Hz per unit at each mode's `position`; the rest of it is not read
+        # Hz per unit at each mode's `position`, the first of a pair's; the rest is not read
         rate = np.full(len(centre.evaluation.modes), np.nan)
         for mode in centre.modes:
             rise = hertz.get(mode.label, np.nan) - mode.frequency_Hz
@@ -137,7 +139,7 @@ def _find(
                 yield place, answer
                 continue
             modes = paired_labels(answer.modes)  # the two modes of each pair as one
-            try:
+            try:  # `match` raises EvaluationFailed (lost_label)
                 labels = _labels(wanted, place, modes)
                 yield place, LabelledModes(answer, modes, match(modes, labels))
             except EvaluationFailed as error:

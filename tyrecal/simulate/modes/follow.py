@@ -29,7 +29,7 @@ def follow(before: Sequence[Mode], after: Sequence[Mode]) -> list[Step]:
     """A step per mode of ``before`` that has a partner in ``after``: harmonic by harmonic, the
     one-to-one assignment with the largest sum of MACs. All modes on the same points.
 
-    A sampled shape is taken as its pair, whatever angle it is turned by (``harmonic_of``).
+    A sampled shape is taken as its pair (``harmonic_of``): turned by any angle it is the same.
     Raises ValueError when the points differ.
     """
     from scipy.optimize import linear_sum_assignment  # late: longer than most evaluations

@@ -19,8 +19,8 @@ from ..evaluate.results import HarmonicShape
 from .label import Label, Mode
 
 Array = np.ndarray
-MAX_LOAD_STEP, MIN_LOAD_SHARE = 1 / 16, 1e-7  # steps, of the way from load to load
-MIN_OVERLAP = 0.8  # least overlap over a step, else it is halved
+MAX_LOAD_STEP, MIN_LOAD_SHARE = 1 / 16, 1e-7  # steps of t, the way from load to load being 1
+MIN_OVERLAP = 0.8  # least MAC of a shape over a step, else the step is halved; chosen
 SPANNED = 1e-6  # singular value over the largest one, above which a direction counts
 ABOVE = 2.0  # omega^2 of directions outside the known modes, over the highest one of these
 SYMMETRIES = ("symmetric", "antisymmetric")
@@ -47,7 +47,7 @@ class Rings:
     areas: Array  # (k, j) of the undeformed tyre, m2, that each point stands for
 
     def flat(self, shapes: Array) -> Array:
-        """Shapes (p, k, j, 3) as vectors (p, size) with the scalar product above."""
+        """Shapes (p, k, j, 3) as vectors (p, 3 k j), their scalar product that of the module."""
         return np.asarray((shapes * np.sqrt(self.areas)[:, :, None]).reshape(len(shapes), -1))
 
     def overlaps(self, a: Array, b: Array) -> Array:
@@ -57,7 +57,7 @@ class Rings:
 
     def part(self, shapes: Array, symmetric: bool) -> Array:
         """The part of shapes (p, k, j, 3) that is symmetric about the patch, or antisymmetric."""
-        back = (-np.arange(len(self.angles))) % len(self.angles)
+        back = (-np.arange(len(self.angles))) % len(self.angles)  # each ring has one at -theta
         image = MIRROR * shapes[:, back]
         return (shapes + image if symmetric else shapes - image) / 2
 
@@ -68,7 +68,8 @@ class Rings:
 
 
 def rings(angles: Array, nodes: Array, all_nodes: Array, points: Array) -> Rings:
-    """The rings through ``nodes`` of a section; ``all_nodes`` (n,), points (n, 2): R, Z in m."""
+    """The rings through ``nodes`` (j,), a line across the section, which Z orders; ``all_nodes``
+    (n,), points (n, 2): R, Z in m."""
     row = {int(number): i for i, number in enumerate(all_nodes)}
     R, Z = points[[row[int(number)] for number in nodes]].T
     order = np.argsort(Z)
@@ -82,7 +83,7 @@ def rings(angles: Array, nodes: Array, all_nodes: Array, points: Array) -> Rings
 
 
 def members(mode: Mode, where: Rings) -> dict[Member, Array]:
-    """The unloaded mode's two members (ring, node, 3), or its only one."""
+    """The unloaded mode's two members (ring, node, 3), any scale, or its only one."""
     shape = mode.raw.shape
     if not isinstance(shape, HarmonicShape):
         raise TypeError("an unloaded mode to compare with comes from its harmonic")
@@ -102,7 +103,7 @@ def members(mode: Mode, where: Rings) -> dict[Member, Array]:
 
 
 def state(frequencies: Array, shapes: Array, where: Rings) -> ModesAtLoad:
-    """The modes of one load."""
+    """The modes of one load: frequencies (m,) in Hz, shapes (m, ring, node, 3)."""
     return ModesAtLoad(frequencies, shapes, where.evenness(shapes) >= 0.5)
 
 
@@ -152,8 +153,8 @@ def follow(before: ModesAtLoad, after: ModesAtLoad, where: Rings) -> Followed:
 
 
 def _homotopy(f_before: Array, a: Array, f_after: Array, b: Array) -> Array:
-    """For each column of a (n, m) the place (m,) of its column in b, or -1; columns orthonormal,
-    frequencies (m,) in Hz."""
+    """For each column of a (3 k j, m) the place (m,) of its column in b, or -1; columns
+    orthonormal, frequencies (m,) in Hz. K is in Hz^2: no factor changes its vectors."""
     from scipy.optimize import linear_sum_assignment  # late: longer than most evaluations
 
     u, size, _ = np.linalg.svd(np.hstack([a, b]), full_matrices=False)
@@ -177,6 +178,6 @@ def _homotopy(f_before: Array, a: Array, f_after: Array, b: Array) -> Array:
 
 
 def _nearest_orthonormal(v: Array) -> Array:
-    """The orthonormal columns (n, m) nearest to those of v (Loewdin)."""
+    """The orthonormal columns (3 k j, m) nearest to those of v (Loewdin)."""
     u, _, w = np.linalg.svd(v / np.linalg.norm(v, axis=0), full_matrices=False)
     return np.asarray(u @ w)

@@ -10,7 +10,7 @@ Array = np.ndarray
 
 
 def on_rings(shape: HarmonicShape, nodes: Array, angles: Array, phase: float = 0.0) -> RingShape:
-    """Re[amplitude exp(i (n Theta + phase))] on one ring of points per node.
+    """Re[amplitude exp(i (n Theta + phase))] (`HarmonicShape`) on one ring of points per node.
 
     nodes (k,): deck numbers; angles (a,): Theta in rad; phase in rad: 0 and pi/2 give the two
     halves of a pair (on n = 0 leave it at 0, there it scales a real amplitude). Returns k * a
@@ -33,9 +33,9 @@ def on_rings(shape: HarmonicShape, nodes: Array, angles: Array, phase: float = 0
 def harmonic_of(shape: RingShape, n: int) -> HarmonicShape:
     """The harmonic shape of which ``shape`` is a sample, by least squares ring by ring.
 
-    Rings: points of one R and Z (to 10 micrometres); its nodes are the rings' numbers. One half
-    of a pair tells the whole amplitude, but for its phase. A component that was not measured on
-    a ring is 0 there.
+    Rings: points of one R and Z (to 10 micrometres); its nodes are the rings' numbers from 0. One
+    half of a pair tells the whole amplitude, except its phase. A component that was not measured
+    on a ring is 0 there.
     """
     places, ring = np.unique(np.round(shape.points[:, [0, 2]], 5), axis=0, return_inverse=True)
     angle = n * shape.points[:, 1]

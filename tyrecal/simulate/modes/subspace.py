@@ -32,8 +32,8 @@ def mac(a: HarmonicShape, b: HarmonicShape) -> float:
 
 def squared_cosines(a: Array, b: Array) -> Array:
     """Squared cosines of the principal angles between the spans of the real shapes in the columns
-    of a and b, both with a row each signal, the largest first; none if either is zero. One column
-    each: their MAC; one and a pair: the MAC of a shape with the plane of the pair."""
+    of a and b, a row for each signal, the largest first; none if either is zero. One column each:
+    their MAC; one and a pair: the MAC of a shape with the plane of the pair."""
     cosines = np.linalg.svd(_basis(a).T @ _basis(b), compute_uv=False)
     return np.asarray(np.minimum(1.0, cosines**2))
 
