@@ -89,7 +89,7 @@ def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mist
     section = kind.read_section(document, data, path.parent) if kind else None
     check_templates(document, data, path.parent)
     measured = measured_file(document, data, path.parent)
-    if is_known:  # the numbers that all else names
+    if is_known:  # paths of numbers can be checked, see `read_kind`
         _add(document, problems(data, section))
     meshable = not any(m.key.startswith(("mesh", "section")) for m in document.mistakes)
     if kind and section and meshable and (message := kind.folds(data, section)):

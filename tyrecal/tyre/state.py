@@ -30,7 +30,7 @@ SPRINGS = tuple(
 """Numbers of a case that are compliances of what holds its rim."""
 PRESSURE_PATH, RIM_FREE = "pressure_kPa", "rim.free"
 WHEEL_FREE = "effects.wheel_free"
-STANDING = "effects.road_contact"  # a wheel that hangs freely does not touch the road
+STANDING = "effects.road_contact"  # 0 for a wheel that hangs freely: it touches no road
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class TyreState:
             case.kind.require_rim()
         if state.pressure_kPa is not None:
             numbers["pressure_kPa"] = state.pressure_kPa
-        if state.rim == "springs":
+        if state.rim == "springs":  # a case that has them is as it is: `of` gave None
             raise InputError(
                 "has no springs in this case: give a compliance in rim.spindle, as"
                 " rim: {spindle: {lateral_m_per_N: 1e-7}}"

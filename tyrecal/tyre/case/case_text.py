@@ -18,14 +18,15 @@ from .made_of import ConstructionParts
 from .mistakes import CaseData
 from .parts import SectionOrigin
 
-ELEMENTS_BY_LEVEL = {"coarse": 14, "default": 28, "refined": 56}  # along the half section, by level
-LETTERS_A_LINE = 118  # letters on a line
+ELEMENTS_BY_LEVEL = {"coarse": 14, "default": 28, "refined": 56}  # along the half section
+LETTERS_A_LINE = 118  # of a case
 OUTER_ROWS = {"coarse": 1, "default": 3, "refined": 4}  # between the outermost line and the surface
 
 
 @dataclass(frozen=True)
 class NewCase:
-    """A case whose section is ``section``, from ``file`` in the case's folder."""
+    """A case whose section is ``section``, from ``file`` in the case's folder. Its fields are the
+    names in templates/case/case.yaml.j2."""
 
     section: Section
     made: ConstructionParts
@@ -36,7 +37,7 @@ class NewCase:
     known_from: SectionOrigin
     origin: str = ""  # a sentence for the heading
     outline: Mapping[str, float] | None = None  # the keys of ``section.outline`` but its file
-    loads_N: Sequence[float] = ()  # of the road, none: as usual for passenger cars
+    loads_N: Sequence[float] = ()  # on the road; none: the template's, as of passenger cars
 
     def text(self) -> str:
         """The case as YAML with comments."""
@@ -102,9 +103,11 @@ def flow_lines(data: CaseData) -> str:
 
 
 def _level(section: Section, level: str) -> dict[str, Any]:
-    """Elements of about the same length, at least one a region; rows thinner towards the road."""
-    middle = section.points[0]
-    arc = length_along(middle)
+    """A mesh level: ``elements`` by region, of about the same length on the inner surface; ``rows``
+    between neighbouring lines; ``grading``: rows of the tread 0.7 times as thick as those inside,
+    None: all alike."""
+    inner = section.points[0]
+    arc = length_along(inner)
     elements, start = {}, 0
     for region, count in section.regions:
         share = (arc[start + count] - arc[start]) / arc[-1]

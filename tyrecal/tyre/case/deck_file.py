@@ -31,8 +31,9 @@ from .stations import inside
 def read_kind(
     document: Document, data: dict[str, Any], folder: Path
 ) -> tuple[TyreKind | None, bool]:
-    """How the case gives its tyre, and whether the numbers of its decks are known: all of them are
-    put into ``data``. None, with the mistakes recorded, if a deck is wrong."""
+    """How the case gives its tyre, and whether paths to its numbers can be checked: those of its
+    decks are put into ``data``. None, with the mistakes recorded, if a deck is wrong; False if none
+    could be read."""
     source = table(data, "deck")
     if not source:
         return Stations(), True
@@ -57,7 +58,6 @@ def read_kind(
         for name in given:
             if name not in marks and name not in known:
                 hint = suggestion(name, [*marks, *known], "")
-                # idle: numbers of the deck that do not change the section, and why
                 message = kind.idle.get(name, f"is no mark and no number of the deck{hint}")
                 document.add(("deck", "numbers", name), message)
         for variable in table(data, "variables").values():  # a mark's value may be its start

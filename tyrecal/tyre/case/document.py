@@ -18,7 +18,7 @@ from ruamel.yaml.parser import Parser
 from .mistakes import Keys, Mistake, dotted, nearby, shortened
 from .parts import WRONG
 
-MAX_TABLE_BYTES = 1_000_000  # of a table beside a case
+MAX_TABLE_BYTES = 1_000_000  # of a table next to a case
 MAX_CASE_BYTES = 100_000  # bytes of YAML; shipped cases have 5000, and it is read at 30 kB/s
 MAX_EVENTS = 20_000  # keys and values
 DEEPEST = 20  # keys within keys
@@ -46,7 +46,7 @@ class Document:
         self.mistakes.append(Mistake(self.file, line, dotted(keys), value, message))
 
     def refuse(self, line: int, message: str) -> None:
-        """Record that the file as a whole is wrong."""
+        """Record that the file as a whole is wrong; line 0: on no line of its own."""
         self.mistakes.append(Mistake(self.file, line, "", "", message))
 
 
@@ -220,4 +220,5 @@ class _Reader:
 
 
 def _kind(node: Node) -> str:
+    """YAML's type of a scalar, as its resolver tagged it: ``str``, ``int``, ``null``, ..."""
     return (node.tag or "").rpartition(":")[2]

@@ -50,7 +50,7 @@ def tyre_sha256(loaded: LoadedCase) -> str:
 
 
 def is_of_tyre(path: str) -> bool:
-    """Whether another number at a dotted path of a case makes another tyre. ``path`` is not the
+    """Whether another number at a path makes another tyre: dotted, or of a user's deck, but not the
     name of a variable."""
     if tuple(path.split(".")) in STATE:
         return False

@@ -12,7 +12,9 @@ from math import pi
 from .loaded import LoadedCase
 from .parts import Rubber
 
-PRONY_REACH = 10.0  # a series describes rubber up to so many times 1 / (2 pi tau), and down to 1/10
+# a series describes rubber up to so many times 1 / (2 pi tau), and down to 1/10: a term's loss
+# modulus g x / (1 + x^2), x = 2 pi f tau, is a fifth of its peak there
+PRONY_REACH = 10.0
 
 
 def lossless_hint(case: LoadedCase) -> Iterator[str]:

@@ -13,16 +13,17 @@ from ..section.curve import length_along
 from ..section.section import Section, SectionError
 
 Keys = dict[str, Any]
-RELAXATION_S = 0.1  # of the one Prony term that usual values say anything of
-COMPOUND_DENSITY_PERCENT, CORD_MODULUS_PERCENT = 2.0, 5.0  # standard deviations over makers
-BELT_ANGLE_DEG, WIRE_ANGLE_DEG = 2.0, 90.0  # standard deviation of belts; angle of bead wires
+RELAXATION_S = 0.1  # of the one Prony term: above 10 Hz its modulus is the instantaneous one
+# estimated standard deviations over makers
+COMPOUND_DENSITY_PERCENT, CORD_MODULUS_PERCENT, BELT_ANGLE_DEG = 2.0, 5.0, 2.0
+WIRE_ANGLE_DEG = 90.0  # of bead wires; all angles are from the meridian
 BELT_CORD = CordMaterial(172.2e9, 0.3, 5900.0)  # Bekakos et al. (2016), like the carcass
 CARCASS_CORD = CordMaterial(9.87e9, 0.3, 1500.0, bears_compression=False)
 
 
 @dataclass(frozen=True)
 class ConstructionParts:
-    """Parts of a case by its keys."""
+    """Parts of a case by its keys, in their units."""
 
     materials: Mapping[str, Keys]
     solids: list[Keys]
@@ -30,7 +31,7 @@ class ConstructionParts:
     variables: Mapping[str, Keys]  # paths that each sets, start and bounds
     uncertainties: Mapping[str, Keys] = field(default_factory=dict)
     notes: Mapping[str, str] = field(default_factory=dict)  # words next to a material
-    # where the rubber's modulus of the modes is taken, None as in the static step
+    # frequency of the rubber's modulus in the modes, None: the modulus of the static step
     modes_at_Hz: float | None = None
 
 
@@ -68,10 +69,10 @@ def one_rubber(section: Section, carcass_plies: int = 1) -> ConstructionParts:
 
 
 def constructed(made: Construction, section: Section) -> ConstructionParts:
-    """A section with the lines and regions that `from_size` gives one of this type of tyre."""
+    """Materials of a section with the lines and regions that `from_size` gives such a tyre."""
     regions = [name for name, _ in section.regions]
     belted = regions[: regions.index("upper_sidewall")]
-    last = made.lines[made.lines.index(BASE) - 1]
+    last = made.lines[made.lines.index(BASE) - 1]  # the outermost cord line: cap ply or belt
     beads = ["filler", "bead"]
     solids: list[Keys] = [
         {"material": "inner_liner", "between": ["inner", "ply"]},
@@ -95,7 +96,7 @@ def constructed(made: Construction, section: Section) -> ConstructionParts:
     }
     belts = {}
     for i, belt in enumerate(made.belts, start=1):
-        line = made.lines[1 + i]
+        line = made.lines[1 + i]  # after inner and ply; the first belt's is TURN_UP
         own = {"regions": belted} if line == TURN_UP else {}
         belts[f"belt_{i}"] = {**_layer(line, belt.ply), **own}
     layers |= {**turned, **belts}
@@ -127,7 +128,8 @@ def constructed(made: Construction, section: Section) -> ConstructionParts:
 
 
 def _uncertainties(made: Construction, belts: Mapping[str, Keys]) -> dict[str, Keys]:
-    """Standard deviations over makers of the usual values."""
+    """Standard deviations over makers of the usual values; belts turn about the circumference in
+    opposite directions (``signs``)."""
     stiff = {
         f"{name}_C10": {"sets": [f"materials.{name}.C10_Pa"], "percent": round(own.spread_percent)}
         for name, own in made.compounds.items()
@@ -172,6 +174,7 @@ def _rubber(compound: Compound) -> Keys:
 
 
 def _prony(g: float) -> list[Keys]:
+    """One term by which a share g of the shear modulus relaxes, none of the bulk modulus."""
     return [{"g": g, "k": 0.0, "tau_s": RELAXATION_S}]
 
 
@@ -198,7 +201,7 @@ def _layer(line: str, ply: Ply) -> Keys:
 
 
 def _areas(layers: list[str], start: float, lower: float) -> Keys:
-    """Variable that sets the cord areas (m2) of layers."""
+    """Variable that sets the cord areas of layers; start and bounds in m2."""
     return {
         "sets": [f"rebar_layers.{name}.area_m2" for name in layers],
         "start": start,
@@ -208,6 +211,7 @@ def _areas(layers: list[str], start: float, lower: float) -> Keys:
 
 
 def _stiffness(rubber: str, start: float) -> Keys:
+    """Variable that sets C10, Pa, of a rubber."""
     sets = [f"materials.{rubber}.C10_Pa"]
     return {"sets": sets, "start": start, "lower": start / 10, "upper": 10 * start}
 

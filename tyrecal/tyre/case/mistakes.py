@@ -1,4 +1,4 @@
-"""Mistakes in a case: where, what stands there, and what would be right."""
+"""Mistakes in a case: where, what is written there, and what would be right."""
 
 from __future__ import annotations
 
@@ -14,10 +14,8 @@ from ...errors import InputError
 from ...files import printable
 
 MAX_FILES = 1000  # whose names are compared with a mistyped one
-MIN_SIMILARITY = {
-    "*": 0.6,
-    "*/*": 0.8,
-}  # how much of two names must be, beside a file and a folder down
+# least `difflib` ratio of two names, in the folder of a file and one folder down
+MIN_SIMILARITY = {"*": 0.6, "*/*": 0.8}
 Keys = tuple[str | int, ...]
 """Keys and list indices that lead to a value of the case."""
 CaseData = Mapping[str, Any]
@@ -31,7 +29,7 @@ class Mistake:
     file: str
     line: int  # from 1, 0 where it has none
     key: str  # dotted, empty where the file as a whole is wrong
-    value: str
+    value: str  # as written, shortened; "missing" where nothing is
     message: str  # what would be right
 
     def __str__(self) -> str:
@@ -70,7 +68,7 @@ def suggestion(name: str, known: Iterable[str], otherwise: str | None = None) ->
 
 def nearby(path: Path, suffix: str) -> str:
     """``; did you mean 'x'?``: the file with this suffix that was probably meant by ``path``, which
-    is not there; beside it, or one folder down. Empty where none has such a name."""
+    is not there; next to it, or one folder down. Empty where none has such a name."""
     name = path.name.removesuffix(suffix) + suffix
     folder = path.parent if path.parent.is_dir() else path.parent.parent
     for pattern, alike in MIN_SIMILARITY.items():

@@ -23,10 +23,10 @@ from .made_of import ConstructionParts, constructed, one_rubber
 from .parts import Outline, SectionSource
 from .stations import read_section_of
 
-FLANGE = 17.3e-3  # m, height of the rim's flange, contour J
-PRESSURE_KPA = 250.0  # where nothing says more
-LOAD_SHARES = (0.25, 0.5, 0.75, 1.0, 1.25)  # of what the tyre is rated for
-MAX_USUAL_LOAD_N = 6e4  # usual on the road
+FLANGE = 17.3e-3  # m, height of the rim's flange, contour J of ETRTO
+PRESSURE_KPA = 250.0  # where no size code gives one
+LOAD_SHARES = (0.25, 0.5, 0.75, 1.0, 1.25)  # of the size code's load
+MAX_USUAL_LOAD_N = 6e4  # the largest load that `validate` does not call unusual
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def from_size(
     size: TyreSize, lengths: Mapping[str, float], pressure_kPa: float | None, stem: str
 ) -> Draft:
     """A case with a section built from a size; ``lengths``: fields of Gauges that differ from the
-    usual, m. Raises InputError."""
+    usual, m; ``stem``: name of the section's file, without .csv. Raises InputError."""
     try:
         gauges = replace(usual(size, lengths.get("rim")), **lengths)
         table = build(size, gauges)
@@ -78,7 +78,7 @@ def from_size(
 
 
 def _rounded(load_N: float) -> float:
-    """Round to two digits."""
+    """Round to two significant digits."""
     return float(f"{load_N:.2g}")
 
 
@@ -86,7 +86,7 @@ def from_file(
     file: Path, size: TyreSize | None, belt: float | None, pressure_kPa: float | None
 ) -> Draft:
     """A case with the section in ``file``: a station table, or two curves with a belt of width
-    ``belt``, m. Raises InputError, OSError."""
+    ``belt``, m (None: usual). Raises InputError, OSError."""
     content = read_bytes(file)  # before others open it: it may be a pipe
     with _place_named(file):
         outline = _is_outline(file)
@@ -137,7 +137,8 @@ def _is_outline(file: Path) -> bool:
 
 
 def _outline_keys(file: Path, size: TyreSize | None, belt: float | None) -> dict[str, float]:
-    """Keys of an outline that its curves do not show: as far as known, else usual values."""
+    """Keys of an outline that its curves do not show, in m: as far as known, else usual values; the
+    belt is 3/4 as wide as the section."""
     from ..section.outline import read_outline
 
     curves = read_outline(file)

@@ -15,7 +15,7 @@ from ..templates import TemplateNames, environment, render
 from .case_text import plain_text
 
 NO_NUMBERS: Mapping[str, float] = MappingProxyType({})
-RANGE = 5.0  # a variable's bounds over its start, and under it
+RANGE = 5.0  # a variable's bounds are its start times and over this
 
 
 def own_case(
@@ -83,10 +83,12 @@ def _text(
     variables: Mapping[str, Sequence[str]],
     **more: Any,
 ) -> str:
-    """Text of the case file for a user's decks."""
+    """Text of the case file for a user's decks: plain ``numbers`` by path, ``marked`` ones by mark;
+    ``crown`` in ``more`` if they are in three dimensions."""
     env = environment("case", None)
     env.filters["text"] = plain_text
     all_numbers = {**numbers, **{f"deck.numbers.{name}": x for name, x in marked.items()}}
+    # a variable's scale is logarithmic: only positive numbers have one
     of_marks = {name: [f"deck.numbers.{name}"] for name, x in marked.items() if x > 0}
     names: TemplateNames = {
         "files": [deck.path.name for deck in decks],
@@ -115,7 +117,7 @@ def _variables(
     numbers: Mapping[str, float], cords: Mapping[str, str], materials: Sequence[str]
 ) -> dict[str, list[str]]:
     """Paths by the name of the variable that sets them: layers of one cord and area are one.
-    cords: the material of each layer."""
+    cords: the material of each layer. mu, mu1: shear moduli of Arruda-Boyce and Ogden."""
     by_name: dict[str, list[str]] = {}
     groups: dict[tuple[str, float], list[str]] = {}
     for path, value in numbers.items():

@@ -28,7 +28,7 @@ from .schema import Case, Road, TargetFootprint, TargetMode, Targets, Uncertaint
 
 UNIONS = (Union, UnionType)
 KINDS: dict[str, type[BaseModel]] = {"rubber": Rubber, "cord": Cord}
-SINGLE: dict[str, type[Part]] = {
+SINGLE: dict[str, type[Part]] = {  # parts with checks of their own, once in a case, by key
     "section": SectionSource,
     "deck": DeckSource,
     "rim": Rim,
@@ -66,7 +66,7 @@ def explain(
     error: ValidationError, start: Keys = (), known: Iterable[str] | None = None
 ) -> Iterator[tuple[Keys, str]]:
     """Keys and message of each mistake in the part at ``start`` of the case. For another file,
-    ``known``: its keys."""
+    ``known``: its keys, to suggest one for an unknown key."""
     for item in error.errors(include_url=False, include_input=False):
         keys, kind, context = (*start, *item["loc"]), item["type"], item.get("ctx", {})
         material: type[BaseModel] | None = None
@@ -115,7 +115,7 @@ def _plain(annotation: Any) -> Any:
 
 
 def fields_at(keys: Keys, material: type[BaseModel] | None = None) -> list[str]:
-    """Names of the fields of the part at ``keys``, for a material those of its kind."""
+    """Names of the fields of the part at ``keys``, of a material those of its type ``material``."""
     part = material if material and len(keys) == 2 else type_at(keys)
     return list(getattr(part, "model_fields", {}))
 

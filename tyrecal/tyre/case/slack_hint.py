@@ -12,8 +12,9 @@ import numpy as np
 from .loaded import LoadedCase
 from .parts import Cord
 
-TEXTILE_PA = 30e9  # Young's modulus below which a cord counts as textile
-MERIDIONAL_DEG = 45.0  # from the meridian: the carcass, and not the wires around a bead
+# Young's modulus below which a cord counts as textile: nylon and polyester have 3 to 10, steel 190
+TEXTILE_PA = 30e9
+MERIDIONAL_DEG = 45.0  # angles below it, from the meridian: a carcass, not wires around a bead
 
 
 def slack_cord_hint(case: LoadedCase) -> str:
@@ -53,6 +54,7 @@ def reaches_the_bead(case: LoadedCase, layer: str) -> bool:
     do."""
     own, section = case.case.rebar_layers[layer], case.section
     last = section.regions[-1][0]  # name of the region at the bead
-    there = section.points[section.names.index(own.line), -1, 0]  # r, m; NaN: the line ends before
+    # r, m, at the last station, the bead; NaN: the line ends before
+    there = section.points[section.names.index(own.line), -1, 0]
     ends_there = own.regions is None or last in own.regions
     return bool(ends_there and not np.isnan(there) and abs(own.angle_deg) < MERIDIONAL_DEG)

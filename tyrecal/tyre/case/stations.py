@@ -157,7 +157,8 @@ def _check_section(section: Section) -> None:
     for name, count in section.regions:
         if count < 1:
             raise SectionError(f"region '{name}' has no two stations: it needs one more")
-    reach = 1e3 * section.points[-1, 0, 0]  # mm; refuses inches, cm and m
+    # mm, of the outer surface at the crown; its limits refuse inches, cm and m
+    reach = 1e3 * section.points[-1, 0, 0]
     if not MIN_RADIUS_MM < reach < MAX_RADIUS_MM:
         raise SectionError(
             f"the tyre's outer radius is {reach:.3g} mm: r and z must be in mm, and a tyre's radius"

@@ -27,8 +27,8 @@ def start_values(loaded: LoadedCase) -> dict[str, float]:
 
 def overruled(loaded: LoadedCase, given: Collection[str] = ()) -> list[str]:
     """A sentence for every number in the case file that differs from the start of its variable: the
-    start counts, so editing that number alone changes nothing. Variables whose values are ``given``
-    are left out."""
+    start counts, so editing that number alone changes nothing. Variables in ``given``, names whose
+    values the user gave, are left out."""
     sentences = []
     for name, variable in loaded.case.variables.items():
         for path in [] if name in given else variable.sets:

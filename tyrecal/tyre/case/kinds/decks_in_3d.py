@@ -39,15 +39,16 @@ class DecksIn3D(UserDecks):
 
     def check_case(self, document: Document, numbers: Mapping[str, float]) -> None:
         """Record a crown that is no node set. Raises OwnDeckError for decks that cannot be run."""
-        if self.own.crown.rpartition(".")[2] not in self.own.node_sets:  # INSTANCE.SET
+        # in an assembly the crown is INSTANCE.SET
+        if self.own.crown.rpartition(".")[2] not in self.own.node_sets:
             hint = suggestion(self.own.crown, self.own.node_sets)
             document.add(("deck", "crown"), f"is no node set of the decks{hint}")
         else:
             self.own.check(numbers)
 
     def usual_lines(self, source: CaseData) -> dict[str, Any]:
-        """Keys that the case may leave out, with values. The decks contain how the rim is held, and
-        what is computed."""
+        """Keys that the case may leave out, with values; no pressure where a mark stands for it.
+        The decks contain how the rim is held, and what is computed."""
         pressure_kPa = self.own.pressure_Pa / 1e3 if self.own.pressures else None
         return lines_of_a_deck(source, pressure_kPa, name=self.own.path.stem, solver="abaqus")
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ..document import Document
     from ..mistakes import Mistake
 
-Change = Callable[[Any, float], Any]  # of a LoadedCase by the parameter of an effect
+Change = Callable[[Any, float], Any]  # LoadedCase and an effect's parameter to a LoadedCase
 
 
 class TyreKind:
@@ -36,10 +36,12 @@ class TyreKind:
     ``effect`` is a `tyre.effects.Effect`, ``tyre`` a `tyre.resolve.Tyre`.
     """
 
-    needs: ClassVar[frozenset[str]] = frozenset({"own_deck"})  # capabilities of a solver
-    names_its_parts: ClassVar[bool] = False  # those that effects change
+    # capabilities that a solver must have for such a tyre
+    needs: ClassVar[frozenset[str]] = frozenset({"own_deck"})
+    # whether the parts that effects change are known by its lines and regions, without deck.parts
+    names_its_parts: ClassVar[bool] = False
     units: Units = "m"  # of the texts that solvers get
-    idle: Mapping[str, str] = {}  # parameters of a deck, by path, that no number sets, and why
+    idle: Mapping[str, str] = {}  # numbers of a deck, by path, that a case may not set, and why
 
     @property
     def deck(self) -> OwnDeck:
@@ -62,7 +64,7 @@ class TyreKind:
         return self.source(case).numbers
 
     def flat(self, case: Case) -> SolverDeck:
-        """The section deck as solvers read it. Raises InputError for a tyre without one."""
+        """The section deck with the case's numbers and gauges. Raises InputError without one."""
         source = self.source(case)
         return self.deck.flat(source.numbers, source.thickened)
 
@@ -79,7 +81,7 @@ class TyreKind:
         return None
 
     def slips(self, data: CaseData) -> Iterable[Mistake]:
-        """Numbers of its deck's text that no tyre has, each at its line."""
+        """Unusual numbers of its deck's text, each at its line."""
         return ()
 
     def unusual(self, numbers: Mapping[str, float]) -> Mapping[str, str]:
@@ -143,11 +145,13 @@ class TyreKind:
         raise NotImplementedError
 
     def check_effect(self, effect: Any, case: Any) -> None:
-        """Raises ValueError if a `LoadedCase` of a deck cannot have half of an effect's range."""
+        """Raises ValueError if a `LoadedCase` of a deck cannot have the effect at half the upper
+        end of its range, or half the lower one if that is 0."""
         effect.of(case)(case, effect.high / 2 or effect.low / 2)
 
     def shape_uncertainty(self, effect: Any) -> Change | None:
-        """The effect with its second, uncertain number; a deck has none."""
+        """The change by the effect with its second, uncertain number one standard deviation off; a
+        deck has none."""
         return None
 
     def parts(self, case: Case, section: Section) -> tuple[Case, Mapping[str, str]]:

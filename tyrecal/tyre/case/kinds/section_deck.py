@@ -41,7 +41,7 @@ class SectionDeck(UserDecks):
 
     @property
     def idle(self) -> Mapping[str, str]:  # type: ignore[override]
-        """Parameters that set only the pressure, or nothing."""
+        """Parameters that set only the pressure, or nothing, and why they are not to be set."""
         return self.own.idle
 
     @property
@@ -64,16 +64,16 @@ class SectionDeck(UserDecks):
         return section(self.own.flat(data["deck"]["numbers"]))
 
     def slips(self, data: CaseData) -> Iterator[Mistake]:
-        """Radius and numbers of the deck that no tyre has."""
+        """Radius and numbers of the deck that are unusual, each at its line."""
         return deck_slips(self.own, data["deck"]["numbers"])
 
     def unusual(self, numbers: Mapping[str, float]) -> Mapping[str, str]:
-        """Why numbers are unusual beside all others."""
+        """Why numbers are unusual, given all others of the deck."""
         return dict(unusual_numbers(self.own, numbers))
 
     def check(self, tyre: Any) -> None:
         """Raises OwnDeckError for numbers with which the deck is no section."""
-        tyre.flat.text  # noqa: B018
+        tyre.flat.text  # noqa: B018  building it checks the numbers
 
     def check_with_solver(self, tyre: Any) -> None:
         """Raises OwnDeckError if the bundled solver refuses something."""
@@ -150,9 +150,9 @@ class SectionDeck(UserDecks):
 
 
 def pressure_in_deck(tyre: Any) -> float:
-    """The pressure of a resolved tyre in the unit of its deck; the deck's own number if it is
-    that."""
-    _, row, i = tyre.flat.model.pressure[0]
+    """The pressure of a resolved tyre in its deck's unit, mass / (length s^2); the deck's own
+    number if it is that."""
+    _, row, i = tyre.flat.model.pressure[0]  # data line, and place of the pressure in it
     units = tyre.written.kind.deck.units
     pressure = 1e3 * tyre.case.pressure_kPa * UNIT_LENGTH[units] / UNIT_MASS[units]
     own = float(row.number(i))
@@ -168,7 +168,7 @@ def trial(flat: SolverDeck) -> float:
     outcome = bundled.examine(flat.text, flat.long_term)
     if isinstance(outcome, float):
         return outcome
-    line, words = outcome
+    line, words = outcome  # of the flat deck, from 1
     raise OwnDeckError(_origin(flat, line - 1) or flat.lines[0][1], words)
 
 

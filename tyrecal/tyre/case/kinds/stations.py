@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ...section.section import Section
     from ..document import Document
 
-TREAD = "tread"  # the part of the crown that wears
+TREAD = "tread"  # part of the crown between the two outermost lines
 
 
 @dataclass(frozen=True)
@@ -37,13 +37,13 @@ class Stations(TyreKind):
     def read_section(
         self, document: Document, data: dict[str, Any], folder: Path
     ) -> Section | None:
-        """The section of the file that the case names."""
+        """The section of the file that the case names; None if it is wrong, mistakes added."""
         from ..stations import read_stations
 
         return read_stations(document, data, folder)
 
     def folds(self, data: CaseData, section: Section) -> str | None:
-        """Why no mesh fits at the chosen level."""
+        """Why no mesh fits at the chosen level, None if one does."""
         from ..checks import folds
 
         return folds(data, section)
@@ -88,6 +88,7 @@ class Stations(TyreKind):
         copies: dict[str, list[str]] = {}
         for i, solid in enumerate(case.solids):
             for region in solid.regions or names:
+                # name, and the two lines that bound it; None: the inner and the outer surface
                 pieces: list[tuple[str, list[str] | None]] = [(region, solid.between)]
                 if region == names[0] and solid.between is None:
                     pieces = [

@@ -55,6 +55,7 @@ def lines_of_a_deck(
     solver: str = "bundled",
 ) -> dict[str, Any]:
     """Keys that a case with a key ``deck`` may leave out, with values; None, "": not this key.
+    reference: r, z of the rim's node, m.
 
     The defaults are for a deck that is wrong: they only keep its case from being blamed for it.
     """
