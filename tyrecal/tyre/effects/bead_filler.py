@@ -10,7 +10,8 @@ from .edit import with_part, with_rubbers_at
 from .effect import Effect
 from .parts import carcass_line, held_regions, lower_sidewall, sidewall, stations, turned_up
 
-# standard deviation of a filler's height: fillers of one size reach 30 to 60 mm above the rim
+# standard deviation of a filler's height: fillers of one size reach 30 to 60 mm above the rim, all
+# heights alike 30 mm / sqrt(12) = 9
 HIGHER_m = 0.010
 
 
@@ -26,7 +27,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 def higher(case: LoadedCase, value: float) -> LoadedCase:
     """The same with a filler that reaches `HIGHER_m` further up: the region above gets stiffer by
     the share of its length that the filler covers. Raises InputError if no region is above."""
-    top = stations(case.section, _place(case)[0][0])[0]
+    top = stations(case.section, _place(case)[0][0])[0]  # first station of the upper region
     above = [name for name in sidewall(case) if stations(case.section, name)[1] == top]
     if not above:
         raise InputError("must be 0: no region of the sidewall is above the filler")

@@ -68,10 +68,10 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 @lru_cache(maxsize=8)
 def _let_go(section: Section, carcass: str, bead: str, gap: str, share: float) -> Section:
-    """The section with region ``gap`` above ``bead``, of a share of its length along the carcass;
-    both have as many stations as the bead had."""
+    """The section with region ``gap`` above ``bead``, of a share of its length along the carcass,
+    not held; both have as many stations as the bead had."""
     first, last = stations(section, bead)
-    whole = fill_lines(section)[:, first : last + 1].swapaxes(0, 1)
+    whole = fill_lines(section)[:, first : last + 1].swapaxes(0, 1)  # (station, line, 2)
     along = length_along(whole[:, section.names.index(carcass)])
     count = last - first
     edge = (share + LEAST * (1 - share)) * along[-1]

@@ -11,7 +11,7 @@ from .parts import belts
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
-    """Every belt cord ``value`` degrees further from the circumference, mirrored as before."""
+    """Every belt cord ``value`` degrees further from the circumference, on the side where it is."""
     moved = {}
     for name in belts(case):
         layer = case.case.rebar_layers[name]
@@ -21,7 +21,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 def _turned(name: str, angle_deg: float, value: float) -> float:
     """A belt cord's angle, degrees, ``value`` further from the circumference. Raises InputError."""
-    angle = angle_deg % 180  # a cord has no head
+    angle = angle_deg % 180  # from the meridian; a cord has no head
     if not 0 < abs(90 - angle) + value < 90:
         raise InputError(
             f"must leave a belt cord between circumference and meridian, '{name}' is"
@@ -41,7 +41,8 @@ EFFECT = Effect(
     title="Belt cord angle",
     symbol="da",
     unit="degrees",
-    # a lift of 2 % in the mould turns cords from 20 to 17 degrees (cos a ~ R)
+    # a lift of 2 % in the mould turns cords from 20 to 17 degrees: cos a ~ R, a from the
+    # circumference
     low=-3.0,
     high=3.0,
     changes=("*REBAR LAYER",),

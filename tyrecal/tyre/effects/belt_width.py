@@ -34,7 +34,8 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 @lru_cache(maxsize=8)
 def _slid(section: Section, line: int, edge: int, end: int, distance: float) -> Section:
-    """Stations slid along the section: not at the crown, ``distance`` at ``edge``, not at ``end``.
+    """Stations slid along the section: not at the crown, ``distance`` (m) at ``edge``, not at
+    ``end``, indices of stations; ``line``: index of the carcass' line, along which that is.
 
     Lines from end to end slide along themselves; what ends between them keeps its share of the
     distance from the carcass to the surface, so the tyre's shape and gauges stay.
@@ -46,7 +47,7 @@ def _slid(section: Section, line: int, edge: int, end: int, distance: float) -> 
     move = np.zeros_like(filled)
     for k in np.flatnonzero(whole):
         move[k] = CubicSpline(at, filled[k])(slid) - filled[k]
-    for k in np.flatnonzero(~whole):
+    for k in np.flatnonzero(~whole):  # between the nearest whole lines
         inner, outer = np.flatnonzero(whole[:k])[-1], k + np.flatnonzero(whole[k:])[0]
         span = filled[outer] - filled[inner]
         share = np.sum((filled[k] - filled[inner]) * span, -1) / np.sum(span * span, -1)

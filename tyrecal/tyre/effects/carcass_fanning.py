@@ -14,8 +14,9 @@ from .parts import carcass, carcass_line, rim_edge
 def add(case: LoadedCase, value: float) -> LoadedCase:
     """A share ``value`` of the carcass' cords at a constant angle, the rest at constant spacing.
 
-    A/s = A/s0 (1 - value + value R_bead / R). Equal at the bead, because a tyre's specification
-    states the spacing on the building drum, of about the bead's diameter.
+    A/s = A/s0 (1 - value + value R_bead / R), R_bead at the first station that the rim holds.
+    Equal there, because a tyre's specification states the spacing s0 on the building drum, of about
+    the bead's diameter.
     """
     if not 0 < value <= 1:
         raise InputError("must be between 0 and 1")

@@ -18,7 +18,8 @@ from .parts import carcass, carcass_line, held_regions, lower_sidewall, present,
 def add(case: LoadedCase, value: float) -> LoadedCase:
     """The carcass once more, ``value`` times as stiff and heavy, up to the widest point.
 
-    It is on the next line outside the carcass, and this line continues to the bead.
+    It is on the line next to the outer surface, and this line continues to the bead; other layers
+    on it stay where they were.
     """
     if not value > 0:
         raise InputError("must be at least 0")
@@ -43,14 +44,15 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
             line=outside,
             regions=regions,
             area_m2=value * layer.area_m2,
-            angle_deg=0.0 - layer.angle_deg,
+            angle_deg=0.0 - layer.angle_deg,  # the ply is folded over
         )
     return with_layers(case, layers)
 
 
 @lru_cache(maxsize=8)
 def _continued(section: Section, line: str, regions: tuple[str, ...]) -> Section:
-    """The section with a line that is there in some regions too, where meshes run it already."""
+    """The section with a line that is there in ``regions`` too, at the points that `fill_lines`
+    gives it in a mesh."""
     place = section.names.index(line)
     points, filled = section.points.copy(), fill_lines(section)
     where = np.zeros(points.shape[1], bool)

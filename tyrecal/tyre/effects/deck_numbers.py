@@ -12,14 +12,14 @@ from ..own_deck.solver_deck import SolverDeck
 from ..own_deck.text import OwnDeckError
 from .edit import changed, with_part
 
-Change = Callable[[str, float], float]  # of a number, by its field's or its layer's name
+Change = Callable[[str, float], float]  # a field's or a layer's name and a number to a new one
 
 
 def stiffer(factor: float, bulk: bool) -> Change:
-    """Shear constants times a factor; with ``bulk`` its modulus too."""
+    """Shear constants times a factor; with ``bulk`` the bulk modulus 2 / D1 too."""
 
     def change(field: str, number: float) -> float:
-        if modulus_sign(field) < 0:
+        if modulus_sign(field) < 0:  # D1; 1: a shear constant; 0: none of these
             return number / factor if bulk else number
         return factor * number if modulus_sign(field) else number
 
@@ -49,7 +49,8 @@ def with_compounds(case: LoadedCase, part: str, option: str, change: Change) -> 
 
 def with_prony(case: LoadedCase, shear: float, tau_s: float) -> LoadedCase:
     """The case with one Prony term in all compounds, which leaves the relaxed state and makes what
-    is faster than ``tau_s`` ``shear`` times as stiff in shear. Raises InputError."""
+    is faster than ``tau_s`` ``shear`` times as stiff in shear: G0 = G_relaxed / (1 - g). Raises
+    InputError."""
     numbers, flat, _ = _read(case, "")
     long_term: set[str] = set()
     material = ""
@@ -72,7 +73,7 @@ def with_prony(case: LoadedCase, shear: float, tau_s: float) -> LoadedCase:
 
 
 def stresses(case: LoadedCase) -> list[str]:
-    """Paths of the moduli of all materials. Raises InputError where one has none, but marks."""
+    """Paths of all materials' moduli, except D1. Raises InputError where one has only marks."""
     numbers, flat, _ = _read(case, "")
     result = []
     for name in dict.fromkeys((*flat.materials, *(ply.material for ply in flat.plies))):
@@ -98,7 +99,7 @@ def with_angles(case: LoadedCase, part: str, change: Change) -> LoadedCase:
 
 
 def with_thickness(case: LoadedCase, part: str, factor: float) -> LoadedCase:
-    """The case with a part so many times as thick. Raises InputError."""
+    """The case with a part, tread or sidewall, so many times as thick. Raises InputError."""
     numbers, flat, sets = _read(case, part)
     deck = case.kind.source(case.case)
     _known(part, sets, [name.upper() for name in flat.sections])
@@ -112,6 +113,7 @@ def with_thickness(case: LoadedCase, part: str, factor: float) -> LoadedCase:
 
 
 def _read(case: LoadedCase, part: str) -> tuple[dict[str, float], SolverDeck, list[str]]:
+    """The deck's numbers by path or mark, the flat deck, and the sets of a part, in capitals."""
     numbers = dict(case.deck_numbers)
     return numbers, case.kind.deck.flat(numbers), case.kind.source(case.case).sets(part)
 

@@ -22,7 +22,7 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     long_term = analysis.static_moduli == "long_term"
 
     def stiffened(m: Rubber) -> Rubber:
-        """The same static state, its vibration as one Prony term: G'/G0 = 1/(1 - g)."""
+        """The same static state, its vibration as one Prony term: G'/G_static = 1/(1 - g)."""
         static, ratio = zip(*(_moduli(m, k, long_term, analysis) for k in "gk"), strict=True)
         shear, bulk = ratio[0] * (1 + value), ratio[1]
         if not (shear >= 1 and bulk >= 1):
@@ -58,7 +58,8 @@ def add_to_deck(case: LoadedCase, value: float) -> LoadedCase:
 def _moduli(m: Rubber, share: str, long_term: bool, analysis: Analysis) -> tuple[float, float]:
     """The static modulus over the given constants', and the vibration's over the static one.
 
-    share: g (shear) or k (bulk). G'(w)/G0 = 1 - sum g + sum g w^2 tau^2 / (1 + w^2 tau^2).
+    share: g (shear) or k (bulk); long_term: whether the static state is relaxed. Of the
+    instantaneous modulus G0: G'(w)/G0 = 1 - sum g + sum g w^2 tau^2 / (1 + w^2 tau^2).
     """
     terms = [(getattr(term, share), term.tau_s) for term in m.prony]
     relaxed = 1 - sum(g for g, _ in terms)

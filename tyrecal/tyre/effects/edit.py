@@ -14,17 +14,18 @@ P = TypeVar("P", bound=Part)
 
 
 def changed(loaded: LoadedCase, **parts: Any) -> LoadedCase:
-    """The case with whole parts of it (``materials=...``) replaced, and judged."""
+    """The case with whole parts of it (``materials=...``) replaced, and checked by the schema.
+    Raises pydantic's ValidationError, a ValueError."""
     return replace(loaded, case=Case.model_validate({**loaded.case.__dict__, **parts}))
 
 
 def with_part(part: P, **values: Any) -> P:
-    """A part of the case with some of its values replaced, and judged."""
+    """A part of the case with some of its values replaced, checked as in `changed`."""
     return type(part).model_validate({**part.__dict__, **values})
 
 
 def unused(name: str, taken: Iterable[str]) -> str:
-    """``name``, or with a number behind it where a deck could not tell it from one taken."""
+    """``name``, or with a number, 2 on, behind it where a deck could not tell it from one taken."""
     known = {other.casefold().replace("-", "_") for other in taken}
     count = 2
     new = name
@@ -89,7 +90,8 @@ def with_layers(loaded: LoadedCase, layers: Mapping[str, Any]) -> LoadedCase:
 
 
 def on_spindle(loaded: LoadedCase, key: str, compliance: float) -> LoadedCase:
-    """The case with that much more compliance at the rim's reference point. Raises InputError."""
+    """The case with that much more compliance at the rim's reference point, in the unit of the
+    ``key`` of ``rim.spindle``. Raises InputError."""
     rim = loaded.case.rim
     if rim.free:
         raise InputError("must be 0 where the rim is free: there is no spindle")

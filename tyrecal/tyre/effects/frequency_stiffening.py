@@ -15,8 +15,8 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
     """Each mode's shear modulus times (f / f_ref)^value, at the mode's frequency f.
 
     f_ref is each rubber's ``reference_frequency_Hz`` (60 Hz): a tilt over the modes, no level.
-    By causality a modulus ~ f^a loses at least tan(pi a / 2): a smaller stated loss factor is
-    raised to that.
+    By causality (Kramers-Kronig) a modulus ~ f^a has a loss factor of at least tan(pi a / 2): a
+    smaller stated one is raised to that.
     """
 
     def stiffening(m: Rubber) -> Rubber:

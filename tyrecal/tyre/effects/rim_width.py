@@ -48,12 +48,13 @@ def _mounted(section: Section, line: int, start: int, end: int, distance: float)
     lever = np.column_stack([np.ones(len(middle)), (middle - middle.mean(0)) / length.sum()])
 
     def turned(moment: Array) -> tuple[Array, Array]:
-        """Angle at each station (n,), rad, and its displacement (n, 2), m."""
+        """Angle at each station (n,), rad, and its displacement (n, 2), m; moment: a, b, c."""
         phi = np.concatenate([[0.0], np.cumsum(lever @ moment * length / length.sum())])
         new = _rotated(step, (phi[1:] + phi[:-1]) / 2)
         return phi, np.concatenate([np.zeros((1, 2)), np.cumsum(new - step, axis=0)])
 
     def miss(moment: Array) -> Array:
+        """Error of the end (3,): its place over the length, r and z, and its angle, rad."""
         phi, moved = turned(moment)
         return np.append((moved[-1] - [0.0, distance]) / length.sum(), phi[-1])
 

@@ -11,8 +11,8 @@ from .effect import Effect
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
-    """Stiffness of rubber (C10, C01) and cords (E) times 1 + value, in a sector of the case's
-    width."""
+    """Stiffness of rubber (C10, C01) and cords (E) times 1 + value, in the sector that the case's
+    ``splice`` places."""
     numbers = []
     for name, material in case.case.materials.items():
         rubber = isinstance(material, Rubber)

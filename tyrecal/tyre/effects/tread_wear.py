@@ -12,7 +12,8 @@ from .edit import with_gauge
 from .effect import Effect
 from .parts import crown, stations, tread
 
-UNEVEN = 0.2  # less in the middle, twice that more at the shoulders: 3 mm are 2.4 to 4.2 mm across
+# share of the wear: less by it in the middle, twice that more at the shoulders: of 3 mm, 2.4 to 4.2
+UNEVEN = 0.2
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
@@ -40,7 +41,7 @@ def at_shoulders(case: LoadedCase, value: float) -> LoadedCase:
     last = max(stations(section, name)[1] for name in crown(case))
     inner = section.names.index(tread(case)[0])
     base = fill_lines(section)[inner, : last + 1]
-    across = 3 * (base[:, 1] / base[-1, 1]) ** 2 - 1
+    across = 3 * (base[:, 1] / base[-1, 1]) ** 2 - 1  # of z over the edge's: its mean is 0
     left = 1 - UNEVEN * value / (1 - value) * across
     points = section.points.copy()
     points[inner + 1 :, : last + 1] = (

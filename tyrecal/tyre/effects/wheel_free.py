@@ -9,7 +9,7 @@ from .effect import Effect
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
-    """Nothing holds the rim; its mass is 1 / ``value``, its radii of gyration are the case's.
+    """Nothing holds the rim; its mass is 1 / ``value``, kg, its radii of gyration are the case's.
 
     At value -> 0 the wheel is so heavy that it does not move.
     """
