@@ -20,9 +20,10 @@ class Assembly:
     root: Scope = field(default_factory=Scope)
     others: list[tuple[Block, str]] = field(default_factory=list)  # sections, rigid bodies, ...
     surfaces: dict[str, tuple[Block, str]] = field(default_factory=dict)
-    instance_nodes: dict[int, tuple[str, int]] = field(default_factory=dict)  # name, own number
+    # number in the model to the instance's name and the number in its part
+    instance_nodes: dict[int, tuple[str, int]] = field(default_factory=dict)
     shifts: dict[str, Point] = field(default_factory=dict)  # of instances, by their prefix
-    reflect: Block | None = None
+    reflect: Block | None = None  # the *SYMMETRIC MODEL GENERATION that makes a half whole
 
     def of(self, *names: str) -> list[tuple[Block, str]]:
         """Blocks of these keywords in their order, each with its prefix."""
@@ -31,7 +32,7 @@ class Assembly:
 
 @dataclass
 class DeckPart:
-    """A *PART."""
+    """A *PART; instances: by name, numbers of nodes and of elements in the model by its own."""
 
     block: Block
     scope: Scope
@@ -40,7 +41,7 @@ class DeckPart:
 
 
 def collect(blocks: Sequence[Block]) -> Assembly:
-    """The deck's. Raises OwnDeckError."""
+    """The assembly of a deck's model blocks. Raises OwnDeckError."""
     made, parts = Assembly(), dict[str, DeckPart]()
     part: DeckPart | None = None
     instance: Block | None = None
@@ -82,7 +83,8 @@ def collect(blocks: Sequence[Block]) -> Assembly:
 
 
 def _instance(made: Assembly, parts: dict[str, DeckPart], block: Block) -> None:
-    """Put a part's nodes, elements, sets and options in the model under INSTANCE.NAME."""
+    """Put a part's nodes, elements, sets and options in the model under INSTANCE.NAME; numbers that
+    are taken there go up by the model's largest."""
     name, part = block.need("NAME"), parts[block.need("PART")]
     if any(name in each.instances for each in parts.values()):
         raise block.refused(f"the instance {name} is defined twice")
@@ -118,6 +120,7 @@ def _renumbered(members: Members, numbers: dict[int, int]) -> Members:
 
 
 def _other(made: Assembly, block: Block, prefix: str, parts: dict[str, DeckPart]) -> None:
+    """Put a block into the assembly that is no mesh keyword, or a set of an instance's members."""
     name = block.name
     if name in ("NSET", "ELSET"):  # of an instance, from outside it
         for part in parts.values():

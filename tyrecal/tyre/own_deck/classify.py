@@ -20,7 +20,7 @@ class ClassifiedDeck:
     """The blocks of a deck by what they are."""
 
     model: list[Block] = field(default_factory=list)
-    options: dict[Block, list[Block]] = field(default_factory=dict)  # of materials and sections
+    options: dict[Block, list[Block]] = field(default_factory=dict)  # by material or section
     inflation: list[Block] = field(default_factory=list)  # of the step that inflates
     passed: list[Block] = field(default_factory=list)  # requests of output, which change nothing
     contact: list[Block] = field(default_factory=list)  # superfluous where the bead is held
@@ -37,7 +37,7 @@ def classify(blocks: Sequence[Block]) -> ClassifiedDeck:
     for block in _acting(model, deck):
         name = block.name
         check_honoured(block, "deck")
-        rule = table.RULES[name]
+        rule = table.RULES[name]  # ABAQUS' manual on the keyword
         deck.model.append(block)
         if not rule.under:
             over = block
@@ -133,7 +133,7 @@ def _step(step: list[Block], deck: ClassifiedDeck, is_inflation: bool) -> None:
 
 
 def _check_amplitudes(deck: ClassifiedDeck, blocks: Sequence[Block], static: Block) -> None:
-    """Refuse an amplitude that does not end at its full size."""
+    """Refuse an amplitude that is not 1 at the end of the step's time (by default 1)."""
     tables = {block.need("NAME"): block for block in deck.model if block.name == "AMPLITUDE"}
     for block in blocks:
         name = block.get("AMPLITUDE")

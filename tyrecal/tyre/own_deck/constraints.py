@@ -14,13 +14,15 @@ from .surfaces import rigid_nodes, rigid_pieces, surface_nodes
 from .text import Block, Row
 
 MERGED = 1e-6  # of the section's size: nodes closer than this are one where they are tied
-# at the middle of a half: u_z and twist change their sign from one half to the other
+# ABAQUS' degrees of freedom of a section: 1 r, 2 z, 5 twist about the axle, 6 turn in its plane.
+# At the middle of a half u_z and twist change their sign from one half to the other
 HELD_BY_SYMMETRY = {2, 4, 5, 6}
 
 
 @dataclass(frozen=True, eq=False)
 class EmbeddedElements:
-    """An *EMBEDDED ELEMENT some of whose nodes are no rubber's: elements of each data line."""
+    """An *EMBEDDED ELEMENT some of whose nodes are no rubber's: elements of each data line;
+    hosts: elements of the rubber that it is in."""
 
     block: Block
     hosts: tuple[int, ...]
@@ -29,7 +31,7 @@ class EmbeddedElements:
 
 @dataclass(frozen=True, eq=False)
 class RigidBody:
-    """A *RIGID BODY: its reference node, the nodes that it holds, and its surfaces by name."""
+    """A *RIGID BODY: its reference node, the nodes that it holds, and its surfaces' names."""
 
     block: Block
     reference: int
@@ -40,10 +42,10 @@ class RigidBody:
 class Constraints:
     """Constraints of a deck, in its own unit of length.
 
-    rim: nodes that it holds; reference: its node; same: node to the node that it is one with;
-    guests: embedded nodes where the rubber has none; bodies: rigid ones; motions: displacements of
-    reference nodes of those that only touch, by degree of freedom, 1: r, 2: z; near: distance up to
-    which nodes are in one place. Raises OwnDeckError.
+    rim: nodes that it holds; reference: its node and place, None without a rigid rim; same: node to
+    the node that it is one with; guests: embedded nodes where the rubber has none; bodies: rigid
+    ones; motions: displacements of reference nodes of those that only touch, by degree of freedom,
+    1: r, 2: z; near: distance up to which nodes are in one place. Raises OwnDeckError.
     """
 
     def __init__(self, made: Assembly, deck: ClassifiedDeck):
@@ -78,6 +80,7 @@ class Constraints:
             self.reference = body.reference, self.root.nodes[body.reference]
 
     def _rigid(self, block: Block, prefix: str) -> None:
+        """A rigid body: the nodes that it holds, and the surfaces that move with it."""
         name = block.need("REF NODE")
         reference = self.root.nodes.members(prefix + name, block)
         if len(reference) != 1:
@@ -218,6 +221,7 @@ class Constraints:
                 self.motions[n][freedom] = size
 
     def on_plane(self, point: Point) -> bool:
+        """Whether a point is its own mirror image, in the middle plane of a half."""
         assert self.made.reflect
         r, z = mirror_of(self.made.reflect)(point)
         return max(abs(r - point[0]), abs(z - point[1])) <= self.near

@@ -21,14 +21,14 @@ from .text import Block, Row
 
 TOUCHING = 0.01  # of the section's size: a node that near to the rim touches it
 PUSHED = 0.1  # of the section's size: how far a rim pushes nodes of a bead that it is mounted on
-MAX_NAMES = 100
+MAX_NAMES = 100  # SEATED, SEATED_2, ... of sets that are proposed
 MAX_DISTANCES = 5_000_000  # nodes times segments of a pair
 Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Nodes that may touch a rigid surface."""
+    """Nodes that may touch a rigid surface; row: the data line of a *CONTACT PAIR, else None."""
 
     block: Block
     row: Row | None
@@ -45,7 +45,7 @@ class DeckContact:
         self.made, self.blocks, self.tied, self.root = made, blocks, tied, made.root
         rubber = self.root.rubber_nodes()
         points = np.array([self.root.nodes[n] for n in rubber])
-        self.middle = points[:, 0].min() / 2 + points[:, 0].max() / 2
+        self.middle = points[:, 0].min() / 2 + points[:, 0].max() / 2  # r; a rim is below it
         self.size = float(np.ptp(points, axis=0).max())
 
     def left_out(self) -> tuple[str, ...]:

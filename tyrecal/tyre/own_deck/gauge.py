@@ -39,7 +39,7 @@ def thickened(model: DeckModel, factors: Gauges) -> DeckModel:
 
 @lru_cache(maxsize=8)
 def _growth(model: DeckModel, sets: Sets) -> Mapping[int, Point]:
-    """Displacement of the part's nodes as it becomes twice as thick."""
+    """Displacement (r, z) of the part's nodes as it becomes twice as thick, in the deck's unit."""
     sections = [s for s in model.solids if s.name.upper() in sets]
     own = {n for section in sections for n in section.elements}
     held, pressed = set(model.rim), {face[:2] for face in model.cavity}
@@ -72,6 +72,6 @@ def _growth(model: DeckModel, sets: Sets) -> Mapping[int, Point]:
 
 
 def _segments(model: DeckModel, faces: Sequence[Face]) -> Array:
-    """Straight pieces (s, 2, 2) of faces, the solid on their left."""
+    """Straight pieces (k, 2, 2) of faces: start and end, r and z; the solid on their left."""
     pairs = [pair for _, _, nodes in faces for pair in pairwise(nodes)]
     return np.array([[model.nodes[n] for n in pair] for pair in pairs])

@@ -20,7 +20,7 @@ from .text import Block, OwnDeckError, Place, number_from, read_blocks, table
 Units = Literal["m", "mm"]
 UNIT_LENGTH = {"m": 1.0, "mm": 1e-3}  # of a unit of length, m
 UNIT_MASS = {"m": 1.0, "mm": 1e3}  # of a unit of mass, kg: mm, t, s, MPa
-# of tyres' materials: kg/m3, or t/mm3
+# lowest and highest of tyres' materials: kg/m3, or t/mm3
 DENSITIES: dict[Units, tuple[float, float]] = {"m": (300.0, 2e4), "mm": (3e-10, 2e-8)}
 # keywords whose numbers change neither the mesh nor what holds or presses it
 OF_NO_MESH = {*table.MATERIAL_OPTIONS, "REBAR LAYER", "PARAMETER", "AMPLITUDE"}
@@ -34,12 +34,13 @@ class OwnDeck:
     units: Units
     blocks: tuple[Block, ...]
     texts: Mapping[str, str]  # of its files, by name relative to its folder
+    # the last filled block at each place, and the last models by the blocks of their mesh
     _filled: dict[int, Block] = field(default_factory=dict, repr=False)
     _models: dict[tuple[Block, ...], DeckModel] = field(default_factory=dict, repr=False)
 
     @cached_property
     def places(self) -> dict[str, tuple[int, int, int]]:
-        """Paths of its plain numbers, to block, row and field."""
+        """Paths of its plain numbers, to block, row and field; field -1: a *PARAMETER's value."""
         return numbers_of.paths(self.blocks)
 
     @cached_property

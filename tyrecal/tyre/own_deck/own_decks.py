@@ -20,7 +20,7 @@ JOB_FILE = re.compile(r"[A-Za-z0-9_\-]{1,60}\.inp", re.IGNORECASE)  # a file tha
 PRESSURE_MARK = "pressure"  # filled with the case's pressure
 MARK_IT = f"write {{{{ {PRESSURE_MARK} }}}} in its place"
 PRESSURE_DOF = "8"  # of a fluid cavity's reference node
-NO_PRESSURE = "HP", "NU"  # in the names of loads that differ from place to place
+NO_PRESSURE = "HP", "NU"  # in the names of hydrostatic and non-uniform loads
 OF_VOLUMES = re.compile(r"C3D|CCL|DC3D|(SF)?M(3D|CL)|S\d")  # types of elements in 3-D
 CONTINUES = {"SYMMETRIC MODEL GENERATION", "SYMMETRIC RESULTS TRANSFER", "IMPORT"}
 
@@ -55,7 +55,7 @@ class OwnDecks:
 
     @cached_property
     def marks(self) -> dict[str, Block]:
-        """But the pressure's."""
+        """Marks except the pressure's, each with its block."""
         by_name = {name: block for deck in self.decks for name, block in deck.marks.items()}
         return {name: block for name, block in by_name.items() if name != PRESSURE_MARK}
 
@@ -119,7 +119,7 @@ class OwnDecks:
 
     @cached_property
     def pressures(self) -> list[tuple[OwnDeck, Row, int, float]]:
-        """Where a pressure stands, and how large it is over the largest of them.
+        """Deck, data line and field of each pressure, and its share of the largest, with its sign.
 
         Empty where `PRESSURE_MARK` says where. Raises OwnDeckError where it cannot be told.
         """
@@ -147,7 +147,7 @@ class OwnDecks:
         return [deck.with_numbers(known) for deck in self.decks]
 
     def _known(self, numbers: Mapping[str, float], pressure_Pa: float) -> dict[str, float]:
-        """Numbers, and the pressure in the decks' own units."""
+        """Numbers, and the pressure in the decks' unit, mass / (length s^2)."""
         own = pressure_Pa * UNIT_LENGTH[self.units] / UNIT_MASS[self.units]
         return {**numbers, PRESSURE_MARK: own}
 

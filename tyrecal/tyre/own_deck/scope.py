@@ -17,8 +17,9 @@ Content = TypeVar("Content")
 CORNERS_OF = {3: 3, 4: 4, 6: 3, 8: 4}  # of solids by their number of nodes
 FARTHEST = 1e9  # coordinate, in any unit
 MOST = 200_000  # nodes or elements that a deck generates
+# beginnings of ABAQUS' types of elements: solids with twist, membranes with twist, rigid lines
 SOLID, PLIES, RIGID = "CGAX", ("SFMGAX", "MGAX"), "RAX"
-BEGINNINGS = (SOLID, *PLIES, RIGID)  # of the types of elements
+BEGINNINGS = (SOLID, *PLIES, RIGID)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +55,7 @@ class MeshTable(dict[int, Content]):
         super().__init__()
         self.what, self.keyword = what, {"node": "NSET", "element": "ELSET"}[what]
         self.sets: dict[str, list[tuple[Block, Members]]] = {}
-        self._asked: list[str] = []
+        self._asked: list[str] = []  # sets whose members are being looked up
 
     def members(self, name: str, block: Block, row: Row | None = None) -> list[int]:
         """Numbers in a set, or the number that a name is. Raises OwnDeckError."""
@@ -94,7 +95,8 @@ class Scope:
 
     nodes: MeshTable[Point] = field(default_factory=lambda: MeshTable("node"))
     elements: MeshTable[Element] = field(default_factory=lambda: MeshTable("element"))
-    system: tuple[Point, Point] = (0.0, 0.0), (1.0, 0.0)  # origin, direction of its first axis
+    # of *SYSTEM: origin, and direction of its first axis
+    system: tuple[Point, Point] = (0.0, 0.0), (1.0, 0.0)
 
     def rubber_nodes(self) -> set[int]:
         """Nodes of the solids."""
@@ -127,8 +129,8 @@ def label_lines(numbers: Sequence[int]) -> list[str]:
 
 
 def mirror_of(block: Block) -> Callable[[Point], Point]:
-    """The mirror image about a line through two points, r, z, 0 each; on the first line, or on
-    two."""
+    """The mirror image about a line through two points, r, z, 0 each, on one data line or on
+    two. Raises OwnDeckError."""
     values = [row.number(i, 0.0) for row in block.rows for i in range(len(row.fields))]
     if len(block.rows) == 2 and all(len(row.fields) <= 3 for row in block.rows):
         values = [row.number(i, 0.0) for row in block.rows for i in range(3)]

@@ -33,7 +33,8 @@ class OwnDeckMesh(SectionMesh):
         return list(self.deck.mesh.outer)
 
     def grid(self) -> tuple[Array, Array]:
-        """Corner nodes, and where the four of each element stand among them."""
+        """Corner nodes, and the places (element, 4) of each element's among them; the third corner
+        of a triangle twice."""
         quads = [(*nodes[:c], *[nodes[2]] * (4 - c)) for nodes, c in self._corners()]
         nodes, places = np.unique(np.array(quads), return_inverse=True)
         return nodes, places.reshape(-1, 4)
@@ -112,7 +113,8 @@ def section_mesh(flat: SolverDeck) -> OwnDeckMesh:
 
 
 def section(flat: SolverDeck) -> Section:
-    """The half of positive z, of its inner and its outer surface."""
+    """The half of positive z, of its inner and its outer surface; each rubber's name is that of a
+    region over all of it, and held is what is no further from the axle than the rim's nodes."""
     mesh = flat.mesh
     lines = []
     for path in (mesh.inner, mesh.outer):

@@ -18,15 +18,15 @@ from .text import Block, Place, Row, fields
 
 @dataclass(frozen=True, eq=False)
 class RebarPly:
-    """A rebar layer as it is found."""
+    """A rebar layer of the user's deck, with its names there."""
 
     name: str
-    set_name: str
+    set_name: str  # of its section's elements
     material: str
     area_m2: float
-    spacing: float  # m, or degrees
+    spacing: float  # m; degrees round the axle if angular
     angular: bool
-    angle_deg: float
+    angle_deg: float  # from the meridian
     elements: tuple[int, ...]  # numbers in the flat deck
 
 
@@ -36,12 +36,12 @@ class SolverDeck:
 
     mesh: SolverMesh
     lines: tuple[Line, ...]
-    materials: tuple[str, ...]  # of the solid sections, by their place
-    sections: tuple[str, ...]  # their sets, likewise
+    materials: tuple[str, ...]  # the user's names, of the solid sections in order
+    sections: tuple[str, ...]  # the user's sets of these sections, likewise
     plies: tuple[RebarPly, ...]
     pressure_Pa: float
     long_term: bool  # whether the moduli of the step that inflates are
-    blocks: ClassifiedDeck
+    blocks: ClassifiedDeck  # the user's, in the deck's own units, as is the model
     model: DeckModel
 
     @property
@@ -127,7 +127,7 @@ class _Writer:
         self.line(head, block.place)
         scales = {}
         for field, i, j in fields.placed_fields(block):
-            L, M = fields.DIMENSIONS.get(field.unit, (0, 0))
+            L, M = fields.DIMENSIONS.get(field.unit, (0, 0))  # powers of length and mass
             scales[i, j] = self.length**L * self.mass**M
         for i, row in enumerate(block.rows):
             texts = list(row.fields)
@@ -211,8 +211,9 @@ def _materials(deck: ClassifiedDeck) -> dict[str, Block]:
 
 
 def _layer_of(block: Block, row: Row) -> Block:
-    """A line of *REBAR as a *REBAR LAYER. A spacing that is measured at a radius grows in
-    proportion to the radius, unless the cords lie round the tyre: it is an angle."""
+    """A line of *REBAR (elements, area, spacing, angle, radius) as a *REBAR LAYER. A spacing that
+    is measured at a radius grows in proportion to the radius, unless the cords lie round the tyre:
+    it is an angle."""
     angle, radius, spacing = row.number(3, 0.0), row.number(4, 0.0), row.text(2, "1.")
     is_fanned = radius != 0 and abs(angle) % 180 != 90
     if is_fanned:

@@ -17,7 +17,7 @@ from .scope import Point, label_lines
 from .surfaces import Face
 from .text import Block, OwnDeckError, Place
 
-REFERENCE_NODE = 900001
+REFERENCE_NODE = 900001  # far above the other nodes' numbers, from 1 to their count
 Line = tuple[str, Place]  # of the flat deck, and the place in the user's that it comes from
 OVER_THE_BELT = 0.94  # of the largest radius: nodes of the outer surface beyond are the crown's
 
@@ -131,7 +131,7 @@ def solver_mesh(model: DeckModel, length: float) -> SolverMesh:
 
 
 def _around(boundary: Sequence[Face], inner: Sequence[int]) -> list[int]:
-    """The boundary that the inner surface is part of, along that."""
+    """Nodes of the closed boundary that the inner surface is part of, in its direction."""
     following = {face[2][0]: face[2] for face in boundary}
     chain = _follow(inner[0] if inner[0] in following else boundary[0][2][0], following)
     return chain if chain[1] == inner[1] else chain[::-1]

@@ -16,7 +16,7 @@ LAWS = ("ELASTIC", "HYPERELASTIC", "VISCOELASTIC")
 
 
 def contents(deck: OwnDeck, flat: SolverDeck) -> Json:
-    """The data."""
+    """Contents of a deck as data, SI where a key has a unit; nodes and elements: their numbers."""
     mesh, model = flat.mesh, flat.model
     crown = np.array([mesh.nodes[n] for n in mesh.crown])
     held = np.array([mesh.nodes[n] for n in mesh.rim])
@@ -61,7 +61,7 @@ def contents(deck: OwnDeck, flat: SolverDeck) -> Json:
 
 
 def laws(flat: SolverDeck, material: str) -> list[str]:
-    """The options of a material."""
+    """The laws of a material: keywords and their options, in small letters."""
     blocks = flat.blocks
     (block,) = (b for b in blocks.model if (b.name, b.get("NAME")) == ("MATERIAL", material))
     laws = (b for b in blocks.options[block] if b.name in LAWS)

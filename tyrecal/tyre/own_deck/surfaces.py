@@ -17,8 +17,9 @@ Face = tuple[int, str, tuple[int, ...]]
 
 
 def surface_faces(made: Assembly, name: str, block: Block, row: Row | None = None) -> list[Face]:
-    """Faces of a surface; a ply (a line element) is its own face, SPOS or SNEG. Raises OwnDeckError
-    at ``block`` and ``row``, which use the surface."""
+    """Faces of a surface; a ply (a line element) is its own face, SPOS, to the left of its way
+    from node 1 to 2 in r, z, or SNEG: nodes in the order that has the ply on their left. Raises
+    OwnDeckError at ``block`` and ``row``, which use the surface."""
     if name not in made.surfaces:
         raise block.refused(f"the surface {name} is not defined", row)
     surface, prefix = made.surfaces[name]
@@ -96,7 +97,8 @@ def rigid_pieces(made: Assembly, surface: Block, prefix: str) -> np.ndarray:
 
 
 def _profile(surface: Block) -> np.ndarray:
-    """Points (k, 2) along a surface of TYPE=SEGMENTS."""
+    """Points (k, 2) along a surface of TYPE=SEGMENTS. Data: LINE end; CIRCL end, centre; PARAB
+    middle point, end."""
     if len(surface.rows) < 2 or surface.rows[0].name(0) != "START":
         raise surface.refused("begins with START, r, z; then LINE, CIRCL or PARAB")
     first = surface.rows[0]

@@ -23,6 +23,7 @@ BELTED = {"crown": 16, "belt_edges": 4, "shoulder": 4}
 BELOW = {"upper_sidewall": 16, "lower_sidewall": 10, "filler": 8, "bead": 4}
 """Intervals between stations by region. Those under the belts end where belts do: two of another
 width are the crown and the shoulder, more have ``belt_edges`` between."""
+# estimates of what radial tyres usually have
 WIDEST = 0.53  # of the section height: where a radial tyre is widest
 CROWN_RADIUS = 1.5  # of the carcass, times the section width over the aspect ratio
 SHOULDER = 0.85  # gauge at the wider belt's edge over the crown's
@@ -56,7 +57,7 @@ def construction(size: TyreSize) -> Construction:
 def usual(size: TyreSize, rim: float | None = None) -> Gauges:
     """Usual gauges of a size, on its measuring rim or one of another width, m."""
     made = construction(size)
-    aspect = size.section_height / size.width
+    aspect = size.section_height / size.width  # the lower, the wider the belt over the width
     grown = {
         name: a + b * size.width
         for name, (a, b) in (
@@ -79,13 +80,14 @@ def usual(size: TyreSize, rim: float | None = None) -> Gauges:
 
 
 def build(size: TyreSize, gauges: Gauges) -> GaugeTable:
-    """The half section of a size. Raises SectionError, one sentence, where there is none."""
+    """The half section of a size; s is the arc along the carcass from the crown, m. Raises
+    SectionError, one sentence, where there is none."""
     g, made = gauges, construction(size)
     layers = _layers(g, made)
     _check(size, g, max(depth for depth, _ in layers.values()))
     width, half_belt = size.section_width(g.rim), g.belt / 2
     seat, flange = size.bead_seat_radius, size.flange_radius(g.rim)
-    inside_bead = max(0.2 * g.bead, g.liner)
+    inside_bead = max(0.2 * g.bead, g.liner)  # inner surface to carcass at the rim
     radius = size.rim_code * 0.0254 / 2 + WIDEST * size.section_height
     line = meridian(
         crown=size.overall_diameter / 2 - g.crown + g.liner,
@@ -151,6 +153,7 @@ def _stations(ends: list[float]) -> tuple[Array, list[str]]:
 
 
 def _check_width(size: TyreSize, table: GaugeTable, line: Meridian, s: Array, width: float) -> None:
+    """Raises SectionError where the tyre is wider than its section ``width``, m."""
     outside = table.section().points[-1, :, 1]
     at = s[np.argmax(outside)]
     if outside.max() > width / 2 + 1e-5:
@@ -162,7 +165,7 @@ def _check_width(size: TyreSize, table: GaugeTable, line: Meridian, s: Array, wi
 
 
 def _check(size: TyreSize, g: Gauges, depth: float) -> None:
-    """Gauges that no tyre has, in words. depth: from the carcass to the tread."""
+    """Raises SectionError for gauges that no tyre has. depth: from the carcass to the tread, m."""
     width = size.section_width(g.rim)
     least = g.liner + depth + 1e-3
     for name, value, low, high in (

@@ -23,7 +23,7 @@ class GaugeTable:
     # (line, station): distances from it, inwards negative, NaN where a line is absent, m
     gauges: Array
     labels: list[str]  # each station's region
-    rigid: Array  # held by the rim
+    rigid: Array  # (station,) whether the rim holds it
 
     def csv(self) -> str:
         """The station table, in mm to the hundredth of a micrometre."""

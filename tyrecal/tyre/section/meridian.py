@@ -1,7 +1,8 @@
 """The carcass of an inflated radial tyre: where its meridian runs from the crown to the rim.
 
 A net of meridional cords under pressure p has the curvature kappa = r p (1 - g) / T, with T the
-cords' tension a radian round the axle and g the share of the pressure that the belt carries, so
+cords' tension a radian round the axle and g the share of the pressure that the belt carries. With
+the arc s and the angle psi of the meridian from the axle's direction,
 
     d psi / ds = (r / rho) (1 - g(s)),   dr/ds = -sin psi,   dz/ds = cos psi
 
@@ -32,21 +33,22 @@ Array = np.ndarray
 STEPS_A_PART = 200  # under the belt, and above and below the widest point
 EXPONENTS = np.log([1.0, 40.0])  # ln n of the belt's share: from a roof to nearly a step
 MAX_RIM_SLOPE = np.tan(np.radians(75))  # of the carcass at the rim, from the wheel's plane
-SHARPEST_TURN = 0.6  # of the carcass at the seat: its curvature times the gauge outside it
+# of the carcass at the seat: its curvature times the gauge outside it, which would fold at 1
+SHARPEST_TURN = 0.6
 
 
 @dataclass(frozen=True)
 class Meridian:
     """A carcass line from the crown to the bead, all in m."""
 
-    arc: Array  # (s,) arc length of each of its points from the crown
-    points: Array  # (s, 2) r and z
+    arc: Array  # (k,) arc length of each of its points from the crown
+    points: Array  # (k, 2) r and z
     widest: float  # arc length to the widest point
     rim: float  # arc length to where the rim holds the tyre
     end: float  # arc length to the end
 
     def at(self, s: Array) -> Array:
-        """Points (s, 2), r and z in m, at arcs s."""
+        """Points (k, 2), r and z in m, at arcs s (k,)."""
         return CubicSpline(self.arc, self.points, start=np.array([0.0, 1.0]))(s)  # along the axle
 
 
@@ -68,7 +70,7 @@ def meridian(
     """
     upper, rho = _upper(crown, crown_radius, belt, *widest)
     curvature = upper[-1, 0] / rho
-    lean = 0.0
+    lean = 0.0  # angle of the carcass at the rim from the wheel's plane
     height = max(upper[-1, 0] - rim[0], 1e-3)
     for _ in range(20):  # the normal of the carcass at the rim leans with it
         z = rim[1] - offset * np.cos(lean)
@@ -95,8 +97,8 @@ def meridian(
 def _upper(
     crown: float, crown_radius: float, belt: float, radius: float, width: float
 ) -> tuple[Array, float]:
-    """Points (n, 2), m, from the crown to the widest one at z = ``width``, near r = ``radius``;
-    and rho."""
+    """Points (k, 2), m, from the crown to the widest one at z = ``width``, near r = ``radius``;
+    and rho, m2."""
 
     def rho_of(log_n: float) -> float:
         """ln rho with which the tyre is as wide as it should be."""
@@ -113,6 +115,7 @@ def _upper(
         return float(brentq(wide, a, b, xtol=1e-13))
 
     def high(log_n: float) -> float:
+        """Radius of the widest point less the wanted one, m."""
         return _widest(crown, crown_radius, belt, rho_of(log_n), log_n)[0] - radius
 
     low, top = EXPONENTS
@@ -143,18 +146,18 @@ def _widest(
 
 
 def _belt(crown: float, crown_radius: float, belt: float, rho: float, n: float) -> Array:
-    """r, z and psi at stations under the belt, (s, 3)."""
+    """r, z and psi at points under the belt, (k, 3)."""
     s = np.linspace(0, belt, STEPS_A_PART + 1)
-    alone = 1 - (1 - rho / (crown * crown_radius)) * (1 - (s / belt) ** n)
+    left = 1 - (1 - rho / (crown * crown_radius)) * (1 - (s / belt) ** n)  # 1 - g
     r = np.full(len(s), crown)
     for _ in range(6):  # r hardly moves, and with it the curvature
-        psi = _integral(r / rho * alone, s)
+        psi = _integral(r / rho * left, s)
         r = crown - _integral(np.sin(psi), s)
     return np.stack([r, _integral(np.cos(psi), s), psi], -1)
 
 
 def _beyond(edge: Array, rho: float) -> Array:
-    """Points (s, 2) from the belt's ``edge`` (r, z, psi) to the widest one, at equal steps of psi:
+    """Points (k, 2) from the belt's ``edge`` (r, z, psi) to the widest one, at equal steps of psi:
     dz/dpsi = cos psi / kappa = rho cos psi / r."""
     r_b, z_b, psi_b = edge
     psi = np.linspace(psi_b, np.pi / 2, STEPS_A_PART + 1)
@@ -163,5 +166,5 @@ def _beyond(edge: Array, rho: float) -> Array:
 
 
 def _integral(f: Array, x: Array) -> Array:
-    """Integral from the first point to each (n,), by trapezia."""
+    """Integral of f (k,) over x from the first point to each (k,), by trapezia."""
     return np.concatenate([[0.0], np.cumsum((f[1:] + f[:-1]) / 2 * np.diff(x))])

@@ -47,7 +47,7 @@ class SectionMesh:
         return 1000 * (step * np.arange(along + 1) + 1) + step * np.arange(rows + 1)[:, None] + 1
 
     def grid(self) -> tuple[Array, Array]:
-        """Corner nodes (k,), and the places (e, 4) of each element's four among them."""
+        """Corner nodes (k,), and the places (element, 4) of each element's among them."""
         nodes = self.corners()
         k = np.arange(nodes.size).reshape(nodes.shape)
         quads = np.stack([k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]], -1)
@@ -195,7 +195,8 @@ def build_mesh(
 
 
 def _through_thickness(lines: Array, rows: list[int], step: int, grading: list[float]) -> Array:
-    """Points on and between the lines, (row points, columns, 2)."""
+    """Points on and between the lines (line, column, 2), (row points, columns, 2); midside points
+    too if ``step`` is 2."""
     layers = [lines[:1]]
     for below, above, count, ratio in zip(lines, lines[1:], rows, grading, strict=False):
         edges = np.concatenate([[0.0], np.cumsum(ratio ** np.arange(count))])
@@ -206,7 +207,7 @@ def _through_thickness(lines: Array, rows: list[int], step: int, grading: list[f
 
 
 def _check_unfolded(grid: Array, regions: list[str]) -> None:
-    """Every cell of the grid has positive area at its four corners."""
+    """Raises SectionError for a cell of the grid with no positive area at one of its corners."""
     along, across = np.diff(grid, axis=1), np.diff(grid, axis=0)
 
     def area(u: Array, v: Array) -> Array:

@@ -44,7 +44,8 @@ def read_outline(path: Path) -> dict[str, Array]:
 
 
 def _from_crown(name: str, points: Array) -> Array:
-    """A curve (n, 2), r and z in m, its first point on the centre plane; points in mm."""
+    """A curve (n, 2), r and z in m, its first point on the centre plane; points in mm. Raises
+    SectionError."""
     if len(points) < 5:
         raise SectionError(f"the {name} curve has {len(points)} points, at least 5 are needed")
     points = points[:: -1 if points[-1, 1] < points[0, 1] and points[-1, 0] > points[0, 0] else 1]
@@ -74,7 +75,7 @@ def section_of_outline(
     outer, _ = _smooth(curves["outer"])
     rays = _rays(inner, tangent, outer[-1] - inner[-1])
     thickness = _thickness(inner, rays, outer)
-    depth = np.minimum(carcass_depth, 0.4 * thickness)
+    depth = np.minimum(carcass_depth, 0.4 * thickness)  # less where the tyre is thin
     carcass = inner + depth[:, None] * rays
     arc = length_along(carcass)
     widest = int(np.argmax(carcass[:, 1]))
@@ -120,8 +121,8 @@ def section_of_outline(
 
 
 def _smooth(curve: Array) -> tuple[Array, Array]:
-    """Points (n, 2) and unit tangents (n, 2) at equal steps of the curve's length, without new
-    bumps."""
+    """Points (n, 2) and unit tangents (n, 2) at equal steps of the curve's length, n = `DENSE`,
+    without new bumps."""
     arc = length_along(curve)
     through = PchipInterpolator(arc, curve)
     at = np.linspace(0, arc[-1], DENSE)
@@ -141,7 +142,8 @@ def _rays(inner: Array, tangent: Array, last: Array) -> Array:
 
 
 def _thickness(start: Array, rays: Array, outer: Array) -> Array:
-    """Length (n,), m, of each ray from the inner surface to the outer, by the nearest crossing."""
+    """Length (n,), m, of each ray from the inner surface to the outer, by the nearest crossing.
+    Raises SectionError for a ray without one."""
     a, side = outer[:-1], np.diff(outer, axis=0)
     turn = rays[:, None, 0] * side[None, :, 1] - rays[:, None, 1] * side[None, :, 0]
     gap = a[None] - start[:, None]

@@ -20,7 +20,7 @@ from ..number_table import read_named_table
 from .spline import CubicSpline
 
 Array = np.ndarray
-GAUGE = "_gauge_mm"
+GAUGE = "_gauge_mm"  # ends the heading of a line's column
 STEPLESS = 1e-9  # m, of a line between its two parts: less is no step
 GaugeFactor = tuple[tuple[str, ...], tuple[str, str], float]  # regions, (line, line), factor
 
@@ -107,7 +107,7 @@ def read_section(path: Path) -> Section:
 
 
 def regions_of(labels: list[str], rigid: list[bool]) -> tuple[tuple[str, int], ...]:
-    """Names and intervals of the regions that the stations belong to."""
+    """Names and intervals of the regions that the stations belong to. Raises SectionError."""
     starts = [0] + [i for i in range(1, len(labels)) if labels[i] != labels[i - 1]]
     # regions share a station: the first one's last, or the first that the rim holds
     ends = [*(s if rigid[s] != rigid[s - 1] else s - 1 for s in starts[1:]), len(labels) - 1]
@@ -234,7 +234,7 @@ def with_gauges(section: Section, gauges: tuple[GaugeFactor, ...]) -> Section:
 
 
 def _share(section: Section, regions: tuple[str, ...], factor: float) -> np.ndarray:
-    """The factor at each station (n,): its geometric mean where two regions meet."""
+    """The factor at each station (station,): its geometric mean where two regions meet."""
     logs = np.zeros((2, section.points.shape[1]))  # of the region before and after a station
     start = 0
     for name, count in section.regions:
