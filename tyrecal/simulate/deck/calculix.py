@@ -135,8 +135,9 @@ def _rubbers(case: Case) -> list[TemplateNames]:
 
 
 def _plies(case: Case, sector: Sector) -> list[TemplateNames]:
-    """One material a layer and strip: stiffness E A / (s t) along the cords, their mass; s the
-    cords' spacing, t the strip's own thickness; angles from the meridian."""
+    """One material a layer and strip, in bricks on top of the rubber's: stiffness E A / (s t) along
+    the cords, their mass; s the cords' spacing, t the strip's own thickness; angles from the
+    meridian."""
     plies, number = [], len(sector.bricks)
     for name, layer in case.rebar_layers.items():
         cord: Any = case.materials[layer.material]

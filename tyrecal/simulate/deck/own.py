@@ -55,7 +55,7 @@ def _refuse_unrevolved(tyre: Tyre) -> None:
     bodies = [block for block in deck.blocks if block.name == "RIGID BODY"]
     r, z = flat.model.reference[1]
     point = c.rim.reference_point_m
-    rings = {"spindle", "cavity", "coupled", "rotation"} & set(tyre.needs)
+    extras = {"spindle", "cavity", "coupled", "rotation"} & set(tyre.needs)
     why = {
         "a revolve takes no *PART: have it written without (in ABAQUS/CAE: Model, Edit Attributes,"
         " 'Do not use parts and assemblies in input files')": "PART" in blocks,
@@ -79,8 +79,8 @@ def _refuse_unrevolved(tyre: Tyre) -> None:
         "ABAQUS gets the deck's own text with its nodes: deck.gauges must be 1": bool(
             source.thickened
         ),
-        f"ABAQUS gets the deck's own text, which cannot express: {', '.join(sorted(rings))}": bool(
-            rings
+        f"ABAQUS gets the deck's own text, which cannot express: {', '.join(sorted(extras))}": bool(
+            extras
         ),
         "it includes a file of the name of a job": bool(
             {"inflate.inp", "modes.inp"} & ({*deck.texts} - {deck.path.name})

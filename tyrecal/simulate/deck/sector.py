@@ -93,7 +93,7 @@ def build_sector(
         below = int(np.sum(plies < row))
         row_of[number] = row - below - (row in plies)
     names = section.names[1:-1]
-    # numbers of `build_mesh`: cords 1000000 line + column, elements 1000 column + row + 1
+    # numbers of `mesh`, columns from 1: cords 1000000 line + column, elements 1000 column + row + 1
     strips = {
         name: [_strip(mesh, 1000 * (n % 1000000) + int(row) + 1) for n in mesh.cords[f"{name}-"]]
         for name, row in zip(names, plies, strict=True)

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import PlainValidator
 
 Array = np.ndarray
-REAL = "fiu"  # NumPy's letters for kinds of number
+REAL = "fiu"  # NumPy's letters for kinds of number; c: complex
 MIN_NUMBER_BYTES = 4  # of a number with decimals: half precision has three digits
 MIN_ANSWER_HZ, MAX_ANSWER_HZ = 1e-3, 1e5  # far beyond those of a tyre's vibrations
 

@@ -46,16 +46,17 @@ class Footprint:
     contact_area_m2: of.PositiveFinite | None = None
     contact_length_m: of.PositiveFinite | None = None
     contact_width_m: of.PositiveFinite | None = None
-    mode_frequency_Hz: of.HertzArray | None = None  # (m,); with friction these modes stick
+    mode_frequency_Hz: of.HertzArray | None = None  # (m,); with friction the patch sticks in them
     mode_node: of.WholeArray | None = None  # (j,) the only nodes of the shapes
-    mode_shape: of.Shapes3D | None = None  # (m, ring, j, 3), as displacement
+    mode_shape: of.Shapes3D | None = None  # (m, ring, j, 3) as displacement, any scale
     mode_damping_ratio: of.RealArray | None = None  # (m,) where a loss factor is known
-    # (m,) the patch's forces along the road in each shape, their sizes summed
+    # (m,) the patch's forces in the road's plane in each shape, in its scale, their sizes summed
     mode_traction_N: of.RealArray | None = None
     sliding_frequency_Hz: of.HertzArray | None = None  # modes of a patch that slides freely
     sliding_shape: of.Shapes3D | None = None
-    # (6, 6) forces and moments at the rim, N and N m, along and about the deck's axes (down, axle,
-    # rolling direction), for a shift (m) or turn (rad) along or about each; the patch is held
+    # (6, 6) rows: shifts (m), then turns (rad) of the rim along and about the deck's axes (down,
+    # axle, rolling direction); columns: forces and moments, N and N m, that they take, likewise;
+    # the patch is held
     rim_reactions: Annotated[Array, of.shaped(of.REAL, 6, 6)] | None = None
     # responses with the rim and the patch held, as `Solver.read` has them
     response: Mapping[str, Any] | None = None

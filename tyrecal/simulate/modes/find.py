@@ -92,6 +92,7 @@ def _with_rates(
         known = dict(_find(evaluator, near, of_neighbour, jobs))
         return [known[i] for i in range(len(keys))]
 
+    # by place, then name: of the modes, Hz per unit, and of the mass, kg per unit
     rates: dict[int, tuple[dict[str, Array], dict[str, float]]] = {p: ({}, {}) for p in designs}
     for (place, name), (value, other) in neighbours(sides, ask).items():
         if not isinstance(other, LabelledModes):

@@ -61,6 +61,7 @@ def own_decks_case(
     if pressure_kPa is None and not decks.pressures:
         raise InputError("the decks have a mark in place of the pressure: give --pressure-kPa")
     blocks = decks.blocks
+    # fields of *REBAR LAYER: name, area, spacing, position, material, angle
     layers = {r.name(0): r.name(4) for b in blocks if b.name == "REBAR LAYER" for r in b.rows}
     materials = [b.get("NAME") for b in blocks if b.name == "MATERIAL"]
     return _text(

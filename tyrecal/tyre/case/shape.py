@@ -35,7 +35,7 @@ SINGLE: dict[str, type[Part]] = {  # parts with checks of their own, once in a c
     "road": Road,
     "targets": Targets,
 }
-MESSAGES = {
+MESSAGES = {  # by pydantic's type of an error
     "missing": "must be given",
     "float_type": "must be a number",
     "int_type": "must be a whole number",

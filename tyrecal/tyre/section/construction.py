@@ -33,7 +33,7 @@ class Compound:
 
     hardness: float  # Shore A
     density: float  # kg/m3
-    # share g of the shear modulus in a vibration that is gone in a static state
+    # share g of a vibration's shear modulus that is gone in a static state
     relaxed: float = 0.4
 
     @property
@@ -113,9 +113,10 @@ class Construction:
     step: float
     wires: int  # how many are in a bead
     wire: float  # m2 of each
-    # its height, share of the arc from the rim to the widest point: the turn-up's end
+    # height of the bead filler, share of the arc from the rim to the widest point; the turn-up ends
+    # there
     filler: float
-    high: bool  # the turn-up ends at the widest point instead
+    high: bool  # whether the turn-up ends at the widest point instead
 
     @property
     def lines(self) -> tuple[str, ...]:

@@ -100,8 +100,9 @@ def _upper(
     """Points (k, 2), m, from the crown to the widest one at z = ``width``, near r = ``radius``;
     and rho, m2."""
 
-    def rho_of(log_n: float) -> float:
+    def log_rho_of(log_n: float) -> float:
         """ln rho with which the tyre is as wide as it should be."""
+        # r0 times radii of curvature
         logs = np.log(crown * np.geomspace(width / 20, crown_radius, 30))
         miss = [_widest(crown, crown_radius, belt, x, log_n)[1] - width for x in logs]
         change = [i for i in range(len(miss) - 1) if miss[i] < 0 <= miss[i + 1]]
@@ -116,7 +117,7 @@ def _upper(
 
     def high(log_n: float) -> float:
         """Radius of the widest point less the wanted one, m."""
-        return _widest(crown, crown_radius, belt, rho_of(log_n), log_n)[0] - radius
+        return _widest(crown, crown_radius, belt, log_rho_of(log_n), log_n)[0] - radius
 
     low, top = EXPONENTS
     if high(low) > 0:
@@ -125,7 +126,7 @@ def _upper(
         log_n = top
     else:
         log_n = float(brentq(high, low, top, xtol=1e-9))
-    log_rho = rho_of(log_n)
+    log_rho = log_rho_of(log_n)
     rho = float(np.exp(log_rho))
     under = _belt(crown, crown_radius, belt, rho, np.exp(log_n))
     return np.concatenate([under[:, :2], _beyond(under[-1], rho)[1:]]), rho

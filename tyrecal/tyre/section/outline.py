@@ -144,7 +144,7 @@ def _rays(inner: Array, tangent: Array, last: Array) -> Array:
 def _thickness(start: Array, rays: Array, outer: Array) -> Array:
     """Length (n,), m, of each ray from the inner surface to the outer, by the nearest crossing.
     Raises SectionError for a ray without one."""
-    a, side = outer[:-1], np.diff(outer, axis=0)
+    a, side = outer[:-1], np.diff(outer, axis=0)  # start + length ray = a + along side
     turn = rays[:, None, 0] * side[None, :, 1] - rays[:, None, 1] * side[None, :, 0]
     gap = a[None] - start[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
