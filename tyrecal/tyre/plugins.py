@@ -16,6 +16,7 @@ from typing import Any
 from ..errors import InputError
 
 EFFECT_GROUP = "tyrecal.effects"
+# id and place of an `Effect` in its file
 _ENTRY = re.compile(r'^ +id="(\w+)",\n +place=(\d+),$', re.MULTILINE)
 
 

@@ -75,7 +75,8 @@ class Tyre:
 
 
 def resolved(case: LoadedCase) -> Tyre:
-    """The tyre of a case. Raises EffectRefused for a parameter that cannot be."""
+    """The tyre of a case, its effects applied in the order of the catalogue. Raises EffectRefused
+    for a parameter that cannot be."""
     present = {id: value for id, value in case.case.effects.items() if value}
     if present:
         case = replace(case, case=case.case.model_copy(update={"effects": dict.fromkeys(IDS, 0.0)}))

@@ -45,7 +45,7 @@ class _Inside(FileSystemLoader):
 
 @lru_cache(maxsize=8)
 def environment(dialect: str, own_folder: Path | None) -> Environment:
-    """Templates of a dialect, the user's own before the tool's."""
+    """Templates of a dialect, the user's own in ``own_folder`` before the tool's."""
     shipped = Path(str(files("tyrecal_templates") / dialect))
     loaders: list[BaseLoader] = [_Inside(shipped)]
     if own_folder is not None:

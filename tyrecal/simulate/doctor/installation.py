@@ -103,6 +103,6 @@ def _free_memory() -> float | None:
             for line in Path("/proc/meminfo").read_text(encoding="utf-8").splitlines()
             if line.startswith("MemAvailable")
         )
-        return round(1024 * int(line.split()[1]) / GB, 1)
+        return round(1024 * int(line.split()[1]) / GB, 1)  # from kB, of 1024 bytes
     except (OSError, ValueError):
         return None

@@ -24,6 +24,7 @@ from ...interrupt import defer_interrupts, exit_code, pending_interrupt, remembe
 WARM = "tyrecal.batch.warm"  # imported by the server that forks the processes, once
 ANSWERED_S = 0.1  # the longest delay of an interruption while `first_done` waits
 PATIENCE_S = 5.0  # for processes that were told to end
+# signals that a terminal sends to all processes, and only the parent answers
 PARENTS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(signal, name))
 
 
@@ -86,6 +87,7 @@ def first_done(futures: Collection[Future[Any]]) -> set[Future[Any]]:
 
 
 def _answer(future: Future[Any]) -> Any:
+    """The result of a future, once it is done. Raises what the task raised."""
     first_done([future])
     return future.result()
 

@@ -52,10 +52,10 @@ class Evaluation:
     pressure_kPa: float
     mass_kg: float  # of the tyre without rim
     modes: tuple[RawMode, ...]
-    # variable name to d f / d variable (mode,), Hz per unit of the variable
+    # variable name to d f / d variable (m,), Hz per unit of the variable, in the order of ``modes``
     gradients: dict[str, Array] = field(default_factory=dict)
     nodes: Array = field(default_factory=lambda: np.empty(0, int))  # (k,) deck numbers
-    # (k, 3) r, theta, z in m by the inflation; (0, 3) if the solver does not give it
+    # (k, 3) r, theta, z in m of these nodes by the inflation; (0, 3) if the solver does not give it
     displacement: Array = field(default_factory=lambda: np.empty((0, 3)))
     # variable name to d mass, kg per unit
     mass_gradients: dict[str, float] = field(default_factory=dict)

@@ -13,7 +13,7 @@ from .document import compose
 from .mistakes import Keys
 from .parts import as_written
 
-Edit = tuple[int, int, str]  # start and end of a part of the text, and what replaces it
+Edit = tuple[int, int, str]  # characters from start to end of the text, and what replaces them
 
 
 def set_in_text(text: str, values: Mapping[Keys, Any]) -> str:
@@ -40,6 +40,7 @@ def is_stated(text: str, keys: Keys) -> bool:
 
 
 def _edit(text: str, node: Node, keys: Keys, value: Any) -> Edit:
+    """The edit of ``text`` that sets the value at ``keys`` below ``node``."""
     key, *rest = keys
     child = _child(node, key)
     if rest and isinstance(child, MappingNode | SequenceNode):
@@ -55,7 +56,7 @@ def _edit(text: str, node: Node, keys: Keys, value: Any) -> Edit:
     start, column = node.start_mark.index, node.start_mark.column
     if node.flow_style:
         return start + 1, start + 1, _flow(keys, value)[1:-1] + (", " if node.value else "")
-    if column:
+    if column:  # an indented table: the key becomes its first line
         return start, start, f"{_flow(keys, value)[1:-1]}\n{column * ' '}"
     # a part of the file goes to its end, where it parts no comment from its key
     entry = f"\n  {_flow(rest, value)[1:-1]}" if rest else f" {_flow(rest, value)}"

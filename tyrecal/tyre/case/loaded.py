@@ -22,7 +22,8 @@ class LoadedCase:
 
     case: Case
     path: Path  # of the case file
-    drawn: Section | None  # as drawn, without effects; None: its kind has none
+    # before its gauges, as its file, or an effect, gives it; None: its kind has none
+    drawn: Section | None
     folder: Path  # to which the case's own paths are relative
     file_data: dict[str, Any]  # the file with the keys that its deck adds; never changed by values
     # values that the user gave for this run, by name or path; results list them

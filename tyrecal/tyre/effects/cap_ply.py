@@ -15,7 +15,7 @@ SPACING_M = 1e-3  # of its cords
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
     """A nylon layer on the outer belt's line, its cords 90 degrees from the meridian, of stiffness
-    E A / s = value, A a cord's area, s the spacing."""
+    E A / s = value, A a cord's area, s the spacing; without the rubber that it is laid in."""
     return _over(case, belt_lines(case)[-1], value)
 
 

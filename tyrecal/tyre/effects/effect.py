@@ -22,7 +22,8 @@ class Effect:
     title: str  # its name in words
     symbol: str  # of the parameter
     unit: str  # of the parameter ("" = a number)
-    # range of the parameter on passenger tyres; a diagnosis takes all values as equally probable
+    # range of the parameter on passenger tyres, by judgement where its file names no source; a
+    # diagnosis takes all values as equally probable
     low: float
     high: float
     changes: tuple[str, ...]  # keywords of the deck that it touches
@@ -41,8 +42,8 @@ class Effect:
     # `add` for a case of a user's deck, None = it changes lines or regions of a section
     add_to_deck: Callable[[LoadedCase, float], LoadedCase] | None = None
     part: str = ""  # of ``deck.parts``, which a case of a user's deck must name for it, "" = none
-    # standard deviation of the error of the effect's shift of a frequency over that shift: a real
-    # tyre responds a little otherwise than this model of the effect
+    # standard deviation, by judgement, of the error of the effect's shift of a frequency over that
+    # shift: a real tyre responds a little otherwise than this model of the effect
     response_error: float = 0.04
     # `add` with one standard deviation more of a second, uncertain number of the effect, such as
     # the height of a bead filler; a diagnosis integrates over it; None: there is none
@@ -75,7 +76,7 @@ class Effect:
 
 
 class EffectRefused(InputError):
-    """A parameter with which the effect, or the case, cannot be."""
+    """A parameter with which the effect, or the case, cannot be; ``reason``: "must be ..."."""
 
     def __init__(self, id: str, reason: str, value: float):
         super().__init__(f"effects.{id} {reason}, got {value:g}")

@@ -9,8 +9,8 @@ from .effect import Effect
 
 
 def add(case: LoadedCase, value: float) -> LoadedCase:
-    """Additional springs from the tread to the ground, as stiff along the road as vertically,
-    because the patch sticks. The tyre stays round."""
+    """Additional springs from the tread to the ground, at the place of the case's ``road_spring``,
+    as stiff along the road as vertically, because the patch sticks. The tyre stays round."""
     if value < 0:
         raise InputError("must be at least 0")
     spring = case.case.road_spring
@@ -29,6 +29,7 @@ EFFECT = Effect(
     title="Light contact with the road",
     symbol="k",
     unit="N/m",
+    # about twice that under a load of 100 N
     low=0.0,
     high=6e5,
     changes=("*SPRING",),

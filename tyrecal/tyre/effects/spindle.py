@@ -14,7 +14,7 @@ HUB_MASS, HUB_INERTIA = 1.2, 1.1
 
 
 def heavier(case: LoadedCase) -> LoadedCase:
-    """The case with more of the hub moving with the wheel."""
+    """The case with one standard deviation more of the hub moving with the wheel."""
     rim = case.case.rim
     more = with_part(
         rim,
@@ -26,7 +26,8 @@ def heavier(case: LoadedCase) -> LoadedCase:
 
 
 def _spindle(key: str, along: str, **entry: Any) -> Effect:
-    """The compliance ``key`` of the case's `rim.spindle`."""
+    """The effect of the compliance ``key`` of `rim.spindle`; along: its direction in words; entry:
+    the other fields of `Effect`."""
     direction = key.partition("_")[0]
 
     def add(case: LoadedCase, value: float) -> LoadedCase:

@@ -41,6 +41,7 @@ EFFECT = Effect(
     title="Stiff sector (splice)",
     symbol="e",
     unit="",
+    # 1: all materials lie twice in the sector
     low=0.0,
     high=1.0,
     changes=("the section of the sector, next to the deck",),

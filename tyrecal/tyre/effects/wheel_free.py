@@ -37,6 +37,7 @@ EFFECT = Effect(
     title="Free wheel",
     symbol="1/m",
     unit="1/kg",
+    # a wheel of 10 kg or more
     low=0.0,
     high=0.1,
     changes=("*BOUNDARY", "*MASS", "*ROTARY INERTIA"),

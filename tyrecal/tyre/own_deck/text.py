@@ -20,7 +20,7 @@ Place = language.Place
 Row = language.Row
 is_label, names_of, number_from = language.is_label, language.names_of, language.number_from
 check_honoured, split_steps = honour.check_honoured, honour.split_steps
-named = spelling.named
+named = spelling.named  # a name as ABAQUS compares it: in capitals
 MAX_OWN_BYTES = 50_000_000  # of a deck and all that it includes
 
 
