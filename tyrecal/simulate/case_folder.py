@@ -1,4 +1,4 @@
-"""Which case a folder of results belongs to, by its entries in run.json, one for each command.
+"""Which case a folder of results belongs to, by its entries in run.json, one for each study.
 
 An entry has the path of the case file relative to the folder (``case``), which stays right if a
 project is moved, copied or renamed as a whole. If no file is there any more, the hash of the file's

@@ -55,6 +55,7 @@ def _refuse_unrevolved(tyre: Tyre) -> None:
     bodies = [block for block in deck.blocks if block.name == "RIGID BODY"]
     r, z = flat.model.reference[1]
     point = c.rim.reference_point_m
+    # capabilities that take keywords which the deck does not have
     extras = {"spindle", "cavity", "coupled", "rotation"} & set(tyre.needs)
     why = {
         "a revolve takes no *PART: have it written without (in ABAQUS/CAE: Model, Edit Attributes,"

@@ -102,8 +102,10 @@ class _Response(_Part):
 
 
 class _Modes(_Tyre):
+    """An answer with m modes; see `Solver.read` and `Evaluation`."""
+
     modes: Annotated[list[_Mode], Field(min_length=1)]
-    gradients: dict[str, of.RealArray]
+    gradients: dict[str, of.RealArray]  # (m,) by variable, Hz per unit
     displacement: of.Vectors  # by the inflation, m; (0, 3) where the solver does not give it
     mass_gradients: dict[str, of.Finite] = Field(default_factory=dict)
     response: _Response | None = None
@@ -173,8 +175,8 @@ class _Pressed(_Tyre):
 
 
 def check(content: Any) -> None:
-    """Raises Damaged if ``content`` is not what `Evaluator` records: a failure's fields, or
-    ``answer`` and what `Solver.read` gave."""
+    """Raises Damaged if ``content`` is not what `Evaluator` records: a failure's fields, or, under
+    ``answer``, what `Solver.read` gave."""
     kind: type[_Part] = _Failure
     if isinstance(content, dict) and "answer" in content:
         content = content["answer"]

@@ -83,6 +83,7 @@ def _with_rates(
     }
 
     def ask(values: Mapping[tuple[int, str], float]) -> list[ModesAnswer]:
+        """Answers of the designs with one number, by place and name, set to each value."""
         keys = list(values)
         near = [
             replace(questions[place], values={**questions[place].values, name: value}, gradients=())

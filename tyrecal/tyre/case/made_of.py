@@ -128,8 +128,8 @@ def constructed(made: Construction, section: Section) -> ConstructionParts:
 
 
 def _uncertainties(made: Construction, belts: Mapping[str, Keys]) -> dict[str, Keys]:
-    """Standard deviations over makers of the usual values; belts turn about the circumference in
-    opposite directions (``signs``)."""
+    """Standard deviations over makers of the usual values; by ``signs`` all belts turn towards the
+    circumference at once."""
     stiff = {
         f"{name}_C10": {"sets": [f"materials.{name}.C10_Pa"], "percent": round(own.spread_percent)}
         for name, own in made.compounds.items()

@@ -137,6 +137,7 @@ def _variables(
 
 
 def _name(words: str, taken: dict[str, list[str]]) -> str:
+    """A variable's name made of ``words``, numbered where it is taken."""
     plain = re.sub(r"\W", "_", words)[:50]
     count = sum(name.startswith(plain) for name in taken)
     return f"{plain}_{count + 1}" if plain in taken else plain

@@ -31,6 +31,7 @@ def to_the_edge(case: LoadedCase, value: float) -> LoadedCase:
 
 
 def _over(case: LoadedCase, line: str, value: float) -> LoadedCase:
+    """`add` on a line of the section."""
     if not value > 0:
         raise InputError("must be at least 0")
     material = unused("cap_ply_cord", case.case.materials)

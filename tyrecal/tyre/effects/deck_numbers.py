@@ -27,7 +27,8 @@ def stiffer(factor: float, bulk: bool) -> Change:
 
 
 def with_compounds(case: LoadedCase, part: str, option: str, change: Change) -> LoadedCase:
-    """The case with the numbers of an option of a part's compounds changed, "" = all compounds.
+    """The case with the numbers of an option, such as HYPERELASTIC, changed in a part's compounds,
+    or, if ``part`` is "", in all.
 
     Raises InputError where a compound of the part is of others, too, or has marks for numbers.
     """

@@ -116,6 +116,7 @@ def _instance(made: Assembly, parts: dict[str, DeckPart], block: Block) -> None:
 
 
 def _renumbered(members: Members, numbers: dict[int, int]) -> Members:
+    """The members of a part's set under their numbers in the model, looked up when asked for."""
     return lambda: [numbers[n] for n in members()]
 
 

@@ -73,6 +73,7 @@ class DeckContact:
         return tuple(words)
 
     def _pairs(self) -> Iterator[Pair]:
+        """Pairs of *CONTACT PAIR; for *CONTACT the rubber's surface with each rigid one."""
         for block in self.blocks.contact:
             if block.name == "CONTACT":
                 nodes = dict.fromkeys(n for _, _, face in boundary_of(self.root) for n in face)

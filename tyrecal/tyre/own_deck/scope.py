@@ -17,7 +17,7 @@ Content = TypeVar("Content")
 CORNERS_OF = {3: 3, 4: 4, 6: 3, 8: 4}  # of solids by their number of nodes
 FARTHEST = 1e9  # coordinate, in any unit
 MOST = 200_000  # nodes or elements that a deck generates
-# beginnings of ABAQUS' types of elements: solids with twist, membranes with twist, rigid lines
+# beginnings of ABAQUS' types of elements: solids; surfaces and membranes; rigid lines
 SOLID, PLIES, RIGID = "CGAX", ("SFMGAX", "MGAX"), "RAX"
 BEGINNINGS = (SOLID, *PLIES, RIGID)
 

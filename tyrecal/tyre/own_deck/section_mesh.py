@@ -77,6 +77,7 @@ class OwnDeckMesh(SectionMesh):
         return by_material
 
     def _named(self) -> dict[str, RebarPly]:
+        """Plies by name, by set and name where several have one name."""
         names = [ply.name for ply in self.deck.plies]
         return {
             ply.name if names.count(ply.name) == 1 else f"{ply.set_name} {ply.name}": ply

@@ -21,8 +21,8 @@ from .size import TyreSize
 Array = np.ndarray
 BELTED = {"crown": 16, "belt_edges": 4, "shoulder": 4}
 BELOW = {"upper_sidewall": 16, "lower_sidewall": 10, "filler": 8, "bead": 4}
-"""Intervals between stations by region. Those under the belts end where belts do: two of another
-width are the crown and the shoulder, more have ``belt_edges`` between."""
+"""Intervals between stations by region. Those under the belts end where lines do: at two widths
+these are the crown and the shoulder, with a third one ``belt_edges`` is between."""
 # estimates of what radial tyres usually have
 WIDEST = 0.53  # of the section height: where a radial tyre is widest
 CROWN_RADIUS = 1.5  # of the carcass, times the section width over the aspect ratio

@@ -107,6 +107,7 @@ class Stations(TyreKind):
                 parts[name] = name.replace("_", " ") + "s"
 
         def paths_of_copies(path: str) -> list[str]:
+            """Paths of the same number of a material's copies; none for other numbers."""
             head, _, rest = path.partition(".")
             material, _, key = rest.partition(".")
             same = copies.get(material, []) if head == "materials" else []
