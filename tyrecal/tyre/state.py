@@ -87,7 +87,7 @@ class TyreState:
                 "has no springs in this case: give a compliance in rim.spindle, as"
                 " rim: {spindle: {lateral_m_per_N: 1e-7}}"
             )
-        if state.rim:
+        if state.rim:  # fixed or free: without springs
             numbers |= {RIM_FREE: state.rim == "free", WHEEL_FREE: 0.0} | dict.fromkeys(
                 SPRINGS, 0.0
             )

@@ -55,11 +55,11 @@ class Solver(Protocol):
 
     def read(self, folder: Path) -> SolverAnswer:
         """pressure_Pa, mass_kg, modes [{frequency_Hz, multiplicity, n, amplitude}], gradients
-        {variable: [Hz per unit]}, nodes, points (as in `HarmonicShape`), displacement (as in
-        `Evaluation`) and, for fits to the mass, mass_gradients {variable: kg per unit}. A doublet
-        that is split is one mode of multiplicity 2 at the mean frequency, with ``members`` [Hz,
-        Hz]. Where a loss factor is known, each mode has its damping_ratio, a fraction of critical
-        damping.
+        {variable: [Hz per unit, by mode]}, nodes, points (as in `HarmonicShape`), displacement (as
+        in `Evaluation`) and, for fits to the mass, mass_gradients {variable: kg per unit}. A
+        doublet that is split is one mode of multiplicity 2 at the mean frequency, with ``members``
+        [Hz, Hz]. Where a loss factor is known, each mode has its damping_ratio, a fraction of
+        critical damping.
 
         Where ``decks.request`` has a response {lowest_Hz, highest_Hz, lines (of frequency), patch_m
         (width under the force), excite, respond} of points [degrees, radial, tangential or

@@ -101,7 +101,7 @@ def _with_rates(
             continue
         centre, width = designs[place], value - questions[place].values[name]
         hertz = {mode.label: mode.frequency_Hz for mode in other.modes}
-        # Hz per unit at each mode's `position`, the first of a pair's; the rest is not read
+        # Hz per unit at each mode's `position`; of pairs joined to one the rest is not read
         rate = np.full(len(centre.evaluation.modes), np.nan)
         for mode in centre.modes:
             rise = hertz.get(mode.label, np.nan) - mode.frequency_Hz

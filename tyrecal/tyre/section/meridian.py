@@ -8,7 +8,8 @@ the arc s and the angle psi of the meridian from the axle's direction,
 
 from the crown's centre (psi = 0) outwards, rho = T / p. The belt, of half width b, carries
 
-    g(s) = g0 (1 - (s/b)^n),   g0 = 1 - rho / (r0 R)      R: its radius of curvature at the crown
+    g(s) = g0 (1 - (s/b)^n),   g0 = 1 - rho / (r0 R)      r0, R: its r and its radius of
+                                                          curvature at the crown
 
 (a choice: any share that fades towards the edge would do) and nothing beyond, where
 cos psi = cos psi_b + (r^2 - r_b^2) / (2 rho). rho and n follow from the widest point. Below it,

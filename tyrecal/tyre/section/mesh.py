@@ -54,8 +54,8 @@ class SectionMesh:
         return nodes.ravel(), quads.reshape(-1, 4)
 
     def skin(self) -> Array:
-        """Corner nodes (k,) of the outer surface from -z to +z, from inner bead edge to inner bead
-        edge."""
+        """Corner nodes (k,) of the outer surface and the beads' ends, from one end of the inner
+        surface, at -z, to the other."""
         grid = self.corners()
         return np.concatenate([grid[:-1, 0], grid[-1], grid[-2::-1, -1]])
 
