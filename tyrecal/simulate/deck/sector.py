@@ -21,7 +21,8 @@ from ...tyre.section.section import Section
 
 Array = np.ndarray
 Corner = tuple[int, ...]  # a corner of the section's mesh, or the two corners of a side
-INNER_FACE = "P6"  # a brick's face over side 4 of the section's element
+# CalculiX's label of a pressure on a brick's face 6, over side 4 of the section's element
+INNER_FACE = "P6"
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from .edit import changed, unused, with_part
 from .effect import Effect
 from .parts import carcass_line, held_regions, present, rim_edge, stations
 
-# of the bead's length: shorter elements are a finer mesh of the clamped edge, which alone moves
-# [0,0] lateral by 0.4 %
+# share of the held rest that is let go too, so that no gap is shorter: short elements are a finer
+# mesh of the clamped edge, which alone moves [0,0] lateral by 0.4 %
 LEAST = 0.02
 GAP_ENDING = "_gap"  # with which the region's name ends
 

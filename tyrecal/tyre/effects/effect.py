@@ -28,7 +28,7 @@ class Effect:
     high: float
     changes: tuple[str, ...]  # keywords of the deck that it touches
     # which modes move, which way and how far: by this model, on the tyre of cases/p235_75r17.yaml
-    # as fitted, at its pressure
+    # as fitted, at its pressure; a re-fit changes its variables A_belt, A_carcass and C10
     signature: str
     toggle: str  # the experiment that would prove it
     aliases: tuple[str, ...]  # ids of effects that frequencies alone hardly distinguish from it
