@@ -22,7 +22,8 @@ class TemplateFailed(InputError):
 
 
 def number(value: Any) -> str:
-    """A finite number as text of at most 20 characters, ABAQUS's limit, good to 13 digits."""
+    """A finite number as text of at most 20 characters, ABAQUS's limit, good to 13 digits. Raises
+    TemplateFailed."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise TemplateFailed(f"'{value}' is not a number")
     if not math.isfinite(value):

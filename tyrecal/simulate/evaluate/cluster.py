@@ -43,7 +43,8 @@ class Cluster:
         self, function: Callable[[Any], Any], tasks: Sequence[Any]
     ) -> Generator[tuple[int, Any], None, None]:
         """As in `Executor`. A task is given up, as crashed, once it has seen more workers die
-        than the scheduler allows (three, unless configured)."""
+        than the scheduler allows (three, unless configured). Raises SolverUnavailable if that goes
+        away, or a worker has other sources."""
         from distributed import KilledWorker, as_completed
         from distributed.client import FutureCancelledError
 
@@ -110,7 +111,7 @@ class QueueSettings(BaseModel):
     memory: Annotated[str, Field(pattern=r"^[0-9.]+ *[kMGT]i?B$")] = "2GB"  # of one job, e.g. "8GB"
     # of one job, [days-]hours:minutes:seconds
     walltime: Annotated[str, Field(pattern=r"^([0-9]+-)?[0-9]+:[0-9]{2}:[0-9]{2}$")] = "01:00:00"
-    queue: str | None = None
+    queue: str | None = None  # None: the system's default, as of the account
     account: str | None = None
     # further lines of the job's head, without their ``#SBATCH`` or ``#PBS``
     directives: list[str] = Field(default_factory=list)

@@ -52,7 +52,8 @@ class Footprint:
     mode_damping_ratio: of.RealArray | None = None  # (m,) where a loss factor is known
     # (m,) the patch's forces in the road's plane in each shape, in its scale, their sizes summed
     mode_traction_N: of.RealArray | None = None
-    sliding_frequency_Hz: of.HertzArray | None = None  # modes of a patch that slides freely
+    # modes of a patch that slides freely, as the two above
+    sliding_frequency_Hz: of.HertzArray | None = None
     sliding_shape: of.Shapes3D | None = None
     # (6, 6) rows: shifts (m), then turns (rad) of the rim along and about the deck's axes (down,
     # axle, rolling direction); columns: forces and moments, N and N m, that they take, likewise;
@@ -71,7 +72,7 @@ class Pressed:
     """One design at rising loads."""
 
     pressure_kPa: float
-    mass_kg: float
+    mass_kg: float  # of the tyre without rim
     nodes: Array  # (n,) deck numbers
     points: Array  # (n, 2) R, Z in m, not inflated
     angles: Array  # (k,) of the rings, rad from the patch's middle, 0 <= angle < 2 pi

@@ -36,6 +36,8 @@ class _Part(BaseModel):
 
 
 class _Failure(_Part):
+    """A failure that another run would repeat; the fields of `EvaluationFailed`."""
+
     cause: Literal["no_equilibrium", "unstable"]  # the deck's own doing, see `evaluator.SETTLED`
     words: Annotated[str, Field(max_length=100_000)]
     folder: Annotated[str, Field(max_length=4096)] | None
@@ -70,6 +72,8 @@ class _Mode(_Part):
 
 
 class _Tyre(_Part):
+    """The fields that all answers have; k points."""
+
     pressure_Pa: Annotated[Any, of.shaped(of.REAL, least=-1e-9)]
     mass_kg: of.PositiveFinite
     nodes: of.WholeArray
@@ -132,6 +136,8 @@ def _shape(array: Any) -> tuple[int, ...]:
 
 
 class _Pressed(_Tyre):
+    """An answer under loads; see `Solver.read` and `Pressed`."""
+
     angles: of.RealArray
     free_radius_m: of.PositiveFinite
     footprints: Annotated[list[Footprint], Field(min_length=1)]

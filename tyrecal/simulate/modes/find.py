@@ -30,7 +30,7 @@ class LabelledModes:
 
     evaluation: Evaluation
     modes: list[Mode]  # all of them, harmonic by harmonic
-    wanted: dict[Label, Mode]
+    wanted: dict[Label, Mode]  # those that were asked for, no other
 
     @property
     def clarity(self) -> float:

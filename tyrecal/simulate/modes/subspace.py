@@ -39,6 +39,6 @@ def squared_cosines(a: Array, b: Array) -> Array:
 
 
 def _basis(shapes: Array) -> Array:
-    """Orthonormal basis of the columns."""
+    """Orthonormal basis (signal, vector) of the columns."""
     basis, size, _ = np.linalg.svd(shapes, full_matrices=False)
     return np.asarray(basis[:, size > SAME_SHAPE * size.max()])

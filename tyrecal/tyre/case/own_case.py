@@ -15,7 +15,7 @@ from ..templates import TemplateNames, environment, render
 from .case_text import plain_text
 
 NO_NUMBERS: Mapping[str, float] = MappingProxyType({})
-RANGE = 5.0  # a variable's bounds are its start times and over this
+RANGE = 5.0  # bounds of a variable: its start divided and multiplied by this
 
 
 def own_case(

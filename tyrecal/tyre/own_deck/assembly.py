@@ -19,6 +19,7 @@ class Assembly:
 
     root: Scope = field(default_factory=Scope)
     others: list[tuple[Block, str]] = field(default_factory=list)  # sections, rigid bodies, ...
+    # by name with its prefix: block, prefix
     surfaces: dict[str, tuple[Block, str]] = field(default_factory=dict)
     # number in the model to the instance's name and the number in its part
     instance_nodes: dict[int, tuple[str, int]] = field(default_factory=dict)

@@ -19,6 +19,7 @@ LOADS = ("DSLOAD", "DLOAD")
 class ClassifiedDeck:
     """The blocks of a deck by what they are."""
 
+    # before the steps, and what steps before the inflation hold
     model: list[Block] = field(default_factory=list)
     options: dict[Block, list[Block]] = field(default_factory=dict)  # by material or section
     inflation: list[Block] = field(default_factory=list)  # of the step that inflates

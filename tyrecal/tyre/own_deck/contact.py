@@ -109,7 +109,7 @@ class DeckContact:
         return Pair(block, row, f"{slave} and {master}", own, moved, body.reference)
 
     def _touching(self, pair: Pair) -> tuple[Array, Array]:
-        """Nodes that lie on the rigid surface or beyond it, and how far from it they are."""
+        """Nodes (k,) that lie on the rigid surface or beyond it, and how far from it they are."""
         X = np.array([self.root.nodes[n] for n in pair.nodes])
         away, normal = nearest(X, pair.pieces[:, ::-1])  # reversed: normals point to the tyre
         points, count = np.unique(pair.pieces.reshape(-1, 2), axis=0, return_counts=True)

@@ -97,7 +97,7 @@ class OwnDecks:
 
     @cached_property
     def modes_step(self) -> list[Block]:
-        """The step of the last deck that finds the modes, *STEP to *END STEP."""
+        """The last deck's step that finds the modes, *STEP to *END STEP. Raises OwnDeckError."""
         _, steps = split_steps(self.decks[-1].blocks)
         modal = [step for step in steps if any(block.name == "FREQUENCY" for block in step)]
         if len(modal) != 1:

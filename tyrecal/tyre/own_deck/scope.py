@@ -169,14 +169,14 @@ def faces_of(element: Element) -> Iterator[tuple[str, tuple[int, ...]]]:
 
 
 def corner_areas(element: Element, points: Mapping[int, Point]) -> Array:
-    """Twice the area of the triangle at each corner of a solid: all positive, or it folds over."""
+    """Twice the area of the triangle at each corner (corner,) of a solid: positive, or it folds."""
     X = np.array([points[n] for n in element.nodes[: CORNERS_OF[len(element.nodes)]]])
     along, back = np.roll(X, -1, 0) - X, np.roll(X, 1, 0) - X
     return np.asarray(along[:, 0] * back[:, 1] - along[:, 1] * back[:, 0])
 
 
 def along_arc(a: Array, b: Array, centre: Array, share: float) -> Array:
-    """The point at a share of the shorter arc from a to b."""
+    """The point at a share of the shorter arc from a to b, points (2,) as the centre."""
     u, v = a - centre, b - centre
     angle = np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v) * share
     cos, sin = np.cos(angle), np.sin(angle)

@@ -40,7 +40,7 @@ class OwnDeckMesh(SectionMesh):
         return nodes, places.reshape(-1, 4)
 
     def skin(self) -> Array:
-        """Corner nodes of the outer surface from -z to +z."""
+        """Corner nodes (k,) of the outer surface from -z to +z."""
         corners = {n for nodes, c in self._corners() for n in nodes[:c]}
         return np.array([n for n in self.deck.mesh.outer if n in corners])
 

@@ -23,7 +23,7 @@ class RebarPly:
     name: str
     set_name: str  # of its section's elements
     material: str
-    area_m2: float
+    area_m2: float  # of a cord
     spacing: float  # m; degrees round the axle if angular
     angular: bool
     angle_deg: float  # from the meridian

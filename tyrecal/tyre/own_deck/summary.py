@@ -16,7 +16,7 @@ LAWS = ("ELASTIC", "HYPERELASTIC", "VISCOELASTIC")
 
 
 def contents(deck: OwnDeck, flat: SolverDeck) -> Json:
-    """Contents of a deck as data, SI where a key has a unit; nodes and elements: their numbers."""
+    """Contents of a deck as data, SI where a key has a unit; nodes, elements, faces are counts."""
     mesh, model = flat.mesh, flat.model
     crown = np.array([mesh.nodes[n] for n in mesh.crown])
     held = np.array([mesh.nodes[n] for n in mesh.rim])

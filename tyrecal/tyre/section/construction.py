@@ -101,7 +101,7 @@ class Construction:
     cords: dict[str, CordMaterial]
     carcass: tuple[Ply, ...]  # from inside to outside
     belts: tuple[Belt, ...]  # from inside to outside
-    cap: Ply | None
+    cap: Ply | None  # None: no cap ply
     crown: tuple[float, float]
     sidewall: tuple[float, float]
     bead: tuple[float, float]

@@ -153,7 +153,8 @@ def _stations(ends: list[float]) -> tuple[Array, list[str]]:
 
 
 def _check_width(size: TyreSize, table: GaugeTable, line: Meridian, s: Array, width: float) -> None:
-    """Raises SectionError where the tyre is wider than its section ``width``, m."""
+    """Raises SectionError where the tyre is wider than its section ``width``, m. s: arcs (n,)
+    of the stations."""
     outside = table.section().points[-1, :, 1]
     at = s[np.argmax(outside)]
     if outside.max() > width / 2 + 1e-5:

@@ -210,7 +210,7 @@ def _check_unfolded(grid: Array, regions: list[str]) -> None:
     """Raises SectionError for a cell of the grid with no positive area at one of its corners."""
     along, across = np.diff(grid, axis=1), np.diff(grid, axis=0)
 
-    def area(u: Array, v: Array) -> Array:
+    def area(u: Array, v: Array) -> Array:  # of the parallelogram of vectors (..., 2)
         return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
 
     corners = [

@@ -65,7 +65,7 @@ def section_of_outline(
     belt_spacing: float,
     belt_step: float,
 ) -> Section:
-    """The section between the curves, all in m.
+    """The section between the ``inner`` and the ``outer`` curve, as `read_outline` has them, in m.
 
     belt_width: of the first, wider belt along the carcass; the second is ``belt_step`` narrower;
     rim_radius: the rim holds what lies nearer to the axle; carcass_depth: inner surface to

@@ -150,7 +150,8 @@ def fill_lines(section: Section) -> Array:
 
     Where a line is absent it keeps the fraction of the thickness, between the nearest lines
     that exist, of the station where it ends, so that element rows run on without a step. Between
-    two parts of a line it goes over from the one's fraction to the other's.
+    two parts of a line it goes over from the one's fraction to the other's. Raises SectionError for
+    a line without a station.
     """
     points = section.points.copy()
     present = ~np.isnan(points).any(-1)

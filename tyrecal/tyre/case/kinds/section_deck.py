@@ -127,7 +127,7 @@ class SectionDeck(UserDecks):
         return {"own_deck": {"length_m": UNIT_LENGTH[units], "mass_kg": UNIT_MASS[units]}}
 
     def change_of(self, effect: Any, case: Case) -> Change:
-        """The effect's change of numbers and named parts."""
+        """The effect's change of numbers and named parts. Raises InputError without one."""
         if effect.add_to_deck is None:
             raise InputError("changes lines or regions of a section or a law, not a deck's numbers")
         if effect.part and not self.source(case).sets(effect.part):
