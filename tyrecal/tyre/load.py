@@ -78,7 +78,7 @@ def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mist
         how = "'tyrecal init SIZE' or 'tyrecal init --deck FILE.inp'"
         document.refuse(1, f"holds no tyre: write a case with {how}")
         return None, document.mistakes[-1:]
-    file_data = deepcopy(data)
+    file_data = deepcopy(data)  # without the deck's numbers, which `read_kind` puts into data
     kind, is_known = read_kind(document, data, path.parent)
     source = table(data, "deck")
     lines = kind.usual_lines(source) if kind else lines_of_a_deck(source)

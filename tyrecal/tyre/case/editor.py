@@ -30,7 +30,7 @@ def case_schema() -> str:
             entry["description"] = words[key]
     needed = {"required": whole.pop("required")}  # a deck's case may leave all else to its deck
     whole |= {"required": ["format"], "if": {"not": {"required": ["deck"]}}, "then": needed}
-    del whole["$defs"]["DeckSource"]["required"]
+    del whole["$defs"]["DeckSource"]["required"]  # units, which the deck's densities show
     return json_text(_in_words_of_schemas(whole))
 
 

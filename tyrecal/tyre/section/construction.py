@@ -139,6 +139,7 @@ SOFT = {  # of passenger cars
     "inner_liner": Compound(72, 1150),
     "belt_skim": Compound(78, 1180),
 }
+# areas of textile cords: dtex, in 1e-7 kg/m, over the density
 PASSENGER = Construction(
     name="passenger car",
     compounds=SOFT,
