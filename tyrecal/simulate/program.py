@@ -24,8 +24,8 @@ PIECE_BYTES = 1_000_000  # bytes of a file that are read at a time
 
 
 def split_command(text: str, windows: bool = WINDOWS) -> list[str]:
-    """The words of a command line, as the system splits it; no shell is used. Raises ValueError
-    for a quotation that does not end, which Windows lets end with the line."""
+    """The words of a command line, as Windows or a POSIX system splits it; no shell is used. Raises
+    ValueError for a quotation that does not end, which Windows lets end with the line."""
     return _split_for_windows(text) if windows else shlex.split(text)
 
 

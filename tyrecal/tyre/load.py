@@ -122,7 +122,7 @@ def _read(path: Path, allow_unusual: bool) -> tuple[LoadedCase | None, list[Mist
 
 
 def _typed(document: Document, data: dict[str, Any]) -> Case | None:
-    """The case as the schema sees it; else its mistakes are recorded, and WRONG in ``data``."""
+    """The case as the schema sees it; else None, its mistakes recorded, and WRONG in ``data``."""
     try:
         return Case.model_validate(data)
     except ValidationError as error:

@@ -82,8 +82,8 @@ def _yaml() -> YAML:
 
 @lru_cache(maxsize=32)
 def compose(text: str) -> Node | None:
-    """The nodes of a text, which must not be changed. Composing takes two thirds of the time to
-    load a case, and one command loads the same text several times. Raises YAMLError."""
+    """The nodes of a text, None of an empty one; they must not be changed. Composing takes two
+    thirds of the time to load a case, which one command does several times. Raises YAMLError."""
     return _yaml().compose(text)
 
 

@@ -52,7 +52,8 @@ def from_size(
     size: TyreSize, lengths: Mapping[str, float], pressure_kPa: float | None, stem: str
 ) -> Draft:
     """A case with a section built from a size; ``lengths``: fields of Gauges that differ from the
-    usual, m; ``stem``: name of the section's file, without .csv. Raises InputError."""
+    usual, m; pressure_kPa None: the size's; ``stem``: name of the section's file, without .csv.
+    Raises InputError."""
     try:
         gauges = replace(usual(size, lengths.get("rim")), **lengths)
         table = build(size, gauges)

@@ -27,7 +27,7 @@ def own_case(
 ) -> str:
     """YAML of a case whose deck is ``deck``: what a fit most often changes is a variable, the
     marks, the layers' areas and the rubbers' first constants. flat: the same deck as the solvers
-    get it, all sets and parts written out; numbers: of the marks. Variables of the deck's numbers
+    get it; pressure_kPa None: the deck's; numbers: of the marks. Variables of the deck's numbers
     are in its own units."""
     r, z = flat.mesh.reference  # node of the rim, m
     return _text(

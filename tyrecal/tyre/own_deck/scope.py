@@ -49,7 +49,7 @@ class Element:
 
 class MeshTable(dict[int, Content]):
     """Nodes, or elements, by number, and the sets of them by name, in pieces. what: node or
-    element."""
+    element; block, and row if any: the lines that errors name."""
 
     def __init__(self, what: str):
         super().__init__()

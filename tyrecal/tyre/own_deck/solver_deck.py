@@ -123,7 +123,7 @@ class _Writer:
         self.lines.append((text, place))
 
     def block(self, block: Block, head: str, angular: bool = False) -> None:
-        """A keyword line, and the block's data in SI units."""
+        """A keyword line, and the block's data in SI units; angular: a spacing stays in degrees."""
         self.line(head, block.place)
         scales = {}
         for field, i, j in fields.placed_fields(block):

@@ -127,8 +127,8 @@ def build_mesh(
 
     ``grading``: thickness of a row over that of the row inside it, per gap between two lines.
 
-    Quadratic: 8-node elements, their midside nodes on the section's own curves. The rim holds the
-    ``whole_bead`` where stations are rigid, or its outside and its end.
+    quadratic: 8-node elements, their midside nodes on the section's own curves, else 4-node ones.
+    The rim holds the ``whole_bead`` where stations are rigid, or its outside and its end.
     Raises SectionError when an element folds over.
     """
     step = 2 if quadratic else 1

@@ -84,7 +84,7 @@ class SectionDeck(UserDecks):
         return _mesh(tyre.flat)
 
     def place_of_line(self, tyre: Any, line: int) -> Place | None:
-        """The line of the deck that a line of the flat mesh and materials comes from."""
+        """The line of the deck that a line, from 0, of the flat deck comes from; None: of none."""
         return _origin(tyre.flat, line)
 
     def template_names(self, tyre: Any) -> TemplateNames:

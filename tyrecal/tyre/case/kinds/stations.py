@@ -62,7 +62,7 @@ class Stations(TyreKind):
         return mesh_at_level(tyre.case, tyre.gauged)
 
     def section_origin(self, case: Case) -> SectionOrigin | None:
-        """As the case states it."""
+        """As the case states it, None where it does not."""
         return case.section.known_from
 
     def change_of(self, effect: Any, case: Case) -> Change:
@@ -74,7 +74,7 @@ class Stations(TyreKind):
         """Every effect suits a section; one that a value makes impossible is refused there."""
 
     def shape_uncertainty(self, effect: Any) -> Change | None:
-        """The effect's own."""
+        """The effect's own, None where it has none."""
         change: Change | None = effect.shape_uncertainty
         return change
 
