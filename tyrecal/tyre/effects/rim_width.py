@@ -35,11 +35,12 @@ def add(case: LoadedCase, value: float) -> LoadedCase:
 
 @lru_cache(maxsize=8)
 def _mounted(section: Section, line: int, start: int, end: int, distance: float) -> Section:
-    """The section with its stations from ``end`` on moved by ``distance`` along the axle.
+    """The section with its stations from ``end`` on moved by ``distance``, m, along the axle.
 
-    Between ``start`` and ``end`` the carcass bends as an inextensible strip of constant
+    Between ``start`` and ``end`` the carcass, ``line``, bends as an inextensible strip of constant
     stiffness whose ends do not turn: its tangent turns by phi(s) with phi' = a + b r + c z, the
-    moment of the forces at its ends. Points off the carcass turn with it.
+    moment of the forces at its ends; s, r and z over its length, r and z from their means. Points
+    off the carcass turn with it.
     """
     carcass = section.points[line, start : end + 1]
     step = np.diff(carcass, axis=0)

@@ -107,7 +107,8 @@ class OwnDecks:
 
     @cached_property
     def modes(self) -> int | None:
-        """Number of modes that are requested; None where a range of frequencies decides."""
+        """Number of modes that are requested; None where a range of frequencies decides. Data of
+        *FREQUENCY: number, lowest, highest frequency."""
         row = next(b for b in self.modes_step if b.name == "FREQUENCY").only_row()
         return None if row.text(1) or row.text(2) or not row.text(0) else row.integer(0)
 
@@ -125,6 +126,7 @@ class OwnDecks:
         """
         if any(PRESSURE_MARK in deck.marks for deck in self.decks):
             return []
+        # last amplitude of pairs of time and amplitude, "" if there is no pair
         tables = (b for b in self.blocks if b.name == "AMPLITUDE" and b.rows)
         ends = {b.get("NAME"): [*filter(None, b.rows[-1].fields), ""][-2] for b in tables}
         loads = [(deck, *place) for deck in self.decks for place in _pressures(deck.blocks, ends)]
@@ -171,7 +173,7 @@ class OwnDecks:
     def check(self, numbers: Mapping[str, float]) -> None:
         """Raises OwnDeckError where they cannot be run, or have no modes to label."""
         self.modes, self.jobs  # noqa: B018
-        self.filled(numbers, 1.0)
+        self.filled(numbers, 1.0)  # at any pressure
 
     @property
     def node_sets(self) -> list[str]:
