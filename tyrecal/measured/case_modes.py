@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 Array = np.ndarray
 
 # mean square error of a shape of the case over its mean square: weight of its label's covariance
-# without a case; by judgement
+# without a case; assumed
 SHAPE_OFF = 0.05
 PLACE_OFF_m = 0.003  # standard deviation of a sensor's place, by judgement
 NEIGHBOURS = 12  # nodes about a sensor, by which a motion's slope over the section is judged

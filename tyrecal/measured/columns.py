@@ -46,7 +46,7 @@ HEADINGS = {  # headings of each meaning, as `_heading` returns their names
 }
 MEANING = {name: meaning for meaning, names in HEADINGS.items() for name in names.split()}
 BRACKETED = re.compile(r"^(.*?)\s*(?:[\[(](.*?)[\])]\s*)?$")  # name [unit]
-ENDING = re.compile(
+ENDING = re.compile(  # name and unit without brackets, as "load / kN" or "frequency_Hz"
     r"^(.+?)(?:\s*/\s*|\s+in\s+|[\s_]|(?=%))(%|hz|kpa|bar|psi|n|m2|n[\s_]per[\s_]m|kg|kn|lbf|kgf|dan|percent)$"
 )
 LENGTH_ENDING = re.compile(r"^(.+)[\s_](m|mm|cm|in|inch)$")  # 'mode m' ends in no unit
@@ -135,7 +135,7 @@ def _column(index: int, heading: str, meaning: str, unit: str) -> TableColumn:
     if table := TABLES.get(meaning):
         if not unit and meaning != "frequency_Hz" and _heading(heading)[0] not in FRACTIONS:
             raise InputError(f" has no unit; write it as '{heading} [{next(iter(table))}]'")
-        factor = units.factor(table, unit) if unit else 1.0
+        factor = units.factor(table, unit) if unit else 1.0  # frequencies without a unit: Hz
         if factor is None:
             raise InputError(f": the unit must be one of {', '.join(table)}")
         return TableColumn(index, factor)
@@ -172,5 +172,5 @@ def _is_length(name: str) -> bool:
 
 
 def _words(name: str) -> str:
-    """Words of a heading, joined by low lines."""
+    """Words of a heading, joined by underscores."""
     return re.sub(r"[\s\-_.]+", "_", name).strip("_")

@@ -81,6 +81,7 @@ def sensor_agreement(measured: Array, computed: Array) -> tuple[Array, Array]:
 
 
 def closest_shape(shape: Array, plane: Array) -> Array:
-    """The shape of a plane that is nearest to a shape (k,), of unit length."""
+    """The shape of a plane (k, 2), or line (k, 1), that is nearest to a shape (k,), of unit length;
+    its sign is the shape's."""
     closest = plane @ np.linalg.lstsq(plane, shape, rcond=None)[0]
     return np.asarray(closest / max(np.linalg.norm(closest), 1e-300))

@@ -11,7 +11,7 @@ a, b, w: SAME_PARITY, OTHER_PARITY, OTHER_WAVES. own, same, other (k, k): covari
 motions of the label's order, of the other orders of its parity, and of the other parity; all: of
 every c; |A|: the mean of the diagonal, at least MIN_SEEN of that of the three together. So no order
 has cleaner shapes than another. A belt's half width is known from a case, or not: then S is the
-mean over HALF_WIDTHS of the radius. The numbers are by judgement.
+mean over HALF_WIDTHS of the radius. The variances are assumed.
 
 A column is the index of an order among the five of a harmonic in `modes.label`: COLUMNS has the
 motions of each, PARITY whether it is even (0) or odd (1). DEGREE is the highest polynomial, BELT
@@ -32,7 +32,7 @@ Array = np.ndarray
 
 SAME_PARITY, OTHER_PARITY = 0.08, 0.01  # variance of motions that are not the label's, of 1
 OTHER_WAVES = 0.001  # likewise, of motions with another c: tyres are not uniform
-SIDEWALL = 0.5  # variance of the sidewalls' motion; belts stand out, but sidewalls bulge
+SIDEWALL = 0.5  # variance of the sidewalls' motion, the belt's being 1: they bulge with it
 HALF_WIDTHS = (0.18, 0.40)  # of a belt's half width over its radius: motorcycles' tyres have others
 WIDTHS = 6  # half widths averaged over
 WIDER = 1.05  # a belt reaches beyond its outermost sensor by up to this factor, at least

@@ -84,7 +84,8 @@ def _axle(X: Array) -> str:
 
 
 def _check_centre(places: Array, axle: str) -> None:
-    """Raise InputError if the outermost sensors are on a circle about another centre.
+    """Raise InputError if the outermost sensors are on a circle about another centre than (0, 0) of
+    ``places`` (k, 2), m.
 
     The circle x^2 + y^2 = 2 a x + 2 b y + c by least squares, through those that stand outermost
     about the last centre.

@@ -21,6 +21,7 @@ from .mode_names import label_parts
 MAX_ORDERS = {"c": 20, "m": 3}  # largest numbers of a label in a table
 KIND_WORDS = {"": None, "axial": "axial", "lateral": "axial"}
 KIND_WORDS |= dict.fromkeys(("torsional", "torsion", "rotational"), "torsional")
+# member of a pair by the words of its cell; "": one value for both
 DOUBLET_WORDS = {"": "", "1": "1", "2": "2", "a": "1", "b": "2", "lower": "1", "upper": "2"}
 LOADED_MEMBERS = ("symmetric", "antisymmetric")
 

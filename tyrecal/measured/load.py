@@ -49,6 +49,7 @@ def _with_own_file(loaded: LoadedCase, to_fit: bool = False) -> LoadedCase:
             with_measured(loaded, path)
         return with_own_file(loaded)
     except OSError as error:
+        # of no line, key or value
         mistakes = [Mistake(str(path), 0, "", "", f"cannot be read: {error.strerror or error}")]
     except InputError as error:
         mistakes = [_mistake(path, line) for line in str(error).splitlines()]

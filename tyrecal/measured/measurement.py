@@ -16,7 +16,7 @@ from ..units import PRESSURE
 CSV_COLUMNS = ("quantity", "c", "m", "kind", "member", "pressure_kPa", "load_N", "value", "sigma")
 RIM_COLUMN = "rim"  # written only if a value was measured on another rim than the case's
 AS_CASE = "case"  # cell of the rim of a value that was measured on the case's
-PRESSURE_USUAL = Usual(20, 2000, "kPa", PRESSURE)
+PRESSURE_USUAL = Usual(20, 2000, "kPa", PRESSURE)  # least, most, unit, and units that may be meant
 DAMPING_RATIO = "damping_ratio"  # a row of its own in a CSV, read as part of its mode's frequency
 OF_A_MODE = ("frequency_Hz", DAMPING_RATIO)
 DAMPING_SIGMA = 0.25  # sigma over the value of a damping ratio that states none
@@ -33,7 +33,7 @@ class Measurement:
     label: Label | None  # None if it is not a frequency, or has no label yet
     member: str  # 1 or 2 of a doublet, symmetric or antisymmetric under load; "": one for both
     pressure_kPa: float  # 0 for the mass
-    load_N: float
+    load_N: float  # 0: unloaded
     value: float
     sigma: float = nan  # standard deviation; NaN: not stated
     run: str = ""  # name of the test: the tyre mounted once and measured

@@ -20,8 +20,8 @@ FREQUENCIES = ("FREQ_LONG", "FREQ_LAT", "FREQ_YAW", "FREQ_WINDUP")
 
 @dataclass(frozen=True)
 class MFSwift:
-    """A tyre by its keys, SI. A method raises KeyError for a key that it lacks, and those that need
-    the deflection ValueError for a Q_FZ2 that is too large; keys of influences, such as PFZ1, are 0
+    """A tyre by its keys, SI. A method raises KeyError for a key that it lacks, and if it needs the
+    curve of F_z ValueError for a Q_FZ2 that is too large; keys of influences, such as PFZ1, are 0
     where absent. Loads in N, lengths in m."""
 
     keys: Mapping[str, float]
@@ -108,7 +108,7 @@ class MFSwift:
 
     def springs(self) -> dict[str, float]:
         """Stiffness between rim and rigid belt, (2 pi f)² times its inertia: ``x`` (also vertical),
-        ``y`` in N/m; ``yaw``, ``windup`` in N m/rad. BELT_IXX is the inertia about z, too."""
+        ``y`` in N/m; ``yaw``, ``windup`` in N m/rad. BELT_IXX is about any diameter, z too."""
         inertias = ("BELT_MASS", "BELT_MASS", "BELT_IXX", "BELT_IYY")
         pairs = zip(("x", "y", "yaw", "windup"), FREQUENCIES, inertias, strict=True)
         return {

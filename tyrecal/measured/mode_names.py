@@ -16,7 +16,7 @@ from ..simulate.modes.label import KNOWN, ORDINALS
 
 BRACKETED_LABEL = re.compile(r"^[\[(]?\s*(\d+)\s*[,;/ ]\s*(\d+)\s*[\])]?\s*(.*)$")
 LETTERED = re.compile(r"^c\s*=?\s*(\d+)\s*[,;/]?\s*m\s*=?\s*(\d+)$", re.IGNORECASE)
-DOUBLET = re.compile(r"\s*\(?[x\u00d7]\s*2\)?$")
+DOUBLET = re.compile(r"\s*\(?[x\u00d7]\s*2\)?$")  # ' x2', which some write behind both of a pair
 NOISE_WORDS = {
     *("mode", "modes", "mod", "modus", "modo", "moda", "eigenform", "eigenmode", "shape", "forma"),
     *("forme", "de", "di", "del", "der", "des", "von", "of", "the", "tyre", "tire", "belt"),
@@ -111,7 +111,7 @@ def _bending(words: str) -> tuple[str, str, str] | None:
 
 
 def _words(text: str) -> str:
-    """Words without case, accents, marks and noise, joined by low lines."""
+    """Words without case, accents, marks and noise, joined by underscores."""
     plain = unicodedata.normalize("NFKD", text.casefold().replace("ß", "ss"))
     plain = "".join(each for each in plain if not unicodedata.combining(each))
     return "_".join(w for w in re.findall(r"[a-z0-9]+", plain) if w not in NOISE_WORDS)

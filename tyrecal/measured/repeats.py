@@ -6,7 +6,7 @@ The value is the mean over n runs, and sigma that of the mean:
     v = (4 v_all (mean x)^2 + sum_i (x_i - mean x)^2) / (4 + n - 1)
 
 sigma_i: standard deviations that the runs state. v_all: relative variance of one run, pooled over
-all values of a quantity; it counts like four more repeats of each, by judgement. The floor is for
+all values of a quantity; it is assumed to count like four more repeats of each. The floor is for
 scatter that repeats do not show: another bench, another day, the mass of the sensors.
 """
 
@@ -116,6 +116,7 @@ def one_for_both(values: Sequence[Measurement]) -> list[Measurement]:
 
 
 def _order(row: Measurement) -> tuple[object, ...]:
+    """Key that sorts frequencies first, by state, then by mode."""
     label = row.label or Label(99, 0)  # those without a label last
     mode = (label.c, label.m, label.kind or "", row.member, 0.0 if row.label else row.value)
     state = (row.pressure_kPa, row.load_N, row.rim or "")

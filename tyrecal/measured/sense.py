@@ -5,9 +5,9 @@ with the waves c along a smooth curve for each m. As a normal distribution of ln
 
     ln f = a + ln F(label) + o_m + g ln(c / 2) + t_label + (s + s_label) ln(p / mean p) + noise
 
-F are the rounded frequencies of two passenger tyres; o_m is common to an m, also to both [0,0];
-mean p is geometric. a is free, the others have the standard deviations below, by judgement; [0,0]
-torsional has an s with a mean and deviation of its own. A doubt is a change of the data, two
+F are the rounded frequencies of two passenger tyres; o_m is common to the modes of an m, which is 0
+for both [0,0]; mean p is geometric. a is free, the others have the standard deviations below, which
+are assumed; [0,0] torsional has an s of its own. A doubt is a change of the data, two
 pressures or two labels exchanged or one value left out, that makes them far more probable. Where
 the next change is nearly as probable, it is named too. These are questions to the user: nothing is
 changed here. `measured import` and `fit` report them; the pattern must never enter a fit.
@@ -33,7 +33,7 @@ USUAL_HZ = {  # by m, from c = 1
     0: (67, 90, 110, 131, 153, 174, 193, 212, 229),
     1: (45, 78, 118, 148, 168, 186, 202, 216, 231),
 }
-ZERO_HZ = {"axial": 37, "torsional": 44}
+ZERO_HZ = {"axial": 37, "torsional": 44}  # of [0,0] by kind
 # by c, and kind or m: of a tyre on a free rim, where these differ
 FREE_HZ = {(0, "axial"): 45, (0, "torsional"): 74, (1, 0): 81, (1, 1): 73}
 SCALE_SD, OFFSET_SD, GROWTH_SD = 2.0, 0.06, 0.08  # of a, o_m, g
@@ -127,6 +127,7 @@ def _exchanges(
     names = sorted({(row.label, row.member) for row in rows}, key=str)
 
     def exchanged(pairs: Sequence[tuple[int, int]]) -> list[int]:
+        """The order of the rows with those of each pair exchanged."""
         order = list(range(len(rows)))
         for i, j in pairs:
             order[i], order[j] = j, i

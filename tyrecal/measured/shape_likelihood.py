@@ -41,6 +41,7 @@ def ln_shape_odds(case: CaseModes, sensors: Sensors, shapes: Array) -> Array:
         c, off = mode.label.c, case.noise_by_place(mode, sensors)
         noise[c] = max(off, noise.get(c, 0.0))
     for mode in case.modes:
+        # a label without a covariance, such as m = 4, has the mean of its c
         same_c = [S for label, S in general.items() if label.c == mode.label.c]
         S = general[mode.label] if mode.label in general else np.mean(same_c, axis=0)
         off = noise[mode.label.c]

@@ -29,6 +29,7 @@ MAX_REPEAT_STEP = {"frequency_Hz": 0.05, "mass_kg": 0.05}
 MAX_REPEAT_STEP_ELSE = 0.25  # of all other quantities
 MIN_COMMON, MIN_SHIFT = 3, 0.02  # common labels of two runs, and their mean ln ratio, to report
 MAX_SLIPS = 12  # largest number of slips
+# of values that are rounded, or of a spectrum's lines: the largest, 500, first
 USUAL_STEPS = [digit * 10.0**power for power in range(2, -8, -1) for digit in (5, 2.5, 2, 1.25, 1)]
 MIN_SCATTER = 1e-4  # relative scatter that repeats of a test have at least
 

@@ -29,8 +29,7 @@ from .result import (
     silent,
 )
 
-# mean contact pressure over the inflation, of a passenger car, by judgement
-USUAL_SHARE = (0.8, 1.6)
+USUAL_SHARE = (0.8, 1.6)  # mean contact pressure over the inflation, of a passenger car; assumed
 PressOutcome = Pressed | EvaluationFailed
 
 

@@ -96,6 +96,7 @@ def _read_universal(path: Path, form: str) -> list[tuple[str, MeasuredResponse]]
 
 
 def _of_function(file: Universal, each: Function, form: str) -> MeasuredResponse:
+    """A function of a universal file in SI; form: if it does not state its own."""
     if each.unit not in SI_PER_UNIT:
         raise InputError(
             f"{each.place}: the unit '{each.unit}' is not one of {SHOWN_RESPONSE_UNITS}"
@@ -181,6 +182,7 @@ def _read_table(path: Path, form: str) -> list[tuple[str, MeasuredResponse]]:
 
 
 def _of_rows(place: str, excite: str, respond: str, form: str, rows: Array) -> MeasuredResponse:
+    """A function of a table; rows (3, f): Hz, real and imaginary part, SI."""
     try:
         (force,), (point,) = read_points(excite, hub=False), read_points(respond)
     except ValueError as error:

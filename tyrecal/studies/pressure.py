@@ -148,8 +148,8 @@ def findings(states: Sequence[State], labels: Sequence[Label]) -> PressureFindin
 
 
 def _curve(p: np.ndarray, f: np.ndarray) -> Json:
-    """Curve of one mode: its rise, whether it rises at every step, and how it bends, which two
-    pressures cannot show."""
+    """Curve of one mode, Hz f (n,) at rising pressures p (n,): its rise, whether it rises at every
+    step, and how it bends, which two pressures cannot show."""
     weight = (p[2:] - p[1:-1]) / (p[2:] - p[:-2])
     bow = f[1:-1] - (weight * f[:-2] + (1 - weight) * f[2:])  # above the neighbours' chord
     straight = "neither" if len(bow) else "unknown"

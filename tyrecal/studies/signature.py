@@ -127,6 +127,7 @@ class Plain:
                 yield failure
 
     def _signature(self, id: str, value: float, evaluations: list[Evaluation]) -> Signature:
+        """Signature by the evaluations with the effect, one at each pressure."""
         lost = np.nan
         hertz = np.array(
             [

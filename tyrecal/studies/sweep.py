@@ -27,7 +27,7 @@ from .fit.targets import target_labels
 from .sensitivities.table import numbers_of
 from .variable import read_variables
 
-MAX_POINTS = 100_000
+MAX_POINTS = 100_000  # of a grid
 DEFAULT_REACH = 0.1  # of a variable's value, to either side, where no range is given
 DEFAULT_POINTS = 10  # of a Latin hypercube, for each range, where their number is not given
 RANGE_TEXT = re.compile(r"([^=]+)=([^:=]+):([^:=]+)(?::([^:=]+))?")

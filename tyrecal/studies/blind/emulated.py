@@ -32,7 +32,7 @@ Array = np.ndarray
 # ignores moves its variables by the rest
 REACH = 0.8
 PLAIN_DEGREE, EFFECT_DEGREE, SOURCE_DEGREE = 4, 3, 2  # of polynomials in the variables
-PLAIN_DESIGNS, EFFECT_DESIGNS, SOURCE_DESIGNS = 20, 10, 12
+PLAIN_DESIGNS, EFFECT_DESIGNS, SOURCE_DESIGNS = 20, 10, 12  # designs that these are fitted to
 # nodes of an effect, of each end of its range
 ONE_SIDED_SHARES, TWO_SIDED_SHARES = (0.1, 0.4, 0.75, 1.0), (0.5, 1.0)
 SEED = 1
@@ -215,6 +215,7 @@ def _effect(
 
 
 def _node_values(span: EffectRange) -> list[float]:
+    """Parameters at which an effect is evaluated, without 0."""
     if span.low < 0 < span.high:
         return [f * end for end in (span.low, span.high) for f in TWO_SIDED_SHARES]
     far = max(span.low, span.high, key=abs)

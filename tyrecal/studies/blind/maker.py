@@ -32,7 +32,7 @@ class Maker:
     solver: str  # its name
     laws: Mapping[str, EffectLaw]  # of effects, by id
     outside: Mapping[str, EffectLaw]  # of families that the catalogue does not hold, by name
-    store: Store | None = None
+    store: Store | None = None  # of finished evaluations; None: they are not kept
 
     def compute(self, case: LoadedCase, labels: list[Label]) -> Computed:
         """The tyre as ``case`` has it. Raises EvaluationFailed, also where a label is lost, and

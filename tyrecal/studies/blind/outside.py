@@ -59,7 +59,7 @@ def stand_resonance(computed: Mapping[float, Frequencies], e: float) -> Mapping[
     return {p: {**ln_f, vertical: (stand, stand)} for p, ln_f in computed.items()}
 
 
-OUTSIDE_FAMILIES = {  # ranges are by judgement
+OUTSIDE_FAMILIES = {  # the ranges are chosen
     "thick_cushion": EffectLaw(0.0, 3.0, thick_cushion),
     "bias_carcass": EffectLaw(0.0, 20.0, bias_carcass),  # degrees
     "tension_stiffening": EffectLaw(-1.0, 1.0, tension_stiffening),

@@ -20,8 +20,8 @@ class Protocol:
     case: str  # the case file beside it
     counts: dict[str, int]  # trials by kind
     spread: float = 0.4  # design variables: start exp(U(-ln(1 + spread), ln(1 + spread)))
-    given_kPa: tuple[float, ...] = (160.0, 240.0, 320.0)
-    held_out_kPa: float = 200.0
+    given_kPa: tuple[float, ...] = (160.0, 240.0, 320.0)  # pressures of the trials' measurements
+    held_out_kPa: float = 200.0  # pressure at which predictions are scored
     noise: float = 0.002  # standard deviation of every frequency, relative
     mass: float = 0.005  # standard deviation of the weighed mass, relative
     # standard deviation of a doublet's split, relative, that each tyre has at all pressures

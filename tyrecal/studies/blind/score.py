@@ -42,8 +42,8 @@ class Scored:
     lam: float  # detectability lambda, 0 without an effect
     # min(lambda, min_j delta_j^2), 0 without an effect; delta_j: distance from effect j (`ruler`)
     band: float
-    verdict: str
-    named: str | None
+    verdict: str  # `VerdictKind` of the answer
+    named: str | None  # key of the effects that it names; None: it names none
     ranked: tuple[str, ...]  # keys by falling probability
     probabilities: dict[str, float]  # by key, 1 together
     on_truth: float  # probability of ``truth`` in the answer

@@ -44,9 +44,9 @@ class ResidualGroup:
 class Contrast:
     """A combination of residuals in per cent with its standard deviation."""
 
-    name: str
+    name: str  # in words, see `_contrasts`
     percent: float  # weighted sum of residuals, 100 (ln measured - ln model)
-    sigma_percent: float
+    sigma_percent: float  # its standard deviation without a gap
 
     @property
     def p_value(self) -> float:

@@ -20,6 +20,7 @@ from .states import is_possible
 from .verdict import Shift
 
 Array = np.ndarray
+# numbers of the case's rim that matter if it is free
 WHEEL = ("mass_kg", "polar_inertia_kg_m2", "diametral_inertia_kg_m2")
 
 
@@ -104,6 +105,7 @@ def _wheel(
     wheel: Sequence[str],
     defaults: Mapping[str, float],
 ) -> Iterator[Shift]:
+    """Other values of the free wheel's numbers that the case does not state, one for each."""
     of_number = [[column for (_, name), column in rates.items() if name == path] for path in wheel]
     if wheel and all(of_number):
         columns = np.column_stack([np.sum(each, axis=0) for each in of_number])

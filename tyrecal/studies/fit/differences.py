@@ -32,6 +32,7 @@ def differences(
     sides = {i: _sides(v, values[v.name], step) for i, v in enumerate(variables)}
 
     def around(steps: Mapping[int, float]) -> Iterator[Array | EvaluationFailed]:
+        """Answers with one coordinate moved each, by its index; sets ``centre`` at first."""
         nonlocal centre
         moved = [(variables[i], step) for i, step in steps.items()]
         designs = [{**values, v.name: v.value(v.scaled(values[v.name]) + s)} for v, s in moved]

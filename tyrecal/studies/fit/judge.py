@@ -20,8 +20,8 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Judgement:
-    """See `verdict`; chi2_per_dof: None if nothing states a scatter, or the covariance of the model
-    is not known."""
+    """See `verdict`; chi2_per_dof: None if nothing states a scatter, the covariance of the model is
+    not known, or there are no more values than variables; reason: None if nothing looks odd."""
 
     verdict: FitVerdict
     chi2_per_dof: float | None

@@ -28,7 +28,7 @@ class ModelErrors:
     """
 
     rows: tuple[Observable, ...]
-    known: list[Source]
+    known: list[Source]  # the k sources of error
     by_constants: Array  # (n, k) changes of ln q by one standard deviation of each of ``known``
     # standard deviation of ln f by each part of the error of material laws (`form_error`)
     laws: float

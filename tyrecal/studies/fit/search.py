@@ -17,7 +17,7 @@ from .crossing import MIXED, TELLING, Crossing, crossing, gap, order, pair_clari
 from .problem import Point, Problem
 
 Array = np.ndarray
-MAX_DESIGNS = 100
+MAX_DESIGNS = 100  # evaluated in one search
 EXACT = 1e-3  # Hz, an objective below every measurement's resolution: the fit is exact
 MIN_OBJECTIVE_GAIN = 1e-9  # of the squared objective: a smaller gain is none
 NO_GAIN = 1e-6  # share of the squared objective: below, a whole step gains nothing

@@ -38,7 +38,7 @@ class Target:
     sigma_Hz: float | None = None
     state: TyreState = AS_THE_CASE
     damping_ratio: float | None = None  # compared, and fitted by loss factors alone
-    damping_sigma: float | None = None
+    damping_sigma: float | None = None  # standard deviation of that; None: not stated
 
     quantity = "frequency_Hz"
 

@@ -18,7 +18,7 @@ from .form_error import FORM_LENGTH, at_pressures, form_error, laws_alike
 from .observations import Observable, Observations
 
 Array = np.ndarray
-# correlations of one mode's error on two rims (fixed, springs, free), and in two runs; by judgement
+# correlations of one mode's error on two rims (fixed, springs, free), and in two runs; assumed
 BETWEEN_RIMS, BETWEEN_RUNS = 0.9, 0.97
 
 

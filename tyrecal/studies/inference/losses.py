@@ -15,7 +15,7 @@ import numpy as np
 from ...tyre.case import LoadedCase, number_at
 from ...tyre.case.schema import Rubber
 from ...tyre.effects.edit import changed, with_part, with_rubbers
-from .section_fields import COMPOUNDS_ALIKE  # in the ln of their loss factors, too
+from .section_fields import COMPOUNDS_ALIKE  # correlation, here of the ln of their loss factors
 
 Array = np.ndarray
 # loss factor of a compound that states none, and standard deviation of its ln, by judgement: 0.08

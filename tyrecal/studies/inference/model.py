@@ -76,7 +76,7 @@ class Answer:
     # (n, k) change of eta by one standard deviation of each of the k sources of error
     constants: Array | None = None
     slopes: Mapping[str, Array] = field(default_factory=dict)  # (n,) d eta / d e; NaN: unknown
-    coupling: Coupling | None = None
+    coupling: Coupling | None = None  # None: not wanted, or not known
     # (n,) change of eta by one standard deviation of the effect's `Effect.shape_uncertainty`
     shape_uncertainty: Array | None = None
     by_pressure: Array | None = None  # (n,) d eta / d ln(pressure), if it was evaluated

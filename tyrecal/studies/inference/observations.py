@@ -30,7 +30,7 @@ class Observable:
 
     quantity: str
     label: Label | None  # of the mode; None: the mass
-    pressure_kPa: float
+    pressure_kPa: float  # 0 for the mass
     run: int = 0  # 0: the tyre as it is; 1, 2, ...: toggled runs, in which one thing was switched
     rim: RimSupport | None = None  # None: as the case has it
 

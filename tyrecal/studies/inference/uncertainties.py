@@ -67,6 +67,7 @@ def _constants(case: LoadedCase) -> tuple[list[Source], bool]:
 
 
 def _assumed(case: LoadedCase, taken: set[str]) -> Iterator[Source]:
+    """Assumed sources, without the paths ``taken`` by variables."""
     for name, path, percent, absolute in _usual(case):
         if path not in taken:
             step = absolute or number_at(case, path) * percent / 100
