@@ -10,10 +10,8 @@ from .correlation import ShapeCorrelation
 from .result import Column, CsvRow, PositiveNumber, Result, ResultPart, Table, csv_text, state_words
 
 FOREIGN_WORDS = "no mode of the tyre"
-MAX_RIVALS, MIN_RIVAL_PROBABILITY = (
-    4,
-    0.01,
-)  # labels, and labelings, beside the likeliest; probability
+MAX_RIVALS = 4  # labels, and labelings, that are listed beside the likeliest
+MIN_RIVAL_PROBABILITY = 0.01  # of those
 SURE_LABEL = 0.9  # probability below which a label is in doubt
 
 

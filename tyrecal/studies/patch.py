@@ -21,8 +21,8 @@ class Patch:
     """The outer surface seen from the road, (ring, node across): rings in the direction of rolling
     with the patch's middle amid them, nodes from -z to +z."""
 
-    along: Array  # m in the road's plane
-    across: Array  # m in the road's plane
+    along: Array  # m in the road's plane, towards larger angles of the rings
+    across: Array  # m in the road's plane, towards +z
     pressure: Array  # Pa, 0 where it does not touch
     touches: Array  # bool
     # m, of nodes below the road, by a solver that places the patch's edge between nodes, else None

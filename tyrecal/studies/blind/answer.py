@@ -49,7 +49,7 @@ def tyre_model(
     jobs: int = 1,
     effects: Sequence[str] | None = None,
 ) -> TyreModel:
-    """The model of the diagnosis for all trials."""
+    """The model of the diagnosis for all trials; effects: their ids, None: the whole catalogue."""
     ranges, _ = effect_ranges(case, evaluator, effects)
     return TyreModel(case, evaluator, rows_of(case, protocol), sources(case)[0], ranges, jobs)
 
@@ -70,7 +70,8 @@ def answer(
     """Answer every trial that has no answer yet; returns the sha256 of all answers.
 
     further: see `Assumed`; for rules that tell how many effects tyres have. Raises InputError
-    where the truth lies among the trials.
+    where the truth lies among the trials, and what the model answers if it has no solution at its
+    start.
     """
     refuse_open_truth(folder)
     protocol = read_protocol(folder)

@@ -1,11 +1,11 @@
 """Answers of simpler methods from the same measurements, with the sensitivities of `Ruler`, the
 model of ln f by which all methods are judged.
 
-All fit ln x first, in the ruler's quadratic model with weights by repeatability alone. Nearest
-signature: the effect whose residual, after its own fit, points most along the measured one; "none"
-where the residual is below twice what noise leaves. AIC: least chi2 + 2 x number of parameters.
-Evidence by repeatability: that of a uniform prior over each range, without the other two parts of
-the covariance. Odds before any measurement are the diagnosis' own.
+All fit the logarithms of the variables first, in the ruler's quadratic model with weights by
+repeatability alone. Nearest signature: the effect whose residual, after its own fit, points most
+along the measured one; "none" where the residual is below twice what noise leaves. AIC: least chi2
++ 2 x number of parameters. Evidence by repeatability: that of a uniform prior over each range,
+without the other two parts of the covariance. Odds before any measurement are the diagnosis' own.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ from .ruler import SIZE_POINTS, Ruler
 
 Array = np.ndarray
 MAX_RULE_STEPS = 8  # of Gauss and Newton's method
-MAX_LN_STEP = 0.5  # of ln x, a step
+MAX_LN_STEP = 0.5  # of the logarithm of a variable, a step
 NONE = "none"
 PRIOR_NONE = 0.25  # probability of no effect, before the data
 
 
 def guesses(ruler: Ruler, y: Array, places: Array, sigma: Array) -> dict[str, str]:
-    """Answer by baseline. y (n,): ln f of rows ``places``; sigma (n, n): repeatability."""
+    """Answer by baseline. y (n,): ln f, or ln mass, of the ruler's rows ``places``; sigma (n, n):
+    repeatability."""
     inverse = np.linalg.inv(sigma)
     d = _fit(ruler, y, places, inverse)
     eta, _ = ruler.plain(d, places)
@@ -54,7 +55,7 @@ def guesses(ruler: Ruler, y: Array, places: Array, sigma: Array) -> dict[str, st
 
 
 def _fit(ruler: Ruler, y: Array, places: Array, inverse: Array) -> Array:
-    """d (v,) = ln x - ln x0 by Gauss and Newton's steps."""
+    """d (v,), ln of the variables less `Ruler.x0`, by Gauss and Newton's steps."""
     d = np.zeros(len(ruler.x0))
     information = np.diag(ruler.spread**-2.0)
     for _ in range(MAX_RULE_STEPS):

@@ -49,7 +49,7 @@ class Polynomial:
     coefficients: Array  # (k, n) of each product in each row
 
     def at(self, t: Array) -> tuple[Array, Array]:
-        """Values (n,) and slopes (n, v) at t (v,)."""
+        """Values (n,) and slopes by t (n, v) at t (v,)."""
         slopes = [products(self.degrees, t[None], j)[0] for j in range(len(t))]
         values = products(self.degrees, t[None])[0] @ self.coefficients
         return values, (np.array(slopes) @ self.coefficients).T

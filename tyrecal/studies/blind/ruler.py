@@ -69,7 +69,7 @@ class Ruler:
     """The plain case at its start x0, and the catalogue's effects there."""
 
     rows: tuple[ModelRow, ...]
-    x0: Array  # (v,)
+    x0: Array  # (v,) logarithms of the variables' start values
     spread: Array  # (v,) prior of ln x
     eta: Array  # (n,) ln f, Hz, and ln mass, kg
     jacobian: Array  # (n, v) d eta / d ln x

@@ -104,7 +104,7 @@ def scored(
     protocol: Protocol,
     labels: Sequence[Label],
 ) -> Scored:
-    """Score of one trial."""
+    """Score of one trial; truth: its entry in truth.json (`make.sealed_trial`)."""
     y, places, counts = means(readings, ruler)
     d = np.array([log(v) for v in truth["variables"].values()]) - ruler.x0
     key = truth["law"] if truth["kind"] == "effect" else truth["kind"]

@@ -49,9 +49,9 @@ def section_map(
     better than the prior.
 
     A part's relative change has the prior N(0, s^2). r (n,): residuals of the plain fit, P (n, n):
-    that of `gap`, g: d eta by the change,
-    a = g^T P g, b = g^T P r. The change is b / (a + 1/s^2), its evidence Z, that of no change Z0:
-    ln Z / Z0 = b^2 / (a + 1/s^2) / 2 - ln(1 + s^2 a) / 2. In the code g is multiplied by s.
+    that of `gap`, g: d eta by the change, a = g^T P g, b = g^T P r. The change is b / (a + 1/s^2),
+    its evidence Z, that of no change Z0: ln Z / Z0 = b^2 / (a + 1/s^2) / 2 - ln(1 + s^2 a) / 2. In
+    the code g is multiplied by s.
     """
     if not parts:
         return [], 0

@@ -106,6 +106,7 @@ def _wheel(
     defaults: Mapping[str, float],
 ) -> Iterator[Shift]:
     """Other values of the free wheel's numbers that the case does not state, one for each."""
+    # a state's column is 0 for the rows of all others, so that their sum is that of all states
     of_number = [[column for (_, name), column in rates.items() if name == path] for path in wheel]
     if wheel and all(of_number):
         columns = np.column_stack([np.sum(each, axis=0) for each in of_number])

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 Array = np.ndarray
-MAX_NEWTON_STEPS = 20  # on the model, which no evaluation is asked for
+MAX_NEWTON_STEPS = 20  # on the model, which needs no evaluation
 MIN_MOVE = 1e-7  # of a coordinate
 MAX_HALVINGS = 12  # of a step on the model
 ROUND_OFF = 1e-12  # of numbers of the order of 1
@@ -61,7 +61,7 @@ def curved_step(J: Array, r: Array, C: Array, damping: float, G: Array, h: Array
 
 
 def quadratic_step(H: Array, g: Array, size: float, G: Array, h: Array) -> Array:
-    """d (v,) of the least g . d + d . H d / 2 where G d >= h; ``size`` F of the residuals. In
+    """d (v,) of the least g . d + d . H d / 2 where G d >= h; ``size``: F, the residuals' norm. In
     coordinates y, d = F H^(-1/2) y, it is the point of the polyhedron nearest to the free step.
 
     Raises LinAlgError where H is not positive definite."""
@@ -70,7 +70,7 @@ def quadratic_step(H: Array, g: Array, size: float, G: Array, h: Array) -> Array
 
 
 def nearest(to: Array, G: Array, h: Array) -> Array:
-    """y (n,) with G y >= h that is nearest to a point; 0 where there is none (Lawson and Hanson,
+    """y (v,) with G y >= h that is nearest to a point; 0 where there is none (Lawson and Hanson,
     Solving Least Squares Problems, sec. 23.4, algorithm LDP)."""
     E = np.vstack([G.T, h - G @ to])
     last = np.eye(len(E))[-1]

@@ -33,7 +33,8 @@ class FreedVariable(Variable):
         return [start + step * z for start, step in zip(self.starts, self.steps, strict=True)]
 
     def with_copies(self, copies: Callable[[str], Sequence[str]]) -> Self:
-        """The variable that moves each of its numbers and the copies of it alike."""
+        """The variable that moves each of its numbers and the copies of it alike; copies: paths of
+        a path's, which a compound has if it is split by region."""
         counts = [1 + len(copies(path)) for path in self.sets]
         starts, steps = (np.repeat(each, counts).tolist() for each in (self.starts, self.steps))
         more = super().with_copies(copies)

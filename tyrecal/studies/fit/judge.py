@@ -36,7 +36,7 @@ def judge(
     is_good: bool,
     readings: Sequence[Measurement] = (),
 ) -> Judgement:
-    """The fit that ended at ``point``.
+    """The fit that ended at ``point``, a `Point.plain`.
 
     covariance: of ln of all values that count (`TotalError`), None if that is not known; is_good:
     it converged and moved; readings: lines of the file that its targets are from. Other states are

@@ -24,7 +24,7 @@ Array = np.ndarray
 class ModelErrors:
     """Possible errors of the n values that count.
 
-    Values other than unloaded modes are rows without a label.
+    Values other than unloaded modes are rows without a label: they have no error of form of a mode.
     """
 
     rows: tuple[Observable, ...]

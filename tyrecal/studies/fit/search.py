@@ -18,7 +18,8 @@ from .problem import Point, Problem
 
 Array = np.ndarray
 MAX_DESIGNS = 100  # evaluated in one search
-EXACT = 1e-3  # Hz, an objective below every measurement's resolution: the fit is exact
+# Hz, or standard deviations: an objective below every measurement's resolution, an exact fit
+EXACT = 1e-3
 MIN_OBJECTIVE_GAIN = 1e-9  # of the squared objective: a smaller gain is none
 NO_GAIN = 1e-6  # share of the squared objective: below, a whole step gains nothing
 DAMPING = 0.01  # share of the mean diagonal of J^T J that is added to it at the start of a search
@@ -48,7 +49,8 @@ Descend = Callable[[Problem, Point, float, Point | None], Descent]
 
 def minimise(problem: Problem, start: Array, tolerance: float, descend: Descend) -> Descent:
     """Minimise the objective from coordinates ``start`` (variables,) by the method ``descend``
-    until the norm of the projected gradient is below ``tolerance``.
+    until the norm of the projected gradient is below ``tolerance``, Hz or standard deviations per
+    unit of x.
 
     Where the search ends with the two [0, 0] modes mixed, the other side of their crossing is
     searched too. Where that is higher, the design is a minimum: the jump bounds it.

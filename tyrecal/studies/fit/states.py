@@ -6,7 +6,8 @@ state has, with the same relative standard deviations, at the fitted design.
 
 A residual of the fit is ``scale`` (model - target), ``scale`` being 1 / Hz or 1 / unit of the
 target, 0 if the target does not count (`targets`). ``sigma`` are the targets' standard deviations.
-The Jacobian has the derivatives of the residuals by the coordinates of the variables.
+The Jacobian has the derivatives of the residuals by the coordinates of the variables. ``point`` is
+a `Point.plain`.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from .freed import freed_variables
 KNOWLEDGE = "knowledge"  # of a number that the fit frees, see `free`
 KNOWLEDGE_SIGMA = 0.01  # of 1 + 0.01 z: a freed number has z = (value - known) / sd
 WITHOUT_MODEL_ERROR = KNOWLEDGE, DAMPING_RATIO  # quantities of which no error of the model is known
-RIM_WORDS = {"springs": "spindle"}  # of provenance
+RIM_WORDS = {"springs": "spindle"}  # words of provenance where they differ from `TyreState.rim`
 
 
 @dataclass(frozen=True)

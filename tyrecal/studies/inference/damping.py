@@ -3,9 +3,10 @@
     ln zeta = ln zeta0 + a(e) + J (x - x0) + error,   error ~ N(0, S)
     S = scatter^2 + DAMPING_FORM^2 (same mode) + L L^T
 
-zeta_r = 1/2 sum_k eta_k S_rk: half the loss factors eta_k of the compounds, weighted by their share
-S_rk of the mode's energy. a(e): what effects change, from the runs of the expansion; J: by x, from
-differences of these runs; L: by the loss factors, exact (`losses`). Uncertain constants of the case
+zeta, here the damping ratio: zeta_r = 1/2 sum_k eta_k w_rk, half the loss factors eta_k of the
+compounds, weighted by their share w_rk of mode r's energy. a(e): what effects change, from the runs
+of the expansion; J: by x, from differences of these runs; L (m, k): by one standard deviation of
+each part of the loss factors, exact (`losses`). Uncertain constants of the case
 move ln zeta by 2 %, [0,0] axial by 9 % (P235/75R17, section measured): `DAMPING_FORM` has them.
 
 Given the frequencies, x ~ N(x_fit, N^-1), N: information of the fit. Integrated over x the

@@ -69,7 +69,7 @@ class Added(NamedTuple):
 
 @dataclass(frozen=True)
 class InverseProblem:
-    """n observations and the model of them, in v variables x (as logarithms)."""
+    """n observations and the model of them, in v variables x as `model` has them."""
 
     observations: Observations = field(repr=False)
     expansion: Expansion = field(repr=False)

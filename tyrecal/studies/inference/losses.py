@@ -1,9 +1,10 @@
 """Loss factors of compounds, on which damping ratios depend and no frequency does.
 
-    zeta_r = 1/2 sum_m eta_m S_rm,   d ln zeta_r / d ln eta_m = eta_m S_rm / (2 zeta_r)
+    zeta_r = 1/2 sum_m eta_m w_rm,   d ln zeta_r / d ln eta_m = eta_m w_rm / (2 zeta_r)
 
-the share of compound m in the mode's loss. Shares sum to 1, so that compounds which are all off
-alike move all modes alike: then only the ratios between modes carry information.
+zeta_r: damping ratio of mode r, eta_m: loss factor of compound m, w_rm: its share of the mode's
+energy. The derivative is its share of the mode's loss. Shares sum to 1, so that compounds which are
+all off alike move all modes alike: then only the ratios between modes carry information.
 """
 
 from __future__ import annotations

@@ -68,7 +68,7 @@ class Coupling:
 
 @dataclass(frozen=True)
 class Answer:
-    """Answer of the model to one query."""
+    """Answer of the model to one query; None is what was not wanted, or is not known."""
 
     eta: Array  # (n,) ln f or ln mass
     jacobian: Array  # (n, v) d eta / d x
@@ -76,7 +76,7 @@ class Answer:
     # (n, k) change of eta by one standard deviation of each of the k sources of error
     constants: Array | None = None
     slopes: Mapping[str, Array] = field(default_factory=dict)  # (n,) d eta / d e; NaN: unknown
-    coupling: Coupling | None = None  # None: not wanted, or not known
+    coupling: Coupling | None = None
     # (n,) change of eta by one standard deviation of the effect's `Effect.shape_uncertainty`
     shape_uncertainty: Array | None = None
     by_pressure: Array | None = None  # (n,) d eta / d ln(pressure), if it was evaluated
@@ -110,4 +110,5 @@ class ResponseModel(Protocol):
         """Effects that `Query.slopes` may name where their parameter is 0."""
 
     def answers(self, points: Sequence[Query]) -> list[Answer | Exception]:
-        """An answer for each point in order, or why there is none; rows as it was made for."""
+        """An answer for each point in order, or why there is none, with the rows for which the
+        model was made."""

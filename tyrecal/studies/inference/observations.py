@@ -218,6 +218,7 @@ def _pair(run: dict, key: ObservationKey, split: float) -> tuple[float, float, f
 
 
 def _order(key: ObservationKey) -> tuple:
+    """Key that sorts by pressure, so that the mass is first, then by rim and mode."""
     label = key[1]
     mode = (label.c, label.m, label.kind or "") if label else ()
     return (key[2], key[3] or "", label is None, mode)

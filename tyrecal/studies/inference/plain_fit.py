@@ -31,6 +31,7 @@ def plain_fit(
     It ends within ``CLOSE_ENOUGH`` of the minimum, where the model has answered: the expansion
     about x goes the rest of the way.
     The covariance is that of the constants at the start and, where x has gone far, anew from there.
+    places (n,): of the observations among the model's rows; form: see `covariance.model_form`;
     known: of the model about its start, on which the fit goes first; moved (n, k): what else may
     have moved the observations, as more constants; begin (v,): first guess of x, None: the model's
     start. Raises the model's own failure if the start has no solution.

@@ -53,7 +53,7 @@ class Separability:
 
 def separate(problem: InverseProblem, P: Array, sizes: Mapping[str, float]) -> Separability:
     """Separability of the effects at their sizes, or at full size if one is not visible at its
-    own."""
+    own. P (n, n): that of the plain fit."""
     ids = tuple(problem.expansion.nodes)
     grids, shifts, ends = {}, {}, {}
     for id in ids:

@@ -27,6 +27,7 @@ from .label import Labelled, labelled_shapes
 def labels_posterior(case: LoadedCase, labelled: Labelled) -> Labels:
     """Labels of the readings that came without one."""
     all_labelings, at = labelled.found.labelings, labelled.found.expansion
+    # each frequency is a reading, or the two of a doublet
     own = [i for i, each in enumerate(labelled.frequencies) if each[0].label is None]
     places = {
         key: n

@@ -23,7 +23,7 @@ second with the probability SECOND if the first is, and SPLIT from it.
 The tree of labelings grows a frequency at a time, lowest first, as in tracking of multiple
 hypotheses (Reid, IEEE Trans. Automatic Control 24 (1979) 843); branches a factor of exp(-CUT) below
 the best, or beyond the first BRANCHES, are cut. How far the model may be off is not known: the
-labelings' evidences are means over `DISCREPANCIES`.
+labelings' evidences are means over `DISCREPANCIES`. All numbers of the priors are assumed.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class Frequencies:
     s: Array  # (m,) standard deviation of y
     states: Array  # (m,) a number each
     allowed: Array  # (m, n) modes that each can be
-    sure: Array  # (m,) it is not foreign
+    sure: Array  # (m,) whether it is known not to be foreign
     # (m, n) ln of p(shape | mode) over p(shape | foreign) of each; None: no shapes were measured
     ln_shape: Array | None = None
 
@@ -118,7 +118,7 @@ def labelings(measured: Frequencies, modes: Modes) -> Labelings:
     total: dict[tuple[int, ...], float] = {}
     evidence: dict[tuple[int, ...], float] = {}
     means: dict[tuple[int, ...], tuple[float, Array]] = {}
-    strata = []
+    strata = []  # ln of the evidence of each discrepancy
     for tau in DISCREPANCIES:
         chosen, ln, of_labelled, mean = _tree(measured, modes, tau)
         strata.append(np.logaddexp.reduce(ln))

@@ -4,8 +4,9 @@ The diagnosis is linear here: with the variables x integrated out, n rows of mea
 
     y ~ N(eta0 + g_h(e), C + R_h(e)),   C = Sigma + J Sx^2 J^T
 
-under explanation h with size e; R_h is the error of the effect's law, and distances of pairs are
-further rows. Tyres are drawn from it, and each gets the probability of every explanation:
+under explanation h with size e; R_h is the covariance of the error of the effect's law, and
+distances of pairs are further rows. Tyres are drawn from it, and each gets the probability of every
+explanation:
 
     p_h ~ prior_h sum_j w_j N(y; eta0 + g_h(e_j), C + R_h(e_j))
 
@@ -60,7 +61,7 @@ class LinearDiagnosis:
 
     @cached_property
     def jacobian(self) -> Array:
-        """(n, v) at x0."""
+        """J (n, v) at x0; 0 for the distances of pairs."""
         own = self.problem.plain(np.zeros(len(self.problem.centre)))[1]
         return np.vstack([own, np.zeros((len(self.pairs), own.shape[1]))])
 

@@ -14,7 +14,7 @@ from ..sensors import SensorPlace
 
 Percent = Annotated[float, Field(ge=0)]
 PLAN = "tyrecal.studies.plan.study:plan"  # not imported by those who read results
-NOISE_PERCENT = 0.2  # of every frequency, where nobody says
+NOISE_PERCENT = 0.2  # standard deviation of every frequency where none is given
 PLAN_STAGES = ("evaluate the tyre and each effect", "choose the measurements")
 HALF_95 = 1.96  # half of a 95 % interval of a normal distribution, in standard deviations
 LABELLED = 0.9  # share of drawn tests in which sensors must label a mode for it to count
