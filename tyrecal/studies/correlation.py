@@ -32,7 +32,8 @@ class ShapePair(ResultPart):
     rival: str | None  # the mode that it is like next
     rival_mac: float  # of the shape with that one
     decided: bool  # whether the first leads by more than the chance level
-    # least squared cosine between the planes of the measured doublet and the mode
+    # least squared cosine between the planes of the measured doublet and the mode; None: only one
+    # of its modes was measured
     plane_mac: float | None
 
 

@@ -22,7 +22,7 @@ class SensorPlace(ResultPart):
 
     sensor: Annotated[int, Column("sensor", ".0f")]  # number
     radius_m: Annotated[float, Column("R mm", ".1f", 1e3)]  # distance from the axle
-    angle_deg: Annotated[float, Column("angle °", ".1f")]  # along the circumference
+    angle_deg: Annotated[float, Column("angle °", ".1f")]  # along the circumference, from any place
     z_m: Annotated[float, Column("Z mm", ".1f", 1e3)]  # along the axle, from the middle plane
 
 

@@ -31,7 +31,7 @@ class Signature:
     labels: tuple[Label, ...]
     # (pressure, label) per cent of the plain tyre's frequency, NaN where a mode got lost
     before: Array
-    after: Array  # the same after the best linear re-fit of the case's variables to it
+    after: Array  # the same after the best linear re-fit, without bounds, of the case's variables
     # share alpha = 1 - |after|^2 / |before|^2 that the re-fit absorbs, doublets counted twice, None
     # where the effect moves nothing
     absorbed: float | None
@@ -78,6 +78,7 @@ class Plain:
         wanted = target_labels(case) or [m for m in modes[0] if m.m < 2]
         self.labels = tuple(label for label in wanted if all(label in each for each in modes))
         self.hertz = np.array([[m[label].frequency_Hz for label in self.labels] for m in modes])
+        # (pressure, label) weights of residuals: in squares doublets count twice
         self.weights = np.sqrt([[m[label].multiplicity for label in self.labels] for m in modes])
         # a variable's step: all of it where it varies by factors, else its range
         self.steps = np.array(

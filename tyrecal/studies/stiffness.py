@@ -36,7 +36,7 @@ from .result import (
 )
 
 Array = np.ndarray
-# places in a rim's stiffness: shifts along the deck's axes, and turns about them
+# places in a rim's stiffness: shifts along down, axle and rolling direction, and turns about them
 VERTICAL, LATERAL, LONGITUDINAL, TORSION, SPIN = 0, 1, 2, 3, 4
 
 

@@ -48,7 +48,7 @@ def write_json(path: Path, content: object) -> None:
 
 
 def read_json(path: Path) -> dict:
-    """A file of JSON. Raises InputError."""
+    """A file of JSON; a link is not followed (`files`). Raises InputError."""
     try:
         content = read_file(path, follow=False)
     except FileNotFoundError:

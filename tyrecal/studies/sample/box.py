@@ -39,7 +39,7 @@ def sample_box(posterior: Posterior, bounds: Array, count: int, seed: int) -> Dr
     """About ``count`` draws from all likely optima on; bounds (v, 2) of x."""
     best, height = posterior.optima
     information, flat = posterior.information(best[:1])[0], _flat(posterior.box)
-    covariance = np.linalg.inv(information + 1e-12 * flat)
+    covariance = np.linalg.inv(information + 1e-12 * flat)  # of what the data see
     likely = best[height > height[0] - LIKELY]
     chains = walk(posterior, likely, np.linalg.inv(information + flat), count, seed)
     edges = shares_at_edge(chains.flat, posterior.box, bounds)

@@ -68,7 +68,7 @@ class Chains:
 
 
 def walkers(count: int, size: int) -> int:
-    """Number of walkers for ``count`` draws of so many variables."""
+    """Number of walkers for ``count`` draws of ``size`` variables; emcee needs 2 ``size``."""
     fewest, most = WALKERS
     return max(min(count // STEPS, most), fewest, 4 * size)
 
