@@ -69,8 +69,8 @@ class CaseModes:
         return _shape(self.modes[0]).points
 
     def signals(self, mode: Mode, sensors: Sensors) -> Array:
-        """Motions along the sensors' directions in both modes of a doublet, (k, 2); for c = 0 in
-        one, (k, 1). Both have components r, theta, z.
+        """Motions along the sensors' directions in both modes of a doublet, (k, 2): real and
+        imaginary part of amplitude exp(i c Theta); for c = 0 in one, (k, 1).
 
         Raises InputError if a sensor is not on the tyre.
         """

@@ -55,7 +55,7 @@ DAMPING_RATIO_OF = {"damping_ratio": 1.0, "loss_factor": 0.5}  # damping ratio p
 FRACTIONS = {"damping_ratio", "modal_damping_ratio", *HEADINGS["loss_factor"].split()}
 TABLES = {"pressure": units.PRESSURE, "load": units.LOAD, **units.QUANTITIES}
 TABLES |= dict.fromkeys(DAMPING_RATIO_OF, units.DAMPING_UNITS)
-NUMBER_MEANINGS = {*TABLES, "sigma", "value"}  # what numbers with a decimal mark stand in
+NUMBER_MEANINGS = {*TABLES, "sigma", "value"}  # of columns whose numbers may have a decimal mark
 LENGTHS = {name for name, table in units.QUANTITIES.items() if table is units.LENGTH}
 
 

@@ -72,7 +72,7 @@ class Labeller:
         self.labels = [label_of_column(c, column) for c, column, *_ in every]
         self.covariance = [S for *_, S, _ in every]
         self.is_seen = np.array([seen >= MIN_SEEN for *_, seen in every])
-        self._spectra = [np.linalg.eigh(S) for S in self.covariance]
+        self._spectra = [np.linalg.eigh(S) for S in self.covariance]  # eigenvalues, -vectors
         self._groups = groups_alike(self.covariance, self._spectra)
 
     def judge(self, shape: Array, below: Collection[Label] = ()) -> Judged:

@@ -7,10 +7,10 @@ with the waves c along a smooth curve for each m. As a normal distribution of ln
 
 F are the rounded frequencies of two passenger tyres; o_m is common to the modes of an m, which is 0
 for both [0,0]; mean p is geometric. a is free, the others have the standard deviations below, which
-are assumed; [0,0] torsional has an s of its own. A doubt is a change of the data, two
-pressures or two labels exchanged or one value left out, that makes them far more probable. Where
-the next change is nearly as probable, it is named too. These are questions to the user: nothing is
-changed here. `measured import` and `fit` report them; the pattern must never enter a fit.
+are assumed; [0,0] torsional has an s of its own. A doubt is a change of the data, two pressures or
+two labels exchanged or one value left out, that makes them far more probable. Where the next change
+is nearly as probable, it is named too. These are questions to the user: nothing is changed here.
+`measured import` and `fit` report them; the pattern must never enter a fit.
 """
 
 from __future__ import annotations
@@ -162,7 +162,7 @@ def _exchanges(
 
 def _usual(row: Measurement) -> float:
     """F of a label, Hz; 0 where no pattern is known."""
-    label = row.label or Label(0, 9)
+    label = row.label or Label(0, 9)  # which has no pattern
     low = FREE_HZ.get((label.c, label.kind or label.m)) if row.rim == "free" else None
     if label.kind:
         return low or ZERO_HZ[label.kind]

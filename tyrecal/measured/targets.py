@@ -1,9 +1,9 @@
 """Measurements (CSV) as the targets of a case.
 
 A target has a state: pressure, load and rim. None in a state means "as the case has it"
-(`TyreState.of` writes it so, `with_defaults` writes the case's own). The case
-that a user has changed (`--set`, `LoadedCase.overrides`) keeps the file's own one as
-``LoadedCase.as_read``.
+(`TyreState.of` writes it so, `with_defaults` writes the case's own). The case that a user has
+changed (`--set`, `LoadedCase.overrides`) keeps the file's own one as ``LoadedCase.as_read``.
+`LoadedCase.measured` is the file of measurements that a case names, or None.
 """
 
 from __future__ import annotations
