@@ -1,4 +1,5 @@
-"""CalculiX's result files: eigenvalues and mass from .dat, shapes from .frd."""
+"""CalculiX's result files, as version 2.20 writes them: eigenvalues and mass from .dat, shapes from
+.frd."""
 
 from __future__ import annotations
 

@@ -14,6 +14,7 @@ from ..process import last_words, run_command
 RESULT_SUFFIXES = ("dat", "frd", "sta", "cvg", "12d", "rout")
 MAX_LINE_LENGTH = 10_000  # characters of a log
 MAX_PATH_LENGTH = 100  # ccx keeps 132 characters of a file's path, the file's name included
+# of the log of ccx 2.20
 NO_EQUILIBRIUM = re.compile(r"increment size smaller|too many cutbacks|max\. # of increments", re.I)
 
 

@@ -78,5 +78,6 @@ def stretches(strips: list[Strip], inflated: Fields) -> Array:
     place, moved = X.mean(1), u.mean(1)
     hoop = np.stack([-moved[:, 1], place[:, 0] + moved[:, 0], np.zeros(len(X))], -1)
     angle = np.radians([strip.angle_deg for strip in strips])[:, None]
+    # as `cords.cord_rows`: cos d/ds + sin / R d/dTheta of the place
     cord = np.cos(angle) * (tangent + slope) / length + np.sin(angle) * hoop / place[:, :1]
     return np.asarray(np.linalg.norm(cord, axis=1))

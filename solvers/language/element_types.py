@@ -1,5 +1,5 @@
-"""Types of elements that tyres' decks are made of: how many nodes they have, and what gives them
-properties."""
+"""Types of elements that tyres' decks are made of, by ABAQUS' manual: how many nodes they have, and
+what gives them properties."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from .rule import Field
 from .table import RULES
 from .text import Block
 
-# exponents of the units of length and mass in those of fields
+# exponents of the units of length and mass in those of fields; time is in seconds
 DIMENSIONS: dict[str, tuple[int, int]] = {
     "stress": (-1, 1),
     "compliance": (1, -1),

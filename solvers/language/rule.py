@@ -29,7 +29,9 @@ from typing import NamedTuple
 MANY = 10**9
 NEEDED = "!"  # behind a parameter that must be given
 QUIET = "~"  # before an option that is honoured as it changes no answer, as a step's name
-PLACES = {  # where blocks are: a user's section (deck), or a job of the bundled solver
+# where blocks are, with words for messages: in a user's section (deck), or in a section job, a
+# revolve job, or a step of either
+PLACES = {
     "deck": "the model",
     "section": "the model",
     "revolve": "the model",

@@ -33,7 +33,7 @@ def junit(reports: Sequence[Report], drift: Json | None, started: str) -> str:
             "name": report["name"],
             "package": "tyrecal.batch",
             "id": str(number),
-            "timestamp": facts.get("started", started)[:19],
+            "timestamp": facts.get("started", started)[:19],  # schemas have no time zone
             "hostname": facts.get("host", "localhost"),
             "time": _time(sum(seconds.values())),
         }

@@ -189,7 +189,7 @@ def describe_decks(loaded: LoadedCase, decks: OwnDecks, terminal: Terminal) -> J
     from ..simulate.deck.own import asked_by_abaqus, lacking_in_calculix
 
     numbers = loaded.deck_numbers
-    jobs_blocks = decks.with_numbers(numbers, 1e3 * loaded.case.pressure_kPa)
+    jobs_blocks = decks.with_numbers(numbers, 1e3 * loaded.case.pressure_kPa)  # Pa
     report: dict[str, list[str]] = {"refuses": [], "unknown": []}
     before: list[Block] = []
     for (_, old_job), blocks in zip(decks.jobs, jobs_blocks, strict=True):

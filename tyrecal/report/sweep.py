@@ -17,6 +17,7 @@ def figures(result: SweepResult) -> dict[str, Figure]:
     number is swept, else a marker for each point."""
     swept = [each.name for each in result.numbers_swept][:MAX_PANELS]
     labels = [mode.label for mode in result.modes]
+    # None: overtones
     families = [name for name in (*FAMILIES, None) if any(x.family == name for x in labels)]
     size = 1.4 + 3.2 * len(swept), 0.8 + 2.6 * len(families)
     figure = new_figure(*size, caption="Frequencies over each number that was swept")

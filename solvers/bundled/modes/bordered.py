@@ -41,7 +41,7 @@ class Border:
     mass: tuple[Array, Array]  # of the same shapes
     wall: Array  # C (s, size)
     wall_rim: Array  # Cq (s, q)
-    air: GasCoupling | None
+    air: GasCoupling | None  # None: no air, w = s = 0
 
     @property
     def widths(self) -> tuple[int, int, int]:

@@ -37,7 +37,7 @@ def lowest(
     block, image, _ = _orthonormal(start, mass(start))
     if not block.shape[1]:
         raise RunFailed("crashed", "there is no mass that is free to vibrate")
-    basis, images = block[:, :0], image[:, :0]
+    basis, images = block[:, :0], image[:, :0]  # images: M times the basis
     projected = np.empty((0, 0), start.dtype)
     while block.shape[1]:
         basis, images = np.hstack([basis, block]), np.hstack([images, image])
@@ -51,6 +51,7 @@ def lowest(
         if len(inverse) >= count:
             inverse, vectors = inverse[::-1][:count], vectors[:, ::-1][:, :count]
             last = vectors[-len(gram) :]
+            # norm, by M, of the residual of each pair
             error = np.sqrt(np.abs(np.einsum("bm,bc,cm->m", last.conj(), gram, last)))
             if (error <= INVERSE_RTOL * inverse).all():
                 return shift + 1 / inverse, basis @ vectors

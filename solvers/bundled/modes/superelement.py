@@ -31,8 +31,8 @@ RIM_PLACES = {0: (2, 5), 1: (0, 3)}
 
 @dataclass(frozen=True)
 class Superelement:
-    """Matrices (d, d), d coordinates, in N/m and kg (of turns in N m and kg m2), and motions (p, d)
-    of p points of tread per unit of each coordinate."""
+    """Matrices (d, d), d coordinates: the rim's six, then modes; in N/m and kg, of turns N m and kg
+    m2, of modes 1/s2 and 1. Motions (p, d) of p points of tread per unit of each coordinate."""
 
     stiffness: Array
     mass: Array
@@ -98,7 +98,7 @@ class _Block:
         self._loss = turn.conj().T @ loss @ turn
         # share: the mean of cos n Theta over a patch about Theta = 0
         self._moved, share = reduced.moved @ turn, response.patch.share(reduced.n)
-        self._motion = reduced.forces.conj().T @ turn  # of the patch (3, m), m modes
+        self._motion = reduced.forces.conj().T @ turn  # of the patch per mode (3, m), m modes
         self._tread = np.array(
             [share * np.exp(1j * self.n * angle) * self._motion[way] for angle, way in points]
         )

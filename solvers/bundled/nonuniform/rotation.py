@@ -43,7 +43,7 @@ def waves(vibration: Vibration, spin: float, n: int, count: int) -> HarmonicMode
     for sign in (1, -1) if n else (1,):
         pick = np.flatnonzero(np.sign(omega) == sign)
         pick = pick[np.argsort(abs(omega[pick]))]
-        chosen.append(pick[assigned(held[:, pick])])
+        chosen.append(pick[assigned(held[:, pick])])  # to each mode at rest the wave like it
     both = np.array(chosen).T  # (count, 1 or 2)
     fixed = (omega[both] - n * spin) ** 2
     mine = np.take_along_axis(both, np.argsort(fixed, axis=1), 1).ravel()

@@ -75,7 +75,8 @@ class FlatRoad:
         return np.where(met, 1.0 - gap / rise, 0.0), np.where(met, -gap / rise**2, 0.0)
 
     def moved(self, points: Points, at: Array) -> Array:
-        """Along and across (i, j, p, 2) from where slip counts; ``at``: the points' positions."""
+        """Along and across (i, j, p, 2), m, from where slip counts; ``at``: the points'
+        positions."""
         t, e = points.t, points.e
         first, last = (each[t, e][..., None] for each in self.former)
         place = (points.angle - first) / np.where(last > first, last - first, 1.0)

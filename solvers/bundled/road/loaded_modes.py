@@ -239,6 +239,7 @@ def standing_waves(unloaded: list[HarmonicModes], symmetry: HalfTurn) -> list[Ar
         turn = symmetry.around.turn(modes.n)[:, None, None]
         for shape in modes.shapes:
             for phase in (1.0, 1j) if modes.n else (1.0,):
+                # at theta and at -theta
                 ahead, behind = (phase * shape * turn).real, (phase * shape * turn.conj()).real
                 image = np.empty_like(behind)
                 image[:, symmetry.other] = HALF_TURN * behind

@@ -100,6 +100,7 @@ def _check_flat(surface: Block) -> None:
     rows = surface.rows
     if surface.get("TYPE") != "CYLINDER" or len(rows) != 4:
         raise DeckError(surface.place, "the road is an analytical surface of TYPE=CYLINDER")
+    # rows: origin and a point along the line; a point along the sweep; the line's two ends
     axes = [rows[0].number(i) for i in range(6)]
     sweep = [rows[1].number(i) for i in range(3)]
     H = axes[0]

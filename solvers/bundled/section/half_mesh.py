@@ -81,7 +81,7 @@ def _own_image(mesh: DeckMesh, symmetry: MirrorHalf, numbers: list[int]) -> bool
     for kind, own in of_kind.items():
         nodes = mesh.connectivity[kind][own]
         images = symmetry.images(nodes)
-        if TYPES[mesh.type_of(kind)].faces:
+        if TYPES[mesh.type_of(kind)].faces:  # solids: in any order
             nodes, images = np.sort(nodes), np.sort(images)
         same = _same(nodes, images)
         if kind in mesh.embedded:  # whose hosts' nodes are in no such order

@@ -48,7 +48,8 @@ class KeptFields:
         self._corner[self._order[first:]] = np.arange(len(self._order) - first)
         self._near = inner.size - int(first)
         self._scatter: dict[bytes, tuple[Array, Array]] = {}
-        # value of a component whose coordinate is 1; factor of a component on both sides of M
+        # value of a component whose coordinate is 1: a node and its image share it, but one on the
+        # middle plane is its own; factor on both sides of M, of which half is here on that plane
         self._length, self._weight = np.full((2, len(self._order), 1), [[[1 / ROOT2]], [[1.0]]])
         self._length[inner.size :], self._weight[inner.size :] = 1.0, ROOT2
         real = self._order % 3 == 0

@@ -69,7 +69,7 @@ def slower(
     """The failure of a tyre that turns, with the highest speed at which it is stable.
 
     U (n, 3): a state to start from; ``state``, ``vibrations``: equations of the inflated state and
-    of its vibrations.
+    of its vibrations. Raises other failures that it meets, and what ``check`` raises to stop.
     """
     spins = [load for load in loads if isinstance(load, Spin)]
     if not spins or failure.cause not in ("unstable", "no_equilibrium"):
@@ -84,7 +84,8 @@ def slower(
         ]
         try:
             slow, _ = equilibrium(model, state, acting, U, check)
-            stable_factor(model, model.mesh.symmetry.field(slow), acting, vibrations)
+            whole = model.mesh.symmetry.field(slow)  # on the nodes of both halves
+            stable_factor(model, whole, acting, vibrations)
             low = share
         except RunFailed as slower_failure:
             if slower_failure.cause not in ("unstable", "no_equilibrium"):

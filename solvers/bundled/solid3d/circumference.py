@@ -19,7 +19,7 @@ import numpy as np
 
 Array = np.ndarray
 MAX_NEAR_LENGTH = np.radians(10.0)  # of elements near the patch
-FARTHEST_ELEMENT = np.radians(45.0)  # from its middle, but for the last one
+FARTHEST_ELEMENT = np.radians(45.0)  # end of an element from the patch's middle, the last apart
 # highest harmonic that elements hold, times their length, rad: 7.5 elements to a wave
 WAVE_BY_ELEMENTS = 2 * np.pi / 7.5
 MORE_WAVES = 5  # than a mode's own, for a pressed tyre mixes them

@@ -44,6 +44,6 @@ def gmres(
         y, *_ = np.linalg.lstsq(H[: j + 2, : j + 1], target[: j + 2], rcond=None)
         left = float(np.linalg.norm(H[: j + 2, : j + 1] @ y - target[: j + 2])) / size
         if left <= tolerance or H[j + 1, j] <= 1e-14 * np.linalg.norm(H[:, j]):
-            break
+            break  # by the second, the basis holds the solution
         basis.append(w / H[j + 1, j])
     return sum(c * v for c, v in zip(y, ahead, strict=True)), j + 1, left

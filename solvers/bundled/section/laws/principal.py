@@ -1,5 +1,5 @@
 """Laws of the principal stretches, by C = F^T F = sum of x_a N_a N_a with x_a = lambda_a^2
-(Holzapfel 2000, eqs. 6.47 and 6.180; Simo and Taylor 1991):
+(Holzapfel 2000, eqs. 6.47 and 6.180; Simo and Taylor 1991), products of vectors being dyads:
 
     s_a = 2 dWbar/dx_a,   P = sum of s_a n_a N_a,   n_a = F N_a
     A = sum of s_a 1 (N_a N_a) + sum of 2 ds_a/dx_b (n_a N_a)(n_b N_b)

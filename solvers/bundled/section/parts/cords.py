@@ -30,7 +30,7 @@ from .elastic import Elastic, ElasticAtStations
 from .part import Rows, SectionJob, TyrePart, consistent_mass, on_diagonals
 
 Array = np.ndarray
-TRANSITION = 5e-4  # w, logarithmic strain: crimp that a cord without compression loses
+TRANSITION = 5e-4  # w, logarithmic strain: assumed crimp that a cord without compression loses
 
 
 @dataclass(frozen=True)

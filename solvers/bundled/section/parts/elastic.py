@@ -41,7 +41,7 @@ class Elastic(TyrePart):
         return (z + self.rows.rest).reshape(e * g, k)
 
     def law_at(self, z: Array) -> EnergyLaw:
-        """The law at the rows z of all points."""
+        """The law at the rows z of all points; `Hybrid`'s depends on them."""
         return self.law
 
     def energy(self, U: Array) -> Any:

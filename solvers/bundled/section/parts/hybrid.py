@@ -49,7 +49,7 @@ class Hybrid(Elastic):
         energy, _, _ = _volume(
             self.hyperelastic, determinant(square(self.at(U)))[0], self.projection
         )
-        return super().energy(U) + (energy * self.rows.weights).sum()
+        return super().energy(U) + (energy * self.rows.weights).sum()  # of the law Wbar alone
 
     def _of_volume(self, U: Array) -> tuple[Array, Array]:
         """dJ/dF (e, g, 9) and w U'' (e, g), dynamic if the law has a dynamic bulk modulus."""

@@ -107,7 +107,7 @@ def _of_one_law(
         scaled = law.scaled(*material.static_scale(job.long_term))
         laws.append(scaled.nearly_incompressible() if law.incompressible else scaled)
         modulus_table = job.tables.index(material.table) if material.table in job.tables else -1
-        ratio = (
+        ratio = (  # dynamic over static shear and bulk modulus
             (1.0, 1.0)
             if modulus_table >= 0
             else material.dynamic_ratio(job.dynamic_Hz, job.long_term)

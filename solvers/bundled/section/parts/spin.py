@@ -1,4 +1,5 @@
-"""The centrifugal force of a tyre that turns: potential -Omega^2 M x^2 / 2 in the wheel's plane."""
+"""The centrifugal force of a tyre that turns: potential -Omega^2 M x^2 / 2, x being the
+place in the wheel's plane, from the axle."""
 
 from __future__ import annotations
 
