@@ -207,6 +207,8 @@ def _shapes(fields: Fields, count: int, n: int, sectors: int, job: str) -> list[
         if not abs(largest) > 0:
             raise RunFailed("no_results", f"{job}.frd: the shape of mode {mode} is no shape")
         turned = shape * abs(largest) / largest  # a pair's phase is arbitrary: make it definite
+        # the modal mass of Re[turned exp(i n Theta)] all round is ``sectors``, or half of that for
+        # waves
         shapes.append(turned * np.sqrt((2 if n else 1) / sectors))
     return shapes
 

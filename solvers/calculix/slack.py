@@ -25,7 +25,7 @@ from .results import Fields
 Array = np.ndarray
 STRIP_COMMENT = re.compile(r"^\*\* no compression: (\{.*\})$", re.M)
 TAUT = -1e-6  # strain above which a cord counts as taut: round-off of the result file
-MAX_PLACES = 3
+MAX_PLACES = 3  # in the message
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@ what gives them properties."""
 
 from __future__ import annotations
 
+# by the keyword that gives them properties, and by their number of nodes
 TYPES_BY_SECTION: dict[str, dict[int, str]] = {
     "SOLID SECTION": {
         2: "T3D2",

@@ -42,7 +42,7 @@ def constants_of(block: Block) -> list[str]:
 def fields_of(block: Block) -> list[Field]:
     """The named data fields of each line of a block; of *HYPERELASTIC, of all lines together."""
     if block.name == "HYPERELASTIC":
-        units = {"C": "stress", "m": "stress", "D": "compliance"}
+        units = {"C": "stress", "m": "stress", "D": "compliance"}  # of C10, mu1, D1: first letters
         return [Field(name, units.get(name[0], ""), 0.0) for name in constants_of(block)]
     rule = RULES.get(block.name)
     return rule.fields_of(block.parameters) if rule else []

@@ -43,7 +43,8 @@ Fields = tuple[str, ...]  # of the first lines, the last for all that follow; ()
 
 
 class Field(NamedTuple):
-    """A data field: its name, the kind of its unit ("" for none), its default."""
+    """A data field: its name, the kind of its unit (`fields.DIMENSIONS`, "" for none), its
+    default, None without one."""
 
     name: str
     unit: str = ""

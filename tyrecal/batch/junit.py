@@ -15,8 +15,9 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from ..files import Json
 from .case import Report
 
+# entry of a study that only the baseline has
 SKIPPED: Json = {"status": "skipped", "cause": None, "words": None, "quantities": {}}
-OUTCOMES = {"error": "error", "failed": "failure", "skipped": "skipped"}
+OUTCOMES = {"error": "error", "failed": "failure", "skipped": "skipped"}  # status to element
 UNPRINTABLE = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # in XML 1.0
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 
-COMPONENTS = ("radial", "tangential", "axial")
+COMPONENTS = ("radial", "tangential", "axial")  # r, theta, z
 MIN_COSINE = 0.9  # of the angle between a sensor and a component that it is drawn as
 AMPLITUDE = 0.35  # largest motion drawn, over the radius of the ring
 PER_ROW = 5  # shapes in a row of a picture

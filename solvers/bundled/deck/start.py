@@ -21,6 +21,7 @@ Array = np.ndarray
 FILE = "start.npy"
 PRESSED_FOLDER, PRESSED_FILE = "start", "start/pressed.npz"
 PRESSED_ARRAYS = ("nodes", "inflated", "displacement", "load_N", "deflection_m")
+# the deck's last line: file and hash
 COMMENT = re.compile(r"^\*\* Newton's method starts from (\S+), SHA-256 ([0-9a-f]{64})$", re.M)
 
 

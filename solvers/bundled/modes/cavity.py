@@ -35,7 +35,7 @@ from ..section.parts.pressure import surface_point
 Array = np.ndarray
 MONOMIAL_DEGREE = 4  # of the pressure terms in R and Z
 POINTS_ALONG = 6  # points of a line of the wall; the well is one line
-GAUSS = np.polynomial.legendre.leggauss(7)
+GAUSS = np.polynomial.legendre.leggauss(7)  # from the section's middle radius to the wall
 ACROSS, ACROSS_WEIGHTS = (GAUSS[0] + 1) / 2, GAUSS[1] / 2
 
 

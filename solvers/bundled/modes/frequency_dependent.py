@@ -43,9 +43,11 @@ class SelfConsistent:
         return joined([self._settled(first, j) for j in range(len(first.eigenvalues))])
 
     def _ratios(self, frequency_Hz: float) -> Array:
+        """rho_l of each table."""
         return np.array([np.real(table.ratio(frequency_Hz)) for table in self.tables])
 
     def _at(self, frequency_Hz: float, n: int, count: int) -> HarmonicModes:
+        """The lowest modes of harmonic n, all with the moduli of one frequency."""
         return self.vibration.at(self._ratios(frequency_Hz)).modes(n, count)
 
     def _settled(self, modes: HarmonicModes, j: int) -> HarmonicModes:

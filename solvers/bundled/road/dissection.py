@@ -129,6 +129,7 @@ class Dissection:
 
 
 def _meet(ends: Array, box: Range) -> Array:
+    """Mask of the members, as `_ranges` has them, of which a group is in the box."""
     return np.asarray((ends[1] >= box[0]) & (ends[0] < box[1]))
 
 

@@ -39,6 +39,7 @@ MOTION_PARITY = np.array(
 )  # of shifts down, along, across, and turns about these
 # matrices (3, 3) of w x d for unit turns w about the three axes, by the last index
 TURN = np.cross(np.eye(3)[:, None], np.eye(3)[None], axis=-1).transpose(1, 2, 0) * -1.0
+# shift and turn of each motion
 UNIT_MOTIONS = [(axis, 0 * axis) for axis in np.eye(3)] + [(0 * axis, axis) for axis in np.eye(3)]
 SAMPLES = 8  # angles, which tell harmonics 0 to 2 apart
 RIM_RTOL = 1e-6  # residual of the displacements; a stiffness is off by its square

@@ -13,6 +13,7 @@ from .mesh import DeckMesh
 from .model import Model
 from .symmetry import MirrorHalf
 
+# give elements their properties
 FILLED = ("SOLID SECTION", "SURFACE SECTION", "MEMBRANE SECTION")
 Array = np.ndarray
 SECTION_DOFS = {1: 0, 2: 2, 5: 1}  # ABAQUS's r, z, twist to our components r, theta, z
@@ -149,6 +150,7 @@ def _names(mesh: DeckMesh, row: Row, reference: int) -> bool:
 
 
 def _range(row: Row) -> tuple[int, int]:
+    """First and last degree of freedom of a row of *BOUNDARY."""
     first = row.integer(1)
     return first, row.integer(2) if row.text(2) else first
 

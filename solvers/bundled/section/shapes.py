@@ -13,6 +13,7 @@ from functools import partial
 import numpy as np
 
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+# nodes of each face, by their places in the element and in the order of the corners
 FACES_QUADRATIC = ((0, 4, 1), (1, 5, 2), (2, 6, 3), (3, 7, 0))
 FACES_LINEAR = ((0, 1), (1, 2), (2, 3), (3, 0))
 FACES_TRIANGLE = ((0, 1), (1, 2), (2, 0))

@@ -94,6 +94,7 @@ class Hyperelastic(EnergyLaw):
         return bool(determinant(square(z))[0].min() > MIN_VOLUME_RATIO)
 
     def _volume(self, J: Array) -> tuple[Array, Array, Array]:
+        """As `volume`; of U with a hybrid element's pressure only the slope."""
         if self.pressure is None:
             return self.volume(J)
         return 0 * J, self.pressure, 0 * J
