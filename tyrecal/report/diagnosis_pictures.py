@@ -184,7 +184,7 @@ def _after(d: Diagnosis) -> Array | None:
 
 
 def _place(label: Label | None) -> float:
-    assert label is not None
+    assert label is not None  # rows without one have no `family`
     return {"axial": 0.0, "torsional": 1.0}.get(label.kind or "", float(label.c))
 
 

@@ -29,7 +29,7 @@ Array = np.ndarray
 NamedShape = tuple[str, float, float | None, RingShape]  # name, Hz, damping ratio, shape
 POINTS_AROUND, POINTS_PER_WAVE = 24, 6  # round the tyre, at least
 POINTS_ACROSS = 11  # along the section's outer surface
-MAX_LINE_NODES = 250  # of a data set 82
+MAX_LINE_NODES = 250  # of a data set 82, which draws a line
 LINE_DIGITS = 5  # of the places, m and rad, by which points are on one line
 
 

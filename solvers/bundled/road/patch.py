@@ -31,8 +31,8 @@ class HalfPatch:
 
 
 def patch(contact: Contact, X: Array, rings: Array) -> HalfPatch:
-    """The patch of a contact, on nodes at the angles ``rings`` (k,) from 0 on. X (n, 2): R, Z of
-    the section, m."""
+    """The patch of a contact, on nodes at the angles ``rings`` (k,), rad, from 0 on. X (n, 2): R, Z
+    of the section, m."""
     tread, points = contact.road.tread, contact.points
     size = points.area * points.densities(contact.U)  # deformed area of each point, m2
     local = np.concatenate([contact.normal[..., None], contact.traction], -1)

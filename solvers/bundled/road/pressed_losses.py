@@ -28,7 +28,7 @@ class PressedLosses:
         model = tyre.model
         by_loss: dict[tuple[LossFactor, int], list[TyrePart]] = {}
         for k, material in enumerate(model.lossy):
-            assert material.loss
+            assert material.loss  # as it is in ``lossy``
             for modulus in (0, 1):  # shear, bulk
                 # without a table both moduli have one loss factor
                 law = material.loss, modulus if material.loss.frequency_Hz else 0

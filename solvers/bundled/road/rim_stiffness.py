@@ -130,7 +130,7 @@ def _caps(loads: Sequence[TyrePart], X: Array) -> float:
     each open end adds - p pi r^2 |z|."""
     thrust = np.zeros(len(X))
     for load in loads:
-        assert isinstance(load, Pressure)
+        assert isinstance(load, Pressure)  # `Spin.at_stations` refuses a spin
         np.add.at(thrust, load.connectivity[:, -1], np.real(load.pressure))
         np.subtract.at(thrust, load.connectivity[:, 0], np.real(load.pressure))
     return float(np.pi * (thrust * X[:, 0] ** 2 * X[:, 1]).sum())

@@ -68,7 +68,7 @@ def build(
     mesh = read_mesh(keywords)
     if half:
         folded = half_mesh(mesh)
-        assert folded is not None
+        assert folded is not None  # `boundary.keeps_half_turn` has been asked
         mesh = folded
     materials = read_materials(keywords)
     known = [m.table for m in materials.values() if m.table is not None]

@@ -88,8 +88,8 @@ class HalfCircle(Circumference):
 
 
 def points(length: float) -> int:
-    """Gauss points of an element: two would leave some motions without stiffness, and long
-    elements must see the resultant of a uniform pressure vanish."""
+    """Gauss points of an element of ``length``, rad: two would leave some motions without
+    stiffness, and long elements must see the resultant of a uniform pressure vanish."""
     return 3 + int(length / 0.2)
 
 

@@ -133,7 +133,7 @@ class Hyperelastic(EnergyLaw):
     def _dynamic_tangent(self, z: Array, weights: Array | float) -> Array:
         """Tangent (p, 9, 9) at the dynamic moduli, less the initial stress that they would bring
         along."""
-        assert self.shear_ratio is not None and self.bulk_ratio is not None
+        assert self.shear_ratio is not None and self.bulk_ratio is not None  # they are set together
         dynamic = replace(self.scaled(self.shear_ratio, self.bulk_ratio), shear_ratio=None)
         more = dynamic.force(z) - self.force(z)
         return _less_stress(dynamic.tangent(z, weights), z, more, weights)

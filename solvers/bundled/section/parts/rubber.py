@@ -103,7 +103,7 @@ def _of_one_law(
     table, laws = [], []
     for section in sections:
         material, law = section.material, section.material.law
-        assert law is not None
+        assert law is not None  # `_sections` has refused the others
         scaled = law.scaled(*material.static_scale(job.long_term))
         laws.append(scaled.nearly_incompressible() if law.incompressible else scaled)
         modulus_table = job.tables.index(material.table) if material.table in job.tables else -1
