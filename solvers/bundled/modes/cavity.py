@@ -8,8 +8,8 @@ tyre's frequencies (`tests/bundled/test_cavity.py`). Weakly,
     Q P'' + H P = -C u'',    Q = 1/B int psi psi dV,  H = 1/rho int grad psi . grad psi dV,
                              C u = int psi u . n dA   (volume that the wall sweeps, weighted)
 
-(here n: unit normal out of the air). rho, B: the air's density and bulk modulus (Morand and Ohayon,
-Fluid Structure Interaction, ch. 8). With P = -Q^-1 (C u + H w) it is symmetric:
+': d/dt; n of n dA: unit normal out of the air; rho, B: the air's density and bulk modulus (Morand
+and Ohayon, Fluid Structure Interaction, ch. 8). With w'' = P = -Q^-1 (C u + H w) it is symmetric:
 
     stiffness  (C u + H w)^T Q^-1 (C u + H w),   mass  w^T H w
 

@@ -6,9 +6,10 @@ fixed-interface reduction after Craig and Bampton.
 
 T: rigid motions of rim and tyre, which are the static shapes as K T = 0; V: modes of the reduced
 problems of `response`, and of harmonics that move the rim also what holds the static response of
-the modes that are left out. A harmonic n >= 1 has two real coordinates for each shape, of cos and
-sin. ``loss`` is the imaginary part of K. The rim's coordinates are motions along Theta = 0, along
-90 degrees and along the axle, and turns about them, at the middle of the wheel.
+the modes that are left out; Lambda: their eigenvalues; R: ``tread``. A harmonic n >= 1 has two real
+coordinates for each shape, of cos and sin. ``loss`` is the imaginary part of K. The rim's
+coordinates are motions along Theta = 0, along 90 degrees and along the axle, and turns about them,
+at the middle of the wheel.
 """
 
 from __future__ import annotations

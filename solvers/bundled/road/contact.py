@@ -7,13 +7,13 @@ c = cos theta, s = sin theta of a point's reference angle its depth and its plac
 
     pressure = k <d - H>,   traction = mu pressure min(|slip| / e, 1) slip / |slip|
 
-The traction is that on the road; x is along the tread, z across it. With the overclosure's
-stiffness k and the elastic slip e, integrated over the part of the tread where d > H (`tread`).
-Slip counts from where a point stood when the last load had been reached, plus the elastic slip that
-it had then. A point that the road was a gap g away from then, at H0, met it on its way to H, and
-slips from there on:
+on the road, per reference area, integrated where d > H (`tread`): <x> = max(x, 0), k stiffness of
+the overclosure, mu coefficient of friction, e elastic slip; x is along the tread, z across it. Slip
+counts from where a point stood when the last load had been reached, plus the elastic slip that it
+had then. A point that the road was a gap g away from then, at H0, met it on its way to H, and slips
+from there on:
 
-    slip = (1 - g / (H0 - H)) (x - x0)
+    slip = (1 - g / (H0 - H)) (x - x0),   x0: its place then
 """
 
 from __future__ import annotations

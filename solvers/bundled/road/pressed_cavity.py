@@ -6,10 +6,10 @@ Air between rigid walls as they stand, p = sum P_km psi_m(r, z) T_k(phi), psi_m 
     H P = omega^2 Q P,   Q = 1/B int p p dV,   H = 1/rho int grad p . grad p dV
 
 (Rayleigh and Ritz; Morse and Ingard, Theoretical Acoustics, 9.1.) Of a thin torus with the area
-A(phi) of its section this is Webster's equation (A p')' + (omega R / c)^2 A p = 0 (R: the torus'
-radius, c: speed of sound): the even wave, with its pressure at the patch, pushes the wheel up and
-down, the odd one fore and aft; with A = A0 (1 + a cos 2 phi) they have c / (2 pi R) (1 -+ a / 2),
-the upper sign for the even one. Narrow at the patch, a < 0.
+A(phi) of its section this is Webster's equation (A p')' + (omega R / c)^2 A p = 0 (': d/dphi, R:
+the torus' radius, c: speed of sound): the even wave, with its pressure at the patch, pushes the
+wheel up and down, the odd one fore and aft; with A = A0 (1 + a cos 2 phi) they have c / (2 pi R) (1
+-+ a / 2), the upper sign for the even one. Narrow at the patch, a < 0.
 """
 
 from __future__ import annotations

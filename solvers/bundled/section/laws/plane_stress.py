@@ -1,9 +1,9 @@
 """A law in a membrane, whose surfaces bear no stress: the column d of F across it is free,
 
-    W2(z) = min over d of W(z, d),   A2 = A_pp - A_pd A_dd^-1 A_dp
+    W2(z) = min over d of W(z, d),   A2 = A_zz - A_zd A_dd^-1 A_dz
 
 with p and q the columns of F along and around: a row z of 6 numbers is p, then q; A: second
-derivatives of W by these and by d.
+derivatives of W.
 """
 
 from __future__ import annotations
