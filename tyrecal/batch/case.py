@@ -70,7 +70,7 @@ class CaseTask:
     folder: Path  # of the results
     studies: tuple[str, ...]  # names of studies, in the order to run
     asked: Asked
-    solver: str = ""
+    solver: str = ""  # its name, empty for the case's own
     mesh: str = ""  # level, empty for the case's own
     record: Path | None = None  # the evaluation store; None: none is used
     command: tuple[str, ...] = ()  # of the solver

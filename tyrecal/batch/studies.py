@@ -19,7 +19,7 @@ from ..studies.result import StudyInput
 class Asked:
     """Options of the studies, by the names of arguments of `Result.run`."""
 
-    loads_N: tuple[float, ...] | None
+    loads_N: tuple[float, ...] | None  # None: those of the case
     pressures_kPa: PressureRange
 
 

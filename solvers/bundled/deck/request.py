@@ -70,8 +70,8 @@ class ResponseRequest(_Strict):
     highest_Hz: Annotated[float, Field(ge=1, le=1e4)]
     lines: Annotated[int, Field(ge=2, le=MAX_RESPONSE_LINES)]  # frequencies of equal steps
     patch_m: Annotated[float, Field(ge=1e-3, le=0.5)]  # width of the patch
-    excite: Points
-    respond: Points
+    excite: Points  # where a force acts
+    respond: Points  # where motions are wanted
     modes: Modes | None = None  # also matrices of the rim's motions and so many modes
 
     def points(self) -> list[list[tuple[float, int]]]:

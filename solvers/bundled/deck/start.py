@@ -36,7 +36,7 @@ class PressedStart:
     # then the angles between pi and 2 pi
     displacement: Array
     load_N: float
-    deflection_m: float
+    deflection_m: float  # way of the axle from where the tyre just touches the road
     sha256: str = ""  # names it once it is written
 
 

@@ -88,8 +88,8 @@ class RimAndAir:
     """Rim and air with the tangent of a number p, and the amplitudes of their motions in each
     mode."""
 
-    wheel: Wheel | None
-    air: GasCavity | None
+    wheel: Wheel | None  # None: the rim is held
+    air: GasCavity | None  # None: it is a constant pressure
     rim: list[Array]  # of each mode (q,), of the q motions of the rim
     flow: list[Array]  # of each mode (w,), of the w terms of the air's flow, kg/m
 

@@ -43,7 +43,7 @@ class ElementColumn:
 class Front:
     """Unknowns, flat indices of the two parts, that are eliminated together."""
 
-    parts: tuple[int, ...]
+    parts: tuple[int, ...]  # 0, 1 or both
     own: Array  # the unknowns that are eliminated
     left: Array  # what they are coupled with that goes later
     inner: list[int]  # the boxes inside, by their place in the order

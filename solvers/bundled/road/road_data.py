@@ -25,7 +25,7 @@ class RoadData:
     node: str  # its reference node
     tread: str  # the tread's surface
     stiffness: complex | float  # of the overclosure, Pa/m
-    friction: complex | float
+    friction: complex | float  # coefficient
     elastic_slip: float  # m
     lengths: Array  # of the elements round half the tyre, from the road to the top, rad
 

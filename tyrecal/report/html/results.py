@@ -32,7 +32,7 @@ class RunFacts(ResultPart):
     command: str | None = None  # name of the study
     finished: bool = True
     started: str = ""  # UTC, as 2026-11-27T08:30:00+00:00
-    arguments: list[str] = Field(default=[])
+    arguments: list[str] = Field(default=[])  # words of the command line behind tyrecal
     host: str = ""
 
     @property
@@ -53,12 +53,12 @@ class Results:
     folder: Path
     studies: dict[str, Result]  # by name, in the order of a page
     fit_shapes: Shapes | None = None
-    history: list[Json] = field(default_factory=list)
+    history: list[Json] = field(default_factory=list)  # design points of a fit, as `_history` reads
     history_csv: str = ""
     modes_shapes: Shapes | None = None
     patches: Patches | None = None
     diagnosis_section: DiagnosisSection | None = None
-    diagnosis_words: str = ""
+    diagnosis_words: str = ""  # diagnosis.md
     runs: dict[str, RunFacts] = field(default_factory=dict)
 
     def get(self, kind: type[StudyContent]) -> StudyContent | None:

@@ -29,7 +29,7 @@ class PlaneStress(EnergyLaw):
 
     weighted_tangent: ClassVar[bool] = True
 
-    bulk: Hyperelastic
+    bulk: Hyperelastic  # the volume's law
 
     def _gradient(self, z: Array) -> Array:
         """F (p, 9), row by row, without stress across the membrane. Raises Inverted."""
