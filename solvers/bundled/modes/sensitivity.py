@@ -94,7 +94,7 @@ class RimAndAir:
     flow: list[Array]  # of each mode (w,), of the w terms of the air's flow, kg/m
 
     def carried(self, X: Array, fields: ModeShapes) -> ModeShapes:
-        """The modes with the rim's nodes where p's tangent takes them."""
+        """The modes with the rim's nodes where p's tangent in X (nodes, 2) takes them."""
         if self.wheel is None or not np.iscomplexobj(X):
             return fields
         real, imag = fields.shapes.real.astype(complex), fields.shapes.imag.astype(complex)

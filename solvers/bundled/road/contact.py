@@ -69,7 +69,8 @@ class FlatRoad:
         return np.maximum(self.height - points.positions(self.U)[..., 0], 0.0)
 
     def share(self, points: Points, height: float) -> tuple[Array, Array]:
-        """Share of a step to ``height`` that each point spends on the road, and its slope, 1/m."""
+        """Share of a step to ``height`` that each point spends on the road, and its slope by the
+        height, 1/m, each (i, j, p)."""
         rise, gap = max(self.height - height, 1e-12), self.gap(points)
         met = gap < rise
         return np.where(met, 1.0 - gap / rise, 0.0), np.where(met, -gap / rise**2, 0.0)

@@ -58,7 +58,8 @@ class Basis:
         return len(block)
 
     def _beyond(self, block: Array, inertia: Array) -> tuple[Array, Array]:
-        """The directions of a block, and M times them, orthonormal to the basis and each other."""
+        """The directions of a block (c, size), and M times them, orthonormal to the basis and each
+        other; inertia: M times the block."""
         for _ in range(2):
             scale = 1 / np.sqrt(np.einsum("bs,bs->b", block, inertia))[:, None]
             block, inertia = block * scale, inertia * scale

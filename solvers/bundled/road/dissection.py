@@ -120,7 +120,7 @@ class Dissection:
         return np.multiply.outer(within(self._functions, pieces), within(self._nodes, columns))
 
     def _unknowns(self, parts: tuple[int, ...], chosen: Array) -> Array:
-        """Flat indices of the free components of some (function, node)."""
+        """Flat indices of the free components of the (function, node) in a mask (f, q)."""
         rows = np.flatnonzero(chosen)
         by_row = lambda values, part: values[part].reshape(-1, 3)[rows]
         return np.concatenate(

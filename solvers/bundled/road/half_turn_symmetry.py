@@ -73,13 +73,13 @@ class HalfTurn:
         return U
 
     def gather(self, F: Array) -> Array:
-        """Transpose of `spread`: forces on the two parts, zero on what is held."""
+        """Transpose of `spread`: forces F (k, n, 3) on the two parts, zero on what is held."""
         here, there = F[:, self.nodes], self.parity * MIRROR_SIGNS * F[:, self.beyond]
         there[:, self._middle] = 0.0
         return self._both(here, there) * self.mask
 
     def parts(self, U: Array) -> Array:
-        """The two parts of a field that has the symmetry."""
+        """The two parts of a field U (k, n, 3) that has the symmetry."""
         here, there = U[:, self.nodes], self.parity * MIRROR_SIGNS * U[:, self.beyond]
         return self._both(here, there) / 2
 

@@ -63,7 +63,7 @@ def cavity_modes(air: GasCavity, X: Array, displacement: Array, angles: Array) -
 
 def _wall(X: Array, connectivity: Array, U: Array, U_around: Array) -> tuple[Array, Array]:
     """Places x (s, p, 3) of the wall in the frame of the stations, and n dA / dTheta there,
-    n out of the air."""
+    n out of the air; U (s, n, 3), U_around: its derivative by the angle."""
     lines = elements.lines(X, connectivity, POINTS_ALONG)
     at = lambda rows, u: np.einsum("ega,seai->segi", rows, u[:, connectivity])
     N = np.broadcast_to(lines.N, lines.slope.shape)

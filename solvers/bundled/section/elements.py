@@ -91,7 +91,8 @@ def _map(X: Array, connectivity: Array, rule: shapes.Rule) -> tuple[Array, Array
 
 
 def _hourglass(corners: Array, gradient: Array, weights: Array) -> Array:
-    """Hourglass vectors of Flanagan and Belytschko (1981), (e, 4), blind to linear fields.
+    """Hourglass vectors of Flanagan and Belytschko (1981), (e, 4), blind to linear fields; gradient
+    dN/dX (e, 4, 2) at the one point.
 
     Scaled by sqrt(R dA sum |grad N|^2), so that an energy per radian is k (gamma . u_i)^2 / 2, k in
     Pa.

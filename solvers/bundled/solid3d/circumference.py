@@ -163,7 +163,7 @@ def _sines(x: Array, highest: int) -> tuple[Array, Array]:
 
 
 def _functions(ends: Array, waves: Array, angles: Array) -> tuple[Array, Array]:
-    """Values and derivatives (p, k) at angles, rad."""
+    """Values and derivatives (p, k) at angles, rad; ends, waves: as in `HalfCircle`."""
     nodes, far = 2 * len(ends) - (2 if waves.size else 1), waves.shape[2]
     result = np.zeros((2, len(angles), nodes + 2 * far))
     own = np.searchsorted(ends, angles, "right") - 1
@@ -188,7 +188,8 @@ def _functions(ends: Array, waves: Array, angles: Array) -> tuple[Array, Array]:
 
 
 def functions(angle: Array, half: Array | float) -> tuple[Array, Array]:
-    """The three functions and their derivatives (p, 3) at angles from the element's middle."""
+    """The three functions and their derivatives (p, 3) at angles from the element's middle, whose
+    ends are ``half`` away, rad."""
     bulge, dbulge = (1 - np.cos(angle)) / (1 - np.cos(half)), np.sin(angle) / (1 - np.cos(half))
     tilt, dtilt = np.sin(angle) / np.sin(half), np.cos(angle) / np.sin(half)
     values = [(bulge - tilt) / 2, 1 - bulge, (bulge + tilt) / 2]

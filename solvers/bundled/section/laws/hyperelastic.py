@@ -59,11 +59,11 @@ class Hyperelastic(EnergyLaw):
 
     @abstractmethod
     def isochoric_energy(self, F: Array, J: Array) -> Array:
-        """Wbar (p,)."""
+        """Wbar (p,), J/m3, of F (p, 3, 3) and J (p,)."""
 
     @abstractmethod
     def isochoric_stress(self, F: Array, J: Array, G: Array, on_G: Array) -> Array:
-        """dWbar/dF + on_G G (p, 3, 3)."""
+        """dWbar/dF + on_G G (p, 3, 3), Pa; G (p, 3, 3), on_G (p,)."""
 
     @abstractmethod
     def isochoric_tangent(
@@ -73,7 +73,8 @@ class Hyperelastic(EnergyLaw):
 
     @classmethod
     def of_points(cls, laws: Sequence[Self], owner: Array) -> Self:
-        """One law of many points, each of which has the constants of one of ``laws``."""
+        """One law of many points, each of which has the constants of one of ``laws``: owner
+        (p,)."""
         names = (*cls.shear_moduli, *cls.bulk_moduli, *cls.numbers)
         constants = [[np.ravel(getattr(law, name))[0] for law in laws] for name in names]
         table = np.array(constants)[:, owner]
@@ -139,7 +140,7 @@ class Hyperelastic(EnergyLaw):
         return _less_stress(dynamic.tangent(z, weights), z, more, weights)
 
     def scaled(self, shear: Array | complex, bulk: Array | complex) -> Self:
-        """The law with its moduli multiplied by factors."""
+        """The law with its moduli multiplied by factors, one each or (p,)."""
         own = {name: getattr(self, name) * shear for name in self.shear_moduli}
         own |= {name: getattr(self, name) * bulk for name in self.bulk_moduli}
         if self.pressure is not None:

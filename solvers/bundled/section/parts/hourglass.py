@@ -40,7 +40,7 @@ class Hourglass(EnergyLaw):
 
 
 def control(solids: Solids, stiffness: Array) -> Elastic:
-    """The hourglass control of one-point elements."""
+    """The hourglass control of one-point elements; stiffness (e,): k."""
     assert solids.hourglass is not None
     gamma = solids.hourglass[:, None]
     ones = np.ones(gamma.shape[:2])
