@@ -195,7 +195,7 @@ def _shapes(fields: Fields, count: int, n: int, sectors: int, job: str) -> list[
     """Amplitudes (nodes, 3), complex, of each pair's first mode, mass-normalised to the tyre.
 
     At Theta = 0, x, y, z are r, theta, z. CalculiX normalises to one sector's mass, and lists each
-    mode of every diameter twice.
+    mode of every diameter twice. Raises RunFailed (``no_results``).
     """
     parts = {(mode, name): values for mode, name, values in fields.blocks}
     shapes = []

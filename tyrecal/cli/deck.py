@@ -117,7 +117,8 @@ def command(
 
 def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Terminal) -> int:
     """Print what a user's deck holds, which of its numbers have paths, what is wrong with it for
-    the bundled solver and for ABAQUS, and what CalculiX lacks."""
+    the bundled solver and for ABAQUS, and what CalculiX lacks. Raises click.UsageError,
+    InputError."""
     from ..simulate.deck.own import asked_by_abaqus, lacking_in_calculix
     from ..tyre.case.kinds.decks_in_3d import DecksIn3D
     from ..tyre.case.kinds.section_deck import trial

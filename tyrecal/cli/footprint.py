@@ -93,7 +93,8 @@ def command(
 
 
 def _fit_compared(compare: str | None, fitted: Path | None, own: Path) -> Path | None:
-    """The fit to press: as given, else the one in the results folder where it is requested."""
+    """The fit to press: as given, else the one in the results folder where it is requested. Raises
+    click.UsageError."""
     if fitted or "fitted" not in (compare or "").split(","):
         return fitted
     if not own.exists():

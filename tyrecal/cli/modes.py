@@ -162,7 +162,8 @@ def write_modes_at_load(
     load_N: float,
     study: Study,
 ) -> int:
-    """Write the modes under one load to modes.json, and their shapes to modes_shapes.json."""
+    """Write the modes under one load to modes.json, and their shapes to modes_shapes.json. Raises
+    EvaluationFailed."""
     from ..report.shape_data import loaded_data
     from ..report.table import shown
     from ..studies.loaded import LoadedTyre, load_tyres

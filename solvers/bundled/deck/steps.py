@@ -136,7 +136,8 @@ def _procedure(block: list[Block], on_road: bool) -> Block:
 
 
 def _check_transfer(section: list[Block], steps: list[DeckStep], revolve: list[Block]) -> None:
-    """The revolve job takes over the end of the section job's only step, and holds its rim."""
+    """The revolve job takes over the end of the section job's only step, and holds its rim. Raises
+    DeckError."""
     blocks = {k.name: k for k in revolve}
     names = "SYMMETRIC MODEL GENERATION", "SYMMETRIC RESULTS TRANSFER"
     for needed in names:

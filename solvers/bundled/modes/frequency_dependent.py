@@ -52,7 +52,7 @@ class SelfConsistent:
 
     def _settled(self, modes: HarmonicModes, j: int) -> HarmonicModes:
         """Mode j, from the modes at ``START_HZ``: the frequency at which the shape has its own
-        modulus, then the shape there, until both agree."""
+        modulus, then the shape there, until both agree. Raises RunFailed."""
         frequency = START_HZ
         for _ in range(MAX_SETTLING):
             before, frequency = frequency, self._own(modes, j, frequency)
@@ -65,7 +65,7 @@ class SelfConsistent:
     def _own(self, modes: HarmonicModes, j: int, frequency_Hz: float) -> float:
         """f with (2 pi f)^2 = lambda + sum_l (rho_l(f) - rho_l(f_0)) phi^H dK_l phi for mode j of
         the modulus at f_0 = ``frequency_Hz``: Rayleigh's quotient, right to the square of the
-        shape's change."""
+        shape's change. Raises RunFailed."""
         forms = self.vibration.forms(modes.n, modes.shapes[j])
         start, value = self._ratios(frequency_Hz), float(modes.eigenvalues[j])
         f = np.sqrt(value) / (2 * np.pi)

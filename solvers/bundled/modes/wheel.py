@@ -122,8 +122,8 @@ def free_along_load(keywords: list[Block], mesh: DeckMesh, step: DeckStep) -> fl
 
 
 def _point_elements(keywords: list[Block], mesh: DeckMesh) -> dict[str, tuple[str, list[int]]]:
-    """Element set to type and nodes of the job's point elements on a rim's reference node; those
-    on the tyre are of the module `point_elements`."""
+    """Element set to type and nodes of the job's point elements on a rim's reference node; those on
+    the tyre are of the module `point_elements`. Raises DeckError."""
     sets: dict[str, tuple[str, list[int]]] = {}
     for k in keywords:
         if k.name == "ELEMENT":
@@ -140,7 +140,7 @@ def _point_elements(keywords: list[Block], mesh: DeckMesh) -> dict[str, tuple[st
 def _properties(
     keywords: list[Block], elements: dict[str, tuple[str, list[int]]], reference: int
 ) -> tuple[dict[str, Scalar], dict[str, Scalar]]:
-    """Stiffness and inertia per motion."""
+    """Stiffness and inertia per motion. Raises DeckError."""
     springs: dict[int, Scalar] = {}
     inertia: dict[str, Scalar] = {}
     needed = {"SPRING": "SPRING1", "MASS": "MASS", "ROTARY INERTIA": "ROTARYI"}

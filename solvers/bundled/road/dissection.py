@@ -146,7 +146,7 @@ def _columns(
     connectivities: list[Array], symmetry: HalfTurn
 ) -> tuple[list[ElementColumn], Array, Array]:
     """Columns from the bead on; the nodes (q,) in that order, and of each the first and last
-    column."""
+    column. Raises Refused."""
     place = np.full(symmetry.shape[1], -1)
     place[symmetry.nodes] = np.arange(len(symmetry.nodes))
     other = symmetry.other

@@ -112,7 +112,7 @@ def _check_flat(surface: Block) -> None:
 
 
 def _half_lengths(model: list[Block]) -> Array:
-    """Lengths (rad) of the elements from the road's side to the top."""
+    """Lengths (rad) of the elements from the road's side to the top. Raises DeckError."""
     generation = next(k for k in model if k.name == "SYMMETRIC MODEL GENERATION")
     lengths: list[float] = []
     for row in generation.rows[2:]:  # of each segment: degrees, elements, bias

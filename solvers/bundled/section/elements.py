@@ -74,7 +74,8 @@ def solids(
 
 
 def _map(X: Array, connectivity: Array, rule: shapes.Rule) -> tuple[Array, Array, Array]:
-    """R (e, g), weights w det R (e, g) and dN/dX (e, g, a, 2) of the isoparametric map."""
+    """R (e, g), weights w det R (e, g) and dN/dX (e, g, a, 2) of the isoparametric map. Raises
+    Inverted."""
     corners = X[connectivity]
     tangent = np.einsum("gak,eaj->egjk", rule.dN, corners)  # dX_j / dxi_k
     det = tangent[..., 0, 0] * tangent[..., 1, 1] - tangent[..., 0, 1] * tangent[..., 1, 0]

@@ -64,7 +64,7 @@ def read_law(k: Block) -> Hyperelastic:
 
 
 def _numbers(k: Block, names: list[str]) -> list[Scalar]:
-    """The constants in their order; those that are left out are 0."""
+    """The constants in their order; those that are left out are 0. Raises DeckError."""
     lines = -(-len(names) // ON_A_LINE)
     if not 1 <= len(k.rows) <= lines:
         of = "one data line" if lines == 1 else f"up to {lines} data lines"

@@ -184,7 +184,8 @@ class _Layer:
 
 
 def _layer(job: SectionJob, k: Block, row: Row, lines: Lines) -> _Layer:
-    """Data line: name, area, spacing, position, material, angle from the meridian (degrees)."""
+    """Data line: name, area, spacing, position, material, angle from the meridian (degrees). Raises
+    DeckError."""
     area, spacing = row.value(1), row.value(2)
     material = job.material(k, row.name(4))
     if row.value(3, 0.0) != 0.0:

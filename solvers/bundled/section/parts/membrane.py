@@ -37,7 +37,7 @@ def read(job: SectionJob) -> list[TyrePart]:
 
 def _sections(job: SectionJob) -> Iterator[tuple[str, np.ndarray, Hyperelastic, list]]:
     """Element type, rows (e,) of its block, law of the material; thickness (m), density (kg/m3),
-    dynamic over static shear and bulk modulus."""
+    dynamic over static shear and bulk modulus. Raises DeckError."""
     for k in job.keywords:
         if k.name != "MEMBRANE SECTION":
             continue

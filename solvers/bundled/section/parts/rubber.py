@@ -46,7 +46,7 @@ def read(job: SectionJob) -> list[TyrePart]:
 
 
 def _sections(job: SectionJob) -> Iterator[tuple[str, _Section]]:
-    """Element types and sections of the deck."""
+    """Element types and sections of the deck. Raises DeckError."""
     keywords: list[Block | None] = [None, *job.keywords, None]
     controls = {k.need("NAME") for k in job.keywords if k.name == "SECTION CONTROLS"}
     for before, k, after in zip(keywords, job.keywords, keywords[2:], strict=False):
@@ -72,7 +72,7 @@ def _sections(job: SectionJob) -> Iterator[tuple[str, _Section]]:
 
 
 def _rubber(job: SectionJob, kind: str, sections: list[_Section]) -> list[TyrePart]:
-    """The elements of one type: those of each law a part."""
+    """The elements of one type: those of each law a part. Raises DeckError."""
     solids = job.mesh.blocks[kind]
     assert isinstance(solids, Solids)
     owner = np.full(len(solids.weights), -1)
