@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -18,9 +19,7 @@ from tyrecal.tyre.load import load_case
 from ..conftest import CASES
 from .test_cli import run
 
-STUDY = Study(
-    Terminal(), "", "", (), None, None, no_store=False, allow_unusual=False, dry_run=False
-)
+STUDY = Study(Terminal())
 
 
 @pytest.fixture
@@ -42,18 +41,18 @@ def fit(folder: Path, case: Path, started: str, good: bool = True) -> None:
 
 def test_the_only_case_is_taken_and_named(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (here / "jobs.yaml").write_text("queue: long\n")  # no case
-    assert default_case(None, None, STUDY) == (Path("p235_75r17.yaml"), None, STUDY)
+    assert default_case(None, STUDY) == (Path("p235_75r17.yaml"), STUDY)
     assert capsys.readouterr().err == "p235_75r17.yaml, the only case here\n"
 
 
 def test_several_cases_or_none_are_refused_with_a_list(here: Path) -> None:
     shutil.copy(here / "p235_75r17.yaml", here / "b.yaml")
     with pytest.raises(click.UsageError, match=r"several here: b\.yaml, p235_75r17\.yaml"):
-        default_case(None, None, STUDY)
+        default_case(None, STUDY)
     for path in here.glob("*.yaml"):
         path.unlink()
     with pytest.raises(click.UsageError, match="no fit and no case here"):
-        default_case(None, None, STUDY)
+        default_case(None, STUDY)
 
 
 def test_the_last_fit_that_converged_is_taken_with_its_case(
@@ -65,29 +64,27 @@ def test_the_last_fit_that_converged_is_taken_with_its_case(
     fit(here / "new", here / "p235_75r17.yaml", "2026-01-02T10:00:00+00:00")
     fit(here / "failed", other, "2026-01-03T10:00:00+00:00", good=False)
     fit(here / "gone", here / "none.yaml", "2026-01-03T10:00:00+00:00")
-    case, fitted, study = default_case(None, None, STUDY)
-    assert (case, fitted) == (Path("p235_75r17.yaml"), Path("new/fit.json"))
+    case, study = default_case(None, STUDY)
+    assert (case, study.fitted) == (Path("p235_75r17.yaml"), Path("new/fit.json"))
     assert study.output == Path("new")
     notes = capsys.readouterr().err
     assert "p235_75r17.yaml, with the fit in 'new'" in notes
     assert "failed" not in notes and "gone" not in notes
-    assert default_case(None, Path("old/fit.json"), STUDY)[:2] == (
-        Path("b.yaml"),
-        Path("old/fit.json"),
-    )
-    assert default_case(other, None, STUDY) == (other, None, STUDY)
+    old = replace(STUDY, fitted=Path("old/fit.json"))
+    assert default_case(None, old) == (Path("b.yaml"), replace(old, output=Path("old")))
+    assert default_case(other, STUDY) == (other, STUDY)
 
 
 def test_a_fit_whose_case_is_not_at_its_place_needs_the_case(here: Path) -> None:
     fit(here / "results", here / "none.yaml", "2026-01-01T10:00:00+00:00")
     with pytest.raises(click.UsageError, match="the case of 'results' is not at its place"):
-        default_case(None, Path("results"), STUDY)
+        default_case(None, replace(STUDY, fitted=Path("results")))
 
 
 def test_a_case_of_an_own_deck_is_one(here: Path) -> None:
     (here / "p235_75r17.yaml").unlink()
     shutil.copytree(CASES / "ring_3d", here, dirs_exist_ok=True)
-    assert default_case(None, None, STUDY)[0] == Path("ring.yaml")
+    assert default_case(None, STUDY)[0] == Path("ring.yaml")
 
 
 @pytest.mark.slow

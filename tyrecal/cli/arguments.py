@@ -124,15 +124,13 @@ def one_load(loaded: Any, load_N: float | None, allowed: bool) -> float:
     return loads[0]
 
 
-def parse_pressures(
-    low: float | None, high: float | None, steps: int, allowed: bool
-) -> PressureRange:
-    """The range of a sweep, kPa; ``allowed``: unusual ends too. Raises click.UsageError."""
+def checked_pressures(pressures: PressureRange, allowed: bool) -> PressureRange:
+    """The range of a sweep; ``allowed``: unusual ends too. Raises click.UsageError."""
     from math import isfinite
 
-    from ..studies.pressure_range import PressureRange
     from ..tyre.usual import ALL_THE_SAME, USUAL
 
+    low, high = pressures.low, pressures.high
     for option, value in (("--from-kPa", low), ("--to-kPa", high)):
         if value is None:
             continue
@@ -142,7 +140,7 @@ def parse_pressures(
             raise click.UsageError(f"{option} {value:g}: {message}{ALL_THE_SAME}")
     if low is not None and high is not None and low >= high:
         raise click.UsageError(f"--from-kPa {low:g} must be less than --to-kPa {high:g}")
-    return PressureRange(low, high, steps)
+    return pressures
 
 
 def parse_pressure_list(flag: str, loaded: Any, text: str, allowed: bool) -> list[float]:

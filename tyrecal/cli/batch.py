@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import click
 
-from ..files import json_text, make_folder, refuse_link, write_text
+from ..files import Json, json_text, make_folder, refuse_link, write_text
 from ..studies import STUDIES, runnable
+from ..studies.pressure_range import PressureRange
 from . import arguments, options
 from .main import EXIT_BATCH
 from .parameters import FileOrFolder, WholeNumber, option
@@ -17,6 +19,40 @@ from .terminal import Terminal
 
 STUDY_NAMES = [name for name, entry in STUDIES.items() if entry.runs_by_name]
 FILE_PATH = FileOrFolder(folder=False)
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """The numbers of an earlier batch, to compare with or to write."""
+
+    file: Path | None
+    write_baseline: bool
+
+    def check(self) -> None:
+        """Raises click.UsageError if there is no file to write."""
+        if self.write_baseline and not self.file:
+            raise click.UsageError("--write-baseline needs --baseline FILE")
+
+    def read(self) -> Json | None:
+        """The content of the file; None: there is none. Raises InputError."""
+        from ..batch.drift import read_baseline
+
+        if self.file and (self.file.exists() or not self.write_baseline):
+            return read_baseline(self.file)
+        return None
+
+    def drift(self, reports: Sequence[Json], before: Json | None) -> Json | None:
+        """Differences of a batch from the numbers before, unless they are written."""
+        from ..batch.drift import compare
+
+        return compare(reports, before) if before and not self.write_baseline else None
+
+    def write(self, reports: Sequence[Json], before: Json | None) -> None:
+        """Write the numbers of a batch where that is requested; tolerances are kept."""
+        from ..batch.drift import baseline_of
+
+        if self.write_baseline and self.file:
+            _write(self.file, json_text(baseline_of(reports, before)))
 
 
 @click.command()
@@ -37,6 +73,7 @@ FILE_PATH = FileOrFolder(folder=False)
 )
 @option(
     "--baseline",
+    "file",
     type=FILE_PATH,
     metavar="FILE",
     help="Baseline file: numbers to compare with, and their tolerances.",
@@ -46,8 +83,10 @@ FILE_PATH = FileOrFolder(folder=False)
     is_flag=True,
     help="Write the numbers to --baseline instead of comparing; its tolerances are kept.",
 )
+@options.packed("baseline", Baseline)
 @options.loads
 @options.pressures
+@options.packed("pressures", PressureRange)
 @option(
     "--jobs",
     type=WholeNumber(1, 256),
@@ -71,27 +110,15 @@ FILE_PATH = FileOrFolder(folder=False)
     options.no_store,
     options.allow_unusual,
 )
-@options.with_terminal
+@options.with_study
 def command(
     cases: tuple[Path, ...],
     studies: str,
     junit: Path | None,
-    baseline: Path | None,
-    write_baseline: bool,
+    baseline: Baseline,
     loads: str | None,
-    from_kPa: float | None,
-    to_kPa: float | None,
-    steps: int,
-    jobs: int,
-    scheduler: str,
-    mesh: str,
-    solver: str,
-    solver_command: tuple[str, ...],
-    output: Path | None,
-    store: Path | None,
-    no_store: bool,
-    allow_unusual: bool,
-    terminal: Terminal,
+    pressures: PressureRange,
+    study: options.Study,
 ) -> int:
     """Study many CASES. If one fails, the others are still studied.
 
@@ -110,10 +137,10 @@ def command(
     """
     from ..simulate.evaluate.pool import warm_up
 
-    if jobs > 1 and len(cases) > 1 and not scheduler:
+    terminal, scheduler = study.terminal, study.scheduler
+    if study.jobs > 1 and len(cases) > 1 and not scheduler:
         warm_up()  # while we import
     from ..batch.case import CaseTask
-    from ..batch.drift import baseline_of, compare, read_baseline
     from ..batch.junit import junit as junit_xml
     from ..batch.run import names_of, run_batch
     from ..batch.studies import Asked
@@ -125,19 +152,16 @@ def command(
 
     names = names_of(cases)
     wanted = _studies(studies)
-    pressures = arguments.parse_pressures(from_kPa, to_kPa, steps, allow_unusual)
+    arguments.checked_pressures(pressures, study.allow_unusual)
     study_options = Asked(
         tuple(arguments.parse_loads(loads)) if loads is not None else None, pressures
     )
-    if write_baseline and not baseline:
-        raise click.UsageError("--write-baseline needs --baseline FILE")
-    options.not_both(jobs, scheduler)
-    before = None
-    if baseline and (baseline.exists() or not write_baseline):
-        before = read_baseline(baseline)
-    output = output or root() / "batch"
+    baseline.check()
+    study.refuse_two_machines()
+    before = baseline.read()
+    output = study.output or root() / "batch"
     run = Run(output, output, "batch")
-    record = run.open_store(store, no_store)
+    record = run.open_store(study.store, study.no_store)
     folder = output.resolve()
     tasks = [
         CaseTask(
@@ -146,11 +170,11 @@ def command(
             folder / name,
             wanted,
             study_options,
-            solver,
-            mesh,
+            study.solver,
+            study.mesh,
             record.folder if record else None,
-            solver_command,
-            allow_unusual,
+            study.solver_command,
+            study.allow_unusual,
         )
         for name, path in zip(names, cases, strict=True)
     ]
@@ -159,25 +183,24 @@ def command(
     progress = BatchProgress(len(tasks), terminal.quiet, terminal.verbose)
     try:
         with progress, reached(scheduler) as address:
-            reports = run_batch(tasks, jobs, address, progress.notify)
+            reports = run_batch(tasks, study.jobs, address, progress.notify)
     except BaseException:
         if not scheduler:  # workers of a scheduler still finish their cases
             _drop_run_folders(tasks)
         raise
     _drop_run_folders(tasks)
     reports.sort(key=lambda report: str(report["name"]))
-    drift = compare(reports, before) if before and not write_baseline else None
+    drift = baseline.drift(reports, before)
     result = summary(wanted, reports, drift)
     result = run.write_json("batch.json", result)
     if junit:
         _write(junit, junit_xml(reports, drift, started))
-    if write_baseline and baseline:
-        _write(baseline, json_text(baseline_of(reports, before)))
+    baseline.write(reports, before)
     run.finish(cases={report["name"]: report["facts"] for report in reports}, scheduler=address)
     terminal.result(result)
     _print_summary(result, terminal)
-    if write_baseline:
-        terminal.say(f"baseline written to {baseline}")
+    if baseline.write_baseline:
+        terminal.say(f"baseline written to {baseline.file}")
     terminal.say(f"results in {run.folder}")
     return 0 if result["counts"]["good"] == len(reports) else EXIT_BATCH
 

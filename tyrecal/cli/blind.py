@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,13 +24,22 @@ truth = option(
 )
 
 
-def trials(flag: str, name: str, default: int, what: str) -> Any:
+def trials_option(flag: str, name: str, default: int, what: str) -> Any:
     """The option for the number of trials of one kind."""
     number = WholeNumber(0)
     help = f"Trials {what}."
     return option(
         flag, name, type=number, default=default, show_default=True, metavar="N", help=help
     )
+
+
+@dataclass(frozen=True)
+class Trials:
+    """Numbers of trials of each kind."""
+
+    effects: int
+    plain: int
+    outside: int
 
 
 @click.group()
@@ -68,9 +78,9 @@ def power(**values: Any) -> int:
     shell_complete=complete.cases,
     help="Case with the plain model, its uncertainties and the measured modes.",
 )
-@trials("--effects", "effects", 300, "with an effect of the catalogue")
-@trials("--none", "plain", 200, "without any")
-@trials("--outside", "outside", 80, "with an error that the catalogue does not list")
+@trials_option("--effects", "effects", 300, "with an effect of the catalogue")
+@trials_option("--none", "plain", 200, "without any")
+@trials_option("--outside", "outside", 80, "with an error that the catalogue does not list")
 @names_option(
     "--effect",
     "drawn",
@@ -86,19 +96,16 @@ def power(**values: Any) -> int:
 )
 @truth
 @options.every(options.jobs, options.allow_unusual)
-@options.with_terminal
+@options.packed("trials", Trials)
+@options.with_study
 def make(
     folder: Path,
     case_path: Path,
-    effects: int,
-    plain: int,
-    outside: int,
+    trials: Trials,
     drawn: tuple[str, ...],
     seed: int | None,
     truth: Path | None,
-    jobs: int,
-    allow_unusual: bool,
-    terminal: Terminal,
+    study: options.Study,
 ) -> int:
     """Draw tyres, compute them, seal the truth and write measurements to DIR.
 
@@ -122,9 +129,11 @@ def make(
     from ..studies.blind.protocol import Protocol
     from ..studies.blind.ruler import measure
 
-    if not effects + plain + outside:
+    counts = {"effect": trials.effects, "none": trials.plain, "outside": trials.outside}
+    if not (number := sum(counts.values())):
         raise click.UsageError("there must be at least one trial")
-    case, sealed = load_case(case_path, allow_unusual), _sealed(folder, truth)
+    terminal, jobs = study.terminal, study.jobs
+    case, sealed = load_case(case_path, study.allow_unusual), _sealed(folder, truth)
     resume("finished trials are kept; run the same command again to resume")
     store = Store((sealed / "record").resolve())
     maker = bundled_maker(case, store)
@@ -132,7 +141,6 @@ def make(
         arguments.refuse_unknown("--effect", id, maker.laws, "effect of these trials")
     if drawn:
         maker = replace(maker, laws={id: maker.laws[id] for id in drawn})
-    counts = {"effect": effects, "none": plain, "outside": outside}
     protocol = Protocol(maker.about, case.path.name, counts).about(case.case.pressure_kPa)
     evaluator = Evaluator(TyreDesign(case), "bundled", store=store)
 
@@ -143,7 +151,6 @@ def make(
     with terminal.progress("make trials") as bar:
         progress = _progress("made", terminal, bar)
         sha256 = made(folder, sealed, case, protocol, maker, ruler, jobs, seed, progress)
-    number = sum(counts.values())
     result = {"trials": number, "folder": str(folder), "truth": str(sealed), "sha256": sha256}
     terminal.result(result)
     terminal.say(f"{number} trials in {folder}; the truth is in {sealed}, sha256 {sha256}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -43,20 +44,8 @@ MAX_DECK_DOUBTS = 10  # printed sentences on lines that are not checked for ABAQ
     options.output,
     options.allow_unusual,
 )
-@options.with_terminal
-def command(
-    case: Path,
-    assignments: tuple[str, ...],
-    pressure_kPa: float | None,
-    loads: str | None,
-    fitted: Path | None,
-    mesh: str,
-    solver: str,
-    output: Path | None,
-    allow_unusual: bool,
-    check: bool,
-    terminal: Terminal,
-) -> int:
+@options.with_study
+def command(case: Path, loads: str | None, check: bool, study: options.Study) -> int:
     """Write the decks of CASE, to read or to run elsewhere.
 
     \b
@@ -66,10 +55,11 @@ def command(
     tyrecal deck cases/p235_75r17.yaml --fitted p235_75r17 --output fitted_decks
     tyrecal deck --check my_tyre.inp
     """
+    terminal = study.terminal
     if check:
-        if fitted:
+        if study.fitted:
             raise click.UsageError("--check takes no --fitted")
-        return _check(case, mesh, assignments, terminal)
+        return _check(case, study)
     from ..files import atomic_write, private_dir
     from ..simulate.deck.decks import Decks
     from ..simulate.deck.decks_design import design_of
@@ -78,17 +68,17 @@ def command(
     from .output import Run
 
     if loads is not None:
-        arguments.refuse_set(assignments, "road.loads_N", "--loads-N")
-    loaded, _ = arguments.load(case, mesh, assignments, pressure_kPa, terminal, allow_unusual)
-    loaded, values = arguments.one_design(fitted, loaded, assignments, terminal)
+        arguments.refuse_set(study.assignments, "road.loads_N", "--loads-N")
+    loaded, _ = study.load(case)
+    loaded, values = study.one_design(loaded)
     design = design_of(loaded, values)
-    evaluator = Evaluator(design, solver)
+    evaluator = Evaluator(design, study.solver)
     adapter = evaluator.solver
     evaluator.refuse_lacking(design)
     if loads is not None:
         evaluator.needs_road()
         loads_N = arguments.parse_loads(loads)
-        arguments.refuse_unusual_loads(loaded, "--loads-N", loads_N, allow_unusual)
+        arguments.refuse_unusual_loads(loaded, "--loads-N", loads_N, study.allow_unusual)
         decks = Decks(design, loads_N=tuple(loads_N))
     else:
         decks = Decks(design, tuple(values) if evaluator.has_gradients else ())
@@ -99,7 +89,7 @@ def command(
         except adapter.refusals as error:
             raise DeckRefused(str(error)) from None
         # what is refused leaves the folder untouched
-        run = Run(case, output, "deck", adapter, loaded=loaded)
+        run = Run(case, study.output, "deck", adapter, loaded=loaded)
         for path in written:
             place = run.folder / path.relative_to(fresh)  # included files may be in folders
             for above in reversed(place.relative_to(run.folder).parents[:-1]):
@@ -115,7 +105,7 @@ def command(
     return 0
 
 
-def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Terminal) -> int:
+def _check(path: Path, study: options.Study) -> int:
     """Print what a user's deck holds, which of its numbers have paths, what is wrong with it for
     the bundled solver and for ABAQUS, and what CalculiX lacks. Raises click.UsageError,
     InputError."""
@@ -127,10 +117,11 @@ def _check(path: Path, mesh: str, assignments: tuple[str, ...], terminal: Termin
     from ..tyre.own_deck.text import OwnDeckError
     from ..tyre.usual_deck import deck_slips
 
+    terminal = study.terminal
     numbers: Mapping[str, float] = {}
     gauges: Gauges = ()
     if path.suffix in (".yaml", ".yml"):
-        loaded, _ = arguments.load(path, mesh, assignments, None, terminal, allow_unusual=True)
+        loaded, _ = replace(study, pressure_kPa=None, allow_unusual=True).load(path)
         if isinstance(loaded.kind, DecksIn3D):
             content = describe_decks(loaded, loaded.kind.decks, terminal)
             terminal.result(content)

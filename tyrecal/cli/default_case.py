@@ -16,19 +16,19 @@ if TYPE_CHECKING:
 CASE_KEYS = {"size", "pressure_kPa", "solver"}  # by which a case differs from other YAML
 
 
-def default_case(
-    case: Path | None, fitted: Path | None, study: Study
-) -> tuple[Path, Path | None, Study]:
-    """Case, fit.json to compare with, and study: as given if there is a case.
+def default_case(case: Path | None, study: Study) -> tuple[Path, Study]:
+    """Case and study: as given if there is a case.
 
-    Else those of the last fit in a folder here that converged and whose case file exists; results
-    go to that folder. Else the only case here. Raises click.UsageError."""
+    Else those of the last fit in a folder here that converged and whose case file exists: its
+    design is studied, and results go to its folder. Else the only case here. Raises
+    click.UsageError."""
     from ..simulate.case_folder import named_case
     from ..studies.fitted import has_good
     from ..tyre.case.document import read_document
 
     if case is not None:
-        return case, fitted, study
+        return case, study
+    fitted = study.fitted
     given = fitted if fitted is None or fitted.is_dir() else fitted.parent
     fits = []
     for folder in [given] if given else [path for path in Path().iterdir() if path.is_dir()]:
@@ -40,7 +40,8 @@ def default_case(
         _, folder, file = max(fits)
         case = file.relative_to(Path.cwd()) if file.is_relative_to(Path.cwd()) else file
         study.terminal.note(f"{case}, with the fit in '{folder}'; another CASE can be given")
-        return case, fitted or folder / "fit.json", replace(study, output=study.output or folder)
+        fitted, output = fitted or folder / "fit.json", study.output or folder
+        return case, replace(study, fitted=fitted, output=output)
     if fitted:
         raise click.UsageError(f"give the CASE too: the case of '{fitted}' is not at its place")
     files = [path for path in sorted(Path().glob("*.y*ml")) if path.is_file()]
@@ -49,4 +50,4 @@ def default_case(
         listed = f"several here: {', '.join(map(str, cases[:10]))}" if cases else "no case here"
         raise click.UsageError(f"give a CASE: there is no fit and {listed}")
     study.terminal.note(f"{cases[0]}, the only case here")
-    return cases[0], None, study
+    return cases[0], study

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -10,7 +12,35 @@ from ..errors import InputError
 from . import arguments, complete, options
 from .parameters import FileOrFolder, NumberWithin, names_option, option
 
+if TYPE_CHECKING:
+    from ..studies.inference.inverse_problem import Assumed
+
 file = FileOrFolder(exists=True, folder=False)
+
+
+@dataclass(frozen=True)
+class Files:
+    """Files of measurements of one tyre."""
+
+    measured: Path | None
+    repeats: tuple[Path, ...]
+    toggled: tuple[tuple[Path, str], ...]  # each with its change, in words
+
+
+@dataclass(frozen=True)
+class Assumptions:
+    """Options of `Assumed`, in per cent."""
+
+    form_percent: float | None
+    split_percent: float
+    further: float
+
+    def assumed(self) -> Assumed:
+        """The same as fractions."""
+        from ..studies.inference.inverse_problem import Assumed
+
+        form = None if self.form_percent is None else self.form_percent / 100
+        return Assumed(form, self.split_percent / 100, further=self.further)
 
 
 @click.command()
@@ -86,21 +116,16 @@ file = FileOrFolder(exists=True, folder=False)
 )
 @option("--pictures/--no-pictures", default=True, help="Draw the result.")
 @options.figure_format
+@options.packed("files", Files)
+@options.packed("assumptions", Assumptions)
 @options.study
 def command(
     case: Path,
-    assignments: tuple[str, ...],
-    measured: Path | None,
-    fitted: Path | None,
-    repeats: tuple[Path, ...],
-    toggled: tuple[tuple[Path, str], ...],
+    files: Files,
     effects: tuple[str, ...],
     without: tuple[str, ...],
-    form_percent: float | None,
-    split_percent: float,
-    further: float,
+    assumptions: Assumptions,
     added: tuple[str, ...],
-    pictures: bool,
     study: options.Study,
 ) -> int:
     """Find where CASE and measurements differ, and which effect explains it.
@@ -133,13 +158,12 @@ def command(
     from ..studies.diagnose.diagnosis import STAGES
     from ..studies.diagnose.study import parse_change, planned, states_measured
     from ..studies.diagnose.study import study as diagnosed
-    from ..studies.inference.inverse_problem import Assumed
     from ..studies.variable import read_variables
     from ..tyre.effects import catalogue
 
-    loaded, _ = study.load(case, assignments)
+    loaded, _ = study.load(case)
     read_variables(loaded)  # refuses a start outside its bounds before anything is written
-    measured = measured or loaded.measured
+    measured = files.measured or loaded.measured
     if measured is None:
         raise click.UsageError("--measured FILE must be given, or --add EFFECT=VALUE")
     for flag, ids in (("--effect", effects), ("--without", without)):
@@ -148,31 +172,29 @@ def command(
     considered = [id for id in effects or catalogue() if id not in without]
     if not considered:
         raise click.UsageError("--without leaves no effect to consider")
-    changes = [(path, parse_change(text)) for path, text in toggled]
+    changes = [(path, parse_change(text)) for path, text in files.toggled]
     for _, change in [] if study.allow_unusual else changes:
         if not change.times:  # EFFECT=VALUE, not EFFECT*FACTOR
             option, name = f"--toggled {change.id}={change.value:g}", f"effects.{change.id}"
             arguments.refuse_unusual(loaded, option, name, change.value, allowed=False)
-    first_guess = arguments.fitted_values(fitted, loaded, terminal) if fitted else None
+    first_guess = study.fitted_values(loaded).get("fitted")
     evaluator = study.evaluator(loaded)
-    others = [*repeats, *(path for path, _ in changes)]
+    others = [*files.repeats, *(path for path, _ in changes)]
     states = states_measured(loaded, measured, others)
     plan = None
     if study.dry_run:
         plan = planned(loaded, evaluator, measured, considered, study.jobs)
-    files = [measured, *others]
-    run = study.run(loaded, "diagnose", evaluator, measured=files, plan=plan, **states)
-    form = None if form_percent is None else form_percent / 100
-    assumed = Assumed(form, split_percent / 100, further=further)
+    every = [measured, *others]
+    run = study.run(loaded, "diagnose", evaluator, measured=every, plan=plan, **states)
     with terminal.progress("diagnose", STAGES) as bar:
         evaluator.on_progress = bar.at
         diagnosed_case = diagnosed(
             loaded,
             evaluator,
             measured,
-            repeats,
+            files.repeats,
             changes,
-            assumed,
+            assumptions.assumed(),
             study.jobs,
             considered,
             stage=bar.begin,
@@ -184,7 +206,7 @@ def command(
     run.write_json("diagnosis_section.json", parts)
     words = page(diagnosed_case, loaded.case.name, measured.name)
     run.write_text("diagnosis.md", words)
-    if pictures:
+    if study.pictures:
         from ..report.diagnosis_pictures import draw_diagnosis
 
         figures = draw_diagnosis(diagnosed_case.diagnosis, parts)

@@ -42,11 +42,8 @@ from .parameters import FileOrFolder, option
 def command(
     name: str | None,
     case: Path | None,
-    fitted: Path | None,
     value: str | None,
     pressures: str | None,
-    pictures: bool,
-    assignments: tuple[str, ...],
     study: options.Study,
 ) -> int:
     """List what a plain tyre model leaves out, or explain the effect NAME.
@@ -89,8 +86,8 @@ def command(
             terminal.show(shown(effects_table(entries)))
         return 0
 
-    loaded, _ = study.load(case, assignments)
-    loaded, values = arguments.one_design(fitted, loaded, assignments, terminal)
+    loaded, _ = study.load(case)
+    loaded, values = study.one_design(loaded)
     size = None
     if name and value is not None:
         path = EFFECT_PATH + name
@@ -127,7 +124,7 @@ def command(
         plain = Plain(loaded, evaluator, values, kPa, study.jobs)
         result, signatures = run(plain, able, size, study.jobs, study.notify)
     figures = {}
-    if pictures:
+    if study.pictures:
         from ..report.signature import draw_signature
 
         figures = {f"effect_{each.id}": draw_signature(each) for each in signatures}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import isclose
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,6 +30,24 @@ OPTIONS_OF_FORMS = {  # formats that an option goes with
     **dict.fromkeys(("--modes", "--points", "--pressure-kPa", "--load-N"), ("matrices",)),
     **dict.fromkeys(("--nominal-load-N", "--nominal-pressure-kPa", "--donor"), ("tir",)),
 }
+
+
+@dataclass(frozen=True)
+class MatrixOptions:
+    """Options of the reduced matrices."""
+
+    modes: int  # most coordinates in addition to the hub's six
+    points: str | None
+    load_N: float | None
+
+
+@dataclass(frozen=True)
+class TirOptions:
+    """Options of a tyre property file."""
+
+    nominal_N: float | None
+    nominal_kPa: float | None
+    donor: Path | None
 
 
 @click.command()
@@ -94,22 +113,17 @@ OPTIONS_OF_FORMS = {  # formats that an option goes with
     help="Folder for the files (default: export in DIR).",
 )
 @options.solver
-@options.with_terminal
+@options.packed("matrices", MatrixOptions)
+@options.packed("tir", TirOptions)
+@options.with_study
 def command(
     folder: Path,
     form: str,
-    modes: int,
-    points: str | None,
-    pressure_kPa: float | None,
-    load_N: float | None,
+    matrices: MatrixOptions,
     case: Path | None,
-    nominal_N: float | None,
-    nominal_kPa: float | None,
-    donor: Path | None,
+    tir: TirOptions,
     force: bool,
-    solver: str,
-    output: Path | None,
-    terminal: Terminal,
+    study: options.Study,
 ) -> int:
     """Write the tyre of DIR to files, in DIR/export or --output.
 
@@ -149,28 +163,28 @@ def command(
     from ..studies.matrices import MATRIX_POINTS, matrix_files
     from .output import Run
 
-    study = STUDY_OF_FORMS[form]
-    results = folder / f"{study}.json" if folder.is_dir() else folder
+    terminal, before = study.terminal, STUDY_OF_FORMS[form]
+    results = folder / f"{before}.json" if folder.is_dir() else folder
     if not results.is_file():
-        advice = f": run 'tyrecal {study}' first"
-        raise click.UsageError(f"there is no {study}.json in the folder '{folder}'{advice}")
+        advice = f": run 'tyrecal {before}' first"
+        raise click.UsageError(f"there is no {before}.json in the folder '{folder}'{advice}")
     of_case = form == "matrices" and results.suffix in (".yaml", ".yml")
-    case = results if of_case else case or _case_of(results, study)
+    case = results if of_case else case or _case_of(results, before)
     loaded = load_case(case, allow_unusual=not of_case)  # accepted for the results
     if form == "tir":
-        files = _property_file(loaded, results, nominal_N, nominal_kPa, donor)
+        files = _property_file(loaded, results, tir)
     elif form == "uff":
         files = _universal_file(loaded, results)
     else:
         if not of_case:
             loaded = _as_fitted(results, loaded, terminal)
         if form == "matrices":
-            load = arguments.one_load(loaded, load_N, not of_case)
-            wanted = points or MATRIX_POINTS
-            files = matrix_files(loaded, solver, pressure_kPa, modes, wanted, load)
+            load = arguments.one_load(loaded, matrices.load_N, not of_case)
+            wanted, kPa = matrices.points or MATRIX_POINTS, study.pressure_kPa
+            files = matrix_files(loaded, study.solver, kPa, matrices.modes, wanted, load)
         else:
-            files = case_files(loaded) if form == "case" else deck_files(loaded, solver)
-    target = output or (root() / results.stem if of_case else results.parent) / "export"
+            files = case_files(loaded) if form == "case" else deck_files(loaded, study.solver)
+    target = study.output or (root() / results.stem if of_case else results.parent) / "export"
     for name, content in files.items():
         place = target / name
         if place.exists() and not force and place.read_bytes() != content:
@@ -206,13 +220,7 @@ def _as_fitted(fit: Path, case: LoadedCase, terminal: Terminal) -> LoadedCase:
     return loaded
 
 
-def _property_file(
-    case: LoadedCase,
-    results: Path,
-    nominal_N: float | None,
-    nominal_kPa: float | None,
-    donor: Path | None,
-) -> dict[str, bytes]:
+def _property_file(case: LoadedCase, results: Path, tir: TirOptions) -> dict[str, bytes]:
     """Name and content of the .tir by the stiffnesses in ``results``. Raises InputError."""
     from ..measured.tir import read_property_file
     from ..studies.fitted import read_result
@@ -221,8 +229,8 @@ def _property_file(
 
     loaded, stiffness = read_result(results, case, StiffnessResult)
     evaluator = _evaluator_of(loaded, stiffness, results.parent)
-    keys = structural_keys(loaded, stiffness, evaluator, nominal_N, nominal_kPa)
-    text = property_text(loaded, keys, read_property_file(donor) if donor else None)
+    keys = structural_keys(loaded, stiffness, evaluator, tir.nominal_N, tir.nominal_kPa)
+    text = property_text(loaded, keys, read_property_file(tir.donor) if tir.donor else None)
     return {f"{case.path.stem}.tir": text.encode("latin-1")}
 
 

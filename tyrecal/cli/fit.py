@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,26 @@ if TYPE_CHECKING:
     from ..studies.fit.calibrate import Fit
     from ..tyre.case import LoadedCase
     from .output import Run
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """Numbers that a fit may change, and may not."""
+
+    fix: tuple[str, ...]  # variables to hold
+    free: str | None  # uncertain numbers to fit too, with commas
+    prior: bool  # weigh in what is known before
+
+    def fixed(self, values: Mapping[str, float]) -> dict[str, float]:
+        """The held variables with their start values. Raises click.UsageError."""
+        for name in self.fix:
+            arguments.refuse_unknown("--fix", name, values, "variable")
+        return {name: values[name] for name in self.fix}
+
+    @property
+    def freed(self) -> list[str]:
+        """The uncertain numbers to fit too."""
+        return [name.strip() for name in self.free.split(",")] if self.free else []
 
 
 @click.command()
@@ -70,20 +91,15 @@ if TYPE_CHECKING:
 @option("--pictures/--no-pictures", default=True, help="Draw convergence, section, modes.")
 @options.scheduler
 @options.figure_format
+@options.packed("numbers", Numbers)
 @options.study
 def command(
     case: Path,
-    assignments: tuple[str, ...],
-    pressure_kPa: float | None,
     method: str,
     measured: Path | None,
-    fix: tuple[str, ...],
-    free: str | None,
-    prior: bool,
+    numbers: Numbers,
     starts: int,
     seed: int,
-    pictures: bool,
-    scheduler: str,
     study: options.Study,
 ) -> int:
     """Calibrate the variables of CASE to its targets: frequencies, and contact areas, lengths,
@@ -114,13 +130,10 @@ def command(
     from ..studies.fitted import NOT_CONVERGED, has_good
 
     terminal = study.terminal
-    options.not_both(study.jobs, scheduler)
-    loaded, values = study.load(case, assignments, pressure_kPa)
-    for name in fix:
-        arguments.refuse_unknown("--fix", name, values, "variable")
-    fixed = {name: values[name] for name in fix}
-    freed = [name.strip() for name in free.split(",")] if free else []
-    calibration = FitStudy(loaded, study.evaluator(loaded), measured, fixed, freed, prior)
+    study.refuse_two_machines()
+    loaded, values = study.load(case)
+    fixed, freed = numbers.fixed(values), numbers.freed
+    calibration = FitStudy(loaded, study.evaluator(loaded), measured, fixed, freed, numbers.prior)
     file = measured or loaded.measured
     file_doubts = doubts_of_file(file) if file else []
     for doubt in file_doubts:
@@ -128,9 +141,9 @@ def command(
     evaluator = calibration.evaluator
     if calibration.evaluates_one_by_one and starts == 1:
         why = "a fit from one start evaluates one design at a time"
-        if scheduler:
+        if study.scheduler:
             raise click.UsageError(f"--scheduler has no effect here: {why}; give --starts too")
-        options.say_idle(terminal, study.jobs, why)
+        study.say_idle(why)
     if method == "slsqp" and not evaluator.has_gradients:
         name = evaluator.solver.name
         terminal.note(
@@ -139,7 +152,7 @@ def command(
         )
     plan = calibration.run_plan(method, starts, study.jobs)
     run = study.run(loaded, "fit", evaluator, plan=plan)
-    with terminal.progress("fit") as bar, reached(scheduler) as evaluator.scheduler:
+    with terminal.progress("fit") as bar, reached(study.scheduler) as evaluator.scheduler:
         unit = "sigma" if calibration.measured else objective_unit(loaded)
         points = _Points(terminal, bar, unit)
         fit = calibration.run(method, starts, seed, study.jobs, points.notify, bar.at)
@@ -163,8 +176,8 @@ def command(
     earlier = not good and has_good(run.folder / "fit.json")
     finish = partial(run.finish, aside=NOT_CONVERGED if earlier else "")
     try:
-        if pictures or study.report:
-            _write_shapes(run, loaded, evaluator, fit, pictures)
+        if study.pictures or study.report:
+            _write_shapes(run, loaded, evaluator, fit, bool(study.pictures))
     except OSError:  # the disk is full: an earlier fit stays
         raise
     except Exception:  # a picture that fails does not lose the fit

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,6 @@ from . import arguments, options
 from .default_case import default_case
 from .main import EXIT_SOLVER
 from .parameters import option
-from .terminal import Terminal
 
 DESIGNS = ("initial", "fitted")
 
@@ -27,16 +27,7 @@ DESIGNS = ("initial", "fitted")
 @option("--pictures/--no-pictures", default=True, help="Draw the patches; write VTU.")
 @options.figure_format
 @options.study
-def command(
-    case: Path | None,
-    assignments: tuple[str, ...],
-    pressure_kPa: float | None,
-    loads: str | None,
-    fitted: Path | None,
-    compare: str | None,
-    pictures: bool,
-    study: options.Study,
-) -> int:
+def command(case: Path | None, loads: str | None, compare: str | None, study: options.Study) -> int:
     """Press the tyre of CASE on a flat road, load after load.
 
     Writes footprint.json, .csv and .png: contact area, length, width, mean and peak pressure,
@@ -56,20 +47,20 @@ def command(
     from ..studies.run_plan import PlannedState, plan_runs
 
     terminal = study.terminal
-    case, fitted, study = default_case(case, fitted, study)
+    case, study = default_case(case, study)
     if loads is not None:
-        arguments.refuse_set(assignments, "road.loads_N", "--loads-N")
-    loaded, values = study.load(case, assignments, pressure_kPa)
+        arguments.refuse_set(study.assignments, "road.loads_N", "--loads-N")
+    loaded, values = study.load(case)
     loads_N = loaded.case.loads_N
     if loads is not None:
         loads_N = arguments.parse_loads(loads)
         arguments.refuse_unusual_loads(loaded, "--loads-N", loads_N, study.allow_unusual)
     evaluator = study.evaluator(loaded)
     evaluator.needs_road()
-    fitted = _fit_compared(compare, fitted, (study.output or Path(case.stem)) / "fit.json")
-    designs = _designs(compare, values, fitted, loaded, terminal)
+    study = _with_fit_compared(compare, study, (study.output or Path(case.stem)) / "fit.json")
+    designs = _designs(compare, values, study, loaded)
     if len(designs) == 1:
-        options.say_idle(terminal, study.jobs, "one design is pressed alone; --fitted adds another")
+        study.say_idle("one design is pressed alone; --fitted adds another")
     pressed_to = [PlannedState(len(loads_N))]
     plan = plan_runs(loaded, evaluator, pressed_to, len(designs), study.jobs)
     output = study.run(loaded, "footprint", evaluator, plan=plan, load_N=loads_N)
@@ -83,7 +74,7 @@ def command(
     patches = patches_data(loaded.case.name, pressed, meshes)
     output.write_json("footprint_patches.json", patches)
     figures = {}
-    if pictures:
+    if study.pictures:
         from ..report.footprint import draw_footprint
         from ..report.vtu import write_pressed
 
@@ -92,30 +83,26 @@ def command(
     return study.present(output, result, figures)
 
 
-def _fit_compared(compare: str | None, fitted: Path | None, own: Path) -> Path | None:
-    """The fit to press: as given, else the one in the results folder where it is requested. Raises
-    click.UsageError."""
-    if fitted or "fitted" not in (compare or "").split(","):
-        return fitted
+def _with_fit_compared(compare: str | None, study: options.Study, own: Path) -> options.Study:
+    """The study with the fit to press: as given, else the one in the results folder where it is
+    requested. Raises click.UsageError."""
+    if study.fitted or "fitted" not in (compare or "").split(","):
+        return study
     if not own.exists():
         raise click.UsageError(f"--compare fitted needs --fitted fit.json: there is no '{own}'")
-    return own
+    return replace(study, fitted=own)
 
 
 def _designs(
-    compare: str | None,
-    values: dict[str, float],
-    fitted: Path | None,
-    loaded: Any,
-    terminal: Terminal,
+    compare: str | None, values: dict[str, float], study: options.Study, loaded: Any
 ) -> dict[str, dict[str, float]]:
     """Values of the variables by design. Raises click.UsageError."""
-    names = DESIGNS[: 2 if fitted else 1] if compare is None else tuple(compare.split(","))
+    names = DESIGNS[: 2 if study.fitted else 1] if compare is None else tuple(compare.split(","))
     for name in names:
         arguments.refuse_unknown("--compare", name, DESIGNS, "design")
     if len(set(names)) < len(names):
         raise click.UsageError("--compare: a design is named twice")
     designs = {"initial": values}
-    if fitted and "fitted" in names:
-        designs["fitted"] = arguments.fitted_values(fitted, loaded, terminal)
+    if "fitted" in names:
+        designs |= study.fitted_values(loaded)
     return {name: designs[name] for name in names}

@@ -2,12 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from . import arguments, options
 from .parameters import FileOrFolder, Number, OneOf, option
+
+if TYPE_CHECKING:
+    from ..studies.response import ResponseForm
+
+
+@dataclass(frozen=True)
+class Functions:
+    """The response functions to compute, by the options of `FrfResult.run`."""
+
+    excite: str  # points of the force; "": default
+    respond: str  # points of the response; "": default
+    from_Hz: float
+    to_Hz: float
+    step_Hz: float
+    patch_mm: float
+    form: ResponseForm
 
 
 @click.command()
@@ -78,22 +96,13 @@ from .parameters import FileOrFolder, Number, OneOf, option
 @options.fitted()
 @option("--pictures/--no-pictures", default=True, help="Draw magnitude and phase.")
 @options.figure_format
+@options.packed("functions", Functions)
 @options.study
 def command(
     case: Path,
-    assignments: tuple[str, ...],
-    pressure_kPa: float | None,
     load_N: float | None,
-    excite: str,
-    respond: str,
-    from_Hz: float,
-    to_Hz: float,
-    step_Hz: float,
-    patch_mm: float,
-    form: str,
+    functions: Functions,
     measured: Path | None,
-    fitted: Path | None,
-    pictures: bool,
     study: options.Study,
 ) -> int:
     """Compute response functions of the tyre of CASE, unloaded on its rim, or on the road.
@@ -116,43 +125,33 @@ def command(
     from ..studies.result import StudyInput
     from ..studies.run_plan import PlannedState, plan_evaluations, plan_runs
 
-    options.say_idle(study.terminal, study.jobs, "only one design is evaluated")
+    study.say_idle("only one design is evaluated")
     if measured and "--step-Hz" in options.given():
         raise click.UsageError("--step-Hz: the frequencies are those of --measured")
+    band = functions.from_Hz, functions.to_Hz
     if measured:
-        read_measured_responses(measured, form, from_Hz, to_Hz)
-    loaded, _ = study.load(case, assignments, pressure_kPa)
-    loaded, values = arguments.one_design(fitted, loaded, assignments, study.terminal)
+        read_measured_responses(measured, functions.form, *band)
+    loaded, _ = study.load(case)
+    loaded, values = study.one_design(loaded)
     load = arguments.one_load(loaded, load_N, study.allow_unusual)
     evaluator = study.evaluator(loaded)
     evaluator.needs_response(rim_held=bool(load))
     moves = rim_moves(evaluator)
     points = default_points(load, moves)
-    excited, seen = excite or points["excite"], respond or points["respond"]
-    response_request(excited, seen, from_Hz, to_Hz, step_Hz, patch_mm, moves)
+    excited, seen = functions.excite or points["excite"], functions.respond or points["respond"]
+    response_request(excited, seen, *band, functions.step_Hz, functions.patch_mm, moves)
     if load:
         evaluator.needs_road(modes=True)
-    designs = {"fitted" if fitted else "initial": values}
+    designs = {"fitted" if study.fitted else "initial": values}
     plan = plan_evaluations(loaded, evaluator, [values])
     if load:
         plan = plan_runs(loaded, evaluator, [PlannedState(1, modes=True)])
     files = [measured] if measured else []
     output = study.run(loaded, "frf", evaluator, measured=files, plan=plan, load_N=load)
     given = StudyInput(loaded, evaluator, designs)
-    result = FrfResult.run(
-        given,
-        excite=excite,
-        respond=respond,
-        from_Hz=from_Hz,
-        to_Hz=to_Hz,
-        step_Hz=step_Hz,
-        patch_mm=patch_mm,
-        form=form,  # type: ignore[arg-type]
-        measured=measured,
-        load_N=load,
-    )
+    result = FrfResult.run(given, **vars(functions), measured=measured, load_N=load)
     figures = {}
-    if pictures:
+    if study.pictures:
         from ..report.response import draw_responses
 
         figures = draw_responses(result)

@@ -33,6 +33,40 @@ def _length(flag: str, text: str, unit: str = "mm") -> Any:
     )
 
 
+@dataclass(frozen=True)
+class DeckFiles:
+    """Your own decks, and how they are read."""
+
+    files: tuple[Path, ...]
+    crown_set: str | None
+    units: Literal["m", "mm"] | None
+    assigned: tuple[str, ...]  # of --set, numbers of marks
+
+
+@dataclass(frozen=True)
+class Lengths:
+    """Lengths of a section that differ from the usual ones."""
+
+    crown_mm: float | None
+    sidewall_mm: float | None
+    bead_mm: float | None
+    belt_width_mm: float | None
+    rim_width_in: float | None
+
+    def in_m(self) -> dict[str, float]:
+        """The given ones, m, by their names in `Gauges`."""
+        from ..units import INCH
+
+        lengths = {
+            "crown": (self.crown_mm, 1e-3),
+            "sidewall": (self.sidewall_mm, 1e-3),
+            "bead": (self.bead_mm, 1e-3),
+            "belt": (self.belt_width_mm, 1e-3),
+            "rim": (self.rim_width_in, INCH),
+        }
+        return {name: value * unit for name, (value, unit) in lengths.items() if value is not None}
+
+
 @click.command()
 @click.argument("size", required=False)
 @option(
@@ -44,7 +78,7 @@ def _length(flag: str, text: str, unit: str = "mm") -> Any:
 )
 @option(
     "--deck",
-    "deck_files",
+    "files",
     type=FileOrFolder(exists=True, folder=False),
     multiple=True,
     metavar="FILE.inp",
@@ -91,26 +125,16 @@ def _length(flag: str, text: str, unit: str = "mm") -> Any:
 @options.allow_unusual
 @option("--pictures/--no-pictures", default=True, help="Draw the section.")
 @options.figure_format
-@options.with_terminal
+@options.packed("deck", DeckFiles)
+@options.packed("gauges", Lengths)
+@options.with_study
 def command(
     size: str | None,
     file: Path | None,
-    deck_files: tuple[Path, ...],
-    crown_set: str | None,
-    units: Literal["m", "mm"] | None,
-    assigned: tuple[str, ...],
-    crown_mm: float | None,
-    sidewall_mm: float | None,
-    bead_mm: float | None,
-    belt_width_mm: float | None,
-    rim_width_in: float | None,
-    pressure_kPa: float | None,
-    output: Path | None,
+    deck: DeckFiles,
+    gauges: Lengths,
     force: bool,
-    allow_unusual: bool,
-    pictures: bool,
-    figure_format: str,
-    terminal: Terminal,
+    study: options.Study,
 ) -> int:
     """Write the case of a tyre: from its SIZE code, your section or your deck.
 
@@ -132,14 +156,15 @@ def command(
     from ..tyre.own_deck.own_decks import read_own_decks, stands_in_space
     from ..tyre.section.size import parse_size
     from ..tyre.usual import ALL_THE_SAME, GAUGES, USUAL
-    from ..units import INCH
 
-    if size is None and file is None and not deck_files:
+    terminal, pressure_kPa, allow_unusual = study.terminal, study.pressure_kPa, study.allow_unusual
+    if size is None and file is None and not deck.files:
         raise click.UsageError(
             "give a SIZE, as in 'tyrecal init 205/60R15', --section FILE or --deck FILE.inp"
         )
-    for flag, of_decks in (("units", units), ("crown-set", crown_set), ("set", assigned)):
-        if of_decks and not deck_files:
+    of_decks = {"units": deck.units, "crown-set": deck.crown_set, "set": deck.assigned}
+    for flag, value in of_decks.items():
+        if value and not deck.files:
             raise click.UsageError(f"--{flag} goes with --deck")
     usual = {**GAUGES, "pressure_kPa": USUAL["pressure_kPa"]}
     stated = click.get_current_context().params
@@ -147,31 +172,28 @@ def command(
         if stated[name] is not None and (message := each.refusal(stated[name])):
             option = name.replace("_", "-")
             raise click.UsageError(f"--{option} {stated[name]:g}: {message}{ALL_THE_SAME}")
-    suffix = f".{figure_format}" if pictures else ""
+    suffix = f".{study.figure_format}" if study.pictures else ""
+    lengths = gauges.in_m()
     tyre = parse_size(size) if size is not None else None
-    if deck_files:
-        if file or lengths_given(stated):
+    if deck.files:
+        if file or lengths:
             raise click.UsageError("with --deck the file holds the tyre's shape and thicknesses")
         words = tyre.text if tyre else "not given"
-        read = read_own_deck(deck_files[0], units)
-        if len(deck_files) > 1 or stands_in_space(read):
-            decks = read_own_decks(deck_files, read.units, crown_set or "CROWN")
-            numbers = _numbers_of_marks(decks, assigned)
-            new = NewFiles(output, "", force)
+        read = read_own_deck(deck.files[0], deck.units)
+        if len(deck.files) > 1 or stands_in_space(read):
+            decks = read_own_decks(deck.files, read.units, deck.crown_set or "CROWN")
+            numbers = _numbers_of_marks(decks, deck.assigned)
+            new = NewFiles(study.output, "", force)
             _from_decks(decks, numbers, words, pressure_kPa, new, terminal)
-        elif crown_set:
+        elif deck.crown_set:
             raise click.UsageError("--crown-set is for decks in three dimensions")
         else:
-            numbers = _numbers_of_marks(read, assigned)
-            new = NewFiles(output, suffix, force)
+            numbers = _numbers_of_marks(read, deck.assigned)
+            new = NewFiles(study.output, suffix, force)
             _from_deck(read, numbers, words, pressure_kPa, new, allow_unusual, terminal)
         return 0
-    given = {"crown": crown_mm, "sidewall": sidewall_mm, "bead": bead_mm, "belt": belt_width_mm}
-    lengths = {key: 1e-3 * value for key, value in given.items() if value is not None}
-    if rim_width_in is not None:
-        lengths["rim"] = rim_width_in * INCH
     name = re.sub(r"\W", "_", tyre.text.lower()) if tyre else file.stem if file else ""
-    target = output or Path(f"{name}.yaml")
+    target = study.output or Path(f"{name}.yaml")
     if target.suffix not in (".yaml", ".yml"):
         raise click.UsageError(f"--output '{target}' must name a case file, as in my_tyre.yaml")
     if file is not None:
@@ -241,11 +263,6 @@ def _draw(loaded: Any, picture: Path, terminal: Terminal) -> None:
     section = section_data(loaded, resolved(loaded).mesh, {})
     save(draw_section(section, loaded.case.name, loaded.case.pressure_kPa), picture)
     terminal.say(f"section drawn in {picture}")
-
-
-def lengths_given(stated: dict[str, Any]) -> bool:
-    """Whether an option gives a length of a section."""
-    return any(stated[name] is not None for name in stated if name.endswith(("_mm", "_in")))
 
 
 def _numbers_of_marks(deck: OwnDeck | OwnDecks, assigned: tuple[str, ...]) -> dict[str, float]:

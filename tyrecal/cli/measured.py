@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,6 @@ from click.core import ParameterSource
 
 from . import arguments, options
 from .parameters import FileOrFolder, Number, NumberWithin, OneOf, WholeNumber, option
-from .terminal import Terminal
 
 if TYPE_CHECKING:
     from ..measured.modal import Layout
@@ -76,6 +76,40 @@ response = option(
 )
 
 
+@dataclass(frozen=True)
+class Setup:
+    """How a test was made and how its files are read, by the options above."""
+
+    axle: str | None
+    centre: str
+    directions: str | None
+    highest: int | None
+    leave_out: tuple[str, ...] = ()
+    band: str | None = None
+    response: str | None = None
+    assumed: float | None = None  # sigma of one run, per cent
+    labels: bool = True
+
+    @property
+    def sigma(self) -> float:
+        """Relative standard deviation of one run; 0: not stated."""
+        return (self.assumed or 0.0) / 100
+
+    def layout(self) -> Layout:
+        """Layout of the sensors. Raises click.UsageError."""
+        from ..measured.modal import Layout
+        from ..simulate.modes.label import MAX_SAMPLED_HARMONIC
+
+        x, y, z = arguments.parse_numbers("--centre", self.centre, count=3)
+        limits = arguments.parse_numbers("--band", self.band, "Hz", 2) if self.band else None
+        if limits and not 0 <= limits[0] < limits[1]:
+            raise click.UsageError(f"--band {self.band}: must rise from 0 or more")
+        most = MAX_SAMPLED_HARMONIC if self.highest is None else self.highest
+        within = (limits[0], limits[1]) if limits else None
+        axle, directions, response = self.axle or "", self.directions or "", self.response or ""
+        return Layout(axle, (x, y, z), directions, most, within, response, self.labels)
+
+
 @click.group()
 def command() -> None:
     """Turn modal tables, mode shapes and frequency-response functions into measurements.
@@ -129,25 +163,10 @@ def command() -> None:
 )
 @option("--pictures/--no-pictures", default=True, help="Draw functions and shapes next to the CSV.")
 @options.figure_format
-@options.with_terminal
+@options.packed("setup", Setup)
+@options.with_study
 def import_files(
-    files: tuple[Path, ...],
-    output: Path,
-    pressure_kPa: float | None,
-    band: str | None,
-    assumed: float | None,
-    floor: float,
-    axle: str | None,
-    centre: str,
-    directions: str | None,
-    highest: int | None,
-    leave_out: tuple[str, ...],
-    response: str | None,
-    labels: bool,
-    keep_going: bool,
-    pictures: bool,
-    figure_format: str,
-    terminal: Terminal,
+    files: tuple[Path, ...], setup: Setup, floor: float, keep_going: bool, study: options.Study
 ) -> int:
     """Write the measurements in FILEs to one CSV, for --measured of 'tyrecal fit' and 'diagnose'.
 
@@ -171,20 +190,18 @@ def import_files(
     tyrecal measured import at_200.csv at_240.csv --output both.csv
     tyrecal measured import tyre.tir vertical.tdx --sigma-percent 2
     """
-    from dataclasses import replace
-
     from ..files import write_text
     from ..measured.correlation import auto_mac, auto_mac_words
     from ..measured.gather import gather, result
     from ..measured.measurement import measurements_csv
     from ..measured.shapes import read_shapes, shapes_of, shapes_path, shapes_text
 
+    output, pressure_kPa, terminal = study.output, study.pressure_kPa, study.terminal
+    assert output is not None
     if output.resolve() in [path.resolve() for path in files]:
         raise click.UsageError(f"--output {output}: is one of the files to read")
-    layout = _layout(axle, centre, directions, highest, band, response or "")
-    layout = replace(layout, labels=labels)
-    sigmas = floor / 100, (assumed or 0.0) / 100  # relative: smallest, and of one run
-    gathered = gather(files, pressure_kPa, layout, *sigmas, leave_out, keep_going)
+    sigmas = floor / 100, setup.sigma  # relative: smallest, and of one run
+    gathered = gather(files, pressure_kPa, setup.layout(), *sigmas, setup.leave_out, keep_going)
     shapes = [each for path in files for each in read_shapes(path)]
     for run in gathered.runs:
         assert pressure_kPa is not None
@@ -194,16 +211,17 @@ def import_files(
     if shapes:
         write_text(shapes_path(output), shapes_text(shapes))
     alike = [auto_mac(each) for each in shapes]
-    if pictures and gathered.runs:
+    if study.pictures and gathered.runs:
         from ..report.correlation import draw_auto_mac
         from ..report.figure import save
         from ..report.measured import draw_measured
 
-        draw_measured(output.with_suffix(f".{figure_format}"), gathered.runs)
-        save(draw_auto_mac(alike[-1]), output.with_name(f"{output.stem}_mac.{figure_format}"))
+        kind = study.figure_format
+        draw_measured(output.with_suffix(f".{kind}"), gathered.runs)
+        save(draw_auto_mac(alike[-1]), output.with_name(f"{output.stem}_mac.{kind}"))
     for note in gathered.notes:
         terminal.note(note)
-    if not labels:
+    if not setup.labels:
         terminal.note("damping is left out with --no-labels: it belongs to a mode")
     for doubt in gathered.doubts:
         terminal.warn(doubt)
@@ -243,20 +261,10 @@ def import_files(
 )
 @options.every(options.assignments, options.fitted(", with --place"))
 @options.every(axle, centre, directions, highest, leave_out)
+@options.packed("setup", Setup)
 @options.study_one_by_one
 def sensors(
-    file: Path,
-    place: int | None,
-    axes: str,
-    mass_g: float,
-    assignments: tuple[str, ...],
-    fitted: Path | None,
-    axle: str | None,
-    centre: str,
-    directions: str | None,
-    highest: int | None,
-    leave_out: tuple[str, ...],
-    study: options.Study,
+    file: Path, place: int | None, axes: str, mass_g: float, setup: Setup, study: options.Study
 ) -> int:
     """List the modes that the sensors of a universal FILE can distinguish, or place N sensors on
     the tread of CASE.
@@ -278,15 +286,15 @@ def sensors(
     if refused:
         raise click.UsageError(f"{refused[0]} goes {'without' if place else 'with'} --place")
     if place:
-        return _place_sensors(file, assignments, fitted, place, axes, mass_g / 1e3, highest, study)
+        return _place_sensors(file, place, axes, mass_g / 1e3, setup.highest, study)
     from ..measured.arrangement import arrange
     from ..measured.gather import label_entry
     from ..measured.modal import sensors_in
     from ..measured.universal import read_universal
     from ..report.measured import sensors_words
 
-    layout = _layout(axle, centre, directions, highest)
-    (test,), notes = arrange([read_universal(file)], leave_out)
+    layout = setup.layout()
+    (test,), notes = arrange([read_universal(file)], setup.leave_out)
     for note in notes:
         terminal.note(note)
     alike_labels = sensors_in(test, layout).looks_like()
@@ -302,23 +310,15 @@ def sensors(
 
 
 def _place_sensors(
-    case: Path,
-    assignments: tuple[str, ...],
-    fitted: Path | None,
-    count: int,
-    axes: str,
-    mass_kg: float,
-    highest: int | None,
-    study: options.Study,
+    case: Path, count: int, axes: str, mass_kg: float, highest: int | None, study: options.Study
 ) -> int:
     """Place ``count`` sensors for the modes [c,0] and [c,1] of a case."""
     from ..measured.case_modes import evaluate_case_modes
     from ..studies.run_plan import plan_evaluations
     from ..studies.sensors import place
 
-    loaded, values = study.load(case, assignments)
-    if fitted:
-        values = arguments.fitted_values(fitted, loaded, study.terminal)
+    loaded, values = study.load(case)
+    values = study.fitted_values(loaded).get("fitted", values)
     evaluator = study.evaluator(loaded)
     plan = plan_evaluations(loaded, evaluator, [values])
     run = study.run(loaded, "measured sensors", evaluator, "sensors", plan=plan)
@@ -342,21 +342,9 @@ def _place_sensors(
     response,
     assumed,
 )
+@options.packed("setup", Setup)
 @options.study
-def label_file(
-    case: Path,
-    file: Path,
-    assignments: tuple[str, ...],
-    fitted: Path | None,
-    axle: str | None,
-    centre: str,
-    directions: str | None,
-    highest: int | None,
-    band: str | None,
-    response: str | None,
-    assumed: float | None,
-    study: options.Study,
-) -> int:
+def label_file(case: Path, file: Path, setup: Setup, study: options.Study) -> int:
     """Find the mode of each frequency in FILE by the model of CASE, and its probability.
 
     FILE: a measurements CSV without labels (c and m), or a universal file as for 'tyrecal measured
@@ -385,12 +373,10 @@ def label_file(
     from ..studies.labelling.result import labels_result
     from ..studies.run_plan import DESIGNS_OF_LABELS, PlannedState, plan_runs
 
-    loaded, values = study.load(case, assignments)
+    loaded, values = study.load(case)
     if is_universal(file):
-        layout = _layout(axle, centre, directions, highest, band, response or "")
-        readings, shapes, notes = unlabelled(
-            file, loaded.case.pressure_kPa, layout, (assumed or 0.0) / 100
-        )
+        kPa = loaded.case.pressure_kPa
+        readings, shapes, notes = unlabelled(file, kPa, setup.layout(), setup.sigma)
         for note in notes:
             study.terminal.note(note)
     else:
@@ -399,8 +385,8 @@ def label_file(
     if not any(each.is_unlabelled for each in readings):
         raise click.UsageError(f"{file}: every frequency has a label")
     prior, fixed = None, dict[str, float]()
-    if fitted:
-        arguments.fitted_values(fitted, loaded, study.terminal)
+    if fitted := study.fitted:
+        study.fitted_values(loaded)  # refuses a fit of another tyre
         path = fitted / "fit.json" if fitted.is_dir() else fitted
         fit = FitResult.model_validate(read_json(path))
         fixed, prior = fit.fixed, fitted_prior(loaded, fit)
@@ -431,29 +417,7 @@ def label_file(
 def _refuse_universal_options(file: Path) -> None:
     """Raises click.UsageError if an option was given that only universal files take."""
     context = click.get_current_context()
-    names = ("axle", "centre", "directions", "highest", "band", "response", "assumed")
     for parameter in context.command.params:
         source = context.get_parameter_source(parameter.name or "")
-        if parameter.name in names and source is ParameterSource.COMMANDLINE:
+        if parameter.name in Setup.__dataclass_fields__ and source is ParameterSource.COMMANDLINE:
             raise click.UsageError(f"{parameter.opts[0]}: {file} is a table, not a universal file")
-
-
-def _layout(
-    axle: str | None,
-    centre: str,
-    directions: str | None,
-    highest: int | None,
-    band: str | None = None,
-    response: str = "",
-) -> Layout:
-    """Layout of the sensors by the options. Raises click.UsageError."""
-    from ..measured.modal import Layout
-    from ..simulate.modes.label import MAX_SAMPLED_HARMONIC
-
-    x, y, z = arguments.parse_numbers("--centre", centre, count=3)
-    limits = arguments.parse_numbers("--band", band, "Hz", 2) if band else None
-    if limits and not 0 <= limits[0] < limits[1]:
-        raise click.UsageError(f"--band {band}: must rise from 0 or more")
-    most = MAX_SAMPLED_HARMONIC if highest is None else highest
-    within = (limits[0], limits[1]) if limits else None
-    return Layout(axle or "", (x, y, z), directions or "", most, within, response)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,14 +45,10 @@ if TYPE_CHECKING:
 @options.study
 def command(
     case: Path,
-    assignments: tuple[str, ...],
-    pressure_kPa: float | None,
     load_N: float | None,
     sweep: str | None,
     wheel: str | None,
-    fitted: Path | None,
     measured: Path | None,
-    pictures: bool | None,
     study: options.Study,
 ) -> int:
     """Evaluate one design of CASE: frequencies with their labels, in modes.json.
@@ -78,17 +75,16 @@ def command(
     loads = requested_loads(load_N, sweep)
     if wheel and not loads:
         raise click.UsageError("--wheel goes with --load-N or --sweep-load")
-    if pictures and load_N is not None:
+    if study.pictures and load_N is not None:
         raise click.UsageError("--pictures goes with --sweep-load, or without a load")
     if measured and loads:
         raise click.UsageError("--measured goes without a load")
     terminal = study.terminal
-    if not (fitted and sweep):
-        why = "only one design is evaluated; --sweep-load with --fitted evaluates two"
-        options.say_idle(terminal, study.jobs, why)
-    loaded, values = study.load(case, assignments, pressure_kPa)
+    if not (study.fitted and sweep):
+        study.say_idle("only one design is evaluated; --sweep-load with --fitted evaluates two")
+    loaded, values = study.load(case)
     if sweep is None:
-        loaded, values = arguments.one_design(fitted, loaded, assignments, terminal)
+        loaded, values = study.one_design(loaded)
     if measured:
         from ..measured.targets import with_measured
 
@@ -102,16 +98,16 @@ def command(
     arguments.refuse_unusual_loads(loaded, option, loads, study.allow_unusual)
     if loads:
         evaluator.needs_road(modes=True)
-    if fitted and sweep is not None:
-        designs["fitted"] = arguments.fitted_values(fitted, loaded, terminal)
+    if sweep is not None:
+        designs |= study.fitted_values(loaded)
     plan = plan_evaluations(loaded, evaluator, [values])
     if loads:
         pressed_to = [PlannedState(sum(load > 0 for load in loads), modes=True)]
         plan = plan_runs(loaded, evaluator, pressed_to, len(designs), study.jobs)
     if sweep is not None:
         run = study.run(loaded, "modes", evaluator, "sweep-load", plan=plan, load_N=loads)
-        draw = pictures is not False
-        return write_load_sweep(loaded, evaluator, run, designs, loads, study, plan.at_once, draw)
+        planned = replace(study, jobs=plan.at_once)
+        return write_load_sweep(loaded, evaluator, run, designs, loads, planned)
     files, load = [measured] if measured else [], loads[0] if loads else 0.0
     run = study.run(loaded, "modes", evaluator, measured=files, plan=plan, load_N=load)
     if loads:
@@ -125,7 +121,7 @@ def command(
         terminal.note(f"solver '{name}' computes no damping: loss factors have no effect")
     result = run.write(result)
     run.write_json("modes_shapes.json", tyre_data(loaded, evaluation, modes))
-    if pictures:
+    if study.pictures:
         from ..report.pictures import draw_evaluation
 
         draw_evaluation(run.new, "modes", loaded, evaluation, modes, run.figure_format)
@@ -193,19 +189,17 @@ def write_load_sweep(
     designs: Mapping[str, Mapping[str, float]],
     loads_N: Sequence[float],
     study: Study,
-    jobs: int,
-    pictures: bool,
 ) -> int:
     """Write the modes over the load to load_sweep.json, .csv and .png."""
     from ..studies.loaded_result import run
 
     with study.terminal.progress("modes on the road") as bar:
         evaluator.on_progress = bar.at
-        result = run(loaded, evaluator, designs, loads_N, jobs, study.notify)
+        result = run(loaded, evaluator, designs, loads_N, study.jobs, study.notify)
     if not result.rows:
         return EXIT_SOLVER
     figures = {}
-    if pictures:
+    if study.pictures is not False:
         from ..report.load import draw_load_sweep
 
         figures["load_sweep"] = draw_load_sweep(result.rows)

@@ -6,7 +6,8 @@
    (`Terminal`): say and show for people, result for programs, detail for --verbose, warn, error.
 3. ``@options.study``, in its place, gives what evaluates designs --jobs, --mesh, --solver,
    --output, --store, --no-store and --report too, as ``study`` (`Study`): load, evaluator,
-   run, finish.
+   run, finish. ``study`` has the shared options above it too, such as --set. `packed` makes an
+   argument of other options that belong together.
 4. Its docstring says what it does and writes, and ends with examples after a line ``\\b``.
 5. Long work runs in ``with terminal.progress("what") as bar``: ``bar.at(done, of)`` shows the time
    left. Ctrl-C says how to go on: ``run`` knows; others call `terminal.resume`.
@@ -19,7 +20,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -152,14 +153,14 @@ wheel = option(
 
 _from = option(
     "--from-kPa",
-    "from_kPa",
+    "low",
     type=Number(),
     metavar="A",
     help="Lowest pressure of a sweep, kPa (default: 5/12 times the case's, 100 for 240 kPa).",
 )
 _to = option(
     "--to-kPa",
-    "to_kPa",
+    "high",
     type=Number(),
     metavar="B",
     help="Highest pressure of a sweep, kPa (default: 4/3 times the case's, 320 for 240 kPa).",
@@ -211,18 +212,22 @@ figure_format = option(
     help="Format of the pictures.",
 )
 OUTPUT_OPTIONS = (as_json, quiet, verbose)
-SERIAL_OPTIONS = (
-    mesh,
-    solver,
-    solver_command,
-    output,
-    store,
-    no_store,
-    allow_unusual,
-    dry_run,
-    *OUTPUT_OPTIONS,
-)
-STUDY = (jobs, *SERIAL_OPTIONS[:-3], report, *OUTPUT_OPTIONS)
+SERIAL_OPTIONS = (mesh, solver, solver_command, output, store, no_store, allow_unusual, dry_run)
+STUDY = (jobs, *SERIAL_OPTIONS, report)
+
+
+def packed(name: str, kind: type[Any]) -> Callable[[Any], Any]:
+    """The options named as the fields of a dataclass ``kind``, as one argument ``name``."""
+
+    def apply(function: Callable[..., int]) -> Callable[..., int]:
+        @wraps(function)
+        def command(*args: Any, **values: Any) -> int:
+            own = {key: values.pop(key) for key in kind.__dataclass_fields__ if key in values}
+            return function(*args, **{**values, name: kind(**own)})
+
+        return command
+
+    return apply
 
 
 def with_terminal(function: Callable[..., int]) -> Callable[..., int]:
@@ -236,52 +241,61 @@ def with_terminal(function: Callable[..., int]) -> Callable[..., int]:
     return result
 
 
+def with_study(function: Callable[..., int]) -> Callable[..., int]:
+    """The options above it that `Study` has, and --json, --quiet and --verbose, as ``study``."""
+    return with_terminal(packed("study", Study)(function))
+
+
 def study(function: Callable[..., int]) -> Callable[..., int]:
     """All that a command has which evaluates designs, as the argument ``study``."""
-    return _study(function, STUDY)
+    result: Callable[..., int] = every(*STUDY)(with_study(function))
+    return result
 
 
 def study_one_by_one(function: Callable[..., int]) -> Callable[..., int]:
     """The options of `study` without --jobs and --report."""
-    return _study(function, SERIAL_OPTIONS)
-
-
-def _study(function: Callable[..., int], given: tuple[Any, ...]) -> Callable[..., int]:
-    @wraps(function)
-    def command(*args: Any, **values: Any) -> int:
-        terminal = _terminal_of(values)
-        own = [field.name for field in fields(Study) if field.name in values]
-        study = Study(terminal, **{name: values.pop(name) for name in own})
-        return function(*args, study=study, **values)
-
-    result: Callable[..., int] = every(*given)(command)
+    result: Callable[..., int] = every(*SERIAL_OPTIONS)(with_study(function))
     return result
 
 
 @dataclass(frozen=True)
 class Study:
-    """How designs are evaluated, and where the results go: the options of their names."""
+    """Designs to evaluate, and where the results go: the options that commands share, each at its
+    default where a command does not have it."""
 
     terminal: Terminal
-    mesh: str
-    solver: str
-    solver_command: tuple[str, ...]  # words of --solver-command; (): the solver's own
-    output: Path | None
-    store: Path | None
-    no_store: bool
-    allow_unusual: bool
-    dry_run: bool
+    mesh: str = ""
+    assignments: tuple[str, ...] = ()  # of --set
+    pressure_kPa: float | None = None
+    fitted: Path | None = None  # fit.json or its folder
+    solver: str = ""
+    solver_command: tuple[str, ...] = ()  # words of --solver-command; (): the solver's own
+    output: Path | None = None
+    store: Path | None = None
+    no_store: bool = False
+    allow_unusual: bool = False
+    dry_run: bool = False
     jobs: int = 1  # designs evaluated at a time
+    scheduler: str = ""
     report: bool = False
+    pictures: bool | None = True  # None: the command decides
     figure_format: str = "png"
 
-    def load(
-        self, path: Path, assigned: tuple[str, ...] = (), pressure_kPa: float | None = None
-    ) -> Any:
-        """`arguments.load`, at the requested mesh level."""
+    def load(self, path: Path) -> Any:
+        """`arguments.load`, with the requested mesh level, numbers and pressure."""
         return arguments.load(
-            path, self.mesh, assigned, pressure_kPa, self.terminal, self.allow_unusual
+            path, self.mesh, self.assignments, self.pressure_kPa, self.terminal, self.allow_unusual
         )
+
+    def one_design(self, loaded: Any) -> tuple[Any, dict[str, float]]:
+        """`arguments.one_design`, of --fitted or the start."""
+        return arguments.one_design(self.fitted, loaded, self.assignments, self.terminal)
+
+    def fitted_values(self, loaded: Any) -> dict[str, dict[str, float]]:
+        """The values of --fitted by the name of their design; empty without --fitted."""
+        if self.fitted is None:
+            return {}
+        return {"fitted": arguments.fitted_values(self.fitted, loaded, self.terminal)}
 
     def evaluator(self, loaded: Any) -> Evaluator:
         """The evaluator with the requested solver. Raises InputError."""
@@ -337,6 +351,19 @@ class Study:
         if run.has_earlier:
             self.terminal.note(
                 f"results of '{run.study}' in '{run.folder}' are those of an earlier run"
+            )
+
+    def say_idle(self, why: str) -> None:
+        """Note that --jobs has no effect here, no error: scripts may give it everywhere."""
+        if self.jobs > 1 and not _by_settings("jobs"):
+            self.terminal.note(f"--jobs has no effect here: {why}")
+
+    def refuse_two_machines(self) -> None:
+        """Raises click.UsageError where this machine and a scheduler's are both requested."""
+        if self.scheduler and self.jobs > 1 and not _by_settings("jobs"):
+            raise click.UsageError(
+                "--jobs applies to this machine only; with --scheduler, its number of workers"
+                " applies"
             )
 
     def notify(self, words: str, failure: EvaluationFailed | None) -> None:
@@ -431,12 +458,6 @@ def given(*without: str) -> list[str]:
     return [name for name in names if name not in (*without, "--json", "--quiet", "--verbose")]
 
 
-def say_idle(terminal: Terminal, jobs: int, why: str) -> None:
-    """Note that --jobs has no effect here, which is no error: scripts may give it everywhere."""
-    if jobs > 1 and not _by_settings("jobs"):
-        terminal.note(f"--jobs has no effect here: {why}")
-
-
 def _by_settings(option: str) -> bool:
     """Whether an option was set by the user's settings alone."""
     source = click.get_current_context().get_parameter_source(option)
@@ -450,11 +471,3 @@ def _words(command: str | None) -> tuple[str, ...]:
     from ..simulate.settings import words
 
     return tuple(words(command, "--solver-command"))
-
-
-def not_both(jobs: int, scheduler: str) -> None:
-    """Raises click.UsageError where this machine and a scheduler's are both requested."""
-    if scheduler and jobs > 1 and not _by_settings("jobs"):
-        raise click.UsageError(
-            "--jobs applies to this machine only; with --scheduler, its number of workers applies"
-        )

@@ -55,13 +55,11 @@ from .parameters import NumberWithin, WholeNumber, option
 @options.study
 def command(
     case: Path,
-    assignments: tuple[str, ...],
     hours: float | None,
     sensors: int | None,
     pressures: tuple[float, ...],
     noise_percent: float,
     steps: tuple[str, ...],
-    pictures: bool,
     study: options.Study,
 ) -> int:
     """Plan a test of CASE before it is made: what to measure, in which order, and what it can find.
@@ -78,7 +76,7 @@ def command(
     from ..studies.plan.study import plan, planned
     from ..studies.result import StudyInput
 
-    loaded, _ = study.load(case, assignments)
+    loaded, _ = study.load(case)
     evaluator = study.evaluator(loaded)
     runs = planned(loaded, evaluator, sensors, pressures, study.jobs)
     run = study.run(loaded, "plan", evaluator, plan=runs)
@@ -87,7 +85,7 @@ def command(
         evaluator.on_progress = bar.at
         noise = noise_percent / 100
         result = plan(given, hours, sensors, pressures, noise, step_hours, bar.begin)
-    if not pictures:
+    if not study.pictures:
         return study.present(run, result, {})
     from ..report.plan import figures
 

@@ -42,13 +42,10 @@ from .parameters import FileOrFolder, Number, WholeNumber, option
 @options.study
 def command(
     case: Path,
-    assignments: tuple[str, ...],
-    pressure_kPa: float | None,
     measured: Path | None,
     draws: int,
     seed: int,
     at_kPa: tuple[float, ...],
-    pictures: bool,
     study: options.Study,
 ) -> int:
     """Sample the variables of CASE that fit the measurements, and predict frequencies with 90 %
@@ -80,7 +77,7 @@ def command(
 
     terminal = study.terminal
     needs_emcee()
-    loaded, _ = study.load(case, assignments, pressure_kPa)
+    loaded, _ = study.load(case)
     for pressure in at_kPa:
         arguments.refuse_unusual(
             loaded, f"--at-kPa {pressure:g}", "pressure_kPa", pressure, study.allow_unusual
@@ -98,7 +95,7 @@ def command(
         given = StudyInput(loaded, evaluator, {}, jobs=study.jobs)
         sample = run(given, readings, draws, seed, at_kPa, bar.begin, terminal.note)
     summary = output.write(result(sample, seed))
-    if pictures:
+    if study.pictures:
         from ..report.sample import figures
 
         output.write_figures(figures(summary))

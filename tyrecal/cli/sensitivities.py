@@ -46,14 +46,10 @@ from .parameters import FileOrFolder, names_option, option
 @options.study
 def command(
     case: Path,
-    assignments: tuple[str, ...],
-    pressure_kPa: float | None,
     by: tuple[str, ...],
     kinds: tuple[str, ...],
     loads: str | None,
     measured: Path | None,
-    fitted: Path | None,
-    pictures: bool,
     study: options.Study,
 ) -> int:
     """State how each number of CASE moves the frequencies: d ln f / d ln x, exact, from one
@@ -73,7 +69,7 @@ def command(
     from ..studies.sensitivities.result import SensitivitiesResult, loads_on_road, planned
     from ..studies.sensitivities.table import kinds_of, needs_gradients, numbers_of
 
-    loaded, values = study.load(case, assignments, pressure_kPa)
+    loaded, values = study.load(case)
     kinds_of(kinds), numbers_of(loaded, by)
     loads_N = None
     if loads is not None:
@@ -84,9 +80,7 @@ def command(
     evaluator = study.evaluator(loaded)
     needs_gradients(evaluator)
     # numbers are selected about the initial design: a fitted one contains the data already
-    designs = {"initial": values}
-    if fitted:
-        designs["fitted"] = arguments.fitted_values(fitted, loaded, study.terminal)
+    designs = {"initial": values, **study.fitted_values(loaded)}
     file = measured or loaded.measured
     if measured:
         measured_values(loaded, measured)
@@ -100,7 +94,7 @@ def command(
         evaluator.on_progress = bar.at
         result = SensitivitiesResult.run(given, by=by, of=kinds, loads_N=loads_N, measured=measured)
     figures = {}
-    if pictures:
+    if study.pictures:
         from ..report.sensitivities import figures as drawn
 
         figures = drawn(result)

@@ -25,13 +25,7 @@ from .parameters import option
 @options.figure_format
 @options.study
 def command(
-    case: Path | None,
-    assignments: tuple[str, ...],
-    loads: str | None,
-    pressures: str | None,
-    fitted: Path | None,
-    pictures: bool,
-    study: options.Study,
+    case: Path | None, loads: str | None, pressures: str | None, study: options.Study
 ) -> int:
     """Find the vertical, lateral, longitudinal and torsional stiffness of the tyre of CASE on a
     flat road, over load and pressure.
@@ -47,17 +41,16 @@ def command(
     tyrecal stiffness cases/205_60r15.yaml --loads-N 4000 --pressure-kPa 200,220,240 --jobs 2
     tyrecal stiffness cases/p235_75r17.yaml --fitted p235_75r17 --dry-run
     """
-    from ..studies.pressure_result import FITTED
     from ..studies.run_plan import PlannedState, plan_runs
     from ..studies.stiffness import run
 
     terminal = study.terminal
-    case, fitted, study = default_case(case, fitted, study)
+    case, study = default_case(case, study)
     if loads is not None:
-        arguments.refuse_set(assignments, "road.loads_N", "--loads-N")
+        arguments.refuse_set(study.assignments, "road.loads_N", "--loads-N")
     if pressures is not None:
-        arguments.refuse_set(assignments, "pressure_kPa", "--pressure-kPa")
-    loaded, values = study.load(case, assignments)
+        arguments.refuse_set(study.assignments, "pressure_kPa", "--pressure-kPa")
+    loaded, values = study.load(case)
     loads_N = loaded.case.loads_N
     if loads is not None:
         loads_N = arguments.parse_loads(loads)
@@ -69,9 +62,7 @@ def command(
         )
     evaluator = study.evaluator(loaded)
     evaluator.needs_road(rim_stiffness=True)
-    designs = {"initial": values}
-    if fitted:
-        designs[FITTED] = arguments.fitted_values(fitted, loaded, terminal)
+    designs = {"initial": values, **study.fitted_values(loaded)}
     pressed_to = [PlannedState(len(loads_N), rim_stiffness=True) for _ in kPa]
     plan = plan_runs(loaded, evaluator, pressed_to, len(designs), study.jobs)
     state = {"load_N": loads_N, "pressure_kPa": kPa}
@@ -82,7 +73,7 @@ def command(
     if not result.rows:
         return EXIT_SOLVER
     figures = {}
-    if pictures:
+    if study.pictures:
         from ..report.stiffness import figures as drawn
 
         figures = drawn(result)

@@ -30,13 +30,8 @@ from .parameters import WholeNumber, option
 def command(
     case: Path,
     ranges: tuple[str, ...],
-    assignments: tuple[str, ...],
-    pressure_kPa: float | None,
     latin_hypercube: int | None,
     seed: int,
-    fitted: Path | None,
-    pictures: bool,
-    scheduler: str,
     study: options.Study,
 ) -> int:
     """Evaluate CASE over ranges of its numbers: all combinations of N values from A to B of each,
@@ -58,19 +53,19 @@ def command(
     from ..studies.sweep_result import run
     from ..tyre.state import pressure_name
 
-    options.not_both(study.jobs, scheduler)
+    study.refuse_two_machines()
     if "--seed" in options.given() and ranges and not latin_hypercube:
         raise click.UsageError("--seed has no effect on a grid: give --latin-hypercube too")
-    loaded, _ = study.load(case, assignments, pressure_kPa)
+    loaded, _ = study.load(case)
     sampled = bool(latin_hypercube) or not ranges
     swept = read_ranges(loaded, ranges, sampled, study.allow_unusual)
     for each in swept:
-        arguments.refuse_set(assignments, each.name, "the ranges")
-        if pressure_kPa is not None and each.name == pressure_name(loaded):
-            raise click.UsageError(f"--pressure-kPa {pressure_kPa:g}: {each.name} is swept")
-    loaded, values = arguments.one_design(fitted, loaded, assignments, study.terminal)
+        arguments.refuse_set(study.assignments, each.name, "the ranges")
+        if study.pressure_kPa is not None and each.name == pressure_name(loaded):
+            raise click.UsageError(f"--pressure-kPa {study.pressure_kPa:g}: {each.name} is swept")
+    loaded, values = study.one_design(loaded)
     evaluator = study.evaluator(loaded)
-    designs = {"fitted" if fitted else "initial": values}
+    designs = {"fitted" if study.fitted else "initial": values}
     given = StudyInput(loaded, evaluator, designs, jobs=study.jobs)
     count = latin_hypercube or DEFAULT_POINTS * len(swept)
     points = [{each.name: each.low for each in swept}] * count if sampled else grid(swept)
@@ -78,11 +73,11 @@ def command(
     plan = plan_evaluations(loaded, evaluator, states, at_once=study.jobs)
     state = swept_state(loaded, swept)
     output = study.run(loaded, "sweep", evaluator, plan=plan, **state)
-    with study.terminal.progress("sweep") as bar, reached(scheduler) as evaluator.scheduler:
+    with study.terminal.progress("sweep") as bar, reached(study.scheduler) as evaluator.scheduler:
         evaluator.on_progress = bar.at
         result = run(given, swept, sampled, latin_hypercube or 0, seed, study.notify)
     figures = {}
-    if pictures:
+    if study.pictures:
         from ..report.sweep import figures as drawn
 
         figures = drawn(result)

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from ..errors import InputError
+from ..studies.pressure_range import PressureRange
 from . import arguments, options
 from .default_case import default_case
 from .main import EXIT_SOLVER
@@ -17,22 +18,13 @@ from .parameters import option
 @click.command()
 @options.every(options.case_or_last, options.assignments)
 @options.pressures
+@options.packed("pressures", PressureRange)
 @options.fitted(" and the initial one")
 @option("--pictures/--no-pictures", default=True, help="Draw frequencies over pressure.")
 @options.scheduler
 @options.figure_format
 @options.study
-def command(
-    case: Path | None,
-    assignments: tuple[str, ...],
-    from_kPa: float | None,
-    to_kPa: float | None,
-    steps: int,
-    fitted: Path | None,
-    pictures: bool,
-    scheduler: str,
-    study: options.Study,
-) -> int:
+def command(case: Path | None, pressures: PressureRange, study: options.Study) -> int:
     """Follow every mode of CASE over the inflation pressure, by default from 5/12 to 4/3 times the
     case's.
 
@@ -50,33 +42,31 @@ def command(
     from ..simulate.evaluate.cluster import reached
     from ..studies.fit.prediction import read_responses
     from ..studies.fit.targets import read_targets
-    from ..studies.pressure_result import FITTED, run
+    from ..studies.pressure_result import run
     from ..studies.run_plan import plan_evaluations
     from ..tyre.state import pressure_name, rim_of
 
     terminal = study.terminal
-    options.not_both(study.jobs, scheduler)
-    case, fitted, study = default_case(case, fitted, study)
-    loaded, values = study.load(case, assignments)
-    pressures = _pressures(loaded, assignments, from_kPa, to_kPa, steps, study.allow_unusual)
+    study.refuse_two_machines()
+    case, study = default_case(case, study)
+    loaded, values = study.load(case)
+    kPa = _pressures(loaded, pressures, study)
     evaluator = study.evaluator(loaded)
-    designs, fit = {"initial": values}, None
-    if fitted:
-        designs[FITTED] = arguments.fitted_values(fitted, loaded, terminal)
-        fit = read_responses(fitted)
+    designs = {"initial": values, **study.fitted_values(loaded)}
+    fit = read_responses(study.fitted) if study.fitted else None
     name = pressure_name(loaded)
-    states = [{**each, name: p} for each in designs.values() for p in pressures]
+    states = [{**each, name: p} for each in designs.values() for p in kPa]
     plan = plan_evaluations(loaded, evaluator, states, int(evaluator.has_gradients), study.jobs)
-    output = study.run(loaded, "sweep-pressure", evaluator, plan=plan, pressure_kPa=pressures)
-    with terminal.progress("sweep") as bar, reached(scheduler) as evaluator.scheduler:
+    output = study.run(loaded, "sweep-pressure", evaluator, plan=plan, pressure_kPa=kPa)
+    with terminal.progress("sweep") as bar, reached(study.scheduler) as evaluator.scheduler:
         evaluator.on_progress = bar.at
-        result = run(loaded, evaluator, designs, pressures, study.jobs, study.notify, fit)
+        result = run(loaded, evaluator, designs, kPa, study.jobs, study.notify, fit)
     if not result.rows:
         return EXIT_SOLVER
     if result.standard_errors_unknown:
         terminal.warn(f"no intervals of the fitted design: {result.standard_errors_unknown}")
     figures = {}
-    if pictures:
+    if study.pictures:
         from ..report.pressure import draw_pressure_sweep
 
         measured = [(each, each.state.with_defaults(loaded)) for each in read_targets(loaded)]
@@ -90,24 +80,17 @@ def command(
     return study.present(output, result, figures)
 
 
-def _pressures(
-    loaded: Any,
-    assignments: tuple[str, ...],
-    low: float | None,
-    high: float | None,
-    steps: int,
-    allow_unusual: bool,
-) -> list[float]:
+def _pressures(loaded: Any, pressures: PressureRange, study: options.Study) -> list[float]:
     """The pressures of the sweep, kPa. Raises click.UsageError."""
     from ..tyre.state import pressure_name
     from ..tyre.values import with_values
 
     name = pressure_name(loaded)
-    arguments.refuse_set(assignments, name, "--from-kPa and --to-kPa")
-    pressures = arguments.parse_pressures(low, high, steps, allow_unusual).on(loaded)
-    for end, value in (("--from-kPa", pressures[0]), ("--to-kPa", pressures[-1])):
+    arguments.refuse_set(study.assignments, name, "--from-kPa and --to-kPa")
+    kPa = arguments.checked_pressures(pressures, study.allow_unusual).on(loaded)
+    for end, value in (("--from-kPa", kPa[0]), ("--to-kPa", kPa[-1])):
         try:
             with_values(loaded, {name: value})
         except InputError as error:
             raise click.UsageError(f"{end} {value:g}: {error}") from None
-    return pressures
+    return kPa

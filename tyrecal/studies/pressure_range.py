@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from ..tyre.case import LoadedCase
-from .sweep import SweptRange
+
+if TYPE_CHECKING:
+    from ..tyre.case import LoadedCase
 
 # of the case's pressure, to 10 kPa: 100 and 320 of a car's 240 kPa, 350 and 1130 of a truck's 850
 DEFAULT_ENDS = (5 / 12, 4 / 3)
@@ -27,6 +29,8 @@ class PressureRange:
 
     def on(self, case: LoadedCase) -> list[float]:
         """Equidistant pressures in kPa, both ends among them. Raises InputError."""
+        from .sweep import SweptRange
+
         own = case.case.pressure_kPa
         ends = [10.0 * round(own * share / 10) for share in DEFAULT_ENDS]
         usual_low, usual_high = ends if own else WITHOUT_PRESSURE
