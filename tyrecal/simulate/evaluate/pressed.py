@@ -75,7 +75,8 @@ class Pressed:
     mass_kg: float  # of the tyre without rim
     nodes: Array  # (n,) deck numbers
     points: Array  # (n, 2) R, Z in m, not inflated
-    angles: Array  # (k,) of the rings, rad from the patch's middle, 0 <= angle < 2 pi
+    # (k,) of the rings, rad from the patch's middle, rising from 0 to < 2 pi, -angle for each angle
+    angles: Array
     free_radius_m: float  # inflated, without a load
     footprints: tuple[Footprint, ...]
     failed: EvaluationFailed | None = None  # why the load after the last footprint was not reached
@@ -92,8 +93,9 @@ def pressed(
     modes: int = 0,
     rim_stiffness: bool = False,
 ) -> Pressed:
-    """A solver's answer to ``loads_N``, of a run ``kept`` there, with so many ``modes`` at each,
-    and the reactions of the rim where ``rim_stiffness`` is wanted.
+    """The typed form of an answer that `recorded.check` has passed to ``loads_N``, of a run whose
+    folder is ``kept`` or None, with so many ``modes`` at each, and the reactions of the rim where
+    ``rim_stiffness`` is wanted.
 
     Raises EvaluationFailed where it does not hold the loads in their order, one at least, each
     borne by the road, or not their modes.

@@ -42,7 +42,7 @@ class Member:
 class Rings:
     """Where shapes are known: nodes of the section, on rings round the tyre."""
 
-    angles: Array  # (k,) of the rings, rad, 0 in the middle of the patch
+    angles: Array  # (k,) of the rings, rad, as in `Pressed`
     nodes: Array  # (j,) deck numbers
     areas: Array  # (k, j) of the undeformed tyre, m2, that each point stands for
 
