@@ -31,7 +31,7 @@ def slack_cord_hint(case: LoadedCase) -> str:
     for material, cord in stiff.items():
         users = [name for name, layer in layers.items() if layer.material == material]
         if cord.youngs_modulus_Pa < TEXTILE_PA:
-            thin, name = users, material
+            thin, name = users, material  # layers to go slack, and the material to give them
         else:
             thin = [user for user in users if user in carcass]
             name = material if thin == users else f"{material}_of_carcass"

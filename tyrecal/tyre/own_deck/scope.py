@@ -12,7 +12,7 @@ from .text import Block, Row, is_label, language
 
 Array = np.ndarray
 Point = tuple[float, float]  # r, z in the deck's unit of length
-Members = Callable[[], list[int]]
+Members = Callable[[], list[int]]  # numbers in a set, looked up once all are known
 Content = TypeVar("Content")
 CORNERS_OF = {3: 3, 4: 4, 6: 3, 8: 4}  # of solids by their number of nodes
 FARTHEST = 1e9  # coordinate, in any unit

@@ -3,7 +3,7 @@
 Every line is given by its points, or one of them is and the others by gauges: their distances
 from it along its normal. Lines given before it lie inside it, those after it outside.
 
-Gauges: the thickness between two lines of the section, scaled region by region.
+The gauges of a case (`GaugeFactor`) are factors on the thickness between two lines, by region.
 """
 
 from __future__ import annotations
