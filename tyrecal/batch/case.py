@@ -226,7 +226,7 @@ def _question(task: CaseTask, loaded: LoadedCase, evaluator: Evaluator) -> str:
 
 def _finished(folder: Path, question: str) -> Json | None:
     """The entries of an earlier run that had the same question and whose files are as it left
-    them."""
+    them; None: there is none."""
     try:
         finished = read_json(folder / FINISHED, follow=False)
         if finished["question"] != question:

@@ -76,7 +76,8 @@ def numbers_of(reports: Sequence[Report]) -> Figures:
 
 
 def baseline_of(reports: Sequence[Report], before: Json | None) -> Json:
-    """A new baseline, with the tolerances of the one ``before``, and of what that did not have."""
+    """A new baseline, with the tolerances of the one ``before`` (None: there was none), and of what
+    that did not have."""
     cases = numbers_of(reports)
     tolerances = dict(before["tolerances"] if before else DEFAULTS)
     for studies in cases.values():

@@ -22,7 +22,8 @@ UNPRINTABLE = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]
 
 
 def junit(reports: Sequence[Report], drift: Json | None, started: str) -> str:
-    """The file's text. started: ISO 8601, for cases that never began."""
+    """The file's text. drift: of `drift.compare`, None without a baseline; started: ISO 8601, for
+    cases that never began."""
     suites = Element("testsuites")
     drifted: dict[tuple[str, str], list[Json]] = {}
     for each in drift["drifted"] if drift else ():

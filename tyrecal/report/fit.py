@@ -64,7 +64,8 @@ def normalised(fit: FitResult) -> list[tuple[str, float | None]]:
 
 
 def farthest(fit: FitResult) -> tuple[str, float] | None:
-    """Name and deviation in per cent of the target that the fit leaves farthest off."""
+    """Name and deviation in per cent of the target that the fit leaves farthest off; None: there
+    are no targets."""
     off = [(mode.label.display, mode.deviation_percent) for mode in fit.modes]
     for each in fit.others:
         name = f"{ROAD_QUANTITIES[each.quantity].name.split(',')[0]} {each.state}"

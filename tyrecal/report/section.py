@@ -146,7 +146,8 @@ def draw_section_map(
     """Parts of the section, coloured by the evidence for a change of them alone; below, that
     evidence as bars, the largest first.
 
-    effective_rank: number of combinations of parts that the data see, for the title.
+    effective_rank: number of combinations of parts that the data see, for the title; None: not
+    known.
     """
     by_name: dict[str, PartChange] = {}
     for place in places:  # of several rubbers in a region the likelier one

@@ -51,9 +51,9 @@ def eigenvalue_rates(
 ) -> Array:
     """d lambda/dp (m,) of the modes ``fields``, lambda (m,).
 
-    ``model`` and ``loads`` carry the tangent of p, V = dU/dp; ``rim_and_air``: what moves along.
-    If the model has tables of moduli, lambda changes its own modulus, rho times the static one:
-    d lambda/dp = (d lambda/dp at that modulus) / (1 - d lambda/d rho d rho/d lambda).
+    ``model`` and ``loads`` carry the tangent of p, V = dU/dp; ``rim_and_air``: what moves along,
+    None: nothing. If the model has tables of moduli, lambda changes its own modulus, rho times the
+    static one: d lambda/dp = (d lambda/dp at that modulus) / (1 - d lambda/d rho d rho/d lambda).
     """
     state = U + 1j * COMPLEX_STEP * V
     if rim_and_air:

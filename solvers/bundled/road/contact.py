@@ -91,7 +91,7 @@ class FlatRoad:
 
     def forces(self, U: Array, height: float, bound: Bound | None = None) -> Contact:
         """Forces at a state U (k, n, 3) with the road at ``height`` (m); ``bound``: of Tresca's
-        friction, instead of Coulomb's."""
+        friction, None: Coulomb's."""
         points = self.tread.patch(U, height, self.former)
         at = points.positions(U)
         normal = self.stiffness * points.area * np.maximum(at[..., 0] - height, 0.0)

@@ -105,7 +105,7 @@ def _hourglass(corners: Array, gradient: Array, weights: Array) -> Array:
 
 def _projection(x: Array, weights: Array, terms: int) -> Array | None:
     """Q (Q^T w Q)^-1 Q^T w, the mean-square fit of the terms Q = 1, R, Z to values at the points
-    x (e, g, 2) with their weights (e, g)."""
+    x (e, g, 2) with their weights (e, g); None: each point keeps its own."""
     e, g, _ = x.shape
     if terms in (0, g):
         return None
@@ -143,7 +143,7 @@ def lines(
 ) -> Lines:
     """Operators along two- or three-node lines in the section; share (e, 1): as for `solids`;
     weights (e, a, h): of the h nodes of the hosts, to which they are connected, in their a own
-    ones."""
+    ones; None: they are in no host."""
     ends = X[connectivity] if weights is None else weights @ X[connectivity]
     rule = shapes.line(ends.shape[1], points)
     dX = np.einsum("ga,eaj->egj", rule.dN[..., 0], ends)

@@ -25,7 +25,7 @@ def half_mesh(mesh: DeckMesh) -> DeckMesh | None:
 
 
 def _half_like(mesh: DeckMesh, like: DeckMesh) -> DeckMesh | None:
-    """Half mesh of a mesh that differs in the nodes' tangents alone."""
+    """Half mesh of a mesh that differs in the nodes' tangents alone; None: that has none."""
     if (half := half_mesh(like)) is None:
         return None
     assert isinstance(half.symmetry, MirrorHalf)

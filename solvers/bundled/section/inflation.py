@@ -43,11 +43,11 @@ def equilibrium(
     """Displacements (n, 3) in equilibrium under ``loads``, reached from the displacements
     ``start``, and how many factorisations they took.
 
-    A ``guess`` (n, 3), the shape of a similar tyre, is tried first, then the whole load from
-    ``start``. If that takes long, because soft rubber between stiff cords wrinkles on the way, the
-    rubber is stiffened and softened again step by step. If that fails too, the load is applied in
-    steps. All paths lead to the same equilibrium. ``check`` is called between steps and may raise
-    to stop.
+    A ``guess`` (n, 3), the shape of a similar tyre, if any, is tried first, then the whole load
+    from ``start``. If that takes long, because soft rubber between stiff cords wrinkles on the way,
+    the rubber is stiffened and softened again step by step. If that fails too, the load is applied
+    in steps. All paths lead to the same equilibrium. ``check`` is called between steps and may
+    raise to stop.
 
     Nearly incompressible rubber first gets a lower bulk modulus (`EASED`), because Newton's
     straight steps change its volume.

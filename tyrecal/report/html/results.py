@@ -62,7 +62,7 @@ class Results:
     runs: dict[str, RunFacts] = field(default_factory=dict)
 
     def get(self, kind: type[StudyContent]) -> StudyContent | None:
-        """The result of a study."""
+        """The result of a study, None if the folder has none."""
         return next((each for each in self.studies.values() if isinstance(each, kind)), None)
 
     @property

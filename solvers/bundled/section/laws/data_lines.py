@@ -28,7 +28,7 @@ LAW_CLASSES: tuple[type[Hyperelastic], ...] = (  # the first that has all consta
 
 
 def kind_of(law: str, order: int) -> type[Hyperelastic] | None:
-    """The class that has all constants of a law of an order."""
+    """The class that has all constants of a law of an order; None: no class has."""
     constants = set(LAW_CONSTANTS[law](order))
     for kind in LAW_CLASSES:
         bulk = (name.removeprefix("inverse_") for name in kind.bulk_moduli)
