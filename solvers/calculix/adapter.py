@@ -192,7 +192,8 @@ def _version(command: tuple[str, ...]) -> str:
 
 
 def _shapes(fields: Fields, count: int, n: int, sectors: int, job: str) -> list[Array]:
-    """Amplitudes (nodes, 3), complex, of each pair's first mode, mass-normalised to the tyre.
+    """Amplitudes (nodes, 3), complex, of the first mode of ``count`` pairs with ``n`` waves round
+    the tyre, mass-normalised to the tyre.
 
     At Theta = 0, x, y, z are r, theta, z. CalculiX normalises to one sector's mass, and lists each
     mode of every diameter twice. Raises RunFailed (``no_results``).

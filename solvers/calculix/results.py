@@ -69,8 +69,8 @@ def pairs(eigenvalues: Array, name: str) -> Array:
 
 
 def read_fields(path: Path, static: bool = True) -> Fields:
-    """A whole .frd file, or that of modes alone in it. Raises RunFailed (``no_results``) where it
-    is cut, doubled or empty.
+    """Fields of a .frd file; static: of its static steps too. Raises RunFailed (``no_results``)
+    where it is cut, doubled or empty.
 
     Columns have a fixed width and may touch."""
     lines = _text(path).splitlines()

@@ -77,8 +77,9 @@ class GasCoupling:
         return np.tensordot(self.C, u, 2) + self.H[:, self.flowing] @ w
 
     def flow(self, u: Array, eigenvalue: float) -> Array:
-        """w of a mode from its u (nodes, 3): (H^T Q^-1 H - lambda H) w = -H^T Q^-1 C u. The strain
-        of w and u is a small difference, which an iteration does not find to many digits."""
+        """w of a mode from its u (nodes, 3) and its eigenvalue lambda: (H^T Q^-1 H - lambda H) w =
+        -H^T Q^-1 C u. The strain of w and u is a small difference, which an iteration does not find
+        to many digits."""
         flow = self.H[:, self.flowing]
         stiff = np.linalg.solve(self.Q, flow).T
         own = stiff @ flow - eigenvalue * flow[self.flowing]
@@ -87,7 +88,8 @@ class GasCoupling:
 
 
 def coupling(air: GasCavity, X: Array, U: Array, n: int) -> GasCoupling:
-    """Matrices of the inflated cavity. X (nodes, 2), U (nodes, 3); complex steps allowed."""
+    """Matrices of the inflated cavity in harmonic n. X (nodes, 2), U (nodes, 3); complex steps
+    allowed."""
     kind = np.result_type(X, U)
     walls = [elements.lines(X, surface.connectivity, POINTS_ALONG) for surface in air.surfaces]
     wall = [(lines, *surface_point(lines, U)) for lines in walls]

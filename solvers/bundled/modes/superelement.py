@@ -88,7 +88,8 @@ class _ModeMatrices:
 
 
 class _Block:
-    """A harmonic in real coordinates; a field is Re[a exp(i n Theta)], with an amplitude a."""
+    """The k-th of the response's harmonics in real coordinates; a field is Re[a exp(i n Theta)],
+    with an amplitude a."""
 
     def __init__(self, response: Response, k: int, points: Sequence[tuple[float, int]]):
         reduced = response.harmonics[k]

@@ -247,7 +247,7 @@ def flat_road(
     X: Array, tread: Tread, stiffness: float, friction: float, elastic_slip: float, U: Array
 ) -> FlatRoad:
     """The road that just touches a tread displaced by U (k, n, 3), all round alike. X (n, 2): R, Z
-    of the section, m."""
+    of the section, m; stiffness, friction, elastic_slip: as in `FlatRoad`."""
     height = float((X[tread.nodes, 0] + U[0, tread.nodes, 0]).max())  # at angle 0
     elastic = np.zeros((len(tread.begin), *tread.ds.shape, SLIP_SAMPLES, 2))
     return FlatRoad(tread, stiffness, friction, elastic_slip, U, elastic, height)

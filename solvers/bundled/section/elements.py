@@ -141,9 +141,9 @@ def lines(
     share: Array | float = 1.0,
     weights: Array | None = None,
 ) -> Lines:
-    """Operators along two- or three-node lines in the section; share (e, 1): as for `solids`;
-    weights (e, a, h): of the h nodes of the hosts, to which they are connected, in their a own
-    ones; None: they are in no host."""
+    """Operators along two- or three-node lines in the section at ``points`` Gauss points; share (e,
+    1): as for `solids`; weights (e, a, h): of the h nodes of the hosts, to which they are
+    connected, in their a own ones; None: they are in no host."""
     ends = X[connectivity] if weights is None else weights @ X[connectivity]
     rule = shapes.line(ends.shape[1], points)
     dX = np.einsum("ga,eaj->egj", rule.dN[..., 0], ends)

@@ -115,7 +115,7 @@ def page(results: Sequence[Results], author: str = "", title: str = "") -> str:
 
 def chapter(results: Results, prefix: str, several: bool = False) -> Json:
     """Values of the templates for one folder's results; the first figure leads the page. prefix: of
-    the ids of the folder's elements. Raises InputError."""
+    the ids of the folder's elements; several: the page has more folders. Raises InputError."""
     parts = []
     for result in results.studies.values():
         with lists_of(results.folder / f"{result.stem}.json"):
