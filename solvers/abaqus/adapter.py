@@ -64,7 +64,7 @@ class Abaqus:
         own = own_decks.load(folder)
         run = own or section_jobs(folder)
         table = read_dat(folder / f"{run.last}.dat")
-        if own:  # the mass is told with the model, not where a job only goes on
+        if own:  # the mass is printed with the model, not where a job goes on
             tables = [read_dat(folder / f"{each}.dat") for each, _ in own.jobs]
             masses = [each.mass for each in tables if each.mass is not None]
             table = DatTable(table.frequencies_Hz, masses[-1] if masses else None)

@@ -44,7 +44,7 @@ def run_batch(
     """Reports in the order of the tasks; ``notify`` gets each as it comes. scheduler: address of a
     Dask scheduler; without one, ``jobs`` processes of this machine work.
 
-    Raises SolverUnavailable. Interrupted, it leaves whatever has finished on record.
+    Raises SolverUnavailable. Interrupted, it leaves the results of cases that have finished.
     """
     reports: dict[int, Report] = {}
     with executor(jobs, scheduler) as workers, closing(workers.each(run_case, tasks)) as answers:

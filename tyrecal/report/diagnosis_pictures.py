@@ -196,6 +196,6 @@ def _short(d: Diagnosis, key: str | None) -> str:
 
 
 def _within(d: Diagnosis, key: str | None) -> str:
-    """Amid a sentence."""
+    """As `_short`, within a sentence; key None: empty."""
     words = _short(d, key)
     return words[:1].lower() + words[1:]

@@ -47,7 +47,7 @@ def shapes_text(
 
 
 def loaded_shapes_text(case: LoadedCase, tyre: LoadedTyre, unit_mass: bool) -> str:
-    """Text of the file, of the tyre at its last load."""
+    """Text of the file, of the tyre at its last load; unit_mass: as in `shapes_text`."""
     last = tyre.loads[-1]
     assert last.surface is not None and tyre.angles is not None
     places = last.surface.reshape(-1, 3)
