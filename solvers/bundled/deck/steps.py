@@ -147,7 +147,7 @@ def _check_transfer(section: list[Block], steps: list[DeckStep], revolve: list[B
     generation, transfer = (blocks[name] for name in names)
     if "REVOLVE" not in generation.parameters:
         raise generation.refused("must REVOLVE the section")
-    # rows: two points of the axis; a point of the section; each segment's degrees, elements, bias
+    # rows: two points of the axis; one of the section's plane; segments: degrees, elements, bias
     segments = [row.number(0) for row in generation.rows[2:]]
     if not abs(sum(segments) - 360.0) < 1e-6:
         raise generation.refused("the tyre is revolved by 360 degrees")

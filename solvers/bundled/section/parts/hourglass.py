@@ -17,7 +17,7 @@ from .elastic import Elastic
 from .part import Rows, on_diagonals
 
 Array = np.ndarray
-SHARE_OF_SHEAR_MODULUS = 0.005  # the hourglass stiffness where a deck states none, as ABAQUS's
+SHARE_OF_SHEAR_MODULUS = 0.005  # the hourglass stiffness where a deck states none
 
 
 @dataclass(frozen=True)
