@@ -27,13 +27,14 @@ from .results import StepResult, write
 from .road.road_data import (
     ROAD_NUMBERS,
     InflatedTangent,
+    LoadRequest,
     ModeRequest,
     RimRequest,
     RoadData,
+    TyreToPress,
     read_road,
 )
 from .section import mechanics
-from .section.band import Numbering
 from .section.boundary import keeps_half_turn, numbering, rim_motion, vibrating
 from .section.inflation import equilibrium
 from .section.loads import loads, pressures
@@ -169,34 +170,31 @@ class Job:
                 raise DeckError(row.place, "loads on the road must push it to the tyre, and rise")
         if not wanted:
             raise DeckError(self.steps[-1].procedure.place, "no *CLOAD presses the road")
-        last, model, equations, acting = self._on_road()
+        last, inflated = self._on_road()
         step = self.steps[last]
+        rim = {load: self._rim_request(motions) for load, motions in rim_motions.items()}
         from .road import footprint_job, pressed_start  # late, as in `run`
 
         result = footprint_job.press(
-            model,
-            equations,
-            acting,
-            self.tyre.U,
+            inflated,
             self.road,
-            wanted,
+            {load: LoadRequest(vibrations.get(load), rim.get(load)) for load in wanted},
             self._check_time,
-            vibrations,
-            self._inflated_tangents(model, equations, acting, last),
+            self._inflated_tangents(inflated, last),
             partial(pressed_start.begin, start, self._of_start) if start else None,
-            {load: self._rim_request(motions) for load, motions in rim_motions.items()},
         )
         if self.tyre.request.cavity:
-            result |= self._cavity(model, result)
+            result |= self._cavity(inflated.model, result)
         return {"pressure_Pa": step.pressure, "mass_kg": self.mass_kg, **result}
 
-    def _on_road(self) -> tuple[int, Model, Numbering, list[Pressure]]:
-        """The place of the last static step, and the model, equations and pressures in it."""
+    def _on_road(self) -> tuple[int, TyreToPress]:
+        """The place of the last static step, and the tyre in it."""
         static = [each.procedure.name == "STATIC" for each in self.steps]
         last = max(i for i, each in enumerate(self.steps) if static[i] and not each.is_perturbation)
         step = self.steps[last]
         model = self.tyre.models(None, step.long_term, False)
-        return last, model, numbering(model, step), pressures(model, step)
+        acting = pressures(model, step)
+        return last, TyreToPress(model, numbering(model, step), acting, self.tyre.U)
 
     def _of_start(self, texts: Mapping[str, str]) -> tuple[Model, list[Pressure], RoadData]:
         """Model, pressures and road of the tyre to start from. Raises DeckError."""
@@ -206,23 +204,21 @@ class Job:
         assert other.road is not None
         for step in other.steps:
             step.held = other._off_road(step).held
-        _, model, _, acting = other._on_road()
-        return model, acting, other.road
+        _, tyre = other._on_road()
+        return tyre.model, tyre.loads, other.road
 
     def _off_road(self, step: DeckStep) -> DeckStep:
         """A step that holds all that it did but the road."""
         node = self.road.node if self.road else None
         return replace(step, held=[row for row in step.held if row.text(0) != node])
 
-    def _inflated_tangents(
-        self, model: Model, equations: Numbering, acting: list[Pressure], place: int
-    ) -> dict[str, InflatedTangent]:
-        """Tangents by variable, of the tyre that the last static step, at its ``place``,
-        presses."""
+    def _inflated_tangents(self, tyre: TyreToPress, place: int) -> dict[str, InflatedTangent]:
+        """Tangents by variable of the tyre of the last static step, at its ``place``."""
         sensitivities = self.tyre.request.sensitivities
         if not sensitivities:
             return {}
-        stiffness = mechanics.tangents(model, self.tyre.U, acting, harmonics=False)[0]
+        equations = tyre.equations
+        stiffness = mechanics.tangents(tyre.model, tyre.U, tyre.loads, harmonics=False)[0]
         newton, tangents = equations.factor(equations.assemble(stiffness)), {}
         for variable, rows in sensitivities.items():
             section, revolve, steps = self.tyre.deck.read(rows)
@@ -230,7 +226,7 @@ class Job:
             step.held = self._off_road(step).held
             seeded = build(section, None, step.long_term)
             loads, rate = pressures(seeded, step), lambda number: np.imag(number) / COMPLEX_STEP
-            U = state_rate(seeded, self.tyre.U, loads, equations, newton)
+            U = state_rate(seeded, tyre.U, loads, equations, newton)
             numbers = {name: float(rate(getattr(road, name))) for name in ROAD_NUMBERS}
             tangents[variable] = InflatedTangent(seeded, loads, U, numbers)
         return tangents

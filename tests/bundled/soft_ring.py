@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy.sparse import csr_matrix
 from tyrecal_solvers.bundled.modes.harmonics import HarmonicModes, Vibration
 from tyrecal_solvers.bundled.road import stick
 from tyrecal_solvers.bundled.road.contact_newton import PressedState
-from tyrecal_solvers.bundled.road.loaded_modes import LoadedModes, loaded_modes
+from tyrecal_solvers.bundled.road.loaded_modes import LoadedModes, TyreOnRoad, loaded_modes
 from tyrecal_solvers.bundled.solid3d.circumference import HalfCircle
 
 from . import support
@@ -35,11 +36,15 @@ def start(work: Round) -> list[HarmonicModes]:
 
 
 def modes(work: Round, U: Array, held: csr_matrix, around: HalfCircle, count: int) -> LoadedModes:
-    symmetry = work.symmetry(around)
-    (result,) = loaded_modes(
-        work.tyre(around), symmetry, U, [held], start(work), count, lambda: None
-    )
+    (result,) = loaded_modes(pressed_tyre(work, U, around), [held], start(work), count)
     return result
+
+
+def pressed_tyre(
+    work: Round, U: Array, around: HalfCircle, check: Callable[[], None] = lambda: None
+) -> TyreOnRoad:
+    tyre = work.tyre(around)
+    return TyreOnRoad(tyre, work.symmetry(around), U, tyre.residual(U), check)
 
 
 def no_hold(work: Round, around: HalfCircle) -> csr_matrix:

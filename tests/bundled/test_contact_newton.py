@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from tyrecal_solvers.bundled.road import contact_newton, footprint_job
 from tyrecal_solvers.bundled.road.contact_newton import ContactNewton
+from tyrecal_solvers.bundled.road.road_data import LoadRequest, TyreToPress
 from tyrecal_solvers.errors import Indefinite, NoEquilibrium, RunFailed
 from tyrecal_solvers.language.text import DeckError
 
@@ -59,7 +60,8 @@ def test_a_clock_that_runs_out_between_loads(solid: Round) -> None:
 def footprints(work: Round, clock: Late, loads: list[float]) -> dict[str, Any]:
     road = footprint_job.RoadData("1", "TREAD", 1e10, 0.0, 1e-5, LENGTHS)
     equations = support.numbering(work.model, ~work.free)
-    return footprint_job.press(work.model, equations, work.loads, work.U, road, loads, clock)
+    inflated = TyreToPress(work.model, equations, work.loads, work.U)
+    return footprint_job.press(inflated, road, dict.fromkeys(loads, LoadRequest()), clock)
 
 
 def test_nodes_that_bear_less_than_a_newton_belong_to_the_patch(solid: Round) -> None:

@@ -13,6 +13,7 @@ from tyrecal_solvers.bundled.road.contact_newton import ContactNewton
 from tyrecal_solvers.bundled.road.loaded_modes import (
     Inertia,
     LoadedModes,
+    TyreOnRoad,
     loaded_modes,
     standing_waves,
 )
@@ -27,7 +28,19 @@ from tyrecal_solvers.errors import RunFailed
 from ..chance import generator
 from . import support
 from .contact import Round
-from .soft_ring import ETA, LENGTHS, State, harmonic, held, modes, no_hold, press, soft_ring, start
+from .soft_ring import (
+    ETA,
+    LENGTHS,
+    State,
+    harmonic,
+    held,
+    modes,
+    no_hold,
+    press,
+    pressed_tyre,
+    soft_ring,
+    start,
+)
 
 pytestmark = pytest.mark.numbers
 Array = np.ndarray
@@ -130,11 +143,11 @@ def test_a_wheel_free_along_the_load(tyre: Round, pressed: State, lowest: Loaded
     """Modes that the half turn reverses stay as they were. A wheel far heavier than the tyre swings
     slowly on the tyre's stiffness, which statics gives, and all else is as if it were held; a wheel
     without mass lowers each eigenvalue, and none below the one before."""
-    symmetry, work = tyre.symmetry(pressed.around), tyre.tyre(pressed.around)
+    there = pressed_tyre(tyre, pressed.U, pressed.around)
+    work = there.tyre
 
     def free(wheel_kg: float) -> LoadedModes:
-        given = work, symmetry, pressed.U, [pressed.hold], start(tyre), 10, lambda: None, wheel_kg
-        return loaded_modes(*given)[0]
+        return loaded_modes(there, [pressed.hold], start(tyre), 10, wheel_kg)[0]
 
     heavy, light = free(1e6), free(0.0)
     keeps = lowest.eigenvalues[lowest.parity == 1]
@@ -162,9 +175,8 @@ def test_a_second_hold_is_as_if_it_were_the_first(tyre: Round, pressed: State) -
     contact = pressed.pressed.contact
     smooth = stick.held(replace(contact, road=replace(contact.road, friction=0.0)))
     alone = modes(tyre, pressed.U, smooth, pressed.around, 10)
-    symmetry, work = tyre.symmetry(pressed.around), tyre.tyre(pressed.around)
-    holds = [pressed.hold, smooth]
-    both = loaded_modes(work, symmetry, pressed.U, holds, start(tyre), 10, lambda: None)
+    there = pressed_tyre(tyre, pressed.U, pressed.around)
+    both = loaded_modes(there, [pressed.hold, smooth], start(tyre), 10)
     np.testing.assert_allclose(both[1].eigenvalues, alone.eigenvalues, rtol=1e-8)
     assert (both[1].eigenvalues < both[0].eigenvalues).all()
 
@@ -194,7 +206,8 @@ def test_the_footprints_factor_gives_the_same_modes(
         results = []
         for release in (lambda: shared, lambda: None):
             revolved = Revolved(model, [], work.tyre.around)
-            given = revolved, work.symmetry, U, [hold], start(tyre), 8, lambda: None, None, release
+            there = TyreOnRoad(revolved, work.symmetry, U, 0 * U, lambda: None)
+            given = there, [hold], start(tyre), 8, None, release
             results.append(loaded_modes(*given)[0].eigenvalues)
         np.testing.assert_allclose(*results, rtol=1e-8)
     assert formed == [-1, 1, -1] * 2
@@ -269,9 +282,9 @@ def test_time_is_looked_at_before_the_factor_and_every_product(
                 raise TimeoutError
 
         done.clear()
-        work, symmetry = tyre.tyre(pressed.around), tyre.symmetry(pressed.around)
+        there = pressed_tyre(tyre, pressed.U, pressed.around, clock)
         with pytest.raises(TimeoutError):
-            loaded_modes(work, symmetry, pressed.U, [pressed.hold], start(tyre), 4, clock)
+            loaded_modes(there, [pressed.hold], start(tyre), 4)
         assert done == wanted
 
 

@@ -12,10 +12,9 @@ import pytest
 from tyrecal_solvers.bundled import job
 from tyrecal_solvers.bundled.modes.harmonics import HarmonicModes, Vibration
 from tyrecal_solvers.bundled.road import footprint_job
-from tyrecal_solvers.bundled.road.loaded_modes import LoadedModes
+from tyrecal_solvers.bundled.road.loaded_modes import LoadedModes, TyreOnRoad
 from tyrecal_solvers.bundled.section.symmetry import HALF_TURN
 from tyrecal_solvers.bundled.solid3d.circumference import half_circle
-from tyrecal_solvers.bundled.solid3d.revolved import Revolved
 from tyrecal_solvers.errors import RunFailed
 from tyrecal_solvers.language.text import DeckError
 
@@ -73,7 +72,7 @@ def test_the_deck_says_how_the_wheel_stands(
     vibrations: list[Any] = []
 
     def press(*given: Any) -> dict[str, Any]:
-        vibrations.extend(given[-4].values())
+        vibrations.extend(each.modes for each in given[2].values())
         raise RunFailed("crashed", "enough")
 
     monkeypatch.setattr(footprint_job, "press", press)
@@ -111,9 +110,9 @@ def test_what_the_job_asks_for_and_how_it_writes_it(
 
     loose = LoadedModes(np.array([100.0]) * np.pi**2, np.array([-1]), shapes[1:])
 
-    def modes_(work_: Revolved, kept: Any, U: Array, holds: Any, *rest: Any) -> list[LoadedModes]:
-        work_.residual(U)
-        calls.append((work_.product(shapes[0]), holds, rest))
+    def modes_(there: TyreOnRoad, holds: Any, *rest: Any) -> list[LoadedModes]:
+        there.tyre.residual(there.U)
+        calls.append((there.tyre.product(shapes[0]), holds, rest))
         return [canned, loose]
 
     monkeypatch.setattr(footprint_job, "lowest_of_all", lowest)

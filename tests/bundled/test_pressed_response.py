@@ -19,7 +19,7 @@ from tyrecal_solvers.errors import Refused
 
 from . import support
 from .contact import Round, ring
-from .soft_ring import State, held, no_hold, start
+from .soft_ring import State, held, no_hold, pressed_tyre, start
 from .test_response import ETA, Solved, _combined, direct
 
 pytestmark = [pytest.mark.numbers, pytest.mark.slow]
@@ -65,10 +65,9 @@ def on_road(work: Round) -> State:
 def responding(work: Round, state: State) -> Pressed:
     outer = np.flatnonzero(abs(work.model.mesh.X[:, 0] - 0.1) < 1e-9)
     patch = TreadPatch(0.03, 0.1, outer, np.full(len(outer), 1 / len(outer)))
-    tyre, symmetry = work.tyre(state.around), work.symmetry(state.around)
-    forces = tyre.residual(state.U)
-    given = symmetry, state.U, state.hold, forces, start(work), patch, POINTS * 2, HIGHEST_HZ
-    return Pressed(work, state, tyre, patch, PressedResponse(tyre, *given, lambda: None))
+    held = pressed_tyre(work, state.U, state.around)
+    response = PressedResponse(held, state.hold, start(work), patch, POINTS * 2, HIGHEST_HZ)
+    return Pressed(work, state, held.tyre, patch, response)
 
 
 class Equations:

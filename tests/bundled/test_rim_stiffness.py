@@ -15,6 +15,7 @@ from tyrecal_solvers.bundled.deck.request import Request
 from tyrecal_solvers.bundled.deck.steps import Deck
 from tyrecal_solvers.bundled.road import footprint_job, stick
 from tyrecal_solvers.bundled.road.half_turn_symmetry import HalfTurn
+from tyrecal_solvers.bundled.road.loaded_modes import TyreOnRoad
 from tyrecal_solvers.bundled.road.rim_stiffness import reactions, rim_stiffness
 from tyrecal_solvers.bundled.solid3d.circumference import half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
@@ -42,7 +43,8 @@ def stiffnesses(
         state = work.to(load)
         U = work.symmetry.spread(state.parts)
         hold, factor = stick.held(state.contact), work.release_factor()
-        C = rim_stiffness(work.tyre, work.symmetry, U, hold, lambda: None, factor=factor)
+        there = TyreOnRoad(work.tyre, work.symmetry, U, work.tyre.residual(U), lambda: None)
+        C = rim_stiffness(there, hold, factor=factor)
         results.append((C, state.stiffness, state.height))
     return results
 
@@ -101,12 +103,13 @@ def test_an_inflated_tyre_without_a_road_costs_nothing_to_move() -> None:
     work._static(inflate)
     for step in work.steps:
         step.held = work._off_road(step).held
-    _, model, equations, acting = work._on_road()
+    _, inflated = work._on_road()
+    model, equations = inflated.model, inflated.equations
     around = half_circle(np.radians([60.0, 60.0, 60.0]))
     symmetry = HalfTurn(model.mesh, equations.equation < equations.size, around)
     U = np.multiply.outer(around.turn(0).real, work.tyre.U)
-    tyre, none = Revolved(model, acting, around), csr_matrix((U.size, U.size))
-    C = rim_stiffness(tyre, symmetry, U, none, lambda: None)
+    tyre, none = Revolved(model, inflated.loads, around), csr_matrix((U.size, U.size))
+    C = rim_stiffness(TyreOnRoad(tyre, symmetry, U, tyre.residual(U), lambda: None), none)
     assert abs(C).max() < 0.01
 
 
@@ -139,7 +142,7 @@ def test_the_deck_moves_the_rim_in_six_steps(
     requests: dict[float, Any] = {}
 
     def press(*given: Any) -> dict[str, Any]:
-        requests.update(given[-1])
+        requests.update({load: each.rim for load, each in given[2].items()})
         raise RunFailed("crashed", "enough")
 
     monkeypatch.setattr(footprint_job, "press", press)

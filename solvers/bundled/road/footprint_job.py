@@ -33,19 +33,18 @@ from ..section.band import Numbering
 from ..section.model import Model
 from ..section.parts.elastic import Elastic
 from ..section.parts.hourglass import Hourglass
-from ..section.parts.pressure import Pressure
 from ..section.symmetry import HALF_TURN
 from ..solid3d.circumference import WAVE_BY_ELEMENTS, HalfCircle, half_circle, waves_beyond
 from ..solid3d.revolved import Revolved
 from .contact import flat_road
 from .contact_newton import ContactNewton, PressedState
 from .half_turn_symmetry import HalfTurn
-from .loaded_modes import SPARE, loaded_modes
+from .loaded_modes import SPARE, TyreOnRoad, loaded_modes
 from .patch import patch
 from .pressed_losses import PressedLosses
 from .pressed_response import UNLOADED_MODES, PressedResponse
 from .rim_stiffness import reactions, rim_stiffness
-from .road_data import InflatedTangent, ModeRequest, RimRequest, RoadData
+from .road_data import InflatedTangent, LoadRequest, ModeRequest, RimRequest, RoadData, TyreToPress
 from .slopes import Slopes
 from .stick import held
 from .tread import tread_of
@@ -61,28 +60,24 @@ MODE_ARRAYS = (
 
 
 def press(
-    model: Model,
-    equations: Numbering,
-    loads: list[Pressure],
-    U: Array,
+    inflated: TyreToPress,
     data: RoadData,
-    wanted: list[float],
+    requests: Mapping[float, LoadRequest],
     check: Callable[[], None],
-    vibrations: Mapping[float, ModeRequest] = MappingProxyType({}),
     tangents: Mapping[str, InflatedTangent] = MappingProxyType({}),
     begin: Callable[[ContactNewton, Array], None] | None = None,
-    rim_requests: Mapping[float, RimRequest] = MappingProxyType({}),
 ) -> dict[str, Any]:
-    """Footprints at the ``wanted`` loads (N) of a tyre inflated to ``U`` (n, 3), with modes where
-    there are ``vibrations``, and derivatives by the numbers of the deck that ``tangents`` are of;
-    ``begin`` gives the first load its guess, from the deck's node numbers (n,); rim_requests: by
-    load, motions of the rim whose reactions are wanted.
+    """Footprints at the loads (N) of ``requests``, which rise, with what is requested there, and
+    derivatives by the numbers of the deck that ``tangents`` are of; ``begin`` gives the first load
+    its guess, from the deck's node numbers (n,).
 
     Raises DeckError; RunFailed where not even the first load is reached.
     """
+    model, equations, U = inflated.model, inflated.equations, inflated.U
     by_elements = half_circle(data.lengths)
     rings = by_elements.angles
-    around = waves_beyond(data.lengths) if vibrations or rim_requests else by_elements
+    waves = any(each.modes or each.rim for each in requests.values())
+    around = waves_beyond(data.lengths) if waves else by_elements
     if data.tread not in model.mesh.faces:
         raise DeckError(WHOLE_DECK, f"surface {data.tread} is not defined in the section's job")
     if any(isinstance(p, Elastic) and isinstance(p.law, Hourglass) for p in model.parts):
@@ -92,7 +87,7 @@ def press(
             " round the circumference: take CGAX8R",
         )
     tread = model.mesh.faces[data.tread]
-    tyre, start = Revolved(model, loads, around), np.multiply.outer(around.turn(0).real, U)
+    tyre, start = Revolved(model, inflated.loads, around), np.multiply.outer(around.turn(0).real, U)
     surface = tread_of(model.mesh.X, tread.connectivity, around)
     law = float(np.real(data.stiffness)), float(np.real(data.friction)), data.elastic_slip
     road = flat_road(model.mesh.X, surface, *law, start)
@@ -106,16 +101,16 @@ def press(
         begin(work, np.array(list(model.mesh.index)))
     footprints: list[dict[str, Any]] = []
     failure = cause = ""
-    for load in wanted:
+    for load, request in requests.items():
         try:
             state = work.to(load)
             footprint = _footprint(work, state, load, rings)
             footprint |= slopes.at(work, state, rings)
-            if load in rim_requests:
-                footprint |= _rim_reactions(work, state, rim_requests[load])
-            if load in vibrations:
-                vibrating = _response if vibrations[load].response else _modes
-                footprint |= vibrating(work, state, vibrations[load], equations, U, rings)
+            if request.rim:
+                footprint |= _rim_reactions(work, state, request.rim)
+            if request.modes:
+                vibrating = _response if request.modes.response else _modes
+                footprint |= vibrating(work, state, request.modes, equations, U, rings)
         except (RunFailed, np.linalg.LinAlgError) as error:
             cause = getattr(error, "cause", "crashed")
             if cause == "timed_out" and work.load:
@@ -125,7 +120,7 @@ def press(
             failure = str(error)
             break
         footprints.append(footprint)
-        reached = len(footprints), len(wanted)
+        reached = len(footprints), len(requests)
         log.info("load %d of %d is reached: %g N", *reached, load, extra={"loads": reached})
     return {
         "free_radius_m": work.free_radius,
@@ -189,19 +184,18 @@ def _footprint(
     }
 
 
+def _pressed(work: ContactNewton, state: PressedState, tyre: Revolved) -> TyreOnRoad:
+    """The tyre about one load, held there by the forces on the tyre that was pressed."""
+    U = work.symmetry.spread(state.parts)
+    return TyreOnRoad(tyre, work.symmetry, U, work.tyre.residual(U), work.check)
+
+
 def _rim_reactions(
     work: ContactNewton, state: PressedState, wanted: RimRequest
 ) -> dict[str, Array]:
     """Reactions to motions of the rim about one load, with the patch held."""
-    C = rim_stiffness(
-        work.tyre,
-        work.symmetry,
-        work.symmetry.spread(state.parts),
-        held(state.contact),
-        work.check,
-        wanted.reference_z,
-        work.release_factor(),
-    )
+    pressed = _pressed(work, state, work.tyre)
+    C = rim_stiffness(pressed, held(state.contact), wanted.reference_z, work.release_factor())
     return {"rim_reactions": reactions(C, wanted.motions)}
 
 
@@ -215,25 +209,14 @@ def _modes(
 ) -> dict[str, Array]:
     """The whole tyre's modes about one load, their shapes at the wanted nodes of the rings."""
     tyre = Revolved(wanted.model, work.tyre.loads, work.tyre.around)
-    U = work.symmetry.spread(state.parts)
-    work.tyre.residual(U)
+    pressed = _pressed(work, state, tyre)
     road = state.contact.road
     smooth = replace(state.contact, road=replace(road, friction=0.0))
     holds = [held(each) for each in (state.contact, smooth)]
     holds = holds if road.friction else holds[:1]
     vibration = Vibration(wanted.model, inflated, tyre.loads, equations, 0.0)
     start = lowest_of_all(vibration, wanted.count + 2 * SPARE, work.check)
-    modes = loaded_modes(
-        tyre,
-        work.symmetry,
-        U,
-        holds,
-        start,
-        wanted.count,
-        work.check,
-        wanted.wheel_kg,
-        work.release_factor,
-    )
+    modes = loaded_modes(pressed, holds, start, wanted.count, wanted.wheel_kg, work.release_factor)
     arrays = {"mode_node": wanted.nodes}
     for name, each in zip(("mode", "sliding"), modes, strict=False):
         shapes = np.array([_at(work.symmetry.around, angles, shape) for shape in each.shapes])
@@ -242,7 +225,7 @@ def _modes(
         arrays[f"{name}_frequency_Hz"] = np.sqrt(each.eigenvalues) / (2 * np.pi)
         arrays[f"{name}_shape"] = whole[:, :, wanted.nodes]
     if wanted.model.lossy:
-        arrays["mode_damping_ratio"] = PressedLosses(tyre, U).damping_ratios(modes[0])
+        arrays["mode_damping_ratio"] = PressedLosses(tyre, pressed.U).damping_ratios(modes[0])
     if road.friction:
         arrays["mode_traction_N"] = np.array(
             [
@@ -265,21 +248,16 @@ def _response(
     request = wanted.response
     assert request is not None
     tyre = Revolved(wanted.model, work.tyre.loads, work.tyre.around)
-    U = work.symmetry.spread(state.parts)
     lowest, highest = request.lowest_Hz, request.highest_Hz
     excited, seen = request.points()
     vibration = Vibration(wanted.model, inflated, tyre.loads, equations, 0.0)
     response = PressedResponse(
-        tyre,
-        work.symmetry,
-        U,
+        _pressed(work, state, tyre),
         held(state.contact),
-        work.tyre.residual(U),
         lowest_of_all(vibration, UNLOADED_MODES, work.check),
         tread_patch(wanted.model.mesh.X, inflated, wanted.nodes, request.patch_m),
         [*excited, *seen],
         highest,
-        work.check,
         work.release_factor() if wanted.model is work.tyre.model else None,
     )
     frequencies = np.linspace(lowest, highest, request.lines)

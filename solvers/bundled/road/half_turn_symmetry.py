@@ -41,7 +41,7 @@ class HalfTurn:
         other = mirror_images(X)
         if (other < 0).any() or (free != free[other]).any():
             raise Refused("the section or its supports differ between z and -z")
-        self.other, self.around = other, around
+        self.mesh, self.other, self.around = mesh, other, around
         self.nodes = np.flatnonzero(X[:, 1] > -SAME_PLACE)
         self.beyond = other[self.nodes]
         self.parity, self.shape = parity, (around.N.shape[1], len(X), 3)
@@ -59,6 +59,10 @@ class HalfTurn:
         mask[even][:, middle, 2] = False
         mask[1 - even][:, middle, :2] = False
         self.mask = mask
+
+    def of_parity(self, parity: int) -> HalfTurn:
+        """The same of the fields that have this parity."""
+        return HalfTurn(self.mesh, self.free, self.around, parity)
 
     def spread(self, parts: Array) -> Array:
         """The field of two parts (2, f, q, 3)."""

@@ -40,6 +40,17 @@ SPARE = 3  # modes of each parity in addition to half of the requested number
 
 
 @dataclass(frozen=True)
+class TyreOnRoad:
+    """A tyre in the state that the road pressed it to, about which it is linear."""
+
+    tyre: Revolved
+    symmetry: HalfTurn  # of the state
+    U: Array  # (k, n, 3), m
+    forces: Array  # (k, n, 3), N, that hold it there
+    check: Callable[[], None]  # raises to stop
+
+
+@dataclass(frozen=True)
 class LoadedModes:
     """The m lowest modes, ascending; the modal mass of the whole tyre is 1."""
 
@@ -49,28 +60,25 @@ class LoadedModes:
 
 
 def loaded_modes(
-    tyre: Revolved,
-    pressed: HalfTurn,
-    U: Array,
+    pressed: TyreOnRoad,
     holds: Sequence[csr_matrix],
     unloaded: list[HarmonicModes],
     count: int,
-    check: Callable[[], None],
     wheel_kg: float | None = None,
     release_factor: Callable[[], ContactUpdate | None] = lambda: None,
 ) -> list[LoadedModes]:
-    """The ``count`` lowest modes about the field U (k, n, 3), m, for each stiffness of ``holds`` (k
-    n 3, k n 3), N/m, which holds the patch.
+    """The ``count`` lowest modes for each stiffness of ``holds`` (k n 3, k n 3), N/m, which holds
+    the patch.
 
-    pressed: the symmetry of U; unloaded: modes of the inflated tyre, to start from; wheel_kg: mass
-    of a wheel that is free along the load, None: it is held; release_factor: gives away a factor of
-    the stiffness near U on fields of parity 1, None: one is formed. Raises RunFailed, and what
-    ``check`` raises to stop.
+    unloaded: modes of the inflated tyre, to start from; wheel_kg: mass of a wheel that is free
+    along the load, None: it is held; release_factor: gives away a factor of the stiffness near U on
+    fields of parity 1, None: one is formed. Raises RunFailed, and what ``check`` raises to stop.
     """
-    tyre.residual(U)  # sets the state of the tangents
+    tyre, check = pressed.tyre, pressed.check
+    tyre.residual(pressed.U)  # sets the state of the tangents
 
     def lowest(parity: int, wanted: int) -> list[tuple[Array, Array]]:
-        symmetry = HalfTurn(tyre.model.mesh, pressed.free, pressed.around, parity)
+        symmetry = pressed.symmetry.of_parity(parity)
         own_kg = wheel_kg if parity == 1 else None
         # the factor goes with the search, so that one at a time is in memory
         factor = release_factor() if parity == 1 else None

@@ -25,11 +25,10 @@ from ..modes.harmonics import HarmonicModes
 from ..modes.response import ResponseResult, TreadPatch
 from ..modes.superelement import Superelement
 from ..section.symmetry import HALF_TURN
-from ..solid3d.revolved import Revolved
 from . import davidson
 from .contact_update import ContactUpdate
 from .half_turn_symmetry import HalfTurn
-from .loaded_modes import Inertia, factor_with_hold, forces_on, standing_waves
+from .loaded_modes import Inertia, TyreOnRoad, factor_with_hold, forces_on, standing_waves
 from .pressed_losses import PressedLosses
 from .rim_stiffness import MOTION_PARITY, followed, rim_motions, turning_stiffness
 
@@ -67,42 +66,36 @@ class _OneParity:
 
 
 class PressedResponse:
-    """Reduced problems of a tyre at the field U (k, n, 3), m, whose patch ``hold`` (k n 3, k n 3)
-    holds, N/m.
+    """Reduced problems of a tyre whose patch ``hold`` (k n 3, k n 3) holds, N/m.
 
-    pressed: the symmetry of U; forces (k, n, 3): what holds it there; unloaded: modes of the
-    inflated tyre; points: angle (rad) and component of points of the tread. Raises RunFailed, and
-    what ``check`` raises to stop.
+    unloaded: modes of the inflated tyre; points: angle (rad) and component of points of the tread.
+    Raises RunFailed, and what ``check`` raises to stop.
     """
 
     def __init__(
         self,
-        tyre: Revolved,
-        pressed: HalfTurn,
-        U: Array,
+        pressed: TyreOnRoad,
         hold: csr_matrix,
-        forces: Array,
         unloaded: list[HarmonicModes],
         patch: TreadPatch,
         points: Sequence[tuple[float, int]],
         highest_Hz: float,
-        check: Callable[[], None],
         factor: ContactUpdate | None = None,
     ):
-        self._tyre, self._pressed, self._hold, self._check = tyre, pressed, hold, check
+        self._pressed, self._hold = pressed, hold
         self._unloaded, self._patch, self._points = unloaded, patch, points
         self.highest_Hz = highest_Hz
-        model = tyre.model
+        tyre, U = pressed.tyre, pressed.U
         tyre.residual(U)
         self._losses = PressedLosses(tyre, U)
-        self._mass = Inertia(model, tyre.around)
-        self._turning = turning_stiffness(tyre, pressed, forces)
-        self._motions = rim_motions(tyre, pressed)
+        self._mass = Inertia(tyre.model, tyre.around)
+        self._turning = turning_stiffness(pressed)
+        self._motions = rim_motions(pressed)
         self.reduced = [self._of_parity(1, factor), self._of_parity(-1, None)]
 
     def _of_parity(self, parity: int, factor: ContactUpdate | None) -> _OneParity:
-        tyre, pressed, hold, check = self._tyre, self._pressed, self._hold, self._check
-        symmetry = HalfTurn(tyre.model.mesh, pressed.free, pressed.around, parity)
+        tyre, hold, check = self._pressed.tyre, self._hold, self._pressed.check
+        symmetry = self._pressed.symmetry.of_parity(parity)
         factor = factor or factor_with_hold(tyre, symmetry, hold, check)
         factor.to(symmetry.fold(hold))
         field = lambda x: symmetry.spread(x.reshape(symmetry.mask.shape))

@@ -31,7 +31,7 @@ from ..solid3d.gmres import gmres
 from ..solid3d.revolved import Revolved
 from .contact_update import ContactUpdate
 from .half_turn_symmetry import HalfTurn
-from .loaded_modes import factor_with_hold, forces_on
+from .loaded_modes import TyreOnRoad, factor_with_hold, forces_on
 
 Array = np.ndarray
 MOTION_PARITY = np.array(
@@ -50,26 +50,24 @@ ROAD_OF_DECK = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
 def rim_stiffness(
-    tyre: Revolved,
-    pressed: HalfTurn,
-    U: Array,
+    pressed: TyreOnRoad,
     hold: csr_matrix,
-    check: Callable[[], None],
     reference_z: float = 0.0,
     factor: ContactUpdate | None = None,
 ) -> Array:
-    """Stiffness (6, 6) of the whole tyre's rim at the field U (k, n, 3), m: forces (N) along and
-    moments (N m) about down, along, across by shifts (m) and turns (rad) at the wheel's centre.
+    """Stiffness (6, 6) of the whole tyre's rim: forces (N) along and moments (N m) about down,
+    along, across by shifts (m) and turns (rad) at the wheel's centre.
 
     hold (k n 3, k n 3), N/m: holds the patch; reference_z: the centre's place on the axle, m;
     factor: of the tangent on fields of parity 1 near U, None: one is formed. Raises RunFailed, and
     what ``check`` raises to stop.
     """
-    forces = tyre.residual(U)
-    motions = rim_motions(tyre, pressed, reference_z)
+    tyre, check = pressed.tyre, pressed.check
+    tyre.residual(pressed.U)  # sets the state of the tangents
+    motions = rim_motions(pressed, reference_z)
     C = np.zeros((6, 6))
     for parity in (1, -1):
-        symmetry = HalfTurn(tyre.model.mesh, pressed.free, pressed.around, parity)
+        symmetry = pressed.symmetry.of_parity(parity)
         own = np.flatnonzero(parity == MOTION_PARITY)
         factor = factor or factor_with_hold(tyre, symmetry, hold, check)
         factor.to(symmetry.fold(hold))
@@ -78,27 +76,26 @@ def rim_stiffness(
         # by the energy of both halves, which is off by the square of the displacements' errors
         C[np.ix_(own, own)] = [[2 * float((V * F).sum()) for F in images] for V in follow]
         factor = None
-    C += turning_stiffness(tyre, pressed, forces, reference_z)
+    C += turning_stiffness(pressed, reference_z)
     return (C + C.T) / 2
 
 
-def rim_motions(tyre: Revolved, pressed: HalfTurn, reference_z: float = 0.0) -> list[Array]:
+def rim_motions(pressed: TyreOnRoad, reference_z: float = 0.0) -> list[Array]:
     """Fields (k, n, 3) of the rim's nodes alone by its six unit motions, m and rad."""
-    X = np.real(tyre.model.mesh.X) - [0.0, reference_z]
-    fields = [rigid(X, pressed.around, shift, TURN @ turn) for shift, turn in UNIT_MOTIONS]
-    return [field * ~pressed.free for field in fields]
+    symmetry, X = pressed.symmetry, np.real(pressed.tyre.model.mesh.X) - [0.0, reference_z]
+    fields = [rigid(X, symmetry.around, shift, TURN @ turn) for shift, turn in UNIT_MOTIONS]
+    return [field * ~symmetry.free for field in fields]
 
 
-def turning_stiffness(
-    tyre: Revolved, pressed: HalfTurn, forces: Array, reference_z: float = 0.0
-) -> Array:
-    """G (6, 6) of the forces (k, n, 3) that hold the rim, and of caps at the cavity's open ends."""
-    G, X = np.zeros((6, 6)), np.real(tyre.model.mesh.X) - [0.0, reference_z]
+def turning_stiffness(pressed: TyreOnRoad, reference_z: float = 0.0) -> Array:
+    """G (6, 6) of the forces that hold the rim, and of caps at the cavity's open ends."""
+    G, X = np.zeros((6, 6)), np.real(pressed.tyre.model.mesh.X) - [0.0, reference_z]
+    symmetry = pressed.symmetry
     for i, j in zip(*np.nonzero(np.equal.outer(MOTION_PARITY[3:], MOTION_PARITY[3:])), strict=True):
         bent = (TURN[..., i] @ TURN[..., j] + TURN[..., j] @ TURN[..., i]) / 2
-        second = ~pressed.free * rigid(X, pressed.around, np.zeros(3), bent)
-        G[3 + i, 3 + j] += 2 * float((forces * second).sum())
-    G[[3, 4], [3, 4]] += _caps(tyre.loads, X)
+        second = ~symmetry.free * rigid(X, symmetry.around, np.zeros(3), bent)
+        G[3 + i, 3 + j] += 2 * float((pressed.forces * second).sum())
+    G[[3, 4], [3, 4]] += _caps(pressed.tyre.loads, X)
     return G
 
 

@@ -10,8 +10,10 @@ import numpy as np
 
 from ...language.text import Block, DeckError
 from ..deck.request import ResponseRequest
+from ..section.band import Numbering
 from ..section.model import Model
 from ..section.parts.part import TyrePart
+from ..section.parts.pressure import Pressure
 
 Array = np.ndarray
 MIN_ELASTIC_SLIP = 1e-6  # m, before friction is full: harder sticks are not reached
@@ -48,6 +50,24 @@ class RimRequest:
 
     motions: Array  # (m, 6) of the rim along and about the deck's axes, m and rad
     reference_z: float  # place on the axle of the node that they are of, m
+
+
+@dataclass(frozen=True)
+class LoadRequest:
+    """Results wanted at a load in addition to the footprint; None: none."""
+
+    modes: ModeRequest | None = None
+    rim: RimRequest | None = None
+
+
+@dataclass(frozen=True)
+class TyreToPress:
+    """The inflated tyre that a road presses."""
+
+    model: Model
+    equations: Numbering
+    loads: list[Pressure]
+    U: Array  # (n, 3), m
 
 
 def read_road(model: list[Block]) -> RoadData | None:
