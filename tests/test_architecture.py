@@ -6,17 +6,33 @@ import ast
 import re
 from collections.abc import Iterator
 from functools import cache
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
+import tyrecal_solvers.bundled
 
 ROOT = Path(__file__).parents[1]
+
+
 MAP = (ROOT / ".github" / "ARCHITECTURE.md").read_text(encoding="utf-8")
+
+
 ROOMS = re.findall(r"^(\w+) {2,}", MAP.split("```")[1], re.MULTILINE)  # from the top down
+
+
 LEAVES = ("errors", "files", "interrupt", "units", "version")
+
+
 FACES = ("__init__", "__main__")  # what is offered, and the command
+
+
 PACKAGES = {"tyrecal": "tyrecal", "solvers": "tyrecal_solvers"}
+
+
 DOCS = (ast.Module, ast.ClassDef, ast.FunctionDef)
+
+
 OTHER_LIMITS = r"(MOST|LEAST(?!_SQUARES)|LARGEST|SMALLEST|LONGEST|SHORTEST|FEWEST|HIGHEST|LOWEST)_"
 
 
@@ -169,6 +185,8 @@ def test_a_class_name_means_one_thing() -> None:
 
 
 KINDS = {"Stations", "SectionDeck", "DecksIn3D", "UserDecks", "OwnDeck", "OwnDecks", "OwnDeckMesh"}
+
+
 BRANCHES_BY_KIND_LEFT = 5  # may only fall: a tyre's kind answers (`tyre/case/kinds`)
 
 
@@ -209,7 +227,11 @@ def test_few_branches_by_kind_of_tyre() -> None:
 
 
 SHAPE = re.compile(r"\(((?:\d*[a-z]|\d)(?:, (?:\d*[a-z]|\d|[a-z]{2,}))*,?)\)")
+
+
 COORDINATES = frozenset("rzxycui")  # tuples with one of these are places, labels, vectors
+
+
 LETTERS = [
     (re.findall(r"`([\w/]+)`", folders), set(re.findall(r"`(\w)`", letters)))
     for folders, letters in re.findall(
@@ -253,3 +275,42 @@ def test_letters_of_shapes_are_in_the_map_or_explained(package: str) -> None:
         if left:
             unknown[name] = sorted(left)
     assert not unknown
+
+
+TOP = Path(tyrecal_solvers.bundled.__file__).parent
+
+
+FLOORS = [["deck"], ["section"], ["modes", "solid3d"], ["nonuniform", "road"], [""]]
+
+
+FLOOR = {room: i for i, rooms in enumerate(FLOORS) for room in rooms}
+
+
+def imports(path: Path) -> set[Path]:
+    """The solver's files that a file imports."""
+    paths = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            folder = path.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+            modules = [folder / name.name for name in node.names] if folder.is_dir() else [folder]
+            paths |= {m.with_suffix(".py") for m in modules if m.with_suffix(".py").exists()}
+    return {path for path in paths if path.is_relative_to(TOP)}  # not what all solvers share
+
+
+def room(path: Path) -> str:
+    return path.relative_to(TOP).parts[0] if path.parent != TOP else ""
+
+
+def test_imports_of_the_solver_run_downwards() -> None:
+    graph = {path: imports(path) for path in TOP.rglob("*.py")}
+    for path, needed in graph.items():
+        for other in needed:
+            here, there = room(path), room(other)
+            assert here == there or FLOOR[there] < FLOOR[here], (path, other)
+    assert sum(map(len, graph.values())) > 100  # the reading of imports works
+    TopologicalSorter(graph).prepare()
+
+
+def test_at_most_seven_rooms_at_first_sight() -> None:
+    folders = {path.name for path in TOP.iterdir() if (path / "__init__.py").exists()}
+    assert folders == set(FLOOR) - {""} and len(folders) <= 7

@@ -36,7 +36,7 @@ from ..chance import Chance, generator
 from ..studies.judge import tyre_told
 from ..studies.judge_section import LINES
 from ..studies.judge_section import section as stations_section
-from ..studies.test_programs_of_tyres import installed
+from ..studies.test_programs import installed
 from .archive import ARCHIVE, seals, unpack
 from .study3 import make as making
 from .study3.__main__ import result

@@ -15,7 +15,7 @@ from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 
 from ..chance import generator
 from . import support
-from .halves import Halves, inflated_halves
+from .support import Halves, inflated_halves
 
 Array = np.ndarray
 

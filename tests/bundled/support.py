@@ -11,19 +11,27 @@ import pytest
 from scipy.sparse import csr_array
 from tyrecal_solvers.bundled.deck import grammar
 from tyrecal_solvers.bundled.modes import harmonics
+from tyrecal_solvers.bundled.modes.harmonics import Vibration
 from tyrecal_solvers.bundled.road.contact_newton import ContactNewton, PressedState
 from tyrecal_solvers.bundled.section import inflation, mechanics, model
 from tyrecal_solvers.bundled.section.band import Numbering
-from tyrecal_solvers.bundled.section.model import Model
+from tyrecal_solvers.bundled.section.kept_fields import KeptFields
+from tyrecal_solvers.bundled.section.model import Model, build
 from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 from tyrecal_solvers.bundled.section.parts.spin import spinning
+from tyrecal_solvers.bundled.section.symmetry import MirrorHalf
 from tyrecal_solvers.errors import NoEquilibrium
 from tyrecal_solvers.language import text as language
+from tyrecal_solvers.language.text import read_keywords
 
 from tyrecal.tyre.section.mesh import build_mesh
 from tyrecal.tyre.section.section import read_section
 
+from . import support
+
 Array = np.ndarray
+
+
 SECTION = Path(__file__).parents[2] / "cases" / "p235_75r17.csv"
 
 
@@ -274,3 +282,46 @@ def order(errors: Sequence[float], ratio: float = 2.0) -> Array:
     """Observed orders between successive meshes."""
     e = abs(np.asarray(errors))
     return np.log(e[:-1] / e[1:]) / np.log(ratio)
+
+
+WAVES, COUNT = [0, 1, 2, 3], 2
+
+
+def frequencies(modes: list[harmonics.HarmonicModes]) -> Array:
+    return np.concatenate([m.eigenvalues for m in modes])
+
+
+def plain(vibration: Vibration) -> Array:
+    """omega^2 of the plain tyre, each doublet twice, in the order of the split ones."""
+    return plain_of(vibration, WAVES)
+
+
+def plain_of(vibration: Vibration, waves: list[int]) -> Array:
+    each = [(n, vibration.modes(n, COUNT).eigenvalues) for n in waves]
+    return np.concatenate([np.repeat(values, 2 if n else 1) for n, values in each])
+
+
+@dataclass(frozen=True)
+class Halves:
+    """A small tyre inflated on the whole, its model of half, coordinates of its vibrations."""
+
+    whole: Model
+    half: Model
+    symmetry: MirrorHalf
+    free: Array
+    fields: KeptFields
+    U: Array
+    loads: list[Pressure]
+
+
+def inflated_halves() -> Halves:
+    tyre = support.tyre((3, 2, 2, 1))
+    section = read_keywords(tyre.deck)
+    whole, half = build(section, None, True), build(section, None, True, half=True)
+    held, loads = support.held(whole, tyre.rim), support.cavity(whole, 240e3)
+    symmetry = half.mesh.symmetry
+    assert isinstance(symmetry, MirrorHalf)
+    free = ~held & symmetry.here[:, None]
+    fields = KeptFields(list(half.mesh.connectivity.values()), free, symmetry)
+    U = support.inflate(whole, held, loads)
+    return Halves(whole, half, symmetry, ~held, fields, U, loads)

@@ -17,7 +17,7 @@ from tyrecal_solvers.language.text import COMPLEX_STEP
 from . import support
 from .conftest import Inflated
 from .contact import ring
-from .split_modes import COUNT, WAVES, frequencies, plain
+from .support import COUNT, WAVES, frequencies, plain
 
 Array = np.ndarray
 SECTORS = 6

@@ -20,7 +20,7 @@ from tyrecal_solvers.errors import Indefinite, Refused
 from . import support
 from .conftest import Inflated
 from .contact import ring
-from .halves import Halves
+from .support import Halves
 
 Array = np.ndarray
 AROUND = half_circle(np.full(3, np.pi / 3))

@@ -1,5 +1,4 @@
-"""The real model behind the protocol: slopes against differences, parts of the section against the
-whole, coordinates, and failures."""
+"""The real model behind the protocol: slopes, parts of the section, effects carried to each fit."""
 
 from __future__ import annotations
 
@@ -15,8 +14,12 @@ from tyrecal_solvers.bundled.adapter import Bundled
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
+from tyrecal.studies.diagnose.diagnosis import diagnose
 from tyrecal.studies.inference.effect_ranges import effect_ranges
+from tyrecal.studies.inference.expansion import carried, derivatives, expand
+from tyrecal.studies.inference.inverse_problem import Assumed
 from tyrecal.studies.inference.model import Answer, Query
+from tyrecal.studies.inference.plain_fit import plain_fit
 from tyrecal.studies.inference.regions import regions
 from tyrecal.studies.inference.tyre_model import TyreModel, _key
 from tyrecal.studies.inference.uncertainties import sources
@@ -25,6 +28,7 @@ from tyrecal.tyre.case import LoadedCase, start_values
 from tyrecal.tyre.values import with_values
 
 from .coarse_model import CASE, MODEL, ROWS, X, asked
+from .toy import Toy, problem
 
 
 @pytest.mark.slow
@@ -141,6 +145,8 @@ def test_an_effect_without_slopes_takes_the_plain_tyres() -> None:
 
 
 SPLICE = "stiffness_splice"
+
+
 WIDE = with_values(CASE, {"splice.width_deg": 100.0})
 
 
@@ -233,3 +239,70 @@ def test_sensitivities_by_differences_are_the_exact_ones(monkeypatch: pytest.Mon
     assert (abs(exact.constants).max(0) > 2e-4).all() and len(wanted) == exact.constants.shape[1]
     slope, its = (each.slopes["pressure_offset"][:-1] for each in (exact, other))
     assert its == pytest.approx(slope, abs=1e-6) and abs(slope).max() > 1e-3
+
+
+START = np.array([0.2, -0.1, 0.15])
+
+
+class Sloped(Toy):
+    """With slopes by the parameters of its effects, whose shifts go with their square, too."""
+
+    sloped = ("e0", "e1")
+
+    def _answer(self, point: Query) -> Answer:
+        own = super()._answer(point)
+        slopes = {}
+        for id in point.slopes:
+            e, g = point.effects[id], self.g[id]
+            own = Answer(own.eta + e**2 * g, own.jacobian, own.split)
+            slopes[id] = g * (1 + 2 * e) + self.tilt[id] @ point.x
+        return Answer(own.eta, own.jacobian, own.split, self.constants, slopes)
+
+
+@pytest.mark.parametrize("toy", [Toy(effects=2, bend=0.05), Sloped(effects=2, bend=0.05)])
+def test_what_goes_with_x_to_first_order_is_carried_exactly(toy: Toy) -> None:
+    known, there = expand(toy, np.zeros(3)), expand(toy, START)
+    before = toy.asked
+    expansion = carried(known, toy, START)
+    assert toy.asked == before + 1
+    assert expansion.eta == pytest.approx(there.eta) and expansion.x0 == pytest.approx(START)
+    for id, nodes in there.nodes.items():
+        assert expansion.nodes[id].shift == pytest.approx(nodes.shift, abs=1e-13)
+        assert expansion.nodes[id].slope == pytest.approx(nodes.slope, abs=1e-12)
+        assert expansion.nodes[id].tilt == pytest.approx(nodes.tilt, abs=1e-13)
+
+
+def test_derivatives_of_a_polynomial() -> None:
+    nodes = np.array([-0.3, 0.0, 0.4, 1.0])
+    assert derivatives(nodes) @ nodes**3 == pytest.approx(3 * nodes**2)
+
+
+def test_the_fit_begins_with_what_is_known() -> None:
+    """The same minimum within what it ends by, asked a few times less."""
+    toy = Toy(bend=0.1)
+    p = problem(toy, toy.base + toy.J @ START + toy.bend * (START @ START))
+    known = expand(toy, np.zeros(3))
+    counts, fits = [], []
+    for each in (None, known):
+        toy.asked = 0
+        fits.append(plain_fit(toy, p.observations, p.places, 0.001, each))
+        counts.append(toy.asked)
+    assert fits[1] == pytest.approx(fits[0], abs=0.02)
+    assert counts[1] < counts[0]
+
+
+@pytest.mark.slow
+def test_a_diagnosis_with_known_effects_says_the_same() -> None:
+    """The tyre has an effect that moves along with x, and its likeliest effects are evaluated
+    again; probabilities agree within 0.01."""
+    toy = Toy(effects=3, bend=0.05)
+    truth = toy.answers([Query(START, {"e1": 0.8})])[0]
+    assert isinstance(truth, Answer)
+    p = problem(toy, truth.eta)
+    rows, assumed = list(toy.rows), Assumed(form=0.001, response_error=0.0)
+    whole, quick = (
+        diagnose(toy, rows, p.observations, assumed=assumed, known=known)
+        for known in (None, expand(toy, np.zeros(3)))
+    )
+    assert whole.verdict.key == quick.verdict.key == "e1"
+    assert quick.probabilities == pytest.approx(whole.probabilities, abs=0.01)

@@ -1,35 +1,180 @@
-"""An answer hangs on its deck alone, though Newton's method starts at the nominal tyre's shape."""
+"""Start states, inflated and on the road: the same answer, which depends on its deck alone."""
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from tyrecal_solvers.bundled.adapter import JOB, OLDJOB, PRESS
+from tyrecal_solvers.bundled.job import run
+from tyrecal_solvers.bundled.road import footprint_job, pressed_start
+from tyrecal_solvers.bundled.road.contact_newton import FirstGuess
+from tyrecal_solvers.errors import Indefinite, Refused
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
-from tyrecal.simulate.evaluate.evaluator import Evaluator, Question, _key
+from tyrecal.simulate.evaluate import executor as executor_module
+from tyrecal.simulate.evaluate.evaluator import Evaluator, PressQuestion, Question, _key
+from tyrecal.simulate.evaluate.pressed import Pressed
 from tyrecal.simulate.evaluate.results import Evaluation
 from tyrecal.simulate.evaluate.store import Store
-from tyrecal.tyre.case import start_values, with_level
+from tyrecal.studies.fit.road import press_with_slopes
+from tyrecal.studies.fit.targets import ValueTarget
+from tyrecal.tyre.case import LoadedCase, start_values, with_level
 from tyrecal.tyre.load import load_case
+from tyrecal.tyre.state import TyreState
 from tyrecal.tyre.values import overridden, with_values
 
 from ..conftest import CASES
+from .test_pressed import small_case
+
+LOADS = [1500.0]
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory: pytest.TempPathFactory) -> LoadedCase:
+    return load_case(small_case(tmp_path_factory.mktemp("case")))
+
+
+def moved(case: LoadedCase) -> dict[str, float]:
+    """Another design, at another pressure."""
+    start = start_values(case)
+    return {**start, "A_carcass": 1.3 * start["A_carcass"], "p": 1.15 * start["p"]}
+
+
+def numbers(pressed: Pressed) -> bytes:
+    """Numbers of an answer that depend on the state."""
+    first = pressed.footprints[0]
+    parts = (first.displacement, first.pressure_Pa, first.stiffness_N_per_m, first.deflection_m)
+    return b"".join(np.asarray(part).tobytes() for part in parts)
+
+
+@pytest.mark.slow
+def test_the_answer_is_that_from_nothing_and_its_bytes_depend_on_no_memory(
+    case: LoadedCase, tmp_path: Path
+) -> None:
+    """Within the tolerance of the out-of-balance force, 1e-8; run alone from its folder, with the
+    start's factor forgotten, the same bytes."""
+    base, values = start_values(case), moved(case)
+    evaluator = Evaluator(TyreDesign(case), folder=tmp_path / "runs", keep=True)
+    begun = evaluator.press(values, LOADS, base=base)
+    assert evaluator.counts.runs == 2  # the base first
+    cold = Evaluator(TyreDesign(case)).press(values, LOADS)
+    for name in ("deflection_m", "stiffness_N_per_m", "contact_area_m2"):
+        one, other = (getattr(each.footprints[0], name) for each in (begun, cold))
+        assert one == pytest.approx(other, rel=1e-6), name
+    pressed_start._FACTORS.clear()
+    (folder,) = (path.parent.parent for path in (tmp_path / "runs").rglob("start/pressed.npz"))
+    alone = tmp_path / "alone"
+    shutil.copytree(folder, alone)
+    for made in (*alone.glob(f"{PRESS}.npz"), *alone.glob(f"{PRESS}.json")):
+        made.unlink()
+    run(alone, PRESS, OLDJOB)
+    assert footprint_job.read(alone / PRESS)["footprints"][0]["stiffness_N_per_m"] == (
+        begun.footprints[0].stiffness_N_per_m
+    )
+    assert not (alone / f"{JOB}.inp").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("bad", ["unstable", "far away"])
+def test_a_bad_start_is_given_up(
+    case: LoadedCase, bad: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The answer is then that from nothing, to the byte."""
+    base, values = start_values(case), moved(case)
+    cold = numbers(Evaluator(TyreDesign(case)).press(values, LOADS))
+    pressed_start._FACTORS.clear()
+    own = pressed_start._factor
+
+    def factor(*given: Any) -> Any:
+        if bad == "unstable":
+            raise Indefinite("no minimum")
+        return own(*given)
+
+    def guess(load: float, parts: Any, deflection: float, *more: Any) -> FirstGuess:
+        return FirstGuess(load, -50 * parts, deflection, *more)
+
+    monkeypatch.setattr(pressed_start, "_factor", factor)
+    monkeypatch.setattr(pressed_start, "FirstGuess", guess)
+    assert numbers(Evaluator(TyreDesign(case)).press(values, LOADS, base=base)) == cold
+
+
+@pytest.mark.slow
+def test_the_order_of_the_questions_does_not_matter(case: LoadedCase, tmp_path: Path) -> None:
+    base, values = start_values(case), moved(case)
+    fresh = lambda: Evaluator(TyreDesign(case), store=Store(tmp_path / "record"))
+    first = fresh()
+    alone = numbers(first.press(values, LOADS, base=base))
+    again = fresh()
+    assert numbers(again.press(values, LOADS, base=base)) == alone
+    assert (again.counts.runs, again.counts.recorded) == (0, 2)
+    both = [PressQuestion(each, LOADS, base=base) for each in (base, values)]
+    evaluator = Evaluator(TyreDesign(case))
+    workers = evaluator.press_all(both, jobs=2)
+    assert [numbers(each) for each in workers if isinstance(each, Pressed)][1] == alone
+    assert evaluator.counts.runs == 2
+
+
+@pytest.mark.slow
+def test_states_that_run_side_by_side_give_the_same_bytes(case: LoadedCase) -> None:
+    """Stiffnesses at two pressures of three designs, each of which begins at the one before it, as
+    a fit asks for them; the workers stay for the next design."""
+    start = start_values(case)
+    designs = [{**start, "A_carcass": share * start["A_carcass"]} for share in (1.0, 1.2, 1.3)]
+    targets = [
+        ValueTarget("vertical_stiffness_N_per_m", 2e5, 1e3, 1.0, TyreState(kPa, LOADS[0]))
+        for kPa in (220.0, 250.0)
+    ]
+    answers = []
+    workers = set()
+    for jobs in (1, 2):
+        evaluator = Evaluator(TyreDesign(case))
+        for values, base in zip(designs, [start, *designs], strict=False):
+            answers.append(press_with_slopes(case, evaluator, targets, values, [], base, jobs)[0])
+            if jobs == 2:
+                workers.add(id(executor_module._idle[2]))
+        assert evaluator.counts.runs == 6
+    assert len(workers) == 1
+    assert all(np.all(answer > 0) for answer in answers)
+    assert [a.tobytes() for a in answers[:3]] == [a.tobytes() for a in answers[3:]]
+
+
+@pytest.mark.slow
+def test_a_start_that_is_not_the_one_named_is_refused(case: LoadedCase, tmp_path: Path) -> None:
+    evaluator = Evaluator(TyreDesign(case), folder=tmp_path, keep=True)
+    evaluator.press(moved(case), LOADS, base=start_values(case))
+    (start,) = tmp_path.rglob("start/pressed.npz")
+    inflate = start.with_name(f"{OLDJOB}.inp")
+    inflate.write_text(inflate.read_text().replace("CAVITY, P, 2", "CAVITY, P, 3"))
+    with pytest.raises(Refused, match="start is not the tyre that the deck names"):
+        run(start.parent.parent, PRESS, OLDJOB)
+    start.unlink()
+    with pytest.raises(Refused, match=r"start/pressed.npz is not there"):
+        run(start.parent.parent, PRESS, OLDJOB)
+
 
 CASE = with_level(load_case(CASES / "p235_75r17.yaml"), "coarse")
+
+
 START = start_values(CASE)
+
+
 NEAR = {name: 1.03 * value for name, value in START.items()}
+
+
 FAR = {name: 0.8 * value for name, value in START.items()}
 
 
 def ask(evaluator: Evaluator, values: dict[str, float], *gradients: str) -> bytes:
     """Return the numbers of an answer."""
-    return numbers(evaluator.evaluate(Question(values, gradients)))
+    return frequencies(evaluator.evaluate(Question(values, gradients)))
 
 
-def numbers(evaluation: Evaluation | Exception) -> bytes:
+def frequencies(evaluation: Evaluation | Exception) -> bytes:
     assert isinstance(evaluation, Evaluation)
     shapes = [mode.shape.amplitude for mode in evaluation.modes]
     return b"".join(
@@ -57,7 +202,7 @@ def test_same_bytes_by_workers() -> None:
     questions = [Question(values) for values in (FAR, START, NEAR)]
     pooled = Evaluator(TyreDesign(CASE)).evaluate_all(questions, jobs=2)
     alone = Evaluator(TyreDesign(CASE)).evaluate_all(questions)
-    assert list(map(numbers, pooled)) == list(map(numbers, alone))
+    assert list(map(frequencies, pooled)) == list(map(frequencies, alone))
 
 
 def test_what_was_set_before_does_not_count() -> None:

@@ -14,8 +14,7 @@ from tyrecal.studies.fit.search import AT_CROSSING
 from tyrecal.tyre.state import AS_THE_CASE
 
 from ..calibrated import calibrate
-from .fake import LABELS, POINTS, FakeEvaluator, shape
-from .known_truth import CASE, START, evaluator
+from .fake import CASE, LABELS, POINTS, START, FakeEvaluator, evaluator, shape
 
 pytestmark = pytest.mark.numbers
 

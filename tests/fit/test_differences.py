@@ -13,7 +13,7 @@ from tyrecal.studies.fit.problem import Problem
 from tyrecal.studies.variable import DesignVariable
 
 from ..calibrated import calibrate
-from .known_truth import CASE, START, START_X, evaluator
+from .fake import CASE, START, START_X, evaluator
 
 
 def asked_slopes(ask: Any, start: dict[str, float], step: float = 0.1, **how: Any) -> Any:

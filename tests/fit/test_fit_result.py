@@ -12,8 +12,7 @@ from tyrecal.studies.fit.problem import Problem
 from tyrecal.studies.fit.result import StartReport, fit_result
 
 from ..calibrated import calibrate
-from .fake import LABELS, FakeEvaluator
-from .known_truth import CASE, POWERS, START, START_X, TARGETS, TRUTH, evaluator
+from .fake import CASE, LABELS, POWERS, START, START_X, TARGETS, TRUTH, FakeEvaluator, evaluator
 
 
 def test_says_that_it_did_not_move() -> None:

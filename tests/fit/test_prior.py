@@ -26,7 +26,7 @@ from tyrecal.tyre.case.schema import TargetMode
 from ..calibrated import calibrate
 from ..chance import generator
 from ..conftest import CASES
-from .test_total_error import coarse
+from .test_uncertainty import coarse
 from .tyre_in_states import CASE, SIGMA, START, TRUTH, TyreInStates, case_with, fitted, measured
 
 Array = np.ndarray

@@ -16,7 +16,7 @@ from tyrecal.studies.fit.search import CrossingWatch, _designs_beyond
 from tyrecal.studies.fit.targets import Target
 from tyrecal.tyre.state import AS_THE_CASE
 
-from .known_truth import START_X, evaluator, with_targets
+from .fake import START_X, evaluator, with_targets
 from .linear import Linear, linear, point
 
 Array = np.ndarray

@@ -21,8 +21,8 @@ from tyrecal.tyre.load import load_case
 from tyrecal.tyre.values import with_values
 
 from ..conftest import CASES
-from ..diagnose.test_calibrated import exact
 from ..diagnose.test_diagnosis import diagnosed
+from ..diagnose.test_present_effects import exact
 from ..diagnose.toy import Toy
 
 NUMBER = "0123456789.+\N{MINUS SIGN} "

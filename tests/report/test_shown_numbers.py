@@ -35,7 +35,7 @@ from tyrecal.studies.sample.result import SampleResult
 from tyrecal.studies.signature import Signature
 
 from .html import ring, ring_inference, ring_under_load
-from .test_pressure import rows as pressure_rows
+from .test_footprint import rows as pressure_rows
 from .test_shape_data import run_of
 from .test_table import lines
 

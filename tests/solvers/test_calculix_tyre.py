@@ -35,7 +35,7 @@ from ..blind.laws import tread_density
 from ..conftest import CASES
 from ..studies.blind_calculix import common_problem
 from ..studies.calculix import common
-from .test_calculix_decks import main_case
+from .test_calculix_files import main_case
 
 
 def coarse_case(folder: Path) -> Path:

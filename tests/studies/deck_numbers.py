@@ -34,7 +34,7 @@ from tyrecal.tyre.own_deck.numbers import assigned, plain_number
 from tyrecal.tyre.own_deck.own_deck import read_own_deck
 from tyrecal.tyre.own_deck.text import Block, Row
 
-from ..tyre import own_decks, test_maker_decks
+from ..tyre import own_decks, test_membranes
 from ..tyre.test_own_deck import write
 
 CASE = Path(__file__).parents[2] / "cases" / "p235_75r17.yaml"
@@ -76,7 +76,7 @@ DECKS: dict[str, Callable[[], str]] = {
 def decks(folder: Path, name: str) -> Path:
     """Write a deck with all of its files; returns the path of the first."""
     path = folder / f"{name}.inp"
-    path.write_text(DECKS[name]() if name in DECKS else test_maker_decks.recorded(name, folder))
+    path.write_text(DECKS[name]() if name in DECKS else test_membranes.recorded(name, folder))
     return path
 
 

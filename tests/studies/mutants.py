@@ -74,7 +74,7 @@ NEW = {  # where an area's tests are; else tests/AREA/
 PROCESSES = {  # tests whose work happens in processes that `cover` does not see into
     "solvers/calculix/": ["tests/solvers/test_calculix_runs.py"],
     "tyrecal/simulate/evaluate/pool": ["tests/evaluate/test_pool.py"],
-    "tyrecal/simulate/evaluate/executor": ["tests/evaluate/test_executor.py"],
+    "tyrecal/simulate/evaluate/executor": ["tests/evaluate/test_pool.py"],
     "tyrecal/simulate/evaluate/cluster": [
         "tests/batch/test_cluster.py",
         "tests/evaluate/test_queue.py",

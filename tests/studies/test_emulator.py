@@ -28,8 +28,7 @@ from tyrecal.studies.emulator import (
 from tyrecal.studies.variable import DesignVariable
 
 from ..chance import Chance, generator
-from ..fit.fake import LABELS, FakeEvaluator, shape
-from ..fit.known_truth import START, evaluator
+from ..fit.fake import LABELS, START, FakeEvaluator, evaluator, shape
 from ..fit.test_crossing import CoupledEvaluator
 
 pytestmark = pytest.mark.numbers

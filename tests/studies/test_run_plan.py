@@ -1,16 +1,18 @@
-"""The plan of a run on the road: its numbers by hand, its words, and what the commands print."""
+"""Plans of runs on the road and of differences: numbers by hand, and their words."""
 
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
-from tyrecal.studies import run_plan
+from tyrecal.studies import difference_runs, run_plan
+from tyrecal.studies.difference_runs import runs_in_words
 from tyrecal.studies.run_plan import (
     FIRST_LOAD_S,
     FURTHER_DESIGN_S,
@@ -117,3 +119,32 @@ def test_a_dry_run_of_a_fit_over_two_pressures(
     assert run(*words, "--method", "gauss-newton", "--starts", "2") == 0
     printed = capsys.readouterr().out
     assert "about 14 designs x 3 states x 0, 1 or 2 loads: about 56 runs; about" in printed
+
+
+@dataclass
+class Tyre:
+    """An evaluator whose run takes 12 s, if it is not recorded."""
+
+    has_gradients: bool = False
+    store: object = None
+    counts: SimpleNamespace = field(default_factory=lambda: SimpleNamespace(runs=0, clock_s=0.0))
+    solver = SimpleNamespace(name="calculix")
+
+    def evaluate(self, question: object) -> None:
+        """Run, or recall."""
+        if not self.store:
+            self.counts.runs, self.counts.clock_s = self.counts.runs + 1, self.counts.clock_s + 12.0
+
+
+@pytest.mark.parametrize(
+    ("tyre", "words"),
+    [
+        (Tyre(), "300 runs of solver 'calculix', 12 s each: about 30 min with 2 at a time"),
+        (Tyre(store="recorded"), "300 runs of solver 'calculix', 12 s each: about 30 min"),
+        (Tyre(has_gradients=True), ""),
+    ],
+)
+def test_runs_and_time(tyre: Tyre, words: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(difference_runs, "monotonic", lambda: tyre.counts.clock_s)
+    assert words in runs_in_words(tyre, {}, 300, 2)  # type: ignore[arg-type]
+    assert tyre.counts.runs == bool(words)

@@ -16,8 +16,7 @@ from ..cli.test_cli import run
 from . import maker_decks
 from .own_decks import STYLES as OTHER_STYLES
 from .own_decks import plain
-from .test_maker_decks import recorded
-from .test_membranes import maker
+from .test_membranes import maker, recorded
 
 STYLES = {"plain": plain, **OTHER_STYLES}
 
