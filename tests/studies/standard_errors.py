@@ -17,10 +17,12 @@ depart from the error by Sigma. That of `diagnose` also knows how far a variable
 start (`DesignVariable.spread`), which is part of the error it is compared with. Totals are as long
 as chi2 per degree of freedom is below 1; else `fit` scales them.
 
-`fit --prior` weighs by the whole covariance and by what is known before, as the other two do. Its
-lines have for each variable its total over the standard error of `diagnose`, and of the tyres that
-are sampled over that of `sample`, linear and by draws (a 90 % interval over 3.29); `clear` where
-the interval keeps a tenth of the range from both bounds. The third command counts a record.
+`fit --prior` weighs by the whole covariance and by what is known before, as `diagnose` does;
+`sample` knows bounds alone, so what is known before is added to its results here. Lines have for
+each variable the total over the error of `diagnose`, and of the tyres that are sampled over that of
+`sample`, linear and by draws (a 90 % interval over 3.29), each of ln of the variable at its own
+likeliest design; `clear` where the interval keeps a tenth of the range from both bounds. The third
+command counts a record.
 """
 
 from __future__ import annotations
@@ -46,9 +48,8 @@ from tyrecal.studies.fit.problem import Point, Problem
 from tyrecal.studies.fit.total_error import TotalError, total_error
 from tyrecal.studies.fit.uncertainty import uncertainty
 from tyrecal.studies.result import StudyInput
-from tyrecal.studies.sample.result import SampledVariable
-from tyrecal.studies.sample.result import result as sample_result
 from tyrecal.studies.sample.study import run as sample
+from tyrecal.studies.variable import read_variable
 from tyrecal.tyre.case import LoadedCase
 
 from ..calibrated import calibrate
@@ -109,43 +110,47 @@ def sampled_errors(case: LoadedCase, seed: int) -> tuple[Array, Array]:
 
 def diagnosed_errors(case: LoadedCase) -> Array:
     """Standard deviations (v,) of ln of each variable by `diagnose`, without an effect."""
-    return np.array([each["standard_error"] / each["value"] for each in diagnosed(case).values()])
-
-
-def diagnosed(case: LoadedCase) -> dict[str, Any]:
-    """Entries of each variable as `diagnose` calibrates it, without an effect."""
     with TemporaryDirectory() as folder:
         file = Path(folder, "measured.csv")
         file.write_text(measurements_csv(table_of(case)))
         made = diagnosis.study(case, Evaluator(TyreDesign(case)), file, effects=list(CHEAPEST))
-    return calibrated_variables(made.diagnosis, made.model)["without"]
+    own = calibrated_variables(made.diagnosis, made.model)["without"].values()
+    return np.array([each["standard_error"] / each["value"] for each in own])
 
 
 def prior_line(case: LoadedCase, seed: int, sampled: bool) -> dict[str, Any]:
     """Totals of a fit with what is known before over the errors of the others, by variable."""
     fit = calibrate(case, Evaluator(TyreDesign(case)), "gauss-newton", prior=True).found
-    given = StudyInput(case, Evaluator(TyreDesign(case)), {})
-    draws = sample_result(sample(given, None, DRAWS, seed), seed).variables if sampled else {}
+    errors = {"diagnose": diagnosed_errors(case)}
+    if sampled:
+        errors |= known_before(case, seed)
+    clear = errors.pop("clear", None)
     line: dict[str, Any] = {"chi2_per_dof": fit.chi2_per_dof, "variables": {}}
-    for name, other in diagnosed(case).items():
-        own = fit.variables[name]
-        total = own.standard_error_total or np.nan
-        ratios = {"at_bound": own.at_bound, "diagnose": total / other["standard_error"]}
-        if name in draws:
-            of = draws[name]
-            ratios |= {"linear": total / of.standard_error, "clear": is_clear(of)}
-            ratios["draws"] = total / ((of.high - of.low) / (2 * QUANTILE_90))
-        line["variables"][name] = {k: v if k in FLAGS else round(v, 4) for k, v in ratios.items()}
+    for i, (name, own) in enumerate(fit.variables.items()):
+        total = (own.standard_error_total or np.nan) / own.value
+        ratios = {other: round(float(total / each[i]), 4) for other, each in errors.items()}
+        flags = {} if clear is None else {"clear": bool(clear[i])}
+        line["variables"][name] = {"at_bound": own.at_bound, **ratios, **flags}
     return line
 
 
-FLAGS = ("at_bound", "clear")
-
-
-def is_clear(variable: SampledVariable) -> bool:
-    """Whether its 90 % interval keeps a tenth of its range from both bounds."""
-    margin = (variable.upper - variable.lower) / 10
-    return variable.lower + margin < variable.low and variable.high < variable.upper - margin
+def known_before(case: LoadedCase, seed: int) -> dict[str, Array]:
+    """Errors (v,) of ln of each variable by `sample` and what is known before, linear and by draws;
+    clear (v,): whether their 90 % interval keeps a tenth of the range from both bounds."""
+    result = sample(StudyInput(case, Evaluator(TyreDesign(case)), {}), None, DRAWS, seed)
+    variables = [read_variable(case, name) for name in case.case.variables]
+    mean, sd = np.array([[v.scaled(v.start), v.spread] for v in variables]).T
+    linear = np.linalg.inv(np.linalg.inv(result.drawn.covariance) + np.diag(sd**-2))
+    x = result.drawn.chains.flat
+    weights = np.exp(-(((x - mean) / sd) ** 2).sum(1) / 2)
+    low, high = np.quantile(x, [0.05, 0.95], axis=0, weights=weights, method="inverted_cdf")
+    lower, upper = np.array([[v.scaled(v.lower), v.scaled(v.upper)] for v in variables]).T
+    margin = (upper - lower) / 10
+    return {
+        "linear": np.sqrt(np.diag(linear)),
+        "draws": (high - low) / (2 * QUANTILE_90),
+        "clear": (lower + margin < low) & (high < upper - margin),
+    }
 
 
 def prior_lines(count: int, seed: int, sampled: int, sizes: Sequence[str]) -> None:
