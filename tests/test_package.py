@@ -45,7 +45,7 @@ def files() -> list[Path]:
 
 
 def test_every_package_of_the_tree_ships() -> None:
-    tree = {name_of(path.parent) for path in files() if path.suffix != ".md"}
+    tree = {name_of(path.parent) for path in files() if path.suffix == ".py"}
     assert sorted(tree) == sorted(SETUP["packages"])
 
 
@@ -53,8 +53,9 @@ def test_every_file_of_a_package_ships() -> None:
     data = SETUP["package-data"]
     for path in files():
         if path.suffix not in (".py", ".md"):
-            patterns = data.get(name_of(path.parent), [])
-            assert any(fnmatch.fnmatch(path.name, p) for p in patterns), path
+            package = next(each for each in path.parents if (each / "__init__.py").exists())
+            patterns, inside = data.get(name_of(package), []), path.relative_to(package)
+            assert any(fnmatch.fnmatch(str(inside), p) for p in patterns), path
 
 
 def core() -> list[metadata.Distribution]:
