@@ -75,10 +75,7 @@ PROCESSES = {  # tests whose work happens in processes that `cover` does not see
     "solvers/calculix/": ["tests/solvers/test_calculix_runs.py"],
     "tyrecal/simulate/evaluate/pool": ["tests/evaluate/test_pool.py"],
     "tyrecal/simulate/evaluate/executor": ["tests/evaluate/test_pool.py"],
-    "tyrecal/simulate/evaluate/cluster": [
-        "tests/batch/test_cluster.py",
-        "tests/evaluate/test_queue.py",
-    ],
+    "tyrecal/simulate/evaluate/cluster": ["tests/batch/test_cluster.py"],
 }
 QUICK = "not (slow or guide or ccx or browser or cluster or lint)"
 SLOW = QUICK.replace("slow or ", "")
