@@ -70,7 +70,8 @@ class CaseModes:
 
     def signals(self, mode: Mode, sensors: Sensors) -> Array:
         """Motions along the sensors' directions in both modes of a doublet, (k, 2): real and
-        imaginary part of amplitude exp(i c Theta); for c = 0 in one, (k, 1).
+        imaginary part of amplitude exp(i c Theta), in components r, theta, z as the directions;
+        for c = 0 in one, (k, 1).
 
         Raises InputError if a sensor is not on the tyre.
         """

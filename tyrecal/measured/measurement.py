@@ -31,7 +31,8 @@ class Measurement:
 
     quantity: str  # one of USUAL_MEASUREMENTS
     label: Label | None  # None if it is not a frequency, or has no label yet
-    member: str  # 1 or 2 of a doublet, symmetric or antisymmetric under load; "": one for both
+    # 1 or 2 of a doublet; under load symmetric or antisymmetric about the patch; "": one for both
+    member: str
     pressure_kPa: float  # 0 for the mass
     load_N: float  # 0: unloaded
     value: float

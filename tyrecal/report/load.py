@@ -13,7 +13,8 @@ from ..studies.loaded_result import LoadRow, LoadSweep
 from .figure import COLOURS, MARKERS, in_house_style, new_figure
 from .pressure import GAP, name_lines
 
-MEMBER_STYLES: dict[str, dict[str, Any]] = {  # symmetric solid, antisymmetric dashed and hollow
+# symmetric about the patch solid, antisymmetric dashed and hollow
+MEMBER_STYLES: dict[str, dict[str, Any]] = {
     SYMMETRIES[0]: {"ls": "-"},
     SYMMETRIES[1]: {"ls": (0, (4, 2)), "mfc": "white"},
 }

@@ -6,8 +6,8 @@ displacement u there and its derivative by the angle:
 
     F = 1 + B0 u + B1 du/dTheta,   q = q0 + b0 u + b1 du/dTheta
 
-F: deformation gradient of rubber; q: deformed vector along a cord, q0 before. In the shapes below,
-e is the number of elements of a part and a the number of nodes of one element.
+F: deformation gradient of rubber; q: deformed vector along a cord, of length 1 before (q0). In the
+shapes below, e is the number of elements of a part and a the number of nodes of one element.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ Tangents = tuple[Array, Array, Array, Array]  # connectivity (e, a), three of (s
 
 
 class Revolved:
-    """Forces and tangents of the revolved tyre about the state that `residual` was last given."""
+    """Forces, energy and tangents, about the state that `residual` was last given, of the angles
+    that ``around`` covers: of half the tyre with a `HalfCircle`."""
 
     def __init__(self, model: Model, loads: Sequence[TyrePart], around: Circumference):
         self.model, self.loads, self.around = model, loads, around

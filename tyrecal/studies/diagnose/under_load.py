@@ -63,7 +63,8 @@ def compare(
 ) -> UnderLoad:
     """Each tyre (name to values of the case's numbers) pressed at the measured pressures and loads.
 
-    The same measured several times counts as its mean.
+    The rim of a pressed tyre is held; for modes it is as the case's ``road.wheel`` has it. The same
+    measured several times counts as its mean.
     """
     rows: list[LoadedRow] = []
     failed: dict[str, None] = {}

@@ -27,7 +27,7 @@ class Source:
     name: str
     steps: dict[str, float]  # change of numbers by path, in their units, at one standard deviation
     words: str  # the same in words
-    field: SectionField | None = None  # of the section; steps are then empty
+    field: SectionField | None = None  # at one standard deviation; steps are then empty
 
 
 def sources(case: LoadedCase) -> tuple[list[Source], bool]:

@@ -1,7 +1,8 @@
 """Hints on compounds whose losses in a vibration are not known, or not those of their Prony series.
 
 A Prony series fitted to relaxation ends far below the modes of a tyre. Beyond its last term its
-modulus is constant, and its loss factor falls as 1 / f, to a tenth or less of a compound's.
+modulus is constant, and its loss factor falls as 1 / f, to a tenth or less of a compound's. No
+damping ratio counts the loss of a series.
 """
 
 from __future__ import annotations
