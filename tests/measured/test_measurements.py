@@ -216,6 +216,9 @@ def test_a_rim_is_told_where_it_is_not_the_cases(tmp_path: Path) -> None:
     free = with_values(case, {"rim.free": True})
     assert [each.rim for each in in_states(case, rows)] == [None, "free", None]
     assert [each.rim for each in in_states(free, rows)] == ["fixed", None, None]
+    pressed = replace(rows[0], quantity="vertical_stiffness_N_per_m", label=None, load_N=4000.0)
+    for rim in ("fixed", "free", None):  # whichever is stated, it is computed on a clamped rim
+        assert in_states(free, [replace(pressed, rim=rim)])[0].rim is None
     with pytest.raises(InputError, match="line 3: the rim has no springs in this case"):
         in_states(case, [rows[0], replace(rows[1], rim="springs")])
 

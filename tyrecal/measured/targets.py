@@ -188,9 +188,14 @@ def _refuse_states(case: LoadedCase, readings: Sequence[Measurement]) -> None:
 
 
 def in_states(case: LoadedCase, readings: Sequence[Measurement]) -> list[Measurement]:
-    """Measurements whose ``rim`` is stated only if it differs from the case's. Raises InputError if
-    the case cannot be in a state."""
-    with_rims = [replace(each, rim=each.state.of(case).rim) for each in readings]
+    """Measurements whose ``rim`` is stated only if it differs from the case's, and of frequencies
+    and the mass alone: a tyre is pressed on a clamped rim. Raises InputError if the case cannot be
+    in a state."""
+    is_pressed = lambda each: each.load_N and each.quantity != "frequency_Hz"
+    with_rims = [
+        replace(each, rim=None if is_pressed(each) else each.state.of(case).rim)
+        for each in readings
+    ]
     _refuse_states(case, [each for each in with_rims if each.rim])
     return with_rims
 
