@@ -30,7 +30,8 @@ class ResultModes:
     eigenvalues: Array  # (m,): omega^2 in 1/s2
     masses: Array  # (m,): generalised, of the shapes in `displacement`
     nodes: Array  # (k,): numbers
-    coordinates: Array  # (k, 3): undeformed, of *NODE; else COORD
+    # (k, 3): undeformed, of record 1901; of a node without one COORD, which may be inflated
+    coordinates: Array
     displacement: Array  # (m, k, 3): any scale
 
 

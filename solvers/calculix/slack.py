@@ -30,14 +30,14 @@ MAX_PLACES = 3  # in the message
 
 @dataclass(frozen=True)
 class Strip:
-    """A ply of tension-only cords in one element: where it is, its cord's angle from the meridian
-    in degrees, and the two pairs of nodes that it runs between."""
+    """A ply of tension-only cords in one element: where it is, its cord's angle in degrees from
+    the meridian towards theta, and the two pairs of nodes that it runs between."""
 
     layer: str
     region: str
     material: str
     angle_deg: float
-    ends: list[list[int]]  # node numbers
+    ends: list[list[int]]  # node numbers, of the end towards -z first
 
 
 def read_strips(sector: Path) -> list[Strip]:

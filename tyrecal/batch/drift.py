@@ -52,8 +52,8 @@ DEFAULTS = {
     "sample/predicted_Hz": {"relative": 1e-3},
     "plan/hours": {"absolute": 1.0},
     "plan/chance": {"absolute": 0.03},
-    "plan/percent": {"relative": 0.05},
-    "diagnose/verdict": {"absolute": 0.0},
+    "plan/percent": {"relative": 0.05},  # standard deviation of a variable after the plan
+    "diagnose/verdict": {"absolute": 0.0},  # 1; another verdict has another name
     "diagnose/gap_p_value": {"absolute": 0.01},
     "diagnose/gap_rms_percent": {"relative": 0.01},
     "diagnose/probability": {"absolute": 0.02},

@@ -36,7 +36,8 @@ from .result import (
 )
 
 Array = np.ndarray
-# places in a rim's stiffness: shifts along down, axle and rolling direction, and turns about them
+# places in a rim's stiffness: shifts along down, axle and rolling direction, and turns about them,
+# right-handed as the deck's axes 1, 2, 3
 VERTICAL, LATERAL, LONGITUDINAL, TORSION, SPIN = 0, 1, 2, 3, 4
 
 

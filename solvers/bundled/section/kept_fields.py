@@ -8,7 +8,9 @@ of fields and forces are those of the coordinates. With z > 0 first, the middle 
     [E^H D] [m] = [g]       S m = g - Re(W^H L^-1 f),  c = L^-H (L^-1 f - W m)
 
 The band of L is that of half as many unknowns. Real and imaginary parts alternate in a coordinate
-vector, so that vector and K are real in them. Imaginary parts on the middle plane are zero.
+vector, so that vector and K are real in them. Imaginary parts on the middle plane are zero. K is
+that of one harmonic. Shapes: s equations of c, of which E couples the last ``near``, m of the
+middle plane, k columns.
 """
 
 from __future__ import annotations
@@ -135,9 +137,9 @@ def _complex(x: Array) -> Array:
 
 
 class KeptCholesky:
-    """Factor of K(n) as above: of its band (b + 1, s), which it overwrites, and its ``corner``: E
-    of the band's last equations, over D. phase (m,): 1 or i; times a real coordinate it is the
-    field on the middle plane. Raises Indefinite.
+    """Factor of K as above: of its band (bandwidth + 1, s), which it overwrites, and its
+    ``corner``: E of the band's last equations, over D. phase (m,): 1 or i; times a real coordinate
+    it is the field on the middle plane. Raises Indefinite.
     """
 
     def __init__(self, band: Array, corner: Array, phase: Array):

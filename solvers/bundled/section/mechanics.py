@@ -47,7 +47,7 @@ def _forces(model: Model, U: Array, loads: Sequence[TyrePart]) -> OfElements:
 def tangents(
     model: Model, U: Array, loads: Sequence[TyrePart], harmonics: bool
 ) -> tuple[OfElements, OfElements, OfElements]:
-    """Element matrices of K(n) = K0 + i n K1 + n^2 K2.
+    """Element matrices of K(n) = K0 + i n K1 + n^2 K2, n the harmonic.
 
     K0, K2 are symmetric, K1 antisymmetric. Without ``harmonics`` only K0 is formed, which is
     also the Newton tangent of the axisymmetric state.

@@ -77,7 +77,7 @@ def calculix_context(tyre: Tyre) -> TemplateNames:
         "nodes": sector.nodes,
         "node_sets": [("SECTION", sector.section), ("BEHIND", sector.behind), ("RIM", sector.rim)]
         + ([("BETWEEN", [node for node, _ in sector.between])] if sector.between else []),
-        "between": sector.between,
+        "between": sector.between,  # (node halfway between the faces, node in front of it)
         # cosine and sine of the turn, -pi / sectors about z, from a sector's face to its middle
         "half_turn": (float(np.cos(np.pi / sectors)), -float(np.sin(np.pi / sectors))),
         "inner_face": INNER_FACE,
@@ -137,7 +137,7 @@ def _rubbers(case: Case) -> list[TemplateNames]:
 def _plies(case: Case, sector: Sector) -> list[TemplateNames]:
     """One material a layer and strip, in bricks on top of the rubber's: stiffness E A / (s t) along
     the cords, their mass; s the cords' spacing, t the strip's own thickness; angles from the
-    meridian."""
+    meridian, which runs from -z to +z, towards theta."""
     plies, number = [], len(sector.bricks)
     for name, layer in case.rebar_layers.items():
         cord: Any = case.materials[layer.material]

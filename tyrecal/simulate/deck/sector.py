@@ -30,7 +30,7 @@ class PlyStrip:
     """An element of a ply."""
 
     element: int  # its number in the section
-    along: tuple[float, float]  # unit vector (r, z) along its meridian
+    along: tuple[float, float]  # unit vector (r, z) along its meridian, from -z to +z
     radius: float  # of the cord line's middle, m
     # its volume over the cord surface's area, m: less than the ply's where the line has a kink
     thickness: float

@@ -55,9 +55,9 @@ class Footprint:
     # modes of a patch that slides freely, as the two above
     sliding_frequency_Hz: of.HertzArray | None = None
     sliding_shape: of.Shapes3D | None = None
-    # (6, 6) rows: shifts (m), then turns (rad) of the rim along and about the deck's axes (down,
-    # axle, rolling direction); columns: forces and moments, N and N m, that they take, likewise;
-    # the patch is held
+    # (6, 6) rows: shifts (m), then turns (rad) of the rim along and about the deck's axes 1, 2,
+    # 3 (down, axle, rolling direction, right-handed); columns: forces and moments, N and N m, that
+    # they take, likewise; the patch is held
     rim_reactions: Annotated[Array, of.shaped(of.REAL, 6, 6)] | None = None
     # responses with the rim and the patch held, as `Solver.read` has them
     response: Mapping[str, Any] | None = None

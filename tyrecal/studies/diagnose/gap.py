@@ -102,7 +102,7 @@ def find_gap(problem: InverseProblem, d: Array, variables: tuple[str, ...]) -> G
     bias: dict[str, dict[str, float]] = {name: {} for name in variables}
     for id, nodes in problem.expansion.nodes.items():
         e = np.array([max(nodes.reach, key=abs)])  # the farther end of what has a solution
-        g = problem.added({id: e}, 1)[0][0] - shift[0]
+        g = problem.added({id: e}, 1).shift[0] - shift[0]
         whole = g @ inverse @ g
         absorbed[id] = float(1 - g @ P @ g / whole) if whole > 0 else 0.0
         for name, change in zip(variables, absorbing @ g, strict=True):

@@ -424,7 +424,7 @@ def _explained(diagnosis: Diagnosis, key: str | None) -> EffectEstimate | None:
         return None
     hypothesis = diagnosis.hypothesis(key)
     effects = {id: np.array([e]) for id, e in hypothesis.mean().items()}
-    shift = diagnosis.bare.added(effects, 1)[0][0] - diagnosis.bare.added({}, 1)[0][0]
+    shift = (diagnosis.bare.added(effects, 1).shift - diagnosis.bare.added({}, 1).shift)[0]
     P, _, _ = projection(diagnosis.bare, hypothesis.fitted.d[hypothesis.best])
     size = {**diagnosis.parameter(key), "lambda": float(shift @ P @ shift)}
     return EffectEstimate(effect=key.split("+")[0], **size)

@@ -131,7 +131,7 @@ def _least_squares(problem: InverseProblem, hold: Array, sizes: Mapping[str, flo
     d, fitted = np.zeros(len(problem.centre)), problem.only(used)
     weight = 1 / np.sqrt(np.mean(fitted.observations.scatter**2))
     for _ in range(LEAST_SQUARES_STEPS):
-        J = fitted.plain(d)[1] + fitted.added(effects, 1)[1][0]
+        J = fitted.plain(d)[1] + fitted.added(effects, 1).tilt[0]
         errors = (fitted.observations.y - fitted.predicted(effects, d[None]))[0]
         tall = np.vstack([weight * J, np.diag(1 / problem.spread)])
         right = np.concatenate(

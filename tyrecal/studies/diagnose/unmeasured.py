@@ -71,7 +71,9 @@ def likeliest(
     best = int(np.argmax(hypothesis.posterior))
     eta, unknown = problem.expansion.eta[places], np.full(len(places), np.nan)
     unseen = tuple(Observable.of(rows[i]) for i in places)
-    observations = Observations(unseen, eta, 0 * eta, 0.0, unknown, unknown)
+    observations = Observations(
+        unseen, eta, 0 * eta, common=0.0, split=unknown, split_scatter=unknown
+    )
     effects = {id: e[[best]] for id, e in hypothesis.values.items()}
     d, zeta = hypothesis.fitted.d[[best]], float(hypothesis.fitted.zeta[best])
     there = replace(problem, observations=observations, places=places, zeta=0.0)
@@ -101,6 +103,7 @@ def expected_by(
             split_scatter=np.append(measured.split_scatter, none),
         ),
     )
+    # shift, tilt and uncertainty of eta of all n + m rows
     added = joint.added({id: e[on] for id, e in hypothesis.values.items()}, len(on))
     couplings: list[tuple[int | None, Array]] = [(None, np.ones(len(on)))]
     if joint.veering.active:

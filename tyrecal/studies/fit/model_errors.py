@@ -42,7 +42,9 @@ class ModelErrors:
     def covariance(self, scatter: Array) -> Array:
         """Sigma (n, n) of ln q; scatter (n,): relative standard deviations."""
         none = np.full(len(self.rows), np.nan)
-        observed = Observations(self.rows, none, scatter, 0.0, none, none)
+        observed = Observations(
+            self.rows, none, scatter, common=0.0, split=none, split_scatter=none
+        )
         of_frequencies = covariance(observed, self.by_constants, self.laws)
         return of_frequencies + np.diag(self.road**2)
 

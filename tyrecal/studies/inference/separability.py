@@ -59,7 +59,7 @@ def separate(problem: InverseProblem, P: Array, sizes: Mapping[str, float]) -> S
     for id in ids:
         low, high = problem.expansion.nodes[id].reach
         grids[id] = np.linspace(low, high, GRID_POINTS)
-        shifts[id] = problem.added({id: grids[id]}, GRID_POINTS)[0] - problem.added({}, 1)[0]
+        shifts[id] = problem.added({id: grids[id]}, GRID_POINTS).shift - problem.added({}, 1).shift
         ends[id] = int(np.argmax(abs(grids[id])))
     length = {id: np.einsum("qn,nm,qm->q", shifts[id], P, shifts[id]) for id in ids}
     at = {}

@@ -188,9 +188,9 @@ def laboratory(
         tuple(observed),
         expansion.eta[places_array],
         scatter,
-        0.0,
-        np.where(is_pair, 0, np.nan),
-        apart,
+        common=0.0,
+        split=np.where(is_pair, 0, np.nan),
+        split_scatter=apart,
     )
     problem = InverseProblem(
         seen, expansion, ranges, places_array, model.start, model.spread, tuple(made.changes)

@@ -294,6 +294,7 @@ class Solid(Part):
     between: Annotated[list[str], Field(min_length=2, max_length=2)] | None = None
 
 
+# angles of cords count from the meridian, which runs from -z to +z, towards Theta
 class RebarLayer(Part):
     """Cords on a line of the section, as long as the line, or in some of its ``regions``."""
 

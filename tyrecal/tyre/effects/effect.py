@@ -28,7 +28,8 @@ class Effect:
     high: float
     changes: tuple[str, ...]  # keywords of the deck that it touches
     # which modes move, which way and how far: by this model, on the tyre of cases/p235_75r17.yaml
-    # as fitted, at its pressure; a re-fit changes its variables A_belt, A_carcass and C10
+    # as fitted, at its pressure; a re-fit changes its variables A_belt, A_carcass and C10, and
+    # absorbs all but an rms change of the frequencies
     signature: str
     toggle: str  # the experiment that would prove it
     aliases: tuple[str, ...]  # ids of effects that frequencies alone hardly distinguish from it

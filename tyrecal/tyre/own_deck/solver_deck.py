@@ -26,7 +26,7 @@ class RebarPly:
     area_m2: float  # of a cord
     spacing: float  # m; degrees round the axle if angular
     angular: bool
-    angle_deg: float  # from the meridian
+    angle_deg: float  # from the meridian, in the order of an element's nodes, towards Theta
     elements: tuple[int, ...]  # numbers in the flat deck
 
 

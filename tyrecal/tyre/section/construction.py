@@ -73,8 +73,8 @@ class CordMaterial:
 
 @dataclass(frozen=True)
 class Ply:
-    """Cords of one layer: their material, area of one in m2, spacing in m, angle from the meridian
-    in degrees."""
+    """Cords of one layer: their material, area of one in m2, spacing in m, angle in degrees
+    from the meridian, which runs from -z to +z, towards Theta."""
 
     cord: str
     area: float

@@ -97,7 +97,7 @@ def build(size: TyreSize, gauges: Gauges) -> GaugeTable:
         rim=(flange, g.rim / 2),
         # the carcass ends 2 mm above the seat; one of 5 degrees counts as flat, of 15 degrees not
         seat=seat + 2e-3 - np.tan(np.radians(15 * size.truck)) * (g.bead - inside_bead),
-        offset=g.bead - inside_bead,
+        offset=g.bead - inside_bead,  # carcass to the outer surface, which touches the flange
     )
     tip = line.rim - made.filler * (line.rim - line.widest)
     edges = sorted({edge for _, edge in layers.values()})

@@ -33,7 +33,7 @@ class PlaneStress(EnergyLaw):
 
     def _gradient(self, z: Array) -> Array:
         """F (p, 9), row by row, without stress across the membrane. Raises Inverted."""
-        static = replace(self.bulk, shear_ratio=None, bulk_ratio=None)
+        static = replace(self.bulk, shear_ratio=None, bulk_ratio=None)  # not a vibration's moduli
         p, q = z[:, :3], z[:, 3:]
         normal = np.cross(p, q)
         d = normal / (normal * normal).sum(-1, keepdims=True)  # J = 1 to begin with

@@ -44,8 +44,8 @@ class TyrePart(ABC):
 
     @abstractmethod
     def tangents(self, U: Array, harmonics: bool) -> Tangents:
-        """K0, K1, K2 (e, 3a, 3a) of K(n) = K0 + i n K1 + n^2 K2; None where one is zero or, except
-        for K0, not requested."""
+        """K0, K1, K2 (e, 3a, 3a) of K(n) = K0 + i n K1 + n^2 K2, n the harmonic; None where one is
+        zero or, except for K0, not requested."""
 
     @abstractmethod
     def at_stations(self, nodes: int) -> AtStations:
