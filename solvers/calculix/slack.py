@@ -72,7 +72,7 @@ def stretches(strips: list[Strip], inflated: Fields) -> Array:
     row = {number: i for i, number in enumerate(inflated.nodes.tolist())}
     ends = np.vectorize(row.__getitem__)(np.array([strip.ends for strip in strips]))
     X = inflated.points[ends].mean(2)  # (strip, end, 3)
-    u = inflated.blocks[0][2][ends].mean(2)
+    u = inflated.blocks[0][2][ends].mean(2)  # DISP of the inflated state, the only block
     tangent, slope = X[:, 1] - X[:, 0], u[:, 1] - u[:, 0]
     length = np.linalg.norm(tangent, axis=1)[:, None]
     place, moved = X.mean(1), u.mean(1)

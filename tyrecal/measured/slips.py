@@ -22,7 +22,8 @@ import numpy as np
 
 from .measurement import Measurement
 
-FALSE_REPORTS = 0.002  # share of files without a slip in which one is reported
+# share of files without a slip in which one is reported, for each quantity
+FALSE_REPORTS = 0.002
 FEW_REPEATS = 3  # degrees of freedom below which a file does not show the scatter of its repeats
 # relative difference between repeats of such a file above which one is a slip
 MAX_REPEAT_STEP = {"frequency_Hz": 0.05, "mass_kg": 0.05}
@@ -160,6 +161,7 @@ def _of_quantity(values: list[Measurement]) -> list[Contradiction]:
 
 
 def _deviations(runs: Sequence[Measurement]) -> np.ndarray:
+    """y less the mean of all n runs: d_i (n - 1) / n."""
     y = np.log([each.value for each in runs])
     return np.asarray(y - y.mean())
 

@@ -57,7 +57,7 @@ def draw_residuals(
 ) -> Figure:
     """Residuals (n,) of the plain fit, ln of measured over model, over the harmonic, a column a
     family, a colour a state; hollow (``after``) with the likeliest ``effect`` in the model. Bars
-    (``spread``): one standard deviation without a gap. Of ``rows`` only those of run 0."""
+    (``spread``): their standard deviation without a gap, `Gap.spread`. Only rows of run 0."""
     states = sorted(dict.fromkeys((row.pressure_kPa, row.rim or "") for row in rows if row.label))
     shown = [name for name in SHOWN_FAMILIES if any(family(row) == name for row in rows)]
     caption = (

@@ -288,8 +288,8 @@ def in_series(usual: Usual, key: str, value: float, others: Sequence[float]) -> 
 
 @dataclass(frozen=True)
 class CordLayer:
-    """Cords of one layer: area m2, spacing m, angle in degrees from the meridian, and its usual
-    angle, which tells a belt."""
+    """Cords of one layer: area m2, spacing m across them, angle in degrees from the meridian, and
+    its usual angle, which tells a belt."""
 
     area: float
     spacing: float

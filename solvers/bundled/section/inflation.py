@@ -41,7 +41,7 @@ def equilibrium(
     guess: Array | None = None,
 ) -> tuple[Array, int]:
     """Displacements (n, 3) in equilibrium under ``loads``, reached from the displacements
-    ``start``, and how many factorisations they took.
+    ``start``, and how many factorisations they took. Of half a model: valid on z >= 0.
 
     A ``guess`` (n, 3), the shape of a similar tyre, if any, is tried first, then the whole load
     from ``start``. If that takes long, because soft rubber between stiff cords wrinkles on the way,

@@ -68,8 +68,9 @@ def slower(
 ) -> RunFailed:
     """The failure of a tyre that turns, with the highest speed at which it is stable.
 
-    U (n, 3): a state to start from; ``state``, ``vibrations``: equations of the inflated state and
-    of its vibrations. Raises other failures that it meets, and what ``check`` raises to stop.
+    U (n, 3): a state to start from, on the nodes of both halves; ``state``, ``vibrations``:
+    equations of the inflated state and of its vibrations. Raises other failures that it meets, and
+    what ``check`` raises to stop.
     """
     spins = [load for load in loads if isinstance(load, Spin)]
     if not spins or failure.cause not in ("unstable", "no_equilibrium"):

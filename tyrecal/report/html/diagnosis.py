@@ -97,8 +97,8 @@ def _bars(d: DiagnosisResult) -> Iterator[BarFigure]:
 def _figures(d: DiagnosisResult, chapter: Chapter) -> Iterator[PageFigure]:
     known = [(row, each) for each in d.gap.residuals if not each.run and (row := each.of)]
     if known:
-        percent = np.array([[each.percent, each.sigma_percent] for _, each in known]).T / 100
-        plot = partial(draw_residuals, [row for row, _ in known], *percent)
+        in_ln = np.array([[each.percent, each.sigma_percent] for _, each in known]).T / 100
+        plot = partial(draw_residuals, [row for row, _ in known], *in_ln)
         yield chapter.figure("residuals", "diagnosis.json", plot)
     place = chapter.results.diagnosis_section
     if place and d.section_map:

@@ -136,8 +136,8 @@ def _rubbers(case: Case) -> list[TemplateNames]:
 
 def _plies(case: Case, sector: Sector) -> list[TemplateNames]:
     """One material a layer and strip, in bricks on top of the rubber's: stiffness E A / (s t) along
-    the cords, their mass; s the cords' spacing, t the strip's own thickness; angles from the
-    meridian, which runs from -z to +z, towards theta."""
+    the cords, their mass; s the cords' spacing across them, t the strip's own thickness; angles
+    from the meridian, which runs from -z to +z, towards theta."""
     plies, number = [], len(sector.bricks)
     for name, layer in case.rebar_layers.items():
         cord: Any = case.materials[layer.material]

@@ -51,9 +51,10 @@ class DecksDesign:
 
     @property
     def request(self) -> dict[str, Any]:
-        """How the decks are run, and SI units per unit of their answer; they request modes
-        themselves: ``modes`` of them, or None where a range of frequencies decides. ``jobs``: pairs
-        of a deck and the one that it continues, "": none; ``mass_sets``: all sets with a mass."""
+        """How the decks are run, and SI units per unit of their answer (time is in s); they request
+        modes themselves: ``modes`` of them, or None where a range of frequencies decides. ``jobs``:
+        pairs of a deck and the one that it continues, "": none; ``mass_sets``: all sets with a
+        mass."""
         units = self.decks.units
         return {
             "modes_per_harmonic": self.case.case.analysis.modes_per_harmonic,

@@ -70,7 +70,7 @@ class Residual(ResultPart):
     row: str  # measured value in words: mode, pressure, rim
     run: int  # 0: the tyre as it is; 1, 2, ...: with something added, in the order of the files
     percent: float  # 100 ln(measured over calibrated model)
-    sigma_percent: float  # its standard deviation
+    sigma_percent: float  # its standard deviation without a gap
 
     @property
     def of(self) -> Observable | None:
@@ -96,8 +96,8 @@ class ContrastPart(ResultPart):
     """A combination of residuals."""
 
     name: str  # combination in words
-    percent: float  # its value
-    sigma_percent: float  # its standard deviation
+    percent: float  # weighted sum of residuals, 100 ln(measured over calibrated model)
+    sigma_percent: float  # its standard deviation without a gap
 
 
 class GapPart(ResultPart):
@@ -127,8 +127,8 @@ class LoadedPart(ResultPart):
     load_N: float
     measured: float  # measured value, in the unit of the quantity
     sigma: float  # standard deviation of the measured value
-    calibrated_percent: float | None  # deviation of the calibrated tyre
-    effect_percent: float | None  # deviation of the tyre with the effect
+    calibrated_percent: float | None  # 100 ln(measured over calibrated tyre)
+    effect_percent: float | None  # 100 ln(measured over tyre with the effect)
 
 
 class UnderLoadPart(ResultPart):

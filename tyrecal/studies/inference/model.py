@@ -70,9 +70,9 @@ class Coupling:
 class Answer:
     """Answer of the model to one query; None is what was not wanted, or is not known."""
 
-    eta: Array  # (n,) ln f or ln mass
+    eta: Array  # (n,) ln f, of a split pair the mean of both, or ln mass
     jacobian: Array  # (n, v) d eta / d x
-    split: Array  # (n,) ln of the ratio of a pair's frequencies
+    split: Array  # (n,) ln of the upper over the lower frequency of a split pair, else 0
     # (n, k) change of eta by one standard deviation of each of the k sources of error
     constants: Array | None = None
     slopes: Mapping[str, Array] = field(default_factory=dict)  # (n,) d eta / d e; NaN: unknown

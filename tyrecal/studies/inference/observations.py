@@ -72,7 +72,7 @@ class Observations:
     """The n frequencies and masses that were measured on one tyre."""
 
     rows: tuple[Observable, ...]
-    y: Array  # (n,) ln value
+    y: Array  # (n,) ln value, of a pair the mean of those measured
     scatter: Array  # (n,) standard deviation of y by repeatability, without ``common``
     # standard deviation of the mean, over the repeats, of a shift that all frequencies of one run
     # share, in addition to scatter

@@ -24,7 +24,7 @@ class RebarPly:
     set_name: str  # of its section's elements
     material: str
     area_m2: float  # of a cord
-    spacing: float  # m; degrees round the axle if angular
+    spacing: float  # m, across the cords; degrees round the axle if angular
     angular: bool
     angle_deg: float  # from the meridian, in the order of an element's nodes, towards Theta
     elements: tuple[int, ...]  # numbers in the flat deck

@@ -7,8 +7,8 @@ Young's modulus, MPa, of Shore A hardness S:
 
 Two choices are the model's. The liner is as hard as the carcass' skim, which lies with it between
 the inner surface and the cords: one of 50 Shore A alone would wrinkle at 850 kPa. And belts stand
-20 degrees from the circumference: from 24 on they contract the carcass under them until its cords,
-which have no bending stiffness here, are not stable.
+20 degrees from the circumference, 18 on a truck: from 24 on they contract the carcass under them
+until its cords, which have no bending stiffness here, are not stable.
 
 Textile cords and the carcass of a truck, thin steel cord in soft rubber, go slack where they are
 compressed. Belts and bead wires of steel, held straight by stiff skim or by each other, bear it.
@@ -73,8 +73,8 @@ class CordMaterial:
 
 @dataclass(frozen=True)
 class Ply:
-    """Cords of one layer: their material, area of one in m2, spacing in m, angle in degrees
-    from the meridian, which runs from -z to +z, towards Theta."""
+    """Cords of one layer: their material, area of one in m2, spacing in m across them, angle in
+    degrees from the meridian, which runs from -z to +z, towards Theta."""
 
     cord: str
     area: float
@@ -93,8 +93,9 @@ class Belt:
 
 @dataclass(frozen=True)
 class Construction:
-    """A type of tyre. Gauges, m: crown, sidewall, bead = (a, b): a + b S1, S1 the nominal section
-    width; liner to under_tread, too. step, m: by how much a belt is narrower than the widest."""
+    """A type of tyre. Gauges, m, as in `from_size.Gauges`: crown, sidewall, bead = (a, b) for
+    a + b S1, S1 the nominal section width; liner to under_tread, too. step, m: by how much a belt
+    is narrower than the widest, in width."""
 
     name: str
     compounds: dict[str, Compound]

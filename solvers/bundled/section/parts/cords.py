@@ -5,7 +5,7 @@ A cord along the reference unit vector a is carried to q = F a, its stretch is l
     W = E A / (2 s) ln^2(lambda)            per reference area of the layer, J/m2
     dW/dq = W' t,  d2W/dqdq = (W'' - W'/lambda) t t^T + (W'/lambda) 1,   t = q / lambda
 
-E, A, s: modulus, area and spacing of the cords; ' is d/dlambda.
+E, A, s: modulus, area and spacing (across them) of the cords; ' is d/dlambda.
 
 One that bears no compression has W = 0 below lambda = 1: the least energy of a layer that may
 wrinkle as finely as it likes (Pipkin, IMA J. Appl. Math. 36, 1986, on relaxed energies). The second
