@@ -136,8 +136,8 @@ def test_section_map(tmp_path: Path) -> None:
     text = words(figure)
     assert "ln evidence" in text and "independent combination of parts" in text
     section, bars = figure.axes
-    numbers = {label.get_text().strip() for label in bars.texts}
-    assert numbers == {"+4.9", "+0.0"}  # no negative nothing
+    numbers = {label.get_text().strip(): label.get_position()[0] for label in bars.texts}
+    assert numbers == {"+4.9": 4.9, "+0.0": 0.0}  # at the bars' ends; no negative nothing
     names = [label.get_text() for label in bars.get_yticklabels()]
     lengths = [bar.get_width() for bar in bars.patches]
     assert dict(zip(names, lengths, strict=True)) == {"upper sidewall": 4.9, "tread": -0.01}

@@ -37,6 +37,7 @@ from tyrecal.tyre.section.section import read_section
 from ..chance import generator
 from ..conftest import CASES
 from ..studies.hertz import Hertz, coarse_case
+from .html.ring_under_load import loaded_shapes
 
 ANGLES = 2 * np.pi * np.arange(48) / 48
 
@@ -52,7 +53,6 @@ def swept_again(content: dict, mode: dict) -> tuple[np.ndarray, np.ndarray]:
     """Points and displacement (node, angle, 3), as the page's script computes them from 16 bit."""
     data = packed(Shapes.model_validate(json.loads(json.dumps(content))))
     chosen = data["modes"][content["modes"].index(mode)]
-    whole = lambda text: np.frombuffer(b64decode(text), "<i2") / 32767
     R, Z = whole(data["place"]).reshape(2, -1)
     real, imaginary = whole(chosen["shape"]).reshape(2, -1, 3)
     n, up = chosen["n"], np.stack([np.sin(ANGLES), 0 * ANGLES, np.cos(ANGLES)], -1)
@@ -61,6 +61,17 @@ def swept_again(content: dict, mode: dict) -> tuple[np.ndarray, np.ndarray]:
     cos, sin = np.cos(n * ANGLES)[:, None], np.sin(n * ANGLES)[:, None]
     r, t, z = np.moveaxis(real[:, None] * cos - imaginary[:, None] * sin, -1, 0)[..., None]
     return R[:, None, None] * up + Z[:, None, None] * axle, r * up + t * round_ + z * axle
+
+
+def whole(text: str) -> np.ndarray:
+    """Numbers of the page, from 16 bit."""
+    return np.frombuffer(b64decode(text), "<i2") / 32767
+
+
+def test_angles_of_a_loaded_tyre_are_parts_of_a_turn() -> None:
+    shapes = Shapes.model_validate(loaded_shapes("toy"))
+    angles = 2 * np.pi * whole(packed(shapes)["angle"])
+    assert angles == pytest.approx(shapes.angles, abs=2e-4)
 
 
 @pytest.mark.slow

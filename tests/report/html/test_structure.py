@@ -8,13 +8,16 @@ import re
 from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote
 
 import pytest
 
-from tyrecal.report.html.page import page
+from tyrecal.report.html.page import environment, page
+from tyrecal.report.html.parts import Block, PageTable, Paragraphs
 from tyrecal.report.html.results import read_results
 from tyrecal.studies import STUDIES
+from tyrecal.studies.result import Column, Table
 
 from . import toy
 from .test_page import DATA, ROOT, VOID, words_of
@@ -134,6 +137,30 @@ def test_numbers_have_one_unit_and_no_zero_a_sign(folder: Path) -> None:
     assert not re.search(r"\d m2\b|\d m²", words)
     rows = [text for text in elements_of(folder).texts("tr") if re.match("A_belt|C10", text)]
     assert len(rows) > 3 and not [text for text in rows if re.search(r"\de[-+\u2212]?\d", text)]
+
+
+def block_of(block: Block) -> Elements:
+    module: Any = environment().get_template("blocks.html.j2").module
+    return Elements(module.block(block, ""))
+
+
+@pytest.mark.parametrize(("columns", "many"), [(16, False), (17, True)])
+def test_a_table_of_many_columns_is_set_smaller(columns: int, many: bool) -> None:
+    """Words of a second column of words stand below those of the first."""
+    heads = [Column(f"h{i}", "" if i < 2 else ".1f") for i in range(columns)]
+    table = Table(heads, [[f"c{i}" for i in range(columns)]])
+    tags = block_of(PageTable(table, "caption", "a.csv", "text"))
+    (shown,) = (str(each["class"]).split() for each in tags.all if each["tag"] == "table")
+    assert ("many" in shown) == many
+    below = [each["text"] for each in tags.all if each.get("class") == "motion"]
+    assert below == ["c1"] and tags.texts("td") == [f"c{i}" for i in range(2, columns)]
+
+
+def test_findings_are_a_list_and_headings_are_none() -> None:
+    for kind, tag in (("findings", "li"), ("heading", "h3"), ("facts", "p")):
+        tags = block_of(Paragraphs(kind, ["one", "two"]))
+        assert tags.texts(tag) == ["one", "two"]
+        assert {e["tag"] for e in tags.all} == {tag} | ({"ul"} if tag == "li" else set())
 
 
 def test_the_page_knows_no_study_by_name() -> None:
