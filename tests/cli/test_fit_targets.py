@@ -389,7 +389,12 @@ def test_labels_are_asked_for_where_they_are_needed(
     """Other commands and files that need labels are refused with the command that finds them;
     nothing is labelled twice."""
     labelled = ["--measured", str(CASES / "p235_75r17_wheeler.csv"), "--output", str(tmp_path)]
-    for more in (["--repeats", str(unlabelled)], ["--toggled", str(unlabelled), "spindle_tilt=0"]):
+    given = str(unlabelled)
+    for more in (
+        ["--repeats", given],
+        ["--toggled", given, "spindle_tilt=0"],
+        ["--toggled", given, "rim_width*9"],  # a factor is not taken for 9 m
+    ):
         assert run("diagnose", CASE, *labelled, *more) == 2
         assert "tyrecal measured label" in capsys.readouterr().err
     other = str(CASES / "p235_75r17_wheeler.csv")

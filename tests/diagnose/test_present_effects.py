@@ -292,6 +292,11 @@ def test_the_page_has_them_with_units(toy: Toy, named: Diagnosis) -> None:
     calibrated = calibrated_variables(named, toy)  # type: ignore[arg-type]
     for name, _, value in rows:
         assert float(value) == pytest.approx(1e-6 * calibrated["with"][name]["value"], rel=1e-3)
+    unseen = {**named.separability.smallest, "e1": None}
+    blind = replace(named, separability=replace(named.separability, smallest=unseen))
+    for d, count in ((named, 0), (blind, 1)):
+        (line, *_) = [*re.findall(r"^.*at any size.*$", told(d, toy), re.M), ""]
+        assert line.count("`e1`") == count and "`e0`" not in line
 
 
 def test_where_there_is_no_gap_nothing_explains_it(toy: Toy, plain: Diagnosis) -> None:

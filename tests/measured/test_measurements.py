@@ -121,8 +121,8 @@ def test_pairs_and_single_values_of_another_load_or_pressure_do_not_meet(tmp_pat
 
 
 def test_what_is_left_empty_is_none(tmp_path: Path) -> None:
-    """An empty load is 0, and so is the mass' pressure; an empty label is none."""
-    mode, mass = read(tmp_path, "frequency_Hz,2,0,,,240,,79.5,0.2", "mass_kg,,,,,,,12.5,0.05")
+    """An empty load is 0, and so is the mass' pressure, given or not; an empty label is none."""
+    mode, mass = read(tmp_path, "frequency_Hz,2,0,,,240,,79.5,0.2", "mass_kg,,,,,240,,12.5,0.05")
     assert (mode.pressure_kPa, mode.load_N, mode.value, mode.sigma) == (240.0, 0.0, 79.5, 0.2)
     assert (mass.pressure_kPa, mass.load_N, mass.label) == (0.0, 0.0, None)
 

@@ -299,6 +299,18 @@ def test_halves_are_joined_to_half_a_per_cent():
         assert len(pair_rings([RawMode(80.0, a, 1), RawMode(80.0 * (1 + split), b, 1)])) == count
 
 
+def test_of_two_alike_a_half_is_joined_to_the_nearer():
+    """Though the farther moves the belt as it does, and the nearer a little otherwise."""
+    a, b = rings(shape(2, [ORDERS[0]]), generator(0))
+    other = rings(shape(2, [ORDERS[0], ORDERS[1]], [1.0, 0.3]), generator(0))[0]
+    halves = [RawMode(f, half, 1) for f, half in ((80.0, a), (80.02, other), (80.38, b))]
+    joined = pair_rings(halves)
+    assert [(m.frequency_Hz, m.multiplicity) for m in joined] == [
+        (pytest.approx(80.01), 2),
+        (80.38, 1),
+    ]
+
+
 def test_harmonics_are_looked_for_up_to_twelve():
     angles = np.arange(40) / 40 * 2 * np.pi
     for c, expected in ((11, 11), (12, 12)):

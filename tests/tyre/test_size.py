@@ -208,6 +208,12 @@ def test_rubber_by_its_hardness(hardness: float, E_MPa: float) -> None:
     assert 10 < compound.spread_percent < 30  # 4 Shore A
 
 
+@pytest.mark.parametrize("part", ["liner", "ply", "belt", "under_tread", "step", "wires", "filler"])
+def test_a_light_truck_is_between_a_car_and_a_truck(part: str) -> None:
+    car, light, truck = (getattr(made, part) for made in CODES.values())
+    assert car <= light <= truck
+
+
 def test_every_element_is_of_one_compound_and_each_is_used(case: LoadedCase) -> None:
     rows = tuple(case.case.mesh.levels["coarse"].rows)
     claims, mesh, lines = solid_claims(case.case), resolved(case).mesh, case.section.names
