@@ -199,6 +199,13 @@ def test_every_command_that_draws_offers_the_formats() -> None:
     assert drawing == names(cli, "--figure-format")
 
 
+def test_numbers_that_are_the_default_are_told() -> None:
+    for name, command in commands().items():
+        for each in command.params:
+            if isinstance(each, click.Option) and type(each.default) in (int, float):
+                assert each.show_default or "default" in str(each.help), (name, each.opts)
+
+
 def test_pictures_are_drawn_unless_they_are_not_wanted() -> None:
     """`modes` alone draws on demand."""
     defaults = {

@@ -190,6 +190,7 @@ def test_it_states_runs_and_time_and_does_nothing(
     assert run(*STUDIES[name], *COARSE, "--dry-run", "--json") == 0
     plan = json.loads(capsys.readouterr().out)
     assert plan["runs"] > 0 and plan["seconds"] > 0
+    assert name != "sweep" or plan["designs"] == 7  # points of the Latin hypercube
     assert run(*STUDIES[name], *COARSE, "--dry-run") == 0
     printed = capsys.readouterr().out
     assert f"{plan['runs']} run" in printed and "in the solver" in printed

@@ -257,6 +257,7 @@ def test_all_tasks_in_order(jobs: int) -> None:
         assert isinstance(workers, Here if jobs == 1 else Processes)
         assert list(in_order(workers.each(square, tasks))) == [t**2 for t in tasks]
         assert list(workers.each(square, [])) == []
+    assert not executor_module._at_work
 
 
 def knows(module: str) -> bool:

@@ -97,6 +97,13 @@ def test_two_slips_do_not_hide_each_other() -> None:
     assert lines(repeated(*map(tuple, rows))) == ["20", "52"]
 
 
+def test_of_many_slips_twelve_are_told() -> None:
+    rows = [[f * (1 + 1e-3 * e) for e in (-1, 0.4, 0.6)] for f in range(40, 140, 2)]
+    for row in rows[:14]:
+        row[1] *= 1.2
+    assert len(lines(repeated(*map(tuple, rows)))) == 12
+
+
 @pytest.mark.parametrize(
     "rows",
     [

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from PIL import Image
 from threadpoolctl import threadpool_limits
 
@@ -143,6 +144,8 @@ def test_section(tyre, tmp_path, written):
         )
         assert figure._suptitle.get_window_extent(render).y0 - facts.y1 < LINE
         assert label.y0 - legend.get_window_extent(render).y1 < LINE
+        rubber = [e.get_facecolor() for e in legend.legend_handles if isinstance(e, Patch)]
+        assert len(set(rubber[:7])) == min(7, len(rubber)) > 2
     assert (tmp_path / "inflated.png").read_bytes() != (tmp_path / "plain.png").read_bytes()
 
 

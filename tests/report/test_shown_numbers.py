@@ -79,6 +79,9 @@ def test_deviations_of_states_stand_in_their_panels() -> None:
         assert list(points.get_xdata()) == [mode.deviation_percent for mode in FIT.modes]
         halves = [np.ptp(segment[:, 0]) / 2 for segment in spread.get_segments()]
         assert halves == pytest.approx([50 / mode.target_Hz for mode in FIT.modes])
+    alone = draw_states(STATES.model_copy(update={"modes": STATES.modes[: len(FIT.modes)]}))
+    for axes in (alone.axes[0], figure.axes[0]):
+        assert len(axes.get_yticklabels()) == len(FIT.modes)
 
 
 def test_residuals_are_in_standard_deviations() -> None:
