@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tyrecal.errors import InputError
-from tyrecal.measured.gather import _entry, gather, result
+from tyrecal.measured.gather import _entry, gather, result, unlabelled
 from tyrecal.measured.labels import Judged
 from tyrecal.measured.modal import Layout, ModalTest
 from tyrecal.measured.sensors import MeasuredMode
@@ -74,6 +74,15 @@ def test_a_file_is_no_repeat_of_itself(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_nothing_is_assumed_of_frequencies_without_labels(tmp_path: Path) -> None:
+    """Unless the user says how far they may be off."""
+    (tmp_path / "t.csv").write_text("pressure [kPa],frequency [Hz]\n240,66.1\n")
+    with pytest.raises(InputError, match="--sigma-percent"):
+        unlabelled(tmp_path / "t.csv", 240.0)
+    (row,), *_ = unlabelled(tmp_path / "t.csv", 240.0, assumed=0.01)
+    assert row.sigma == pytest.approx(0.661)
+
+
 def test_two_references_and_geometry_of_its_own(tmp_path: Path) -> None:
     """Further contents of a file are passed over and reported."""
     where = write(tmp_path / "where.uff", nodes())
