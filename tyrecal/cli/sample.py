@@ -62,7 +62,6 @@ def command(
     """
     from ..report.table import shown
     from ..studies.result import StudyInput
-    from ..studies.sample.chains import needs_emcee
     from ..studies.sample.result import result
     from ..studies.sample.study import (
         SAMPLE_STAGES,
@@ -76,7 +75,6 @@ def command(
     from .main import EXIT_FIT
 
     terminal = study.terminal
-    needs_emcee()
     loaded, _ = study.load(case)
     for pressure in at_kPa:
         arguments.refuse_unusual(
