@@ -16,6 +16,7 @@ from tyrecal.studies.diagnose.result import diagnosis_result
 from tyrecal.studies.diagnose.robustness import robustness
 from tyrecal.studies.diagnose.several import (
     PARTNERS,
+    _gains,
     before,
     next_candidates,
     present,
@@ -25,7 +26,7 @@ from tyrecal.studies.diagnose.several import (
 from tyrecal.studies.diagnose.study import DiagnosedCase
 from tyrecal.studies.diagnose.verdict import Further, decide, most_sure, perhaps
 from tyrecal.studies.inference.expansion import anchored
-from tyrecal.studies.inference.model import Query
+from tyrecal.studies.inference.model import EffectRange, Query
 
 from ..chance import generator
 from .toy import Toy, drawn, problem
@@ -105,6 +106,17 @@ def test_a_third_effect_is_looked_for_where_the_rest_of_the_gap_is_like_it() -> 
     base = problem(toy)
     p = base.measured(toy.base + 0.8 * toy.g["e1"] + 0.5 * toy.g["e4"] + 0.6 * toy.g["e7"])
     assert next_candidates(p, explain(p, ["e1", "e4"], 1.0))[0] == "e7"
+
+
+def test_a_gain_does_not_depend_on_the_unit_of_another_effect() -> None:
+    gains = []
+    for unit in (1.0, 0.1):
+        toy = Toy(effects=2, bend=0.0)
+        toy.ranges["e0"] = EffectRange(0.0, unit)
+        toy.g["e0"], toy.tilt["e0"] = toy.g["e0"] / unit, toy.tilt["e0"] / unit
+        p = problem(toy).measured(toy.base + 0.5 * unit * toy.g["e0"] + 0.3 * toy.g["e1"])
+        gains.append(_gains(p, explain(p, ["e0"], 1.0))["e1"][0])
+    np.testing.assert_allclose(*gains, rtol=1e-6)
 
 
 def test_two_effects_that_hide_one_another_are_found() -> None:

@@ -163,6 +163,10 @@ def test_a_compressed_cord_is_refused_by_layer_and_region(tmp_path: Path) -> Non
     with pytest.raises(RunFailed, match=words) as failure:
         refuse_slack(plies, cylinder(0.01, -0.01, 0.0))
     assert failure.value.cause == "unstable" and "cap_ply" not in str(failure.value)
+    layers = ["belt_1", "belt_2", "carcass", "chafer"]
+    with pytest.raises(RunFailed) as failure:
+        refuse_slack([strip(0.0, name) for name in layers], cylinder(0.01, -0.01, 0.0))
+    assert [name in str(failure.value) for name in layers] == [True, True, True, False]
 
 
 def test_the_deck_says_which_cords_must_be_taut() -> None:
