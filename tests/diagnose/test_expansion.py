@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from tyrecal.studies.diagnose.diagnosis import _asked_again
+from tyrecal.studies.diagnose.diagnosis import _asked_again, _nearer_sizes
 from tyrecal.studies.diagnose.several import weigh_hypotheses
 from tyrecal.studies.diagnose.study import _reaching
 from tyrecal.studies.inference.between import Between
@@ -143,6 +143,16 @@ def test_one_more_size_and_its_slope_make_a_quartic() -> None:
     e = np.linspace(0, 1, 7)
     assert nodes.at(e)[0][:, 0] == pytest.approx(toy.curve(e), abs=1e-12)
     assert abs(expansion.nodes["e0"].at(e)[0][:, 0] - toy.curve(e)).max() > 1e-6
+
+
+def test_an_effect_in_play_is_evaluated_near_its_likeliest_size_once() -> None:
+    toy = Toy(effects=1, size=0.03, bend=0.0)
+    p = problem(toy).measured(toy.base + 0.72 * toy.g["e0"])
+    seen = []
+    for _ in range(2):
+        p, changed = _nearer_sizes(p, toy, weigh_hypotheses(p))
+        seen.append((changed, p.expansion.nodes["e0"].values.tolist()))
+    assert seen == [(True, [0, 0.5, 0.75, 1]), (False, [0, 0.5, 0.75, 1])]
 
 
 def test_a_nearer_size_is_asked_where_the_far_end_has_no_solution() -> None:

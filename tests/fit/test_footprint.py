@@ -22,7 +22,8 @@ from tyrecal.studies.diagnose.under_load import LoadedRow
 from tyrecal.studies.fit.problem import Problem, objective
 from tyrecal.studies.fit.targets import Target, objective_unit
 from tyrecal.studies.footprint import footprint_result, press
-from tyrecal.tyre.case.schema import TargetFootprint
+from tyrecal.tyre.case.schema import TargetFootprint, Variable
+from tyrecal.tyre.effects.edit import changed
 from tyrecal.tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 
 from ..calibrated import calibrate
@@ -336,6 +337,16 @@ def test_sensitivities_are_those_of_the_formula(solver: type[Elastic]) -> None:
     elasticities = point.jacobian / (problem.scale * point.others)[:, None]
     powers = [[own[name] for name in START] for own in POWERS.values()]
     assert elasticities == pytest.approx(np.array(powers), rel=1e-4, abs=1e-6)
+
+
+def test_a_pressure_that_varies_moves_nothing_at_a_pressure_of_its_own() -> None:
+    own = [target(name).model_copy(update={"pressure_kPa": 200.0}) for name in POWERS]
+    case = case_with([], own)
+    varies = Variable(sets=["pressure_kPa"], start=240, lower=200, upper=300)
+    case = changed(case, variables={"p": varies, **case.case.variables})
+    problem = Problem(case, Evaluator(TyreDesign(case), _solver=Sloped()))
+    point = problem.evaluate(problem.start())
+    assert not point.jacobian[:, 0].any() and point.jacobian[:, 1:].any()
 
 
 def test_they_come_from_a_table(tmp_path: Any) -> None:

@@ -17,6 +17,7 @@ from tyrecal.files import json_text
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.modes.find import LabelledModes, find_modes
+from tyrecal.studies.fit.model_errors import ModelErrors
 from tyrecal.studies.fit.prediction import prediction_variance, read_responses
 from tyrecal.studies.fit.problem import Point, Problem
 from tyrecal.studies.fit.road import press
@@ -24,6 +25,7 @@ from tyrecal.studies.fit.road_errors import road_changes
 from tyrecal.studies.fit.targets import ValueTarget, read_targets
 from tyrecal.studies.fit.total_error import BY_SECTION, TotalError, total_error
 from tyrecal.studies.fit.uncertainty import uncertainty
+from tyrecal.studies.inference.observations import Observable
 from tyrecal.studies.inference.section_fields import fields, with_fields
 from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.studies.pressure import PressureFindings
@@ -223,6 +225,23 @@ def test_why_it_is_not_known() -> None:
     )
     assert result["total_error_unknown"]
     assert "not known" in fit.found.sentences()[0]
+
+
+def test_one_value_whose_scatter_is_not_known_leaves_the_whole_unknown() -> None:
+    problem = Problem(CASE, evaluator())  # type: ignore[arg-type]
+    point = problem.evaluate(problem.start())
+    scatter = uncertainty(problem, point)
+    sigma = np.where(np.arange(len(scatter.sigma)), scatter.sigma, np.nan)
+    with pytest.raises(ValueError, match="standard deviation"):
+        total_error(problem, point, replace(scatter, sigma=sigma))
+
+
+def test_the_models_error_on_the_road_adds_its_variance() -> None:
+    rows = (Observable("vertical_stiffness_N_per_m", None, 240.0),) * 2
+    errors = ModelErrors(rows, [], np.zeros((2, 0)), 0.0, np.array([0.0, 0.02]))
+    scatter = np.array([0.01, 0.03])
+    added = errors.covariance(scatter) - replace(errors, road=np.zeros(2)).covariance(scatter)
+    np.testing.assert_allclose(added, np.diag([0, 4e-4]), atol=1e-12)
 
 
 @pytest.mark.slow

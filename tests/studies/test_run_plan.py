@@ -13,6 +13,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.studies import difference_runs, run_plan
 from tyrecal.studies.difference_runs import runs_in_words
+from tyrecal.studies.fit.study import FitStudy
 from tyrecal.studies.run_plan import (
     FIRST_LOAD_S,
     FURTHER_DESIGN_S,
@@ -66,6 +67,13 @@ def test_no_more_run_side_by_side_than_the_memory_holds(monkeypatch: pytest.Monk
     for available, at_once in ((2.5 * one, 2), (0.5 * one, 1), (None, 6)):
         monkeypatch.setattr(run_plan, "available_memory_bytes", lambda a=available: a)
         assert plan_runs(case, evaluator, states, 3, at_once=8).at_once == at_once
+
+
+def test_a_fit_of_fewer_variables_takes_less_time() -> None:
+    case = load_case(CASE)
+    study = lambda fixed: FitStudy(case, Evaluator(TyreDesign(case)), fixed=fixed)
+    plans = [study(fixed).run_plan("slsqp", 1, 1) for fixed in ({}, {"A_belt": 2e-7})]
+    assert plans[0].seconds > plans[1].seconds
 
 
 def test_its_words() -> None:
