@@ -9,8 +9,9 @@ import pytest
 from numpy.polynomial.hermite import hermgauss
 from scipy.stats import multivariate_normal
 
-from tyrecal.studies.diagnose.evidence import explain, families, grid, refit
+from tyrecal.studies.diagnose.evidence import explain, families, grid, outside, refit
 from tyrecal.studies.diagnose.reweighed import Perturbation, lines, perturbed_evidence
+from tyrecal.studies.diagnose.robustness import _reevaluate
 from tyrecal.studies.diagnose.several import weigh_hypotheses
 from tyrecal.studies.inference.expansion import expand
 from tyrecal.studies.inference.inverse_problem import Assumed, InverseProblem
@@ -18,7 +19,7 @@ from tyrecal.studies.inference.model import Answer, EffectRange, Query
 
 from ..chance import Chance, generator
 from .test_veering import Near
-from .toy import Toy, drawn, flat, problem
+from .toy import LABELS, Toy, drawn, flat, problem
 
 pytestmark = pytest.mark.numbers
 
@@ -277,3 +278,11 @@ def test_near_modes_are_coupled_about_a_fit_as_by_a_fit_made_anew(
         ln, chi2 = perturbed_evidence(fits, other, among)
         assert ln == pytest.approx(anew.ln_evidence, abs=0.1), other.words
         assert chi2 == pytest.approx(anew.chi2, abs=0.2), other.words
+
+
+def test_a_label_of_near_modes_that_is_left_out_is_as_if_never_read() -> None:
+    toy = Near(0.01, effects=1)
+    p = problem(toy, toy.coupled(1.1) + 0.3 * toy.g["e0"])
+    keep = np.array([row.label != LABELS[0] for row in p.observations.rows])
+    (again,) = _reevaluate(p, outside(p), [Perturbation("a label", p, keep)])
+    assert again.ln_evidence == pytest.approx(outside(p.only(keep)).ln_evidence, abs=1e-6)

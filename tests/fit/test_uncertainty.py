@@ -17,9 +17,16 @@ from tyrecal.files import json_text
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.modes.find import LabelledModes, find_modes
+from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.fit.model_errors import ModelErrors
-from tyrecal.studies.fit.prediction import prediction_variance, read_responses
+from tyrecal.studies.fit.prediction import (
+    FitResponses,
+    predicted_errors,
+    prediction_variance,
+    read_responses,
+)
 from tyrecal.studies.fit.problem import Point, Problem
+from tyrecal.studies.fit.responses import FitResponse
 from tyrecal.studies.fit.road import press
 from tyrecal.studies.fit.road_errors import road_changes
 from tyrecal.studies.fit.targets import ValueTarget, read_targets
@@ -31,7 +38,7 @@ from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.studies.pressure import PressureFindings
 from tyrecal.studies.pressure_result import PressureRow, PressureSweep, run
 from tyrecal.studies.result import ModeEntry
-from tyrecal.studies.variable import DesignVariable
+from tyrecal.studies.variable import DesignVariable, read_variable
 from tyrecal.tyre.case import LoadedCase, start_values
 from tyrecal.tyre.case.schema import Uncertainty
 from tyrecal.tyre.effects.edit import changed, with_part
@@ -337,6 +344,20 @@ def test_a_sweep_of_a_fitted_design_has_intervals(tmp_path: Path) -> None:
     by_angle = np.sqrt(errors[0] ** 2 - errors[1] ** 2)
     np.testing.assert_allclose(by_angle, abs(off), atol=0.01, rtol=0.1)
     assert "standard_error_Hz" in swept.csv()
+
+
+def test_what_the_data_leave_of_the_prior_adds_to_predictions(monkeypatch: Any) -> None:
+    """All of it, by a fit that does not answer its data."""
+    J = generator("prior").normal(size=(2, len(CASE.case.variables)))
+    answer = J, np.zeros((2, 0)), 0.0
+    monkeypatch.setattr("tyrecal.studies.fit.prediction.linear_answer", lambda *_: answer)
+    measured = [FitResponse(c=2, m=0, pressure_kPa=240.0, scatter=0.01, response={})]
+    wanted, variance = [(Label(2, 0), 300.0)], []
+    for prior in (True, False):
+        fit = FitResponses(responses=measured, prior=prior)
+        variance.append(predicted_errors(CASE, Any, {}, fit, wanted) ** 2)
+    spread = [read_variable(CASE, name).spread for name in CASE.case.variables]
+    assert variance[0] - variance[1] == pytest.approx(((J[1] * spread) ** 2).sum())
 
 
 def test_a_table_shows_the_half_width_of_the_interval() -> None:
