@@ -16,6 +16,7 @@ from tyrecal_solvers.bundled.job import Job
 from tyrecal_solvers.bundled.modes.harmonics import Vibration
 from tyrecal_solvers.bundled.modes.response import Response, TreadPatch, tread_patch
 from tyrecal_solvers.bundled.section import mechanics
+from tyrecal_solvers.bundled.section.materials import ModulusTable
 from tyrecal_solvers.bundled.section.model import Model
 from tyrecal_solvers.errors import Refused
 
@@ -196,9 +197,11 @@ def test_reciprocity_and_dissipated_power(solved: Solved) -> None:
     assert (np.diagonal(receptance).imag < 0).all()
 
 
-def test_a_heavy_ring_on_rubber_in_closed_form() -> None:
+@pytest.mark.parametrize("growth", [0.0, 0.5])
+def test_a_heavy_ring_on_rubber_in_closed_form(growth: float) -> None:
     """A ring of moment of inertia J on massless rubber that turns about the axle:
-    u / F = R^2 / (k (1 + i eta) - omega^2 J), k = 4 pi G L / (1/a^2 - 1/b^2)."""
+    u / F = R^2 / (k (1 + i eta) - omega^2 J), k = 4 pi G L / (1/a^2 - 1/b^2); G is by 1 + growth
+    larger than the static one, at all frequencies, and its losses are given as of the latter."""
     b = support.block((0.1, 0.3, 40), (-0.025, 0.025, 1), True)
     text = support.deck(b.X, b.solids, Rubber(C10=2e5, density=1e-3))
     text = text.replace("*DENSITY", f"*DAMPING, STRUCTURAL={ETA}\n*DENSITY")
@@ -207,6 +210,10 @@ def test_a_heavy_ring_on_rubber_in_closed_form() -> None:
     sets = "*ELSET, ELSET=R\n40\n*ELSET, ELSET=S, GENERATE\n1, 39\n"
     sections = "*SOLID SECTION, ELSET=R, MATERIAL=RING\n*SOLID SECTION, ELSET=S, MATERIAL=RUBBER\n"
     m = support.model_of(head + sets + sections + rest.partition("\n")[2] + ring)
+    if growth:
+        places = np.repeat([0, -1], np.array([39, 1]) * m.parts[0].rows.weights.shape[1])
+        m = m.with_laws(lambda own: replace(own, table=places))
+        m = replace(m, tables=[ModulusTable((1.0, 100.0), (1 + growth,) * 2)])
     mask = np.repeat(abs(m.mesh.X[:, :1] - 0.1) < 1e-9, 3, 1)
     outer = np.flatnonzero(abs(m.mesh.X[:, 0] - 0.3) < 1e-9)
     patch = tread_patch(m.mesh.X, 0.0 * mask, outer, 0.2)
@@ -217,7 +224,7 @@ def test_a_heavy_ring_on_rubber_in_closed_form() -> None:
     response.harmonics = response.harmonics[:1]
     receptance, hub = response.at(hertz, [(0.0, TANGENTIAL)], [(1.0, TANGENTIAL)])
     a, c, G, L = 0.1, 0.295, 4e5, 0.05
-    k = 4 * np.pi * G * L / (a**-2 - c**-2) * (1 + 1j * ETA)
+    k = 4 * np.pi * G * L / (a**-2 - c**-2) * (1 + growth + 1j * ETA)
     J = np.pi / 2 * 1e4 * L * (0.3**4 - c**4)
     exact = 0.3**2 / (k - (2 * np.pi * hertz) ** 2 * J)
     np.testing.assert_allclose(receptance[0, 0], exact, atol=1e-3 * abs(exact).max())
