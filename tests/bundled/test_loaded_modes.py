@@ -138,6 +138,11 @@ def test_they_solve_the_whole_problem(tyre: Round, pressed: State, lowest: Loade
     np.testing.assert_allclose(gram[same], np.eye(10)[same], atol=1e-7)
 
 
+def test_one_mode_is_the_lowest(tyre: Round, pressed: State, lowest: LoadedModes) -> None:
+    (value,) = modes(tyre, pressed.U, pressed.hold, pressed.around, 1).eigenvalues
+    assert value == pytest.approx(lowest.eigenvalues[0], rel=1e-6)
+
+
 @pytest.mark.slow
 def test_a_wheel_free_along_the_load(tyre: Round, pressed: State, lowest: LoadedModes) -> None:
     """Modes that the half turn reverses stay as they were. A wheel far heavier than the tyre swings
