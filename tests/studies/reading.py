@@ -58,6 +58,8 @@ constant has its value:
 | seed | tyre | simulate | measured | studies | report, batch, cli | solvers |
 |---|---|---|---|---|---|---|
 | 20262801 | 1 | 0 | 2 | 2 | 1 | 2 |
+| 20262802 | 3 | 2 | 0 | 3 | 2 | 4 |
+| 20262803 | 4 | 1 | 2 | 2 | 2 | 2 |
 """
 
 from __future__ import annotations
