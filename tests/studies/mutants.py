@@ -290,7 +290,12 @@ class Runner:
                             **outcome(slot, process, code, began),
                         }
                         with self.given.record.open("a") as out:
-                            out.write(json.dumps(row) + "\n")
+                            kept = {
+                                k: v
+                                for k, v in row.items()
+                                if row["outcome"] != "killed" or k != "by"
+                            }
+                            out.write(json.dumps(kept) + "\n")
                         fields = number, mutant.file, mutant.line, row["outcome"], row["by"]
                         print(*fields, f"{row['seconds']} s", file=sys.__stdout__, flush=True)
                         free.append(slot)

@@ -47,7 +47,7 @@ from tyrecal.studies.fit.study import FitStudy
 from tyrecal.studies.fit.verdict import FITS, MAX_CHI2_PER_DOF
 from tyrecal.tyre.case import LoadedCase
 
-from .fit_errors import LABELS, SIZES, case_of, drawn
+from .fit_errors import LABELS, SIZES, case_of, drawn, shortened
 
 CLEAN, DIGIT, DECIMAL, DIGITS, ROWS, PRESSURES = (
     "clean",
@@ -202,17 +202,18 @@ def _line(
 ) -> dict[str, Any]:
     moved = [] if kind == PRESSURES else [(rows[i].value, slipped[i].value) for i in wrong]
     words = {"doubt": judgement.doubt, "reason": judgement.reason}
+    names = lambda said: is_named(kind, wrong, said) if kind != CLEAN else bool(said)
+    first, by_fit = names(judgement.first), names(judgement.reason)
+    if not (first or by_fit) if kind == CLEAN else first and by_fit:
+        words = {}  # of what is as it should be
+    chi2 = judgement.chi2_per_dof
     return {
         "kind": kind,
         "moved": moved,
-        "named_first": is_named(kind, wrong, judgement.first)
-        if kind != CLEAN
-        else bool(judgement.first),
-        "named_by_fit": is_named(kind, wrong, judgement.reason)
-        if kind != CLEAN
-        else bool(judgement.reason),
+        "named_first": first,
+        "named_by_fit": by_fit,
         "verdict": judgement.verdict,
-        "chi2_per_dof": judgement.chi2_per_dof,
+        "chi2_per_dof": chi2 and shortened(chi2),
         **{key: re.sub(r"\S*measured\.csv", "measured.csv", each) for key, each in words.items()},
     }
 
