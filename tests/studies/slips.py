@@ -202,7 +202,7 @@ def _line(
 ) -> dict[str, Any]:
     moved = [] if kind == PRESSURES else [(rows[i].value, slipped[i].value) for i in wrong]
     words = {"doubt": judgement.doubt, "reason": judgement.reason}
-    names = lambda said: is_named(kind, wrong, said) if kind != CLEAN else bool(said)
+    names = lambda text: is_named(kind, wrong, text) if kind != CLEAN else bool(text)
     first, by_fit = names(judgement.first), names(judgement.reason)
     if not (first or by_fit) if kind == CLEAN else first and by_fit:
         words = {}  # of what is as it should be
