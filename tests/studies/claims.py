@@ -9,7 +9,10 @@ of a case of decks. Of the 60 of seed 20261203, 1 was wrong on the same day and 
 shortfall of the real tyre's predicted modes. Of the 60 of seed 20261801, 7 were wrong on the same
 day and are mended: the waves from which a tyre is unstable, the sensitivity of vertical stiffness,
 the first box of a sampling, numbers that cannot be variables, a total error with a prior, designs
-outside an emulator's box, the tangent that antisymmetric modes on the road use.
+outside an emulator's box, the tangent that antisymmetric modes on the road use. Of the 60 of seed
+20262801, 6 were wrong on 2026-11-28 and are mended: the prior of a linear variable, what loads in
+between change, by how much plies may be outside, where a fit goes that did not converge, the size
+of a batch, what scatter repeats replace; three more were imprecise, three could not be decided.
 """
 
 from __future__ import annotations
