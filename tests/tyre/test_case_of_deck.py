@@ -13,6 +13,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from tyrecal.cli.main import main
+from tyrecal.errors import InputError
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.modes.label import paired_labels
@@ -190,6 +191,11 @@ def test_what_a_deck_cannot_have_is_refused_by_name(case: LoadedCase) -> None:
     object.__setattr__(bare.case, "deck", deck)
     with pytest.raises(ValueError, match="needs a free outer surface"):
         resolved(with_values(bare, {"effects.tread_wear": 0.1}))
+    gauges = deck.gauges.model_copy(update={"tread": 1.05})
+    parts = {"tread": ["NOBODY"]}
+    deck = deck.model_copy(update={"parts": parts, "gauges": gauges})
+    with pytest.raises(InputError, match="NOBODY is none of "):
+        case.kind.deck.flat({}, deck.thickened)
 
 
 @pytest.mark.slow

@@ -106,8 +106,8 @@ def study(
     effects: ids to consider, None = the whole catalogue; one that a variable of the case sets is
     none; stage: hears of each of ``diagnosis.STAGES``; first_guess: values of the
     variables at which the calibration begins, None: their starts; say: hears how long it takes
-    where the solver gives no exact sensitivities. Then a section map, and other pressures and modes
-    to measure next, which take many runs, are left out. Raises InputError, EvaluationFailed, and
+    where the solver gives no exact sensitivities. Then other pressures and modes to measure next,
+    which take many runs, are left out. Raises InputError, EvaluationFailed, and
     what ``Evaluator.evaluate`` raises.
     """
     switched = [path for path, _ in toggled]

@@ -14,6 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from ...errors import InputError
 from .model import DeckModel
 from .scope import Point, corner_areas, faces_of, nearest
 from .surfaces import Face
@@ -26,7 +27,7 @@ Gauges = tuple[tuple[Sets, float], ...]  # factors on the thickness of parts
 @lru_cache(maxsize=8)
 def thickened(model: DeckModel, factors: Gauges) -> DeckModel:
     """The section with the thickness of parts times their factors. Raises OwnDeckError where one
-    has no free outer surface, or an element folds over."""
+    has no free outer surface, or an element folds over; InputError for a set of no section."""
     nodes = dict(model.nodes)
     for sets, factor in factors:
         for n, (r, z) in _growth(model, sets).items():
@@ -40,6 +41,13 @@ def thickened(model: DeckModel, factors: Gauges) -> DeckModel:
 @lru_cache(maxsize=8)
 def _growth(model: DeckModel, sets: Sets) -> Mapping[int, Point]:
     """Displacement (r, z) of the part's nodes as it becomes twice as thick, in the deck's unit."""
+    known = [s.name.upper() for s in model.solids]
+    for name in sets:
+        if name not in known:
+            raise InputError(
+                f"deck.gauges: needs sets of sections in deck.parts: {name} is none of"
+                f" {', '.join(known)}"
+            )
     sections = [s for s in model.solids if s.name.upper() in sets]
     own = {n for section in sections for n in section.elements}
     held, pressed = set(model.rim), {face[:2] for face in model.cavity}
