@@ -187,7 +187,10 @@ def test_what_fails_after_a_fit_does_not_lose_it(
     def fails(*arguments: object) -> None:
         raise ValueError("cannot reshape array")
 
-    module = {"draw_fit": "tyrecal.report.pictures", "next_states": "tyrecal.studies.fit.result"}
+    module = {
+        "draw_fit": "tyrecal.report.pictures",
+        "next_states": "tyrecal.studies.fit.build_result",
+    }
     monkeypatch.setattr(f"{module[place]}.{place}", fails)
     rows = TWO_MODES + TWO_MODES.removeprefix(HEADER).replace("240", "200")
     (tmp_path / "states.csv").write_text(rows)

@@ -107,9 +107,9 @@ def test_exit_codes(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     if code == 4:  # the objective is least at the start: nothing moves
-        from tyrecal.studies.fit import result
+        from tyrecal.studies.fit import build_result
 
-        monkeypatch.setattr(result, "MIN_STEP", float("inf"))
+        monkeypatch.setattr(build_result, "MIN_STEP", float("inf"))
     assert run(*arguments) == code
     assert "Traceback" not in capsys.readouterr().err
     assert code in EXIT_CODES

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tyrecal.studies.fit.build_result import StartReport, fit_result
 from tyrecal.studies.fit.calibrate import history_csv
 from tyrecal.studies.fit.problem import Problem
-from tyrecal.studies.fit.result import StartReport, fit_result
 
 from ..calibrated import calibrate
 from .fake import CASE, LABELS, POWERS, START, START_X, TARGETS, TRUTH, FakeEvaluator, evaluator

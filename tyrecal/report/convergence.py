@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
-from ..studies.fit.result import FitResult, FittedMode
+from ..studies.fit.result import FitResult
+from ..studies.fit.result_parts import FittedMode
 from ..studies.result import in_lines
 from . import correlation
 from .figure import COLOURS, GREY, MARKERS, headline, in_house_style, new_figure

@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from ..studies.fit.result import ROAD_QUANTITIES, FitResult, FittedMode, FittedVariable
+from ..studies.fit.result import ROAD_QUANTITIES, FitResult
+from ..studies.fit.result_parts import FittedMode, FittedVariable
 from ..units import printed_value, signed
 from .figure import COLOURS, GREY, in_house_style, new_figure
 from .sensitivities import draw_cells

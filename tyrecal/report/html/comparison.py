@@ -8,7 +8,8 @@ from functools import partial
 from typing import TypeVar
 
 from ...studies.diagnose.result import DiagnosisResult
-from ...studies.fit.result import ROAD_QUANTITIES, FitResult, FittedMode
+from ...studies.fit.result import ROAD_QUANTITIES, FitResult
+from ...studies.fit.result_parts import FittedMode
 from ...studies.result import Column, Table
 from ...units import printed_value, signed
 from ..fit import farthest

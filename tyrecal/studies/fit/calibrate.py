@@ -19,10 +19,11 @@ from ..far_off import far_off
 from ..notebook import Notebook
 from ..result import csv_text
 from . import gauss_newton, slsqp
+from .build_result import StartReport, fit_result
 from .judge import measured_rows
 from .model_errors import needs_model_errors
 from .problem import Point, Problem
-from .result import FitResult, StartReport, fit_result
+from .result import FitResult
 from .search import AT_CROSSING, CONVERGED, Descend, is_converged, minimise
 from .verdict import FIT_VERDICT_WORDS
 
