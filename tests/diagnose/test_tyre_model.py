@@ -94,14 +94,15 @@ def test_coordinates_of_a_linear_and_a_logarithmic_variable() -> None:
     own = TyreModel(replace(CASE, case=case), Evaluator(TyreDesign(CASE)), ROWS, [], {})
     start = start_values(CASE)
     assert list(own.variables) == ["A_belt", "A_carcass", "C10"]
-    assert own.values(own.start) == pytest.approx(start)
+    assert own.designs.values(own.start) == pytest.approx(start)
     assert own.start[[0, 2]] == pytest.approx([np.log(start["A_belt"]), (start["C10"] - 3e5) / 8e5])
-    there = own.values(own.start + np.array([0.1, 0.0, 0.5]))
+    there = own.designs.values(own.start + np.array([0.1, 0.0, 0.5]))
     assert there["A_belt"] == pytest.approx(np.exp(0.1) * start["A_belt"])
     assert there["C10"] == pytest.approx(start["C10"] + 4e5) and there["C10"] > 1.1e6
     assert own.spread.tolist() == [v.spread for v in read_variables(replace(CASE, case=case))]
-    assert own._slope("C10", there) == 8e5 and own._slope("A_belt", there) == there["A_belt"]
-    with_more = own.design(Query(own.start, {"frequency_stiffening": 0.3}))
+    slopes = {name: own.designs.slope(name, there) for name in ("C10", "A_belt")}
+    assert slopes == {"C10": 8e5, "A_belt": there["A_belt"]}
+    with_more = own.designs.at(own.start, {"frequency_stiffening": 0.3})
     assert with_more["effects.frequency_stiffening"] == 0.3
 
 
@@ -109,7 +110,7 @@ def test_a_solver_that_gives_no_slopes_of_the_mass_is_refused_where_that_was_mea
     silent = SimpleNamespace(mass_kg=10.0, gradients={"C10": np.ones(1)}, mass_gradients={})
     own = TyreModel(CASE, Evaluator(TyreDesign(CASE)), [(None, 0.0)], [], {})
     with pytest.raises(DeckRefused, match="gives no sensitivities of the mass, which was measured"):
-        own._mass_slopes(own.start, [SimpleNamespace(evaluation=silent)])  # type: ignore[list-item]
+        own._answer_rows._mass_slopes(own.start, [SimpleNamespace(evaluation=silent)])  # type: ignore[list-item]
 
 
 def test_a_denied_licence_ends_the_study_and_is_no_answer_about_an_effect(

@@ -14,6 +14,7 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.evidence import explain, refit, refit_at
+from tyrecal.studies.inference.cord_coupling import cord_coupling
 from tyrecal.studies.inference.inverse_problem import InverseProblem
 from tyrecal.studies.inference.model import Answer, Coupling, Query
 from tyrecal.studies.inference.tyre_model import TyreModel
@@ -94,7 +95,7 @@ def test_cords_three_standard_deviations_off_move_a_near_pair_as_the_model_says(
     x = MODEL.start + np.array([0.0, 0.0, np.log(0.83)])  # the two cross near here
     (at_0,) = model.answers([Query(x, constants=True, coupled=True)])
     assert isinstance(at_0, Answer) and at_0.constants is not None and at_0.coupling is not None
-    evaluated, failed = model._modes, list[int]()
+    evaluated, failed = model.modes, list[int]()
 
     def fails_once(wanted: Any) -> Any:
         if failed:
@@ -102,8 +103,8 @@ def test_cords_three_standard_deviations_off_move_a_near_pair_as_the_model_says(
         failed.append(len(wanted))
         return [EvaluationFailed("unstable", "no solution")] * len(wanted)
 
-    monkeypatch.setattr(model, "_modes", fails_once)
-    other = model._coupling(x, at_0.eta, at_0.constants)
+    monkeypatch.setattr(model, "modes", fails_once)
+    other = cord_coupling(model, x, at_0.eta, at_0.constants)
     assert failed and other is not None
     assert other.size == pytest.approx(at_0.coupling.size, rel=0.1)
     carcass = list(model.sources).index("carcass_angle")

@@ -75,6 +75,11 @@ class Toy:
         self.splits = {id: np.zeros(n) for id in self.g}
         self.asked = 0
 
+    @property
+    def designs(self) -> Toy:
+        """Itself: it has its coordinates' values and units."""
+        return self
+
     def values(self, x: Array) -> dict[str, float]:
         """The variables, of a logarithmic scale about 2."""
         return {name: 2.0 * float(np.exp(xi)) for name, xi in zip(self.variables, x, strict=True)}

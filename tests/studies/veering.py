@@ -47,7 +47,7 @@ AXIAL, TORSIONAL = Label(0, 0, "axial"), Label(0, 0, "torsional")
 
 def made(model: TyreModel, x: np.ndarray, random: np.random.Generator) -> tuple[np.ndarray, dict]:
     """ln f of a tyre at x (v,) with drawn constants, by the model itself, and what was drawn."""
-    values = {**model._plain, **model.values(x)}
+    values = {**model.designs.constants, **model.designs.values(x)}
     drawn = {}
     for source in model.found:
         turned = any(path.endswith("angle_deg") for path in source.steps)
@@ -58,7 +58,7 @@ def made(model: TyreModel, x: np.ndarray, random: np.random.Generator) -> tuple[
     own = values["pressure_kPa"] - model.case.case.pressure_kPa
     designs = [{**values, "pressure_kPa": p + own} for p in PRESSURES_kPa]
     by_pressure = dict(
-        zip(PRESSURES_kPa, model._modes([(each, ()) for each in designs]), strict=True)
+        zip(PRESSURES_kPa, model.modes([(each, ()) for each in designs]), strict=True)
     )
     ln_f = []
     for label, p in model.rows:

@@ -33,14 +33,14 @@ def _calibrated(diagnosis: Diagnosis, model: TyreModel, key: str) -> dict[str, J
     # mean of the covariances, and covariance of the means, over the parameters
     covariance = np.tensordot(p, hypothesis.fitted.covariance, 1) + (p[:, None] * apart).T @ apart
     x = diagnosis.problem.expansion.x0 + d[hypothesis.best]
-    values = model.values(x)
-    above, below = (model.values(x + step) for step in (SLOPE_STEP, -SLOPE_STEP))
+    values = model.designs.values(x)
+    above, below = (model.designs.values(x + step) for step in (SLOPE_STEP, -SLOPE_STEP))
     scatter = np.sqrt(np.diag(covariance)).tolist()  # of x
     return {
         name: {
             "value": values[name],
             "standard_error": scatter[i] * (above[name] - below[name]) / (2 * SLOPE_STEP),
-            "unit": model.unit(name),
+            "unit": model.designs.unit(name),
         }
         for i, name in enumerate(values)
     }

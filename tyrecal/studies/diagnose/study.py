@@ -244,7 +244,7 @@ def _under_load(
         hypothesis = diagnosis.hypothesis(key)
         x = diagnosis.problem.expansion.x0 + hypothesis.fitted.d[hypothesis.best]
         effects = {id: float(e[hypothesis.best]) for id, e in hypothesis.values.items()}
-        tyres[key] = model.design(Query(x, effects))
+        tyres[key] = model.designs.at(x, effects)
     return compare(case, evaluator, readings, tyres)
 
 

@@ -3,7 +3,7 @@ the inflated state."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -15,6 +15,7 @@ from ...simulate.modes.find import LabelledModes, modes_in_order
 from ...tyre.case import LoadedCase, number_at
 from ...tyre.state import TyreState
 from .model import ModelRow, state_of
+from .model_designs import ModelDesigns
 
 Array = np.ndarray
 
@@ -38,14 +39,7 @@ class Parted(Protocol):
     rows: list[ModelRow]
     states: list[TyreState]
     jobs: int
-
-    def values(self, x: Array) -> dict[str, float]:
-        """Design variables at x, in their own units."""
-
-    def in_state(
-        self, state: TyreState, design: Mapping[str, float], names: Sequence[str] = ()
-    ) -> tuple[dict[str, float], tuple[str, ...]]:
-        """A design in a state, and those of the slopes ``names`` that it has there."""
+    designs: ModelDesigns
 
 
 def regions(model: Parted, x: Array) -> list[SectionPart]:
@@ -61,14 +55,14 @@ def regions(model: Parted, x: Array) -> list[SectionPart]:
     numbers = {path: float(number_at(case, path)) for path in paths}
     evaluator = model.evaluator.of(TyreDesign(case))
     labels = sorted({label for label, _ in model.rows if label}, key=str)
-    own = model.values(x)
+    own = model.designs.values(x)
     taken = {
         path: number
         for name, v in case.case.variables.items()
         for path, number in zip(v.sets, v.numbers(own[name]), strict=True)
     }
     design = {**numbers, **taken}
-    designs = [model.in_state(state, design, list(numbers)) for state in model.states]
+    designs = [model.designs.in_state(state, design, list(numbers)) for state in model.states]
     at: dict[TyreState, LabelledModes] = {}
     answers = modes_in_order(evaluator, designs, labels, model.jobs)
     for state, each in zip(model.states, answers, strict=True):

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from itertools import islice
-from math import exp, log
+from math import log
 
 import numpy as np
 
@@ -17,28 +16,27 @@ from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.failure import DeckRefused, EvaluationFailed, SolverUnavailable
 from ...simulate.modes.find import LabelledModes, ModesAnswer, modes_in_order
 from ...simulate.modes.label import Label
-from ...tyre.case import LoadedCase, start_values
+from ...tyre.case import LoadedCase
 from ...tyre.case.schema import TargetMode, Targets
 from ...tyre.effects import catalogue
-from ...tyre.number_units import EFFECT_PATH, unit_of
-from ...tyre.state import TyreState, without
+from ...tyre.number_units import EFFECT_PATH
+from ...tyre.state import TyreState
 from ...tyre.values import with_values
-from ..variable import read_variables
+from .answer_rows import AnswerRows, ln_frequency
 from .between import Between
+from .cord_coupling import cord_coupling
 from .expansion import node_values
 from .form_error import MATERIAL_LAWS
 from .losses import loss_deviations, losses_in_words, with_losses, with_twice_the_loss
-from .model import Answer, Coupling, EffectRange, ModelRow, Query, state_of
+from .model import Answer, EffectRange, ModelRow, Query, state_of
+from .model_designs import ModelDesigns
 from .regions import SectionPart, count_numbers, regions
 from .section_design import SectionDesign
 from .section_fields import OF_COMPOUNDS, known_from
 from .uncertainties import Source, values_of
-from .veering import coupling, partner
 
 Array = np.ndarray
 WORTH_A_POOL = 10  # evaluations, for processes to be started
-
-MAY_VEER = 0.15  # of ln f at some pressure, from which modes of one harmonic may veer
 
 FIT_STEPS = 4  # of a calibration, as a rule
 
@@ -72,7 +70,6 @@ class TyreModel:
             case = with_losses(case)
         self.rows, self.found, self.jobs = list(rows), own_sources, jobs
         self.ranges: Mapping[str, EffectRange] = ranges
-        self._present = case.case.effects
         found_in = {state_of(where) for label, where in rows if label}
         self.states = sorted(found_in, key=lambda s: (s.pressure_kPa, s.rim or "")) or [
             TyreState(case.case.pressure_kPa)
@@ -87,16 +84,16 @@ class TyreModel:
             SectionDesign(case, self._moved) if self._moved else design_of(case)
         )
         self._labels = labels
-        self._variables = case.case.variables
-        self.variables: Sequence[str] = list(self._variables)
+        self.designs = designs = ModelDesigns(case, values_of(case, own_sources))
+        self.variables: Sequence[str] = designs.names
         self.sources: Sequence[str] = [source.name for source in own_sources]
         self.material_laws = 0.0 if known_from(case) == "exact" else MATERIAL_LAWS
-        self.start = np.array([self._scaled(n, v) for n, v in start_values(case).items()])
-        self.spread = np.array([v.spread for v in read_variables(case)])
-        self._plain = values_of(case, own_sources)
-        self._plain.setdefault("pressure_kPa", case.case.pressure_kPa)
+        self.start, self.spread = designs.start, designs.spread
         self._slopeless = {id for id, span in ranges.items() if not self._has_slopes(id, span)}
-        self._between = Between.of(self.rows, self.states)
+        self.between = Between.of(self.rows, self.states)
+        self._answer_rows = AnswerRows(
+            self.between.rows, designs, own_sources, evaluator.solver.name
+        )
         self._known_moves: dict[tuple[str, float], bool] = {}
         self._plain_answers: dict[bytes, Answer] = {}
         self._known_shares: dict[str, Array] = {}  # see `_loss_shares`
@@ -136,25 +133,6 @@ class TyreModel:
             and path.removeprefix(EFFECT_PATH) not in self._sloped_sources
         ]
 
-    def values(self, x: Array) -> dict[str, float]:
-        """Design variables at x, in their own units, bounds not enforced."""
-        return {
-            name: exp(xi) if v.scale == "log" else v.lower + xi * (v.upper - v.lower)
-            for (name, v), xi in zip(self._variables.items(), map(float, x), strict=True)
-        }
-
-    def unit(self, variable: str) -> str:
-        """The unit of a design variable, "" where it has none."""
-        return unit_of(self._variables[variable].sets[0])
-
-    def design(self, point: Query) -> dict[str, float]:
-        """Numbers of the case at a point: variables, and effects on top of those that it has."""
-        effects = {
-            EFFECT_PATH + id: self._present.get(id, 0.0) + float(e)
-            for id, e in point.effects.items()
-        }
-        return {**self.values(point.x), **effects}
-
     def answers(self, points: Sequence[Query]) -> list[Answer | Exception]:
         """Each point in every state, all in one batch, ``jobs`` evaluations at a time.
 
@@ -191,7 +169,7 @@ class TyreModel:
     @property
     def first_design(self) -> dict[str, float]:
         """The start in the first state."""
-        return self.in_state(self.states[0], self.values(self.start))[0]
+        return self.designs.in_state(self.states[0], self.designs.values(self.start))[0]
 
     @property
     def runs_of_calibration(self) -> int:
@@ -202,7 +180,7 @@ class TyreModel:
 
     def _queries(self, points: Sequence[Query]) -> tuple[list[Query], dict[QueryKey, Query]]:
         """The points, and by key all that has to be evaluated for them."""
-        saves = bool(self._between.inner.any())
+        saves = bool(self.between.inner.any())
         points = [p if saves and _is_smooth(p) else replace(p, near=None) for p in points]
         more = [Query(p.x) for p in points if self._is_bare(p)]
         more += [Query(p.near) for p in points if p.near is not None]
@@ -228,15 +206,18 @@ class TyreModel:
     def values_at(self, x: Array) -> Array:
         """eta (n,) alone, without slopes. Raises DeckRefused, EvaluationFailed."""
         answers = []
-        designs = [self.in_state(state, self.values(x))[0] for state in self.states]
-        for each in self._modes([(design, ()) for design in designs]):
+        designs = [self.designs.in_state(state, self.designs.values(x))[0] for state in self.states]
+        for each in self.modes([(design, ()) for design in designs]):
             if not isinstance(each, LabelledModes):
                 raise each
             answers.append(each)
         at = dict(zip(self.states, answers, strict=True))
         mass_kg = answers[0].evaluation.mass_kg
         return np.array(
-            [_ln(label, at[state_of(w)]) if label else log(mass_kg) for label, w in self.rows]
+            [
+                ln_frequency(label, at[state_of(w)]) if label else log(mass_kg)
+                for label, w in self.rows
+            ]
         )
 
     def _completed(
@@ -250,7 +231,7 @@ class TyreModel:
             plain = known[_key(Query(point.near))]
             if not isinstance(plain, Answer):
                 return plain
-            answer = self._between.filled(answer, plain)
+            answer = self.between.filled(answer, plain)
         if self._is_bare(point):
             plain = known[_key(Query(point.x))]
             if not isinstance(plain, Answer):
@@ -269,7 +250,7 @@ class TyreModel:
                 constants[:, k] += other.eta - answer.eta
             self._add_compounds(point.x, constants)
         if point.coupled and constants is not None:
-            coupled = self._coupling(point.x, answer.eta, constants)
+            coupled = cord_coupling(self, point.x, answer.eta, constants)
             answer = replace(answer, coupling=coupled)
         if constants is not None and self._deviations and answer.damping is not None:
             shares = self._loss_shares(point.x, answer.damping)
@@ -285,7 +266,7 @@ class TyreModel:
         if len(self._deviations) == 1:
             return {name: np.ones(len(damping)) for name in self._deviations}
         for name in self._deviations.keys() - self._known_shares.keys():
-            case, rows = with_twice_the_loss(self.case, name), self._between.rows
+            case, rows = with_twice_the_loss(self.case, name), self.between.rows
             (twice,) = TyreModel(case, self.evaluator, rows, [], {}, self.jobs).answers([Query(x)])
             if not isinstance(twice, Answer):
                 raise twice
@@ -314,20 +295,20 @@ class TyreModel:
         highest pressure; None where the case cannot have it. The tyre at x is written first, so
         that all is of its numbers."""
         ((id, e),) = point.effects.items()
-        own = with_values(self.case, {**self.values(point.x), EFFECT_PATH + id: 0.0})
+        own = with_values(self.case, {**self.designs.values(point.x), EFFECT_PATH + id: 0.0})
         add = catalogue()[id].shape_uncertainty
         assert add
         try:
-            made = add(own, self._present.get(id, 0.0) + e)
+            made = add(own, self.designs.present(id) + e)
         except ValueError:  # an effect from outside may raise one
             return None
-        top = sorted(set(self._between.high.tolist()))
-        rows = [self._between.rows[i] for i in top]
+        top = sorted(set(self.between.high.tolist()))
+        rows = [self.between.rows[i] for i in top]
         try:
             shift = TyreModel(made, self.evaluator, rows, [], {}, self.jobs).values_at(point.x)
         except EvaluationFailed:
             return None
-        return np.asarray((shift - eta[top])[np.searchsorted(top, self._between.high)])
+        return np.asarray((shift - eta[top])[np.searchsorted(top, self.between.high)])
 
     def _add_compounds(self, x: Array, constants: Array) -> None:
         """Fill in the columns of the compounds' fields, by the slopes of the section's parts."""
@@ -367,7 +348,7 @@ class TyreModel:
         if catalogue()[id].needs == "rotation" or (e and id in self._slopeless):
             return False
         if (id, e) not in self._known_moves:
-            path, base = EFFECT_PATH + id, self._present.get(id, 0.0)
+            path, base = EFFECT_PATH + id, self.designs.present(id)
             try:
                 design = self.evaluator.design.at({path: base + e})
                 Decks(design, (path,)).tangents(self.evaluator.solver.dialect)
@@ -379,17 +360,13 @@ class TyreModel:
     def _is_bare(self, point: Query) -> bool:
         return not self._slopeless.isdisjoint(point.effects)
 
-    def _scaled(self, name: str, value: float) -> float:
-        v = self._variables[name]
-        return log(value) if v.scale == "log" else (value - v.lower) / (v.upper - v.lower)
-
     def _evaluated(self, points: Sequence[Query]) -> list[Answer | Exception]:
         """Distinct points, slopes with those that have them."""
         wanted, first = [], [0]
         for point in points:
             wanted += self._wanted(point)
             first.append(len(wanted))
-        modes = self._modes(wanted)
+        modes = self.modes(wanted)
         results = []
         for i, point in enumerate(points):
             here = slice(first[i], first[i + 1])
@@ -399,32 +376,25 @@ class TyreModel:
     def _wanted(self, point: Query) -> list[tuple[dict[str, float], tuple[str, ...]]]:
         """The point's design in each state, and the names of the slopes that are wanted there."""
         ids = {*point.slopes, *(self._sloped_sources if point.constants else ())}
-        constants = {**self._plain, **dict.fromkeys(self._moved, 0.0)} if point.constants else {}
+        constants = (
+            {**self.designs.constants, **dict.fromkeys(self._moved, 0.0)} if point.constants else {}
+        )
         slopes = [EFFECT_PATH + id for id in sorted(ids)]
         names = dict.fromkeys((*self.variables, *constants, *slopes))
-        if self._between.inner.any():
+        if self.between.inner.any():
             names["pressure_kPa"] = None
         if self._is_bare(point):
             names = {}
-        at_0 = {EFFECT_PATH + id: self._present.get(id, 0.0) for id in ids}
-        design = {**constants, **at_0, **self.design(point)}
-        return [self.in_state(state, design, list(names)) for state in self._states_of(point)]
+        at_0 = {EFFECT_PATH + id: self.designs.present(id) for id in ids}
+        design = {**constants, **at_0, **self.designs.at(point.x, point.effects)}
+        return [
+            self.designs.in_state(state, design, list(names)) for state in self._states_of(point)
+        ]
 
     def _states_of(self, point: Query) -> Sequence[TyreState]:
-        return self.states if point.near is None else self._between.ends
+        return self.states if point.near is None else self.between.ends
 
-    def in_state(
-        self, state: TyreState, design: Mapping[str, float], names: Sequence[str] = ()
-    ) -> tuple[dict[str, float], tuple[str, ...]]:
-        """A design in a state, which wins over an effect that holds the rim otherwise, and those
-        of the slopes ``names`` that it has there."""
-        held = replace(state, pressure_kPa=None).numbers(self.case)
-        pressure = state.with_defaults(self.case).pressure_kPa or 0.0
-        left = without(self.case, dict.fromkeys(names, 0.0), held)
-        there = {**without(self.case, design, held), "pressure_kPa": pressure, **held}
-        return there, tuple(name for name in left if name not in held)
-
-    def _modes(
+    def modes(
         self, wanted: Sequence[tuple[dict[str, float], tuple[str, ...]]]
     ) -> list[ModesAnswer]:
         """Labelled modes of designs, each with the names of which sensitivities are wanted. Raises
@@ -463,135 +433,9 @@ class TyreModel:
                 return each
             labelled.append(each)
         at = dict(zip(self._states_of(point), zip(designs, labelled, strict=True), strict=True))
-        rows = self._between.rows
-        eta, jacobian = np.zeros(len(rows)), np.zeros((len(rows), len(self.variables)))
-        slopes, split = np.zeros((len(rows), len(self.found))), np.zeros(len(rows))
-        by_pressure, damping = np.zeros(len(rows)), np.full(len(rows), np.nan)
-        by_effect = {id: np.full(len(rows), np.nan) for id in point.slopes}  # not the mass
-        for i, (label, where) in enumerate(rows):
-            if label and state_of(where) not in at:
-                continue  # between the ends
-            if label is None:
-                eta[i] = log(labelled[0].evaluation.mass_kg)
-                jacobian[i], slopes[i] = self._mass_slopes(point.x, labelled)
-                continue
-            design, answer = at[state_of(where)]
-            gradients, modes = answer.evaluation.gradients, answer.wanted
-            f, place = modes[label].frequency_Hz, modes[label].position
-            eta[i] = _ln(label, answer)
-            if members := modes[label].raw.members:
-                split[i] = log(members[1] / members[0])
-            if ratio := modes[label].raw.damping_ratio:
-                damping[i] = log(ratio)
-            for id, slope in by_effect.items():
-                path = EFFECT_PATH + id  # a state may hold it at 0
-                slope[i] = gradients[path][place] / f if path in gradients else 0.0
-            if "pressure_kPa" in gradients:
-                by_pressure[i] = gradients["pressure_kPa"][place] * design["pressure_kPa"] / f
-            for j, name in enumerate(self.variables):
-                if name in gradients:
-                    jacobian[i, j] = gradients[name][place] * self._slope(name, design) / f
-            if point.constants:
-                for k, source in enumerate(self.found):
-                    slopes[i, k] = sum(
-                        step * gradients[path][place] / f
-                        for path, step in _steps(source).items()
-                        if path in gradients
-                    )
-        known = by_pressure if self._between.inner.any() and not self._is_bare(point) else None
-        return Answer(
-            eta,
-            jacobian,
-            split,
-            slopes if point.constants else None,
-            by_effect,
-            by_pressure=known,
-            damping=None if np.isnan(damping).all() else damping,
-        )
-
-    def _coupling(self, x: Array, eta: Array, constants: Array) -> Coupling | None:
-        """Coupling by turned cords of modes that are near each other at x; other constants move
-        modes, and couple hardly any. None where there are no such modes.
-
-        One step of each, to the other side where that has no solution, at the lowest and the
-        highest pressure.
-        """
-        rows, count = self._between.rows, len(self.rows)
-        places = {(label, state_of(w) if label else w): i for i, (label, w) in enumerate(rows)}
-        mates = np.array([places.get((partner(x), state_of(w)), -1) if x else -1 for x, w in rows])
-        near = {
-            label
-            for i, (label, _) in enumerate(rows)
-            if mates[i] >= 0 and abs(eta[i] - eta[mates[i]]) < MAY_VEER
-        }
-        mates[[label not in near for label, _ in rows]] = -1
-        turned = {
-            k: source
-            for k, source in enumerate(self.found)
-            if any(unit_of(path) == "degrees" for path in source.steps)
-        }
-        if not near or not turned:
-            return None
-        own, ends = {**self._plain, **self.values(x)}, self._between.ends
-
-        def moved(source: Source, side: float) -> list[tuple[dict[str, float], tuple[str, ...]]]:
-            steps = {k: own[k] + side * step for k, step in source.steps.items() if k in own}
-            return [self.in_state(state, {**own, **steps}) for state in ends]
-
-        answers = iter(self._modes([each for s in turned.values() for each in moved(s, 1.0)]))
-        square, rise = np.zeros(len(rows)), np.zeros(len(rows))
-        for k, source in turned.items():
-            side, here = 1.0, list(islice(answers, len(ends)))
-            if not all(isinstance(answer, LabelledModes) for answer in here):
-                side, here = -1.0, self._modes(moved(source, -1.0))
-            ln_f = eta.copy()
-            for state, answer in zip(ends, here, strict=True):
-                if not isinstance(answer, LabelledModes):
-                    raise answer
-                for i, (label, where) in enumerate(rows):
-                    if label and mates[i] >= 0 and state_of(where) == state:
-                        ln_f[i] = log(answer.wanted[label].frequency_Hz)
-            slope = side * constants[:, k]
-            q, more = coupling(*(np.array([v, v[mates]]) for v in (eta, slope, ln_f)))
-            square, rise = square + q**2, rise + q**2 * more
-        square, rise = (self._between.straight(each) for each in (square, rise))
-        size = np.where(mates >= 0, np.sqrt(square), 0.0)[:count]
-        rise = np.where(size > 0, rise[:count] / np.maximum(square[:count], 1e-300), 0.0)
-        return Coupling(np.where(mates < count, mates, -1)[:count], size, rise)
-
-    def _mass_slopes(self, x: Array, labelled: Sequence[LabelledModes]) -> tuple[Array, Array]:
-        """d ln mass by x (v,) and by the sources of error (k,). Raises DeckRefused where the solver
-        does not give them."""
-        mass_kg, values, rates = labelled[0].evaluation.mass_kg, self.values(x), dict[str, float]()
-        for each in labelled:  # a number that one state sets moves the mass in the others
-            rates |= each.evaluation.mass_gradients
-            if each.evaluation.gradients.keys() != each.evaluation.mass_gradients.keys():
-                raise DeckRefused(
-                    f"solver '{self.evaluator.solver.name}' gives no sensitivities of the mass,"
-                    " which was measured"
-                )
-        by_x = [rates.get(name, 0.0) * self._slope(name, values) for name in self.variables]
-        by_source = [
-            sum(step * rates.get(path, 0.0) for path, step in _steps(source).items())
-            for source in self.found
-        ]
-        return np.array(by_x) / mass_kg, np.array(by_source) / mass_kg
-
-    def _slope(self, name: str, design: Mapping[str, float]) -> float:
-        v = self._variables[name]
-        return design[name] if v.scale == "log" else v.upper - v.lower
-
-
-def _ln(label: Label, labelled: LabelledModes) -> float:
-    """ln f of a mode, of a pair the mean."""
-    mode = labelled.wanted[label]
-    members = mode.raw.members
-    return log(members[0] * members[1]) / 2 if members else log(mode.frequency_Hz)
-
-
-def _steps(source: Source) -> Mapping[str, float]:
-    """Steps of numbers by path, or of the field of the section that the source is."""
-    return {source.name: 1.0} if source.field else source.steps
+        answer = self._answer_rows.answer(point, at)
+        smooth = self.between.inner.any() and not self._is_bare(point)
+        return answer if smooth else replace(answer, by_pressure=None)
 
 
 def _key(point: Query) -> QueryKey:

@@ -178,7 +178,7 @@ def run(
     J, other = (posterior.slopes(best[None], which)[0] for which in (posterior.rows, at))
     return Sample(
         variables,
-        tuple(map(model.unit, model.variables)),
+        tuple(map(model.designs.unit, model.variables)),
         observations,
         tuple(own_sources),
         drawn,

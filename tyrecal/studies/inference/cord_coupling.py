@@ -1,0 +1,86 @@
+"""Coupling of near modes by turned cords, by one step of each source of error that turns them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import islice
+from math import log
+from typing import Protocol
+
+import numpy as np
+
+from ...simulate.modes.find import LabelledModes, ModesAnswer
+from ...tyre.number_units import unit_of
+from .between import Between
+from .model import Coupling, ModelRow, state_of
+from .model_designs import ModelDesigns
+from .uncertainties import Source
+from .veering import coupling, partner
+
+Array = np.ndarray
+MAY_VEER = 0.15  # of ln f at some pressure, from which modes of one harmonic may veer
+
+
+class Coupled(Protocol):
+    """A tyre that can give its modes at other designs."""
+
+    rows: list[ModelRow]
+    found: list[Source]
+    between: Between
+    designs: ModelDesigns
+
+    def modes(
+        self, wanted: Sequence[tuple[dict[str, float], tuple[str, ...]]]
+    ) -> list[ModesAnswer]:
+        """Labelled modes of designs, each with the names of which sensitivities are wanted."""
+
+
+def cord_coupling(model: Coupled, x: Array, eta: Array, constants: Array) -> Coupling | None:
+    """Coupling by turned cords of modes that are near each other at x; other constants move
+    modes, and couple hardly any. None where there are no such modes.
+
+    One step of each, to the other side where that has no solution, at the lowest and the
+    highest pressure.
+    """
+    rows, count = model.between.rows, len(model.rows)
+    places = {(label, state_of(w) if label else w): i for i, (label, w) in enumerate(rows)}
+    mates = np.array([places.get((partner(x), state_of(w)), -1) if x else -1 for x, w in rows])
+    near = {
+        label
+        for i, (label, _) in enumerate(rows)
+        if mates[i] >= 0 and abs(eta[i] - eta[mates[i]]) < MAY_VEER
+    }
+    mates[[label not in near for label, _ in rows]] = -1
+    turned = {
+        k: source
+        for k, source in enumerate(model.found)
+        if any(unit_of(path) == "degrees" for path in source.steps)
+    }
+    if not near or not turned:
+        return None
+    own, ends = {**model.designs.constants, **model.designs.values(x)}, model.between.ends
+
+    def moved(source: Source, side: float) -> list[tuple[dict[str, float], tuple[str, ...]]]:
+        steps = {k: own[k] + side * step for k, step in source.steps.items() if k in own}
+        return [model.designs.in_state(state, {**own, **steps}) for state in ends]
+
+    answers = iter(model.modes([each for s in turned.values() for each in moved(s, 1.0)]))
+    square, rise = np.zeros(len(rows)), np.zeros(len(rows))
+    for k, source in turned.items():
+        side, here = 1.0, list(islice(answers, len(ends)))
+        if not all(isinstance(answer, LabelledModes) for answer in here):
+            side, here = -1.0, model.modes(moved(source, -1.0))
+        ln_f = eta.copy()
+        for state, answer in zip(ends, here, strict=True):
+            if not isinstance(answer, LabelledModes):
+                raise answer
+            for i, (label, where) in enumerate(rows):
+                if label and mates[i] >= 0 and state_of(where) == state:
+                    ln_f[i] = log(answer.wanted[label].frequency_Hz)
+        slope = side * constants[:, k]
+        q, more = coupling(*(np.array([v, v[mates]]) for v in (eta, slope, ln_f)))
+        square, rise = square + q**2, rise + q**2 * more
+    square, rise = (model.between.straight(each) for each in (square, rise))
+    size = np.where(mates >= 0, np.sqrt(square), 0.0)[:count]
+    rise = np.where(size > 0, rise[:count] / np.maximum(square[:count], 1e-300), 0.0)
+    return Coupling(np.where(mates < count, mates, -1)[:count], size, rise)
