@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import doctest
 import inspect
+import re
 import subprocess
 import sys
 from hashlib import sha256
@@ -60,6 +61,12 @@ def test_all_that_is_offered_is_there_and_nothing_else() -> None:
     assert {name for name in own if not name.startswith("_")} <= set(api.__all__)
     with pytest.raises(AttributeError, match="no attribute 'fit_everything'"):
         tyrecal.fit_everything  # noqa: B018
+
+
+def test_the_errors_of_the_guide_are_offered() -> None:
+    _, _, text = (ROOT / "cases/python.md").read_text(encoding="utf-8").partition("## Errors")
+    errors = re.findall(r"^\| `(\w+)` \|", text.partition("\n## ")[0], re.MULTILINE)
+    assert errors and set(errors) <= set(api.__all__)
 
 
 SLOW = {"diagnose_case", "evaluate_footprint", "read_results"}

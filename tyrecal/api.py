@@ -57,6 +57,7 @@ __all__ = [
     "Emulator",
     "EvaluationFailed",
     "Fit",
+    "InputError",
     "LoadedCase",
     "Mode",
     "Result",
