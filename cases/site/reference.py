@@ -267,7 +267,7 @@ def case_keys() -> str:
 HEAD = """\
 # Keys of a case file
 
-For users who write or read a case file. You get every key with an example, written from the code by
+For users who write or read a case file. You get every key, with examples, written from the code by
 `python cases/site/reference.py`. Look up what you need. `NAME` is a name of yours, `[]` each entry
 of a list. Sub-keys are required only if their key is given. [More](README.md#the-case-file).
 """

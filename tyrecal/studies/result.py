@@ -347,7 +347,7 @@ class ModeEntry(Named):
     overlap: float | None = None  # overlap with the unloaded shape of this label
     spanned: float | None = None  # share of the shape that the modes at the load before span
     sliding_Hz: float | None = None  # frequency if nothing holds the patch along the road
-    grip_mm: float | None = None  # largest motion of the crown before the patch starts to slide
+    grip_mm: float | None = None  # motion of the crown at which the whole patch slides
     d_ln_f_d_ln_p: float | None = None  # sensitivity to the pressure
     standard_error_Hz: float | None = None  # of a fitted design, by all that is uncertain
 

@@ -12,7 +12,7 @@ LABEL_WORDS = (
 COLUMN_WORDS = {
     "clarity": "clarity: share of the motion that the label explains, less that of the next label",
     "sliding_Hz": "sliding: frequency if nothing holds the patch along the road",
-    "grip_mm": "grip: largest motion of the crown before the patch starts to slide",
+    "grip_mm": "grip: motion of the crown at which the whole patch slides",
     "overlap": "overlap: with the unloaded shape of this label, 1 for an equal one",
 }
 

@@ -58,7 +58,7 @@ class Analysis(Part):
     static_moduli: Moduli = "long_term"  # moduli of the rubber in the inflation
     # increments of the inflation in the decks
     static_increments: Annotated[int, Field(ge=1, le=1000)] = 10
-    # frequency of the Prony series in vibrations; absent: no series
+    # frequency of the Prony series in vibrations; absent: moduli of the inflation
     vibration_frequency_Hz: Frequency | None = None
     sectors: Annotated[int, Field(ge=8, le=1000)] = 60  # sectors of the revolved tyre in the decks
     # modes are computed up to this number of waves
@@ -129,7 +129,7 @@ class Variable(Part):
     start: Number  # value at the start; it overrides the values at the paths
     lower: Number  # least value
     upper: Number  # largest value
-    # standard deviation of the start in percent; absent: 0.5 of its logarithm
+    # standard deviation of the start in percent; absent: 0.5 of its logarithm, linear: uniform
     percent: Positive | None = None
     scale: Literal["log", "linear"] = "log"  # how a fit takes steps
 
@@ -168,7 +168,8 @@ class TargetMode(Part):
     kind: Literal["axial", "torsional"] | None = None  # only of [0,0]: axial (lateral) or torsional
     frequency_Hz: Frequency  # frequency
     weight: Weight = 1.0  # weight in the objective
-    sigma_Hz: Positive | None = None  # standard deviation; absent: counts as 1 Hz
+    # standard deviation; absent: counts as 1 Hz; required under a load
+    sigma_Hz: Positive | None = None
     damping_ratio: Positive | None = None  # fraction of critical; fitted by loss factors alone
     damping_sigma: Positive | None = None  # standard deviation of damping_ratio; absent: 25 %
     pressure_kPa: Pressure | None = None  # pressure at which it was measured; absent: the case's
@@ -278,7 +279,8 @@ class Uncertainty(Part):
 
     sets: Annotated[list[Text], Field(min_length=1)]  # paths of numbers that are off together
     percent: Positive | None = None  # standard deviation in percent of each number
-    absolute: Positive | None = None  # standard deviation in the numbers' unit
+    # instead of percent: standard deviation in the numbers' unit
+    absolute: Positive | None = None
     # -1 for numbers that fall where the others rise
     signs: list[Annotated[int, Field(ge=-1, le=1)]] | None = None
 
@@ -313,7 +315,8 @@ class Case(Part):
     name: Text  # name in words
     size: Text  # size code
     pressure_kPa: Pressure  # inflation pressure
-    deck: DeckSource | None = None  # instead of section, mesh, materials and solids: your own deck
+    # instead of section, mesh, materials, solids, layers and templates: your own deck
+    deck: DeckSource | None = None
     section: SectionSource = SectionSource()  # source of the section
     # element type and meshes
     mesh: Mesh = Mesh(
@@ -340,7 +343,7 @@ class Case(Part):
     )
     variables: dict[Name, Variable] = Field(default_factory=dict)  # what a fit may vary, by name
     targets: Targets = Targets()  # measured values
-    # uncalibrated numbers, for a diagnosis, by name
+    # uncalibrated numbers by name
     uncertainties: dict[Name, Uncertainty] = Field(default_factory=dict)
     solver: SolverChoice  # solver and its limits
     templates: Text | None = None  # folder of your own deck templates
