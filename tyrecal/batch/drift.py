@@ -31,6 +31,7 @@ DEFAULTS = {
     "modes/mass_kg": {"relative": 1e-6},
     "modes/frequency_Hz": {"relative": 1e-5},
     "sweep-pressure/frequency_Hz": {"relative": 1e-3},
+    "sweep/frequency_Hz": {"relative": 1e-3},
     "footprint/deflection_m": {"relative": 2e-3},
     "footprint/area_m2": {"relative": 0.01},
     "footprint/length_m": {"relative": 0.02},
@@ -39,6 +40,9 @@ DEFAULTS = {
     "footprint/peak_pressure_Pa": {"relative": 0.03},
     "footprint/vertical_stiffness_N_per_m": {"relative": 0.01},
     "sensitivities/sensitivity": {"relative": 1e-3, "absolute": 1e-4},
+    "frf/peak_Hz": {"relative": 1e-3},
+    "frf/peak": {"relative": 0.01},
+    "frf/frac": {"absolute": 0.01},
     **{
         f"stiffness/{direction}_per_{unit}": {"relative": 0.01}
         for direction, unit in (
@@ -59,6 +63,7 @@ DEFAULTS = {
     "diagnose/probability": {"absolute": 0.02},
     "diagnose/calibrated": {"relative": 0.01},
 }
+OTHERS = {"relative": 1e-3}  # of quantities that are not above, as those of studies from outside
 Figures = dict[str, dict[str, dict[str, float]]]  # by case, study, quantity
 
 
@@ -84,8 +89,8 @@ def baseline_of(reports: Sequence[Report], before: Json | None) -> Json:
         for study, quantities in studies.items():
             for quantity in quantities:
                 kind = f"{study}/{quantity.partition(' ')[0]}"
-                if not _named(tolerances, study, quantity) and kind in DEFAULTS:
-                    tolerances[kind] = DEFAULTS[kind]
+                if not _named(tolerances, study, quantity):
+                    tolerances[kind] = DEFAULTS.get(kind, OTHERS)
     return {"format": 1, "tolerances": tolerances, "cases": cases}
 
 
