@@ -69,6 +69,14 @@ def test_every_key_of_a_case_has_its_entry() -> None:
     assert not [row for row in rows if not row[-1] and row[2] not in groups]
 
 
+def test_usual_ranges_are_those_that_refusals_state() -> None:
+    density, angle = "materials.NAME.density_kg_per_m3", "rebar_layers.NAME.angle_deg"
+    assert reference.usual_range("targets.modes[].weight") == "0, or 0.0001 to 10000"
+    assert reference.usual_range(density) == "500 to 9000, rubber 700 to 2500"
+    assert reference.usual_range(angle) == "carcass -30 to 30, belt 25 to 155"
+    assert not reference.usual_range("name")
+
+
 @pytest.mark.parametrize("study", [*result_types(), "an effect"])
 def test_every_key_of_a_result_has_its_entry(study: str) -> None:
     model = {**result_types(), "an effect": EffectResult}[study]

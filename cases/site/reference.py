@@ -33,7 +33,7 @@ from tyrecal.tyre.case.meanings import meanings
 from tyrecal.tyre.case.schema import Case
 from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.number_units import UNIT_BY_ENDING
-from tyrecal.tyre.usual import USUAL
+from tyrecal.tyre.usual import BELT_ANGLE, CARCASS_ANGLE, RUBBER_DENSITY, USUAL
 from tyrecal.units import printed_unit
 
 CASES = Path(__file__).parents[1]
@@ -46,6 +46,10 @@ UNITS = {  # by the end of a key, the longest first
 LIMITS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}  # the first letter tells lower from upper
 WORDS = {str: "text", bool: "true or false", float: "number", int: "integer", Any: "any"}
 MAX_EXAMPLE = 45  # characters
+USUAL_OF_KINDS = {  # of kinds of a part, which have ranges of their own
+    "materials.NAME.density_kg_per_m3": [f"rubber {RUBBER_DENSITY.span}"],
+    "rebar_layers.NAME.angle_deg": [f"carcass {CARCASS_ANGLE.span}", f"belt {BELT_ANGLE.span}"],
+}
 EXAMPLES = {  # of keys that neither a shipped case nor a guide has
     "section.gauges[].between": "[inner, ply]",
     "section.gauges[].factor": "1.1",
@@ -238,9 +242,14 @@ def case_entries() -> dict[str, Entry]:
     return keys
 
 
+def usual_range(path: str) -> str:
+    """The usual range of a key in words, with those of kinds of its part."""
+    usual = USUAL.get(path.replace("NAME", "*").replace("[]", ".*"))
+    return ", ".join([*([usual.span] if usual else []), *USUAL_OF_KINDS.get(path, [])])
+
+
 def case_row(key: Entry) -> list[str]:
     """The row of a key of a case."""
-    usual = USUAL.get(key.path.replace("NAME", "*").replace("[]", ".*"))
     example = examples().get(key.path) or key.default
     return [
         f"`{key.path}`",
@@ -248,7 +257,7 @@ def case_row(key: Entry) -> list[str]:
         key.kind,
         key.unit,
         "required" if key.is_required else key.default,
-        f"{usual.low:g} to {usual.high:g}" if usual else "",
+        usual_range(key.path),
         f"`{example}`" if example else "",
     ]
 

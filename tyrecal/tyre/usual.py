@@ -51,17 +51,22 @@ class Usual:
         """Whether ``value`` is usual."""
         return self.low <= value <= self.high and (value == 0 or abs(value) >= self.least)
 
+    @property
+    def span(self) -> str:
+        """The range in words, without its unit."""
+        low = f"0, or {self.least:g}" if self.least and self.low == 0 else f"{self.low:g}"
+        return f"{low} to {self.high:g}"
+
     def refusal(self, value: float) -> str | None:
         """Sentence with the range that is usual instead of ``value``, and what was probably meant;
         None where the value is usual."""
         if self.holds(value):
             return None
-        low = f"0, or {self.least:g}" if self.least and self.low == 0 else f"{self.low:g}"
         unit = f" {printed_unit(self.unit)}" if self.unit else ""
         least = f", of a size of at least {self.least:g} or 0" if self.low < 0 < self.least else ""
         meant = self._meant(value, unit)
         question = f"; did you mean {' or '.join(meant)}?" if meant else ""
-        return f"usual is {low} to {self.high:g}{unit}{least}{self.reason}{question}"
+        return f"usual is {self.span}{unit}{least}{self.reason}{question}"
 
     def _meant(self, value: float, unit: str) -> list[str]:
         """At most two readings of ``value`` that would be usual, in words; of those that are almost
