@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 
 from tyrecal.batch.case import CaseTask, lost
-from tyrecal.batch.drift import DEFAULTS, OTHERS, baseline_of, compare, read_baseline
+from tyrecal.batch.drift import DEFAULTS, OTHER_QUANTITIES, baseline_of, compare, read_baseline
 from tyrecal.batch.junit import drift_line, junit
 from tyrecal.batch.studies import Asked
 from tyrecal.batch.summary import summary
@@ -119,14 +119,14 @@ def test_a_study_that_is_new_in_a_baseline_brings_its_tolerances(tmp_path: Path)
 
 
 def test_every_study_can_be_compared_with_its_own_baseline(tmp_path: Path) -> None:
-    """Each has default tolerances; what has none, as in a study from outside, gets `OTHERS`."""
+    """Each has default tolerances; studies from outside, which have none, get one, too."""
     studies = {name for name, entry in STUDIES.items() if entry.runs_by_name}
     assert {kind.partition("/")[0] for kind in DEFAULTS} == studies
     now = [report("a", own=entry(**{"width_m at 4 kN": 1.0}))]
     path = tmp_path / "baseline.json"
     path.write_text(json.dumps(baseline_of(now, None)))
     known = read_baseline(path)
-    assert known["tolerances"]["own/width_m"] == OTHERS
+    assert known["tolerances"]["own/width_m"] == OTHER_QUANTITIES
     drifted = compare([report("a", own=entry(**{"width_m at 4 kN": 1.002}))], known)["drifted"]
     assert [each["quantity"] for each in drifted] == ["width_m at 4 kN"]
     assert not compare(now, known)["drifted"]

@@ -63,7 +63,8 @@ DEFAULTS = {
     "diagnose/probability": {"absolute": 0.02},
     "diagnose/calibrated": {"relative": 0.01},
 }
-OTHERS = {"relative": 1e-3}  # of quantities that are not above, as those of studies from outside
+# of quantities that are not above, as those of studies from outside
+OTHER_QUANTITIES = {"relative": 1e-3}
 Figures = dict[str, dict[str, dict[str, float]]]  # by case, study, quantity
 
 
@@ -90,7 +91,7 @@ def baseline_of(reports: Sequence[Report], before: Json | None) -> Json:
             for quantity in quantities:
                 kind = f"{study}/{quantity.partition(' ')[0]}"
                 if not _named(tolerances, study, quantity):
-                    tolerances[kind] = DEFAULTS.get(kind, OTHERS)
+                    tolerances[kind] = DEFAULTS.get(kind, OTHER_QUANTITIES)
     return {"format": 1, "tolerances": tolerances, "cases": cases}
 
 
