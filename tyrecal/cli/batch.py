@@ -62,8 +62,8 @@ class Baseline:
     default="fit",
     metavar="S1,S2,...",
     show_default=True,
-    help=f"Studies to run, of {', '.join(STUDY_NAMES)}. After a fit, sweep and footprint study the"
-    " fitted design too.",
+    help=f"Studies to run, of {', '.join(STUDY_NAMES)}. After a fit, sweeps, footprint,"
+    " stiffness, sensitivities and frf study the fitted design.",
 )
 @option(
     "--junit",
@@ -132,8 +132,8 @@ def command(
     tyrecal batch cases/*.yaml --baseline baseline.json
     tyrecal batch cases/*.yaml --scheduler tcp://10.0.0.1:8786
 
-    Exit codes: 0 all cases good; 2 the input is wrong; 5 some failed or drifted; 130, 143,
-    129 interrupted, terminated, hung up.
+    Exit codes: 0 all cases good; 2 the input is wrong; 3 no scheduler answers; 5 some failed or
+    drifted; 130, 143, 129 interrupted, terminated, hung up.
     """
     from ..simulate.evaluate.pool import warm_up
 
