@@ -104,9 +104,10 @@ SENTENCES: list[tuple[str, str, Callable[[Record], list[float]]]] = [
     ),
     (
         REAL_DATA,
-        "The labels [3,0] to [8,0] have a probability of {} %, and the fit fails: {} standard"
-        " deviations are left (χ² per degree of freedom {}). A_belt is {}e-7 m² ± {} %, A_carcass"
-        " {}e-7 m² ± {} %, C10 {} MPa ± {} %",
+        "The labels [3,0] to [8,0] have a probability of {} %, and {} standard deviations of the"
+        " scatter are left. As the section is hardly known, the verdict is `fits`, χ² per degree of"
+        " freedom {}. By the scatter, A_belt is {}e-7 m² ± {} %, A_carcass {}e-7 m² ± {} %, C10 {}"
+        " MPa ± {} %",
         of(
             "both",
             *("labels %", "objective_Hz", "chi2", ("A_belt", 1e7), "A_belt %"),

@@ -48,8 +48,7 @@ def of_fit(content: Mapping[str, Any]) -> Figures:
         ]
     if "labels" in content:
         figures["labels %"] = 100 * content["labels"]["labelings"][0]["probability"]
-        rows = sum(mode["multiplicity"] for mode in content["modes"]) - len(content["variables"])
-        figures["chi2"] = content["objective_Hz"] ** 2 / rows
+        figures["chi2"] = content["chi2_per_dof"]
     return figures
 
 
