@@ -9,7 +9,6 @@ from scipy.stats import uniform
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.modes.label import Label, paired_labels
-from tyrecal.studies.blind.emulated import emulate
 from tyrecal.studies.blind.laws import EffectLaw
 from tyrecal.studies.blind.outside import OUTSIDE_FAMILIES
 from tyrecal.studies.inference.model import Answer, Query
@@ -18,6 +17,7 @@ from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.values import with_values
 
 from ..chance import Chance, generator
+from .emulated import emulate
 from .laws import other_laws
 from .makers import finer, other_maker
 from .regions import divided

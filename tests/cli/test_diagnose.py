@@ -214,17 +214,6 @@ def test_a_study_from_end_to_end(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    few = {
-        "PLAIN_DEGREE": 2,
-        "PLAIN_DESIGNS": 4,
-        "SOURCE_DEGREE": 1,
-        "SOURCE_DESIGNS": 4,
-        "EFFECT_DEGREE": 1,
-        "EFFECT_DESIGNS": 2,
-        "ONE_SIDED_SHARES": (0.5, 1.0),
-    }
-    for name, value in few.items():
-        monkeypatch.setattr(f"tyrecal.studies.blind.emulated.{name}", value)
     only = lambda case, evaluator, ids=None: effect_ranges(case, evaluator, ["spindle_lateral"])
     monkeypatch.setattr("tyrecal.studies.blind.answer.effect_ranges", only)  # the ruler's, too
     out = tmp_path / "t"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
@@ -29,6 +30,11 @@ from tyrecal.tyre.values import with_values
 
 from .coarse_model import CASE, MODEL, ROWS, X, asked
 from .toy import Toy, problem
+
+
+def test_a_worker_runs_one_evaluation_at_a_time() -> None:
+    own = TyreModel(CASE, MODEL.evaluator, ROWS, [], {}, jobs=2)
+    assert own.jobs == 2 and pickle.loads(pickle.dumps(own)).jobs == 1
 
 
 @pytest.mark.slow

@@ -29,7 +29,6 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.store import Store
 from tyrecal.studies.blind.answer import answer, case_of, rows_of, tyre_model
-from tyrecal.studies.blind.emulated import emulate
 from tyrecal.studies.blind.protocol import read_protocol
 from tyrecal.studies.blind.score import Scored, score
 from tyrecal.studies.blind.seal import ANSWERS, check_answers
@@ -37,6 +36,7 @@ from tyrecal.studies.blind.tables import summary
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE
 
 from ..blind.archive import STUDIES, unpack
+from ..blind.emulated import emulate
 from ..blind.study3.kinds import further
 
 ORIGINS = "exact", "drawing"

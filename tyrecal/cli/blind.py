@@ -78,9 +78,9 @@ def power(**values: Any) -> int:
     shell_complete=complete.cases,
     help="Case with the plain model, its uncertainties and the measured modes.",
 )
-@trials_option("--effects", "effects", 300, "with an effect of the catalogue")
-@trials_option("--none", "plain", 200, "without any")
-@trials_option("--outside", "outside", 80, "with an error that the catalogue does not list")
+@trials_option("--effects", "effects", 60, "with an effect of the catalogue")
+@trials_option("--none", "plain", 40, "without any")
+@trials_option("--outside", "outside", 20, "with an error that the catalogue does not list")
 @names_option(
     "--effect",
     "drawn",
@@ -159,12 +159,6 @@ def make(
 
 @command.command()
 @folder
-@option(
-    "--emulated/--asked",
-    default=True,
-    show_default=True,
-    help="Surrogate model for all trials, or runs of the model for each trial.",
-)
 @names_option(
     "--effect",
     "effects",
@@ -175,12 +169,7 @@ def make(
 @options.every(options.jobs, options.store)
 @options.with_terminal
 def answer(
-    folder: Path,
-    emulated: bool,
-    effects: tuple[str, ...],
-    jobs: int,
-    store: Path | None,
-    terminal: Terminal,
+    folder: Path, effects: tuple[str, ...], jobs: int, store: Path | None, terminal: Terminal
 ) -> int:
     """Answer every trial of DIR with the diagnosis; reads only DIR.
 
@@ -193,10 +182,8 @@ def answer(
     from ..simulate.evaluate.evaluator import Evaluator
     from ..simulate.evaluate.store import Store
     from ..studies.blind import answer as blind
-    from ..studies.blind.emulated import emulate
     from ..studies.blind.protocol import read_protocol
     from ..studies.blind.seal import refuse_open_truth
-    from ..studies.inference.model import ResponseModel
     from ..tyre.effects import catalogue
 
     for id in effects:
@@ -205,9 +192,7 @@ def answer(
     protocol, case = read_protocol(folder), blind.case_of(folder)
     resume("finished answers are kept; run the same command again to resume")
     evaluator = Evaluator(TyreDesign(case), store=Store((store or folder / "record").resolve()))
-    model: ResponseModel = blind.tyre_model(case, evaluator, protocol, jobs, effects or None)
-    if emulated:
-        model = emulate(model)
+    model = blind.tyre_model(case, evaluator, protocol, jobs, effects or None)
     with terminal.progress("answer trials") as bar:
         rows = blind.rows_of(case, protocol)
         sha256 = blind.answer(folder, model, rows, jobs, _progress("answered", terminal, bar))

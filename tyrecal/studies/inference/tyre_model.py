@@ -99,6 +99,10 @@ class TyreModel:
         self._known_shares: dict[str, Array] = {}  # see `_loss_shares`
         self._known_parts: list[tuple[Array, list[SectionPart]]] = []
 
+    def __getstate__(self) -> dict[str, object]:
+        """In a worker, one evaluation at a time: the other workers have trials of their own."""
+        return {**self.__dict__, "jobs": 1}
+
     @cached_property
     def sloped(self) -> Collection[str]:
         """Effects with whose parameter numbers of the decks change, and no keywords."""

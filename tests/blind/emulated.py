@@ -6,9 +6,9 @@ effect, 0 if it is absent. About the centre x0, with t = (x - x0) / reach, |t| <
 
     eta(x, e) = sum_k a_k q_k(t) + sum over effects of sum_j L_j(e) sum_k b_jk q_k(t)
 
-q_k: products of Legendre's polynomials, as in `emulator`; their coefficients a_k and b_jk (n,) are
-fitted by least squares to values and Jacobians at designs of a Halton sequence. L_j: Lagrange's
-polynomials of the effect's nodes, 0 among them. Changes by the sources of error
+q_k: products of Legendre's polynomials, as in `studies.emulator`; their coefficients a_k and b_jk
+(n,) are fitted by least squares to values and Jacobians at designs of a Halton sequence. L_j:
+Lagrange's polynomials of the effect's nodes, 0 among them. Changes by the sources of error
 (`ResponseModel.sources`) are emulated in the same way. Two quantities hardly change with x: the
 coupling of near modes (`Coupling`) is that of the nearest design, and the shift by an effect's
 uncertain shape (`Query.shape_uncertainty`) is that of the centre. Beyond the box the model goes
@@ -23,9 +23,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
-from ..emulator import products, up_to
-from ..inference.expansion import derivatives, lagrange
-from ..inference.model import Answer, Coupling, EffectRange, Query, ResponseModel
+from tyrecal.studies.emulator import products, up_to
+from tyrecal.studies.inference.expansion import derivatives, lagrange
+from tyrecal.studies.inference.model import Answer, Coupling, EffectRange, Query, ResponseModel
 
 Array = np.ndarray
 # half width of the box in ln of a variable: blind trials draw within 0.4, and an effect that a fit
