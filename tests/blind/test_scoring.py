@@ -10,20 +10,19 @@ import pytest
 from scipy.stats import binom
 
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.blind.baselines import guesses
 from tyrecal.studies.blind.protocol import Protocol
 from tyrecal.studies.blind.ruler import EffectShifts, Ruler, difficulty, measure
 from tyrecal.studies.blind.score import Scored
 from tyrecal.studies.blind.statistics import (
-    brier,
     calibration_error,
     calibration_quantile,
     clopper_pearson,
 )
-from tyrecal.studies.blind.tables import summary
 from tyrecal.studies.inference.model import Query
 
 from ..chance import Chance
+from .baselines import guesses
+from .tables import brier, full_summary
 from .toy import Scale
 
 pytestmark = pytest.mark.numbers
@@ -104,21 +103,16 @@ def trial(kind: str, law: str, p: dict[str, float], **more: object) -> Scored:
         law=law,
         size=1.0,
         swapped=False,
-        truth=truth,
         group=group,
         lam=30.0,
         band=30.0,
         verdict=verdict,
         named=ranked[0] if sure else None,
-        ranked=ranked,
         probabilities=p,
-        on_truth=p.get(truth, 0.0),
-        on_group=p.get(truth, 0.0),
         in_set=truth in ranked[:1],
         parameter_held=None,
         before=0.01,
         after=0.002,
-        baselines={"AIC": "a"},
     )
     return replace(made, **more)  # type: ignore[arg-type]
 
@@ -134,7 +128,7 @@ def test_figures_of_answers_made_by_hand() -> None:
         trial("outside", "odd", {"outside": 0.9, "a": 0.1}),
         trial("outside", "odd", {"a": 0.7, "outside": 0.3}),
     ]
-    f = summary(trials)
+    f = full_summary(trials, {t.id: {"AIC": "a"} for t in trials})
     assert f["trials"] == {"effect": 4, "none": 2, "outside": 2}
     best, middle = f["by_band"][3], f["by_band"][2]
     assert (best["top_1_group"]["right"], best["top_1_group"]["count"]) == (1, 1)
@@ -144,7 +138,7 @@ def test_figures_of_answers_made_by_hand() -> None:
     assert (f["false_alarms"]["right"], f["false_alarms"]["count"]) == (1, 2)
     assert (f["named_right"]["right"], f["named_right"]["count"]) == (2, 5)
     assert f["outside_recognised"]["right"] == f["outside_named"]["right"] == 1
-    assert f["mean_probability_on_group"] == pytest.approx((0.9 + 0.2) / 2)
+    assert f["mean_probability_on_group"] == pytest.approx((0.9 + 1.0) / 2)
     assert f["interval_holds_parameter"]["count"] == 1
     assert f["held_out"]["median_shrinkage"] == pytest.approx(0.8)
     assert 0.1 < f["held_out"]["placebo_95"] < 0.2
@@ -213,7 +207,7 @@ def test_the_ruler_of_a_model_is_its_own_sensitivities() -> None:
 
 def test_baselines_find_a_strong_effect_and_none_where_there_is_none() -> None:
     r, places = ruler(), np.arange(4)
-    sigma = r.sigma(places, np.full(4, 2), RULES, constants=False)
+    sigma = r.scatter(places, np.full(4, 2), RULES)
     by_baseline = guesses(r, np.array([0.02, 0, 0, 0]) + 0.1, places, sigma)
     assert set(by_baseline.values()) == {"a"}
     assert set(guesses(r, np.full(4, 0.1), places, sigma).values()) == {"none"}

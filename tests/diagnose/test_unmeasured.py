@@ -10,9 +10,10 @@ from scipy.stats import norm
 
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE, Hypothesis, explain, outside, refit
 from tyrecal.studies.diagnose.several import weigh_hypotheses
-from tyrecal.studies.diagnose.unmeasured import expected, expected_by, likeliest
+from tyrecal.studies.diagnose.unmeasured import likeliest
 from tyrecal.studies.inference.inverse_problem import InverseProblem
 
+from ..blind.answers import expected, expected_by
 from ..chance import Chance, generator
 from .test_veering import Near
 from .toy import LABELS, Toy, drawn, flat, problem

@@ -20,6 +20,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -31,13 +32,14 @@ from tyrecal.simulate.evaluate.store import Store
 from tyrecal.studies.blind.answer import answer, case_of, rows_of, tyre_model
 from tyrecal.studies.blind.protocol import read_protocol
 from tyrecal.studies.blind.score import Scored, score
-from tyrecal.studies.blind.seal import ANSWERS, check_answers
-from tyrecal.studies.blind.tables import summary
+from tyrecal.studies.blind.seal import ANSWERS
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE
 
+from ..blind.answers import one_answer
 from ..blind.archive import STUDIES, unpack
 from ..blind.emulated import emulate
 from ..blind.study3.kinds import further
+from ..blind.tables import full_summary
 
 ORIGINS = "exact", "drawing"
 STATED = "section:\n", "section:\n  known_from: {}\n"
@@ -83,9 +85,9 @@ def answered(
     evaluator = Evaluator(TyreDesign(case), store=Store((folder / "record").resolve()))
     model = tyre_model(case, evaluator, protocol, jobs, json.loads(marked.read_text()))
     on_progress = lambda done, all: print(f"{done} of {all}", file=sys.stderr, flush=True)
-    more = further(protocol.counts)
+    one = partial(one_answer, further=further(protocol.counts))
     used = model if solver else emulate(model)
-    return answer(trials, used, rows_of(case, protocol), jobs, on_progress, more)
+    return answer(trials, used, rows_of(case, protocol), jobs, on_progress, one)
 
 
 def changes(first: Path, other: Path) -> str:
@@ -117,8 +119,7 @@ def compared(study: str, folder: Path) -> dict[str, list[Scored]]:
     for origin in ORIGINS:
         trials = folder / origin / "trials"
         if (trials / ANSWERS).exists():
-            check_answers(trials)
-            by_origin[origin] = score(recorded, sealed, trials / "answers")
+            by_origin[origin] = score(trials, sealed)
     common = set.intersection(*({t.id for t in those} for those in by_origin.values()))
     return {name: [t for t in those if t.id in common] for name, those in by_origin.items()}
 
@@ -169,7 +170,7 @@ def main(
         print(answered(study, folder, origin, jobs, every, solver))
         return
     by_origin = compared(study, folder / study)
-    columns = {name: dict(figures(summary(trials))) for name, trials in by_origin.items()}
+    columns = {name: dict(figures(full_summary(trials))) for name, trials in by_origin.items()}
     print(f"| {study} | {' | '.join(columns)} |\n{'|---' * (1 + len(columns))}|")
     for row in columns["recorded"]:
         print(f"| {row} | {' | '.join(each[row] for each in columns.values())} |")

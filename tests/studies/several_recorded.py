@@ -14,7 +14,6 @@ import json
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from unittest.mock import patch
 
 import click
 import numpy as np
@@ -27,6 +26,7 @@ from tyrecal.studies.diagnose.verdict import CHECK, RULED_OUT, SET, most_sure
 from tyrecal.studies.inference.inverse_problem import Assumed
 
 from ..blind.archive import STUDIES, unpack
+from ..blind.tables import on_group
 
 SINGLES, PAIRS, EFFECTS = 0.62, 0.03, 20  # together, when the answers were given; considered
 
@@ -46,10 +46,8 @@ def again(trial: Scored, check: float, singles: float, pairs: float) -> Scored:
     return replace(
         trial,
         probabilities=p,
-        ranked=ranked,
         named=named,
         verdict="named" if named else "outside" if outside else "other",
-        on_group=sum(p.get(key, 0.0) for key in trial.group),
         in_set=trial.truth in kept,
     )
 
@@ -61,7 +59,7 @@ def figures(trials: list[Scored]) -> dict[str, str]:
     of = lambda kind: [t for t in trials if t.kind == kind]
     named = [t for t in trials if t.named]
     seen = by(10, np.inf)
-    mean = np.mean([t.on_group for t in seen])
+    mean = np.mean([on_group(t) for t in seen])
     stated = np.array([t.probabilities[t.ranked[0]] for t in trials])
     right = np.array([t.ranked[0] == t.truth for t in trials], float)
     return {
@@ -87,10 +85,7 @@ def main(further: float) -> None:
     singles = EFFECTS * prior[1] / SINGLES
     pairs = EFFECTS * (EFFECTS - 1) / 2 * prior[2] / PAIRS
     for study in STUDIES:
-        with (
-            TemporaryDirectory() as place,
-            patch("tyrecal.studies.blind.score.guesses", lambda *args: {}),
-        ):
+        with TemporaryDirectory() as place:
             folder = Path(place) / "trials"
             unpack(study, folder)
             recorded = score(folder, folder.with_name("trials-truth"))

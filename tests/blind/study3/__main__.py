@@ -27,6 +27,7 @@ import argparse
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -42,6 +43,7 @@ from tyrecal.studies.blind.seal import ANSWERS, SEAL
 from tyrecal.studies.inference.tyre_model import TyreModel
 from tyrecal.tyre.effects.edit import changed, with_part
 
+from ..answers import one_answer
 from .cases import GROUPS, LABELS, LEARNED_FROM, Group, written
 from .kinds import further
 from .make import FENICS, make
@@ -98,8 +100,8 @@ def main() -> None:
         else:
             case, protocol = case_of(folder), read_protocol(folder)
             model = tyre_model(case, Evaluator(TyreDesign(case)), protocol, o.jobs)
-            more = further(protocol.counts)
-            print(answer(folder, model, rows_of(case, protocol), o.jobs, on_progress, more))
+            one = partial(one_answer, further=further(protocol.counts))
+            print(answer(folder, model, rows_of(case, protocol), o.jobs, on_progress, one))
 
 
 def sealed_in(folder: str) -> Path:

@@ -23,7 +23,7 @@ from ...tyre.case import LoadedCase
 from ..diagnose.diagnosis import Diagnosis, diagnose
 from ..diagnose.evidence import NONE
 from ..diagnose.result import diagnosis_result
-from ..diagnose.unmeasured import expected, likeliest
+from ..diagnose.unmeasured import likeliest
 from ..inference.effect_ranges import effect_ranges
 from ..inference.expansion import Expansion, expand
 from ..inference.inverse_problem import Assumed
@@ -34,6 +34,9 @@ from ..inference.uncertainties import sources
 from .make import labels_of
 from .protocol import Protocol, read_protocol, write_json
 from .seal import refuse_open_truth, seal_answers
+
+# the answer to a file of measurements, from model, rows, rules and the model's expansion
+OneAnswer = Callable[[ResponseModel, list[ModelRow], Protocol, Expansion, Path], Json]
 
 
 def rows_of(case: LoadedCase, protocol: Protocol) -> list[ModelRow]:
@@ -65,13 +68,13 @@ def answer(
     rows: Sequence[ModelRow],
     jobs: int = 1,
     on_progress: Callable[[int, int], None] = lambda done, all: None,
-    further: float = Assumed.further,
+    one: OneAnswer | None = None,
 ) -> str:
-    """Answer every trial that has no answer yet; returns the sha256 of all answers.
+    """Answer every trial that has no answer yet, by `one_answer` or ``one``; returns the sha256 of
+    all answers.
 
-    further: see `Assumed`; for rules that tell how many effects tyres have. Raises InputError
-    where the truth lies among the trials, and what the model answers if it has no solution at its
-    start.
+    Raises InputError where the truth lies among the trials, and what the model answers if it has
+    no solution at its start.
     """
     refuse_open_truth(folder)
     protocol = read_protocol(folder)
@@ -79,8 +82,7 @@ def answer(
     answers = folder / "answers"
     private_dir(answers)
     waiting = [t for t in trials if not (answers / f"{t.stem}.json").exists()]
-    known = expand(model, model.start)
-    work = partial(one_answer, model, list(rows), protocol, known, further)
+    work = partial(one or one_answer, model, list(rows), protocol, expand(model, model.start))
     before = len(trials) - len(waiting)
     with process_pool(jobs) if jobs > 1 and len(waiting) > 1 else nullcontext() as pool:
         contents = (pool.map if pool else map)(work, waiting)
@@ -91,25 +93,24 @@ def answer(
 
 
 def one_answer(
-    model: ResponseModel,
-    rows: list[ModelRow],
-    protocol: Protocol,
-    known: Expansion,
-    further: float,
-    trial: Path,
+    model: ResponseModel, rows: list[ModelRow], protocol: Protocol, known: Expansion, trial: Path
 ) -> Json:
     """The diagnosis of one file of measurements, and its prediction at the held-out pressure.
 
     known: the model's expansion about its start, which serves all trials.
     """
     observations = observe(read_measurements(trial), split=protocol.split)
-    assumed = Assumed(split=protocol.split, further=further)
+    assumed = Assumed(split=protocol.split)
     diagnosis = diagnose(model, rows, observations, assumed=assumed, known=known, ranked=False)
+    return content_of(diagnosis, rows, protocol)
+
+
+def content_of(diagnosis: Diagnosis, rows: Sequence[ModelRow], protocol: Protocol) -> Json:
+    """An answer as plain data."""
     content = diagnosis_result(diagnosis).content()
     content.pop("next_measurements"), content.pop("section_map")  # empty: neither was asked for
     key = content["effect"] or content["likeliest"]
     return {
-        "further": further,
         "diagnosis": content,
         "held_out": {
             "pressure_kPa": protocol.held_out_kPa,
@@ -118,7 +119,6 @@ def one_answer(
             "with_effect_Hz": predicted(diagnosis, rows, protocol.held_out_kPa, key)
             if key
             else None,
-            "expected_Hz": intervals(diagnosis, rows, protocol.held_out_kPa),
         },
     }
 
@@ -129,20 +129,7 @@ def predicted(
     """Hz by label at a pressure that was not fitted, by a hypothesis at its best parameters."""
     places = places_at(rows, pressure_kPa)
     eta = likeliest(diagnosis.problem, diagnosis.hypothesis(key), rows, places)
-    return _by_label(diagnosis, rows, places, [round(float(np.exp(f)), 4) for f in eta])
-
-
-def intervals(
-    diagnosis: Diagnosis, rows: Sequence[ModelRow], pressure_kPa: float
-) -> dict[str, list[float]]:
-    """Hz by label at a pressure that was not fitted: mean of all explanations of the catalogue,
-    weighted by their probabilities, and the ends of its 90 % interval."""
-    places = places_at(rows, pressure_kPa)
-    prediction = expected(diagnosis.problem, diagnosis.hypotheses, rows, places)
-    three = np.exp([prediction.mean, *prediction.interval()]).T
-    return _by_label(
-        diagnosis, rows, places, [[round(f, 4) for f in each] for each in three.tolist()]
-    )
+    return by_label(diagnosis, rows, places, [round(float(np.exp(f)), 4) for f in eta])
 
 
 def places_at(rows: Sequence[ModelRow], pressure_kPa: float) -> np.ndarray:
@@ -150,13 +137,13 @@ def places_at(rows: Sequence[ModelRow], pressure_kPa: float) -> np.ndarray:
     return np.array([i for i, (label, p) in enumerate(rows) if label and p == pressure_kPa], int)
 
 
-def _by_label(
+def by_label(
     diagnosis: Diagnosis, rows: Sequence[ModelRow], places: np.ndarray, each: Sequence[Any]
 ) -> Json:
     """Values, one for each place, by the laboratory's own labels: the diagnosis may have exchanged
     two."""
-    by_label = {str(rows[i][0]): value for i, value in zip(places, each, strict=True)}
+    values = {str(rows[i][0]): value for i, value in zip(places, each, strict=True)}
     if diagnosis.exchanged:
         a, b = map(str, diagnosis.exchanged)
-        by_label[a], by_label[b] = by_label[b], by_label[a]
-    return by_label
+        values[a], values[b] = values[b], values[a]
+    return values

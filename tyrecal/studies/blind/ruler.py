@@ -80,17 +80,16 @@ class Ruler:
     laws_shared: bool = False  # by a family, and by all modes, too
     laws_length: float = LAWS_LENGTH  # of ln p, over which that is alike
 
-    def sigma(
-        self, places: Array, counts: Array, protocol: Protocol, constants: bool = True
-    ) -> Array:
-        """Covariance (n, n) of rows that are means of ``counts`` (n,) values; constants False:
-        repeatability alone."""
+    def scatter(self, places: Array, counts: Array, protocol: Protocol) -> Array:
+        """Covariance (n, n) by repeatability of rows that are means of ``counts`` (n,) values."""
+        is_mass = np.array([self.rows[i][0] is None for i in places])
+        return np.diag(np.where(is_mass, protocol.mass, protocol.noise) ** 2 / counts)
+
+    def sigma(self, places: Array, counts: Array, protocol: Protocol) -> Array:
+        """Covariance (n, n) of such rows: repeatability, form, material laws and constants."""
         rows = [self.rows[i] for i in places]
         labels = [label for label, _ in rows]
         is_mass = np.array([label is None for label in labels])
-        scatter = np.diag(np.where(is_mass, protocol.mass, protocol.noise) ** 2 / counts)
-        if not constants:
-            return np.asarray(scatter)
         same = np.array([[a == b for b in labels] for a in labels])
         alike = np.where(np.eye(len(rows), dtype=bool), 1.0, BETWEEN_PRESSURES) * same
         form = np.array([form_error(label) for label in labels])
@@ -101,6 +100,7 @@ class Ruler:
         parts = same + (kin + 1.0 if self.laws_shared else 0.0)
         laws = self.material_laws**2 * parts * near * np.outer(~is_mass, ~is_mass)
         g = self.constants[places]
+        scatter = self.scatter(places, counts, protocol)
         return np.asarray(scatter + alike * np.outer(form, form) + laws + g @ g.T)
 
     def plain(self, d: Array, places: Array) -> tuple[Array, Array]:

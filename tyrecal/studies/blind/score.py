@@ -19,7 +19,6 @@ from ...measured.measurement import Measurement
 from ...measured.tables import read_measurements
 from ...simulate.modes.label import Label
 from .answer import case_of
-from .baselines import guesses
 from .make import labels_of
 from .protocol import Protocol, read_json, read_protocol
 from .ruler import Difficulty, Ruler, difficulty, read_ruler
@@ -37,17 +36,15 @@ class Scored:
     law: str  # id of the true effect, or name of the family outside the catalogue, "" for none
     size: float  # true parameter, in the unit of the effect
     swapped: bool  # whether two labels were exchanged in the measurements
-    truth: str  # the true key: "none", "outside" or an id
-    group: tuple[str, ...]  # keys that count as right: the truth, and effects that look the same
+    # keys that count as right: the true one, "none", "outside" or an id, and effects that look the
+    # same
+    group: tuple[str, ...]
     lam: float  # detectability lambda, 0 without an effect
     # min(lambda, min_j delta_j^2), 0 without an effect; delta_j: distance from effect j (`ruler`)
     band: float
     verdict: str  # `VerdictKind` of the answer
     named: str | None  # key of the effects that it names; None: it names none
-    ranked: tuple[str, ...]  # keys by falling probability
     probabilities: dict[str, float]  # by key, 1 together
-    on_truth: float  # probability of ``truth`` in the answer
-    on_group: float  # and of all keys of ``group``
     in_set: bool  # whether ``truth`` is one of the answer's candidates
     # whether the interval of the named parameter holds `Difficulty.equivalent`, the catalogue's
     # parameter that is closest to the true effect; None: the true effect is not named
@@ -55,7 +52,16 @@ class Scored:
     # rms error of held-out values in ln f, without and with the named effect
     before: float
     after: float
-    baselines: dict[str, str]  # answers of simple rules, by their name
+
+    @property
+    def truth(self) -> str:
+        """The true key."""
+        return self.group[0]
+
+    @property
+    def ranked(self) -> list[str]:
+        """Keys by falling probability."""
+        return sorted(self.probabilities, key=lambda key: -self.probabilities[key])
 
     @property
     def right(self) -> bool:
@@ -69,30 +75,27 @@ class Scored:
 
     def plain(self) -> Json:
         """The trial as plain data for JSON."""
-        kept = {k: v for k, v in asdict(self).items() if k not in ("probabilities", "ranked")}
-        kept["top"] = list(self.ranked[:3])
-        kept["band"] = min(self.band, 1e9)
-        return kept
+        kept = {key: value for key, value in asdict(self).items() if key != "probabilities"}
+        more = {"truth": self.truth, "top": self.ranked[:3], "band": min(self.band, 1e9)}
+        return kept | more
 
 
-def score(folder: Path, sealed: Path, answers: Path | None = None) -> list[Scored]:
-    """Scores of all trials of a study; answers: another folder of them. Raises InputError."""
-    paths = (answers or folder / "answers").glob("*.json")
-    content, answered = open_truth(folder, sealed), {path.stem: path for path in paths}
+def score(folder: Path, sealed: Path) -> list[Scored]:
+    """Scores of all trials of a study. Raises InputError."""
+    truths = {truth["id"]: truth for truth in open_truth(folder, sealed)["trials"]}
     protocol = read_protocol(folder)
     labels = labels_of(case_of(folder))
     ruler = read_ruler(folder, labels)
     return [
         scored(
-            truth,
-            read_json(answered[truth["id"]]),
-            read_measurements(folder / "trials" / f"{truth['id']}.csv"),
+            truths[path.stem],
+            read_json(path),
+            read_measurements(folder / "trials" / f"{path.stem}.csv"),
             ruler,
             protocol,
             labels,
         )
-        for truth in content["trials"]
-        if truth["id"] in answered
+        for path in sorted((folder / "answers").glob("*.json"))
     ]
 
 
@@ -105,7 +108,7 @@ def scored(
     labels: Sequence[Label],
 ) -> Scored:
     """Score of one trial; truth: its entry in truth.json (`make.sealed_trial`)."""
-    y, places, counts = means(readings, ruler)
+    _, places, counts = means(readings, ruler)
     d = np.array([log(v) for v in truth["variables"].values()]) - ruler.x0
     key = truth["law"] if truth["kind"] == "effect" else truth["kind"]
     rated = Difficulty(0.0, 0.0, (key,), None)
@@ -114,33 +117,26 @@ def scored(
         rated = difficulty(ruler, protocol, truth["law"], d, places, counts, moved)
     group = rated.group if truth["kind"] == "effect" else (key,)
     diagnosis = answer["diagnosis"]
-    p = diagnosis["probabilities"]
     named, held = diagnosis["effect"], None
     if truth["kind"] == "effect" and named == key and rated.equivalent is not None:
         held = diagnosis["parameter"]["low"] <= rated.equivalent <= diagnosis["parameter"]["high"]
     out = answer["held_out"]
-    sigma = ruler.sigma(places, counts, protocol, constants=False)
     return Scored(
         truth["id"],
         truth["kind"],
         truth["law"],
         truth["size"],
         truth["swapped"],
-        key,
         group,
         rated.lam,
         rated.band,
         diagnosis["verdict"],
         named,
-        tuple(sorted(p, key=lambda k: -p[k])),
-        p,
-        p.get(key, 0.0),
-        sum(p.get(k, 0.0) for k in group),
+        diagnosis["probabilities"],
         key in diagnosis["candidate_set"],
         held,
         held_out_error(truth["held_out"], out["plain_Hz"]),
         held_out_error(truth["held_out"], out["with_effect_Hz"] or out["plain_Hz"]),
-        guesses(ruler, y, places, sigma),
     )
 
 

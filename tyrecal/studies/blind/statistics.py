@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-
 import numpy as np
 from scipy.stats import binomtest
 
@@ -36,12 +34,3 @@ def calibration_quantile(stated: Array, quantile: float = 0.95) -> float:
     random = np.random.default_rng(0)
     drawn = random.random((SIMULATIONS, len(stated))) < stated
     return float(np.quantile(_calibration_errors(stated, drawn), quantile))
-
-
-def brier(probabilities: Sequence[Mapping[str, float]], truth: Sequence[str]) -> float:
-    """Mean over trials of sum over keys of (p - 1 or 0)^2: 0 is certain and right, 2 the worst."""
-    scores = []
-    for p, key in zip(probabilities, truth, strict=True):
-        scores.append(sum((value - (name == key)) ** 2 for name, value in p.items()))
-        scores[-1] += key not in p
-    return float(np.mean(scores)) if scores else 0.0

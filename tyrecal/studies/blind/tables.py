@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from ...files import Json
 from .score import Scored
-from .statistics import brier, calibration_error, calibration_quantile, clopper_pearson
+from .statistics import calibration_error, calibration_quantile, clopper_pearson
 
 # ranges of `Scored.band`, and of lambda
 DIFFICULTY_BANDS = ((0.0, 4.0), (4.0, 10.0), (10.0, 25.0), (25.0, float("inf")))
@@ -38,25 +37,12 @@ def summary(trials: Sequence[Scored]) -> Json:
             {"low": low, "high": high if high < 1e9 else None, **_band(effects, low, high)}
             for low, high in DIFFICULTY_BANDS
         ],
-        "by_lambda": [
-            {"low": low, "top_1_group": rate([t.right for t in effects if low <= t.lam < high])}
-            for low, high in DIFFICULTY_BANDS
-        ],
         "false_alarms": rate([t.verdict == "named" for t in none]),
         "named_right": rate([t.named in t.group for t in named]),
-        "mean_probability_on_group": _mean([t.on_group for t in detected]),
         "outside_recognised": rate([t.verdict == "outside" for t in outside]),
         "outside_named": rate([t.verdict == "named" for t in outside]),
-        "families": {
-            law: {
-                "recognised": rate([t.verdict == "outside" for t in outside if t.law == law]),
-                "named": rate([t.verdict == "named" for t in outside if t.law == law]),
-            }
-            for law in sorted({t.law for t in outside})
-        },
         "calibration_error": calibration_error(stated, right),
         "calibration_error_95": calibration_quantile(stated),
-        "brier": brier([t.probabilities for t in trials], [t.truth for t in trials]),
         "set_holds_truth": rate([t.in_set for t in trials]),
         "interval_holds_parameter": rate([bool(held) for held in parameters]),
         "held_out": {
@@ -65,8 +51,6 @@ def summary(trials: Sequence[Scored]) -> Json:
             "placebo_95": placebo,
             "beyond_placebo": rate([t.shrinkage > (placebo or 0.0) for t in proven]),
         },
-        "baselines": _baselines(trials),
-        "confusion": _confusion(trials),
         "misses": [
             t.plain()
             for t in trials
@@ -103,31 +87,6 @@ def _band(effects: Sequence[Scored], low: float, high: float) -> Json:
     }
 
 
-def _baselines(trials: Sequence[Scored]) -> Json:
-    """Right by group over all trials: the diagnosis, chance, the commonest answer, and others."""
-    keys = [t.truth for t in trials]
-    commonest = max(sorted(set(keys)), key=keys.count) if keys else ""
-    known = sorted(set(keys))
-    result: Json = {"diagnosis": rate([t.right for t in trials])}
-    result["random"] = {
-        "share": _mean([len(set(t.group) & set(known)) / len(known) for t in trials])
-    }
-    result["commonest"] = rate([commonest in t.group for t in trials])
-    for name in trials[0].baselines if trials else ():
-        result[name] = rate([t.baselines[name] in t.group for t in trials])
-        alarms = [t.baselines[name] != "none" for t in trials if t.kind == "none"]
-        result[name]["false_alarms"] = rate(alarms)
-    return result
-
-
-def _confusion(trials: Sequence[Scored]) -> dict[str, dict[str, int]]:
-    """How often each likeliest answer was given, by truth."""
-    table: defaultdict[str, Counter[str]] = defaultdict(Counter)
-    for t in trials:
-        table[t.truth][t.ranked[0]] += 1
-    return {key: dict(row.most_common()) for key, row in sorted(table.items())}
-
-
 def _lines(f: Json, maker: str) -> Iterator[str]:
     kinds = ", ".join(f"{count} {kind}" for kind, count in f["trials"].items())
     yield f"Maker: {maker}.\nTrials: {kinds}; labels swapped in {f['swapped']}.\n"
@@ -137,11 +96,6 @@ def _lines(f: Json, maker: str) -> Iterator[str]:
         span = f"{band['low']:g} to {band['high']:g}" if band["high"] else f"{band['low']:g} on"
         cells = [_rate(band[key]) for key in ("top_1_group", "top_1", "top_2_group")]
         yield f"| {span} | {band['top_1']['count']} | {' | '.join(cells)} |"
-    yield "\n| lambda alone, from | trials | top 1, group |\n|---|---|---|"
-    for band in f["by_lambda"]:
-        yield (
-            f"| {band['low']:g} | {band['top_1_group']['count']} | {_rate(band['top_1_group'])} |"
-        )
     yield "\n| quantity | measured |\n|---|---|"
     for key in (
         "false_alarms",
@@ -152,30 +106,16 @@ def _lines(f: Json, maker: str) -> Iterator[str]:
         "interval_holds_parameter",
     ):
         yield f"| {key.replace('_', ' ')} | {_rate(f[key])} |"
-    mean = _number(f["mean_probability_on_group"])
-    yield f"| mean probability on the true group, detectable | {mean} |"
     yield (
         f"| calibration error (95 % quantile of a calibrated simulation) |"
         f" {f['calibration_error']:.3f} ({f['calibration_error_95']:.3f}) |"
     )
-    yield f"| Brier score | {f['brier']:.3f} |"
     out = f["held_out"]
     yield (
         f"| held-out shrinkage, detectable and named: median (placebo's 95 % quantile) |"
         f" {_number(out['median_shrinkage'])} ({_number(out['placebo_95'])}), {out['count']}"
         " trials |"
     )
-    yield "\n| not explained by the catalogue | recognised | named as an effect |\n|---|---|---|"
-    for law, each in f["families"].items():
-        yield f"| {law} | {_rate(each['recognised'])} | {_rate(each['named'])} |"
-    yield "\n| on the same trials | right by group | false alarms |\n|---|---|---|"
-    for name, each in f["baselines"].items():
-        alarms = f["false_alarms"] if name == "diagnosis" else each.get("false_alarms")
-        shown = _rate(each) if "count" in each else _number(each["share"])
-        yield f"| {name} | {shown} | {_rate(alarms) if alarms else ''} |"
-    yield "\n| truth | likeliest answers |\n|---|---|"
-    for key, row in f["confusion"].items():
-        yield f"| {key} | {', '.join(f'{name} {count}' for name, count in row.items())} |"
     yield "\n| missed | truth | size | band | verdict | likeliest |\n|---|---|---|---|---|---|"
     for t in f["misses"]:
         law = f"{t['truth']}: {t['law']}" if t["kind"] == "outside" else t["truth"]
@@ -198,10 +138,6 @@ def _rate(each: Json) -> str:
 
 def _number(value: float | None) -> str:
     return "none" if value is None else f"{value:.2f}"
-
-
-def _mean(values: Sequence[float]) -> float | None:
-    return float(np.mean(values)) if values else None
 
 
 def _median(values: Sequence[float]) -> float | None:

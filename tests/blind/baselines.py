@@ -10,15 +10,32 @@ without the other two parts of the covariance. Odds before any measurement are t
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
-from .ruler import SIZE_POINTS, Ruler
+from tyrecal.measured.tables import read_measurements
+from tyrecal.studies.blind.answer import case_of
+from tyrecal.studies.blind.make import labels_of
+from tyrecal.studies.blind.protocol import read_protocol
+from tyrecal.studies.blind.ruler import SIZE_POINTS, Ruler, read_ruler
+from tyrecal.studies.blind.score import means
 
 Array = np.ndarray
 MAX_RULE_STEPS = 8  # of Gauss and Newton's method
 MAX_LN_STEP = 0.5  # of the logarithm of a variable, a step
 NONE = "none"
 PRIOR_NONE = 0.25  # probability of no effect, before the data
+
+
+def rivals(folder: Path) -> dict[str, dict[str, str]]:
+    """`guesses` of each trial by its id."""
+    protocol, ruler = read_protocol(folder), read_ruler(folder, labels_of(case_of(folder)))
+    answers = {}
+    for path in (folder / "trials").glob("*.csv"):
+        y, places, counts = means(read_measurements(path), ruler)
+        answers[path.stem] = guesses(ruler, y, places, ruler.scatter(places, counts, protocol))
+    return answers
 
 
 def guesses(ruler: Ruler, y: Array, places: Array, sigma: Array) -> dict[str, str]:
