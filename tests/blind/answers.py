@@ -21,7 +21,7 @@ from numpy.polynomial.legendre import leggauss
 
 from tyrecal.files import Json
 from tyrecal.measured.tables import read_measurements
-from tyrecal.studies.blind.answer import by_label, content_of, places_at
+from tyrecal.studies.blind.answer import content_of, labels_at
 from tyrecal.studies.blind.protocol import Protocol
 from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
 from tyrecal.studies.diagnose.evidence import OUTSIDE, Hypothesis
@@ -63,12 +63,11 @@ def intervals(
 ) -> dict[str, list[float]]:
     """Hz by label at a pressure that was not fitted: mean of all explanations of the catalogue,
     weighted by their probabilities, and the ends of its 90 % interval."""
-    places = places_at(rows, pressure_kPa)
-    prediction = expected(diagnosis.problem, diagnosis.hypotheses, rows, places)
-    three = np.exp([prediction.mean, *prediction.interval()]).T
-    return by_label(
-        diagnosis, rows, places, [[round(f, 4) for f in each] for each in three.tolist()]
-    )
+    labels = labels_at(diagnosis, rows, pressure_kPa)
+    known = expected(diagnosis.problem, diagnosis.hypotheses, rows, np.array([*labels]))
+    three = np.exp([known.mean, *known.interval()]).T.tolist()
+    rounded = [[round(f, 4) for f in each] for each in three]
+    return dict(zip(labels.values(), rounded, strict=True))
 
 
 @dataclass(frozen=True)

@@ -43,6 +43,8 @@ STUDIES = ("blind_study_1", "blind_study_2", "blind_study_2_second_maker")  # th
 RULER_PLACES = 7  # decimals of a change of ln f
 PLACES_OF = {"probabilities": 6, "held_out": 4}  # decimals; Hz
 SIZE_DIGITS = 6  # significant ones of an effect's size and its interval
+# of rulers that do not state them
+EARLIER_LAWS = {"material_laws": 0.0, "laws_shared": False, "laws_length": 0.5}
 READ_OF_DIAGNOSIS = "verdict", "effect", "exchanged_labels"  # by the scorers
 READ_OF_STUDIES = "likeliest", "candidate_set", "fit_p_value"  # and by those of studies 1 and 2
 KINDS = "trials", "answers", "rulers", "truth"
@@ -66,7 +68,7 @@ def unpack(name: str, folder: Path, sealed: Path | None = None) -> None:
         for path, content in archive(kind, f"{name}/"):
             _write(folder / path.removeprefix(f"{name}/"), content)
     ((_, ruler),) = archive("rulers", mark["ruler"])
-    _write(folder / RULER_FILE, ruler)
+    _write(folder / RULER_FILE, json.dumps(EARLIER_LAWS | json.loads(ruler)))
     _write(folder / SEAL, json.dumps({"sha256": mark["truth"]}))
     if "packed_answers" in mark:
         count = len(list((folder / "answers").glob("*.json")))
@@ -97,8 +99,7 @@ def pack(groups: Mapping[str, tuple[Path, Path]]) -> None:
         known[name] = {"truth": json.loads((folder / SEAL).read_text())["sha256"], "ruler": key}
         if (folder / ANSWERS).exists():
             known[name]["answers"] = json.loads((folder / ANSWERS).read_text())["sha256"]
-            answers = sorted((folder / "answers").glob("*.json"))
-            known[name]["packed_answers"] = seal_answers(folder, answers)
+            known[name]["packed_answers"] = seal_answers(folder)
     ARCHIVE.mkdir(exist_ok=True)
     for kind in KINDS:
         (ARCHIVE / f"{kind}.xz").write_bytes(packed_bytes(files[kind]))

@@ -15,8 +15,6 @@ from pathlib import Path
 import numpy as np
 
 from tyrecal.measured.tables import read_measurements
-from tyrecal.studies.blind.answer import case_of
-from tyrecal.studies.blind.make import labels_of
 from tyrecal.studies.blind.protocol import read_protocol
 from tyrecal.studies.blind.ruler import SIZE_POINTS, Ruler, read_ruler
 from tyrecal.studies.blind.score import means
@@ -30,7 +28,7 @@ PRIOR_NONE = 0.25  # probability of no effect, before the data
 
 def rivals(folder: Path) -> dict[str, dict[str, str]]:
     """`guesses` of each trial by its id."""
-    protocol, ruler = read_protocol(folder), read_ruler(folder, labels_of(case_of(folder)))
+    protocol, ruler = read_protocol(folder), read_ruler(folder)
     answers = {}
     for path in (folder / "trials").glob("*.csv"):
         y, places, counts = means(read_measurements(path), ruler)

@@ -21,7 +21,7 @@ from .toy import CASE, Scale, protocol
 
 SCALE = Scale()
 
-RULER = ruler_of(measure(SCALE, SCALE.model_rows), labels_of(CASE))
+RULER = ruler_of(measure(SCALE, SCALE.model_rows))
 RULES = protocol()
 FOUND = {power.id: power for power in powers(RULER, RULES)}
 

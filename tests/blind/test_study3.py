@@ -228,7 +228,7 @@ def test_effects_of_a_band_are_those_of_which_the_ruler_foresees_as_much(chance:
         folder = Path(place) / "trials"
         unpack(group.name, folder)
         case = load_case(folder / "case" / f"{group.name}.yaml", allow_unusual=True)
-        ruler, rules = read_ruler(folder, labels_of(case)), read_protocol(folder)
+        ruler, rules = read_ruler(folder), read_protocol(folder)
     lam: dict[str, list[float]] = {}
     of_one = {"one": 40, "one_faint": 10, "one_weak": 10, "one_strong": 20}
     for kind, count in {**of_one, "two_strong": 10, "three_strong": 5}.items():
@@ -251,7 +251,7 @@ def test_what_is_evident_outside_the_catalogue_moves_as_much_as_one_effect(tmp_p
     group = next(group for group in GROUPS if group.name == "205_60r15_own")
     unpack(group.name, tmp_path / "trials")
     case, rules = case_of(tmp_path / "trials"), read_protocol(tmp_path / "trials")
-    ruler = read_ruler(tmp_path / "trials", labels_of(case))
+    ruler = read_ruler(tmp_path / "trials")
     drawn = one_drawn(rules, case, group, "outside_strong", generator("evident"), None)
     (law,) = (EVIDENT[id] for id in drawn.effects)
     assert drawn.truth.kind == "outside" and 0.6 <= drawn.truth.size / law.high <= 1

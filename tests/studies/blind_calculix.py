@@ -41,10 +41,9 @@ from tyrecal.simulate.modes.label import Label, label_modes
 from tyrecal.simulate.modes.match import match
 from tyrecal.studies.blind.answer import rows_of, tyre_model
 from tyrecal.studies.blind.draw import Truth, draw, tyre
-from tyrecal.studies.blind.laws import EffectLaw
+from tyrecal.studies.blind.laws import OUTSIDE_FAMILIES, EffectLaw
 from tyrecal.studies.blind.make import make
 from tyrecal.studies.blind.maker import Computed, Maker
-from tyrecal.studies.blind.outside import OUTSIDE_FAMILIES
 from tyrecal.studies.blind.protocol import Protocol
 from tyrecal.studies.blind.ruler import measure
 from tyrecal.studies.inference.uncertainties import sources

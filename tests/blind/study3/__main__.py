@@ -36,7 +36,6 @@ import numpy as np
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.studies.blind.answer import answer, case_of, rows_of, tyre_model
-from tyrecal.studies.blind.make import labels_of
 from tyrecal.studies.blind.protocol import read_protocol
 from tyrecal.studies.blind.ruler import read_ruler
 from tyrecal.studies.blind.seal import ANSWERS, SEAL
@@ -142,7 +141,7 @@ def power(folder: Path) -> str:
     by_group = {}
     for group in (g for g in GROUPS if (folder / g.name / SEAL).exists()):
         trials = folder / group.name
-        ruler = read_ruler(trials, labels_of(case_of(trials)))
+        ruler = read_ruler(trials)
         by_group[group] = {each.id: each for each in powers(ruler, read_protocol(trials))}
     ids = sorted(set[str]().union(*by_group.values()), key=lambda id: -lambdas(by_group, id)[0])
     heads = [f"{group.size} {'own' if group.own else 'foreign'}" for group in by_group]

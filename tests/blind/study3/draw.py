@@ -149,9 +149,8 @@ def seen(
 def evident(trial: Trial, protocol: Protocol, ruler: Ruler | None) -> bool:
     """Whether what is outside the catalogue moves as much as one effect that should be found."""
     assert ruler is not None
-    labels = [label for label, _ in ruler.rows if label]
     plain, places = plain_trial(trial), measured_places(ruler, protocol)
-    return seen(ruler, protocol, trial.truth, *true_shift(plain, ruler, places, labels)) >= ONE
+    return seen(ruler, protocol, trial.truth, *true_shift(plain, ruler, places)) >= ONE
 
 
 def drawn_anew(

@@ -24,14 +24,13 @@ from tyrecal.studies.blind.make import (
     Trial,
     copy_case,
     kept_seed,
-    labels_of,
     plain_trial,
     sealed_trial,
     write_trials,
 )
 from tyrecal.studies.blind.maker import Computed
 from tyrecal.studies.blind.protocol import Protocol, read_json, write_json, write_protocol
-from tyrecal.studies.blind.ruler import RULER_FILE, Ruler, measure, read_ruler, write_ruler
+from tyrecal.studies.blind.ruler import RULER_FILE, Ruler, measure, read_ruler
 from tyrecal.studies.blind.seal import SEAL, seal
 from tyrecal.tyre.case import LoadedCase
 
@@ -72,10 +71,10 @@ def make(
         held_out_kPa=group.held_out_kPa,
     )
     if not (folder / RULER_FILE).exists():
-        write_ruler(folder, (ruler or partial(measured, jobs=jobs))(case, protocol))
+        write_json(folder / RULER_FILE, (ruler or partial(measured, jobs=jobs))(case, protocol))
     seed = kept_seed(sealed, seed)
     judged = any(counts.get(kind) for kind in (*FORESEEN, "outside_strong"))
-    known = read_ruler(folder, labels_of(case)) if judged else None
+    known = read_ruler(folder) if judged else None
     every = drawn(protocol, case, group, counts, seed, known)
     work = partial(one, sealed, protocol, case, group, known)
     results = []

@@ -15,7 +15,6 @@ import numpy as np
 
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.blind.answer import case_of
-from tyrecal.studies.blind.make import labels_of
 from tyrecal.studies.blind.ruler import Ruler, read_ruler
 from tyrecal.studies.blind.seal import open_truth
 from tyrecal.studies.inference.uncertainties import sources
@@ -29,7 +28,7 @@ def rises(folder: Path, sealed: Path) -> dict[Label, Array]:
     """ln f at the highest pressure less ln f at the lowest, above the model's (tyres,), by mode.
     Raises InputError."""
     content, case = open_truth(folder, sealed), case_of(folder)
-    ruler = read_ruler(folder, labels_of(case))
+    ruler = read_ruler(folder)
     names = [source.name for source in sources(with_exact_section(case))[0]]
     each = [risen(ruler, names, truth) for truth in content["trials"]]
     return {label: np.array([by_label[label] for by_label in each]) for label in each[0]}

@@ -123,7 +123,7 @@ def scored(folder: Path, sealed: Path) -> list[Scored]:
     """Every trial of a group. Raises InputError."""
     content, protocol = open_truth(folder, sealed), read_protocol(folder)
     labels = labels_of(case_of(folder))
-    ruler = read_ruler(folder, labels)
+    ruler = read_ruler(folder)
     answer_of = lambda truth: read_json(folder / "answers" / f"{truth['id']}.json")
     return [one(t, answer_of(t), folder, ruler, protocol, labels) for t in content["trials"]]
 
@@ -143,10 +143,10 @@ def one(
     hard = {}
     effects = tuple(sorted(truth["effects"])) if truth["kind"] != "outside" else ()
     for id in effects:
-        moved = moved_by(id, truth, ruler, places, labels)
+        moved = moved_by(id, truth, ruler, places)
         hard[id] = difficulty(ruler, protocol, id, d, places, counts, moved)
     if truth["kind"] == "outside":
-        moved = true_shift(truth, ruler, places, labels)
+        moved = true_shift(truth, ruler, places)
         hard["outside"] = difficulty(ruler, protocol, "outside", d, places, counts, moved)
     diagnosis, out = answer["diagnosis"], answer["held_out"]
     p, named = diagnosis["probabilities"], diagnosis["effect"]
@@ -178,7 +178,7 @@ def one(
     )
     again = weighed_again(p, answer.get("further", Assumed.further), further(protocol.counts))
     if len(effects) > 1:
-        moved = true_shift(truth, ruler, places, labels)
+        moved = true_shift(truth, ruler, places)
         whole = difficulty(ruler, protocol, effects[0], d, places, counts, moved)
         score = replace(score, together=whole.lam)
     score = replace(
@@ -200,11 +200,11 @@ def one(
 
 
 def moved_by(
-    id: str, truth: Mapping[str, Any], ruler: Ruler, places: np.ndarray, labels: Sequence[Any]
+    id: str, truth: Mapping[str, Any], ruler: Ruler, places: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """`true_shift` of one effect, alone or beside the others that are there."""
     table = truth["members"].get(id, truth["without"])
-    return true_shift({**truth, "without": table}, ruler, places, labels)
+    return true_shift({**truth, "without": table}, ruler, places)
 
 
 def weighed(trial: Scored, p: Mapping[str, float]) -> Scored:

@@ -15,8 +15,6 @@ from pathlib import Path
 import numpy as np
 
 from tyrecal.measured.tables import read_measurements
-from tyrecal.studies.blind.answer import case_of
-from tyrecal.studies.blind.make import labels_of
 from tyrecal.studies.blind.protocol import read_protocol
 from tyrecal.studies.blind.ruler import read_ruler
 from tyrecal.studies.blind.score import means
@@ -32,8 +30,7 @@ Unlike = dict[str, list[tuple[float, float]]]  # by id: share of lambda left, an
 def unlike(folder: Path, sealed: Path) -> Unlike:
     """For every effect of a group that is seen, alone or among others: the share of its shift that
     the catalogue's effect leaves, and the ratio of the sizes. Raises InputError."""
-    labels, protocol = labels_of(case_of(folder)), read_protocol(folder)
-    ruler, result = read_ruler(folder, labels), Unlike()
+    protocol, ruler, result = read_protocol(folder), read_ruler(folder), Unlike()
     for truth in open_truth(folder, sealed)["trials"]:
         readings = read_measurements(folder / "trials" / f"{truth['id']}.csv")
         _, places, counts = means(readings, ruler)
@@ -42,7 +39,7 @@ def unlike(folder: Path, sealed: Path) -> Unlike:
         for id, size in truth["effects"].items():
             if id not in ruler.signatures:
                 continue
-            shift, _ = moved_by(id, truth, ruler, places, labels)
+            shift, _ = moved_by(id, truth, ruler, places)
             sizes, own, _ = ruler.signatures[id].grid(d, places)
             left = np.einsum("qn,nm,qm->q", own - shift, P, own - shift)
             lam = float(shift @ P @ shift)

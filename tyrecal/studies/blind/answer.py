@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -34,9 +33,6 @@ from ..inference.uncertainties import sources
 from .make import labels_of
 from .protocol import Protocol, read_protocol, write_json
 from .seal import refuse_open_truth, seal_answers
-
-# the answer to a file of measurements, from model, rows, rules and the model's expansion
-OneAnswer = Callable[[ResponseModel, list[ModelRow], Protocol, Expansion, Path], Json]
 
 
 def rows_of(case: LoadedCase, protocol: Protocol) -> list[ModelRow]:
@@ -62,36 +58,6 @@ def case_of(folder: Path) -> LoadedCase:
     return load_case(folder / "case" / read_protocol(folder).case, allow_unusual=True)
 
 
-def answer(
-    folder: Path,
-    model: ResponseModel,
-    rows: Sequence[ModelRow],
-    jobs: int = 1,
-    on_progress: Callable[[int, int], None] = lambda done, all: None,
-    one: OneAnswer | None = None,
-) -> str:
-    """Answer every trial that has no answer yet, by `one_answer` or ``one``; returns the sha256 of
-    all answers.
-
-    Raises InputError where the truth lies among the trials, and what the model answers if it has
-    no solution at its start.
-    """
-    refuse_open_truth(folder)
-    protocol = read_protocol(folder)
-    trials = sorted((folder / "trials").glob("*.csv"))
-    answers = folder / "answers"
-    private_dir(answers)
-    waiting = [t for t in trials if not (answers / f"{t.stem}.json").exists()]
-    work = partial(one or one_answer, model, list(rows), protocol, expand(model, model.start))
-    before = len(trials) - len(waiting)
-    with process_pool(jobs) if jobs > 1 and len(waiting) > 1 else nullcontext() as pool:
-        contents = (pool.map if pool else map)(work, waiting)
-        for done, (trial, content) in enumerate(zip(waiting, contents, strict=True), before + 1):
-            write_json(answers / f"{trial.stem}.json", content)
-            on_progress(done, len(trials))
-    return seal_answers(folder, [answers / f"{trial.stem}.json" for trial in trials])
-
-
 def one_answer(
     model: ResponseModel, rows: list[ModelRow], protocol: Protocol, known: Expansion, trial: Path
 ) -> Json:
@@ -110,15 +76,14 @@ def content_of(diagnosis: Diagnosis, rows: Sequence[ModelRow], protocol: Protoco
     content = diagnosis_result(diagnosis).content()
     content.pop("next_measurements"), content.pop("section_map")  # empty: neither was asked for
     key = content["effect"] or content["likeliest"]
+    hertz = partial(predicted, diagnosis, rows, protocol.held_out_kPa)
     return {
         "diagnosis": content,
         "held_out": {
             "pressure_kPa": protocol.held_out_kPa,
             "effect": key,
-            "plain_Hz": predicted(diagnosis, rows, protocol.held_out_kPa, NONE),
-            "with_effect_Hz": predicted(diagnosis, rows, protocol.held_out_kPa, key)
-            if key
-            else None,
+            "plain_Hz": hertz(NONE),
+            "with_effect_Hz": hertz(key) if key else None,
         },
     }
 
@@ -127,23 +92,45 @@ def predicted(
     diagnosis: Diagnosis, rows: Sequence[ModelRow], pressure_kPa: float, key: str
 ) -> dict[str, float]:
     """Hz by label at a pressure that was not fitted, by a hypothesis at its best parameters."""
-    places = places_at(rows, pressure_kPa)
-    eta = likeliest(diagnosis.problem, diagnosis.hypothesis(key), rows, places)
-    return by_label(diagnosis, rows, places, [round(float(np.exp(f)), 4) for f in eta])
+    labels = labels_at(diagnosis, rows, pressure_kPa)
+    eta = likeliest(diagnosis.problem, diagnosis.hypothesis(key), rows, np.array([*labels]))
+    hertz = [round(float(f), 4) for f in np.exp(eta)]
+    return dict(zip(labels.values(), hertz, strict=True))
 
 
-def places_at(rows: Sequence[ModelRow], pressure_kPa: float) -> np.ndarray:
-    """Places (n,) among the rows of the modes at a pressure."""
-    return np.array([i for i, (label, p) in enumerate(rows) if label and p == pressure_kPa], int)
+def labels_at(
+    diagnosis: Diagnosis, rows: Sequence[ModelRow], pressure_kPa: float
+) -> dict[int, str]:
+    """The laboratory's own labels of the modes at a pressure, by their places among the rows: the
+    diagnosis may have exchanged two."""
+    exchanged = diagnosis.exchanged or ()
+    own = dict(zip(exchanged, reversed(exchanged), strict=True))
+    return {i: str(own.get(x, x)) for i, (x, p) in enumerate(rows) if x and p == pressure_kPa}
 
 
-def by_label(
-    diagnosis: Diagnosis, rows: Sequence[ModelRow], places: np.ndarray, each: Sequence[Any]
-) -> Json:
-    """Values, one for each place, by the laboratory's own labels: the diagnosis may have exchanged
-    two."""
-    values = {str(rows[i][0]): value for i, value in zip(places, each, strict=True)}
-    if diagnosis.exchanged:
-        a, b = map(str, diagnosis.exchanged)
-        values[a], values[b] = values[b], values[a]
-    return values
+def answer(
+    folder: Path,
+    model: ResponseModel,
+    rows: Sequence[ModelRow],
+    jobs: int = 1,
+    on_progress: Callable[[int, int], None] = lambda done, all: None,
+    one: Callable[..., Json] = one_answer,
+) -> str:
+    """Answer every trial that has no answer yet; returns the sha256 of all answers.
+
+    one: as `one_answer`. Raises InputError where the truth lies among the trials, and what the
+    model answers if it has no solution at its start.
+    """
+    refuse_open_truth(folder)
+    protocol = read_protocol(folder)
+    trials = sorted((folder / "trials").glob("*.csv"))
+    answers = private_dir(folder / "answers")
+    waiting = [t for t in trials if not (answers / f"{t.stem}.json").exists()]
+    work = partial(one, model, list(rows), protocol, expand(model, model.start))
+    before = len(trials) - len(waiting)
+    with process_pool(jobs) if jobs > 1 and len(waiting) > 1 else nullcontext() as pool:
+        contents = (pool.map if pool else map)(work, waiting)
+        for done, (trial, content) in enumerate(zip(waiting, contents, strict=True), before + 1):
+            write_json(answers / f"{trial.stem}.json", content)
+            on_progress(done, len(trials))
+    return seal_answers(folder)

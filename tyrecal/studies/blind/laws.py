@@ -1,15 +1,18 @@
-"""The laws by which the maker of blind trials writes effects into a tyre."""
+"""How the maker of blind trials writes effects, and errors that no catalogue holds, into a tyre."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import log1p
 
 import numpy as np
 
 from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase
-from ...tyre.effects import catalogue
+from ...tyre.case.schema import Cord
+from ...tyre.effects.edit import changed, with_gauge, with_layers, with_part
+from ...tyre.effects.parts import belt_lines, carcass, carcass_line, crown
 
 Frequencies = Mapping[Label, tuple[float, float]]
 """ln f of both members by label, equal where they do not split."""
@@ -31,10 +34,55 @@ class EffectLaw:
         return float(random.choice(ends) * random.uniform(smallest, 1.0))
 
 
-def catalogue_laws(case: LoadedCase, capabilities: frozenset[str]) -> dict[str, EffectLaw]:
-    """The catalogue's own, of effects that a solver with these capabilities can express."""
-    return {
-        id: EffectLaw(*e.range_on(case), e.add)
-        for id, e in catalogue().items()
-        if e.within(capabilities)
+def thick_cushion(case: LoadedCase, e: float) -> LoadedCase:
+    """Rubber between carcass and inner belt is 1 + e times as thick."""
+    return with_gauge(case, (carcass_line(case), belt_lines(case)[0]), crown(case), 1 + e)
+
+
+def bias_carcass(case: LoadedCase, e: float) -> LoadedCase:
+    """Carcass cords are ``e`` degrees off the meridian."""
+    layers = case.case.rebar_layers
+    return with_layers(
+        case,
+        {
+            name: with_part(layers[name], angle_deg=layers[name].angle_deg + e)
+            for name in carcass(case)
+        },
+    )
+
+
+def tension_stiffening(case: LoadedCase, e: float) -> LoadedCase:
+    """Carcass cords whose modulus goes with their tension: times 1 + e per 100 kPa over the
+    pressure of the case file."""
+    nominal = case.file_data["pressure_kPa"]
+    factor = 1 + e * (case.case.pressure_kPa - nominal) / 100.0
+    names = {case.case.rebar_layers[name].material for name in carcass(case)}
+    materials = {
+        name: with_part(m, youngs_modulus_Pa=factor * m.youngs_modulus_Pa)
+        if isinstance(m, Cord) and name in names
+        else m
+        for name, m in case.case.materials.items()
     }
+    return changed(case, materials=materials)
+
+
+def untouched(case: LoadedCase, e: float) -> LoadedCase:
+    """The tyre as it is: the error is the laboratory's."""
+    return case
+
+
+def stand_resonance(computed: Mapping[float, Frequencies], e: float) -> Mapping[float, Frequencies]:
+    """A resonance of the test stand, 1 + e times as high as [1,0] at the middle pressure and the
+    same at all, is taken for [1,0]."""
+    vertical = Label(1, 0)
+    middle = sorted(computed)[len(computed) // 2]
+    stand = sum(computed[middle][vertical]) / 2 + log1p(e)
+    return {p: {**ln_f, vertical: (stand, stand)} for p, ln_f in computed.items()}
+
+
+OUTSIDE_FAMILIES = {  # the ranges are chosen
+    "thick_cushion": EffectLaw(0.0, 3.0, thick_cushion),
+    "bias_carcass": EffectLaw(0.0, 20.0, bias_carcass),  # degrees
+    "tension_stiffening": EffectLaw(-1.0, 1.0, tension_stiffening),
+    "stand_resonance": EffectLaw(-0.15, 0.15, untouched, stand_resonance),
+}

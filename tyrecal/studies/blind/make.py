@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import secrets
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError
-from ...files import Json, atomic_write, make_folder, refuse_link
-from ...measured.measurement import CSV_COLUMNS
+from ...files import Json, make_folder, refuse_link, write_text
+from ...measured.measurement import Measurement, measurements_csv
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.evaluate.pool import process_pool
 from ...simulate.modes.label import Label
@@ -26,7 +26,7 @@ from ..inference.uncertainties import sources
 from .draw import SWAPPED_WITHIN, Truth, draw, tyre
 from .maker import Computed, Maker
 from .protocol import Protocol, read_json, write_json, write_protocol
-from .ruler import write_ruler
+from .ruler import RULER_FILE
 from .seal import SEAL, seal
 
 USUAL_LABELS = (
@@ -74,7 +74,7 @@ def make(
     make_folder(sealed)
     for path in (*folder.rglob("*"), sealed / "record"):
         refuse_link(path)
-    write_ruler(folder, ruler())
+    write_json(folder / RULER_FILE, ruler())
     seed = kept_seed(sealed, seed)
     own_sources, _ = sources(case)
     truths = draw(protocol, case, own_sources, maker.laws, maker.outside, seed)
@@ -87,9 +87,8 @@ def make(
     copy_case(case, folder)
     write_protocol(folder, protocol)
     write_trials(folder, protocol, trials)
-    return seal(
-        folder, sealed, {"seed": seed, "trials": [sealed_trial(t, protocol) for t in trials]}
-    )
+    truth = [sealed_trial(trial, protocol) for trial in trials]
+    return seal(folder, sealed, {"seed": seed, "trials": truth})
 
 
 def labels_of(case: LoadedCase) -> list[Label]:
@@ -98,38 +97,51 @@ def labels_of(case: LoadedCase) -> list[Label]:
     return target_labels(case) or list(USUAL_LABELS)
 
 
-def values(trial: Trial, protocol: Protocol) -> dict[float, dict[Label, tuple[float, ...]]]:
-    """Readings of the laboratory, Hz by pressure and label: noise, the tyre's own splits, labels.
+def readings(trial: Trial, protocol: Protocol) -> list[Measurement]:
+    """Readings of the laboratory at all pressures: with noise, the tyre's own splits and gaps.
 
-    One member for [0,0], two for doublets in an order by chance; NaN where a value is missing.
+    One member for [0,0], two for doublets in an order by chance.
     """
     random = np.random.default_rng(trial.truth.scatter)
     labels = list(next(iter(trial.with_effect.values())).ln_f)
     own = {label: protocol.split * random.normal() for label in labels}
-    read: dict[float, dict[Label, tuple[float, ...]]] = {}
+    read = []
     for pressure in protocol.pressures_kPa:
-        computed, here = trial.with_effect[pressure], {}
+        here = []
         for label in labels:
-            low, high = computed.ln_f[label]
+            low, high = trial.with_effect[pressure].ln_f[label]
             pair = [low - own[label] / 2, high + own[label] / 2] if label.c else [low]
             noisy = np.exp(pair + protocol.noise * random.normal(size=len(pair)))
-            here[label] = tuple(random.permutation(noisy).tolist())
-        places = [(label, i) for label in labels for i in range(len(here[label]))]
-        gone = random.choice(len(places), int(random.integers(protocol.missing + 1)), False)
-        for label, i in (places[k] for k in gone):
-            here[label] = tuple(float("nan") if j == i else f for j, f in enumerate(here[label]))
-        read[pressure] = here
-    if trial.truth.swapped:
-        _swap(read, labels, random)
-    return read
+            for i, f in enumerate(random.permutation(noisy).tolist(), 1):
+                state = str(i) if label.c else "", pressure, 0.0
+                here.append(Measurement("frequency_Hz", label, *state, f, protocol.noise * f))
+        gone = random.choice(len(here), int(random.integers(protocol.missing + 1)), False)
+        read += [each for i, each in enumerate(here) if i not in gone]
+    return _swapped(read, random) if trial.truth.swapped else read
+
+
+def _swapped(read: list[Measurement], random: np.random.Generator) -> list[Measurement]:
+    """The readings, two doublets of like frequency with each other's label at every pressure."""
+    order = list(dict.fromkeys((each.pressure_kPa, each.label) for each in read))
+    first: dict[Label, list[float]] = {}
+    for each in read:
+        if each.label and each.label.c and each.pressure_kPa == read[0].pressure_kPa:
+            first.setdefault(each.label, []).append(each.value)
+    ln = {label: np.log(np.mean(values)) for label, values in first.items()}
+    near = [(a, b) for a in ln for b in ln if a < b and abs(ln[a] - ln[b]) < SWAPPED_WITHIN]
+    if not near:
+        return read
+    a, b = near[int(random.integers(len(near)))]
+    other: dict[Label | None, Label] = {a: b, b: a}
+    read = [replace(each, label=other.get(each.label, each.label)) for each in read]
+    return sorted(read, key=lambda each: order.index((each.pressure_kPa, each.label)))
 
 
 def _make(protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth) -> Trial:
     """The trial, its tyre drawn again where it has no solution."""
-    own_sources, _ = sources(case)
-    labels = labels_of(case)
+    own_sources, labels = sources(case)[0], labels_of(case)
     random = np.random.default_rng(truth.scatter + 1)
-    law = {"effect": maker.laws, "outside": maker.outside, "none": {}}[truth.kind].get(truth.law)
+    law = {**maker.laws, **maker.outside}.get(truth.law)
     for tries in range(1, MAX_TRIES + 1):
         try:
             both = [
@@ -145,85 +157,42 @@ def _make(protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth) -> T
             return Trial(truth, tries, both[0], both[-1])
         except (EvaluationFailed, ValueError) as failure:
             last = failure
-        truth = _again(truth, case, protocol, random)
+        rules = replace(protocol, counts={"none": 1})
+        (other,) = draw(rules, case, own_sources, {}, {}, int(random.integers(2**63)))
+        truth = replace(truth, variables=other.variables, constants=other.constants)
     raise InputError(f"no tyre with {truth.law or 'these constants'} has a solution: {last}")
 
 
-def _again(
-    truth: Truth, case: LoadedCase, protocol: Protocol, random: np.random.Generator
-) -> Truth:
-    """A trial like the given one with other design variables and constants."""
-    rules, own_sources = replace(protocol, counts={"none": 1}), sources(case)[0]
-    (other,) = draw(rules, case, own_sources, {}, {}, int(random.integers(2**63)))
-    return replace(truth, variables=other.variables, constants=other.constants)
-
-
-def _swap(
-    read: Mapping[float, dict[Label, tuple[float, ...]]],
-    labels: list[Label],
-    random: np.random.Generator,
-) -> None:
-    """Two doublets of like frequency take each other's label at every pressure."""
-    first = next(iter(read.values()))
-    mean = {label: np.nanmean(first[label]) for label in labels if label.c}
-    near = [
-        (a, b)
-        for a in mean
-        for b in mean
-        if a < b and abs(np.log(mean[a] / mean[b])) < SWAPPED_WITHIN
-    ]
-    if near:
-        a, b = near[int(random.integers(len(near)))]
-        for here in read.values():
-            here[a], here[b] = here[b], here[a]
-
-
 def write_trials(folder: Path, protocol: Protocol, trials: list[Trial]) -> None:
-    """One CSV a trial, all of the same form, digits and time."""
+    """One CSV a trial, all of the same form and time."""
     make_folder(folder / "trials")
     for trial in trials:
-        lines = [",".join(CSV_COLUMNS)]
-        read = values(trial, protocol)
-        for p in protocol.given_kPa:
-            for label, members in read[p].items():
-                for i, f in enumerate(members, 1):
-                    if np.isfinite(f):
-                        member = i if len(members) > 1 else ""
-                        mode = f"{label.c},{label.m},{label.kind or ''},{member}"
-                        reading = f"{f:.3f},{protocol.noise * f:.3f}"
-                        lines.append(f"frequency_Hz,{mode},{p:.0f},0,{reading}")
+        read = [x for x in readings(trial, protocol) if x.pressure_kPa in protocol.given_kPa]
         random = np.random.default_rng(trial.truth.scatter + 2)
         mass = exp(trial.with_effect[protocol.given_kPa[0]].ln_mass)
         mass *= exp(protocol.mass * random.normal())
-        lines.append(f"mass_kg,,,,,,,{mass:.3f},{protocol.mass * mass:.3f}")
+        read.append(Measurement("mass_kg", None, "", 0.0, 0.0, mass, protocol.mass * mass))
         path = folder / "trials" / f"{trial.truth.id}.csv"
-        with atomic_write(path) as partial:
-            partial.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="")
-    for path in (folder / "trials").iterdir():
+        write_text(path, measurements_csv(read))
         os.utime(path, (0, 0))
 
 
 def plain_trial(trial: Trial) -> Json:
     """One trial without noise, for JSON."""
-    tables = {}
-    for key, computed in (("with_effect", trial.with_effect), ("without", trial.without)):
-        tables[key] = [
-            {
-                "pressure_kPa": p,
-                "ln_mass": each.ln_mass,
-                "ln_f": {str(label): list(pair) for label, pair in each.ln_f.items()},
-            }
-            for p, each in computed.items()
-        ]
-    return {**asdict(trial.truth), "tries": trial.tries, **tables}
+    tables = {"with_effect": trial.with_effect, "without": trial.without}
+    plain = {
+        key: [{"pressure_kPa": p, **each.plain()} for p, each in table.items()]
+        for key, table in tables.items()
+    }
+    return {**asdict(trial.truth), "tries": trial.tries, **plain}
 
 
 def sealed_trial(trial: Trial, protocol: Protocol) -> Json:
     """One trial of the truth, with what was held out as it was measured."""
-    read = values(trial, protocol)[protocol.held_out_kPa]
-    held_out = {
-        str(label): [f for f in members if np.isfinite(f)] for label, members in read.items()
-    }
+    held_out: dict[str, list[float]] = {}
+    for each in readings(trial, protocol):
+        if each.pressure_kPa == protocol.held_out_kPa:
+            held_out.setdefault(str(each.label), []).append(each.value)
     return {**plain_trial(trial), "held_out": held_out}
 
 
@@ -231,14 +200,12 @@ def kept_seed(sealed: Path, seed: int | None) -> int:
     """The seed of the sealed folder, which is drawn and kept at first. Raises InputError for
     another one."""
     path = sealed / "seed.json"
-    if path.exists():
-        known = int(read_json(path)["seed"])
-        if seed is not None and seed != known:
-            raise InputError(f"{path} has another seed; give another folder with --truth")
-        return known
-    seed = secrets.randbits(63) if seed is None else seed
-    write_json(path, {"seed": seed})
-    return seed
+    if not path.exists():
+        write_json(path, {"seed": secrets.randbits(63) if seed is None else seed})
+    known = int(read_json(path)["seed"])
+    if seed not in (None, known):
+        raise InputError(f"{path} has another seed; give another folder with --truth")
+    return known
 
 
 def copy_case(case: LoadedCase, folder: Path) -> None:

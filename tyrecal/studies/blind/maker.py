@@ -6,14 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import log
 
+from ...files import Json
 from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator, Question
 from ...simulate.evaluate.store import Store
 from ...simulate.modes.find import LabelledModes, find_modes
 from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase
-from .laws import EffectLaw, Frequencies, catalogue_laws
-from .outside import OUTSIDE_FAMILIES
+from ...tyre.effects import catalogue
+from .laws import OUTSIDE_FAMILIES, EffectLaw, Frequencies
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,11 @@ class Computed:
 
     ln_f: Frequencies
     ln_mass: float  # in kg
+
+    def plain(self) -> Json:
+        """As plain data for JSON."""
+        ln_f = {str(label): list(pair) for label, pair in self.ln_f.items()}
+        return {"ln_mass": self.ln_mass, "ln_f": ln_f}
 
 
 @dataclass
@@ -43,17 +49,16 @@ class Maker:
             raise labelled
         ln_f = {}
         for label in labels:
-            low, high = (
-                labelled.wanted[label].raw.members or (labelled.wanted[label].frequency_Hz,) * 2
-            )
+            mode = labelled.wanted[label]
+            low, high = mode.raw.members or (mode.frequency_Hz, mode.frequency_Hz)
             ln_f[label] = log(low), log(high)
         return Computed(ln_f, log(labelled.evaluation.mass_kg))
 
 
 def bundled_maker(case: LoadedCase, store: Store | None = None) -> Maker:
-    """The diagnosis' own model, mesh and laws."""
-    laws = catalogue_laws(
-        case, frozenset(Evaluator(TyreDesign(case), "bundled").solver.capabilities)
-    )
+    """The diagnosis' own model, mesh and laws, of the effects that the solver can express."""
+    able = frozenset(Evaluator(TyreDesign(case), "bundled").solver.capabilities)
+    effects = {id: e for id, e in catalogue().items() if e.within(able)}
+    laws = {id: EffectLaw(*e.range_on(case), e.add) for id, e in effects.items()}
     about = "bundled solver, the diagnosis' own mesh and the catalogue's laws: an inverse crime"
     return Maker(about, "bundled", laws, OUTSIDE_FAMILIES, store)

@@ -14,10 +14,10 @@ one of its judge's.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +27,7 @@ from ...files import Json
 from ...simulate.modes.label import Label
 from ..inference.form_error import LAWS_LENGTH, form_error
 from ..inference.model import Answer, ModelRow, Query, ResponseModel, state_of
-from .protocol import Protocol, read_json, write_json
+from .protocol import Protocol, read_json
 
 Array = np.ndarray
 RULER_FILE = "ruler.json"
@@ -35,9 +35,9 @@ CURVATURE_STEP = 0.05  # of ln x, for the curvature
 SHARES = (0.15, 0.5, 1.0)  # of each side of a range
 SIZE_POINTS = 61  # of the grid over the sizes of an effect
 BETWEEN_PRESSURES = 0.9  # correlation of form errors: as all studies on record were scored
-EARLIER_LAWS_LENGTH = 0.5  # of ln p, over which laws were alike in rulers that do not say it
 NUMBERS = ("x0", "spread", "eta", "jacobian", "hessian", "constants")
 SIGNATURE = ("sizes", "shift", "tilt", "split")
+LAWS = ("material_laws", "laws_shared", "laws_length")
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Ruler:
     constants: Array  # (n, k) change by one standard deviation of each
     signatures: Mapping[str, EffectShifts]
     material_laws: float = 0.0  # standard deviation of each part
-    laws_shared: bool = False  # by a family, and by all modes, too
+    laws_shared: bool = True  # by a family, and by all modes, too
     laws_length: float = LAWS_LENGTH  # of ln p, over which that is alike
 
     def scatter(self, places: Array, counts: Array, protocol: Protocol) -> Array:
@@ -169,38 +169,34 @@ def difficulty(
 def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> Json:
     """The ruler as plain data. Raises the model's failure where the plain tyre has no solution."""
     x0 = np.asarray(model.start, float)
-    count = len(x0)
-    steps = [side * CURVATURE_STEP * unit for unit in np.eye(count) for side in (1, -1)]
-    plain = [Query(x0, constants=True), *(Query(x0 + step) for step in steps)]
-    sizes = {
-        id: sorted({f * end for end in (span.low, span.high) if end for f in SHARES})
+    steps = CURVATURE_STEP * np.eye(len(x0))
+    plain = [Query(x0, constants=True), *(Query(x0 + side * d) for d in steps for side in (1, -1))]
+    effects = [
+        (id, e)
         for id, span in model.ranges.items()
-    }
-    with_effects = [Query(x0, {id: e}) for id, each in sizes.items() for e in each]
-    answers = model.answers([*plain, *with_effects])  # all at once: one count of the progress
+        for e in sorted({f * end for end in (span.low, span.high) if end for f in SHARES})
+    ]
+    # all at once: one count of the progress
+    answers = model.answers([*plain, *(Query(x0, {id: e}) for id, e in effects)])
     first, *around = answers[: len(plain)]
-    left = iter(answers[len(plain) :])
     for answer in (first, *around):
         if not isinstance(answer, Answer):
             raise answer
     assert isinstance(first, Answer) and first.constants is not None
-    slopes = [a.jacobian for a in around]  # type: ignore[union-attr]
-    hessian = np.stack(
-        [(slopes[2 * i] - slopes[2 * i + 1]) / (2 * CURVATURE_STEP) for i in range(count)], -1
-    )
-    hessian = (hessian + hessian.transpose(0, 2, 1)) / 2
+    slopes = np.array([a.jacobian for a in around])  # type: ignore[union-attr]
+    hessian = np.moveaxis(slopes[::2] - slopes[1::2], 0, -1) / (2 * CURVATURE_STEP)
     signatures = {}
-    for id, each in sizes.items():
-        replies = list(islice(left, len(each)))
-        known = [(e, a) for e, a in zip(each, replies, strict=True) if isinstance(a, Answer)]
-        zero = (0.0, Answer(first.eta, first.jacobian, 0 * first.split))
-        known = sorted([*known, zero], key=lambda pair: pair[0])
-        if len(known) > 1:
+    with_effects = dict(zip(effects, answers[len(plain) :], strict=True))
+    for id in model.ranges:
+        known = {e: a for (of, e), a in with_effects.items() if of == id and isinstance(a, Answer)}
+        if known:
+            known[0.0] = Answer(first.eta, first.jacobian, 0 * first.split)
+            each = [known[e] for e in sorted(known)]
             signatures[id] = {
-                "sizes": [e for e, _ in known],
-                "shift": [_rounded(a.eta - first.eta) for _, a in known],
-                "tilt": [_rounded(a.jacobian - first.jacobian) for _, a in known],
-                "split": [_rounded(a.split) for _, a in known],
+                "sizes": sorted(known),
+                "shift": [_rounded(a.eta - first.eta) for a in each],
+                "tilt": [_rounded(a.jacobian - first.jacobian) for a in each],
+                "split": [_rounded(a.split) for a in each],
             }
     return {
         "format": 1,
@@ -209,7 +205,7 @@ def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> Json:
         "spread": np.asarray(model.spread).tolist(),
         "eta": first.eta.tolist(),
         "jacobian": first.jacobian.tolist(),
-        "hessian": _rounded(hessian),
+        "hessian": _rounded((hessian + hessian.transpose(0, 2, 1)) / 2),
         "constants": _rounded(first.constants),
         "signatures": signatures,
         "material_laws": model.material_laws,
@@ -218,37 +214,34 @@ def measure(model: ResponseModel, rows: Sequence[ModelRow]) -> Json:
     }
 
 
-def write_ruler(folder: Path, content: Json) -> None:
-    """Write the ruler next to the trials, open to all."""
-    write_json(folder / RULER_FILE, content)
-
-
-def read_ruler(folder: Path, labels: Sequence[Label]) -> Ruler:
+def read_ruler(folder: Path) -> Ruler:
     """The ruler of ``folder``. Raises InputError."""
     try:
-        return ruler_of(read_json(folder / RULER_FILE), labels)
+        return ruler_of(read_json(folder / RULER_FILE))
     except (KeyError, ValueError, TypeError) as error:
-        raise InputError(f"{folder / RULER_FILE}: not a ruler of these trials ({error})") from None
+        raise InputError(f"{folder / RULER_FILE}: not a ruler of trials ({error})") from None
 
 
-def ruler_of(content: Json, labels: Sequence[Label]) -> Ruler:
+def ruler_of(content: Json) -> Ruler:
     """The ruler from the data of `measure`. Raises KeyError, ValueError, TypeError where they are
     none."""
-    known: dict[str, Label | None] = {str(label): label for label in labels}
-    known["mass"] = None
-    numbers = {key: np.array(content[key], float) for key in NUMBERS}
+    fields: Json = {key: np.array(content[key], float) for key in NUMBERS}
+    fields |= {key: content[key] for key in LAWS}
     signatures = {
         id: EffectShifts(*(np.array(each[key], float) for key in SIGNATURE))
         for id, each in content["signatures"].items()
     }
-    return Ruler(
-        tuple((known[name], float(p)) for name, p in content["rows"]),
-        **numbers,
-        signatures=signatures,
-        material_laws=float(content.get("material_laws", 0.0)),  # none in rulers of earlier studies
-        laws_shared=bool(content.get("laws_shared")),
-        laws_length=float(content.get("laws_length", EARLIER_LAWS_LENGTH)),
-    )
+    rows = tuple((_label(name), float(p)) for name, p in content["rows"])
+    return Ruler(rows, **fields, signatures=signatures)
+
+
+def _label(name: str) -> Label | None:
+    """The label that `measure` wrote; None of the mass."""
+    if name == "mass":
+        return None
+    numbers, _, kind = name.partition(" ")
+    c, m = json.loads(numbers)
+    return Label(c, m, kind or None)
 
 
 def _rounded(values: Array) -> list:

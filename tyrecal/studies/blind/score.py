@@ -18,8 +18,6 @@ from ...files import Json
 from ...measured.measurement import Measurement
 from ...measured.tables import read_measurements
 from ...simulate.modes.label import Label
-from .answer import case_of
-from .make import labels_of
 from .protocol import Protocol, read_json, read_protocol
 from .ruler import Difficulty, Ruler, difficulty, read_ruler
 from .seal import open_truth
@@ -76,16 +74,13 @@ class Scored:
     def plain(self) -> Json:
         """The trial as plain data for JSON."""
         kept = {key: value for key, value in asdict(self).items() if key != "probabilities"}
-        more = {"truth": self.truth, "top": self.ranked[:3], "band": min(self.band, 1e9)}
-        return kept | more
+        return kept | {"truth": self.truth, "top": self.ranked[:3], "band": min(self.band, 1e9)}
 
 
 def score(folder: Path, sealed: Path) -> list[Scored]:
     """Scores of all trials of a study. Raises InputError."""
     truths = {truth["id"]: truth for truth in open_truth(folder, sealed)["trials"]}
-    protocol = read_protocol(folder)
-    labels = labels_of(case_of(folder))
-    ruler = read_ruler(folder, labels)
+    protocol, ruler = read_protocol(folder), read_ruler(folder)
     return [
         scored(
             truths[path.stem],
@@ -93,19 +88,13 @@ def score(folder: Path, sealed: Path) -> list[Scored]:
             read_measurements(folder / "trials" / f"{path.stem}.csv"),
             ruler,
             protocol,
-            labels,
         )
         for path in sorted((folder / "answers").glob("*.json"))
     ]
 
 
 def scored(
-    truth: Json,
-    answer: Json,
-    readings: Sequence[Measurement],
-    ruler: Ruler,
-    protocol: Protocol,
-    labels: Sequence[Label],
+    truth: Json, answer: Json, readings: Sequence[Measurement], ruler: Ruler, protocol: Protocol
 ) -> Scored:
     """Score of one trial; truth: its entry in truth.json (`make.sealed_trial`)."""
     _, places, counts = means(readings, ruler)
@@ -113,7 +102,7 @@ def scored(
     key = truth["law"] if truth["kind"] == "effect" else truth["kind"]
     rated = Difficulty(0.0, 0.0, (key,), None)
     if truth["kind"] != "none":
-        moved = true_shift(truth, ruler, places, labels)
+        moved = true_shift(truth, ruler, places)
         rated = difficulty(ruler, protocol, truth["law"], d, places, counts, moved)
     group = rated.group if truth["kind"] == "effect" else (key,)
     diagnosis = answer["diagnosis"]
@@ -155,22 +144,18 @@ def means(readings: Sequence[Measurement], ruler: Ruler) -> tuple[Array, Array, 
     )
 
 
-def true_shift(
-    truth: Json, ruler: Ruler, places: Array, labels: Sequence[Label]
-) -> tuple[Array, Array]:
+def true_shift(truth: Json, ruler: Ruler, places: Array) -> tuple[Array, Array]:
     """Shift of ln f by the true effect (n,), and by how much it moves pairs apart (n,), from the
     maker's runs without noise."""
-    names = {str(label) for label in labels}
-    tables: list[dict[tuple[str, float], list[float]]] = []
-    for key in ("with_effect", "without"):
-        tables.append({("None", 0.0): [truth[key][0]["ln_mass"]] * 2})
-        for entry in truth[key]:
-            for name in names:
-                tables[-1][name, entry["pressure_kPa"]] = entry["ln_f"][name]
-    rows = [(str(ruler.rows[i][0]), ruler.rows[i][1]) for i in places]
-    after, before = (np.array([table[row] for row in rows]) for table in tables)
-    apart = [pairs[:, 1] - pairs[:, 0] for pairs in (after, before)]
-    return after.mean(1) - before.mean(1), apart[0] - apart[1]
+
+    def pairs(entries: Sequence[Json]) -> Array:
+        at = {entry["pressure_kPa"]: entry["ln_f"] for entry in entries}
+        mass = [entries[0]["ln_mass"]] * 2
+        rows = [ruler.rows[i] for i in places]
+        return np.array([at[state][str(label)] if label else mass for label, state in rows])
+
+    after, before = pairs(truth["with_effect"]), pairs(truth["without"])
+    return after.mean(1) - before.mean(1), (np.diff(after) - np.diff(before))[:, 0]
 
 
 def held_out_error(

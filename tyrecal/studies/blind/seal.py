@@ -7,13 +7,12 @@ opens its folder, and refuses to work if a truth is among the trials. Answers ar
 
 from __future__ import annotations
 
-import json
 import secrets
 from hashlib import sha256
 from pathlib import Path
 
 from ...errors import InputError
-from ...files import Json, atomic_write, read_bytes
+from ...files import Json, read_bytes
 from .protocol import read_json, write_json
 
 SEAL, TRUTH, ANSWERS = "seal.json", "truth.json", "answers.json"
@@ -21,9 +20,7 @@ SEAL, TRUTH, ANSWERS = "seal.json", "truth.json", "answers.json"
 
 def seal(folder: Path, sealed: Path, content: Json) -> str:
     """Write the truth to ``sealed`` and its sha256 to ``folder``; returns the sha256."""
-    text = json.dumps({"nonce": secrets.token_hex(32), **content}, indent=1, allow_nan=False)
-    with atomic_write(sealed / TRUTH) as partial:
-        partial.write_text(text + "\n", encoding="utf-8")
+    write_json(sealed / TRUTH, {"nonce": secrets.token_hex(32), **content})
     digest = _sha256(sealed / TRUTH)
     write_json(folder / SEAL, {"sha256": digest})
     return digest
@@ -31,8 +28,13 @@ def seal(folder: Path, sealed: Path, content: Json) -> str:
 
 def open_truth(folder: Path, sealed: Path) -> Json:
     """Content of truth.json. Raises InputError if it is not the sealed one, or an answer is missing
-    or was changed."""
-    check_answers(folder)
+    or was changed since `seal_answers`."""
+    stated = read_json(folder / ANSWERS)
+    answered = {path.stem for path in (folder / "answers").glob("*.json")}
+    if answered != {path.stem for path in (folder / "trials").glob("*.csv")}:
+        raise InputError(f"{folder}: not every trial has one answer; 'tyrecal blind answer' first")
+    if stated != _hashed_answers(folder):
+        raise InputError(f"{folder}: answers were changed after they were hashed")
     content = read_json(sealed / TRUTH)
     if _sha256(sealed / TRUTH) != read_json(folder / SEAL).get("sha256"):
         raise InputError(f"{sealed / TRUTH} is not the truth that {folder / SEAL} seals")
@@ -47,30 +49,18 @@ def refuse_open_truth(folder: Path) -> None:
     read_json(folder / SEAL)
 
 
-def seal_answers(folder: Path, files: list[Path]) -> str:
+def seal_answers(folder: Path) -> str:
     """Write the sha256 of all answers together to ``folder``; returns it."""
-    digest = _sha256_of_all(files)
-    write_json(folder / ANSWERS, {"sha256": digest, "count": len(files)})
-    return digest
+    hashed = _hashed_answers(folder)
+    write_json(folder / ANSWERS, hashed)
+    return str(hashed["sha256"])
 
 
-def check_answers(folder: Path) -> list[Path]:
-    """Files of the answers. Raises InputError if one is missing or was changed since
-    `seal_answers`."""
-    stated = read_json(folder / ANSWERS)
+def _hashed_answers(folder: Path) -> Json:
+    """sha256 of one line for each answer, its file's name and sha256; and how many these are."""
     files = sorted((folder / "answers").glob("*.json"))
-    names = {path.stem for path in (folder / "trials").glob("*.csv")}
-    if {path.stem for path in files} != names:
-        raise InputError(f"{folder}: not every trial has one answer; 'tyrecal blind answer' first")
-    if stated.get("sha256") != _sha256_of_all(files):
-        raise InputError(f"{folder}: answers were changed after they were hashed")
-    return files
-
-
-def _sha256_of_all(files: list[Path]) -> str:
-    """sha256 of one line for each file: its name and sha256."""
-    lines = "".join(f"{path.name} {_sha256(path)}\n" for path in sorted(files))
-    return sha256(lines.encode()).hexdigest()
+    lines = "".join(f"{path.name} {_sha256(path)}\n" for path in files)
+    return {"sha256": sha256(lines.encode()).hexdigest(), "count": len(files)}
 
 
 def _sha256(path: Path) -> str:

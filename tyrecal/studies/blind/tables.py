@@ -26,12 +26,10 @@ def summary(trials: Sequence[Scored]) -> Json:
     right = np.array([t.ranked[0] == t.truth for t in trials], float)
     # held-out shrinkage where there is no effect, by chance
     placebo = float(np.quantile([t.shrinkage for t in none], 0.95)) if none else None
+    parameters = [t.parameter_held for t in trials]
     proven = [t for t in detected if t.verdict == "named"]
-    parameters = [t.parameter_held for t in trials if t.parameter_held is not None]
     return {
-        "trials": {
-            kind: sum(t.kind == kind for t in trials) for kind in ("effect", "none", "outside")
-        },
+        "trials": {"effect": len(effects), "none": len(none), "outside": len(outside)},
         "swapped": sum(t.swapped for t in trials),
         "by_band": [
             {"low": low, "high": high if high < 1e9 else None, **_band(effects, low, high)}
@@ -44,7 +42,7 @@ def summary(trials: Sequence[Scored]) -> Json:
         "calibration_error": calibration_error(stated, right),
         "calibration_error_95": calibration_quantile(stated),
         "set_holds_truth": rate([t.in_set for t in trials]),
-        "interval_holds_parameter": rate([bool(held) for held in parameters]),
+        "interval_holds_parameter": rate([held for held in parameters if held is not None]),
         "held_out": {
             "count": len(proven),
             "median_shrinkage": _median([t.shrinkage for t in proven]),
@@ -63,13 +61,8 @@ def rate(hits: Sequence[bool]) -> Json:
     """A share with its exact 95 % bounds."""
     right, count = sum(hits), len(hits)
     low, high = clopper_pearson(right, count)
-    return {
-        "right": right,
-        "count": count,
-        "share": right / count if count else None,
-        "low": low,
-        "high": high,
-    }
+    share = right / count if count else None
+    return {"right": right, "count": count, "share": share, "low": low, "high": high}
 
 
 def page(figures: Json, maker: str) -> str:
@@ -97,15 +90,9 @@ def _lines(f: Json, maker: str) -> Iterator[str]:
         cells = [_rate(band[key]) for key in ("top_1_group", "top_1", "top_2_group")]
         yield f"| {span} | {band['top_1']['count']} | {' | '.join(cells)} |"
     yield "\n| quantity | measured |\n|---|---|"
-    for key in (
-        "false_alarms",
-        "named_right",
-        "outside_recognised",
-        "outside_named",
-        "set_holds_truth",
-        "interval_holds_parameter",
-    ):
-        yield f"| {key.replace('_', ' ')} | {_rate(f[key])} |"
+    for key, each in f.items():
+        if isinstance(each, dict) and "share" in each:
+            yield f"| {key.replace('_', ' ')} | {_rate(each)} |"
     yield (
         f"| calibration error (95 % quantile of a calibrated simulation) |"
         f" {f['calibration_error']:.3f} ({f['calibration_error_95']:.3f}) |"
