@@ -126,7 +126,6 @@ def test_a_diagnosis_does_not_depend_on_units(seed: int) -> None:
                 base.measured(y).observations,
                 assumed=Assumed(form=0.001),
                 parts=lambda x: parts,
-                seed=seed,
             )
         ).content()
         for toy in toys

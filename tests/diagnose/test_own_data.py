@@ -102,7 +102,7 @@ def test_a_plain_tyre_has_no_gap(plain: InverseProblem, chance: Chance) -> None:
 
     False failures: 2e-7.
     """
-    d = diagnose(MODEL, ROWS, plain.observations, expansion=plain.expansion)
+    d = diagnose(MODEL, ROWS, plain.observations, known=plain.expansion)
     assert d.verdict.kind == "no_gap"
     factor, named, quarter = np.linalg.cholesky(plain.sigma), [], []
     for _ in range(25):

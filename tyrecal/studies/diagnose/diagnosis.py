@@ -129,9 +129,7 @@ def diagnose(
     parts: Callable[[Array], Sequence[SectionPart]] | None = None,
     further: OtherStates | None = None,
     ranked: bool = True,
-    expansion: Expansion | None = None,
     known: Expansion | None = None,
-    seed: int = 0,
     stage: Callable[[str], None] = lambda stage: None,
     begin: Array | None = None,
 ) -> Diagnosis:
@@ -140,10 +138,9 @@ def diagnose(
     observations: or readings of them where frequencies came without labels, see `labelings`;
     changes: what was switched in runs 1, 2, ...; parts: slopes by the section's parts at x;
     further: other rows of the tyre, for the next measurement; ranked: whether `choices` are wanted;
-    expansion: of an earlier call with the same model, near whose x0 the fit lies; known: of the
-    same model anywhere, from where effects are carried to the fit and only the likeliest are asked
-    there; stage: hears of each of ``STAGES``; begin (v,): first guess of x. Raises the model's
-    failure where the plain tyre has no solution.
+    known: expansion of the same model anywhere, from where effects are carried to the fit and only
+    the likeliest are asked there; stage: hears of each of ``STAGES``; begin (v,): first guess of x.
+    Raises the model's failure where the plain tyre has no solution.
     """
     labelled = isinstance(observations, Observations)
     readings = [Reading(observations)] if isinstance(observations, Observations) else observations
@@ -151,10 +148,7 @@ def diagnose(
     bares, first, labels = list[InverseProblem](), list[list[Hypothesis]](), None
     for reading in readings:
         seen = reading.observations
-        if expansion is None:
-            bare = _calibrated(model, rows, seen, changes, assumed, known, begin)
-        else:
-            bare = _about(expansion, model, rows, seen, changes, assumed)
+        bare = _calibrated(model, rows, seen, changes, assumed, known, begin)
         hypotheses = weigh_hypotheses(bare)
         enough = labelled and len(bare.places) > len(model.start)
         labels = exchanged(bare, hypotheses, rows) if enough else None
@@ -164,7 +158,7 @@ def diagnose(
             hypotheses = weigh_hypotheses(bare)
         bares.append(bare)
         first.append(hypotheses)
-        known, expansion = known or bare.expansion, None
+        known = known or bare.expansion
     stage(STAGES[1])
     share = shares(readings, first)
     kept = np.flatnonzero(share > REFUTED).tolist()
@@ -193,7 +187,7 @@ def diagnose(
     regions = list(parts(problem.expansion.x0 + d)) if parts else []
     mapped, effective_rank = section_map(bare, P, gap.residuals, regions)
     named = verdict.best if verdict.key else None
-    shrinkage = shrink(problem, named, seed) if problem.expansion.nodes else None
+    shrinkage = shrink(problem, named) if problem.expansion.nodes else None
     stage(STAGES[3])
     typical = {h.key: h.typical(SIZES) for h in hypotheses if h.values}
     choices = rank(bare, d, p, typical, model.sources, further) if ranked else []
@@ -235,7 +229,17 @@ def _calibrated(
     where = places(observations, rows)
     x0 = plain_fit(model, observations, where, assumed.form, known, begin=begin)
     expansion = carried(known, model, x0) if known else expand(model, x0)
-    problem = _about(expansion, model, rows, observations, changes, assumed)
+    problem = InverseProblem(
+        observations,
+        expansion,
+        model.ranges,
+        where,
+        model.start,
+        model.spread,
+        changes,
+        assumed,
+        damping_places=places(observations.damping, rows),
+    )
     if _fits(problem):
         return problem
     shifts = (known or expansion).range_shifts(where)
@@ -247,22 +251,6 @@ def _calibrated(
     except (EvaluationFailed, InputError):  # there is no such tyre
         return problem
     return replace(problem, expansion=there)
-
-
-def _about(
-    expansion: Expansion,
-    model: ResponseModel,
-    rows: Sequence[ModelRow],
-    observations: Observations,
-    changes: tuple[Toggle, ...],
-    assumed: Assumed,
-) -> InverseProblem:
-    """Observations and the model in an expansion."""
-    where, start, spread = places(observations, rows), model.start, model.spread
-    problem = InverseProblem(
-        observations, expansion, model.ranges, where, start, spread, changes, assumed
-    )
-    return replace(problem, damping_places=places(observations.damping, rows))
 
 
 def _fits(problem: InverseProblem) -> bool:

@@ -8,7 +8,7 @@ g_i: shift of all rows by the effect at a given size.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,14 +33,13 @@ class Separability:
     distances: Array  # (m, m) delta_ij^2, row i at its size
     smallest: Mapping[str, float | None]  # the parameter with lambda = 10; None beyond the range
 
-    def groups(self, among: Sequence[str] | None = None) -> list[list[str]]:
+    def groups(self) -> list[list[str]]:
         """Ids that these data cannot separate: linked by delta^2 < 9 from either side, each with
         lambda >= 9."""
-        ids = [id for id in self.ids if among is None or id in among]
         place = {id: i for i, id in enumerate(self.ids)}
         distances = np.minimum(self.distances, self.distances.T)
         near = lambda a, b: distances[place[a], place[b]] < APART
-        left, result = [id for id in ids if self.lambdas[id] >= APART], []
+        left, result = [id for id in self.ids if self.lambdas[id] >= APART], []
         while left:
             group = [left.pop(0)]
             for member in group:
