@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +17,7 @@ from tyrecal.measured.tables import read_measurements
 from tyrecal.simulate.evaluate.store import Store
 from tyrecal.studies.blind.answer import answer
 from tyrecal.studies.blind.draw import draw
-from tyrecal.studies.blind.make import make
+from tyrecal.studies.blind.make import Trial, make, readings
 from tyrecal.studies.blind.maker import bundled_maker
 from tyrecal.studies.blind.protocol import Protocol, read_json, write_json
 from tyrecal.studies.blind.ruler import RULER_FILE as RULER
@@ -24,6 +26,7 @@ from tyrecal.studies.blind.score import score
 from tyrecal.studies.blind.seal import ANSWERS, SEAL, TRUTH
 from tyrecal.studies.blind.tables import page, summary
 from tyrecal.studies.inference.uncertainties import sources
+from tyrecal.tyre.values import with_values
 
 from .toy import CASE, Scale, ToyMaker, protocol
 
@@ -79,6 +82,35 @@ def test_members_stand_in_an_order_by_chance_and_values_go_missing(tmp_path: Pat
                 rising.append(both["2"] > both["1"])
     assert set(gone) == {0, 1, 2} and min(gone.values()) > 20
     assert 0.3 < np.mean(rising) < 0.7
+
+
+def test_exchanged_labels_show_in_the_values_alone() -> None:
+    """Two doublets within 25 % have each other's values; all modes are in their order, whichever
+    values are missing."""
+    rules, labels = protocol(none=1, missing=10), [label for label, p in SCALE.rows if p == 160.0]
+    (truth,) = draw(rules, CASE, sources(CASE)[0], {}, {}, 1)
+    computed = {
+        p: MAKER.compute(with_values(CASE, {**truth.variables, "pressure_kPa": p}), labels)
+        for p in rules.pressures_kPa
+    }
+    places = {(p, label): i for i, (p, label) in enumerate(product(computed, labels))}
+    exchanged = set()
+    for scatter in range(60):
+        own = replace(truth, scatter=scatter)
+        plain, swapped = (
+            readings(Trial(replace(own, swapped=each), 1, computed, computed), rules)
+            for each in (False, True)
+        )
+        assert sorted(r.value for r in plain) == sorted(r.value for r in swapped)
+        order = [places[r.pressure_kPa, r.label] for r in swapped]
+        assert order == sorted(order)
+        was = {r.value: r.label for r in plain}
+        pairs = {frozenset((was[r.value], r.label)) for r in swapped if was[r.value] != r.label}
+        assert len(pairs) <= 1
+        exchanged |= pairs
+    assert len(exchanged) > 2
+    for a, b in exchanged:
+        assert abs(np.subtract(computed[160.0].ln_f[a], computed[160.0].ln_f[b])).max() < 0.26
 
 
 def test_draws_have_the_stated_distribution() -> None:

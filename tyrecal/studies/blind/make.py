@@ -9,6 +9,7 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from itertools import product
 from math import exp
 from pathlib import Path
 
@@ -117,15 +118,18 @@ def readings(trial: Trial, protocol: Protocol) -> list[Measurement]:
                 here.append(Measurement("frequency_Hz", label, *state, f, protocol.noise * f))
         gone = random.choice(len(here), int(random.integers(protocol.missing + 1)), False)
         read += [each for i, each in enumerate(here) if i not in gone]
-    return _swapped(read, random) if trial.truth.swapped else read
+    return _swapped(read, labels, random) if trial.truth.swapped else read
 
 
-def _swapped(read: list[Measurement], random: np.random.Generator) -> list[Measurement]:
-    """The readings, two doublets of like frequency with each other's label at every pressure."""
-    order = list(dict.fromkeys((each.pressure_kPa, each.label) for each in read))
+def _swapped(
+    read: list[Measurement], labels: list[Label], random: np.random.Generator
+) -> list[Measurement]:
+    """The readings in their order, two doublets of like frequency with each other's label at every
+    pressure."""
+    pressures = list(dict.fromkeys(each.pressure_kPa for each in read))
     first: dict[Label, list[float]] = {}
     for each in read:
-        if each.label and each.label.c and each.pressure_kPa == read[0].pressure_kPa:
+        if each.label and each.label.c and each.pressure_kPa == pressures[0]:
             first.setdefault(each.label, []).append(each.value)
     ln = {label: np.log(np.mean(values)) for label, values in first.items()}
     near = [(a, b) for a in ln for b in ln if a < b and abs(ln[a] - ln[b]) < SWAPPED_WITHIN]
@@ -134,7 +138,8 @@ def _swapped(read: list[Measurement], random: np.random.Generator) -> list[Measu
     a, b = near[int(random.integers(len(near)))]
     other: dict[Label | None, Label] = {a: b, b: a}
     read = [replace(each, label=other.get(each.label, each.label)) for each in read]
-    return sorted(read, key=lambda each: order.index((each.pressure_kPa, each.label)))
+    place = {key: i for i, key in enumerate(product(pressures, labels))}
+    return sorted(read, key=lambda each: place[each.pressure_kPa, each.label])
 
 
 def _make(protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth) -> Trial:

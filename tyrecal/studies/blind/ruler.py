@@ -50,18 +50,23 @@ class EffectShifts:
     split: Array  # (k, n) between a pair's two modes, in ln f
 
     @cached_property
-    def _weights(self) -> tuple[Array, Array]:
-        """Sizes (q,) from end to end, and the weights (q, k) of the given ones there."""
-        e = np.linspace(self.sizes[0], self.sizes[-1], SIZE_POINTS)
-        if len(self.sizes) > 2:  # a parabola through three of them is smoother than lines
-            return e, _parabolas(self.sizes, e)
-        return e, np.array([np.interp(e, self.sizes, unit) for unit in np.eye(len(self.sizes))]).T
+    def _weights(self) -> Array:
+        """Weights (q, k) of the given sizes at those of `grid`: parabolas through the three that
+        are nearest, lines between two."""
+        weights = np.zeros((SIZE_POINTS, len(self.sizes)))
+        for q, value in enumerate(np.linspace(self.sizes[0], self.sizes[-1], SIZE_POINTS)):
+            chosen = np.sort(np.argsort(abs(self.sizes - value), kind="stable")[:3])
+            for k in chosen:
+                others = self.sizes[chosen[chosen != k]]
+                weights[q, k] = np.prod((value - others) / (self.sizes[k] - others))
+        return weights
 
     def grid(self, d: Array, places: Array) -> tuple[Array, Array, Array]:
-        """Sizes (q,), shift (q, n) at x0 + d, split (q, n), rows ``places`` alone."""
-        e, weights = self._weights
+        """Sizes (q,) from end to end, shift (q, n) at x0 + d, split (q, n), rows ``places``
+        alone."""
+        e = np.linspace(self.sizes[0], self.sizes[-1], SIZE_POINTS)
         shift = self.shift + self.tilt @ d
-        return e, (weights @ shift)[:, places], (weights @ self.split)[:, places]
+        return e, (self._weights @ shift)[:, places], (self._weights @ self.split)[:, places]
 
 
 @dataclass(frozen=True)
@@ -247,14 +252,3 @@ def _label(name: str) -> Label | None:
 def _rounded(values: Array) -> list:
     """Nine decimals: 1e-7 % of a frequency."""
     return np.round(values, 9).tolist()
-
-
-def _parabolas(nodes: Array, e: Array) -> Array:
-    """Weights (q, k) of the nodes: parabolas through the three that are nearest to each e."""
-    weights = np.zeros((len(e), len(nodes)))
-    for q, value in enumerate(e):
-        chosen = np.sort(np.argsort(abs(nodes - value), kind="stable")[:3])
-        for k in chosen:
-            others = nodes[chosen[chosen != k]]
-            weights[q, k] = np.prod((value - others) / (nodes[k] - others))
-    return weights

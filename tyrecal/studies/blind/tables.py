@@ -28,6 +28,7 @@ def summary(trials: Sequence[Scored]) -> Json:
     placebo = float(np.quantile([t.shrinkage for t in none], 0.95)) if none else None
     parameters = [t.parameter_held for t in trials]
     proven = [t for t in detected if t.verdict == "named"]
+    shrinks = [t.shrinkage for t in proven]
     return {
         "trials": {"effect": len(effects), "none": len(none), "outside": len(outside)},
         "swapped": sum(t.swapped for t in trials),
@@ -45,9 +46,9 @@ def summary(trials: Sequence[Scored]) -> Json:
         "interval_holds_parameter": rate([held for held in parameters if held is not None]),
         "held_out": {
             "count": len(proven),
-            "median_shrinkage": _median([t.shrinkage for t in proven]),
+            "median_shrinkage": float(np.median(shrinks)) if proven else None,
             "placebo_95": placebo,
-            "beyond_placebo": rate([t.shrinkage > (placebo or 0.0) for t in proven]),
+            "beyond_placebo": rate([shrink > (placebo or 0.0) for shrink in shrinks]),
         },
         "misses": [
             t.plain()
@@ -125,7 +126,3 @@ def _rate(each: Json) -> str:
 
 def _number(value: float | None) -> str:
     return "none" if value is None else f"{value:.2f}"
-
-
-def _median(values: Sequence[float]) -> float | None:
-    return float(np.median(values)) if values else None
