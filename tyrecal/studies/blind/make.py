@@ -138,8 +138,8 @@ def _swapped(
     a, b = near[int(random.integers(len(near)))]
     other: dict[Label | None, Label] = {a: b, b: a}
     read = [replace(each, label=other.get(each.label, each.label)) for each in read]
-    place = {key: i for i, key in enumerate(product(pressures, labels))}
-    return sorted(read, key=lambda each: place[each.pressure_kPa, each.label])
+    order = list(product(pressures, map(str, labels)))
+    return sorted(read, key=lambda each: order.index((each.pressure_kPa, str(each.label))))
 
 
 def _make(protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth) -> Trial:
