@@ -174,7 +174,8 @@ def _refuse_unlabelled_repeats(values: Sequence[Measurement]) -> None:
 
 
 def all_nodes(files: Sequence[Universal]) -> dict[int, Place]:
-    """Coordinates of all files together. Raises InputError where two differ."""
+    """x, y, z (m, global system) of the nodes of all files together, by number. Raises InputError
+    where two differ."""
     nodes: dict[int, Place] = {}
     for file in files:
         for number, place in file.nodes.items():

@@ -1,8 +1,8 @@
 """Slips: repeated measurements of one value that contradict each other.
 
 All repeats of one quantity together show how far two runs of one thing may differ. With y = ln x,
-run i of n runs of one label differs from the mean of the other n - 1 by d_i; its studentised
-deviation is
+run i of n runs of one value (one quantity, label, member and state: `Measurement.key`) differs from
+the mean of the other n - 1 by d_i; its studentised deviation is
 
     t_i = |d_i| sqrt((n - 1) / n) / s,    s^2 = the scatter of all repeats of the file without it.
 

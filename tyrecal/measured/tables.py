@@ -292,6 +292,7 @@ def _runs(values: list[Measurement], named: bool) -> list[Measurement]:
         return values
     twice = [key for (_, key), k in times.items() if k > 1]
     once = [key for (_, key), k in times.items() if k == 1]
+    # a key is the quantity, label, member, pressure, load and rim
     waves = all(key[1] is not None and key[1].c and not key[2] and not key[4] for key in twice)
     flat = any(key[1] is not None and not key[1].c for key in once)
     members = worst == 2 and waves

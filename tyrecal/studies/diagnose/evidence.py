@@ -4,8 +4,9 @@
 
 plus ln p(damping ratios) (`inference.damping`), at the re-fitted x, here less its centre, over its
 spread (Laplace's approximation; MacKay, Information Theory, ch. 27-28). r: residual in ln f; S: the
-problem's Sigma plus the covariance of the effect's response error. Then Z = integral of Z(e) p(e)
-de by the Gauss-Legendre rule, p(e) uniform over the range.
+problem's Sigma plus the covariance of the effect's shift by `Effect.response_error` and
+`Effect.shape_uncertainty`. Then Z = integral of Z(e) p(e) de by the Gauss-Legendre rule, p(e)
+uniform over the range.
 """
 
 from __future__ import annotations

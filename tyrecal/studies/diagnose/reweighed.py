@@ -30,7 +30,7 @@ class Perturbation:
     words: str
     problem: InverseProblem  # with the same rows
     keep: Array  # (n,) mask of the rows that are used
-    response_factor: float = 1.0  # factor on the response errors of the effects
+    response_factor: float = 1.0  # factor on `Effect.response_error` of all effects
 
     @property
     def parts_near_modes(self) -> bool:
@@ -46,8 +46,8 @@ class LinearFit:
     place: int | None  # index of zeta in `veering.rule`; None: no modes are coupled
     residual: Array  # (q, n) at the centre of x
     slopes: Array  # (q, n, v) J = d eta / dx
-    by_response: Array  # (q, n, n) covariance by the response errors of the effects
-    by_shape: Array  # (q, n, n) covariance by their uncertain shapes
+    by_response: Array  # (q, n, n) covariance of the effects' shifts by `Effect.response_error`
+    by_shape: Array  # (q, n, n) and by `Effect.shape_uncertainty`
     ln_label: Array  # (q,) ln probability of the labels
     split: Array  # (q, n) distance of the two modes of a pair, in ln f
     ln_damping: Array | float = 0.0  # (q,) ln probability of the damping ratios
@@ -102,6 +102,7 @@ def line_about(problem: InverseProblem, added: Added, d: Array, place: int | Non
     eta, J, ln_label = model_of(problem, at, added)(d)
     back = d - (problem.centre - problem.expansion.x0)
     residual = problem.observations.y - eta + (J @ back[:, :, None])[:, :, 0]
+    # with their standard deviations transformed to the coupled modes
     by_response, by_shape = problem.response_covariances(at.with_mixed_laws(added))
     return LinearFit(place, residual, J, by_response, by_shape, ln_label, added.split)
 

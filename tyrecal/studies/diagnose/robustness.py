@@ -1,8 +1,8 @@
 """Dependence of a verdict on the assumptions: the verdict on the same data with other assumptions.
 
-Every prior, the standard deviation of every constant, the response errors of effects (the allowance
-for their laws) and the spread of the variables are halved and doubled. The model's form error and
-the section's errors are set to zero.
+Every prior, the standard deviation of every constant, the response errors of effects
+(`Effect.response_error`, the allowance for their laws) and the spread of the variables are halved
+and doubled. The model's form error and the section's errors are set to zero.
 Each label is left out in turn. The scatter of the data stays: the check of the fit tests it.
 
 Only hypotheses with enough probability are evaluated again, on the grids of their parameters, with

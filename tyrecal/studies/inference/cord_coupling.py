@@ -1,4 +1,8 @@
-"""Coupling of near modes by turned cords, by one step of each source of error that turns them."""
+"""Coupling of near modes by turned cords, by one step of each source of error that turns them.
+
+A step is one standard deviation. `veering.coupling` gives q and a rise of each source: size^2 is
+the sum of q^2, and the rise of a `Coupling` the mean of these rises, weighted by q^2.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +22,8 @@ from .uncertainties import Source
 from .veering import coupling, partner
 
 Array = np.ndarray
-MAY_VEER = 0.15  # of ln f at some pressure, from which modes of one harmonic may veer
+# distance in ln f, at some pressure, below which modes of one harmonic may veer
+MAY_VEER = 0.15
 
 
 class Coupled(Protocol):
@@ -40,10 +45,12 @@ def cord_coupling(model: Coupled, x: Array, eta: Array, constants: Array) -> Cou
     modes, and couple hardly any. None where there are no such modes.
 
     One step of each, to the other side where that has no solution, at the lowest and the
-    highest pressure.
+    highest pressure; between them q^2 is linear in ln p (`Between.straight`). eta (r,), constants
+    (r, k): of the r rows of `Between`, of which the first n are the model's.
     """
     rows, count = model.between.rows, len(model.rows)
     places = {(label, state_of(w) if label else w): i for i, (label, w) in enumerate(rows)}
+    # rows of the modes of the other family with the same number of waves (`veering.partner`)
     mates = np.array([places.get((partner(x), state_of(w)), -1) if x else -1 for x, w in rows])
     near = {
         label

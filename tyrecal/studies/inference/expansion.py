@@ -319,7 +319,7 @@ def anchored(expansion: Expansion, model: ResponseModel, wanted: Sequence[Query]
 
 def _with_effect(model: ResponseModel, x: Array, id: str, e: float) -> Query:
     """The query for one effect, with its slope if the model has that and, at the ends of its range,
-    the shift by its uncertain shape."""
+    the shift by `Effect.shape_uncertainty`."""
     span = model.ranges[id]
     uncertain = span.has_shape_uncertainty and e in (span.low, span.high)
     slopes = (id,) if id in model.sloped else ()

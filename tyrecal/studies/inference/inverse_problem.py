@@ -63,7 +63,8 @@ class Added(NamedTuple):
     tilt: Array  # (q, n, v) change of the sensitivities d eta / dx
     split: Array  # (q, n) distance of the two modes of a pair with the effects, in ln f
     off: Array  # (k, q, n) standard deviation of the shift by `response_error`, mode by mode
-    shape_uncertainty: Array  # (k, q, n) shift by one standard deviation of the uncertain shape
+    # (k, q, n) shift by one standard deviation of `Effect.shape_uncertainty`
+    shape_uncertainty: Array
     damping: Array  # (q, m) change of the ln of the measured damping ratios
 
 
@@ -210,7 +211,7 @@ class InverseProblem:
         return self.with_mixed_laws(added)
 
     def with_mixed_laws(self, added: Added) -> Added:
-        """Transform the response errors of effects to the coupled modes."""
+        """``off`` and ``shape_uncertainty`` transformed to the coupled modes (`mixed`)."""
         if not self.zeta:
             return added
         by_mode, by_shape = added.off @ self.mixed.T, added.shape_uncertainty @ self.mixed.T
@@ -221,8 +222,8 @@ class InverseProblem:
         return np.add(*self.response_covariances(added))
 
     def response_covariances(self, added: Added) -> tuple[Array, Array]:
-        """The two parts (q, n, n) of `response_covariance`: by the response errors of the effects,
-        mode by mode, and by their uncertain shapes."""
+        """The two parts (q, n, n) of `response_covariance`: by `Effect.response_error`, mode by
+        mode, and by `Effect.shape_uncertainty`."""
         off, shape = (each.transpose(1, 2, 0) for each in (added.off, added.shape_uncertainty))
         by_mode = off @ off.swapaxes(1, 2) * self._alike
         return np.asarray(by_mode), np.asarray(shape @ shape.swapaxes(1, 2))

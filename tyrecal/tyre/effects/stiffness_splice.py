@@ -45,6 +45,7 @@ EFFECT = Effect(
     low=0.0,
     high=1.0,
     changes=("the section of the sector, next to the deck",),
+    # of a sector of 10 degrees, the default of ``splice``
     signature=(
         "all up by 0.2 to 0.4 % at e = 1, pairs split by 0.2 to 0.4 %, [c,1] most; C10 absorbs the"
         " means, the splits remain"

@@ -43,7 +43,8 @@ class SolverMesh:
 
 
 def _tolerances(block: Block, length: float) -> str:
-    """Tolerances of an *EMBEDDED ELEMENT that are given, m."""
+    """Tolerances of an *EMBEDDED ELEMENT that are given: EXTERIOR over the hosts' size, ROUNDOFF a
+    weight of a host's node (both without a unit), ABSOLUTE EXTERIOR in m."""
     units = {"ROUNDOFF": 1.0, "EXTERIOR": 1.0, "ABSOLUTE EXTERIOR": length}
     numbers = {word: block.number(f"{word} TOLERANCE") for word in units}
     given = {word: written(x * units[word]) for word, x in numbers.items() if x is not None}
