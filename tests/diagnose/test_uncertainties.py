@@ -255,9 +255,7 @@ def test_pairs_of_which_one_member_was_measured_say_nothing() -> None:
 
 def judged(distances: np.ndarray, **lambdas: float) -> Separability:
     sizes = dict.fromkeys(lambdas, 1.0)
-    return Separability(
-        tuple(lambdas), sizes, lambdas, lambdas, np.eye(len(lambdas)), distances, {}
-    )
+    return Separability(tuple(lambdas), sizes, lambdas, lambdas, distances, {})
 
 
 def test_effects_are_linked_by_what_stands_between_them() -> None:

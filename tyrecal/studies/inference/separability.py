@@ -29,7 +29,6 @@ class Separability:
     sizes: Mapping[str, float]  # parameter of each effect in lambda and delta
     lambdas: Mapping[str, float]  # lambda at those sizes
     full: Mapping[str, float]  # lambda at the far end of the range
-    cosines: Array  # (m, m) g_i P g_j / (|P^1/2 g_i| |P^1/2 g_j|); 1: the two look alike
     distances: Array  # (m, m) delta_ij^2, row i at its size
     smallest: Mapping[str, float | None]  # the parameter with lambda = 10; None beyond the range
 
@@ -66,9 +65,7 @@ def separate(problem: InverseProblem, P: Array, sizes: Mapping[str, float]) -> S
         nearest = int(np.argmin(abs(grids[id] - sizes.get(id, 0.0))))
         at[id] = nearest if length[id][nearest] >= VISIBLE else ends[id]
     chosen = np.array([shifts[id][at[id]] for id in ids]).reshape(len(ids), len(P))
-    gram = chosen @ P @ chosen.T
-    norm = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    distances = np.zeros_like(gram)
+    distances = np.zeros((len(ids), len(ids)))
     for i in range(len(ids)):
         for j, b in enumerate(ids):
             if i != j:
@@ -79,7 +76,6 @@ def separate(problem: InverseProblem, P: Array, sizes: Mapping[str, float]) -> S
         {id: float(grids[id][at[id]]) for id in ids},
         {id: float(length[id][at[id]]) for id in ids},
         {id: float(length[id][ends[id]]) for id in ids},
-        gram / np.outer(norm, norm),
         distances,
         {id: smallest(grids[id], length[id]) for id in ids},
     )
