@@ -35,7 +35,8 @@ def again(trial: Scored, check: float, singles: float, pairs: float) -> Scored:
     """The trial with singles and pairs that much likelier before the data, and today's rule."""
     odds = {NONE: 1.0, OUTSIDE: 1.0}
     of = lambda key: odds.get(key, pairs if "+" in key else singles)
-    weight = {key: p * of(key) for key, p in trial.probabilities.items()}
+    stated = {NONE: 0.0, OUTSIDE: 0.0, **trial.probabilities}  # packed without zeros
+    weight = {key: p * of(key) for key, p in stated.items()}
     total = sum(weight.values())
     p = {key: each / total for key, each in weight.items()}
     ranked = tuple(sorted(p, key=lambda key: -p[key]))
