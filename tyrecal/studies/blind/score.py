@@ -79,17 +79,18 @@ class Scored:
 
 def score(folder: Path, sealed: Path) -> list[Scored]:
     """Scores of all trials of a study. Raises InputError."""
-    truths = {truth["id"]: truth for truth in open_truth(folder, sealed)["trials"]}
+    truths = open_truth(folder, sealed)["trials"]
     protocol, ruler = read_protocol(folder), read_ruler(folder)
     return [
         scored(
-            truths[path.stem],
+            truth,
             read_json(path),
             read_measurements(folder / "trials" / f"{path.stem}.csv"),
             ruler,
             protocol,
         )
-        for path in sorted((folder / "answers").glob("*.json"))
+        for truth in truths
+        if (path := folder / "answers" / f"{truth['id']}.json").exists()
     ]
 
 
