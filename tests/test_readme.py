@@ -162,8 +162,18 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> Clone:
     )
 
 
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One evaluation store for all guides, whose commands evaluate the same tyres again."""
+    return tmp_path_factory.mktemp("record")
+
+
 @pytest.mark.parametrize(("guide", "number"), parameters())
-def test_commands_of(guide: str, number: int, clone: Clone) -> None:
+def test_commands_of(
+    guide: str, number: int, clone: Clone, record: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if "tyrecal store" not in (ROOT / guide).read_text():  # which looks for the folder's own
+        monkeypatch.setenv("TYRECAL_STORE", str(record))
     block = blocks(guide)[number]
     is_kept = makes(guide, block)
     output = clone(guide, number + 1)[1] if is_kept else execute(block, clone(guide, number)[0])
