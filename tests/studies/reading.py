@@ -60,6 +60,9 @@ constant has its value:
 | 20262801 | 1 | 0 | 2 | 2 | 1 | 2 |
 | 20262802 | 3 | 2 | 0 | 3 | 2 | 4 |
 | 20262803 | 4 | 1 | 2 | 2 | 2 | 2 |
+| 20262911 | 2 | 0 | 2 | 8 | 0 | 0 |
+
+Five of the eight are of a file that was cut out of another one on that day.
 """
 
 from __future__ import annotations
