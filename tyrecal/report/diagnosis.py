@@ -502,8 +502,8 @@ def _assumptions(study: DiagnosedCase) -> Iterator[str]:
     )
     yield (
         f"Prior probabilities: no effect {PRIOR_NONE:g}, not explained by the catalogue"
-        f" {PRIOR_OUTSIDE:g}. Two effects have {a.further:g} times the probability of one, and"
-        f" three {a.further:g} times that of two."
+        f" {PRIOR_OUTSIDE:g}. All pairs of effects together have {a.further:g} times the"
+        f" probability of all single ones, and all triples {a.further:g} times that of the pairs."
     )
     stated = [f"`{id}`" for id, span in d.problem.ranges.items() if span.prior_sd]
     if stated:
