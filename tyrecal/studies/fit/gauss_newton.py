@@ -4,8 +4,8 @@ Each step minimises a model of second order of the residuals, with the curvature
 seen so far show (`curvature`), within the bounds. Steps are damped as Levenberg and Marquardt's
 are, by how much of the promised decrease comes true (Nocedal and Wright, Numerical Optimization,
 ch. 10). An ``edge`` bounds steps where the two [0, 0] modes change labels (`crossing`). With three
-variables it needs a third of the designs of SLSQP, or fewer, because it knows each residual's slopes and not their sum
-alone.
+variables it needs a third of the designs of SLSQP, or fewer, because it knows each residual's
+slopes and not their sum alone.
 """
 
 from __future__ import annotations
