@@ -52,7 +52,7 @@ def test_slopes_against_differences() -> None:
         ((path, size),) = MODEL.found[k].steps.items()
         shifted = []
         for side in (0.1, -0.1):
-            value = MODEL._plain[path] + side * size
+            value = MODEL.designs.constants[path] + side * size
             there = with_values(CASE, {} if path == "pressure_kPa" else {path: value})
             rows = ROWS
             if path == "pressure_kPa":
