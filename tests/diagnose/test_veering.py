@@ -14,12 +14,12 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.evidence import explain, refit, refit_at
-from tyrecal.studies.inference.cord_coupling import cord_coupling
+from tyrecal.studies.inference.cord_coupling import cord_coupling, coupling, partner
 from tyrecal.studies.inference.inverse_problem import InverseProblem
 from tyrecal.studies.inference.model import Answer, Coupling, Query
 from tyrecal.studies.inference.tyre_model import TyreModel
 from tyrecal.studies.inference.uncertainties import sources
-from tyrecal.studies.inference.veering import Veering, coupling, partner
+from tyrecal.studies.inference.veering import Veering
 from tyrecal.tyre.values import with_values
 
 from ..chance import Chance

@@ -114,8 +114,9 @@ def readings(trial: Trial, protocol: Protocol) -> list[Measurement]:
             pair = [low - own[label] / 2, high + own[label] / 2] if label.c else [low]
             noisy = np.exp(pair + protocol.noise * random.normal(size=len(pair)))
             for i, f in enumerate(random.permutation(noisy).tolist(), 1):
-                state = str(i) if label.c else "", pressure, 0.0
-                here.append(Measurement("frequency_Hz", label, *state, f, protocol.noise * f))
+                member, sigma = str(i) if label.c else "", protocol.noise * f
+                one = Measurement("frequency_Hz", label, member, pressure, 0.0, f, sigma)
+                here.append(one)
         gone = random.choice(len(here), int(random.integers(protocol.missing + 1)), False)
         read += [each for i, each in enumerate(here) if i not in gone]
     return _swapped(read, labels, random) if trial.truth.swapped else read

@@ -26,6 +26,7 @@ from .evidence import NONE, Hypothesis, explain, grid, refit
 Array = np.ndarray
 PLACEBOS, DRAWS = 200, 200  # simulated tyres without effects; sizes drawn from the posterior
 LEAST_SQUARES_STEPS = 8  # Gauss-Newton steps
+SHRINKAGE_SEED = 0  # of all that is drawn here, so that a diagnosis again has the same bytes
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ def shrink(problem: InverseProblem, key: str | None = None) -> Shrinkage | None:
     out = problem.only(hold)
     likeliest = lambda h: _errors(out, h, [int(np.argmax(h.posterior))])[0]
     before, after = _errors(out, none, [0])[0], likeliest(chosen)
-    random = np.random.default_rng(0)
+    random = np.random.default_rng(SHRINKAGE_SEED)
     places = random.choice(len(chosen.posterior), DRAWS, p=chosen.posterior)
     normal = partial(random.multivariate_normal, method="cholesky")
     drawn = np.array([normal(chosen.fitted.d[i], chosen.fitted.covariance[i]) for i in places])

@@ -1,7 +1,8 @@
 """Coupling of near modes by turned cords, by one step of each source of error that turns them.
 
-A step is one standard deviation. `veering.coupling` gives q and a rise of each source: size^2 is
-the sum of q^2, and the rise of a `Coupling` the mean of these rises, weighted by q^2.
+A step is one standard deviation. `coupling` gives q and a rise of each source: size^2 is the sum of
+q^2, and the rise of a `Coupling` the mean of these rises, weighted by q^2. The symbols are those of
+`veering`.
 """
 
 from __future__ import annotations
@@ -14,12 +15,12 @@ from typing import Protocol
 import numpy as np
 
 from ...simulate.modes.find import LabelledModes, ModesAnswer
+from ...simulate.modes.label import Label
 from ...tyre.number_units import unit_of
 from .between import Between
 from .model import Coupling, ModelRow, state_of
 from .model_designs import ModelDesigns
 from .uncertainties import Source
-from .veering import coupling, partner
 
 Array = np.ndarray
 # distance in ln f, at some pressure, below which modes of one harmonic may veer
@@ -40,6 +41,33 @@ class Coupled(Protocol):
         """Labelled modes of designs, each with the names of which sensitivities are wanted."""
 
 
+def partner(label: Label | None) -> Label | None:
+    """The mode of the other family that one of the same harmonic can be coupled with."""
+    if label is None or label.m > 1 or (label.c == 0) != (label.kind is not None):
+        return None
+    if label.kind:
+        return Label(0, 0, "torsional" if label.kind == "axial" else "axial")
+    return Label(label.c, 1 - label.m)
+
+
+def coupling(at_0: Array, slopes: Array, above: Array) -> tuple[Array, Array]:
+    """|q| and the rise of (a + b)/2, both over lambda, by one standard deviation of a constant.
+
+    at_0: ln f (2, pressures) of a pair at x0; slopes: its derivatives by the constant in standard
+    deviations; above: ln f with the constant one standard deviation higher.
+    D^2 = delta^2 + q^2 = (delta_0 + p z)^2 + (q z)^2 with the constant z standard deviations higher
+    and p = d delta / dz, whichever mode has which label.
+    """
+    scale = at_0.mean(0)
+    here, there = (np.exp(2 * (ln_f - scale)) for ln_f in (at_0, above))
+    rates = 2 * here * slopes
+    delta, rate = (here[0] - here[1]) / 2, (rates[0] - rates[1]) / 2
+    up = ((there[0] - there[1]) / 2) ** 2
+    both = np.maximum(up - delta**2 - 2 * delta * rate, 0.0)
+    size = np.sqrt(np.maximum(both - np.minimum(rate**2, both), 0.0))
+    return size, there.mean(0) - here.mean(0) - rates.mean(0)
+
+
 def cord_coupling(model: Coupled, x: Array, eta: Array, constants: Array) -> Coupling | None:
     """Coupling by turned cords of modes that are near each other at x; other constants move
     modes, and couple hardly any. None where there are no such modes.
@@ -50,8 +78,10 @@ def cord_coupling(model: Coupled, x: Array, eta: Array, constants: Array) -> Cou
     """
     rows, count = model.between.rows, len(model.rows)
     places = {(label, state_of(w) if label else w): i for i, (label, w) in enumerate(rows)}
-    # rows of the modes of the other family with the same number of waves (`veering.partner`)
-    mates = np.array([places.get((partner(x), state_of(w)), -1) if x else -1 for x, w in rows])
+    # rows of the modes of the other family with the same number of waves (`partner`)
+    mates = np.array(
+        [places.get((partner(label), state_of(w)), -1) if label else -1 for label, w in rows]
+    )
     near = {
         label
         for i, (label, _) in enumerate(rows)

@@ -19,7 +19,6 @@ from functools import cache
 
 import numpy as np
 
-from ...simulate.modes.label import Label
 from .model import Coupling
 from .observations import Observations
 
@@ -28,33 +27,6 @@ MAX_ZETA = 4.0  # standard deviations, from 0 to which zeta is integrated
 ZETA_POINTS, ZETA_GRID = 8, 64  # Gauss-Legendre points from 0 to MAX_ZETA; points of a finer grid
 NEGLIGIBLE_SHIFT = 5e-4  # shift of ln f at 3 standard deviations of q
 MISLABELLED = 0.01  # probability of a label of whose uncoupled mode the measured one has no share
-
-
-def partner(label: Label | None) -> Label | None:
-    """The mode of the other family that one of the same harmonic can be coupled with."""
-    if label is None or label.m > 1 or (label.c == 0) != (label.kind is not None):
-        return None
-    if label.kind:
-        return Label(0, 0, "torsional" if label.kind == "axial" else "axial")
-    return Label(label.c, 1 - label.m)
-
-
-def coupling(at_0: Array, slopes: Array, above: Array) -> tuple[Array, Array]:
-    """|q| and the rise of (a + b)/2, both over lambda, by one standard deviation of a constant.
-
-    at_0: ln f (2, pressures) of a pair at x0; slopes: its derivatives by the constant in standard
-    deviations; above: ln f with the constant one standard deviation higher.
-    D^2 = delta^2 + q^2 = (delta_0 + p z)^2 + (q z)^2 with the constant z standard deviations higher
-    and p = d delta / dz, whichever mode has which label.
-    """
-    scale = at_0.mean(0)
-    here, there = (np.exp(2 * (ln_f - scale)) for ln_f in (at_0, above))
-    rates = 2 * here * slopes
-    delta, rate = (here[0] - here[1]) / 2, (rates[0] - rates[1]) / 2
-    up = ((there[0] - there[1]) / 2) ** 2
-    both = np.maximum(up - delta**2 - 2 * delta * rate, 0.0)
-    size = np.sqrt(np.maximum(both - np.minimum(rate**2, both), 0.0))
-    return size, there.mean(0) - here.mean(0) - rates.mean(0)
 
 
 @cache
