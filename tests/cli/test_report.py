@@ -25,20 +25,18 @@ def timeless(page: Path) -> bytes:
 def test_studies_write_it_and_the_command_writes_the_same(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Fit, sweep and footprint of one folder on one page; a second time the same bytes."""
+    """Fit, sweep and footprint of one folder on one page; by the command the same bytes."""
     case, out = str(coarse_case(tmp_path)), tmp_path / "out"
-    options = ["--output", str(out), "--no-pictures", "--quiet", "--report"]
+    options = ["--output", str(out), "--no-pictures", "--quiet"]
     fitted = ["--fitted", str(out / "fit.json")]
-    assert run("fit", case, *options) in (0, 4)
+    assert run("fit", case, *options, "--report") in (0, 4)
     first = (out / "report.html").read_text()
     assert "P235/75R17 on an 8 inch rim" in first and "Shapes of the fitted tyre" in first
     assert run("sweep-pressure", case, *options, *fitted, "--steps", "2") == 0
     monkeypatch.setattr(door_module, "find_solver", lambda name, *command: Hertz())
-    assert run("footprint", case, *options, *fitted, "--loads-N", "1000,4000") == 0
+    assert run("footprint", case, *options, *fitted, "--report", "--loads-N", "1000,4000") == 0
     page = timeless(out / "report.html")
     assert page.count(b"<svg ") > 4 and len(page) < 1_000_000
-    assert run("fit", case, *options) in (0, 4)
-    assert timeless(out / "report.html") == page
     (out / "report.html").unlink()
     assert capsys.readouterr().out == ""
     assert run("report", str(out)) == 0

@@ -21,7 +21,7 @@ from . import toy
 from .ring import TABLE_2
 
 ROOT = Path(__file__).parents[3]
-TRIALS = 60
+TRIALS = 30
 DATA = "data:text/csv;charset=utf-8,"
 VOID = {"meta", "input", "br", "path", "rect", "use"}
 HOSTILE = "</script><script>window.hacked=1</script><img src=x onerror=alert(1)>\"'{{ 7*7 }}"
