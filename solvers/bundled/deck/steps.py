@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ...language.honour import split_steps
 from ...language.text import WHOLE_DECK, Block, DeckError, Row, read_keywords, seed
 from . import grammar
 
@@ -43,6 +44,8 @@ class Deck:
     def __init__(self, texts: dict[str, str], job: str, oldjob: str | None):
         self.jobs = [oldjob, job] if oldjob else [job]
         self._keywords = {name: read_keywords(texts[name], name) for name in self.jobs}
+        for place, keywords in enumerate(self._keywords.values()):
+            grammar.check(keywords, place > 0)  # once: tangents change numbers alone
         for k in [] if oldjob else self._keywords[job]:
             if k.name == "SYMMETRIC MODEL GENERATION":
                 raise DeckError(k.place, "this job revolves a section job: name that with --oldjob")
@@ -55,7 +58,7 @@ class Deck:
         for place, name in enumerate(self.jobs):
             own = [(line, index, value) for job, line, index, value in tangents if job == name]
             keywords = self._keywords[name]
-            model, blocks = grammar.check(seed(keywords, own) if own else keywords, place > 0)
+            model, blocks = split_steps(seed(keywords, own) if own else keywords)
             models.append(model)
             steps.append(_steps(model, blocks, place > 0))
         if len(models) > 1:
