@@ -16,7 +16,9 @@ The judge: all single effects by `weigh_hypotheses`, each at further sizes, carr
 with near modes coupled as `diagnose` does; what it evaluates anew at re-fits is left out. The same
 frequencies, with their noise, are judged three times: alone, with damping of either case. Damping
 moves no re-fit, so that it is added to the evidence of each, on the grids of the frequencies.
-A pair: the effect, and that effect of another kind which its frequencies are most like (`RIVALS`).
+A pair: the effect, and that effect of another kind which its frequencies are most like (`rivals`).
+Ceiling: mean of the larger of the pair's two stated probabilities, normed to their sum. An answerer
+is right as often if its probabilities are; over both members of a pair alike, no other is oftener.
 """
 
 from __future__ import annotations
@@ -378,6 +380,30 @@ def scored(record: str = NAME, sets: bool = False) -> dict[str, Row]:
     return result
 
 
+def shares(way: str, record: str = NAME) -> dict[str, Array]:
+    """By kind, of single effects: size of each effect, and its share of its pair (n, 2); and that
+    of a point mass against a temperature, the other member of that pair."""
+    _, other, *rows = read(record)
+    truths = json.loads(truth_file(record).read_text(encoding="utf-8"))["trials"]
+    groups = {kind: {id: other["rivals"][id] for id in ids} for kind, ids in KINDS.items()}
+    groups["point mass or temperature"] = {"point_mass": "temperature"}
+    result = {}
+    for name, rival in groups.items():
+        own = []
+        for row in [row for row in rows if not row["sets"]]:
+            truth, each = truths[row["trial"]], row[way]["each"]
+            if (id := truth["effect"]) in rival:
+                own.append((truth["size"], each[id] / (each[id] + each[rival[id]])))
+        result[name] = np.array(own).reshape(-1, 2)
+    return result
+
+
+def ceiling(share: Array) -> tuple[float, float]:
+    """The ceiling of trials by the shares (n,) of their effects, and its standard error."""
+    larger = np.maximum(share, 1 - share)
+    return float(larger.mean()), float(larger.std(ddof=1) / np.sqrt(len(share)))
+
+
 def tell(record: str) -> None:
     """The tables: judged with single effects, and with sets of them."""
     for sets in {row["sets"] for row in read(record)[2:]}:
@@ -391,6 +417,13 @@ def tell(record: str) -> None:
             each = [counts[way]["pairs"].get(id, [0, 0]) for way in WAYS]
             print(f"{id} or {rival}:", ", ".join(f"{right} of {all}" for right, all in each))
         print()
+    for way in WAYS:
+        for name, own in shares(way, record).items():
+            if len(own):
+                mean, error = ceiling(own[:, 1])
+                wrong = ", ".join(f"{size:.3g} ({p:.2f})" for size, p in own if p <= 0.5)
+                print(f"{way}, {name}: {len(own)}, ceiling {mean:.2f} +- {error:.2f}", end="")
+                print("; wrong: " + wrong if wrong else "")
 
 
 if __name__ == "__main__":

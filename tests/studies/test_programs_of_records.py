@@ -1,7 +1,8 @@
 """Programs of studies on record: they find what they import, and count as their page states.
 
 The record of selected numbers is counted as its page states, and a part of it is drawn anew.
-The record of what damping tells: sealed, as the page states it, and no loss to frequencies.
+The record of what damping tells: sealed, as the page states it, and no loss to frequencies; the
+ceiling of its pairs.
 The closed form by which a fit's total exceeds the error by the whole covariance.
 Slips as the study draws them, and a hundredth of the study itself.
 The comparison of one study's answers by two commits.
@@ -27,7 +28,7 @@ from ..chance import generator
 from ..conftest import ROOT
 from . import sensitivities, slips
 from .answered_again import changes
-from .damping import WAYS, scored
+from .damping import WAYS, ceiling, scored, shares
 from .fit_errors import LABELS, SIZES, case_of, drawn, table
 from .sensitivities import is_right, study
 from .slips import DECIMAL, DIGIT, DIGITS, PRESSURES, ROWS, is_named, with_slip
@@ -152,6 +153,29 @@ def test_the_page_has_the_figures_of_the_sealed_record() -> None:
     alone, stated, unknown = (counts[way]["top"] / counts[way]["effects"] for way in WAYS)
     assert stated > alone + 0.05 and unknown >= alone
     assert all(counts[way]["pair"] > 0.9 * counts[way]["effects"] for way in WAYS)
+
+
+def test_the_page_states_what_a_right_answerer_would_reach() -> None:
+    """Right of all pairs as often as the stated probabilities expect, within three standard
+    deviations. The record is fixed, so that no chance is in this test."""
+    page = (BENCHMARKS / "DAMPING.md").read_text(encoding="utf-8")
+    own = shares(WAYS[1])
+    mean, error = ceiling(own["temperature"][:, 1])
+    others = [ceiling(own[kind][:, 1])[0] for kind in ("spindle", "stiffening", "mass")]
+    assert f"{mean:.2f} ± {error:.2f} for temperature" in page and mean + 3 * error < 0.9
+    assert f"{min(others):.2f} to {max(others):.2f} for the three others" in page
+    size, share = own["temperature"].T
+    wrong = share <= 0.5
+    least, most = abs(size[wrong]).min(), abs(size[wrong]).max()
+    assert wrong.sum() == 6 and f"of {least:.0f} to {most:.0f} K" in page
+    assert f"share of {share[wrong].min():.2f} to {share[wrong].max():.2f}" in page
+    assert (abs(size) < 7).sum() == 11 and least > 7
+    rival = own.pop("point mass or temperature")[:, 1]
+    assert len(rival) == 10 and (rival > 0.5).sum() == 6
+    assert f"exceeds {(mean + ceiling(rival)[0]) / 2:.2f}" in page
+    every = np.concatenate(list(own.values()))[:, 1]
+    larger = np.maximum(every, 1 - every)
+    assert abs((every > 0.5).sum() - larger.sum()) < 3 * np.sqrt(larger @ (1 - larger))
 
 
 @pytest.mark.numbers
