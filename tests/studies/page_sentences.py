@@ -93,11 +93,6 @@ SENTENCES: list[tuple[str, str, Callable[[Record], list[float]]]] = [
     (REAL_DATA, "next, with {} %, is [9,0]", of("labels", "labeling 1")),
     (
         REAL_DATA,
-        "114 Hz is [2,0] with {} %, [3,0] with {} %, [1,0] with {} %",
-        of("labels without a fit", "114 [2,0]", "114 [3,0]", "114 [1,0]"),
-    ),
-    (
-        REAL_DATA,
         'calibration leaves {} % (rms), p = {}. "Nothing" has {} %, "not explained" {} %, the'
         " likeliest effect {} %",
         of("diagnosed", "rms %", "p", "none %", "outside %", "effect %"),

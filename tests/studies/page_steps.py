@@ -232,9 +232,6 @@ STEPS = {
         "labels.json",
         of_labels,
     ),
-    "labels without a fit": Step(
-        f"tyrecal measured label {REAL} cases/205_60r15_vervoort.csv", "labels.json", of_labels
-    ),
     "diagnosed": Step(
         f"tyrecal diagnose {REAL} --set rim.free=true --measured {{labels}}/labelled.csv"
         " --no-pictures",

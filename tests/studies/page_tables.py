@@ -109,9 +109,6 @@ def labelled(record: Record) -> list[list[float]]:
 EFFECTS = (  # rows of `real_data` in the order of the page
     "nothing",
     "frequency_stiffening 0.2",
-    "cap_ply 2e+06",
-    "tread_wear 0.25",
-    "sidewall_gauge 0.15",
     "tread_modulus 20",
 )
 PUBLIC_SET = (  # rows of `real_prior` in the order of the page
@@ -120,12 +117,22 @@ PUBLIC_SET = (  # rows of `real_prior` in the order of the page
         for name in ("vertical_stiffness_N_per_m", "contact_length_m", "contact_width_m")
         for load_N in (2000, 4000, 6000)
     ),
-    *(f"{label} 220 kPa 0 N" for label in ("[0,0] axial", "[0,0] torsional", "[1,1]")),
+    *(
+        f"{label} 220 kPa 0 N{which}"
+        for label in ("[0,0] axial", "[0,0] torsional", "[1,1]")
+        for which in ("", ", set B")
+    ),
     *(f"[{c},0] 160 kPa 0 N" for c in range(3, 9)),
 )
 PUBLIC_DAMPING = ("[1,0]", "[0,0] axial", "[1,1]", "[0,0] torsional")
-PUBLIC_RIM = tuple(f"{way}_N_per_m" for way in ("lateral", "longitudinal"))
-PUBLIC_RIM += ("torsional_Nm_per_rad",)
+PUBLIC_RIM = (
+    *(
+        f"{way}_N_per_m {state} kPa"
+        for way in ("lateral", "longitudinal")
+        for state in ("2000 N 220", "4000 N 220", "6000 N 220", "4000 N 198", "4000 N 242")
+    ),
+    *(f"torsional_Nm_per_rad {load_N} N 220 kPa" for load_N in (2000, 4000, 6000)),
+)
 MF_SWIFT = {  # deflection in mm and area in cm2, by load in N
     1000: (5.33, 59.0),
     2000: (10.48, 105.5),
@@ -366,9 +373,9 @@ TABLES: dict[str, Rows] = {
         *(of("public", *(f"3: {row} {k}" for k in (0, 1, 4, 5, 6))) for row in PUBLIC_SET)
     ),
     "public damping": rows(
-        *(of("public", *(f"1: {row} {k}" for k in range(4))) for row in PUBLIC_DAMPING)
+        *(of("public", *(f"1: {row} {k}" for k in range(5))) for row in PUBLIC_DAMPING)
     ),
-    "public rim": rows(*(of("public", *(f"2: {row} {k}" for k in range(3))) for row in PUBLIC_RIM)),
+    "public rim": rows(*(of("public", *(f"2: {row} {k}" for k in range(5))) for row in PUBLIC_RIM)),
     "as built": rows(
         lambda record: None,
         *(

@@ -1,8 +1,12 @@
 """Static stiffnesses of the 205/60R15 over those of two published parameter sets of this size.
 
-The tyre is that of `tyrecal fit cases/205_60r15.yaml --mesh coarse --fix A_belt`, at 220 kPa. The
-first set (C_x0, p_cfx1 and so on of an MF-Swift file) has stiffnesses over the load; of both the
-ratios at 4 kN are known: C_x/C_z 1.71 and 1.82, C_y/C_z .49 and .75, C_psi 84 and 87 Nm/deg.
+The tyre is that of `tyrecal fit cases/205_60r15.yaml --mesh coarse --fix A_belt`, at 220 kPa.
+Set A: Pacejka, Tire and Vehicle Dynamics, App. 3; set B: TNO_car205_60R15.tir, an example of
+MF-Tyre/MF-Swift 6.2 (TNO, 2013). By MF-Swift's formulas, dp = p/220 kPa - 1, df = F_z/4 kN - 1:
+
+    C_y = C_y0 (1 + p_cfy1 df) (1 + p_cfy3 dp), C_x alike, C_psi = C_psi0
+
+The ratios are those to set A.
 
     python -m tests.studies.stiffness coarse 2000,4000,6000
 """
@@ -10,7 +14,7 @@ ratios at 4 kN are known: C_x/C_z 1.71 and 1.82, C_y/C_z .49 and .75, C_psi 84 a
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import radians
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
@@ -22,18 +26,29 @@ from tyrecal.tyre.load import load_case
 from ..conftest import CASES
 
 FITTED = {"A_belt": 2.118683e-7, "A_carcass": 7.998e-7, "C10": 1.868e6}
-# of the first set at 4 kN, N/m and N m/rad, and their growth: d ln C / d (load / 4 kN)
+# of set A at 220 kPa and 4 kN, N/m and N m/rad, and their relative growth with load and pressure
 PUBLISHED = {
-    "vertical_N_per_m": (209651.0, 0.114),
-    "lateral_N_per_m": (102673.0, 0.164),
-    "longitudinal_N_per_m": (358066.0, 0.275),
-    "torsional_Nm_per_rad": (4793.0, 0.0),
+    "vertical_N_per_m": (209651.0, 0.114, 0.627),  # of the tangent
+    "lateral_N_per_m": (102673.0, 0.16365, 0.24993),
+    "longitudinal_N_per_m": (358066.0, 0.27504, 0.0),
+    "torsional_Nm_per_rad": (4793.0, 0.0, 0.0),
+}
+SET_B = {  # its mass, vertical stiffness and patch are set A's
+    **PUBLISHED,
+    "lateral_N_per_m": (157632.5, 0.16365, 0.24993),
+    "longitudinal_N_per_m": (381913.4, 0.18677, 0.0),
+    "torsional_Nm_per_rad": (5000.0, 0.0, 0.0),
 }
 
 
-def published(load_N: float) -> dict[str, float]:
-    """The first set's stiffnesses at a load."""
-    return {name: C * (1 + rise * (load_N / 4e3 - 1)) for name, (C, rise) in PUBLISHED.items()}
+def published(
+    load_N: float,
+    pressure_kPa: float = 220.0,
+    known: Mapping[str, tuple[float, float, float]] = PUBLISHED,
+) -> dict[str, float]:
+    """A set's stiffnesses at a load and a pressure."""
+    df, dp = load_N / 4e3 - 1, pressure_kPa / 220 - 1
+    return {name: C * (1 + a * df) * (1 + b * dp) for name, (C, a, b) in known.items()}
 
 
 def stiffnesses(level: str, loads_N: Sequence[float]) -> list[StiffnessRow]:

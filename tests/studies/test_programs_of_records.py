@@ -6,6 +6,7 @@ ceiling of its pairs.
 The closed form by which a fit's total exceeds the error by the whole covariance.
 Slips as the study draws them, and a hundredth of the study itself.
 The comparison of one study's answers by two commits.
+Stiffnesses of the published sets.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from .fit_errors import LABELS, SIZES, case_of, drawn, table
 from .sensitivities import is_right, study
 from .slips import DECIMAL, DIGIT, DIGITS, PRESSURES, ROWS, is_named, with_slip
 from .standard_errors import compared
+from .stiffness import PUBLISHED, SET_B, published
 
 BENCHMARKS = ROOT / "tests" / "benchmarks"
 PROGRAMS = sorted(
@@ -176,6 +178,19 @@ def test_the_page_states_what_a_right_answerer_would_reach() -> None:
     every = np.concatenate(list(own.values()))[:, 1]
     larger = np.maximum(every, 1 - every)
     assert abs((every > 0.5).sum() - larger.sum()) < 3 * np.sqrt(larger @ (1 - larger))
+
+
+@pytest.mark.numbers
+def test_published_sets_have_their_ratios_and_check_values() -> None:
+    """kN/m of set A over load and pressure; of both sets C_x/C_z, C_y/C_z, and C_psi in Nm/deg."""
+    lateral = [published(*at)["lateral_N_per_m"] for at in ((2e3,), (6e3,), (4e3, 198), (4e3, 242))]
+    assert np.divide(lateral, 1e3) == pytest.approx([94.3, 111.1, 100.1, 105.2], abs=0.05)
+    along = [published(load)["longitudinal_N_per_m"] / 1e3 for load in (2e3, 6e3)]
+    assert along == pytest.approx([308.8, 407.3], abs=0.05)
+    for known, ratios in ((PUBLISHED, (1.71, 0.49, 84)), (SET_B, (1.82, 0.75, 87))):
+        C_z, C_y, C_x, C_psi = published(4e3, 220, known).values()
+        assert (C_x / C_z, C_y / C_z) == pytest.approx(ratios[:2], abs=0.005)
+        assert C_psi * np.pi / 180 == pytest.approx(ratios[2], abs=0.5)
 
 
 @pytest.mark.numbers
