@@ -2,6 +2,7 @@
 after each measurement, and by a fixed list; effects found as often as the plan promises.
 
     python -m tests.studies.planned run [--judge evidence] [--tyres 200] [--sound 40] [--store DIR]
+    python -m tests.studies.planned hindsight [--store DIR]
     python -m tests.studies.planned table
 
 The P235/75R17 (coarse mesh, section taken as drawn) is evaluated once, with every effect, in all
@@ -17,6 +18,8 @@ list: `LIST`, in its order. Footprint and loaded modes cost hours and add no evi
 order of `plan.order` within the list's hours. next: the plan's first item, then the most
 information per hour of what is left, as `next_measurement` has it ("evidence" only). Where there
 is no verdict, all hours of the list count. Hours are those of `next_measurement.STEP_HOURS`.
+least: the cheapest measurements within the list's hours by which the linear judge names the tyre's
+effect, a set of response functions among them, if all outcomes were known before any is taken.
 Resumed: a tyre that is on record is not computed again; a second process goes ``--backwards``.
 """
 
@@ -25,6 +28,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +48,7 @@ from tyrecal.studies.diagnose.next_measurement import (
 )
 from tyrecal.studies.diagnose.several import present, probabilities, weigh_hypotheses
 from tyrecal.studies.fit.targets import target_labels
-from tyrecal.studies.plan.chance import DRAWN_FROM, FOUND, shares
+from tyrecal.studies.plan.chance import DRAWN_FROM, FOUND, Drawn, shares
 from tyrecal.studies.plan.laboratory import Laboratory, laboratory
 from tyrecal.studies.plan.order import order
 from tyrecal.studies.plan.study import DRAWN_TYRES, TRIED_TYRES
@@ -58,7 +62,7 @@ Judge = Callable[[Laboratory, Sequence[str]], dict[str, float]]
 RESULT = Path(__file__).parents[1] / "benchmarks" / "planned.jsonl"
 LIST = "160 kPa", "weigh", "240 kPa", "320 kPa", "calliper", "footprint", "clamp", "loaded modes"
 LISTED_HOURS = {"footprint": 2.0, "loaded modes": 4.0}  # of what adds no evidence
-WAYS = "list", "plan", "next"
+WAYS = "list", "plan", "next", "least"
 NOISE, APART, SEED, RESAMPLES = 0.002, 0.05, 1, 4000
 MANY = 4  # times as many tyres as a user's plan draws, for the promised chances
 
@@ -110,16 +114,35 @@ def by_evidence(lab: Laboratory, done: Sequence[str]) -> dict[str, float]:
     return judged(lab, done)[1]
 
 
+def deviations(base: Laboratory, lab: Laboratory) -> Array:
+    """Measured rows (n,) of a tyre minus those of the start, distances of pairs last."""
+    o = lab.problem.observations
+    return np.append(o.y - base.problem.observations.y, o.split[base.linear.pairs])
+
+
 def linear_judge(base: Laboratory) -> Judge:
     """The judge that is linear about the start of ``base``."""
     linear = base.linear
 
     def judge(lab: Laboratory, done: Sequence[str]) -> dict[str, float]:
-        o = lab.problem.observations
-        y = np.append(o.y - base.problem.observations.y, o.split[linear.pairs])
+        y = deviations(base, lab)
         return dict(zip(linear.keys, linear.probabilities(y[None], lab.rows(done))[0], strict=True))
 
     return judge
+
+
+def least_hours(lab: Laboratory, tyres: Drawn, limit: float) -> Array:
+    """Hours (t,) of the cheapest measurements that name each tyre's effect, inf above ``limit``."""
+    every = [set for k in range(len(lab.menu)) for set in combinations(lab.menu, k + 1)]
+    least = np.full(len(tyres.y), np.inf)
+    for names in sorted(every, key=lab.hours):
+        if lab.hours(names) > limit + 1e-9 or not any(lab.menu[n].pressure_kPa for n in names):
+            continue
+        if all(name in lab.offered(names[:k]) for k, name in enumerate(names)):
+            left = np.flatnonzero(np.isinf(least))
+            hits = lab.linear.found(tyres.only(np.isinf(least)), lab.rows(names))
+            least[left[hits]] = lab.hours(names)
+    return least
 
 
 def by_order(lab: Laboratory, names: Sequence[str], judge: Judge) -> Row:
@@ -238,6 +261,26 @@ def run(
                 row |= more_of(lab, plan, row, tyre % every == 0)
             write(row)
     tell(read())
+
+
+@main.command()
+@click.option("--store", type=Path)
+def hindsight(store: Path | None) -> None:
+    """Add to each linear campaign on record what it needed at least. Seven minutes of a core."""
+    lab, rows = study_laboratory(store), read()
+    own = of_judge(rows, "linear")[0]
+    ids = tuple(row["effect"] for row in own)
+    seeds = [[SEED, row["tyre"], False] for row in own]
+    tyres = [
+        drawn(lab, id, np.random.default_rng(seed))[1] for id, seed in zip(ids, seeds, strict=True)
+    ]
+    y = np.array([deviations(lab, tyre) for tyre in tyres])
+    for row, least in zip(own, least_hours(lab, Drawn(ids, y), hours(lab, LIST)), strict=True):
+        is_named = np.isfinite(least)
+        row["least"] = {"hours": round(float(least), 3) if is_named else None}
+        row["least"]["verdict"] = row["effect"] if is_named else NONE
+    RESULT.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
+    tell(rows)
 
 
 def read() -> list[Row]:
