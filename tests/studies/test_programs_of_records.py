@@ -172,6 +172,7 @@ def test_the_page_states_what_a_right_answerer_would_reach() -> None:
     assert wrong.sum() == 6 and f"of {least:.0f} to {most:.0f} K" in page
     assert f"share of {share[wrong].min():.2f} to {share[wrong].max():.2f}" in page
     assert (abs(size) < 7).sum() == 11 and least > 7
+    assert f"would make {(share > 1 / 3).sum()} of 30 right" in page  # odds times two
     rival = own.pop("point mass or temperature")[:, 1]
     assert len(rival) == 10 and (rival > 0.5).sum() == 6
     assert f"exceeds {(mean + ceiling(rival)[0]) / 2:.2f}" in page
