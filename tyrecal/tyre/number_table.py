@@ -15,6 +15,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import islice
 from math import inf, nan
 from pathlib import Path
@@ -44,7 +45,10 @@ class TextTable:
 
 def read_text_table(path: Path) -> TextTable:
     """The cells of a file. Raises InputError, OSError."""
-    raw = read_bytes(path)
+    return _text_table(read_bytes(path))
+
+
+def _text_table(raw: bytes) -> TextTable:
     if raw[:2] == b"PK":
         return _checked(TextTable(",", _workbook_lines(raw)))
     text = _text(raw)
@@ -186,7 +190,13 @@ class NamedRow:
 def read_named_table(path: Path) -> NamedTable:
     """A table whose columns have our own names, those that end in ``_mm`` numbers. Raises
     InputError, OSError."""
-    table = read_text_table(path)
+    return named_table(read_bytes(path))
+
+
+@lru_cache(maxsize=8)  # loading a case takes its table twice, studies of variants again and again
+def named_table(raw: bytes) -> NamedTable:
+    """The table in a file's content. Raises InputError."""
+    table = _text_table(raw)
     first, headings = table.lines[0]
     for column, count in Counter(filter(None, headings)).items():
         if count > 1:

@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError
-from ..number_table import read_named_table
+from ...files import read_bytes
+from ..number_table import named_table
 from .spline import CubicSpline
 
 Array = np.ndarray
@@ -60,7 +61,12 @@ def read_section(path: Path) -> Section:
     Columns of lines stand from the inner surface to the outer; <line>_gauge_mm, its distance from
     the one line that has points, takes the place of a line's two. Raises SectionError, OSError.
     """
-    table = read_named_table(path)
+    return _section(read_bytes(path))
+
+
+@lru_cache(maxsize=8)
+def _section(raw: bytes) -> Section:
+    table = named_table(raw)
     header = table.headings
     gauged = gauged_lines(header)
     names = tuple(h.rsplit("_", 2)[0] for h in header if h.endswith(("_r_mm", GAUGE)))
