@@ -8,9 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix
 from tyrecal_solvers.bundled.modes.harmonics import HarmonicModes, Vibration
-from tyrecal_solvers.bundled.road import stick
 from tyrecal_solvers.bundled.road.contact_newton import PressedState
-from tyrecal_solvers.bundled.road.loaded_modes import LoadedModes, TyreOnRoad, loaded_modes
+from tyrecal_solvers.bundled.road.loaded_modes import (
+    LoadedModes,
+    TyreOnRoad,
+    hold_of_patch,
+    loaded_modes,
+)
 from tyrecal_solvers.bundled.solid3d.circumference import HalfCircle
 
 from . import support
@@ -66,7 +70,7 @@ def press(work: Round, load: float, friction: float = 0.5, stiffness: float = 1e
     stand = work.press(LENGTHS, stiffness, friction)
     state = stand.to(load)
     U = stand.symmetry.spread(state.parts)
-    return State(stand.tyre.around, U, state, stick.held(state.contact))
+    return State(stand.tyre.around, U, state, hold_of_patch(state.contact))
 
 
 def shifted(work: Round, around: HalfCircle, component: int) -> Array:

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.section.embedding import _inverse
-from tyrecal_solvers.bundled.section.laws.mooney_rivlin import MooneyRivlin
 from tyrecal_solvers.bundled.section.laws.plane_stress import PlaneStress
+from tyrecal_solvers.bundled.section.laws.polynomial import MooneyRivlin
 from tyrecal_solvers.bundled.section.mesh import DeckMesh, read_mesh
 from tyrecal_solvers.bundled.section.model import build
 from tyrecal_solvers.bundled.section.parts.cords import LogarithmicCord

@@ -18,7 +18,7 @@ from tyrecal_solvers.bundled.modes import harmonics, lanczos
 from tyrecal_solvers.bundled.modes.frequency_dependent import SelfConsistent
 from tyrecal_solvers.bundled.results import StepResult
 from tyrecal_solvers.bundled.section import model
-from tyrecal_solvers.bundled.section.laws.mooney_rivlin import MooneyRivlin
+from tyrecal_solvers.bundled.section.laws.polynomial import MooneyRivlin
 from tyrecal_solvers.bundled.section.materials import ModulusTable, read_materials
 from tyrecal_solvers.errors import RunFailed
 from tyrecal_solvers.language.text import DeckError, read_keywords

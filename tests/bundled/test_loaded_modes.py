@@ -7,18 +7,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled.road import footprint_job, stick
+from tyrecal_solvers.bundled.road import footprint_job
 from tyrecal_solvers.bundled.road import loaded_modes as loaded_modes_module
 from tyrecal_solvers.bundled.road.contact_newton import ContactNewton
 from tyrecal_solvers.bundled.road.loaded_modes import (
     Inertia,
     LoadedModes,
     TyreOnRoad,
+    hold_of_patch,
     loaded_modes,
     standing_waves,
 )
 from tyrecal_solvers.bundled.road.multifrontal import Elimination
-from tyrecal_solvers.bundled.road.pressed_losses import PressedLosses
+from tyrecal_solvers.bundled.road.pressed_response import PressedLosses
 from tyrecal_solvers.bundled.section.mechanics import mass
 from tyrecal_solvers.bundled.section.symmetry import HALF_TURN
 from tyrecal_solvers.bundled.solid3d.circumference import half_circle
@@ -178,7 +179,7 @@ def test_a_second_hold_is_as_if_it_were_the_first(tyre: Round, pressed: State) -
     """The factor's hold exchanged for none along the road: the same eigenvalues, below those of
     the patch that sticks."""
     contact = pressed.pressed.contact
-    smooth = stick.held(replace(contact, road=replace(contact.road, friction=0.0)))
+    smooth = hold_of_patch(replace(contact, road=replace(contact.road, friction=0.0)))
     alone = modes(tyre, pressed.U, smooth, pressed.around, 10)
     there = pressed_tyre(tyre, pressed.U, pressed.around)
     both = loaded_modes(there, [pressed.hold, smooth], start(tyre), 10)
@@ -194,7 +195,7 @@ def test_the_footprints_factor_gives_the_same_modes(
     they vibrate with, and form none: the eigenvalues are those with an own factor."""
     work = tyre.press(LENGTHS, 1e9, 0.5)
     state = work.to(10.0)
-    U, hold = work.symmetry.spread(state.parts), stick.held(state.contact)
+    U, hold = work.symmetry.spread(state.parts), hold_of_patch(state.contact)
     (rubber,) = tyre.model.parts
     twice = np.full(rubber.rows.weights.size, 2.0)
     stiff = tyre.model.with_laws(lambda law: replace(law, shear_ratio=twice, bulk_ratio=twice))

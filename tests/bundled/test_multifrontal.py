@@ -285,11 +285,11 @@ def test_neighbours_stand_nearly_as_near_as_scipy_puts_them() -> None:
 
 STARVED = """
 import resource
-import numpy, scipy.linalg
+import numpy, scipy.linalg, scipy.sparse
 size = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
 hard = resource.getrlimit(resource.RLIMIT_AS)[1]
 resource.setrlimit(resource.RLIMIT_AS, (size + 20_000_000, hard))  # a buffer has 32 MB
-from tyrecal_solvers.bundled.section import lapack_memory
+from tyrecal_solvers.bundled.section import band
 """
 
 

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.modes.response import TreadPatch
-from tyrecal_solvers.bundled.road import stick
-from tyrecal_solvers.bundled.road.loaded_modes import Inertia, forces_on
+from tyrecal_solvers.bundled.road.loaded_modes import Inertia, forces_on, hold_of_patch
 from tyrecal_solvers.bundled.road.pressed_response import PressedResponse
 from tyrecal_solvers.bundled.road.rim_stiffness import MOTION_PARITY, rigid
 from tyrecal_solvers.bundled.section.symmetry import HALF_TURN
@@ -59,7 +58,7 @@ def on_road(work: Round) -> State:
     stand = work.press(LENGTHS, 1e9, 0.5)
     state = stand.to(6.0)
     U = stand.symmetry.spread(state.parts)
-    return State(stand.tyre.around, U, state, stick.held(state.contact))
+    return State(stand.tyre.around, U, state, hold_of_patch(state.contact))
 
 
 def responding(work: Round, state: State) -> Pressed:

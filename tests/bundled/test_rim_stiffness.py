@@ -13,9 +13,9 @@ from scipy.sparse import csr_matrix
 from tyrecal_solvers.bundled import job
 from tyrecal_solvers.bundled.deck.request import Request
 from tyrecal_solvers.bundled.deck.steps import Deck
-from tyrecal_solvers.bundled.road import footprint_job, stick
+from tyrecal_solvers.bundled.road import footprint_job
 from tyrecal_solvers.bundled.road.half_turn_symmetry import HalfTurn
-from tyrecal_solvers.bundled.road.loaded_modes import TyreOnRoad
+from tyrecal_solvers.bundled.road.loaded_modes import TyreOnRoad, hold_of_patch
 from tyrecal_solvers.bundled.road.rim_stiffness import reactions, rim_stiffness
 from tyrecal_solvers.bundled.solid3d.circumference import half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
@@ -42,7 +42,7 @@ def stiffnesses(
     for load in loads:
         state = work.to(load)
         U = work.symmetry.spread(state.parts)
-        hold, factor = stick.held(state.contact), work.release_factor()
+        hold, factor = hold_of_patch(state.contact), work.release_factor()
         there = TyreOnRoad(work.tyre, work.symmetry, U, work.tyre.residual(U), lambda: None)
         C = rim_stiffness(there, hold, factor=factor)
         results.append((C, state.stiffness, state.height))

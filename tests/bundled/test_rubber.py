@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.linalg import qr
 from tyrecal_solvers.bundled.section import inflation
-from tyrecal_solvers.bundled.section.laws.mooney_rivlin import MooneyRivlin
+from tyrecal_solvers.bundled.section.laws.polynomial import MooneyRivlin
 from tyrecal_solvers.bundled.section.parts.cords import LogarithmicCord
 from tyrecal_solvers.errors import NoEquilibrium
 

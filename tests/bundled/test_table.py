@@ -21,11 +21,10 @@ from tyrecal_solvers.bundled.job import Job
 from tyrecal_solvers.errors import Refused, RunFailed
 from tyrecal_solvers.language.laws import LAW_CONSTANTS
 from tyrecal_solvers.language.model_rules import MODEL_RULES
-from tyrecal_solvers.language.other_keywords import OTHER_KEYWORDS
 from tyrecal_solvers.language.rule import PLACES as PLACES_OF_BLOCKS
 from tyrecal_solvers.language.rule import QUIET
 from tyrecal_solvers.language.step_rules import STEP_RULES
-from tyrecal_solvers.language.table import RULES
+from tyrecal_solvers.language.table import OTHER_KEYWORDS, RULES
 from tyrecal_solvers.language.text import Block
 
 PLACES = ("section", "revolve", "step")

@@ -12,8 +12,7 @@ from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
 
-from tyrecal_solvers.language.keyword_names import KEYWORD_NAMES
-from tyrecal_solvers.language.spelling import EVERYWHERE, squeezed
+from tyrecal_solvers.language.spelling import EVERYWHERE, KEYWORD_NAMES, squeezed
 from tyrecal_solvers.language.table import RULES
 
 from tyrecal.tyre.own_deck.own_deck import read_own_deck

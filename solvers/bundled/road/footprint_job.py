@@ -32,21 +32,19 @@ from ..modes.response import tread_patch
 from ..section.band import Numbering
 from ..section.model import Model
 from ..section.parts.elastic import Elastic
-from ..section.parts.hourglass import Hourglass
+from ..section.parts.rubber import Hourglass
 from ..section.symmetry import HALF_TURN
 from ..solid3d.circumference import WAVE_BY_ELEMENTS, HalfCircle, half_circle, waves_beyond
 from ..solid3d.revolved import Revolved
 from .contact import flat_road
 from .contact_newton import ContactNewton, PressedState
 from .half_turn_symmetry import HalfTurn
-from .loaded_modes import SPARE, TyreOnRoad, loaded_modes
+from .loaded_modes import SPARE, TyreOnRoad, hold_of_patch, loaded_modes
 from .patch import patch
-from .pressed_losses import PressedLosses
-from .pressed_response import UNLOADED_MODES, PressedResponse
+from .pressed_response import UNLOADED_MODES, PressedLosses, PressedResponse
 from .rim_stiffness import reactions, rim_stiffness
 from .road_data import InflatedTangent, LoadRequest, ModeRequest, RimRequest, RoadData, TyreToPress
 from .slopes import Slopes
-from .stick import held
 from .tread import tread_of
 
 Array = np.ndarray
@@ -195,7 +193,8 @@ def _rim_reactions(
 ) -> dict[str, Array]:
     """Reactions to motions of the rim about one load, with the patch held."""
     pressed = _pressed(work, state, work.tyre)
-    C = rim_stiffness(pressed, held(state.contact), wanted.reference_z, work.release_factor())
+    hold = hold_of_patch(state.contact)
+    C = rim_stiffness(pressed, hold, wanted.reference_z, work.release_factor())
     return {"rim_reactions": reactions(C, wanted.motions)}
 
 
@@ -212,7 +211,7 @@ def _modes(
     pressed = _pressed(work, state, tyre)
     road = state.contact.road
     smooth = replace(state.contact, road=replace(road, friction=0.0))
-    holds = [held(each) for each in (state.contact, smooth)]
+    holds = [hold_of_patch(each) for each in (state.contact, smooth)]
     holds = holds if road.friction else holds[:1]
     vibration = Vibration(wanted.model, inflated, tyre.loads, equations, 0.0)
     start = lowest_of_all(vibration, wanted.count + 2 * SPARE, work.check)
@@ -253,7 +252,7 @@ def _response(
     vibration = Vibration(wanted.model, inflated, tyre.loads, equations, 0.0)
     response = PressedResponse(
         _pressed(work, state, tyre),
-        held(state.contact),
+        hold_of_patch(state.contact),
         lowest_of_all(vibration, UNLOADED_MODES, work.check),
         tread_patch(wanted.model.mesh.X, inflated, wanted.nodes, request.patch_m),
         [*excited, *seen],

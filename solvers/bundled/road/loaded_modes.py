@@ -2,7 +2,7 @@
 
     K = tangent of the tyre + hold,   M = kron(N^T w N, M_section)
 
-hold: see `stick`; N (s, k) and w (s,), rad: functions of the angle and weights at Gauss stations
+hold: `hold_of_patch`; N (s, k) and w (s,), rad: functions of the angle, weights at Gauss stations
 (`Circumference`); M_section: mass per radian. Fields (k, n, 3) have k functions of the angle, n
 nodes of the section and the components r, theta, z in the frame of the reference angle, so the mass
 does not depend on the angle. ``around.turn(j)`` is exp(i j theta) in these functions, (k,).
@@ -11,6 +11,14 @@ The pressed tyre is unchanged by a half turn about the vertical. So each mode is
 1) or changes its sign (parity -1), and the two kinds are computed apart (`HalfTurn`, which states
 its masks and images of nodes). A wheel that is free along the load adds one unknown, its shift down
 (to theta = 0), to modes of parity 1.
+
+As ABAQUS in a *FREQUENCY step, contact neither opens nor closes, and where there is friction
+nothing slides. The contact's own stiffness holds every point of the patch, along the normal and
+along the road,
+
+    K = int k diag(1, t, t) dA,   t = 1 with friction, 0 without
+
+so the hold grows steadily with the load, from nothing.
 """
 
 from __future__ import annotations
@@ -31,11 +39,14 @@ from ..section.symmetry import HALF_TURN
 from ..solid3d.circumference import Circumference
 from ..solid3d.revolved import Revolved
 from . import davidson
+from .contact import Contact
 from .contact_update import ContactUpdate
 from .half_turn_symmetry import HalfTurn
 from .multifrontal import Elimination, Factor
 
 Array = np.ndarray
+
+
 SPARE = 3  # modes of each parity in addition to half of the requested number
 
 
@@ -255,3 +266,10 @@ def standing_waves(unloaded: list[HarmonicModes], symmetry: HalfTurn) -> list[Ar
                 if abs(wave).max() > 1e-6 * abs(ahead).max():
                     waves.append(wave)
     return waves
+
+
+def hold_of_patch(contact: Contact) -> csr_matrix:
+    """The stiffness of fields (k n 3, k n 3) that holds the patch, N/m."""
+    road, points = contact.road, contact.points
+    kinds = np.diag([1.0, 1.0, 1.0] if road.friction > 0 else [1.0, 0.0, 0.0])
+    return points.matrix(road.stiffness * points.area[..., None, None] * kinds)

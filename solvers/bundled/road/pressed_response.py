@@ -10,12 +10,20 @@ x has of the forces less K + i L - omega^2 M times q; the road bears the rest.
 
 Each parity of the half turn is a problem of its own. Modal masses are those of the whole tyre. The
 directions of the hub are those of `modes.response`.
+
+Parts with a loss factor damp a mode by
+
+    zeta_r = 1/2 sum_k eta_k(f_r) phi_r^T K_k phi_r / omega_r^2,   phi_r^T M phi_r = 1
+
+zeta_r: damping ratio of mode r; eta_k: loss factors; K_k: the part of the tangent at U that is
+proportional to a compound's shear or bulk modulus (`modes.damping`).
+Initial stress, pressure, and what holds the patch have no losses.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -24,15 +32,62 @@ from ...errors import Refused
 from ..modes.harmonics import HarmonicModes
 from ..modes.response import ResponseResult, TreadPatch
 from ..modes.superelement import Superelement
+from ..section.materials import LossFactor
+from ..section.parts.part import TyrePart
 from ..section.symmetry import HALF_TURN
+from ..solid3d.revolved import Revolved
 from . import davidson
 from .contact_update import ContactUpdate
 from .half_turn_symmetry import HalfTurn
-from .loaded_modes import Inertia, TyreOnRoad, factor_with_hold, forces_on, standing_waves
-from .pressed_losses import PressedLosses
+from .loaded_modes import (
+    Inertia,
+    LoadedModes,
+    TyreOnRoad,
+    factor_with_hold,
+    forces_on,
+    standing_waves,
+)
 from .rim_stiffness import MOTION_PARITY, followed, rim_motions, turning_stiffness
 
 Array = np.ndarray
+
+
+class PressedLosses:
+    """The parts with losses of a tyre at the field U (k, n, 3), m."""
+
+    def __init__(self, tyre: Revolved, U: Array):
+        model = tyre.model
+        by_loss: dict[tuple[LossFactor, int], list[TyrePart]] = {}
+        for k, material in enumerate(model.lossy):
+            assert material.loss  # as it is in ``lossy``
+            for modulus in (0, 1):  # shear, bulk
+                # without a table both moduli have one loss factor
+                law = material.loss, modulus if material.loss.frequency_Hz else 0
+                by_loss.setdefault(law, []).extend(model.material_parts(k, modulus))
+        laws = {law: parts for law, parts in by_loss.items() if parts}
+        self._laws = list(laws)
+        self.parts = [
+            Revolved(replace(model, parts=parts), [], tyre.around) for parts in laws.values()
+        ]
+        for part in self.parts:
+            part.residual(U)  # sets the state of the tangents
+
+    def factors(self, hertz: float) -> list[float]:
+        """The loss factor of each of ``parts``."""
+        at = np.array([hertz])
+        return [float(loss.at(at)[modulus][0]) for loss, modulus in self._laws]
+
+    def damping_ratios(self, modes: LoadedModes) -> Array:
+        """zeta (m,) of modes about U."""
+        # half the circumference stores half of the energy
+        energies = np.array(
+            [[2 * (V * part.product(V)).sum() for part in self.parts] for V in modes.shapes]
+        )
+        hertz = np.sqrt(modes.eigenvalues) / (2 * np.pi)
+        losses = np.array([self.factors(f) for f in hertz])
+        return np.asarray((losses * energies).sum(1) / modes.eigenvalues / 2)
+
+
 MODES_UP_TO = 1.2  # times the highest frequency
 MODE_RTOL = 1e-7  # of an eigenvalue, omega^2
 INERTIA_ROUNDS = 2  # of static responses to the inertia of the ones before

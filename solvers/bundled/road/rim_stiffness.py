@@ -2,7 +2,8 @@
 
     C = K_bb - K_bf K_ff^-1 K_fb + G
 
-b: six motions of the rim, f: the tyre's free displacements, K: tangent of tyre and hold (`stick`).
+b: six motions of the rim, f: free displacements of the tyre, K: tangent of the tyre and of
+`hold_of_patch`.
 G is of turns w alone, which move a node of the rim, at d from the wheel's centre, by w x d + w x (w
 x d) / 2. The second part works against the forces f that hold the rim. And the tyre's -p V
 (`parts.pressure`) counts caps of radius r at the cavity's open ends z, which the rim closes: about

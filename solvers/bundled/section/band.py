@@ -1,4 +1,8 @@
-"""Symmetric and Hermitian banded matrices: numbering, storage and Cholesky factors (LAPACK)."""
+"""Symmetric and Hermitian banded matrices: numbering, storage and Cholesky factors (LAPACK).
+
+SciPy and NumPy each have a copy of OpenBLAS, which takes a buffer of 32 MB in its first call and
+keeps it. Without memory for it OpenBLAS tries for ever: importing this file makes both calls.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +11,25 @@ from scipy.linalg import lapack
 from scipy.sparse import csr_array
 
 from ...errors import Indefinite
-from . import lapack_memory  # noqa: F401  (takes LAPACK's buffers, or raises MemoryError)
 from .sparse import narrow_order
 
 Array = np.ndarray
+
+
+BUFFER_BYTES = 1 << 26  # twice a buffer of OpenBLAS
+
+
+def take_buffers() -> None:
+    """Let both copies of OpenBLAS take their buffers. Raises MemoryError if there is no memory."""
+    for first_call in (
+        lambda: lapack.dpbtrs(np.ones((1, 1)), np.ones(1)),
+        lambda: np.linalg.solve(np.ones((1, 1)), np.ones(1)),
+    ):
+        np.empty(BUFFER_BYTES, np.uint8)  # raises; its pages are never touched
+        first_call()
+
+
+take_buffers()
 
 
 class Numbering:

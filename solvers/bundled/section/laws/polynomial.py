@@ -1,7 +1,15 @@
-"""The polynomial law of second order in I1bar - 3 and I2bar - 3 (Rivlin and Saunders, 1951):
+"""Polynomial laws in I1bar - 3 and I2bar - 3: that of second order (Rivlin and Saunders, 1951),
 
 Wbar = sum of C_ij (I1bar - 3)^i (I2bar - 3)^j, i + j = 1, 2
 U = (J - 1)^2 / D1 + (J - 1)^4 / D2;   shear modulus 2 (C10 + C01)
+
+Mooney and Rivlin's, and neo-Hooke's, which is C01 = 0,
+
+Wbar = C10 (I1bar - 3) + C01 (I2bar - 3),   U = (J - 1)^2 / D1;   shear modulus 2 (C10 + C01)
+
+and the reduced one of third order, which is Yeoh's (1993),
+
+Wbar = sum of C_i0 (I1bar - 3)^i, U = sum of (J - 1)^(2i) / D_i, i = 1, 2, 3;   shear modulus 2 C10
 """
 
 from __future__ import annotations
@@ -15,6 +23,33 @@ from .hyperelastic import even_powers
 from .invariants import InvariantLaw, Slopes
 
 Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class MooneyRivlin(InvariantLaw):
+    """C10, C01 and 1 / D1, Pa."""
+
+    shear_moduli: ClassVar[tuple[str, ...]] = ("C10", "C01")
+
+    C10: Array
+    C01: Array
+    inverse_D1: Array
+
+    @property
+    def needs_I2(self) -> bool:
+        return bool(np.any(self.C01))
+
+    def of_invariants(self, I1: Array, I2: Array) -> Array:
+        return self.C10 * (I1 - 3) + self.C01 * (I2 - 3)
+
+    def slopes(self, I1: Array, I2: Array) -> Slopes:
+        return self.C10, self.C01 if self.needs_I2 else None
+
+    def curvatures(self, I1: Array, I2: Array) -> None:
+        return None
+
+    def volume(self, J: Array) -> tuple[Array, Array, Array]:
+        return even_powers(J, self.inverse_D1)
 
 
 @dataclass(frozen=True)
@@ -51,3 +86,32 @@ class PolynomialLaw(InvariantLaw):
 
     def volume(self, J: Array) -> tuple[Array, Array, Array]:
         return even_powers(J, self.inverse_D1, self.inverse_D2)
+
+
+@dataclass(frozen=True)
+class ReducedPolynomial(InvariantLaw):
+    """C_i0 and 1 / D_i, Pa."""
+
+    shear_moduli: ClassVar[tuple[str, ...]] = ("C10", "C20", "C30")
+    bulk_moduli: ClassVar[tuple[str, ...]] = ("inverse_D1", "inverse_D2", "inverse_D3")
+
+    C10: Array
+    C20: Array
+    C30: Array
+    inverse_D1: Array
+    inverse_D2: Array
+    inverse_D3: Array
+
+    def of_invariants(self, I1: Array, I2: Array) -> Array:
+        x = I1 - 3
+        return x * (self.C10 + x * (self.C20 + x * self.C30))
+
+    def slopes(self, I1: Array, I2: Array) -> Slopes:
+        x = I1 - 3
+        return self.C10 + x * (2 * self.C20 + 3 * x * self.C30), None
+
+    def curvatures(self, I1: Array, I2: Array) -> tuple[Array, Array, Array]:
+        return 2 * self.C20 + 6 * self.C30 * (I1 - 3), 0 * I1, 0 * I1
+
+    def volume(self, J: Array) -> tuple[Array, Array, Array]:
+        return even_powers(J, self.inverse_D1, self.inverse_D2, self.inverse_D3)

@@ -1,6 +1,12 @@
 """Rubber, and what else fills solid elements: one part for each element type and law.
 
 The rows are the deformation gradient F, row by row (p, 9): F_rR, F_rTheta, F_rZ, F_thetaR, ...
+
+Hourglass control, of patterns that one Gauss point does not see (Flanagan and Belytschko, 1981):
+
+W = k / 2 (gamma . u_i)^2 per radian, for each component i of the displacements,   k = 0.005 G
+
+gamma (m^0.5) are the hourglass vectors of `elements.Solids`, u_i (a,) of an element's nodes.
 """
 
 from __future__ import annotations
@@ -13,13 +19,46 @@ import numpy as np
 from ....language.text import WHOLE_DECK, Block, DeckError
 from .. import shapes
 from ..elements import Solids
+from ..laws.energy_law import EnergyLaw
 from ..materials import Material
-from . import hourglass
 from .elastic import Elastic
 from .hybrid import Hybrid
-from .part import Rows, SectionJob, TyrePart, consistent_mass
+from .part import Rows, SectionJob, TyrePart, consistent_mass, on_diagonals
 
 Array = np.ndarray
+
+
+SHARE_OF_SHEAR_MODULUS = 0.005  # the hourglass stiffness where a deck states none
+
+
+@dataclass(frozen=True)
+class Hourglass(EnergyLaw):
+    """Springs between the nodes of an element."""
+
+    stiffness: Array  # (e,), Pa
+
+    def energy(self, z: Array) -> Array:
+        return np.asarray(self.stiffness * (z**2).sum(1)) / 2
+
+    def force(self, z: Array) -> Array:
+        return self.stiffness[:, None] * z
+
+    def tangent(self, z: Array, weights: Array | float = 1.0) -> Array:
+        return (self.stiffness * weights)[:, None, None] * np.eye(3)
+
+    def blended(self, other: Hourglass, share: Array) -> Hourglass:
+        return self
+
+
+def hourglass_control(solids: Solids, stiffness: Array) -> Elastic:
+    """The hourglass control of one-point elements; stiffness (e,): k."""
+    assert solids.hourglass is not None
+    gamma = solids.hourglass[:, None]
+    ones = np.ones(gamma.shape[:2])
+    rows = Rows(
+        on_diagonals(gamma), 0 * gamma.real, around=slice(0, 3), rest=np.zeros(3), weights=ones
+    )
+    return Elastic(solids.connectivity, rows, Hourglass(stiffness))
 
 
 @dataclass
@@ -114,7 +153,7 @@ def _of_one_law(
         )
         hold = section.hourglass  # hourglass stiffness, Pa
         if hold is None:
-            hold = hourglass.SHARE_OF_SHEAR_MODULUS * np.ravel(laws[-1].shear_modulus)[0]
+            hold = SHARE_OF_SHEAR_MODULUS * np.ravel(laws[-1].shear_modulus)[0]
         compound = job.lossy.index(material) if material in job.lossy else -1
         table.append([*ratio, material.density, hold, modulus_table, compound])
     shear, bulk, density, hold, modulus_table, compound = np.array(table).T[:, owner]
@@ -139,4 +178,4 @@ def _of_one_law(
     rubber = Elastic(solids.connectivity, rows, law, mass)
     if solids.projection is not None:
         rubber = Hybrid(solids.connectivity, rows, law, mass, projection=solids.projection)
-    return [rubber] if solids.hourglass is None else [rubber, hourglass.control(solids, hold)]
+    return [rubber] if solids.hourglass is None else [rubber, hourglass_control(solids, hold)]
