@@ -29,7 +29,7 @@ from tyrecal.cli.main import EXIT_CODES
 from tyrecal.studies import result_types
 from tyrecal.studies.effects import CatalogueEntry, EffectResult
 from tyrecal.studies.result import Provenance
-from tyrecal.tyre.case.meanings import meanings
+from tyrecal.tyre.case.editor import meanings
 from tyrecal.tyre.case.schema import Case
 from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.number_units import UNIT_BY_ENDING

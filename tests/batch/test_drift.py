@@ -17,8 +17,8 @@ from hypothesis import strategies as some
 from tyrecal.batch.case import CaseTask, lost
 from tyrecal.batch.drift import DEFAULTS, OTHER_QUANTITIES, baseline_of, compare, read_baseline
 from tyrecal.batch.junit import drift_line, junit
+from tyrecal.batch.run import summary
 from tyrecal.batch.studies import Asked
-from tyrecal.batch.summary import summary
 from tyrecal.errors import InputError
 from tyrecal.studies import STUDIES
 from tyrecal.studies.pressure_range import PressureRange

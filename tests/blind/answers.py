@@ -23,10 +23,10 @@ from tyrecal.files import Json
 from tyrecal.measured.tables import read_measurements
 from tyrecal.studies.blind.answer import content_of, labels_at
 from tyrecal.studies.blind.protocol import Protocol
+from tyrecal.studies.diagnose.calibrated import likeliest
 from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
 from tyrecal.studies.diagnose.evidence import OUTSIDE, Hypothesis
 from tyrecal.studies.diagnose.reweighed import LinearFit, line_about
-from tyrecal.studies.diagnose.unmeasured import likeliest
 from tyrecal.studies.inference.expansion import Expansion
 from tyrecal.studies.inference.inverse_problem import Assumed, InverseProblem
 from tyrecal.studies.inference.model import ModelRow, ResponseModel

@@ -18,8 +18,8 @@ from tyrecal.errors import InputError
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.simulate.modes.find import match
 from tyrecal.simulate.modes.label import Label, label_modes
-from tyrecal.simulate.modes.match import match
 from tyrecal.studies.blind.answer import case_of
 from tyrecal.studies.blind.make import Trial, labels_of
 from tyrecal.studies.blind.maker import Computed

@@ -14,8 +14,8 @@ import pytest
 import pyuff
 
 from tyrecal.errors import InputError
-from tyrecal.measured.readings import readings_with_shapes
 from tyrecal.measured.tables import read_measurements
+from tyrecal.measured.targets import readings_with_shapes
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.inference.observations import observe
 from tyrecal.tyre.load import load_case

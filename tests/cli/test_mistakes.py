@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.studies.far_off import far_off
+from tyrecal.studies.inference.check_units import far_off
 
 from ..case import bad_cases
 from ..conftest import CASES

@@ -18,16 +18,17 @@ from tyrecal.studies.diagnose.diagnosis import diagnose
 from tyrecal.studies.diagnose.label_swap import with_exchanged
 from tyrecal.studies.diagnose.result import diagnosis_result
 from tyrecal.studies.diagnose.several import probabilities, weigh_hypotheses
-from tyrecal.studies.inference.damping import DAMPING_FORM, DampingEvidence
-from tyrecal.studies.inference.expansion import expand
-from tyrecal.studies.inference.losses import (
+from tyrecal.studies.inference.damping import (
     ASSUMED_LOSS,
     ASSUMED_LOSS_SD,
+    DAMPING_FORM,
     STATED_LOSS_SD,
+    DampingEvidence,
     loss_deviations,
     with_losses,
     with_twice_the_loss,
 )
+from tyrecal.studies.inference.expansion import expand
 from tyrecal.studies.inference.model import Answer, Query
 from tyrecal.studies.inference.observations import DampingRatios, Observable, observe
 from tyrecal.studies.inference.section_fields import COMPOUNDS_ALIKE

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.inference.form_error import (
+from tyrecal.studies.inference.covariance import (
     FORM_LENGTH,
     OTHERS,
     PERCENT,

@@ -13,7 +13,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.modes.find import LabelledModes, find_modes
 from tyrecal.studies.diagnose.diagnosis import diagnose
-from tyrecal.studies.diagnose.section_posterior import section_posterior
+from tyrecal.studies.diagnose.posteriors import section_posterior
 from tyrecal.studies.inference.inverse_problem import Assumed
 from tyrecal.studies.inference.model import Answer, Query
 from tyrecal.studies.inference.section_fields import (

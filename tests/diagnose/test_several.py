@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from tyrecal.report.diagnosis import page
-from tyrecal.studies.diagnose.constants_posterior import constants_posterior
 from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
 from tyrecal.studies.diagnose.evidence import COVERAGE, explain
+from tyrecal.studies.diagnose.posteriors import constants_posterior
 from tyrecal.studies.diagnose.result import diagnosis_result
 from tyrecal.studies.diagnose.robustness import robustness
 from tyrecal.studies.diagnose.several import (

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from tyrecal.studies.diagnose.calibrated import likeliest
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE, Hypothesis, explain, outside, refit
 from tyrecal.studies.diagnose.several import weigh_hypotheses
-from tyrecal.studies.diagnose.unmeasured import likeliest
 from tyrecal.studies.inference.inverse_problem import InverseProblem
 
 from ..blind.answers import expected, expected_by

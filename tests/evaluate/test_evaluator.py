@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tyrecal.simulate import provenance
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate import cluster
 from tyrecal.simulate.evaluate import evaluator as door_module
-from tyrecal.simulate.evaluate import sources as sources_module
 from tyrecal.simulate.evaluate.cluster import _at_worker
 from tyrecal.simulate.evaluate.evaluator import Counts, Evaluator, Question
 from tyrecal.simulate.evaluate.executor import Here
@@ -26,8 +26,8 @@ from tyrecal.simulate.evaluate.folders import drop_unfinished
 from tyrecal.simulate.evaluate.pressed import pressed
 from tyrecal.simulate.evaluate.record import Damaged
 from tyrecal.simulate.evaluate.recorded import check, contradiction
-from tyrecal.simulate.evaluate.sources import sources
 from tyrecal.simulate.evaluate.store import Store
+from tyrecal.simulate.provenance import sources
 
 from ..studies.hertz import Hertz
 from .stand_in import CASE, StandIn, ask, evaluator
@@ -448,8 +448,8 @@ def test_the_sources_hash_tells_names_and_contents(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whatever the order in which a disk lists them; other files count for nothing."""
-    monkeypatch.setattr(sources_module, "files", lambda package: tmp_path / package)
-    for package in sources_module.PACKAGES:
+    monkeypatch.setattr(provenance, "files", lambda package: tmp_path / package)
+    for package in provenance.PACKAGES:
         (tmp_path / package / "in").mkdir(parents=True)
     path = tmp_path / "tyrecal" / "in" / "a.py"
     hashes = []

@@ -15,8 +15,8 @@ import pytest
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.simulate.modes.find import match
 from tyrecal.simulate.modes.label import Label, label_modes
-from tyrecal.simulate.modes.match import match
 from tyrecal.tyre.case import LoadedCase, start_values, with_level
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.values import with_values

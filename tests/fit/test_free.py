@@ -14,8 +14,7 @@ from tyrecal.errors import InputError
 from tyrecal.measured.load import load_case
 from tyrecal.simulate.evaluate.evaluator import Question
 from tyrecal.studies.fit.calibrate import Fit
-from tyrecal.studies.fit.free import with_freed, without_freed
-from tyrecal.studies.fit.freed import freed_variables
+from tyrecal.studies.fit.free import freed_variables, with_freed, without_freed
 from tyrecal.studies.fit.result import FitResult
 from tyrecal.studies.fitted import read_fitted
 from tyrecal.studies.inference.regions import split_by_region

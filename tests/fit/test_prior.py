@@ -16,8 +16,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import DeckRefused
 from tyrecal.studies.fit import model_errors
-from tyrecal.studies.fit.free import with_freed
-from tyrecal.studies.fit.freed import freed_variables
+from tyrecal.studies.fit.free import freed_variables, with_freed
 from tyrecal.studies.fit.prior import PriorProblem
 from tyrecal.studies.fit.uncertainty import uncertainty
 from tyrecal.studies.variable import read_variable

@@ -13,7 +13,7 @@ from scipy.optimize import lsq_linear, minimize
 from tyrecal.studies.fit import gauss_newton, search, slsqp
 from tyrecal.studies.fit.calibrate import METHODS, _tolerance
 from tyrecal.studies.fit.crossing import AXIAL, TORSIONAL, Crossing, crossing, gap
-from tyrecal.studies.fit.curvature import (
+from tyrecal.studies.fit.gauss_newton import (
     curved_step,
     foreseen,
     nearest,

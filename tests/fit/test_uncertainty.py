@@ -18,7 +18,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.modes.find import LabelledModes, find_modes
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.fit.model_errors import ModelErrors
+from tyrecal.studies.fit.model_errors import ModelErrors, road_changes
 from tyrecal.studies.fit.prediction import (
     FitResponses,
     predicted_errors,
@@ -28,7 +28,6 @@ from tyrecal.studies.fit.prediction import (
 from tyrecal.studies.fit.problem import Point, Problem
 from tyrecal.studies.fit.responses import FitResponse
 from tyrecal.studies.fit.road import press
-from tyrecal.studies.fit.road_errors import road_changes
 from tyrecal.studies.fit.targets import ValueTarget, read_targets
 from tyrecal.studies.fit.total_error import BY_SECTION, TotalError, total_error
 from tyrecal.studies.fit.uncertainty import uncertainty

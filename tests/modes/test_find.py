@@ -13,11 +13,9 @@ from tyrecal.simulate.deck.decks import steps
 from tyrecal.simulate.evaluate.evaluator import Question
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode
-from tyrecal.simulate.modes.find import MORE_MODES, LabelledModes, find_modes
-from tyrecal.simulate.modes.follow import follow
+from tyrecal.simulate.modes.find import MORE_MODES, LabelledModes, find_modes, margin, match
 from tyrecal.simulate.modes.label import Label, Mode, label_modes, labelled
-from tyrecal.simulate.modes.match import margin, match
-from tyrecal.simulate.modes.rings import harmonic_of, on_rings
+from tyrecal.simulate.modes.rings import follow, harmonic_of, on_rings
 
 from ..chance import generator
 from ..fit.fake import CASE, LABELS, POWERS, START, TARGETS, FakeEvaluator

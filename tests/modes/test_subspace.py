@@ -4,8 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tyrecal.simulate.evaluate.results import HarmonicShape
-from tyrecal.simulate.modes.rings import on_rings
-from tyrecal.simulate.modes.subspace import mac, squared_cosines
+from tyrecal.simulate.modes.rings import mac, on_rings, squared_cosines
 
 from ..chance import generator
 

@@ -19,8 +19,15 @@ from threadpoolctl import threadpool_limits
 from tyrecal.files import PICTURE_FORMATS
 from tyrecal.report import shapes
 from tyrecal.report.convergence import draw_convergence
-from tyrecal.report.drawn import read_drawn_numbers
-from tyrecal.report.figure import COLOURS, GREY, in_house_style, new_figure, save, svg
+from tyrecal.report.figure import (
+    COLOURS,
+    GREY,
+    in_house_style,
+    new_figure,
+    read_drawn_numbers,
+    save,
+    svg,
+)
 from tyrecal.report.section import draw_section
 from tyrecal.report.shape_data import section_data
 from tyrecal.report.shapes import draw_modes_overview, title

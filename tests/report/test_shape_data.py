@@ -26,8 +26,7 @@ from tyrecal.simulate.evaluate import evaluator as door_module
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode, RingShape
 from tyrecal.simulate.modes.label import Label, Mode, paired_labels
-from tyrecal.studies.footprint import press
-from tyrecal.studies.patch import patch_of
+from tyrecal.studies.footprint import patch_of, press
 from tyrecal.tyre.case import start_values
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.resolve import resolved

@@ -18,8 +18,8 @@ from pathlib import Path
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
+from tyrecal.simulate.modes.find import match
 from tyrecal.simulate.modes.label import Label, label_modes
-from tyrecal.simulate.modes.match import match
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.values import with_values

@@ -37,8 +37,8 @@ from tyrecal.simulate.deck.calculix import PLY_THICKNESS_M
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
+from tyrecal.simulate.modes.find import match
 from tyrecal.simulate.modes.label import Label, label_modes
-from tyrecal.simulate.modes.match import match
 from tyrecal.studies.blind.answer import rows_of, tyre_model
 from tyrecal.studies.blind.draw import Truth, draw, tyre
 from tyrecal.studies.blind.laws import OUTSIDE_FAMILIES, EffectLaw

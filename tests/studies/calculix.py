@@ -35,9 +35,9 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.results import HarmonicShape
 from tyrecal.simulate.evaluate.store import Store
+from tyrecal.simulate.modes.find import match
 from tyrecal.simulate.modes.label import Label, Mode, label_modes
-from tyrecal.simulate.modes.match import match
-from tyrecal.simulate.modes.subspace import mac
+from tyrecal.simulate.modes.rings import mac
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.section import mesh as mesh_module

@@ -45,11 +45,15 @@ from tyrecal.studies.diagnose.several import present, probabilities, weigh_hypot
 from tyrecal.studies.diagnose.verdict import decide
 from tyrecal.studies.fit.targets import target_labels
 from tyrecal.studies.inference.covariance import model_form
-from tyrecal.studies.inference.damping import DAMPING_FORM
+from tyrecal.studies.inference.damping import (
+    ASSUMED_LOSS,
+    ASSUMED_LOSS_SD,
+    DAMPING_FORM,
+    STATED_LOSS_SD,
+)
 from tyrecal.studies.inference.effect_ranges import effect_ranges
 from tyrecal.studies.inference.expansion import MIDDLE, carried, expand, refined
 from tyrecal.studies.inference.inverse_problem import InverseProblem
-from tyrecal.studies.inference.losses import ASSUMED_LOSS, ASSUMED_LOSS_SD, STATED_LOSS_SD
 from tyrecal.studies.inference.model import Answer, Query
 from tyrecal.studies.inference.observations import DampingRatios, Observable, Observations
 from tyrecal.studies.inference.plain_fit import plain_fit

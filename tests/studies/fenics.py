@@ -32,9 +32,9 @@ import numpy as np
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode
+from tyrecal.simulate.modes.find import match
 from tyrecal.simulate.modes.label import Label, Mode, label_modes
-from tyrecal.simulate.modes.match import match
-from tyrecal.simulate.modes.subspace import mac
+from tyrecal.simulate.modes.rings import mac
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.resolve import resolved
 

@@ -36,8 +36,7 @@ from tyrecal.simulate.modes.find import LabelledModes, find_modes
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.fit.prediction import FitResponses, predicted_errors
 from tyrecal.studies.fit.result import FitResult
-from tyrecal.studies.inference.covariance import by_laws
-from tyrecal.studies.inference.form_error import MATERIAL_LAWS
+from tyrecal.studies.inference.covariance import MATERIAL_LAWS, by_laws
 from tyrecal.studies.inference.observations import Observable
 from tyrecal.studies.inference.section_fields import fields, with_fields
 from tyrecal.studies.inference.uncertainties import sources, values_of

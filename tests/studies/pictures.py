@@ -19,7 +19,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from tyrecal.report.drawn import Panel, read_drawn_numbers
+from tyrecal.report.figure import Panel, read_drawn_numbers
 
 ROOT = Path(__file__).parents[2]
 PICTURES = ROOT / "cases" / "pictures"

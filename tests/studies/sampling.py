@@ -33,8 +33,7 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.modes.label import Label, labelled
 from tyrecal.studies.emulator import emulator
 from tyrecal.studies.fit.targets import read_targets
-from tyrecal.studies.inference.covariance import alike, covariance
-from tyrecal.studies.inference.form_error import form_error
+from tyrecal.studies.inference.covariance import alike, covariance, form_error
 from tyrecal.studies.inference.observations import Observable, Observations
 from tyrecal.studies.inference.tyre_model import TyreModel
 from tyrecal.studies.inference.uncertainties import sources

@@ -17,8 +17,15 @@ from tyrecal.simulate.evaluate import evaluator as door_module
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.simulate.evaluate.pressed import Pressed
-from tyrecal.studies.footprint import FootprintRow, findings, footprint_result, footprint_row, press
-from tyrecal.studies.patch import Patch, patch_of
+from tyrecal.studies.footprint import (
+    FootprintRow,
+    Patch,
+    findings,
+    footprint_result,
+    footprint_row,
+    patch_of,
+    press,
+)
 from tyrecal.studies.result import StudyInput
 from tyrecal.studies.stiffness import StiffnessResult, at_constant_load, run
 from tyrecal.tyre.case import start_values, with_level

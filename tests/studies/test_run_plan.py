@@ -11,8 +11,7 @@ import pytest
 
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
-from tyrecal.studies import difference_runs, run_plan
-from tyrecal.studies.difference_runs import runs_in_words
+from tyrecal.studies import run_plan
 from tyrecal.studies.fit.study import FitStudy
 from tyrecal.studies.run_plan import (
     FIRST_LOAD_S,
@@ -20,6 +19,7 @@ from tyrecal.studies.run_plan import (
     PlannedState,
     RunPlan,
     plan_runs,
+    runs_in_words,
 )
 from tyrecal.tyre.load import load_case
 
@@ -153,6 +153,6 @@ class Tyre:
     ],
 )
 def test_runs_and_time(tyre: Tyre, words: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(difference_runs, "monotonic", lambda: tyre.counts.clock_s)
+    monkeypatch.setattr(run_plan, "monotonic", lambda: tyre.counts.clock_s)
     assert words in runs_in_words(tyre, {}, 300, 2)  # type: ignore[arg-type]
     assert tyre.counts.runs == bool(words)

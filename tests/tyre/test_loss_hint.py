@@ -12,10 +12,9 @@ from typing import Any
 import pytest
 
 from tyrecal.tyre.case import LoadedCase
-from tyrecal.tyre.case.loss_hint import lossless_hint, prony_hints
+from tyrecal.tyre.case.hints import lossless_hint, prony_hints, slack_cord_hint
 from tyrecal.tyre.case.new_case import from_size
 from tyrecal.tyre.case.parts import Prony
-from tyrecal.tyre.case.slack_hint import slack_cord_hint
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.section.size import parse_size
 

@@ -13,12 +13,12 @@ import pytest
 from scipy import interpolate
 
 from tyrecal.errors import InputError
+from tyrecal.tyre.section.curve import CubicSpline
 from tyrecal.tyre.section.from_size import build, usual
 from tyrecal.tyre.section.mesh import build_mesh
 from tyrecal.tyre.section.outline import read_outline, section_of_outline
 from tyrecal.tyre.section.section import SectionError, from_gauges, read_section
 from tyrecal.tyre.section.size import parse_size
-from tyrecal.tyre.section.spline import CubicSpline
 
 from ..chance import generator
 

@@ -45,9 +45,8 @@ from ..simulate.deck.decks_design import design_of
 from ..simulate.evaluate.evaluator import Evaluator
 from ..simulate.evaluate.failure import EvaluationFailed, SolverUnavailable
 from ..simulate.evaluate.solver import solver_facts
-from ..simulate.evaluate.sources import sources
 from ..simulate.evaluate.store import Store, solver_identity
-from ..simulate.provenance import provenance
+from ..simulate.provenance import provenance, sources
 from ..studies.fitted import NOT_CONVERGED, has_good
 from ..studies.result import StudyInput
 from ..tyre.case import LoadedCase, start_values, with_level

@@ -1,14 +1,15 @@
-"""All cases of a batch through an executor."""
+"""All cases of a batch through an executor, and their summary, the content of batch.json."""
 
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from pathlib import Path
 
 from ..errors import InputError
-from ..files import printable
+from ..files import Json, printable
 from ..simulate.evaluate.executor import executor
 from ..simulate.evaluate.failure import EvaluationFailed
 from .case import CaseTask, Report, lost, run_case
@@ -54,3 +55,37 @@ def run_batch(
             reports[place] = answer
             notify(answer)
     return [reports[place] for place in range(len(tasks))]
+
+
+# the worst first. error: a study gave no result; failed: it has one that is no good, as a fit that
+# did not converge; drifted: a quantity is off the baseline
+VERDICTS = ("error", "failed", "drifted", "good")
+
+
+def summary(studies: Sequence[str], reports: Sequence[Report], drift: Json | None) -> Json:
+    """Results only: ``studies``; ``counts`` of cases by verdict; ``cases``, each with its
+    ``verdict``, provenance and studies; ``baseline``, as `drift.compare` says, or None."""
+    drifted = {each["case"] for each in drift["drifted"]} if drift else set()
+    cases = [
+        {
+            "name": report["name"],
+            "verdict": _verdict(report, report["name"] in drifted),
+            "provenance": report["provenance"],
+            "studies": report["studies"],
+        }
+        for report in reports
+    ]
+    counts = Counter(case["verdict"] for case in cases)
+    return {
+        "format": 1,
+        "studies": list(studies),
+        "counts": {"cases": len(cases), **{verdict: counts[verdict] for verdict in VERDICTS}},
+        "cases": cases,
+        "baseline": drift,
+    }
+
+
+def _verdict(report: Report, drifted: bool) -> str:
+    statuses = {entry["status"] for entry in report["studies"].values()}
+    statuses |= {"drifted"} if drifted else set()
+    return next((verdict for verdict in VERDICTS if verdict in statuses), "good")

@@ -142,9 +142,8 @@ def command(
         warm_up()  # while we import
     from ..batch.case import CaseTask
     from ..batch.junit import junit as junit_xml
-    from ..batch.run import names_of, run_batch
+    from ..batch.run import names_of, run_batch, summary
     from ..batch.studies import Asked
-    from ..batch.summary import summary
     from ..simulate.evaluate.cluster import reached
     from ..simulate.settings import root
     from .output import Run

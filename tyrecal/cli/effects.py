@@ -114,7 +114,7 @@ def command(
             terminal.say(f"{each.id}: solver '{adapter.name}' cannot express it")
     terminal.detail(f"each at {', '.join(f'{p:g}' for p in kPa)} kPa")
     if not evaluator.has_gradients:
-        from ..studies.difference_runs import runs_in_words
+        from ..studies.run_plan import runs_in_words
 
         # at each pressure: the plain tyre, a neighbour by each variable, and each effect
         runs = len(kPa) * (1 + len(values) + len(able))

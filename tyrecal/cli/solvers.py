@@ -31,7 +31,7 @@ def command(selftest: str | None, output: Path | None, terminal: Terminal) -> in
     tyrecal solvers --selftest abaqus --output for_a_colleague
     """
     if selftest:
-        from ..simulate.doctor.selftest import write_selftest
+        from ..simulate.doctor.self_check import write_selftest
 
         paths = write_selftest(output or Path(f"{selftest}_selftest"))
         terminal.result([str(path) for path in paths])

@@ -32,8 +32,7 @@ def command(case: Path, allow_unusual: bool, terminal: Terminal) -> int:
     from ..measured.load import judged
     from ..tyre.case import overruled
     from ..tyre.case.case_text import flow_lines
-    from ..tyre.case.loss_hint import lossless_hint, prony_hints
-    from ..tyre.case.slack_hint import slack_cord_hint
+    from ..tyre.case.hints import lossless_hint, prony_hints, slack_cord_hint
 
     loaded, mistakes = judged(case, allow_unusual)
     if loaded and (refused := _refused(loaded)):

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ..simulate.modes.label import in_words
-from ..simulate.modes.subspace import squared_cosines
+from ..simulate.modes.rings import squared_cosines
 from .shapes import SensorShapes
 
 Array = np.ndarray

@@ -12,14 +12,13 @@ from ..files import Json, open_file
 from ..simulate.modes.label import Label
 from ..tyre.state import TyreState
 from .arrangement import arrange
-from .formats import HEAD, PROPERTY_FILE, TYDEX, other_format
 from .measurement import Measurement
 from .modal import Geometry, LabelledMode, Layout, ModalTest, measurements_of, read_modal_test
 from .repeats import FLOOR, combined, one_for_both
 from .sense import doubts
 from .shapes import SensorShapes, shapes_of
 from .slips import common_shifts, contradictions
-from .tables import read_table
+from .tables import HEAD, PROPERTY_FILE, TYDEX, other_format, read_table
 from .tir import property_measurements
 from .tydex import tydex_measurements
 from .universal import Place, Universal, is_same_place, is_universal, read_universal

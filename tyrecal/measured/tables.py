@@ -3,6 +3,8 @@
 A table has a line of headings; each says what the column holds, and its unit in brackets or
 after a low line: ``Frequency [Hz]``, ``f (Hz)``, ``Fülldruck [bar]``, ``pressure_kPa``. The
 measurements CSV is such a table, too. ``tyre.number_table`` reads cells and numbers.
+
+Files of other formats are recognised by how they begin, so that a message can name them.
 """
 
 from __future__ import annotations
@@ -20,9 +22,28 @@ from ..tyre.number_table import NumberMarks, cells_under, read_text_table
 from ..tyre.usual import MAX_SIGMA
 from ..units import QUANTITIES
 from .columns import NUMBER_MEANINGS, TableColumn, is_unit, meaning_of, read_columns, unit_of
-from .formats import PROPERTY_FILE, TYDEX, other_format
 from .line import Line
 from .measurement import CSV_COLUMNS, DAMPING_RATIO, RIM_COLUMN, Measurement
+
+HEAD = 4096  # bytes that tell
+PROPERTY_FILE, TYDEX = "tyre property file (.tir)", "TYDEX file"
+FORMATS = (
+    (rb"MATLAB [57]\.\d MAT-file", "MATLAB file (.mat)"),
+    (rb"\x89HDF\r\n\x1a\n", "HDF5 file"),
+    (
+        rb"(?im)^\s*\[(?:MDI_HEADER|UNITS|MODEL|DIMENSION|OPERATING_CONDITIONS|VERTICAL)\]",
+        PROPERTY_FILE,
+    ),
+    (rb"(?im)^\*\*(?:HEADER|CONSTANTS|MEASURCHANNELS)", TYDEX),
+)
+
+
+def other_format(raw: bytes) -> str | None:
+    """Name of the format of a file that is neither a table nor a universal file; None if it may
+    be one. raw: the file, or its first 4096 bytes."""
+    head = raw[:HEAD]
+    return next((name for pattern, name in FORMATS if re.search(pattern, head)), None)
+
 
 MAX_LINES = 10_000  # of a file
 MAX_TITLES = 20  # lines in which the headings are looked for

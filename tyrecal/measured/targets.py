@@ -4,6 +4,8 @@ A target has a state: pressure, load and rim. None in a state means "as the case
 (`TyreState.of` writes it so, `with_defaults` writes the case's own). The case that a user has
 changed (`--set`, `LoadedCase.overrides`) keeps the file's own one as ``LoadedCase.as_read``.
 `LoadedCase.measured` is the file of measurements that a case names, or None.
+
+Fits and diagnoses call `readings_with_shapes` for the measurements of any file.
 """
 
 from __future__ import annotations
@@ -25,8 +27,9 @@ from ..tyre.state import AS_THE_CASE, PRESSURE_PATH, RIM_FREE, WHEEL_FREE, TyreS
 from ..tyre.values import set_values
 from .measurement import Measurement
 from .repeats import mean_damping
-from .shapes import SAME_PRESSURE_kPa
+from .shapes import SAME_PRESSURE_kPa, SensorShapes, read_shapes
 from .tables import read_measurements
+from .universal import is_universal
 
 PRESSED_RIM: RimSupport = "fixed"  # footprints are computed with the rim clamped
 
@@ -243,3 +246,23 @@ def _footprint(case: LoadedCase, readings: Sequence[Measurement]) -> list[Target
 
 def _mass(reading: Measurement) -> TargetMass:
     return TargetMass(mass_kg=reading.value, sigma_kg=reading.sigma)
+
+
+def readings_with_shapes(
+    case: LoadedCase, path: Path
+) -> tuple[list[Measurement], list[SensorShapes]]:
+    """Measurements of a file, with or without labels, and the shapes measured with them: of a
+    universal file at the case's pressure `unlabelled`, else those that were imported with the file.
+
+    Raises InputError, OSError.
+    """
+    if not is_universal(path):
+        return readings_of(case, path, labelled=False), read_shapes(path)
+    from .gather import unlabelled  # which identifies modes: SciPy is slow to import
+
+    try:
+        readings, shapes, _ = unlabelled(path, case.case.pressure_kPa)
+    except InputError as error:
+        way = "'tyrecal measured import --no-labels' has options for universal files"
+        raise InputError(f"{error}; {way}") from None
+    return readings, shapes

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from ..files import json_text
-from ..studies.diagnose.constants_posterior import constants_posterior
 from ..studies.diagnose.diagnosis import Diagnosis
 from ..studies.diagnose.evidence import COVERAGE, NONE, OUTSIDE, PRIOR_OUTSIDE
 from ..studies.diagnose.gap import OWN_RIM
+from ..studies.diagnose.posteriors import constants_posterior
 from ..studies.diagnose.result import DiagnosisResult
 from ..studies.diagnose.several import PRIOR_NONE, present
 from ..studies.diagnose.study import DiagnosedCase

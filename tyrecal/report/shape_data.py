@@ -15,8 +15,8 @@ from ..simulate.evaluate.pressed import Pressed
 from ..simulate.evaluate.results import Evaluation, HarmonicShape
 from ..simulate.modes.label import Mode
 from ..simulate.modes.loaded import MIRROR
+from ..studies.footprint import patch_of
 from ..studies.loaded import LoadedTyre
-from ..studies.patch import patch_of
 from ..studies.result import Named, Result, ResultPart, Wave
 from ..tyre.case import LoadedCase
 from ..tyre.effects.bead_seat import GAP_ENDING

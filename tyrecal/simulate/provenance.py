@@ -1,4 +1,5 @@
-"""Origin of results: tool, solver, tyre, state, mesh and measurements, the same in every file."""
+"""Origin of results: tool, solver, tyre, state, mesh and measurements, the same in every file; and
+the hash of the tool's own sources, so that results of two editions are never mixed."""
 
 from __future__ import annotations
 
@@ -15,6 +16,8 @@ from ..version import __version__
 
 if TYPE_CHECKING:
     from .evaluate.solver import Solver
+from functools import lru_cache
+from importlib.resources import files
 
 KEY = "provenance"
 OneOrMore = float | Sequence[float]
@@ -82,3 +85,18 @@ def _rim(case: LoadedCase) -> str:
 
 def _plain(number: OneOrMore) -> float | list[float]:
     return float(number) if isinstance(number, int | float) else [float(each) for each in number]
+
+
+PACKAGES = {"tyrecal": "*.py", "tyrecal_solvers": "*.py", "tyrecal_templates": "*.j2"}
+
+
+@lru_cache(maxsize=1)
+def sources() -> str:
+    """Hash of all Python files and templates of the tool and its solvers, 64 hexadecimal digits."""
+    digest = sha256()
+    for package, pattern in PACKAGES.items():
+        root = Path(str(files(package)))
+        for path in sorted(root.rglob(pattern)):
+            digest.update(f"{package}/{path.relative_to(root).as_posix()}\0".encode())
+            digest.update(sha256(path.read_bytes()).digest())
+    return digest.hexdigest()

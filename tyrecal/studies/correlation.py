@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from ..simulate.modes.label import in_words
-from ..simulate.modes.subspace import squared_cosines
+from ..simulate.modes.rings import squared_cosines
 from .result import Column, ResultPart, Table
 
 if TYPE_CHECKING:  # those who read results need no SciPy

@@ -13,8 +13,8 @@ from ..files import Json
 from ..simulate.evaluate.evaluator import Evaluator
 from ..simulate.evaluate.failure import EvaluationFailed
 from ..simulate.modes.find import LabelledModes
-from ..simulate.modes.follow import follow
 from ..simulate.modes.label import FAMILIES, Label, Mode, labelled
+from ..simulate.modes.rings import follow
 from ..tyre.case import LoadedCase
 from ..tyre.state import pressure_name
 from .result import Failed, Notify, ResultPart, silent

@@ -52,7 +52,7 @@ class PressureSweep(Result):
     """pressure_sweep.json"""
 
     study, stem, heading = "sweep-pressure", "pressure_sweep", "Frequencies over pressure"
-    part = "tyrecal.report.html.pressure:part"
+    part = "tyrecal.report.html.states:pressure_part"
     figures = "tyrecal.report.pressure:figures"
     follows_fit = True
 

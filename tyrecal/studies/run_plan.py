@@ -1,15 +1,20 @@
 """How often the solver runs for a study, on how large a problem, and about how long it takes.
-Commands print it with --dry-run; on the road, where a run takes minutes, always."""
+Commands print it with --dry-run; on the road, where a run takes minutes, always.
+
+Where the solver gives no exact sensitivities, commands print how many runs differences take, and
+how long, before they begin.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from time import monotonic
 
 from ..files import Json
 from ..simulate.deck.decks_design import design_of
-from ..simulate.evaluate.evaluator import Evaluator
+from ..simulate.evaluate.evaluator import Evaluator, Question
 from ..tyre.case import LoadedCase
 from ..tyre.values import paths_of, value_at
 
@@ -227,3 +232,25 @@ def available_memory_bytes() -> float | None:
         return 1024.0 * next(int(x.split()[1]) for x in lines if x.startswith("MemAvailable:"))
     except (OSError, ValueError, StopIteration):
         return None
+
+
+def runs_in_words(
+    evaluator: Evaluator, values: Mapping[str, float], runs: int, jobs: int = 1
+) -> str:
+    """A sentence on about so many ``runs``, ``jobs`` at a time; "" for exact sensitivities. The
+    design ``values`` is run to measure the time, again if it is recorded. Raises what
+    ``Evaluator.evaluate`` does."""
+    if evaluator.has_gradients:
+        return ""
+    before = evaluator.counts.runs
+    for each in (evaluator, replace(evaluator, store=None)):
+        began = monotonic()
+        each.evaluate(Question(values))
+        seconds = monotonic() - began
+        if evaluator.counts.runs > before:
+            break
+    return (
+        f"sensitivities are differences: about {runs} runs of solver '{evaluator.solver.name}',"
+        f" {time_in_words(seconds)} each: about {time_in_words(runs * seconds / jobs)} with {jobs}"
+        " at a time, less where runs are recorded"
+    )

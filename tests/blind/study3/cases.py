@@ -14,8 +14,7 @@ from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.case.new_case import from_file, from_size
 from tyrecal.tyre.effects.edit import changed, with_part
 from tyrecal.tyre.load import load_case
-from tyrecal.tyre.section.from_size import BELOW, BELTED
-from tyrecal.tyre.section.gauge_table import GaugeTable
+from tyrecal.tyre.section.from_size import BELOW, BELTED, GaugeTable
 from tyrecal.tyre.section.size import parse_size
 
 from .section import TREAD, VOID, Mould, at, carcass, mould

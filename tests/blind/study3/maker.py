@@ -12,8 +12,8 @@ import numpy as np
 from tyrecal.errors import InputError
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.results import HarmonicShape, RawMode
+from tyrecal.simulate.modes.find import match
 from tyrecal.simulate.modes.label import Label, label_modes
-from tyrecal.simulate.modes.match import match
 from tyrecal.studies.blind.maker import Computed
 
 from ...studies.judge import PYTHON

@@ -12,9 +12,8 @@ from typing import Any
 
 from ...errors import InputError
 from ...tyre.case import LoadedCase, number_at, start_values
-from ...tyre.case.loss_hint import lossless_hint
+from ...tyre.case.hints import lossless_hint, slack_cord_hint
 from ...tyre.case.schema import SolverChoice
-from ...tyre.case.slack_hint import slack_cord_hint
 from ...tyre.effects import catalogue
 from ...tyre.resolve import Tyre, resolved
 from ...tyre.templates import TemplateFailed, TemplateNames, environment, render

@@ -20,9 +20,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from threadpoolctl import threadpool_limits
 
 from ...files import Json
+from ..provenance import sources
 from ..settings import typed
 from .failure import EvaluationFailed, SolverUnavailable
-from .sources import sources
 
 SCHEDULER_PATIENCE_S = 20.0  # for a scheduler to answer
 log = logging.getLogger("tyrecal")

@@ -1,23 +1,48 @@
 """Labelled modes of designs; more modes are computed if a wanted label is not among the first.
 
-Where the solver gives no exact sensitivities, they are differences to neighbouring designs.
-"""
+Where the solver gives no exact sensitivities, they are differences to neighbouring designs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
 from ..evaluate.evaluator import Evaluator, Question
 from ..evaluate.failure import DeckRefused, EvaluationFailed
-from ..evaluate.neighbours import neighbours
 from ..evaluate.results import Evaluation
 from .label import Label, Mode, paired_labels
-from .match import margin, match
 
 Array = np.ndarray
+
+
+Key = TypeVar("Key", bound=Hashable)
+Reply = TypeVar("Reply")
+
+
+def neighbours(
+    sides: Mapping[Key, Sequence[float]], ask: Callable[[Mapping[Key, float]], Iterable[Reply]]
+) -> dict[Key, tuple[float, Reply]]:
+    """The neighbour of each number and what was answered there: on the first of its ``sides``, or
+    on the next one if that has no solution.
+
+    ask: answers for one neighbour of each number, in order. A failure is the answer if no side has
+    a solution, or without a licence, because then the other side would fail, too.
+    """
+    left = {key: list(each) for key, each in sides.items()}
+    known: dict[Key, tuple[float, Reply]] = {}
+    while left:
+        here = {key: each.pop(0) for key, each in left.items()}
+        for (key, neighbour), answer in zip(here.items(), ask(here), strict=True):
+            denied = getattr(answer, "denied", False)
+            if not isinstance(answer, Exception) or denied or not left[key]:
+                known[key] = neighbour, answer
+                del left[key]
+    return known
+
+
 # per harmonic, one after the other, if a label is not among the modes first computed
 MORE_MODES = (4, 8)
 # labels that are wanted of a question, from its index and its modes
@@ -161,3 +186,32 @@ def modes_in_order(
     questions = [Question(*each) for each in designs]
     answers = dict(find_modes(evaluator, questions, wanted, jobs))
     return [answers[place] for place in range(len(questions))]
+
+
+def match(modes: Sequence[Mode], targets: Sequence[Label]) -> dict[Label, Mode]:
+    """The mode of each target. Labels of one evaluation are unique: ``label_modes`` settled
+    shared orders, the two [0,0] among them, by assignment.
+
+    Raises EvaluationFailed (lost_label) naming every target that no mode carries.
+    """
+    by_label = {mode.label: mode for mode in modes}
+    lost = [label for label in targets if label not in by_label]
+    if lost:
+        waves = {label.c for label in lost}
+        near = [
+            f"{mode.label.display} at {mode.frequency_Hz:.2f} Hz"
+            for mode in sorted(modes, key=lambda mode: mode.frequency_Hz)
+            if mode.label.c in waves
+        ]
+        raise EvaluationFailed(
+            "lost_label",
+            f"no mode is {', '.join(label.display for label in lost)}; with"
+            f" {' or '.join(map(str, sorted(waves)))} waves round the circumference there"
+            f" {'are ' + ', '.join(near) if near else 'is none'}",
+        )
+    return {label: by_label[label] for label in targets}
+
+
+def margin(matched: dict[Label, Mode]) -> float:
+    """The smallest clarity of the matched modes, 0 (some label is a tie) to 1."""
+    return min((mode.clarity for mode in matched.values()), default=1.0)

@@ -19,10 +19,10 @@ from ...measured.tables import read_measurements
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.pool import process_pool
 from ...tyre.case import LoadedCase
+from ..diagnose.calibrated import likeliest
 from ..diagnose.diagnosis import Diagnosis, diagnose
 from ..diagnose.evidence import NONE
 from ..diagnose.result import diagnosis_result
-from ..diagnose.unmeasured import likeliest
 from ..inference.effect_ranges import effect_ranges
 from ..inference.expansion import Expansion, expand
 from ..inference.inverse_problem import Assumed

@@ -25,7 +25,7 @@ import numpy as np
 from ...errors import InputError
 from ...files import Json
 from ...simulate.modes.label import Label
-from ..inference.form_error import LAWS_LENGTH, form_error
+from ..inference.covariance import LAWS_LENGTH, form_error
 from ..inference.model import Answer, ModelRow, Query, ResponseModel, state_of
 from .protocol import Protocol, read_json
 

@@ -1,13 +1,23 @@
-"""Design variables as a diagnosis calibrates them, without an effect and with the likeliest."""
+"""Design variables as a diagnosis calibrates them, without an effect and with the likeliest, and
+predictions for modes that were not measured."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ...files import Json
+from ..inference.inverse_problem import InverseProblem
+from ..inference.model import ModelRow
+from ..inference.observations import Observable, Observations
 from ..inference.tyre_model import TyreModel
 from .diagnosis import Diagnosis
-from .evidence import NONE
+from .evidence import NONE, Hypothesis
+
+Array = np.ndarray
+
 
 SLOPE_STEP = 1e-6  # of x, for the slope of a variable in its own unit
 
@@ -44,3 +54,21 @@ def _calibrated(diagnosis: Diagnosis, model: TyreModel, key: str) -> dict[str, J
         }
         for i, name in enumerate(values)
     }
+
+
+def likeliest(
+    problem: InverseProblem, hypothesis: Hypothesis, rows: Sequence[ModelRow], places: Array
+) -> Array:
+    """ln values (m,) of the rows with the indices ``places``, at the likeliest sizes and variables
+    of an explanation, with constants as they are stated."""
+    best = int(np.argmax(hypothesis.posterior))
+    eta, unknown = problem.expansion.eta[places], np.full(len(places), np.nan)
+    unseen = tuple(Observable.of(rows[i]) for i in places)
+    observations = Observations(
+        unseen, eta, 0 * eta, common=0.0, split=unknown, split_scatter=unknown
+    )
+    effects = {id: e[[best]] for id, e in hypothesis.values.items()}
+    d, zeta = hypothesis.fitted.d[[best]], float(hypothesis.fitted.zeta[best])
+    there = replace(problem, observations=observations, places=places, zeta=0.0)
+    uncoupled = there.predicted(effects, d)[0]  # decides which of two near modes is the upper one
+    return replace(there.measured(uncoupled), zeta=zeta).predicted(effects, d)[0]

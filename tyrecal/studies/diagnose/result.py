@@ -23,9 +23,9 @@ from .. import named
 from ..inference.observations import Observable
 from ..labels import Labels
 from ..result import Column, CsvRow, Result, ResultPart, StudyInput, Table, rows_csv
-from .constants_posterior import ConstantShift, constants_posterior
 from .evidence import NONE, OUTSIDE
 from .gap import projection
+from .posteriors import ConstantShift, constants_posterior
 from .shrinkage import Shrinkage
 from .verdict import Further, VerdictKind, holds
 from .where import FieldValue, PartChange

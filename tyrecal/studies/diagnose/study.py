@@ -11,15 +11,13 @@ import numpy as np
 from ...errors import InputError
 from ...files import Json
 from ...measured.measurement import Measurement
-from ...measured.readings import readings_with_shapes
-from ...measured.targets import in_states, readings_of
+from ...measured.targets import in_states, readings_of, readings_with_shapes
 from ...simulate.evaluate.evaluator import Evaluator
 from ...tyre.case import LoadedCase
 from ...tyre.case.mistakes import suggestion
 from ...tyre.effects import catalogue
 from ...tyre.number_units import EFFECT_PATH
 from ...units import read_number
-from ..difference_runs import runs_in_words
 from ..fit.targets import rims_of
 from ..inference.check_units import check_units
 from ..inference.effect_ranges import effect_ranges
@@ -33,7 +31,7 @@ from ..inference.uncertainties import Source, calibrated, sources
 from ..labelling.label import label
 from ..labelling.result import labels_posterior
 from ..labels import Labels
-from ..run_plan import PlannedState, RunPlan
+from ..run_plan import PlannedState, RunPlan, runs_in_words
 from ..variable import read_variables
 from .calibrated import calibrated_variables
 from .diagnosis import Diagnosis, diagnose
@@ -41,8 +39,8 @@ from .evidence import NONE
 from .label_swap import rows_if_exchanged
 from .labelings import Reading, likely, with_probabilities
 from .next_measurement import OtherStates
+from .posteriors import section_posterior
 from .result import DiagnosisResult, diagnosis_result
-from .section_posterior import section_posterior
 from .under_load import UnderLoad, Values, compare
 from .where import FieldValue
 

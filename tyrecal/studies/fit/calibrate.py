@@ -15,7 +15,7 @@ from ...simulate.evaluate.executor import executor, in_order
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...tyre.case.schema import cannot_fit
 from ...tyre.state import pressure_name
-from ..far_off import far_off
+from ..inference.check_units import far_off
 from ..notebook import Notebook
 from ..result import csv_text
 from . import gauss_newton, slsqp

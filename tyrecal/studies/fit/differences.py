@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import numpy as np
 
 from ...simulate.evaluate.failure import EvaluationFailed
-from ...simulate.evaluate.neighbours import neighbours
+from ...simulate.modes.find import neighbours
 from ..variable import DesignVariable
 
 Array = np.ndarray

@@ -3,22 +3,61 @@
 Each is bounded by three of its standard deviations. What is known of it stays a value like those
 that were measured, so that the fit weighs both: q = 1 + 0.01 (x - x0) / s, known to be 1 with a
 standard deviation of 0.01. Its residual is (x - x0) / s, x the number itself, x0 what is known of
-it and s the standard deviation of that; 1 and 0.01 make it a target above 0 in any unit.
-"""
+it and s the standard deviation of that; 1 and 0.01 make it a target above 0 in any unit."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Self
+
+import numpy as np
 
 from ...errors import InputError
 from ...files import Json
 from ...tyre.case import LoadedCase, number_at
 from ...tyre.case.mistakes import suggestion
+from ...tyre.case.schema import Variable
 from ...tyre.number_units import EFFECT_PATH, unit_of
 from ...tyre.own_deck.numbers import as_known
 from ..inference.uncertainties import Source, sources
-from .freed import FreedVariable, freed_variables
+
+
+class FreedVariable(Variable):
+    """A number, and others that move with it as their uncertainty states: the variable's value is
+    the first number's."""
+
+    starts: list[float]  # each number as it is known, in its own unit
+    steps: list[float]  # change of each by one standard deviation
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation of the first number."""
+        return abs(self.steps[0])
+
+    def in_sd(self, value: float) -> float:
+        """How far a value is from what is known, in standard deviations."""
+        return (value - self.start) / self.steps[0]
+
+    def numbers(self, value: float) -> list[float]:
+        """Each number: as it is known, and as many of its standard deviations as the first."""
+        z = self.in_sd(value)
+        return [start + step * z for start, step in zip(self.starts, self.steps, strict=True)]
+
+    def with_copies(self, copies: Callable[[str], Sequence[str]]) -> Self:
+        """The variable that moves each of its numbers and the copies of it alike; copies: paths of
+        a path's, which a compound has if it is split by region."""
+        counts = [1 + len(copies(path)) for path in self.sets]
+        starts, steps = (np.repeat(each, counts).tolist() for each in (self.starts, self.steps))
+        more = super().with_copies(copies)
+        return more.model_copy(update={"starts": starts, "steps": steps})
+
+
+def freed_variables(case: LoadedCase) -> dict[str, FreedVariable]:
+    """The numbers that `with_freed` made variables, by name."""
+    variables = case.case.variables.items()
+    return {name: each for name, each in variables if isinstance(each, FreedVariable)}
+
 
 FREED_WITHIN = 3.0  # standard deviations of what is known
 

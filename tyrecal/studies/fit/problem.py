@@ -31,7 +31,7 @@ from ...tyre.case import LoadedCase
 from ...tyre.state import AS_THE_CASE, TyreState, without
 from ..variable import read_variable
 from .differences import differences
-from .freed import freed_variables
+from .free import freed_variables
 from .least_squares import fit_covariance, fit_response
 from .road import PRESS_STEP, press, press_with_slopes
 from .targets import (

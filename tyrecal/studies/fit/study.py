@@ -12,9 +12,8 @@ from ...errors import InputError
 from ...files import Json
 from ...measured.case_modes import evaluate_case_modes
 from ...measured.measurement import Measurement
-from ...measured.readings import readings_with_shapes
 from ...measured.shapes import SAME_PRESSURE_kPa
-from ...measured.targets import in_set_state, with_measured
+from ...measured.targets import in_set_state, readings_with_shapes, with_measured
 from ...simulate.deck.decks_design import design_of
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.failure import EvaluationFailed

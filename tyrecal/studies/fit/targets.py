@@ -13,7 +13,7 @@ from ...simulate.modes.loaded import Member
 from ...tyre.case import LoadedCase
 from ...tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ...tyre.state import AS_THE_CASE, TyreState
-from .freed import freed_variables
+from .free import freed_variables
 
 KNOWLEDGE = "knowledge"  # of a number that the fit frees, see `free`
 KNOWLEDGE_SIGMA = 0.01  # of 1 + 0.01 z: a freed number has z = (value - known) / sd

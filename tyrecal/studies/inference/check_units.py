@@ -1,4 +1,8 @@
-"""Measurements that are not even near the model are refused: wrong units, or another tyre."""
+"""Measurements that are not even near the model are refused: wrong units, or another tyre.
+
+A measured frequency that is far off the model's is a slip of digit, unit, label or pressure. `fit`,
+`diagnose` and `sample` look for both before they calibrate anything.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +11,29 @@ from math import exp
 
 from ...errors import InputError
 from ...simulate.modes.label import in_words
-from ..far_off import far_off
 from .inverse_problem import Toggle
 from .model import Answer, Query
 from .observations import Observations
 from .tyre_model import TyreModel
+
+MAX_FREQUENCY_RATIO = 2.0  # between measured and computed; beyond, something else was measured
+SLIPS = (10.0, 0.1)  # factors of a decimal point in the wrong place
+SLIP_FITS = 1.3  # ratio to the model at which such a slip explains the value
+
+
+def far_off(what: str, measured_Hz: float, model_Hz: float) -> str:
+    """Why ``what`` cannot have been measured at such a frequency, and what was probably meant;
+    empty where it can."""
+    ratio = measured_Hz / model_Hz
+    if 1 / MAX_FREQUENCY_RATIO < ratio < MAX_FREQUENCY_RATIO:
+        return ""
+    meant = [f"{measured_Hz * f:.6g} Hz" for f in SLIPS if 1 / SLIP_FITS < ratio * f < SLIP_FITS]
+    hint = f", or did you mean {meant[0]}" if meant else ""
+    return (
+        f"{what} was measured at {measured_Hz:.6g} Hz, {ratio:.2g} times the model's"
+        f" {model_Hz:.4g} Hz; is it the right unit, mode and pressure{hint}?"
+    )
+
 
 # measured mass over the model's, from which it is refused: with its rim a tyre weighs twice as much
 MAX_MASS_RATIO = 1.5

@@ -25,14 +25,13 @@ from ...tyre.values import with_values
 from .answer_rows import AnswerRows, ln_frequency
 from .between import Between
 from .cord_coupling import cord_coupling
+from .covariance import MATERIAL_LAWS
+from .damping import loss_deviations, losses_in_words, with_losses, with_twice_the_loss
 from .expansion import node_values
-from .form_error import MATERIAL_LAWS
-from .losses import loss_deviations, losses_in_words, with_losses, with_twice_the_loss
 from .model import Answer, EffectRange, ModelRow, Query, state_of
 from .model_designs import ModelDesigns
 from .regions import SectionPart, count_numbers, regions
-from .section_design import SectionDesign
-from .section_fields import OF_COMPOUNDS, known_from
+from .section_fields import OF_COMPOUNDS, SectionDesign, known_from
 from .uncertainties import Source, values_of
 
 Array = np.ndarray

@@ -34,7 +34,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...simulate.modes.label import FAMILIES, Label
-from ..inference.form_error import form_error
+from ..inference.covariance import form_error
 
 Array = np.ndarray
 

@@ -19,7 +19,6 @@ from ...tyre.case.parts import RimSupport
 from ...tyre.effects.edit import changed
 from ...tyre.state import AS_THE_CASE, SPRINGS, WHEEL_FREE, TyreState
 from ...tyre.values import set_values
-from ..difference_runs import runs_in_words
 from ..emulator import Emulator, emulator
 from ..fit.calibrate import noise_Hz
 from ..fit.problem import Problem
@@ -34,7 +33,7 @@ from ..inference.run_estimate import estimate, model_of, selection_runs
 from ..inference.tyre_model import TyreModel
 from ..inference.uncertainties import Source, calibrated, sources
 from ..result import StudyInput
-from ..run_plan import RunPlan
+from ..run_plan import RunPlan, runs_in_words
 from ..variable import DesignVariable, read_variables
 from .box import Draws, grow_box
 from .chains import needs_emcee

@@ -9,9 +9,8 @@ import numpy as np
 
 from ...errors import InputError
 from ..case import LoadedCase
-from ..section.curve import length_along
+from ..section.curve import CubicSpline, length_along
 from ..section.section import Section, fill_lines
-from ..section.spline import CubicSpline
 from .edit import changed, unused, with_part
 from .effect import Effect
 from .parts import carcass_line, held_regions, present, rim_edge, stations

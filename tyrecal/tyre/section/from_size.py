@@ -3,22 +3,65 @@
 The tread is smooth, of its rubber's mean thickness, the carcass in equilibrium. It is turned up
 round the bead: from the rim on it runs on both sides of the filler. Gauges are estimates, which
 grow with the nominal width S1; with them tyres have their usual mass. Measure yours.
+
+``tyrecal init`` writes the section as its carcass and gauges (`GaugeTable`), which an engineer
+edits.
 """
 
 from __future__ import annotations
 
+import csv
+import io
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from .construction import BASE, CAP, LIGHT_TRUCK, PASSENGER, TRUCK, TURN_UP, Construction
-from .gauge_table import GaugeTable
 from .meridian import Meridian, meridian
-from .section import SectionError
+from .section import GAUGE, Section, SectionError, from_gauges, regions_of
 from .size import TyreSize
 
 Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class GaugeTable:
+    """Half a section, by the gauges from one of its lines."""
+
+    names: tuple[str, ...]  # of the lines, from the inner surface to the outer
+    line: str  # the one that has points
+    points: Array  # (station, 2), m
+    # (line, station): distances from it, inwards negative, NaN where a line is absent, m
+    gauges: Array
+    labels: list[str]  # each station's region
+    rigid: Array  # (station,) whether the rim holds it
+
+    def csv(self) -> str:
+        """The station table, in mm to the hundredth of a micrometre."""
+        file = io.StringIO(newline="")
+        write = csv.writer(file, lineterminator="\n").writerow
+        header, columns = ["region"], []
+        for name, gauge in zip(self.names, self.gauges, strict=True):
+            own = name == self.line
+            header += [f"{name}_r_mm", f"{name}_z_mm"] if own else [name + GAUGE]
+            columns += list(self.points.T) if own else [abs(gauge)]
+        write(["station", *header, "rigid"])
+        for i, label in enumerate(self.labels):
+            words = ["" if np.isnan(x[i]) else f"{1e3 * x[i]:.5f}" for x in columns]
+            write([i, label, *words, int(self.rigid[i])])
+        return file.getvalue()
+
+    def section(self) -> Section:
+        """The same as ``read_section`` makes of ``csv``, but for its rounding."""
+        return Section(
+            self.names,
+            from_gauges(self.points, self.gauges),
+            regions_of(self.labels, list(self.rigid)),
+            self.rigid,
+        )
+
+
 BELTED = {"crown": 16, "belt_edges": 4, "shoulder": 4}
 BELOW = {"upper_sidewall": 16, "lower_sidewall": 10, "filler": 8, "bead": 4}
 """Intervals between stations by region. Those under the belts end where lines do: at two widths

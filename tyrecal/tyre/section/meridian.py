@@ -26,9 +26,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from .curve import length_along
+from .curve import CubicSpline, length_along
 from .section import SectionError
-from .spline import CubicSpline
 
 Array = np.ndarray
 STEPS_A_PART = 200  # under the belt, and above and below the widest point

@@ -18,7 +18,7 @@ import numpy as np
 from ...errors import InputError
 from ...files import read_bytes
 from ..number_table import named_table
-from .spline import CubicSpline
+from .curve import CubicSpline
 
 Array = np.ndarray
 GAUGE = "_gauge_mm"  # ends the heading of a line's column

@@ -1,4 +1,4 @@
-"""Footprints on the page, with the pressure in the patches that is in a file of its own."""
+"""Frequencies over the pressure and footprints over the load, on the page."""
 
 from __future__ import annotations
 
@@ -6,12 +6,22 @@ from collections.abc import Iterator
 from functools import partial
 
 from ...studies.footprint import FootprintResult
+from ...studies.pressure_result import PressureSweep
 from ..footprint import draw_curves, draw_patches
+from ..pressure import draw_pressure_sweep
 from .parts import Block, Chapter, PageFigure, Paragraphs, StudyPart, usual_part
 
 
-def part(footprint: FootprintResult, chapter: Chapter) -> StudyPart:
-    """The part of the footprints of a page. Raises InputError."""
+def pressure_part(sweep: PressureSweep, chapter: Chapter) -> StudyPart:
+    """The sweep's part of a page, with the targets of the fit. Raises InputError."""
+    fit = chapter.results.fit
+    plot = partial(draw_pressure_sweep, sweep.rows, fit.over_pressure() if fit else [])
+    return usual_part(sweep, [chapter.figure("pressure", f"{sweep.stem}.json", plot)])
+
+
+def footprint_part(footprint: FootprintResult, chapter: Chapter) -> StudyPart:
+    """The part of the footprints of a page; the pressure in the patches is in a file of its own.
+    Raises InputError."""
     more: list[Block] = []
     if not chapter.results.patches:
         words = "The pressure in the patches (footprint_patches.json) is not in this folder;"
