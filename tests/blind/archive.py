@@ -31,9 +31,9 @@ from typing import Any
 
 import numpy as np
 
+from tyrecal.studies.blind.protocol import ANSWERS, SEAL, TRUTH, seal_answers
 from tyrecal.studies.blind.ruler import RULER_FILE
 from tyrecal.studies.blind.score import score
-from tyrecal.studies.blind.seal import ANSWERS, SEAL, TRUTH, seal_answers
 
 from ..benchmarks.blind.benchmark import FILE, NEW, PLACES, archive, packed
 

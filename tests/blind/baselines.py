@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from tyrecal.measured.tables import read_measurements
-from tyrecal.studies.blind.protocol import read_protocol
+from tyrecal.studies.blind.protocol import Protocol, read_protocol
 from tyrecal.studies.blind.ruler import SIZE_POINTS, Ruler, read_ruler
 from tyrecal.studies.blind.score import means
 
@@ -32,8 +32,15 @@ def rivals(folder: Path) -> dict[str, dict[str, str]]:
     answers = {}
     for path in (folder / "trials").glob("*.csv"):
         y, places, counts = means(read_measurements(path), ruler)
-        answers[path.stem] = guesses(ruler, y, places, ruler.scatter(places, counts, protocol))
+        scatter = repeatability(ruler, places, counts, protocol)
+        answers[path.stem] = guesses(ruler, y, places, scatter)
     return answers
+
+
+def repeatability(ruler: Ruler, places: Array, counts: Array, protocol: Protocol) -> Array:
+    """Covariance (n, n) of rows that are means of ``counts`` (n,) values, by scatter alone."""
+    is_mass = np.array([ruler.rows[i][0] is None for i in places])
+    return np.diag(np.where(is_mass, protocol.mass, protocol.noise) ** 2 / counts)
 
 
 def guesses(ruler: Ruler, y: Array, places: Array, sigma: Array) -> dict[str, str]:

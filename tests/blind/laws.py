@@ -12,7 +12,7 @@ from math import exp, radians, sin, tanh
 
 import numpy as np
 
-from tyrecal.studies.blind.laws import EffectLaw
+from tyrecal.studies.blind.maker import EffectLaw
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.case.schema import Cord, RebarLayer, Rubber
 from tyrecal.tyre.effects import catalogue

@@ -9,8 +9,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.store import Store
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.blind.laws import OUTSIDE_FAMILIES
-from tyrecal.studies.blind.maker import Computed, Maker
+from tyrecal.studies.blind.maker import OUTSIDE_FAMILIES, Computed, Maker
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.effects.edit import with_part
 

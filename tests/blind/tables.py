@@ -8,8 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tyrecal.files import Json
-from tyrecal.studies.blind.score import Scored
-from tyrecal.studies.blind.tables import DETECTED, DIFFICULTY_BANDS, rate, summary
+from tyrecal.studies.blind.score import DETECTED, DIFFICULTY_BANDS, Scored, rate, summary
 
 
 def full_summary(

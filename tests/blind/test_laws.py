@@ -9,7 +9,7 @@ from scipy.stats import uniform
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.modes.label import Label, paired_labels
-from tyrecal.studies.blind.laws import OUTSIDE_FAMILIES, EffectLaw
+from tyrecal.studies.blind.maker import OUTSIDE_FAMILIES, EffectLaw
 from tyrecal.studies.inference.model import Answer, Query
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.effects import catalogue

@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tyrecal.studies.blind.make import USUAL_LABELS, labels_of
 from tyrecal.studies.blind.protocol import Protocol
 from tyrecal.studies.blind.ruler import measure, ruler_of
+from tyrecal.studies.fit.targets import USUAL_LABELS, labels_to_measure
 from tyrecal.studies.inference.model import Answer, Query
 from tyrecal.studies.inference.separability import VISIBLE
 from tyrecal.tyre.case.schema import Targets
@@ -66,4 +66,4 @@ def test_pressures_lie_about_the_tyres_own_and_any_tyre_has_modes() -> None:
     truck = Protocol("", "", {}).about(830.0)
     assert truck.given_kPa == (553, 830, 1107) and truck.held_out_kPa == 692
     bare = replace(CASE, case=CASE.case.model_copy(update={"targets": Targets()}))
-    assert set(labels_of(bare)) == set(labels_of(CASE)) == set(USUAL_LABELS)
+    assert set(labels_to_measure(bare)) == set(labels_to_measure(CASE)) == set(USUAL_LABELS)

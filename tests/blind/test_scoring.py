@@ -12,8 +12,8 @@ from scipy.stats import binom
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.blind.protocol import Protocol
 from tyrecal.studies.blind.ruler import EffectShifts, Ruler, difficulty, measure
-from tyrecal.studies.blind.score import Scored
-from tyrecal.studies.blind.statistics import (
+from tyrecal.studies.blind.score import (
+    Scored,
     calibration_error,
     calibration_quantile,
     clopper_pearson,
@@ -21,7 +21,7 @@ from tyrecal.studies.blind.statistics import (
 from tyrecal.studies.inference.model import Query
 
 from ..chance import Chance
-from .baselines import guesses
+from .baselines import guesses, repeatability
 from .tables import brier, full_summary
 from .toy import Scale
 
@@ -207,7 +207,7 @@ def test_the_ruler_of_a_model_is_its_own_sensitivities() -> None:
 
 def test_baselines_find_a_strong_effect_and_none_where_there_is_none() -> None:
     r, places = ruler(), np.arange(4)
-    sigma = r.scatter(places, np.full(4, 2), RULES)
+    sigma = repeatability(r, places, np.full(4, 2), RULES)
     by_baseline = guesses(r, np.array([0.02, 0, 0, 0]) + 0.1, places, sigma)
     assert set(by_baseline.values()) == {"a"}
     assert set(guesses(r, np.full(4, 0.1), places, sigma).values()) == {"none"}

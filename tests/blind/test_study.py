@@ -15,11 +15,10 @@ import numpy as np
 import pytest
 
 from tyrecal.errors import InputError
+from tyrecal.report.blind import page
 from tyrecal.studies.blind.protocol import read_protocol
-from tyrecal.studies.blind.score import Scored, score
+from tyrecal.studies.blind.score import Scored, clopper_pearson, score
 from tyrecal.studies.blind.score import score as full_score
-from tyrecal.studies.blind.statistics import clopper_pearson
-from tyrecal.studies.blind.tables import page
 
 from ..benchmarks.blind import benchmark
 from ..studies.blind_least_squares import errors

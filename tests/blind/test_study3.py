@@ -21,11 +21,11 @@ from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.modes.find import match
 from tyrecal.simulate.modes.label import Label, label_modes
 from tyrecal.studies.blind.answer import case_of
-from tyrecal.studies.blind.make import Trial, labels_of
+from tyrecal.studies.blind.make import Trial
 from tyrecal.studies.blind.maker import Computed
-from tyrecal.studies.blind.protocol import read_json, read_protocol
+from tyrecal.studies.blind.protocol import SEAL, TRUTH, read_json, read_protocol
 from tyrecal.studies.blind.ruler import read_ruler
-from tyrecal.studies.blind.seal import SEAL, TRUTH
+from tyrecal.studies.fit.targets import labels_to_measure
 from tyrecal.tyre.case import LoadedCase, with_level
 from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.load import load_case
@@ -307,7 +307,7 @@ def test_on_the_same_stations_with_the_same_laws_both_solvers_agree(
     for id in catalogue():
         if soft and id.startswith("spindle_"):
             case = catalogue()[id].add(case, soft * catalogue()[id].high)
-    labels = labels_of(case)
+    labels = labels_to_measure(case)
     answer = Evaluator(TyreDesign(case), "bundled").evaluate(Question({}))
     ours = match(label_modes(answer.modes), labels)
     result = fenics.ask(on_the_same_stations(case))

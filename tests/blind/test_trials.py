@@ -14,17 +14,15 @@ from tyrecal_solvers.bundled.adapter import Bundled
 
 from tyrecal.errors import InputError
 from tyrecal.measured.tables import read_measurements
+from tyrecal.report.blind import page
 from tyrecal.simulate.evaluate.store import Store
 from tyrecal.studies.blind.answer import answer
-from tyrecal.studies.blind.draw import draw
-from tyrecal.studies.blind.make import Trial, make, readings
+from tyrecal.studies.blind.make import Trial, draw, make, readings
 from tyrecal.studies.blind.maker import bundled_maker
-from tyrecal.studies.blind.protocol import Protocol, read_json, write_json
+from tyrecal.studies.blind.protocol import ANSWERS, SEAL, TRUTH, Protocol, read_json, write_json
 from tyrecal.studies.blind.ruler import RULER_FILE as RULER
 from tyrecal.studies.blind.ruler import measure
-from tyrecal.studies.blind.score import score
-from tyrecal.studies.blind.seal import ANSWERS, SEAL, TRUTH
-from tyrecal.studies.blind.tables import page, summary
+from tyrecal.studies.blind.score import score, summary
 from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.tyre.values import with_values
 

@@ -8,8 +8,7 @@ from math import log
 import numpy as np
 
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.blind.laws import EffectLaw
-from tyrecal.studies.blind.maker import Computed, Maker
+from tyrecal.studies.blind.maker import Computed, EffectLaw, Maker
 from tyrecal.studies.blind.protocol import Protocol
 from tyrecal.studies.inference.model import Answer, Query
 from tyrecal.tyre.case import LoadedCase, number_at, start_values

@@ -24,8 +24,6 @@ from .conftest import Inflated
 from .contact import ring
 
 Array = np.ndarray
-
-
 LENGTHS = np.array([0.05, 0.05, 0.1, 0.3, 0.6, 0.9, np.pi - 2.0])
 
 

@@ -11,7 +11,7 @@ import pytest
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.modes.label import Label, paired_labels
-from tyrecal.studies.blind.seal import ANSWERS, SEAL, TRUTH
+from tyrecal.studies.blind.protocol import ANSWERS, SEAL, TRUTH
 from tyrecal.studies.inference.effect_ranges import effect_ranges
 from tyrecal.tyre.case import start_values
 from tyrecal.tyre.load import load_case

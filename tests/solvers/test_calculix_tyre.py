@@ -26,7 +26,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.modes.label import label_modes
-from tyrecal.studies.blind.laws import thick_cushion
+from tyrecal.studies.blind.maker import thick_cushion
 from tyrecal.tyre.case import start_values
 from tyrecal.tyre.effects.edit import changed, with_part
 from tyrecal.tyre.load import load_case

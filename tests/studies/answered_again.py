@@ -30,9 +30,8 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.store import Store
 from tyrecal.studies.blind.answer import answer, case_of, rows_of, tyre_model
-from tyrecal.studies.blind.protocol import read_protocol
+from tyrecal.studies.blind.protocol import ANSWERS, read_protocol
 from tyrecal.studies.blind.score import Scored, score
-from tyrecal.studies.blind.seal import ANSWERS
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE
 
 from ..blind.answers import one_answer

@@ -40,10 +40,8 @@ from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.modes.find import match
 from tyrecal.simulate.modes.label import Label, label_modes
 from tyrecal.studies.blind.answer import rows_of, tyre_model
-from tyrecal.studies.blind.draw import Truth, draw, tyre
-from tyrecal.studies.blind.laws import OUTSIDE_FAMILIES, EffectLaw
-from tyrecal.studies.blind.make import make
-from tyrecal.studies.blind.maker import Computed, Maker
+from tyrecal.studies.blind.make import Truth, draw, make, tyre
+from tyrecal.studies.blind.maker import OUTSIDE_FAMILIES, Computed, EffectLaw, Maker
 from tyrecal.studies.blind.protocol import Protocol
 from tyrecal.studies.blind.ruler import measure
 from tyrecal.studies.inference.uncertainties import sources

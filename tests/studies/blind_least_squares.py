@@ -22,12 +22,10 @@ import numpy as np
 from tyrecal.measured.tables import read_measurements
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.blind.answer import case_of
-from tyrecal.studies.blind.make import labels_of
-from tyrecal.studies.blind.protocol import Protocol, read_protocol
+from tyrecal.studies.blind.protocol import Protocol, open_truth, read_protocol
 from tyrecal.studies.blind.ruler import EffectShifts, Ruler, read_ruler
-from tyrecal.studies.blind.score import Scored, means, score
-from tyrecal.studies.blind.seal import open_truth
-from tyrecal.studies.blind.tables import DETECTED
+from tyrecal.studies.blind.score import DETECTED, Scored, means, score
+from tyrecal.studies.fit.targets import labels_to_measure
 
 from ..blind.archive import STUDIES, unpack
 
@@ -38,7 +36,7 @@ STEPS, LONGEST = 20, 0.5
 def errors(folder: Path, trials: Sequence[Scored]) -> dict[str, Array]:
     """Rms errors held out, in ln f, (trials, 2), of calibrations without and with the effect, by
     kind of trial: "effect" (detectable and named) and "none". ``trials``: as they were scored."""
-    protocol, labels = read_protocol(folder), labels_of(case_of(folder))
+    protocol, labels = read_protocol(folder), labels_to_measure(case_of(folder))
     ruler = read_ruler(folder)
     scored = {each.id: each for each in trials}
     by_kind: dict[str, list[list[float]]] = {"effect": [], "none": []}

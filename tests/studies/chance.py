@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 from tests.chance import budget
-from tyrecal.studies.blind.statistics import clopper_pearson
+from tyrecal.studies.blind.score import clopper_pearson
 
 TESTS = Path(__file__).parents[1]
 

@@ -38,7 +38,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.store import Store
-from tyrecal.studies.blind.draw import Truth, tyre
+from tyrecal.studies.blind.make import Truth, tyre
 from tyrecal.studies.diagnose.evidence import NONE, Hypothesis
 from tyrecal.studies.diagnose.gap import projection
 from tyrecal.studies.diagnose.several import present, probabilities, weigh_hypotheses

@@ -23,7 +23,7 @@ from tyrecal.simulate.deck.calculix import FILLER, PARTS, PLY_THICKNESS_M, calcu
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.store import Store
 from tyrecal.simulate.modes.label import Mode
-from tyrecal.studies.blind.draw import Truth, tyre
+from tyrecal.studies.blind.make import Truth, tyre
 from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.resolve import resolved

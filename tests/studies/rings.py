@@ -52,11 +52,7 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.evaluate.results import HarmonicShape
 from tyrecal.simulate.evaluate.store import Store
 from tyrecal.simulate.modes.label import Label, Mode, labelled
-from tyrecal.studies.blind.statistics import (
-    calibration_error,
-    calibration_quantile,
-    clopper_pearson,
-)
+from tyrecal.studies.blind.score import calibration_error, calibration_quantile, clopper_pearson
 from tyrecal.studies.labelling.label import label
 from tyrecal.studies.labelling.tree import DISCREPANCIES, FOREIGN_MARGIN, SECOND, discrepancy
 from tyrecal.studies.labels import SURE_LABEL

@@ -18,8 +18,7 @@ from tempfile import TemporaryDirectory
 import click
 import numpy as np
 
-from tyrecal.studies.blind.score import Scored, score
-from tyrecal.studies.blind.statistics import calibration_error
+from tyrecal.studies.blind.score import Scored, calibration_error, score
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE
 from tyrecal.studies.diagnose.several import priors
 from tyrecal.studies.diagnose.verdict import CHECK, RULED_OUT, SET, most_sure

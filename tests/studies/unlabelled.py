@@ -24,11 +24,7 @@ from tests.conftest import CASES
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.blind.statistics import (
-    calibration_error,
-    calibration_quantile,
-    clopper_pearson,
-)
+from tyrecal.studies.blind.score import calibration_error, calibration_quantile, clopper_pearson
 from tyrecal.studies.emulator import Emulator, emulator
 from tyrecal.studies.fit.targets import target_labels
 from tyrecal.studies.labelling.expansion import ModesNearDesign, Prior, admissible, find_labels

@@ -27,11 +27,7 @@ import numpy as np
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.blind.statistics import (
-    calibration_error,
-    calibration_quantile,
-    clopper_pearson,
-)
+from tyrecal.studies.blind.score import calibration_error, calibration_quantile, clopper_pearson
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE
 from tyrecal.studies.diagnose.gap import projection
 from tyrecal.studies.diagnose.label_swap import exchanged, with_exchanged

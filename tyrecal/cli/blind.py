@@ -182,8 +182,7 @@ def answer(
     from ..simulate.evaluate.evaluator import Evaluator
     from ..simulate.evaluate.store import Store
     from ..studies.blind import answer as blind
-    from ..studies.blind.protocol import read_protocol
-    from ..studies.blind.seal import refuse_open_truth
+    from ..studies.blind.protocol import read_protocol, refuse_open_truth
     from ..tyre.effects import catalogue
 
     for id in effects:
@@ -214,9 +213,10 @@ def score(folder: Path, truth: Path | None, terminal: Terminal) -> int:
     tyrecal blind score trials --json
     """
     from ..files import write_text
+    from ..report.blind import page
     from ..studies.blind.protocol import read_protocol, write_json
     from ..studies.blind.score import score as scored
-    from ..studies.blind.tables import page, summary
+    from ..studies.blind.score import summary
 
     figures = summary(scored(folder, _sealed(folder, truth)))
     write_json(folder / "score.json", figures)

@@ -35,8 +35,6 @@ from .result import (
 )
 
 Array = np.ndarray
-
-
 FINE_STEPS = 8  # of an element of three nodes, between which its depth is a parabola
 
 

@@ -45,8 +45,6 @@ from .half_turn_symmetry import HalfTurn
 from .multifrontal import Elimination, Factor
 
 Array = np.ndarray
-
-
 SPARE = 3  # modes of each parity in addition to half of the requested number
 
 

@@ -25,8 +25,6 @@ from .dissection import Dissection, ElementColumn, Front, Kind, Range
 from .half_turn_symmetry import ODD, HalfTurn
 
 Array = np.ndarray
-
-
 MAX_UNDIVIDED_ROWS = 200  # rows of a triangle that are not halved any more
 
 

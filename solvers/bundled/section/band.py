@@ -14,8 +14,6 @@ from ...errors import Indefinite
 from .sparse import narrow_order
 
 Array = np.ndarray
-
-
 BUFFER_BYTES = 1 << 26  # twice a buffer of OpenBLAS
 
 

@@ -36,9 +36,8 @@ import numpy as np
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.studies.blind.answer import answer, case_of, rows_of, tyre_model
-from tyrecal.studies.blind.protocol import read_protocol
+from tyrecal.studies.blind.protocol import ANSWERS, SEAL, read_protocol
 from tyrecal.studies.blind.ruler import read_ruler
-from tyrecal.studies.blind.seal import ANSWERS, SEAL
 from tyrecal.studies.inference.tyre_model import TyreModel
 from tyrecal.tyre.effects.edit import changed, with_part
 

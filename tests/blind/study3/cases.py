@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tyrecal.studies.blind.make import USUAL_LABELS
+from tyrecal.studies.fit.targets import USUAL_LABELS
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.case.new_case import from_file, from_size
 from tyrecal.tyre.effects.edit import changed, with_part

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tyrecal.errors import InputError
-from tyrecal.studies.blind.draw import Truth, draw, tyre
-from tyrecal.studies.blind.make import Trial, plain_trial
+from tyrecal.studies.blind.make import Trial, Truth, draw, plain_trial, tyre
 from tyrecal.studies.blind.protocol import Protocol
 from tyrecal.studies.blind.ruler import Ruler, difficulty
 from tyrecal.studies.blind.score import true_shift

@@ -18,10 +18,10 @@ from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.pool import process_pool
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.blind.answer import rows_of, tyre_model
-from tyrecal.studies.blind.draw import Truth
 from tyrecal.studies.blind.make import (
     MAX_TRIES,
     Trial,
+    Truth,
     copy_case,
     kept_seed,
     plain_trial,
@@ -29,9 +29,15 @@ from tyrecal.studies.blind.make import (
     write_trials,
 )
 from tyrecal.studies.blind.maker import Computed
-from tyrecal.studies.blind.protocol import Protocol, read_json, write_json, write_protocol
+from tyrecal.studies.blind.protocol import (
+    SEAL,
+    Protocol,
+    read_json,
+    seal,
+    write_json,
+    write_protocol,
+)
 from tyrecal.studies.blind.ruler import RULER_FILE, Ruler, measure, read_ruler
-from tyrecal.studies.blind.seal import SEAL, seal
 from tyrecal.tyre.case import LoadedCase
 
 from .cases import LABELS, Group, written

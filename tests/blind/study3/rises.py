@@ -15,8 +15,8 @@ import numpy as np
 
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.blind.answer import case_of
+from tyrecal.studies.blind.protocol import open_truth
 from tyrecal.studies.blind.ruler import Ruler, read_ruler
-from tyrecal.studies.blind.seal import open_truth
 from tyrecal.studies.inference.uncertainties import sources
 
 from .cases import Group, with_exact_section

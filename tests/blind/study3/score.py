@@ -16,13 +16,12 @@ import numpy as np
 
 from tyrecal.measured.tables import read_measurements
 from tyrecal.studies.blind.answer import case_of
-from tyrecal.studies.blind.make import labels_of
-from tyrecal.studies.blind.protocol import Protocol, read_json, read_protocol
+from tyrecal.studies.blind.protocol import Protocol, open_truth, read_json, read_protocol
 from tyrecal.studies.blind.ruler import Difficulty, Ruler, difficulty, read_ruler
 from tyrecal.studies.blind.score import held_out_error, means, true_shift
-from tyrecal.studies.blind.seal import open_truth
 from tyrecal.studies.diagnose.several import present
 from tyrecal.studies.diagnose.verdict import SET
+from tyrecal.studies.fit.targets import labels_to_measure
 from tyrecal.studies.inference.inverse_problem import Assumed
 
 from ...studies.blind_least_squares import held_out, held_out_rms
@@ -122,7 +121,7 @@ class Scored:
 def scored(folder: Path, sealed: Path) -> list[Scored]:
     """Every trial of a group. Raises InputError."""
     content, protocol = open_truth(folder, sealed), read_protocol(folder)
-    labels = labels_of(case_of(folder))
+    labels = labels_to_measure(case_of(folder))
     ruler = read_ruler(folder)
     answer_of = lambda truth: read_json(folder / "answers" / f"{truth['id']}.json")
     return [one(t, answer_of(t), folder, ruler, protocol, labels) for t in content["trials"]]

@@ -10,8 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tyrecal.studies.blind.ruler import MIN_LAMBDA_APART
-from tyrecal.studies.blind.statistics import calibration_error, calibration_quantile
-from tyrecal.studies.blind.tables import rate
+from tyrecal.studies.blind.score import calibration_error, calibration_quantile, rate
 
 from .cases import Group
 from .score import EACH, ONE, Scored

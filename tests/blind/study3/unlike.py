@@ -15,10 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from tyrecal.measured.tables import read_measurements
-from tyrecal.studies.blind.protocol import read_protocol
+from tyrecal.studies.blind.protocol import open_truth, read_protocol
 from tyrecal.studies.blind.ruler import read_ruler
 from tyrecal.studies.blind.score import means
-from tyrecal.studies.blind.seal import open_truth
 
 from .cases import Group
 from .score import moved_by

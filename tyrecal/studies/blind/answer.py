@@ -23,6 +23,7 @@ from ..diagnose.calibrated import likeliest
 from ..diagnose.diagnosis import Diagnosis, diagnose
 from ..diagnose.evidence import NONE
 from ..diagnose.result import diagnosis_result
+from ..fit.targets import labels_to_measure
 from ..inference.effect_ranges import effect_ranges
 from ..inference.expansion import Expansion, expand
 from ..inference.inverse_problem import Assumed
@@ -30,14 +31,12 @@ from ..inference.model import ModelRow, ResponseModel
 from ..inference.observations import observe
 from ..inference.tyre_model import TyreModel
 from ..inference.uncertainties import sources
-from .make import labels_of
-from .protocol import Protocol, read_protocol, write_json
-from .seal import refuse_open_truth, seal_answers
+from .protocol import Protocol, read_protocol, refuse_open_truth, seal_answers, write_json
 
 
 def rows_of(case: LoadedCase, protocol: Protocol) -> list[ModelRow]:
     """All rows that a model answers: the mass, and each mode at each pressure."""
-    modes = labels_of(case)
+    modes = labels_to_measure(case)
     return [(None, 0.0), *((label, p) for p in protocol.pressures_kPa for label in modes)]
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import secrets
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import product
-from math import exp
+from math import exp, log1p
 from pathlib import Path
 
 import numpy as np
@@ -21,22 +21,86 @@ from ...measured.measurement import Measurement, measurements_csv
 from ...simulate.evaluate.failure import EvaluationFailed
 from ...simulate.evaluate.pool import process_pool
 from ...simulate.modes.label import Label
-from ...tyre.case import LoadedCase
-from ..fit.targets import target_labels
-from ..inference.uncertainties import sources
-from .draw import SWAPPED_WITHIN, Truth, draw, tyre
-from .maker import Computed, Maker
-from .protocol import Protocol, read_json, write_json, write_protocol
+from ...tyre.case import LoadedCase, start_values
+from ...tyre.number_units import EFFECT_PATH
+from ...tyre.values import with_values
+from ..fit.targets import labels_to_measure
+from ..inference.section_fields import with_fields
+from ..inference.uncertainties import Source, sources, values_of
+from .maker import Computed, EffectLaw, Maker
+from .protocol import SEAL, Protocol, read_json, seal, write_json, write_protocol
 from .ruler import RULER_FILE
-from .seal import SEAL, seal
 
-USUAL_LABELS = (
-    Label(0, 0, "axial"),
-    Label(0, 0, "torsional"),
-    *(Label(c, m) for c in (1, 2, 3) for m in (1, 0)),
-    Label(4, 0),
-)
 MAX_TRIES = 20  # tyres that a trial may draw until one has a solution
+SWAPPED_WITHIN = 0.25  # relative distance of modes whose labels could be taken for one another
+
+
+@dataclass(frozen=True)
+class Truth:
+    """One tyre."""
+
+    id: str  # random
+    kind: str  # effect, none or outside
+    law: str  # id of the effect, or name of the family outside the catalogue, "" for none
+    size: float  # its parameter, in the unit of the law
+    variables: dict[str, float]  # by name, in their own units
+    constants: dict[str, float]  # in standard deviations
+    scatter: int  # seed of noise, missing values, splits of pairs and order of their modes
+    swapped: bool  # whether two labels are exchanged in its data
+
+
+def draw(
+    protocol: Protocol,
+    case: LoadedCase,
+    sources: Sequence[Source],
+    laws: Mapping[str, EffectLaw],
+    outside: Mapping[str, EffectLaw],
+    seed: int,
+) -> list[Truth]:
+    """All trials, in the order of their ids, which reveals nothing.
+
+    Effects and families have equal chances, sizes are uniform over ``smallest`` to 1 of the range,
+    on either side where it has two. Variables are log-uniform within a factor 1 + ``spread`` of
+    their starts; ``swapped`` is the probability that labels are exchanged.
+    """
+    random = np.random.default_rng(seed)
+    kinds = [kind for kind, count in protocol.counts.items() for _ in range(count)]
+    truths = []
+    for kind in kinds:
+        known = {"effect": laws, "outside": outside, "none": {}}[kind]
+        law = str(random.choice(sorted(known))) if known else ""
+        size = known[law].drawn(random, protocol.smallest) if law else 0.0
+        width, id = log1p(protocol.spread), random.bytes(6).hex()
+        variables = {
+            name: value * float(np.exp(random.uniform(-width, width)))
+            for name, value in start_values(case).items()
+        }
+        constants = {source.name: float(random.normal()) for source in sources}
+        scatter, swapped = int(random.integers(2**63)), bool(random.random() < protocol.swapped)
+        truths.append(Truth(id, kind, law, size, variables, constants, scatter, swapped))
+    return sorted(truths, key=lambda truth: truth.id)
+
+
+def tyre(
+    truth: Truth,
+    case: LoadedCase,
+    sources: Sequence[Source],
+    pressure_kPa: float,
+    law: EffectLaw | None,
+) -> LoadedCase:
+    """The case as this tyre is at a stated pressure, with ``law``'s effect or without.
+
+    Raises ValueError where no such tyre can be.
+    """
+    plain = {**values_of(case, list(sources)), "pressure_kPa": pressure_kPa}
+    values: dict[str, float] = dict(truth.variables)
+    for source in sources:
+        for path, step in source.steps.items():  # by one standard deviation
+            known = values.get(path, 0.0 if path.startswith(EFFECT_PATH) else plain[path])
+            values[path] = known + truth.constants[source.name] * step
+    values.setdefault("pressure_kPa", pressure_kPa)
+    made = with_fields(with_values(case, values), truth.constants)
+    return law.add(made, truth.size) if law else made
 
 
 @dataclass(frozen=True)
@@ -77,8 +141,7 @@ def make(
         refuse_link(path)
     write_json(folder / RULER_FILE, ruler())
     seed = kept_seed(sealed, seed)
-    own_sources, _ = sources(case)
-    truths = draw(protocol, case, own_sources, maker.laws, maker.outside, seed)
+    truths = draw(protocol, case, sources(case)[0], maker.laws, maker.outside, seed)
     work = partial(_make, protocol, case, maker)
     trials: list[Trial] = []
     with process_pool(jobs) if jobs > 1 else nullcontext() as pool:
@@ -90,12 +153,6 @@ def make(
     write_trials(folder, protocol, trials)
     truth = [sealed_trial(trial, protocol) for trial in trials]
     return seal(folder, sealed, {"seed": seed, "trials": truth})
-
-
-def labels_of(case: LoadedCase) -> list[Label]:
-    """The modes that are measured: the case's targets or, where it has none, those that a modal
-    analysis of any tyre shows."""
-    return target_labels(case) or list(USUAL_LABELS)
 
 
 def readings(trial: Trial, protocol: Protocol) -> list[Measurement]:
@@ -115,8 +172,7 @@ def readings(trial: Trial, protocol: Protocol) -> list[Measurement]:
             noisy = np.exp(pair + protocol.noise * random.normal(size=len(pair)))
             for i, f in enumerate(random.permutation(noisy).tolist(), 1):
                 member, sigma = str(i) if label.c else "", protocol.noise * f
-                one = Measurement("frequency_Hz", label, member, pressure, 0.0, f, sigma)
-                here.append(one)
+                here += [Measurement("frequency_Hz", label, member, pressure, 0.0, f, sigma)]
         gone = random.choice(len(here), int(random.integers(protocol.missing + 1)), False)
         read += [each for i, each in enumerate(here) if i not in gone]
     return _swapped(read, labels, random) if trial.truth.swapped else read
@@ -145,16 +201,14 @@ def _swapped(
 
 def _make(protocol: Protocol, case: LoadedCase, maker: Maker, truth: Truth) -> Trial:
     """The trial, its tyre drawn again where it has no solution."""
-    own_sources, labels = sources(case)[0], labels_of(case)
+    own_sources, labels = sources(case)[0], labels_to_measure(case)
     random = np.random.default_rng(truth.scatter + 1)
     law = {**maker.laws, **maker.outside}.get(truth.law)
+    compute = lambda truth, p, law: maker.compute(tyre(truth, case, own_sources, p, law), labels)
     for tries in range(1, MAX_TRIES + 1):
         try:
             both = [
-                {
-                    p: maker.compute(tyre(truth, case, own_sources, p, each), labels)
-                    for p in protocol.pressures_kPa
-                }
+                {p: compute(truth, p, each) for p in protocol.pressures_kPa}
                 for each in ([law, None] if law else [None])
             ]
             if law and law.read:
@@ -217,9 +271,7 @@ def kept_seed(sealed: Path, seed: int | None) -> int:
 def copy_case(case: LoadedCase, folder: Path) -> None:
     """The case file and what it names, for who answers."""
     target = folder / "case"
-    make_folder(target)
-    shutil.copyfile(case.path, target / case.path.name)
-    for path in case.files:
+    for path in (case.path, *case.files):
         copy = target / path.relative_to(case.folder)
         make_folder(copy.parent)
         shutil.copyfile(path, copy)

@@ -85,35 +85,27 @@ class Ruler:
     laws_shared: bool = True  # by a family, and by all modes, too
     laws_length: float = LAWS_LENGTH  # of ln p, over which that is alike
 
-    def scatter(self, places: Array, counts: Array, protocol: Protocol) -> Array:
-        """Covariance (n, n) by repeatability of rows that are means of ``counts`` (n,) values."""
-        is_mass = np.array([self.rows[i][0] is None for i in places])
-        return np.diag(np.where(is_mass, protocol.mass, protocol.noise) ** 2 / counts)
-
     def sigma(self, places: Array, counts: Array, protocol: Protocol) -> Array:
         """Covariance (n, n) of such rows: repeatability, form, material laws and constants."""
-        rows = [self.rows[i] for i in places]
-        labels = [label for label, _ in rows]
+        labels, states = zip(*(self.rows[i] for i in places), strict=True)
         is_mass = np.array([label is None for label in labels])
         same = np.array([[a == b for b in labels] for a in labels])
-        alike = np.where(np.eye(len(rows), dtype=bool), 1.0, BETWEEN_PRESSURES) * same
+        alike = np.where(np.eye(len(labels), dtype=bool), 1.0, BETWEEN_PRESSURES) * same
         form = np.array([form_error(label) for label in labels])
-        ln_p = np.log([state_of(where).pressure_kPa or 1.0 for _, where in rows])
+        ln_p = np.log([state_of(where).pressure_kPa or 1.0 for where in states])
         near = np.exp(-(((ln_p[:, None] - ln_p) / self.laws_length) ** 2) / 2)
         families = [label.family if label else None for label in labels]
         kin = np.array([[a is not None and a == b for b in families] for a in families])
         parts = same + (kin + 1.0 if self.laws_shared else 0.0)
         laws = self.material_laws**2 * parts * near * np.outer(~is_mass, ~is_mass)
         g = self.constants[places]
-        scatter = self.scatter(places, counts, protocol)
-        return np.asarray(scatter + alike * np.outer(form, form) + laws + g @ g.T)
+        scatter = np.where(is_mass, protocol.mass, protocol.noise) ** 2 / counts
+        return np.asarray(np.diag(scatter) + alike * np.outer(form, form) + laws + g @ g.T)
 
     def plain(self, d: Array, places: Array) -> tuple[Array, Array]:
         """eta (n,), J (n, v) at x0 + d without effects."""
-        bent = self.hessian[places] @ d
-        return self.eta[places] + self.jacobian[places] @ d + bent @ d / 2, (
-            self.jacobian[places] + bent
-        )
+        J, bent = self.jacobian[places], self.hessian[places] @ d
+        return self.eta[places] + J @ d + bent @ d / 2, J + bent
 
     def projection(self, d: Array, places: Array, sigma: Array) -> Array:
         """P (n, n) at x0 + d."""

@@ -3,6 +3,9 @@
 The ruler is a record of sensitivities and effects that was made before the study; it gives the
 difficulty of a trial without the diagnosis. Code of the diagnosis is not used here, except the
 names of modes and the recorded form error.
+
+`summary` has the figures of all trials: rates with exact bounds, held-out errors, every miss, and
+the calibration of stated probabilities with its measure by chance alone.
 """
 
 from __future__ import annotations
@@ -13,14 +16,14 @@ from math import log
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import binomtest
 
 from ...files import Json
 from ...measured.measurement import Measurement
 from ...measured.tables import read_measurements
 from ...simulate.modes.label import Label
-from .protocol import Protocol, read_json, read_protocol
+from .protocol import Protocol, open_truth, read_json, read_protocol
 from .ruler import Difficulty, Ruler, difficulty, read_ruler
-from .seal import open_truth
 
 Array = np.ndarray
 
@@ -81,17 +84,13 @@ def score(folder: Path, sealed: Path) -> list[Scored]:
     """Scores of all trials of a study. Raises InputError."""
     truths = open_truth(folder, sealed)["trials"]
     protocol, ruler = read_protocol(folder), read_ruler(folder)
-    return [
-        scored(
-            truth,
-            read_json(path),
-            read_measurements(folder / "trials" / f"{path.stem}.csv"),
-            ruler,
-            protocol,
-        )
-        for truth in truths
-        if (path := folder / "answers" / f"{truth['id']}.json").exists()
-    ]
+    trials = []
+    for truth in truths:
+        path = folder / "answers" / f"{truth['id']}.json"
+        if path.exists():
+            readings = read_measurements(folder / "trials" / f"{path.stem}.csv")
+            trials.append(scored(truth, read_json(path), readings, ruler, protocol))
+    return trials
 
 
 def scored(
@@ -169,3 +168,99 @@ def held_out_error(
         if values and name in predicted
     ]
     return float(np.sqrt(np.mean(np.square(errors))))
+
+
+BINS, SIMULATIONS = 10, 2000  # of stated probabilities, 0 to 1; draws of the quantile
+
+
+def clopper_pearson(right: int, count: int) -> tuple[float, float]:
+    """Exact 95 % interval of a binomial share (Clopper and Pearson 1934); (0, 1) of none."""
+    if not count:
+        return 0.0, 1.0
+    interval = binomtest(right, count).proportion_ci(0.95)
+    return float(interval.low), float(interval.high)
+
+
+def calibration_error(stated: Array, right: Array) -> float:
+    """ECE: mean over trials of |share right - mean stated| in ten bins of what was stated."""
+    return float(_calibration_errors(stated, right[None])[0])
+
+
+def _calibration_errors(stated: Array, right: Array) -> Array:
+    """ECE (k,) of each row of ``right`` (k, n), trials of one and the same ``stated`` (n,)."""
+    place = np.minimum((stated * BINS).astype(int), BINS - 1)
+    in_bin = (place[:, None] == np.arange(BINS)).astype(float)
+    return np.asarray(abs((right - stated) @ in_bin).sum(1) / max(len(stated), 1))
+
+
+def calibration_quantile(stated: Array, quantile: float = 0.95) -> float:
+    """Quantile of the ECE of as many trials whose stated probabilities are exactly right."""
+    random = np.random.default_rng(0)
+    drawn = random.random((SIMULATIONS, len(stated))) < stated
+    return float(np.quantile(_calibration_errors(stated, drawn), quantile))
+
+
+# ranges of `Scored.band`, and of lambda
+DIFFICULTY_BANDS = ((0.0, 4.0), (4.0, 10.0), (10.0, 25.0), (25.0, float("inf")))
+DETECTED = 10.0  # band from which an effect counts as detectable
+
+
+def summary(trials: Sequence[Scored]) -> Json:
+    """All figures, as plain data; a rate is {"right", "count", "share", "low", "high"}."""
+    effects = [t for t in trials if t.kind == "effect"]
+    none = [t for t in trials if t.kind == "none"]
+    outside = [t for t in trials if t.kind == "outside"]
+    named = [t for t in trials if t.verdict == "named"]
+
+    stated = np.array([t.probabilities[t.ranked[0]] for t in trials])
+    right = np.array([t.ranked[0] == t.truth for t in trials], float)
+    # held-out shrinkage where there is no effect, by chance
+    placebo = float(np.quantile([t.shrinkage for t in none], 0.95)) if none else None
+    held = [t.parameter_held for t in trials if t.parameter_held is not None]
+    proven = [t for t in effects if t.band >= DETECTED and t.verdict == "named"]
+    shrinks = [t.shrinkage for t in proven]
+    return {
+        "trials": {"effect": len(effects), "none": len(none), "outside": len(outside)},
+        "swapped": sum(t.swapped for t in trials),
+        "by_band": [
+            {"low": low, "high": high if high < 1e9 else None, **_band(effects, low, high)}
+            for low, high in DIFFICULTY_BANDS
+        ],
+        "false_alarms": rate([t.verdict == "named" for t in none]),
+        "named_right": rate([t.named in t.group for t in named]),
+        "outside_recognised": rate([t.verdict == "outside" for t in outside]),
+        "outside_named": rate([t.verdict == "named" for t in outside]),
+        "calibration_error": calibration_error(stated, right),
+        "calibration_error_95": calibration_quantile(stated),
+        "set_holds_truth": rate([t.in_set for t in trials]),
+        "interval_holds_parameter": rate(held),
+        "held_out": {
+            "count": len(proven),
+            "median_shrinkage": float(np.median(shrinks)) if proven else None,
+            "placebo_95": placebo,
+            "beyond_placebo": rate([shrink > (placebo or 0.0) for shrink in shrinks]),
+        },
+        "misses": [
+            t.plain()
+            for t in trials
+            if not t.right or (t.verdict == "named" and t.named not in t.group)
+        ],
+    }
+
+
+def rate(hits: Sequence[bool]) -> Json:
+    """A share with its exact 95 % bounds."""
+    right, count = sum(hits), len(hits)
+    low, high = clopper_pearson(right, count)
+    share = right / count if count else None
+    return {"right": right, "count": count, "share": share, "low": low, "high": high}
+
+
+def _band(effects: Sequence[Scored], low: float, high: float) -> Json:
+    """Rates of right first and second answers among the effects of one band of difficulty."""
+    here = [t for t in effects if low <= t.band < high]
+    return {
+        "top_1_group": rate([t.right for t in here]),
+        "top_1": rate([t.ranked[0] == t.truth for t in here]),
+        "top_2_group": rate([bool(set(t.ranked[:2]) & set(t.group)) for t in here]),
+    }

@@ -17,8 +17,6 @@ from .diagnosis import Diagnosis
 from .evidence import NONE, Hypothesis
 
 Array = np.ndarray
-
-
 SLOPE_STEP = 1e-6  # of x, for the slope of a variable in its own unit
 
 

@@ -40,8 +40,6 @@ from .search import (
 )
 
 Array = np.ndarray
-
-
 MIN_DAMPING = 1e-6  # mu over the mean diagonal of J^T J, at last
 GOOD_GAIN, POOR_GAIN = 0.7, 0.25  # shares of a promised decrease: above mu falls, below it rises
 HALVINGS = 5  # of a step towards a design without a solution

@@ -18,6 +18,12 @@ from .free import freed_variables
 KNOWLEDGE = "knowledge"  # of a number that the fit frees, see `free`
 KNOWLEDGE_SIGMA = 0.01  # of 1 + 0.01 z: a freed number has z = (value - known) / sd
 WITHOUT_MODEL_ERROR = KNOWLEDGE, DAMPING_RATIO  # quantities of which no error of the model is known
+USUAL_LABELS = (
+    Label(0, 0, "axial"),
+    Label(0, 0, "torsional"),
+    *(Label(c, m) for c in (1, 2, 3) for m in (1, 0)),
+    Label(4, 0),
+)
 RIM_WORDS = {"springs": "spindle"}  # words of provenance where they differ from `TyreState.rim`
 
 
@@ -109,6 +115,12 @@ def target_labels(case: LoadedCase) -> list[Label]:
     """Labels of the unloaded tyre's target modes, each once, whatever states they were measured
     in."""
     return list(dict.fromkeys(target.label for target in read_targets(case)))
+
+
+def labels_to_measure(case: LoadedCase) -> list[Label]:
+    """The modes of trials and plans: the case's targets or, where it has none, those that a modal
+    analysis of any tyre shows."""
+    return target_labels(case) or list(USUAL_LABELS)
 
 
 def read_road_targets(case: LoadedCase) -> list[ValueTarget]:

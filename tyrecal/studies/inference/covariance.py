@@ -30,8 +30,6 @@ from ...simulate.modes.label import Label
 from .observations import Observable, Observations
 
 Array = np.ndarray
-
-
 PERCENT = {  # standard deviation of ln f by mesh and element, per cent
     "[0,0] axial": 0.13,
     "[0,0] torsional": 0.44,

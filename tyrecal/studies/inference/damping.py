@@ -36,8 +36,6 @@ from .observations import DampingRatios
 from .section_fields import COMPOUNDS_ALIKE  # correlation, here of the ln of their loss factors
 
 Array = np.ndarray
-
-
 # standard deviation of ln zeta of a mode, alike in all states, by judgement: the uncertain
 # constants above, loss that changes with frequency and strain, and friction in the fixture
 DAMPING_FORM = 0.1

@@ -39,8 +39,6 @@ from ...tyre.section.curve import length_along
 from .regions import split_by_region
 
 Array = np.ndarray
-
-
 SECTION = "section "  # start of the names of these sources of error
 OF_COMPOUNDS = ("stiffness", "density")
 OF_ORIGIN = ("meridian", "filler", "gauge", *OF_COMPOUNDS)

@@ -13,8 +13,8 @@ from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.modes.label import Label
 from ...tyre.case import LoadedCase, start_values
 from ...tyre.case.mistakes import suggestion
-from ..blind.make import labels_of
 from ..diagnose.next_measurement import STEP_HOURS
+from ..fit.targets import labels_to_measure
 from ..inference.expansion import first_points
 from ..inference.run_estimate import estimate
 from ..inference.separability import APART, GRID_POINTS, VISIBLE, smallest
@@ -56,7 +56,7 @@ def plan(
         if name not in STEP_HOURS:
             raise InputError(f"'{name}' is no step{suggestion(name, STEP_HOURS)}")
     stage(PLAN_STAGES[0])
-    labels, steps = labels_of(case), {**STEP_HOURS, **step_hours}
+    labels, steps = labels_to_measure(case), {**STEP_HOURS, **step_hours}
     placed = _sensors(case, evaluator, labels, sensors) if sensors else None
     confused = [m.label for m in placed.modes if m.labelled < LABELLED] if placed else []
     seen = [label for label in labels if label not in confused]
@@ -128,7 +128,9 @@ def planned(
     jobs: int,
 ) -> RunPlan:
     """About how often the solver runs for a plan, before it does. Raises InputError."""
-    model = offer(case, evaluator, labels_of(case), pressures_kPa).model(case, evaluator, jobs)
+    model = offer(case, evaluator, labels_to_measure(case), pressures_kPa).model(
+        case, evaluator, jobs
+    )
     runs = model.runs(first_points(model, model.start))
     return estimate(model, runs + (1 if sensors else 0), jobs)
 

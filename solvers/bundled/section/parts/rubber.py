@@ -26,8 +26,6 @@ from .hybrid import Hybrid
 from .part import Rows, SectionJob, TyrePart, consistent_mass, on_diagonals
 
 Array = np.ndarray
-
-
 SHARE_OF_SHEAR_MODULUS = 0.005  # the hourglass stiffness where a deck states none
 
 
