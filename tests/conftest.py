@@ -30,6 +30,16 @@ if threading.current_thread() is threading.main_thread():
 
 ROOT = Path(__file__).parents[1]
 CASES = ROOT / "cases"
+SOLVED_ONCE = ("cli", "deck", "effects", "fit")  # folders whose tests only need a tyre's answers
+
+
+@pytest.fixture(autouse=True)
+def solved_once(request: pytest.FixtureRequest) -> None:
+    """Solve each tyre once for all tests of these folders."""
+    if request.path.parent.name in SOLVED_ONCE:
+        from .solved import recall
+
+        recall(request.getfixturevalue("monkeypatch"), request.getfixturevalue("tmp_path_factory"))
 
 
 @pytest.fixture

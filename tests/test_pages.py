@@ -1,5 +1,5 @@
-"""Figures of the documents are those that the commands give; links of all documents lead somewhere,
-and a page on recorded studies stays short."""
+"""Figures and pictures of the documents are those that the commands give, pictures by the numbers
+that they draw; links lead somewhere, and a page on recorded studies stays short."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from .conftest import CASES
 from .studies.page_steps import STEPS
 from .studies.pages import DOCUMENTS as FIGURE_PAGES
 from .studies.pages import differences, is_rounded, marked_tables, numbers, plain, recorded, run
+from .studies.pictures import DRAWN, PICTURES, Drawn, draw, numbers_apart
 
 ROOT = CASES.parent
 BENCHMARKS = ROOT / "tests" / "benchmarks"
@@ -105,3 +106,19 @@ def test_a_page_on_recorded_studies_is_short(page: Path) -> None:
 def test_notes_on_recorded_studies_have_a_page() -> None:
     for notes in (BENCHMARKS / "records").glob("*.md"):
         assert (BENCHMARKS / notes.name).exists(), notes
+
+
+def test_every_picture_of_the_guides_has_a_command() -> None:
+    names = [name for drawn in DRAWN for name in drawn.pictures]
+    assert sorted(names) == sorted(path.name for path in PICTURES.iterdir())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "drawn",
+    [drawn for drawn in DRAWN if drawn.is_quick],
+    ids=lambda drawn: next(iter(drawn.pictures)),
+)
+def test_pictures_are_of_today(drawn: Drawn, tmp_path: Path) -> None:
+    for name, path in draw(drawn, tmp_path).items():
+        assert not list(numbers_apart(path, PICTURES / name)), name

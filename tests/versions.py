@@ -35,8 +35,8 @@ TESTS = [
     "tests/cli/test_cli.py",
     "tests/cli/test_conventions.py",
     "tests/cli/test_mistakes.py",
-    "tests/cli/test_default_case.py",
-    "tests/case/test_bad_cases.py",  # what Pydantic refuses, and does not
+    "tests/cli/test_after_a_good_fit.py",
+    "tests/case/test_case.py",  # what Pydantic refuses, and does not
     "tests/report/test_pictures.py",  # what Matplotlib leaves out
 ]
 LOWEST = "lowest-direct"  # of what is stated; what that needs in turn is the newest

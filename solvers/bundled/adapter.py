@@ -149,7 +149,7 @@ def examine(text: str, long_term: bool) -> float | tuple[int, str]:
     """The mass, kg, of the tyre in a section job's model, or a refusal: its line and words.
     long_term: as in `section.model.build`."""
     from ..language.text import DeckError, read_keywords
-    from .deck.grammar import check
+    from .deck.steps import check
     from .section.mechanics import total_mass
     from .section.model import build
 

@@ -17,9 +17,8 @@ from tyrecal.tyre.values import with_values
 
 from ..chance import Chance, generator
 from .emulated import emulate
-from .laws import other_laws
+from .laws import divided, other_laws
 from .makers import finer, other_maker
-from .regions import divided
 from .toy import CASE, Scale
 
 LABELS = [Label(t.c, t.m, t.kind) for t in CASE.case.targets.modes]  # type: ignore[union-attr]

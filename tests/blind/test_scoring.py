@@ -21,8 +21,7 @@ from tyrecal.studies.blind.score import (
 from tyrecal.studies.inference.model import Query
 
 from ..chance import Chance
-from .baselines import guesses, repeatability
-from .tables import brier, full_summary
+from .tables import brier, full_summary, guesses, repeatability
 from .toy import Scale
 
 pytestmark = pytest.mark.numbers

@@ -23,8 +23,7 @@ from tyrecal.studies.blind.score import score as full_score
 from ..benchmarks.blind import benchmark
 from ..studies.blind_least_squares import errors
 from .archive import ARCHIVE, STUDIES, digits, packed_bytes, unpack
-from .baselines import rivals
-from .tables import full_summary
+from .tables import full_summary, rivals
 
 LEAST_SQUARES = {  # errors held out without and with the effect, %, shrinkage, by chance
     "blind_study_1": (1.70, 0.47, 0.74, 0.68),

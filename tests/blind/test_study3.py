@@ -40,11 +40,10 @@ from ..studies.test_programs import installed
 from .archive import ARCHIVE, seals, unpack
 from .study3 import make as making
 from .study3.__main__ import result
-from .study3.cases import GROUPS, LABELS, SIZES, SURFACE_HELD, Group, written
+from .study3.cases import EFFECTS_OF, GROUPS, LABELS, SIZES, SURFACE_HELD, Group, further, written
 from .study3.draw import evident, foreseen, known_laws, one_drawn
-from .study3.kinds import EFFECTS_OF, further
 from .study3.laws import EVIDENT, bead_seat
-from .study3.maker import Fenics, computed, modes
+from .study3.make import Fenics, computed, modes
 from .study3.section import Section, columns, mould, off, section
 from .study3.tyre import Mesh, Tyre, on_springs, problem, tyre_of
 

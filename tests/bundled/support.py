@@ -1,24 +1,30 @@
-"""Decks, meshes and shorthands that the tests of the bundled solver share."""
+"""Decks, meshes and shorthands that the tests of the bundled solver share; and pairs of jobs
+as the tool writes them, edited, with their results."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.sparse import csr_array
-from tyrecal_solvers.bundled.deck import grammar
+from tyrecal_solvers.bundled.deck import steps
+from tyrecal_solvers.bundled.deck.request import Request
+from tyrecal_solvers.bundled.deck.steps import Deck
+from tyrecal_solvers.bundled.job import Job
 from tyrecal_solvers.bundled.modes import harmonics
 from tyrecal_solvers.bundled.modes.harmonics import Vibration
 from tyrecal_solvers.bundled.road.contact_newton import ContactNewton, PressedState
 from tyrecal_solvers.bundled.section import inflation, mechanics, model
 from tyrecal_solvers.bundled.section.band import Numbering
 from tyrecal_solvers.bundled.section.kept_fields import KeptFields
+from tyrecal_solvers.bundled.section.loads import spinning
 from tyrecal_solvers.bundled.section.model import Model, build
 from tyrecal_solvers.bundled.section.parts.pressure import Pressure
-from tyrecal_solvers.bundled.section.parts.spin import spinning
 from tyrecal_solvers.bundled.section.symmetry import MirrorHalf
 from tyrecal_solvers.errors import NoEquilibrium
 from tyrecal_solvers.language import text as language
@@ -27,6 +33,7 @@ from tyrecal_solvers.language.text import read_keywords
 from tyrecal.tyre.section.mesh import build_mesh
 from tyrecal.tyre.section.section import read_section
 
+from ..effects.support import CASE, decks
 from . import support
 
 Array = np.ndarray
@@ -201,7 +208,7 @@ def _outline(solids: Array) -> list[Array]:
 
 def model_of(text: str) -> Model:
     """The model of a deck with static moduli."""
-    return model.build(grammar.check(language.read_keywords(text), False)[0], None, True)
+    return model.build(steps.check(language.read_keywords(text), False)[0], None, True)
 
 
 def numbering(m: Model, held: Array | None = None) -> Numbering:
@@ -325,3 +332,26 @@ def inflated_halves() -> Halves:
     fields = KeptFields(list(half.mesh.connectivity.values()), free, symmetry)
     U = support.inflate(whole, held, loads)
     return Halves(whole, half, symmetry, ~held, fields, U, loads)
+
+
+PLAIN: tuple[tuple[str, float], ...] = ()
+WHEEL, TURNING, MASS = (("wheel_free", 0.1),), (("rotation", 5.0),), (("point_mass", 0.1),)
+FREQUENCY = "*FREQUENCY, EIGENSOLVER=LANCZOS, NORMALIZATION=MASS\n20\n"
+STEP = "*STEP, NAME=EQUILIBRIUM"
+
+
+@cache
+def texts(effects: tuple[tuple[str, float], ...]) -> dict[str, str]:
+    """inflate and modes."""
+    written = decks(CASE, **dict(effects))
+    return {name: written[f"{name}.inp"] for name in ("inflate", "modes")}
+
+
+def run(effects: tuple[tuple[str, float], ...], *edits: tuple[str, str], **request: Any) -> list:
+    """Results of the pair with (old, new) edits, the revolve job's where it stands in both."""
+    pair = dict(texts(effects))
+    for old, new in edits:
+        name = "modes" if old in pair["modes"] else "inflate"
+        assert old in pair[name]
+        pair[name] = pair[name].replace(old, new, 1)
+    return Job(Deck(pair, "modes", "inflate"), Request(**request)).run()

@@ -32,8 +32,6 @@ from . import support
 from .wheel_and_gas import SHIFT, STEEL, inflated
 
 Array = np.ndarray
-
-
 RHO, BULK = 4.06, 4.78e5
 
 

@@ -27,8 +27,6 @@ from . import support
 from .support import Layer, Rubber
 
 Array = np.ndarray
-
-
 H = 1e-30
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.linalg import eigvals
-from tyrecal_solvers.bundled.deck import grammar
+from tyrecal_solvers.bundled.deck import steps
 from tyrecal_solvers.bundled.deck.request import Request
 from tyrecal_solvers.bundled.deck.steps import Deck
 from tyrecal_solvers.bundled.job import Job
@@ -212,4 +212,4 @@ def test_damping_of_cords_is_refused() -> None:
         "*ELASTIC", "*DAMPING, STRUCTURAL=0.1\n*ELASTIC", 1
     )
     with pytest.raises(Refused, match="the damping of material CORD1, of cords, is not honoured"):
-        model.build(grammar.check(read_keywords(text), False)[0], None, True)
+        model.build(steps.check(read_keywords(text), False)[0], None, True)

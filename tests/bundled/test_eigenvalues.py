@@ -19,8 +19,6 @@ pytestmark = pytest.mark.numbers
 
 
 Array = np.ndarray
-
-
 KIND = pytest.mark.parametrize("kind", [float, complex])
 
 

@@ -24,7 +24,7 @@ from tyrecal_solvers.bundled.section.shapes import TYPES, ElementType
 from tyrecal_solvers.errors import Inverted
 from tyrecal_solvers.language.text import DeckError
 
-from .job_pairs import MASS, PLAIN, texts
+from .support import MASS, PLAIN, texts
 
 Array = np.ndarray
 

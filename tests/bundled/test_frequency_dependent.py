@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled import job as jobs
-from tyrecal_solvers.bundled.deck import grammar
+from tyrecal_solvers.bundled.deck import steps
 from tyrecal_solvers.bundled.deck.request import Request
 from tyrecal_solvers.bundled.deck.steps import Deck, Tangent
 from tyrecal_solvers.bundled.job import Job
@@ -145,7 +145,7 @@ def test_each_rubber_has_its_own_table_or_none() -> None:
     tables = {1: table.format(0.1), 2: "", 3: table.format(0.2)}
     for i, rows in tables.items():
         head += f"*MATERIAL, NAME=GUM{i}\n{gum}{rows}"
-    keywords, _ = grammar.check(read_keywords(head), False)
+    keywords, _ = steps.check(read_keywords(head), False)
     m = model.build(keywords, None, True, own_frequency=True)
     assert [t.ratios[0] for t in m.tables] == pytest.approx([1.1, 1.2])
     grown = [part.law.C10 for each in m.frequency_dependent_models() for part in each.parts]

@@ -21,7 +21,7 @@ from tyrecal_solvers.bundled.section.boundary import rim_freedoms
 from tyrecal_solvers.errors import RunFailed
 from tyrecal_solvers.language.text import WHOLE_DECK, Row
 
-from .job_pairs import FREQUENCY, MASS, PLAIN, STEP, TURNING, WHEEL, run, texts
+from .support import FREQUENCY, MASS, PLAIN, STEP, TURNING, WHEEL, run, texts
 
 
 def test_rubber_is_relaxed_until_a_static_step_says_otherwise() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled.deck import grammar
+from tyrecal_solvers.bundled.deck import steps
 from tyrecal_solvers.bundled.section import model
 from tyrecal_solvers.language.text import (
     COMPLEX_STEP,
@@ -44,7 +44,7 @@ RUBBER, S4
 
 def refused(text: str) -> DeckError:
     with pytest.raises(DeckError) as error:
-        keywords, _ = grammar.check(read_keywords(text), False)
+        keywords, _ = steps.check(read_keywords(text), False)
         model.build(keywords, None, True)
     return error.value
 
@@ -314,7 +314,7 @@ def test_a_datum_that_is_not_honoured_is_refused(name: str) -> None:
         text = f"*{name}\n{line}\n"
         if where == "step":
             text = f"*STEP, NLGEOM=YES\n{text}*END STEP\n"
-        grammar.check(read_keywords(text), where != "section")
+        steps.check(read_keywords(text), where != "section")
 
     check(data)
     check(f"{data}, ,")

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.linalg import qr
-from tyrecal_solvers.bundled.deck import grammar
+from tyrecal_solvers.bundled.deck import steps
 from tyrecal_solvers.bundled.section.laws.hyperelastic import Hyperelastic
 from tyrecal_solvers.bundled.section.materials import read_materials
 from tyrecal_solvers.language.text import DeckError, read_keywords, seed
@@ -82,7 +82,7 @@ def deck(name: str) -> str:
 
 def read(text: str, tangents: list[tuple[int, int, float]] | None = None) -> Hyperelastic:
     """The one law of a deck, at `POINTS` points."""
-    model, _ = grammar.check(seed(read_keywords(text), tangents or []), False)
+    model, _ = steps.check(seed(read_keywords(text), tangents or []), False)
     (material,) = read_materials(model).values()
     assert material.law is not None
     return material.law.of_points([material.law], np.zeros(POINTS, int))

@@ -28,10 +28,10 @@ from tyrecal_solvers.errors import RunFailed
 
 from ..chance import generator
 from . import support
-from .contact import Round
-from .soft_ring import (
+from .contact import (
     ETA,
     LENGTHS,
+    Round,
     State,
     harmonic,
     held,

@@ -23,15 +23,23 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 
 from ..chance import generator
 from . import support
-from .contact import Round, coarse_case
-from .soft_ring import LENGTHS, State, held, modes, no_hold, press, shifted, soft_ring
+from .contact import (
+    LENGTHS,
+    Round,
+    State,
+    coarse_case,
+    held,
+    modes,
+    no_hold,
+    press,
+    shifted,
+    soft_ring,
+)
 
 pytestmark = pytest.mark.numbers
 
 
 Array = np.ndarray
-
-
 LOADS = (1000.0,)
 
 

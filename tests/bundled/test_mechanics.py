@@ -21,8 +21,6 @@ from . import support
 from .conftest import Inflated
 
 Array = np.ndarray
-
-
 ANGLES = np.arange(24) * 2 * np.pi / 24
 
 

@@ -17,8 +17,7 @@ from tyrecal_solvers.bundled.solid3d.revolved import Revolved
 from tyrecal_solvers.errors import Refused
 
 from . import support
-from .contact import Round, ring
-from .soft_ring import State, held, no_hold, pressed_tyre, start
+from .contact import Round, State, held, no_hold, pressed_tyre, ring, start
 from .test_response import ETA, Solved, _combined, direct
 
 pytestmark = [pytest.mark.numbers, pytest.mark.slow]

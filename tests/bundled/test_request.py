@@ -23,7 +23,7 @@ from tyrecal.tyre.case import with_level
 from tyrecal.tyre.load import load_case
 
 from ..conftest import CASES
-from .job_pairs import FREQUENCY, MASS, PLAIN, STEP, TURNING, WHEEL, run, texts
+from .support import FREQUENCY, MASS, PLAIN, STEP, TURNING, WHEEL, run, texts
 
 ROW = ["inflate", 30, 0, 1.0]
 

@@ -26,8 +26,7 @@ from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 
 from . import support
-from .contact import Round, ball, coarse_case
-from .soft_ring import LENGTHS, soft_ring
+from .contact import LENGTHS, Round, ball, coarse_case, soft_ring
 
 pytestmark = pytest.mark.numbers
 Array = np.ndarray

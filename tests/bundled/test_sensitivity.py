@@ -21,8 +21,6 @@ pytestmark = pytest.mark.numbers
 
 
 Array = np.ndarray
-
-
 HARMONICS, COUNT, PRESSURE = (0, 1, 2, 3), 2, 240e3
 
 

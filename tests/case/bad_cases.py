@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from . import bad_files as bad_files  # more of them
 from .wrong import BAD as BAD
 from .wrong import CASES as CASES
 from .wrong import CSV as CSV

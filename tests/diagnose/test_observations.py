@@ -158,8 +158,6 @@ def test_the_scatter_of_repeats_by_the_analysis_of_variance() -> None:
 
 
 Array = np.ndarray
-
-
 A, B = Label(3, 0), Label(3, 1)
 
 

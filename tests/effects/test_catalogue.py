@@ -26,8 +26,8 @@ from tyrecal.tyre.resolve import resolved
 from tyrecal.tyre.templates import TemplateFailed
 from tyrecal.tyre.values import with_values
 
-from ..calibrated import calibrate
 from ..conftest import ROOT
+from ..solved import calibrate
 from .support import CASE, CASES, START, coarse, data, decks, frequencies, slopes
 
 EFFECTS = list(catalogue().values())

@@ -23,8 +23,6 @@ from ..studies.wrinkles import by_size
 from .support import CASE, CASES
 
 Array = np.ndarray
-
-
 RIGID = {
     "lateral": Label(0, 0, "axial"),
     "torsional": Label(0, 0, "torsional"),

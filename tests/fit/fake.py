@@ -1,4 +1,5 @@
-"""A tyre with frequencies in closed form, to test the optimiser, and the paper's case."""
+"""A tyre with frequencies in closed form, to test the optimiser, and the paper's case;
+and residuals that are linear in a box, where every step of a search is known by hand."""
 
 from __future__ import annotations
 
@@ -6,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
@@ -14,11 +16,16 @@ from tyrecal.simulate.evaluate.evaluator import Question
 from tyrecal.simulate.evaluate.failure import DeckRefused, EvaluationFailed
 from tyrecal.simulate.evaluate.results import Evaluation, HarmonicShape, RawMode
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies.fit.targets import read_targets
+from tyrecal.studies.fit.problem import Point
+from tyrecal.studies.fit.targets import Target, read_targets
 from tyrecal.tyre.case import LoadedCase, start_values
 from tyrecal.tyre.load import load_case
 
+from ..chance import generator
 from ..conftest import CASES
+
+Array = np.ndarray
+
 
 WIDTH = np.linspace(-0.08, 0.08, 9)
 
@@ -145,3 +152,34 @@ def with_targets(**changes: list) -> LoadedCase:
     ]
     targets = CASE.case.targets.model_copy(update={"modes": modes})
     return replace(CASE, case=CASE.case.model_copy(update={"targets": targets}))
+
+
+def point(x: Any, r: Any, J: Any, modes: dict | None = None) -> Point:
+    x, r, J = (np.array(each, float) for each in (x, r, J))
+    return Point({}, x, r, J, modes or {}, 1.0, 1.0, np.empty(0))
+
+
+class Linear:
+    """Residuals J x - y within a box; ``wall``: x that have no solution."""
+
+    targets: tuple[Target, ...] = ()
+
+    def __init__(self, J: Array, y: Array, box: float = 10.0):
+        self.J, self.y = J, y
+        self.asked: list[Array] = []
+        self.lower, self.upper = np.full(J.shape[1], -box), np.full(J.shape[1], box)
+        self.wall = lambda x: False
+        self.added = lambda x: 0.0  # to the residuals, and to no slope
+
+    def evaluate(self, x: Array) -> Point:
+        self.asked.append(x)
+        assert (x >= self.lower).all() and (x <= self.upper).all()
+        if self.wall(x):
+            raise EvaluationFailed("no_equilibrium", "beyond the wall")
+        return point(x, self.J @ x - self.y + self.added(x), self.J)
+
+
+def linear(key: object = 0, box: float = 10.0, rows: int = 7, columns: int = 3) -> Any:
+    random = generator("linear", key)
+    J = random.normal(size=(rows, columns))
+    return Linear(J, J @ random.normal(size=columns) + 0.3 * random.normal(size=rows), box)

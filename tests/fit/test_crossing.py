@@ -13,7 +13,7 @@ from tyrecal.studies.fit.problem import Problem
 from tyrecal.studies.fit.search import AT_CROSSING
 from tyrecal.tyre.state import AS_THE_CASE
 
-from ..calibrated import calibrate
+from ..solved import calibrate
 from .fake import CASE, LABELS, POINTS, START, FakeEvaluator, evaluator, shape
 
 pytestmark = pytest.mark.numbers

@@ -12,7 +12,7 @@ from tyrecal.studies.fit.differences import differences
 from tyrecal.studies.fit.problem import Problem
 from tyrecal.studies.variable import DesignVariable
 
-from ..calibrated import calibrate
+from ..solved import calibrate
 from .fake import CASE, START, START_X, evaluator
 
 

@@ -26,7 +26,7 @@ from tyrecal.tyre.case.schema import TargetFootprint, Variable
 from tyrecal.tyre.effects.edit import changed
 from tyrecal.tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 
-from ..calibrated import calibrate
+from ..solved import calibrate
 from . import pressed
 from .pressed import (
     AREA,

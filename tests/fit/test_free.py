@@ -23,8 +23,8 @@ from tyrecal.tyre.case.identity import tyre_sha256
 from tyrecal.tyre.case.schema import TargetMode, Targets, Uncertainty
 from tyrecal.tyre.values import with_values
 
-from ..calibrated import calibrate
 from ..conftest import CASES
+from ..solved import calibrate
 from .fake import LABELS, FakeEvaluator
 
 CASE = with_level(load_case(CASES / "p235_75r17.yaml"), "coarse")

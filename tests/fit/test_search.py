@@ -26,8 +26,7 @@ from tyrecal.studies.fit.targets import Target
 from tyrecal.tyre.state import AS_THE_CASE
 
 from ..chance import generator
-from .fake import START_X, evaluator, with_targets
-from .linear import Linear, linear, point
+from .fake import START_X, Linear, evaluator, linear, point, with_targets
 
 Array = np.ndarray
 

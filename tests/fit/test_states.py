@@ -28,7 +28,7 @@ from tyrecal.tyre.case.schema import TargetMass, TargetMode, Targets, Variable
 from tyrecal.tyre.state import AS_THE_CASE, TyreState
 from tyrecal.tyre.values import with_values
 
-from ..calibrated import calibrate
+from ..solved import calibrate
 from . import pressed
 from .tyre_in_states import (
     CASE,

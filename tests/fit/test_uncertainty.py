@@ -20,13 +20,13 @@ from tyrecal.simulate.modes.find import LabelledModes, find_modes
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.fit.model_errors import ModelErrors, road_changes
 from tyrecal.studies.fit.prediction import (
+    FitResponse,
     FitResponses,
     predicted_errors,
     prediction_variance,
     read_responses,
 )
 from tyrecal.studies.fit.problem import Point, Problem
-from tyrecal.studies.fit.responses import FitResponse
 from tyrecal.studies.fit.road import press
 from tyrecal.studies.fit.targets import ValueTarget, read_targets
 from tyrecal.studies.fit.total_error import BY_SECTION, TotalError, total_error
@@ -43,9 +43,9 @@ from tyrecal.tyre.case.schema import Uncertainty
 from tyrecal.tyre.effects.edit import changed, with_part
 from tyrecal.tyre.state import TyreState
 
-from ..calibrated import calibrate
 from ..chance import Chance, generator
 from ..conftest import CASES
+from ..solved import calibrate
 from .fake import CASE, POWERS, evaluator, with_targets
 
 

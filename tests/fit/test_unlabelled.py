@@ -39,8 +39,8 @@ from tyrecal.studies.labelling.tree import (
 from tyrecal.studies.labels import FOREIGN_WORDS
 from tyrecal.tyre.state import TyreState
 
-from ..calibrated import calibrate
 from ..chance import generator
+from ..solved import calibrate
 from .tyre_in_states import CASE, TRUTH, TyreInStates, case_with, measured
 
 Array = np.ndarray

@@ -19,9 +19,9 @@ from tyrecal.tyre.case.schema import TargetMass, TargetMode, Targets
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.state import TyreState
 
-from ..calibrated import calibrate
 from ..chance import generator
 from ..conftest import CASES
+from ..solved import calibrate
 from .fake import LABELS, FakeEvaluator
 
 CASE = with_level(load_case(CASES / "p235_75r17.yaml"), "coarse")

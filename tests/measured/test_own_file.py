@@ -34,10 +34,10 @@ from tyrecal.tyre.case.shape import with_defaults
 from tyrecal.tyre.state import TyreState
 from tyrecal.tyre.values import overridden
 
-from ..calibrated import calibrate
 from ..conftest import CASES
 from ..fit.fake import LABELS, FakeEvaluator
 from ..fit.test_fit_study import study
+from ..solved import calibrate
 
 HEAD = "label,frequency_Hz,sigma_Hz,pressure_kPa,rim\n"
 

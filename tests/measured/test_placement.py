@@ -17,9 +17,8 @@ from tyrecal.errors import InputError
 from tyrecal.measured import placement
 from tyrecal.measured.case_modes import CaseModes
 from tyrecal.measured.correlation import mac_matrix
-from tyrecal.measured.geometry import _axle, sensors_of
 from tyrecal.measured.placement import at_places, mass_shifts, place_sensors, tread_places
-from tyrecal.measured.sensors import real_part
+from tyrecal.measured.sensors import _axle, real_part, sensors_of
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator, Question
 from tyrecal.simulate.modes.label import paired_labels

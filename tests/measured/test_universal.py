@@ -10,7 +10,7 @@ import pytest
 import pyuff
 
 from tyrecal.errors import InputError
-from tyrecal.measured.geometry import sensors_of
+from tyrecal.measured.sensors import sensors_of
 from tyrecal.measured.universal import is_universal, read_universal
 
 from ..chance import generator

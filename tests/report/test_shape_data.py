@@ -16,7 +16,7 @@ from tyrecal.errors import InputError
 from tyrecal.measured.labels import Judged
 from tyrecal.measured.modal import LabelledMode, ModalTest
 from tyrecal.measured.sensors import MeasuredMode, Sensors
-from tyrecal.report.html.shapes import packed
+from tyrecal.report.html.modes import packed
 from tyrecal.report.measured import measured_table
 from tyrecal.report.revolve import motion, placed, swept
 from tyrecal.report.shape_data import Shapes, patches_data, section_data, tyre_data

@@ -21,8 +21,8 @@ from pathlib import Path
 import numpy as np
 
 from tyrecal.errors import InputError
-from tyrecal.measured.geometry import sensors_of
 from tyrecal.measured.modal import Geometry, Layout, read_modal_test
+from tyrecal.measured.sensors import sensors_of
 from tyrecal.measured.universal import MeasuredShape, Universal
 
 from ..measured.tyres import HIGHEST, measured, modes, shape_of

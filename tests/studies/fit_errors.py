@@ -48,8 +48,8 @@ from tyrecal.tyre.load import load_case
 from tyrecal.tyre.number_units import EFFECT_PATH
 from tyrecal.tyre.values import with_values
 
-from ..calibrated import calibrate
 from ..conftest import CASES
+from ..solved import calibrate
 from .wrinkles import by_size
 
 SIZES = ("P235/75R17", "205/60R15", "225/45R17")

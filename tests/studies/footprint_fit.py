@@ -26,8 +26,8 @@ from tyrecal.tyre.load import load_case
 from tyrecal.tyre.resolve import resolved
 from tyrecal.tyre.values import with_values
 
-from ..calibrated import calibrate
 from ..conftest import CASES
+from ..solved import calibrate
 
 TRUTH = {"A_belt": 2.6e-7, "A_carcass": 2.5e-7, "C10": 7.0e5}
 COARSE = """\

@@ -4,7 +4,7 @@
     python -m tests.studies.pictures --check        # name those whose numbers differ; exits with 1
 
 About five minutes of processor time, most of it for the diagnosis. The tests compare those of the
-commands that take seconds (`test_pictures_in_guides`).
+commands that take seconds (`test_pages`).
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def draw(drawn: Drawn, folder: Path) -> dict[str, Path]:
     return {name: folder / place for name, place in drawn.pictures.items()}
 
 
-def differences(fresh: Path, recorded: Path) -> Iterator[str]:
+def numbers_apart(fresh: Path, recorded: Path) -> Iterator[str]:
     """Panels of two pictures whose words differ, or numbers by more than `WITHIN` of the panel's
     largest. Raises ValueError where a picture keeps no numbers."""
     new, old = read_drawn_numbers(fresh), read_drawn_numbers(recorded)
@@ -108,7 +108,7 @@ def differences(fresh: Path, recorded: Path) -> Iterator[str]:
 
 
 def _words(panel: Panel) -> list[str]:
-    """Texts without their digits, which `differences` compares as numbers where they are drawn."""
+    """Texts without their digits, which `numbers_apart` compares where they are drawn."""
     return ["".join("#" if sign.isdigit() else sign for sign in text) for text in panel["words"]]
 
 
@@ -121,7 +121,7 @@ def main(check: bool) -> int:
                 if not check:
                     shutil.copy(path, PICTURES / name)
                     continue
-                for difference in differences(path, PICTURES / name):
+                for difference in numbers_apart(path, PICTURES / name):
                     print(f"{name}: {difference}", flush=True)
                     differing += 1
     return int(differing > 0)

@@ -28,7 +28,7 @@ from tyrecal.tyre.load import load_case
 from tyrecal.tyre.state import TyreState
 from tyrecal.tyre.values import set_values
 
-from ..calibrated import calibrate
+from ..solved import calibrate
 
 CASE = load_case(CASES / "205_60r15.yaml")
 MEASURED = read_measurements(CASES / "205_60r15_vervoort.csv", labelled=False)

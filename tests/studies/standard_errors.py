@@ -52,7 +52,7 @@ from tyrecal.studies.sample.study import run as sample
 from tyrecal.studies.variable import read_variable
 from tyrecal.tyre.case import LoadedCase
 
-from ..calibrated import calibrate
+from ..solved import calibrate
 from .fit_errors import QUANTILE_90, SIZES, case_of, drawn
 from .slips import table_of
 

@@ -61,7 +61,7 @@ from tyrecal.tyre.load import load_case
 from tyrecal.tyre.state import AS_THE_CASE, TyreState
 from tyrecal.tyre.values import set_values
 
-from ..calibrated import calibrate
+from ..solved import calibrate
 
 Array = np.ndarray
 Hertz = Mapping[TyreState, Sequence[float]]  # of `LABELS`

@@ -43,7 +43,7 @@ from tyrecal.tyre.values import overridden
 from ..chance import Chance, generator
 from ..conftest import CASES
 from ..effects.support import coarse
-from .known_posteriors import (
+from .test_posterior import (
     BOUNDS,
     CENTRE,
     LABELS,
@@ -217,7 +217,7 @@ def test_the_corner_picture_says_names_units_and_lines(
 ) -> None:
     from pathlib import Path
 
-    from ..report.watched import every_text_readable
+    from ..report.conftest import every_text_readable
 
     assert isinstance(tmp_path, Path)
     (name, figure), *_ = figures(result(sampled(), 0)).items()

@@ -18,11 +18,10 @@ import numpy as np
 from ..errors import InputError
 from ..simulate.modes.label import BELT, MAX_SAMPLED_HARMONIC, TAKES_PART, Label
 from ..tyre.usual import USUAL_MEASUREMENTS
-from .geometry import sensors_of
 from .identify import FORMS, Responses, identify
 from .labels import Judged, Labeller
 from .measurement import DAMPING_RATIO, Measurement
-from .sensors import MeasuredMode, Sensors, real_part
+from .sensors import MeasuredMode, Sensors, real_part, sensors_of
 from .universal import Function, MeasuredShape, Place, Signal, Universal, channel_name
 
 Array = np.ndarray

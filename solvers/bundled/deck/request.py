@@ -15,7 +15,7 @@ from pydantic import AfterValidator, ConfigDict, Field, TypeAdapter, ValidationE
 
 from ...errors import Refused
 from ...language.text import Block, read_deck, read_keywords
-from . import grammar
+from . import steps
 
 MAX_HARMONIC, MAX_MODES = 999, 999  # harmonic; modes of one
 MAX_RESPONSE_LINES = 20_000  # of a response
@@ -159,7 +159,7 @@ def _sentence(error: ValidationError) -> str:
 
 
 def read_sector(folder: Path, sector: SectorRequest) -> list[Block]:
-    """The model blocks of the sector's section job, which by `grammar.check` may have only what is
+    """The model blocks of the sector's section job, which by `steps.check` may have only what is
     honoured in a section. Raises DeckError, OSError."""
     text = read_deck(folder / f"{sector.job}.inp")
-    return grammar.check(read_keywords(text, sector.job), revolve=False)[0]
+    return steps.check(read_keywords(text, sector.job), revolve=False)[0]

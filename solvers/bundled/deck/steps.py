@@ -1,4 +1,8 @@
-"""Steps of a pair of jobs: procedure, loads and supports of each, and what must agree."""
+"""Steps of a pair of jobs: procedure, loads and supports of each, and what must agree.
+
+`check` splits a job's deck into its model and its steps, and refuses by name what the table does
+not list as honoured.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +11,28 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...language.honour import split_steps
+from ...language.honour import check_honoured, split_steps
 from ...language.text import WHOLE_DECK, Block, DeckError, Row, read_keywords, seed
-from . import grammar
 
 PROCEDURES = ("STATIC", "FREQUENCY", "COMPLEX FREQUENCY")
 Numbers = dict[str, complex | float]
 Tangent = tuple[str, int, int, float]  # job, 1-based line, 0-based field, d number / d variable
+
+
+def check(keywords: list[Block], revolve: bool) -> tuple[list[Block], list[list[Block]]]:
+    """Split a job into its model and its steps, refusing what is not honoured. revolve: the job
+    revolves a section job, else it is one. Raises DeckError naming the keyword or parameter and its
+    line."""
+    model, steps = split_steps(keywords)
+    places = ["revolve" if revolve else "section", *["step"] * len(steps)]
+    for place, blocks in zip(places, (model, *steps), strict=True):
+        for block in blocks:
+            check_honoured(block, place)
+    formats = [keyword for keyword in keywords if keyword.name == "FILE FORMAT"]
+    if len(formats) > 1:
+        first = formats[0].place
+        raise formats[1].refused(f"may be given once in a job: it is given in {first} already")
+    return model, steps
 
 
 @dataclass
@@ -45,7 +64,7 @@ class Deck:
         self.jobs = [oldjob, job] if oldjob else [job]
         self._keywords = {name: read_keywords(texts[name], name) for name in self.jobs}
         for place, keywords in enumerate(self._keywords.values()):
-            grammar.check(keywords, place > 0)  # once: tangents change numbers alone
+            check(keywords, place > 0)  # once: tangents change numbers alone
         for k in [] if oldjob else self._keywords[job]:
             if k.name == "SYMMETRIC MODEL GENERATION":
                 raise DeckError(k.place, "this job revolves a section job: name that with --oldjob")

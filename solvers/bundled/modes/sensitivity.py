@@ -19,9 +19,9 @@ from scipy.sparse import csr_array
 from ...language.text import COMPLEX_STEP
 from ..section import mechanics
 from ..section.kept_fields import Coordinates, Factor
+from ..section.loads import Spin
 from ..section.model import Model
 from ..section.parts.part import IN_PLANE, ModeShapes, TyrePart
-from ..section.parts.spin import Spin
 from .cavity import GasCavity, coupling
 from .wheel import Wheel
 

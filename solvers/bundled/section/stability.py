@@ -24,9 +24,9 @@ from . import mechanics
 from .band import Numbering
 from .inflation import buckled_cords, equilibrium
 from .kept_fields import Coordinates, Factor
+from .loads import Spin
 from .model import Model
 from .parts.part import TyrePart
-from .parts.spin import Spin
 
 Array = np.ndarray
 SPEED_TOL = 0.005  # of the stated speed, to which the highest stable one is bisected

@@ -42,17 +42,13 @@ from tyrecal.studies.inference.tyre_model import TyreModel
 from tyrecal.tyre.effects.edit import changed, with_part
 
 from ..answers import one_answer
-from .cases import GROUPS, LABELS, LEARNED_FROM, Group, written
-from .kinds import further
-from .make import FENICS, make
-from .maker import computed
+from .cases import GROUPS, LABELS, LEARNED_FROM, Group, further, written
+from .make import FENICS, computed, make
 from .power import NAMED_AS_A_RULE, Power, powers
-from .rises import rises, table_of_rises
 from .score import scored
 from .section import columns, mould
-from .tables import misses, table
+from .tables import misses, rises, table, table_of_rises, table_of_unlike, unlike
 from .tyre import tyre_of
-from .unlike import table_of_unlike, unlike
 
 COUNTS = {"none": 12, "one": 12, "one_strong": 20, "two": 4, "two_strong": 14, "three": 4}
 COUNTS |= {"three_strong": 0, "outside": 6, "outside_strong": 0, "again": 2}

@@ -15,8 +15,7 @@ from tyrecal.studies.blind.score import true_shift
 from tyrecal.studies.inference.uncertainties import sources
 from tyrecal.tyre.case import LoadedCase
 
-from .cases import Group, with_exact_section
-from .kinds import EFFECTS_OF
+from .cases import EFFECTS_OF, Group, with_exact_section
 from .laws import CLAMP, EVIDENT, EVIDENT_FROM, OUTSIDE, OwnLaw, laws, rim_width
 from .score import EACH, ONE
 from .section import columns, mould, off

@@ -25,7 +25,7 @@ from tyrecal.studies.fit.targets import labels_to_measure
 from tyrecal.studies.inference.inverse_problem import Assumed
 
 from ...studies.blind_least_squares import held_out, held_out_rms
-from .kinds import further, weighed_again
+from .cases import further, weighed_again
 from .laws import CLAMP
 
 ONE, EACH = 25.0, 15.0  # lambda from which one effect, and each of a pair, should be found

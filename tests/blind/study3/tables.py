@@ -1,19 +1,40 @@
 """Figures of study 3 as tables: rates with their bounds, calibration, shrinkage.
 
 A rate with too few trials is not shown.
+
+Rises: by how much less or more sound tyres' frequencies rise over the run of pressures than the
+ruler's model has it at their own numbers: what other laws, and another section, do to modes alike.
+Of every tyre, of those with effects what its maker has of it without them; no noise.
+
+Unlike: how unlike what the makers' effects move is to what the catalogue's do, by the trials'
+rulers. Of an effect that moves g, and the catalogue's g_j(e) at the size e that comes closest, in
+what calibration leaves of both (P, see `ruler`), two numbers:
+
+    (g - g_j)^T P (g - g_j) / lambda,  lambda = g^T P g;    e over the size that it was made with
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from math import log
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from tyrecal.studies.blind.ruler import MIN_LAMBDA_APART
-from tyrecal.studies.blind.score import calibration_error, calibration_quantile, rate
+from tyrecal.measured.tables import read_measurements
+from tyrecal.simulate.modes.label import Label
+from tyrecal.studies.blind.answer import case_of
+from tyrecal.studies.blind.protocol import open_truth, read_protocol
+from tyrecal.studies.blind.ruler import MIN_LAMBDA_APART, Ruler, read_ruler
+from tyrecal.studies.blind.score import calibration_error, calibration_quantile, means, rate
+from tyrecal.studies.inference.uncertainties import sources
 
-from .cases import Group
-from .score import EACH, ONE, Scored
+from .cases import Group, with_exact_section
+from .score import EACH, ONE, Scored, moved_by
+
+Array = np.ndarray
+
 
 LEAST, LEAST_A_SIZE, LEAST_ROBUST = 60, 40, 100  # trials of a rate that is shown
 SIGNIFICANT = 0.95
@@ -185,3 +206,99 @@ def _middle(shrinks: Sequence[float], sound: Sequence[float], least: int) -> str
 
 def _few(count: int) -> str:
     return f"not shown ({count})"
+
+
+def rises(folder: Path, sealed: Path) -> dict[Label, Array]:
+    """ln f at the highest pressure less ln f at the lowest, above the model's (tyres,), by mode.
+    Raises InputError."""
+    content, case = open_truth(folder, sealed), case_of(folder)
+    ruler = read_ruler(folder)
+    names = [source.name for source in sources(with_exact_section(case))[0]]
+    each = [risen(ruler, names, truth) for truth in content["trials"]]
+    return {label: np.array([by_label[label] for by_label in each]) for label in each[0]}
+
+
+def risen(ruler: Ruler, names: Iterable[str], truth: Mapping[str, Any]) -> dict[Label, float]:
+    """Rise of each mode of one tyre with pressure beyond the model's, in ln f. names: those of the
+    ruler's constants, except the section's, which come after them."""
+    every = np.arange(len(ruler.rows))
+    x = np.array([log(value) for value in truth["variables"].values()])
+    constants = np.array([truth["constants"].get(name, 0.0) for name in names])
+    eta = ruler.plain(x - ruler.x0, every)[0] + ruler.constants[:, : len(constants)] @ constants
+    model = dict(zip(ruler.rows, eta.tolist(), strict=True))
+    table = sorted(truth["without"], key=lambda entry: entry["pressure_kPa"])
+    low, high = table[0], table[-1]
+    ends = [(entry["pressure_kPa"], entry["ln_f"]) for entry in (low, high)]
+    above = lambda label, p, ln_f: float(np.mean(ln_f[str(label)])) - model[label, p]
+    return {
+        label: above(label, *ends[1]) - above(label, *ends[0])
+        for label in dict.fromkeys(label for label, _ in ruler.rows)
+        if label
+    }
+
+
+def table_of_rises(by_group: Mapping[Group, Mapping[Label, Array]]) -> str:
+    """Medians, per cent, and in parentheses half of what the middle 68 % of the tyres span."""
+    labels = list(next(iter(by_group.values())))
+    lines = [
+        f"| group | tyres | {' | '.join(map(str, labels))} |",
+        "|---" * (2 + len(labels)) + "|",
+    ]
+    for group, modes in by_group.items():
+        cells = []
+        for label in labels:
+            low, middle, high = 100 * np.percentile(modes[label], (16, 50, 84))
+            cells.append(f"{middle:+.2f} ({(high - low) / 2:.2f})")
+        lines.append(f"| {group.name} | {len(modes[labels[0]])} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+SEEN = 8.0  # lambda from which an effect's shape can be told
+Unlike = dict[str, list[tuple[float, float]]]  # by id: share of lambda left, and ratio of sizes
+
+
+def unlike(folder: Path, sealed: Path) -> Unlike:
+    """For every effect of a group that is seen, alone or among others: the share of its shift that
+    the catalogue's effect leaves, and the ratio of the sizes. Raises InputError."""
+    protocol, ruler, result = read_protocol(folder), read_ruler(folder), Unlike()
+    for truth in open_truth(folder, sealed)["trials"]:
+        readings = read_measurements(folder / "trials" / f"{truth['id']}.csv")
+        _, places, counts = means(readings, ruler)
+        d = np.array([log(value) for value in truth["variables"].values()]) - ruler.x0
+        P = ruler.projection(d, places, ruler.sigma(places, counts, protocol))
+        for id, size in truth["effects"].items():
+            if id not in ruler.signatures:
+                continue
+            shift, _ = moved_by(id, truth, ruler, places)
+            sizes, own, _ = ruler.signatures[id].grid(d, places)
+            left = np.einsum("qn,nm,qm->q", own - shift, P, own - shift)
+            lam = float(shift @ P @ shift)
+            if lam >= SEEN:
+                best = int(np.argmin(left))
+                result.setdefault(id, []).append((float(left[best]) / lam, sizes[best] / size))
+    return result
+
+
+def table_of_unlike(by_group: Iterable[tuple[Group, Unlike]]) -> str:
+    """Medians by effect, size and section: per cent of lambda left, ratio of sizes, and of how
+    many."""
+    cells: dict[str, dict[tuple[str, bool], list[tuple[float, float]]]] = {}
+    for group, each in by_group:
+        for id, several in each.items():
+            place = cells.setdefault(id, {}).setdefault((group.size, group.own), [])
+            place.extend(several)
+    places = sorted({place for each in cells.values() for place in each})
+    heads = [f"{size} {'own' if own else 'foreign'}" for size, own in places]
+    lines = [f"| effect | {' | '.join(heads)} |", "|---" * (1 + len(heads)) + "|"]
+    for id, each in sorted(cells.items()):
+        lines.append(f"| {id} | {' | '.join(_cell(each, place) for place in places)} |")
+    return "\n".join(lines)
+
+
+def _cell(
+    each: Mapping[tuple[str, bool], list[tuple[float, float]]], place: tuple[str, bool]
+) -> str:
+    if place not in each:
+        return ""
+    left, ratio = np.median(each[place], axis=0)
+    return f"{100 * left:.0f} %, {ratio:.2f} ({len(each[place])})"

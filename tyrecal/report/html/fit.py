@@ -12,7 +12,7 @@ from ..convergence import draw_convergence, draw_deviations, draw_states
 from ..correlation import figures as mac_figures
 from ..fit import draw_bounds, draw_correlations, draw_normalised, draw_responses, farthest
 from ..table import CLOSE, FAR, ended_words, fit_doubts, nearness
-from .modes import LABEL_WORDS
+from .modes import LABEL_WORDS, section_drawing, shape_section
 from .parts import (
     Block,
     Chapter,
@@ -25,7 +25,6 @@ from .parts import (
     StudyPart,
     usual_part,
 )
-from .shapes import section_drawing, shape_section
 
 CAPTIONS = "Targets, with frequencies in Hz and deviations in %", "Variables with standard errors"
 

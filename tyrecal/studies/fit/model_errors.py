@@ -21,8 +21,8 @@ from ..inference.observations import Observable, Observations
 from ..inference.regions import split_by_region
 from ..inference.section_fields import OF_COMPOUNDS, SectionDesign
 from ..inference.uncertainties import Source, sources, values_of
+from .prediction import linear_answer
 from .problem import Point, Problem
-from .responses import linear_answer
 from .road import press, press_with_slopes
 from .targets import WITHOUT_MODEL_ERROR, Target, ValueTarget
 

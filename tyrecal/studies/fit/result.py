@@ -29,8 +29,7 @@ from ..result import (
     csv_text,
     in_lines,
 )
-from .prediction import AtBound, FitResponses
-from .responses import FitResponse
+from .prediction import AtBound, FitResponse, FitResponses
 from .result_parts import FittedFootprint, FittedMode, FittedState, FittedVariable, FreedNumberFit
 from .verdict import DOES_NOT_FIT, NOT_JUDGED, FitReason, FitVerdict, does_not_fit_words
 

@@ -16,9 +16,9 @@ import numpy as np
 
 from ...files import Json
 from .model_errors import ModelErrors, model_errors
+from .prediction import FitResponse
 from .prior import PriorProblem
 from .problem import Point, Problem
-from .responses import FitResponse
 from .targets import Target, ValueTarget
 from .uncertainty import FitUncertainty, standard_errors
 
