@@ -14,11 +14,10 @@ import xmlschema
 from hypothesis import given, settings
 from hypothesis import strategies as some
 
-from tyrecal.batch.case import CaseTask, lost
+from tyrecal.batch.case import Asked, CaseTask, lost
 from tyrecal.batch.drift import DEFAULTS, OTHER_QUANTITIES, baseline_of, compare, read_baseline
 from tyrecal.batch.junit import drift_line, junit
 from tyrecal.batch.run import summary
-from tyrecal.batch.studies import Asked
 from tyrecal.errors import InputError
 from tyrecal.studies import STUDIES
 from tyrecal.studies.pressure_range import PressureRange

@@ -16,9 +16,9 @@ from tyrecal.tyre.effects import catalogue
 from tyrecal.tyre.values import with_values
 
 from ..chance import Chance, generator
+from .__main__ import finer, other_maker
 from .emulated import emulate
 from .laws import divided, other_laws
-from .makers import finer, other_maker
 from .toy import CASE, Scale
 
 LABELS = [Label(t.c, t.m, t.kind) for t in CASE.case.targets.modes]  # type: ignore[union-attr]

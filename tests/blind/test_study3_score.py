@@ -26,7 +26,7 @@ from tyrecal.tyre.case.schema import Targets
 
 from .archive import unpack
 from .study3.cases import Group, weighed_again
-from .study3.power import NAMED_AS_A_RULE, powers
+from .study3.draw import NAMED_AS_A_RULE, powers
 from .study3.score import Scored, foretold
 from .study3.tables import figures, misses, risen, table, table_of_unlike, unlike
 from .toy import CASE, Scale, protocol

@@ -29,7 +29,7 @@ from tyrecal.tyre.values import with_values
 
 from ..effects.support import CASE
 from . import support
-from .wheel_and_gas import SHIFT, STEEL, inflated
+from .test_wheel import SHIFT, STEEL, inflated
 
 Array = np.ndarray
 RHO, BULK = 4.06, 4.78e5

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tyrecal.batch.case import CaseTask, run_case
-from tyrecal.batch.studies import Asked
+from tyrecal.batch.case import Asked, CaseTask, run_case
 from tyrecal.files import PREVIOUS, RESULTS
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import EvaluationFailed

@@ -18,7 +18,6 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import DeckRefused
 from tyrecal.simulate.modes.label import Label
 from tyrecal.simulate.modes.loaded import Member
-from tyrecal.studies.diagnose.add import add
 from tyrecal.studies.diagnose.diagnosis import diagnose
 from tyrecal.studies.diagnose.gap import find_gap, projection
 from tyrecal.studies.diagnose.result import diagnosis_result
@@ -26,6 +25,7 @@ from tyrecal.studies.diagnose.several import probabilities, weigh_hypotheses
 from tyrecal.studies.diagnose.study import parse_change, study
 from tyrecal.studies.diagnose.under_load import LoadedRow, UnderLoad, compare
 from tyrecal.studies.diagnose.verdict import decide
+from tyrecal.studies.export import add
 from tyrecal.studies.footprint import footprint_row
 from tyrecal.studies.inference.check_units import check_units
 from tyrecal.studies.inference.expansion import expand

@@ -15,10 +15,9 @@ import numpy as np
 import pytest
 
 from tyrecal.errors import InputError
-from tyrecal.measured.case_modes import CaseModes
+from tyrecal.measured.case_modes import SPOILT, CaseModes, ln_shape_odds
 from tyrecal.measured.correlation import auto_mac, auto_mac_words, chance_level
 from tyrecal.measured.sensors import Sensors, real_part
-from tyrecal.measured.shape_likelihood import SPOILT, ln_shape_odds
 from tyrecal.measured.shapes import SensorShapes, ShapeOfMode, read_shapes, shapes_path, shapes_text
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.correlation import correlate

@@ -18,8 +18,7 @@ from tyrecal.studies.diagnose.several import probabilities, weigh_hypotheses
 from tyrecal.studies.inference.effect_ranges import effect_ranges
 from tyrecal.studies.plan.chance import FOUND, NONE, LinearDiagnosis, shares
 from tyrecal.studies.plan.laboratory import Item, Laboratory
-from tyrecal.studies.plan.order import order
-from tyrecal.studies.plan.study import _widths
+from tyrecal.studies.plan.study import _widths, order
 
 from ..chance import generator
 from ..cli.test_cli import run

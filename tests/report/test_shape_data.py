@@ -36,7 +36,7 @@ from tyrecal.tyre.section.section import read_section
 from ..chance import generator
 from ..conftest import CASES
 from ..studies.hertz import Hertz, coarse_case
-from .html.ring_under_load import loaded_shapes
+from .html.toy import loaded_shapes
 
 ANGLES = 2 * np.pi * np.arange(48) / 48
 

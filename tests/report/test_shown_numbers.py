@@ -34,7 +34,7 @@ from tyrecal.studies.result import Column, Deviation, Table
 from tyrecal.studies.sample.result import SampleResult
 from tyrecal.studies.signature import Signature
 
-from .html import ring, ring_inference, ring_under_load
+from .html import ring, ring_inference, toy
 from .test_footprint import rows as pressure_rows
 from .test_shape_data import run_of
 from .test_table import lines
@@ -140,7 +140,7 @@ def test_convergence_shows_every_point_and_the_best_so_far() -> None:
 
 
 def test_frequencies_over_load_have_their_values() -> None:
-    rows = LoadSweep.model_validate(ring_under_load.load_sweep()).rows
+    rows = LoadSweep.model_validate(toy.load_sweep()).rows
     figure = draw_load_sweep(rows)
     hertz = {x for axes in figure.axes for line in axes.lines for x in line.get_ydata()}
     assert {mode.frequency_Hz for row in rows for mode in row.modes} <= hertz
@@ -167,7 +167,7 @@ def test_tables_say_numbers_units_and_how_near() -> None:
     rms = math.sqrt(np.average(deviations**2, weights=twice))
     assert words.startswith(f"{(abs(deviations) <= 2).sum()} of {len(deviations)} frequencies")
     assert f"rms {rms:.1f} %" in words and f"{max(deviations, key=abs):+.1f} %" in words
-    modes = ModesResult.model_validate(ring_under_load.loaded_modes())
+    modes = ModesResult.model_validate(toy.loaded_modes())
     text = "\n".join(lines(shown(*modes.tables()), 200))
     assert f"{modes.pressure_kPa:g} kPa, {modes.load_N:g} N, {modes.mass_kg:.2f} kg" in text
     assert all(f"{mode.frequency_Hz:.2f}" in text for mode in modes.modes)

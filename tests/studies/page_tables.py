@@ -9,7 +9,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from .both_columns import PAPER_HZ
-from .page_figures import AXIAL, CHANGED, LABELS, MEASURED_HZ, change, distance, of, pressed, rises
+from .page_sentences import (
+    AXIAL,
+    CHANGED,
+    LABELS,
+    MEASURED_HZ,
+    change,
+    distance,
+    of,
+    pressed,
+    rises,
+)
 from .page_steps import LOADS_N, Record
 
 Row = Callable[[Record], list[float] | None]  # None: figures of others

@@ -15,7 +15,7 @@ effects only (`weigh_hypotheses`), on the recorded model: no solver runs again, 
 not coupled. Every tenth of these is also judged with pairs and triples of effects.
 
 list: `LIST`, in its order. Footprint and loaded modes cost hours and add no evidence. plan: the
-order of `plan.order` within the list's hours. next: the plan's first item, then the most
+order of `plan.study.order` within the list's hours. next: the plan's first item, then the most
 information per hour of what is left, as `next_measurement` has it ("evidence" only). Where there
 is no verdict, all hours of the list count. Hours are those of `next_measurement.STEP_HOURS`.
 least: the cheapest measurements within the list's hours by which the linear judge names the tyre's
@@ -50,8 +50,7 @@ from tyrecal.studies.diagnose.several import present, probabilities, weigh_hypot
 from tyrecal.studies.fit.targets import target_labels
 from tyrecal.studies.plan.chance import DRAWN_FROM, FOUND, Drawn, shares
 from tyrecal.studies.plan.laboratory import Laboratory, laboratory
-from tyrecal.studies.plan.order import order
-from tyrecal.studies.plan.study import DRAWN_TYRES, TRIED_TYRES
+from tyrecal.studies.plan.study import DRAWN_TYRES, TRIED_TYRES, order
 from tyrecal.tyre.effects.edit import changed, with_part
 
 from ..effects.support import coarse

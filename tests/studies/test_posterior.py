@@ -17,9 +17,9 @@ from scipy.signal import lfilter
 
 from tyrecal.errors import InputError
 from tyrecal.simulate.modes.label import Label
-from tyrecal.studies import variance_shares as module
 from tyrecal.studies.emulator import Evaluated, fitted, spread, up_to
 from tyrecal.studies.inference.observations import Observable
+from tyrecal.studies.sample import predict as module
 from tyrecal.studies.sample.box import sample_box
 from tyrecal.studies.sample.chains import (
     ENOUGH,
@@ -31,9 +31,9 @@ from tyrecal.studies.sample.chains import (
     walkers,
 )
 from tyrecal.studies.sample.posterior import Posterior, optima
+from tyrecal.studies.sample.predict import variance_shares
 from tyrecal.studies.sample.study import rows_of
 from tyrecal.studies.variable import DesignVariable
-from tyrecal.studies.variance_shares import variance_shares
 from tyrecal.tyre.state import TyreState
 
 from ..chance import Chance, generator

@@ -4,24 +4,28 @@ The report is plain data, small enough for any network: ``name``; ``provenance``
 case could not be read; ``studies``, each with
 
 * ``status``: ``good``; ``failed``, finished but not as it should (a fit that did not converge, a
-  load that was not reached); ``error``, there is no result; ``skipped``, see `studies.study`;
+  load that was not reached); ``error``, there is no result; ``skipped``, see `study`;
 * ``cause`` (`EvaluationFailed`, `_failed`) and ``words``, or None; ``quantities``, name to number;
 of a diagnosis its ``verdict``,
   and the ``effect`` that it names or None;
 
 and ``facts``, which are volatile: seconds by study and of a core, when, where, which solver, how
 often it ran and the record answered, or ``answered``: all of it by the case's folder.
+
+Result files are those of the command of the same name. Where a batch fits, studies that follow a
+fit study the fitted design next to the initial one, as with their --fitted.
 """
 
 from __future__ import annotations
 
+import inspect
 import json
 import os
 import platform
 import time
 from collections.abc import Collection, Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from hashlib import sha256
 from pathlib import Path
@@ -47,11 +51,62 @@ from ..simulate.evaluate.failure import EvaluationFailed, SolverUnavailable
 from ..simulate.evaluate.solver import solver_facts
 from ..simulate.evaluate.store import Store, solver_identity
 from ..simulate.provenance import provenance, sources
+from ..studies import study_class
 from ..studies.fitted import NOT_CONVERGED, has_good
+from ..studies.pressure_range import PressureRange
 from ..studies.result import StudyInput
 from ..tyre.case import LoadedCase, start_values, with_level
 from ..tyre.values import unusual_value, with_values
-from .studies import Asked, Studied, StudyOutcome, study
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Options of the studies, by the names of arguments of `Result.run`."""
+
+    loads_N: tuple[float, ...] | None  # None: those of the case
+    pressures_kPa: PressureRange
+
+
+@dataclass
+class Studied:
+    """A case under study."""
+
+    given: StudyInput
+    asked: Asked
+    no_fit: bool = False  # a fit was requested and has no result
+
+
+@dataclass
+class StudyOutcome:
+    """Outcome of a study (see `case`), its numbers, and its result files, name to text."""
+
+    status: str = "good"  # or "failed", "skipped"
+    cause: str | None = None  # of a failure, a key
+    words: str | None = None  # of a failure, for people
+    quantities: dict[str, float] = field(default_factory=dict)  # `Result.quantities`, by name
+    files: dict[str, str] = field(default_factory=dict)
+    conclusion: dict[str, str | None] = field(default_factory=dict)  # `Result.conclusion`
+
+
+def study(name: str, state: Studied) -> StudyOutcome:
+    """One study; skipped where it follows a fit that has no result. Raises what the study does."""
+    kind = study_class(name)
+    if state.no_fit and kind.follows_fit:
+        return StudyOutcome("skipped", None, "the fit before it has no result")
+    state.no_fit = state.no_fit or kind.fits
+    known = inspect.signature(kind.run).parameters
+    options = {key: value for key, value in vars(state.asked).items() if key in known}
+    result = kind.run(state.given, **options)
+    result.pass_on(state.given)
+    state.no_fit = state.no_fit and not kind.fits
+    failed = getattr(result, "failed", ())  # states not reached; without any row there is no result
+    if failed and not getattr(result, "rows", True):
+        raise EvaluationFailed(failed[0].cause, failed[0].words)
+    conclusion, short = result.conclusion(), result.shortfall()
+    cause, words = short or (None, conclusion.pop("words", None))
+    status = "failed" if short else "good"
+    return StudyOutcome(status, cause, words, result.quantities(), result.texts(), conclusion)
+
 
 FINISHED = "finished.json"  # in a case's folder: what was asked, and the answer
 ENDED = ("good", "failed")  # statuses of studies with a result

@@ -140,10 +140,9 @@ def command(
     terminal, scheduler = study.terminal, study.scheduler
     if study.jobs > 1 and len(cases) > 1 and not scheduler:
         warm_up()  # while we import
-    from ..batch.case import CaseTask
+    from ..batch.case import Asked, CaseTask
     from ..batch.junit import junit as junit_xml
     from ..batch.run import names_of, run_batch, summary
-    from ..batch.studies import Asked
     from ..simulate.evaluate.cluster import reached
     from ..simulate.settings import root
     from .output import Run

@@ -223,7 +223,7 @@ def command(
 def _with_effects(case: Path, added: tuple[str, ...], output: Path | None, allowed: bool) -> Path:
     """Write the case with the effects ``added``; returns its path. allowed: unusual values too.
     Raises click.UsageError, CaseError."""
-    from ..studies.diagnose.add import add
+    from ..studies.export import add
     from ..tyre.case import parse_assignment
     from ..tyre.load import load_case
     from ..tyre.number_units import EFFECT_PATH, unit_of

@@ -2,16 +2,19 @@
 
 `tyrecal export` calls this. A case keeps its user's text, and decks of a user keep theirs: only
 numbers change.
+`add` writes a new case with effects in it.
 """
 
 from __future__ import annotations
 
 from codecs import BOM_UTF8
+from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ..files import read_bytes
+from ..errors import InputError
+from ..files import read_bytes, write_text
 from ..simulate.deck.decks import Decks
 from ..simulate.deck.decks_design import design_of
 from ..simulate.evaluate.evaluator import Evaluator
@@ -22,7 +25,9 @@ from ..tyre.case.edit_text import is_stated, set_in_text
 from ..tyre.case.editor import SCHEMA_FILE, case_schema, with_editor_line
 from ..tyre.case.identity import is_of_tyre
 from ..tyre.case.mistakes import Keys
+from ..tyre.load import load_case
 from ..tyre.resolve import resolved
+from ..tyre.values import with_values
 
 Files = dict[str, bytes]  # content by path relative to the folder of the export
 
@@ -114,3 +119,27 @@ def _text_of(content: bytes) -> tuple[str, str]:
         return content.decode(encoding), encoding
     except UnicodeDecodeError:
         return content.decode("latin-1"), "latin-1"
+
+
+def add(path: Path, effects: Mapping[str, float], folder: Path | None = None) -> Path:
+    """Write CASE_EFFECTS.yaml next to the case at ``path`` with the effects' parameters, by id.
+
+    Its section and templates are named relative to the case, so it goes beside it, or into
+    ``folder`` where that is the same. Raises InputError; ValueError for an unknown effect or a
+    parameter that cannot be, OSError.
+    """
+    loaded = load_case(path, allow_unusual=True)  # of the old case its user was told
+    with_values(loaded, {f"effects.{id}": value for id, value in effects.items()})
+    target = path.with_name(f"{'_'.join((path.stem, *effects))}{path.suffix}")
+    if folder is not None and folder.resolve() != path.parent.resolve():
+        raise InputError(
+            f"the new case must be next to the old one, in '{target}', not to '{folder}'"
+        )
+    if target.exists():
+        raise InputError(f"'{target}' exists already; move it away first")
+    values: dict[Keys, float] = {("effects", id): value for id, value in effects.items()}
+    text = with_editor_line(set_in_text(path.read_text(encoding="utf-8-sig"), values))
+    write_text(target, text)
+    write_text(target.with_name(SCHEMA_FILE), case_schema())
+    load_case(target, allow_unusual=True)
+    return target

@@ -12,7 +12,7 @@ import numpy as np
 from ...language.text import Block, DeckError, Place
 from .laws.data_lines import read_law
 from .laws.hyperelastic import Hyperelastic
-from .laws.linear_elastic import LinearElastic
+from .laws.principal import LinearElastic
 
 Array = np.ndarray
 Scalar = complex | float  # complex where it carries the tangent of a slope (`sensitivity`)

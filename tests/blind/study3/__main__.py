@@ -43,8 +43,8 @@ from tyrecal.tyre.effects.edit import changed, with_part
 
 from ..answers import one_answer
 from .cases import GROUPS, LABELS, LEARNED_FROM, Group, further, written
+from .draw import NAMED_AS_A_RULE, Power, powers
 from .make import FENICS, computed, make
-from .power import NAMED_AS_A_RULE, Power, powers
 from .score import scored
 from .section import columns, mould
 from .tables import misses, rises, table, table_of_rises, table_of_unlike, unlike

@@ -10,9 +10,8 @@ from math import ceil
 
 import numpy as np
 
-from ...measured.case_modes import PER_HARMONIC, CaseModes, require_harmonic_shapes
+from ...measured.case_modes import PER_HARMONIC, CaseModes, ln_shape_odds, require_harmonic_shapes
 from ...measured.measurement import Measurement
-from ...measured.shape_likelihood import ln_shape_odds
 from ...measured.shapes import SensorShapes
 from ...simulate.deck.tyre_design import TyreDesign
 from ...simulate.evaluate.evaluator import Evaluator, Question

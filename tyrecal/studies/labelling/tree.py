@@ -17,7 +17,7 @@ frequency after the other, each conditions z for the next (Kalman, J. Basic Engi
     foreign ones are FOREIGN on average (Poisson), anywhere in the band: FOREIGN / width each
 
 Where shapes were measured, too, that of a frequency is one more factor: p(shape | mode) over
-p(shape | foreign), `measured.shape_likelihood`. Then both modes of a pair may be measured: the
+p(shape | foreign), `measured.case_modes`. Then both modes of a pair may be measured: the
 second with the probability SECOND if the first is, and SPLIT from it.
 
 The tree of labelings grows a frequency at a time, lowest first, as in tracking of multiple

@@ -24,9 +24,9 @@ from ..result import (
     Table,
     csv_text,
 )
-from ..variance_shares import variance_shares
 from .box import AT_EDGE
 from .chains import ENOUGH, enough_draws
+from .predict import variance_shares
 from .study import MANY_DRAWS, MAX_EMULATOR_ERROR, Sample, measured_readings, run, states_sampled
 
 Array = np.ndarray

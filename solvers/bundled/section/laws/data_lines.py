@@ -12,8 +12,8 @@ from ....language.laws import LAW_CONSTANTS, MAX_ENERGY_ORDER, OF_ORDER_N, ON_A_
 from ....language.text import Block, DeckError
 from .arruda_boyce import ArrudaBoyce
 from .hyperelastic import Hyperelastic
-from .ogden import Ogden
 from .polynomial import MooneyRivlin, PolynomialLaw, ReducedPolynomial
+from .principal import Ogden
 
 Scalar = complex | float
 LAW_CLASSES: tuple[type[Hyperelastic], ...] = (  # the first that has all constants of a law
