@@ -8,9 +8,9 @@ import pytest
 
 from tyrecal.errors import InputError
 from tyrecal.tyre.case import LoadedCase
-from tyrecal.tyre.case.kinds.decks_in_3d import DecksIn3D
 from tyrecal.tyre.case.kinds.section_deck import SectionDeck
 from tyrecal.tyre.case.kinds.stations import Stations
+from tyrecal.tyre.case.kinds.user_decks import DecksIn3D
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.resolve import resolved
 

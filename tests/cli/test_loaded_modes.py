@@ -12,7 +12,7 @@ from tyrecal.report.load import draw_load_sweep
 from tyrecal.studies.loaded_result import LoadRow, LoadSweep
 
 from ..bundled import support
-from ..studies.loaded import coarse_case
+from ..studies.hertz import coarser_case
 from .test_cli import CASE, run
 
 
@@ -22,7 +22,7 @@ def test_one_load_the_record_and_a_load_out_of_reach(
 ) -> None:
     """modes.json as the interface has it, the same bytes from the record; a sweep that ends early
     keeps the loads below."""
-    case, out = str(coarse_case(tmp_path)), tmp_path / "out"
+    case, out = str(coarser_case(tmp_path)), tmp_path / "out"
     arguments = ["modes", case, "--output", str(out), "--load-N", "300"]
     assert run(*arguments) == 0
     first = (out / "modes.json").read_bytes()
@@ -60,7 +60,7 @@ def test_a_tyre_that_no_load_is_borne_by(
 ) -> None:
     support.bears(monkeypatch, 0.0)
     out = tmp_path / "out"
-    arguments = ["modes", str(coarse_case(tmp_path)), "--output", str(out), "--load-N", "300000"]
+    arguments = ["modes", str(coarser_case(tmp_path)), "--output", str(out), "--load-N", "300000"]
     assert run(*arguments, "--allow-unusual") == 3
     printed = capsys.readouterr()
     assert "no equilibrium between 0 and" in printed.err and "Traceback" not in printed.err

@@ -14,7 +14,7 @@ from tyrecal.tyre.case.identity import tyre_sha256
 from tyrecal.tyre.load import load_case
 
 from ..conftest import CASES
-from ..studies.loaded import coarse_case
+from ..studies.hertz import coarser_case
 from .test_cli import run
 
 KEYS = {
@@ -42,7 +42,7 @@ TURNED = "rebar_layers.belt_1.angle_deg"
 def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A case, measurements, and in ``out`` the results of several studies of it."""
     folder = tmp_path_factory.mktemp("project")
-    case = coarse_case(folder)
+    case = coarser_case(folder)
     (folder / "measured.csv").write_text(MEASURED)
     quiet = ["--output", str(folder / "out"), "--no-pictures", "--quiet"]
     fit = ["fit", str(case), "--measured", str(folder / "measured.csv"), "--report"]
@@ -141,7 +141,7 @@ def test_a_fit_is_of_its_tyre(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    case = coarse_case(tmp_path)
+    case = coarser_case(tmp_path)
     text = case.read_text()
     assert old in text
     case.write_text(text.replace(old, new, 1))
@@ -170,7 +170,7 @@ def test_a_fit_is_of_its_tyre(
 def test_another_mesh_is_taken_and_said(
     project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    case = coarse_case(tmp_path)
+    case = coarser_case(tmp_path)
     fit = read(project / "out/fit.json")
     fit["provenance"]["mesh"] = "another"
     (tmp_path / "fit.json").write_text(json.dumps(fit))
@@ -200,7 +200,7 @@ def test_another_mesh_is_taken_and_said(
 def test_a_fit_with_other_numbers_set_says_which(
     project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    case = coarse_case(tmp_path)
+    case = coarser_case(tmp_path)
     fit = read(project / "out/fit.json")
     turned = read(project / "out/modes.json")["provenance"]
     (tmp_path / "fit.json").write_text(json.dumps(fit | {"provenance": turned}))

@@ -11,8 +11,7 @@ import pytest
 from tyrecal.simulate.evaluate import evaluator as door_module
 
 from ..report.html import toy
-from ..studies.hertz import Hertz
-from ..studies.loaded import coarse_case
+from ..studies.hertz import Hertz, coarser_case
 from .test_cli import run
 
 
@@ -26,7 +25,7 @@ def test_studies_write_it_and_the_command_writes_the_same(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Fit, sweep and footprint of one folder on one page; by the command the same bytes."""
-    case, out = str(coarse_case(tmp_path)), tmp_path / "out"
+    case, out = str(coarser_case(tmp_path)), tmp_path / "out"
     options = ["--output", str(out), "--no-pictures", "--quiet"]
     fitted = ["--fitted", str(out / "fit.json")]
     assert run("fit", case, *options, "--report") in (0, 4)
@@ -46,7 +45,7 @@ def test_studies_write_it_and_the_command_writes_the_same(
 
 def test_modes_of_the_case_itself(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    assert run("modes", str(coarse_case(tmp_path)), "--output", str(out), "--report") == 0
+    assert run("modes", str(coarser_case(tmp_path)), "--output", str(out), "--report") == 0
     page = (out / "report.html").read_text()
     assert "Mode shapes" in page and "Not in it: results of fit" in page
     assert "[0,0]" in page and "Section" in page
@@ -107,7 +106,7 @@ def test_damaged_results_beside_those_of_a_study(
     out = tmp_path / "out"
     out.mkdir()
     (out / "footprint.json").write_text("[1, 2")
-    assert run("modes", str(coarse_case(tmp_path)), "--output", str(out), "--report") == 2
+    assert run("modes", str(coarser_case(tmp_path)), "--output", str(out), "--report") == 2
     assert "footprint.json' is damaged" in capsys.readouterr().err
     assert (out / "modes.json").exists() and not (out / "report.html").exists()
 

@@ -41,7 +41,7 @@ from tyrecal.tyre.resolve import resolved
 
 from ..case.test_guard import SLIPS
 from ..chance import Chance
-from ..studies.loaded import coarse_case
+from ..studies.hertz import coarser_case
 from .coarse_model import CASE, EFFECTS, MODEL, ROWS, X, asked, written
 
 
@@ -275,7 +275,7 @@ AREA, STIFFNESS = "contact_area_m2", "vertical_stiffness_N_per_m"
 
 @pytest.fixture(scope="module")
 def case(tmp_path_factory: pytest.TempPathFactory) -> LoadedCase:
-    return load_case(coarse_case(tmp_path_factory.mktemp("coarse")))
+    return load_case(coarser_case(tmp_path_factory.mktemp("coarse")))
 
 
 def true_values(case: LoadedCase) -> dict[str, float]:

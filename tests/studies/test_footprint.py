@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tyrecal.errors import InputError
-from tyrecal.report.stiffness import figures
+from tyrecal.report.footprint import stiffness_figures as figures
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate import evaluator as door_module
 from tyrecal.simulate.evaluate.evaluator import Evaluator

@@ -23,7 +23,7 @@ from tyrecal.tyre.values import with_values
 
 from ..evaluate.stand_in import CASE, StandIn
 from ..evaluate.test_foreign_records import of_footprints
-from .loaded import coarse_case
+from .hertz import coarser_case
 
 LOADS = [0.0, 500.0, 1000.0]
 LOSS = 0.3
@@ -33,7 +33,7 @@ LOSS = 0.3
 def tyre(tmp_path_factory: pytest.TempPathFactory) -> LoadedTyre:
     """A coarse tyre whose rubber has losses, at three loads."""
     folder = tmp_path_factory.mktemp("coarse")
-    case = with_values(load_case(coarse_case(folder)), {"materials.rubber.loss_factor": LOSS})
+    case = with_values(load_case(coarser_case(folder)), {"materials.rubber.loss_factor": LOSS})
     outcome = load_tyres(
         case, Evaluator(TyreDesign(case), store=Store(folder / "record")), {"initial": {}}, LOADS
     )
@@ -195,7 +195,7 @@ def test_a_solver_without_modes_on_the_road_is_refused() -> None:
 @pytest.mark.slow
 def test_an_unloaded_tyre_that_fails_is_the_outcome(tmp_path: Path) -> None:
     """Far too much pressure: no modes without a load either."""
-    case = load_case(coarse_case(tmp_path))
+    case = load_case(coarser_case(tmp_path))
     outcome = load_tyres(
         case, Evaluator(TyreDesign(case)), {"initial": {"pressure_kPa": 1900.0}}, [1000.0]
     )["initial"]

@@ -110,8 +110,8 @@ def _check(path: Path, study: options.Study) -> int:
     the bundled solver and for ABAQUS, and what CalculiX lacks. Raises click.UsageError,
     InputError."""
     from ..simulate.deck.own import asked_by_abaqus, lacking_in_calculix
-    from ..tyre.case.kinds.decks_in_3d import DecksIn3D
     from ..tyre.case.kinds.section_deck import trial
+    from ..tyre.case.kinds.user_decks import DecksIn3D
     from ..tyre.own_deck.own_deck import read_own_deck
     from ..tyre.own_deck.summary import contents, words
     from ..tyre.own_deck.text import OwnDeckError

@@ -212,9 +212,9 @@ def import_files(
         write_text(shapes_path(output), shapes_text(shapes))
     alike = [auto_mac(each) for each in shapes]
     if study.pictures and gathered.runs:
-        from ..report.correlation import draw_auto_mac
         from ..report.figure import save
         from ..report.measured import draw_measured
+        from ..report.sensitivities import draw_auto_mac
 
         kind = study.figure_format
         draw_measured(output.with_suffix(f".{kind}"), gathered.runs)
@@ -366,7 +366,7 @@ def label_file(case: Path, file: Path, setup: Setup, study: options.Study) -> in
     from ..measured.shapes import read_shapes
     from ..measured.tables import read_measurements
     from ..measured.universal import is_universal
-    from ..report.correlation import figures
+    from ..report.sensitivities import mac_figures as figures
     from ..report.table import shown
     from ..studies.fit.result import FitResult
     from ..studies.labelling.label import fitted_prior, label

@@ -74,7 +74,7 @@ def command(
         return EXIT_SOLVER
     figures = {}
     if study.pictures:
-        from ..report.stiffness import figures as drawn
+        from ..report.footprint import stiffness_figures as drawn
 
         figures = drawn(result)
     return study.present(output, result, figures)

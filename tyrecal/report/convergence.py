@@ -12,14 +12,14 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 from ..studies.fit.result import FitResult
 from ..studies.fit.result_parts import FittedMode
 from ..studies.result import in_lines
-from . import correlation
+from . import sensitivities
 from .figure import COLOURS, GREY, MARKERS, headline, in_house_style, new_figure
 
 
 def figures(fit: FitResult) -> dict[str, Figure]:
     """Deviations from the targets, and how shapes agree."""
     deviations = draw_states(fit) if fit.states else draw_deviations(fit.modes)
-    return {"deviations": deviations, **correlation.figures(fit)}
+    return {"deviations": deviations, **sensitivities.mac_figures(fit)}
 
 
 @in_house_style

@@ -1,4 +1,5 @@
-"""The pressed tyre drawn: pressure in the patch at each load, what it comes to over the load."""
+"""The pressed tyre drawn: pressure in the patch at each load, what it comes to over the load;
+and static stiffnesses over the load, one curve for each design and pressure."""
 
 from __future__ import annotations
 
@@ -12,6 +13,7 @@ from matplotlib.path import Path
 from matplotlib.ticker import MaxNLocator
 
 from ..studies.footprint import FootprintResult, FootprintRow
+from ..studies.stiffness import StiffnessResult, StiffnessRow
 from .figure import COLOUR_MAP, COLOURS, GREY, headline, in_house_style, new_figure
 from .shape_data import PatchData
 
@@ -115,4 +117,38 @@ def draw_curves(rows: Sequence[FootprintRow]) -> Figure:
         axes.grid(True, color="0.92", lw=0.6)
         axes.tick_params(color=GREY)
     grid[0].legend(frameon=False, loc="upper left")
+    return figure
+
+
+STIFFNESSES = [key for key in StiffnessRow.columns() if "_per_" in key]
+
+
+def stiffness_figures(result: StiffnessResult) -> dict[str, Figure]:
+    """The figure of a result by its name; none without rows."""
+    return {"stiffness": draw_stiffness(result.rows)} if result.rows else {}
+
+
+@in_house_style
+def draw_stiffness(rows: Sequence[StiffnessRow]) -> Figure:
+    """Vertical, lateral, longitudinal and torsional stiffness over the load. A pressure has a
+    colour, a design a line style."""
+    figure = new_figure(8.6, 6.2, caption="Static stiffnesses over the load")
+    grid = figure.subplots(2, 2).ravel()
+    pressures = sorted({row.pressure_kPa for row in rows})
+    states = dict.fromkeys((row.design, row.pressure_kPa) for row in rows)
+    for design, kPa in states:
+        own = [row for row in rows if (row.design, row.pressure_kPa) == (design, kPa)]
+        style = {"color": COLOURS[pressures.index(kPa) % len(COLOURS)], "ms": 4.5, "lw": 1.4}
+        style |= DESIGN_STYLES.get(design, {}) | {"label": f"{design}, {kPa:g} kPa"}
+        for axes, key in zip(grid, STIFFNESSES, strict=True):
+            scale = StiffnessRow.columns()[key].per_unit  # from SI to the unit of the axis
+            load = [row.load_N / 1e3 for row in own]
+            axes.plot(load, [scale * getattr(row, key) for row in own], **style)
+    for axes, key in zip(grid, STIFFNESSES, strict=True):
+        top = 1.05 * axes.dataLim.ymax
+        words = StiffnessRow.columns()[key].name.replace(" N", " stiffness, N")
+        axes.set(xlabel="load, kN", ylabel=words, xlim=(0, None), ylim=(0, top))
+        axes.grid(True, color="0.92", lw=0.6)
+        axes.tick_params(color=GREY)
+    grid[0].legend(frameon=False, loc="lower right")
     return figure

@@ -12,10 +12,10 @@ from ..studies.fit.result import FitResult
 from ..tyre.case import LoadedCase
 from ..tyre.resolve import resolved
 from .convergence import draw_convergence, draw_states
-from .correlation import figures
 from .figure import save
 from .revolve import placed
 from .section import draw_section
+from .sensitivities import mac_figures
 from .shape_data import section_data
 from .shapes import draw_modes_overview
 from .vtu import write_vtu
@@ -64,7 +64,7 @@ def draw_fit(
     """
     draw_evaluation(folder, "fit", case, evaluation, modes, kind)
     save(draw_convergence(history, fit.objective_unit), folder / f"convergence.{kind}")
-    for name, figure in figures(fit).items():
+    for name, figure in mac_figures(fit).items():
         save(figure, folder / f"{name}.{kind}")
     if fit.states and fit.modes:
         save(draw_states(fit), folder / f"fit_states.{kind}")

@@ -125,7 +125,7 @@ class LabelsResult(Result):
     study, stem, command, heading = "labels", "labels", "measured label", "Labels"
     is_seldom = True
 
-    figures = "tyrecal.report.correlation:figures"
+    figures = "tyrecal.report.sensitivities:mac_figures"
 
     labels: Labels  # labels of frequencies that came without one
     shapes: list[ShapeCorrelation] = Field(default=[])  # measured shapes with modes of the case

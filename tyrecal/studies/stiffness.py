@@ -88,7 +88,7 @@ class StiffnessResult(Result):
     """stiffness.json"""
 
     study, stem, heading = "stiffness", "stiffness", "Static stiffnesses"
-    figures = "tyrecal.report.stiffness:figures"
+    figures = "tyrecal.report.footprint:stiffness_figures"
     follows_fit = True
     is_seldom = True
 

@@ -9,8 +9,8 @@ from functools import partial
 from ...studies.fit.result import FitResult
 from ...units import display_unit, printed_value
 from ..convergence import draw_convergence, draw_deviations, draw_states
-from ..correlation import figures as mac_figures
 from ..fit import draw_bounds, draw_correlations, draw_normalised, draw_responses, farthest
+from ..sensitivities import mac_figures
 from ..table import CLOSE, FAR, ended_words, fit_doubts, nearness
 from .modes import LABEL_WORDS, section_drawing, shape_section
 from .parts import (

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from ...tyre.case import LoadedCase
-from ...tyre.case.kinds.decks_in_3d import DecksIn3D
+from ...tyre.case.kinds.user_decks import DecksIn3D
 from ...tyre.case.schema import SolverChoice
 from ...tyre.own_deck.own_deck import UNIT_LENGTH, UNIT_MASS
 from ...tyre.own_deck.own_decks import OwnDecks

@@ -17,11 +17,10 @@ from ..own_deck.own_deck import Units, read_own_deck
 from ..own_deck.own_decks import read_own_decks
 from ..own_deck.text import OwnDeckError
 from .document import Document
-from .kinds.decks_in_3d import DecksIn3D
 from .kinds.kind import TyreKind
 from .kinds.section_deck import SectionDeck
 from .kinds.stations import Stations
-from .kinds.user_decks import UserDecks
+from .kinds.user_decks import DecksIn3D, UserDecks
 from .mistakes import Mistake, suggestion
 from .parts import DeckSource
 from .shape import entries, table

@@ -10,9 +10,8 @@ import numpy as np
 from ....language.fields import constants_of, law_of
 from ....language.laws import LAW_CONSTANTS, MAX_ENERGY_ORDER, OF_ORDER_N, ON_A_LINE
 from ....language.text import Block, DeckError
-from .arruda_boyce import ArrudaBoyce
 from .hyperelastic import Hyperelastic
-from .polynomial import MooneyRivlin, PolynomialLaw, ReducedPolynomial
+from .polynomial import ArrudaBoyce, MooneyRivlin, PolynomialLaw, ReducedPolynomial
 from .principal import Ogden
 
 Scalar = complex | float

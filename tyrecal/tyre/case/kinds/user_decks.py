@@ -1,4 +1,5 @@
-"""Tyres in decks of the user: their files, and the lines that their cases may leave out."""
+"""Tyres in decks of the user: their files, and the lines that their cases may leave out;
+and those in three dimensions, which are known as text only, without a section."""
 
 from __future__ import annotations
 
@@ -16,6 +17,12 @@ if TYPE_CHECKING:
     from ...own_deck.own_decks import OwnDecks
     from ...section.section import Section
     from ..document import Document
+from ....errors import InputError
+from ...own_deck.own_deck import Units
+from ...own_deck.own_decks import OwnDecks
+from ..document import Document
+from ..mistakes import suggestion
+from .kind import Change
 
 # by default: the bundled solver computes section decks, ABAQUS those in three dimensions
 TIME_LIMITS_S = {"bundled": 300.0, "abaqus": 3600.0}
@@ -68,3 +75,57 @@ def lines_of_a_deck(
         "analysis": {"static_moduli": static_moduli} if static_moduli else {},
         "solver": {"name": solver, "time_limit_s": TIME_LIMITS_S[solver]},
     }
+
+
+@dataclass(frozen=True)
+class DecksIn3D(UserDecks):
+    """All is in decks that a solver runs one after the other."""
+
+    own: OwnDecks
+
+    @property
+    def decks(self) -> OwnDecks:
+        """The decks."""
+        return self.own
+
+    @property
+    def units(self) -> Units:  # type: ignore[override]
+        """Units of the decks, which a solver gets as they are."""
+        return self.own.units
+
+    @property
+    def known_numbers(self) -> Mapping[str, float]:
+        """Plain numbers by path."""
+        return self.own.numbers
+
+    def check_case(self, document: Document, numbers: Mapping[str, float]) -> None:
+        """Record a crown that is no node set. Raises OwnDeckError for decks that cannot be run."""
+        # in an assembly the crown is INSTANCE.SET
+        if self.own.crown.rpartition(".")[2] not in self.own.node_sets:
+            hint = suggestion(self.own.crown, self.own.node_sets)
+            document.add(("deck", "crown"), f"is no node set of the decks{hint}")
+        else:
+            self.own.check(numbers)
+
+    def usual_lines(self, source: CaseData) -> dict[str, Any]:
+        """Keys that the case may leave out, with values; no pressure where a mark stands for it.
+        The decks contain how the rim is held, and what is computed."""
+        pressure_kPa = self.own.pressure_Pa / 1e3 if self.own.pressures else None
+        return lines_of_a_deck(source, pressure_kPa, name=self.own.path.stem, solver="abaqus")
+
+    def own_texts(self, tyre: Any) -> dict[str, str]:
+        """Texts of the decks and of what they include. `filled` gets the pressure in Pa and writes
+        it in the decks' units."""
+        return self.own.filled(self.numbers(tyre.case), 1e3 * tyre.case.pressure_kPa)
+
+    def require_section(self, refusal: str) -> None:
+        """Raises InputError(refusal)."""
+        raise InputError(refusal)
+
+    def require_rim(self) -> None:
+        """Raises InputError."""
+        raise InputError("must be absent: the decks state how the rim is held")
+
+    def change_of(self, effect: Any, case: Case) -> Change:
+        """Raises InputError."""
+        raise InputError("changes a section, and the tyre is given by decks in three dimensions")
