@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tyrecal.report.figure import save
-from tyrecal.report.load import draw_load_sweep
+from tyrecal.report.frequencies import draw_load_sweep
 from tyrecal.studies.loaded_result import LoadRow, LoadSweep
 
 from ..bundled import support

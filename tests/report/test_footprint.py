@@ -15,7 +15,7 @@ from rich.console import Console
 from tyrecal.report import pressure
 from tyrecal.report.figure import save
 from tyrecal.report.footprint import draw_curves, draw_footprint, draw_patches
-from tyrecal.report.pressure import draw_pressure_sweep
+from tyrecal.report.frequencies import draw_pressure_sweep
 from tyrecal.report.shape_data import patches_data
 from tyrecal.report.table import shown
 from tyrecal.report.vtu import write_pressed, write_pressed_vtu

@@ -19,9 +19,8 @@ from tyrecal.report.fit import (
     draw_responses,
     normalised,
 )
-from tyrecal.report.load import draw_load_sweep
+from tyrecal.report.frequencies import draw_load_sweep, draw_pressure_sweep
 from tyrecal.report.measured import measured_table
-from tyrecal.report.pressure import draw_pressure_sweep
 from tyrecal.report.sample import draw_corner
 from tyrecal.report.signature import draw_signature
 from tyrecal.report.table import MINUS, nearness, shown

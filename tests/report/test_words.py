@@ -19,8 +19,7 @@ from matplotlib.figure import Figure
 from tyrecal.report.convergence import draw_convergence
 from tyrecal.report.diagnosis import _robust
 from tyrecal.report.figure import headline, new_figure, save
-from tyrecal.report.load import draw_load_sweep
-from tyrecal.report.pressure import draw_pressure_sweep
+from tyrecal.report.frequencies import draw_load_sweep, draw_pressure_sweep
 from tyrecal.report.section import draw_section
 from tyrecal.report.shape_data import section_data
 from tyrecal.report.signature import draw_signature

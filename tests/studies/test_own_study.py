@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from ..example import tyrecal
+from ..test_from_outside import tyrecal
 from .hertz import coarse_case
 
 FILES = {

@@ -200,7 +200,7 @@ def write_load_sweep(
         return EXIT_SOLVER
     figures = {}
     if study.pictures is not False:
-        from ..report.load import draw_load_sweep
+        from ..report.frequencies import draw_load_sweep
 
         figures["load_sweep"] = draw_load_sweep(result.rows)
     return study.present(output, result, figures)

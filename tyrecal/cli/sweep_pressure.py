@@ -67,7 +67,7 @@ def command(case: Path | None, pressures: PressureRange, study: options.Study) -
         terminal.warn(f"no intervals of the fitted design: {result.standard_errors_unknown}")
     figures = {}
     if study.pictures:
-        from ..report.pressure import draw_pressure_sweep
+        from ..report.frequencies import draw_pressure_sweep
 
         measured = [(each, each.state.with_defaults(loaded)) for each in read_targets(loaded)]
         rim = rim_of(loaded)

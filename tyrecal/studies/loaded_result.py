@@ -60,7 +60,7 @@ class LoadSweep(Result):
     """load_sweep.json"""
 
     study, stem, heading = "sweep-load", "load_sweep", "Frequencies over load"
-    figures = "tyrecal.report.load:figures"
+    figures = "tyrecal.report.frequencies:load_figures"
     command = "modes --sweep-load"
 
     pressure_kPa: dict[str, float] = Field(default={})  # inflation pressure by design

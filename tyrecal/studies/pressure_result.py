@@ -53,7 +53,7 @@ class PressureSweep(Result):
 
     study, stem, heading = "sweep-pressure", "pressure_sweep", "Frequencies over pressure"
     part = "tyrecal.report.html.states:pressure_part"
-    figures = "tyrecal.report.pressure:figures"
+    figures = "tyrecal.report.frequencies:figures"
     follows_fit = True
 
     slopes: str = ""  # how sensitivities were computed: exact, or differences

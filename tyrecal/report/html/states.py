@@ -8,7 +8,7 @@ from functools import partial
 from ...studies.footprint import FootprintResult
 from ...studies.pressure_result import PressureSweep
 from ..footprint import draw_curves, draw_patches
-from ..pressure import draw_pressure_sweep
+from ..frequencies import draw_pressure_sweep
 from .parts import Block, Chapter, PageFigure, Paragraphs, StudyPart, usual_part
 
 
