@@ -150,7 +150,7 @@ def test_a_number_has_one_range_and_unusual_ends_may_be_allowed() -> None:
 
 @pytest.mark.slow
 def test_a_sweep_that_was_cut_off_runs_no_point_twice(tmp_path: Path) -> None:
-    """As `killed_sweep` has it of 200 points, killed five times."""
+    """As `studies.kill` has it of 200 points, killed five times."""
     swept = [SweptRange("C10", 8e5, 1.2e6)]
     evaluator = Evaluator(TyreDesign(CASE), store=Store(tmp_path))
     start = StudyInput(CASE, evaluator, {"initial": start_values(CASE)})
