@@ -120,6 +120,33 @@ def test_no_circle() -> None:
         visit(name, ())
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("folder", ["studies", "benchmarks"])
+def test_programs_that_no_test_runs_import_what_is_there(folder: str) -> None:
+    """Names that a program imports from the tests and from tyrecal are bound in that module."""
+    for path in sorted((ROOT / "tests" / folder).glob("*.py")):
+        for node in tree(path).body:
+            if isinstance(node, ast.ImportFrom) and node.module:
+                above = ["tests", folder][: 3 - node.level] if node.level else []
+                file = ROOT.joinpath(*above, *node.module.split(".")).with_suffix(".py")
+                if file.is_file():
+                    bound = {name for each in tree(file).body for name in bound_names(each)}
+                    assert {each.name for each in node.names} <= bound, f"{path}: {node.module}"
+
+
+def bound_names(node: ast.stmt) -> set[str]:
+    """Names that a statement of a module binds."""
+    if isinstance(node, ast.FunctionDef | ast.ClassDef):
+        return {node.name}
+    if isinstance(node, ast.Import | ast.ImportFrom):
+        return {alias.asname or alias.name for alias in node.names}
+    return {
+        each.id
+        for each in ast.walk(node)
+        if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Store)
+    }
+
+
 def test_studies_stand_on_inference_not_on_diagnosis() -> None:
     """`inference` imports no room of the studies, and `blind` and `plan` alone import
     `diagnose`."""

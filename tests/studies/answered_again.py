@@ -37,7 +37,7 @@ from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE
 from ..blind.answers import one_answer
 from ..blind.archive import STUDIES, unpack
 from ..blind.emulated import emulate
-from ..blind.study3.draw import further
+from ..blind.study3.cases import further
 from ..blind.tables import full_summary
 
 ORIGINS = "exact", "drawing"

@@ -2,7 +2,7 @@
 
     python -m tests.studies.sizes_calculix [SIZE ...]
 
-The ten sizes of `pressed_sizes` by default, as `tyrecal init` writes them, inflated to their
+Ten sizes by default, as `tyrecal init` writes them, inflated to their
 pressure, coarse mesh. Printed for each: the deviations of five modes of one discrete problem
 (`calculix`), with the static moduli in vibration, in per cent; or CalculiX's reason for none.
 """
@@ -18,8 +18,12 @@ from tyrecal.tyre.effects.edit import changed, with_part
 
 from . import calculix
 from .belts import ANY_HZ, MODES
-from .pressed_sizes import SIZES
 from .wrinkles import by_size
+
+SIZES = (
+    *("175/65R14", "185/80R14", "195/65R15", "205/60R15", "225/45R17", "245/40R18"),
+    *("275/35R19", "265/70R17", "11R22.5", "385/65R22.5"),
+)
 
 
 def outcome(size: str) -> str:
