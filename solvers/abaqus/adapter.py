@@ -20,8 +20,7 @@ from ..own_decks import DecksOfRun
 from ..process import program_version
 from ..rings import about_axle
 from .evidence import DatTable, checked_modes, read_dat
-from .launch import run_job
-from .options import load, read_options
+from .launch import load, read_options, run_job
 
 OLDJOB, JOB = "inflate", "modes"
 

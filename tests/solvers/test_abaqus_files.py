@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from tyrecal_solvers.abaqus.evidence import read_dat
 from tyrecal_solvers.abaqus.fil import read_fil
-from tyrecal_solvers.abaqus.launch import denial, is_queueing
-from tyrecal_solvers.abaqus.options import read_options
+from tyrecal_solvers.abaqus.launch import denial, is_queueing, read_options
 from tyrecal_solvers.errors import Refused, RunFailed
 from tyrecal_solvers.rings import check_revolved, components, cylindrical
 
