@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 from rich.console import Console
 
-from tyrecal.report import pressure
+from tyrecal.report import frequencies
 from tyrecal.report.figure import save
 from tyrecal.report.footprint import draw_curves, draw_footprint, draw_patches
 from tyrecal.report.frequencies import draw_pressure_sweep
@@ -256,7 +256,7 @@ def test_whatever_was_found_is_drawn(given, tmp_path):
 
 
 def test_names_that_would_touch_are_moved_apart():
-    place = pressure.apart([0.30, 0.31, 0.32, 0.8], 0.05)
+    place = frequencies.apart([0.30, 0.31, 0.32, 0.8], 0.05)
     assert min(np.diff(place)) > 0.05 - 1e-3
     assert place[1] == pytest.approx(0.31, abs=1e-3) and place[3] == 0.8
 

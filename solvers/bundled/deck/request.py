@@ -135,7 +135,7 @@ def read_request(path: Path, jobs: Sequence[str]) -> Request:
 
 @cache
 def _schema() -> TypeAdapter[Request]:
-    """Of requests, built once: that takes as long as a tenth of an evaluation."""
+    """The schema of requests, built once: that takes as long as a tenth of an evaluation."""
     return TypeAdapter(Request)
 
 
