@@ -1,14 +1,17 @@
 """Stiffnesses of the pressed tyre, its patch held, by the bundled solver and by CalculiX.
 
-    python -m tests.benchmarks.stiffness_calculix FOLDER [half|whole]
+    python -m tests.benchmarks.stiffness_calculix FOLDER half|whole SIZE ...
 
-One mesh of 16/3 degrees at the patch, C3D20 and CGAX8, the section, cord law, straight sides and
-road alike (1e9 Pa/m across and along it). CalculiX gets the deflection that the bundled solver
-finds at 3 kN, with so much friction that nothing slides. The bundled solver's next loads show how
-the stiffness depends on the patch, which such a mesh gives another size by each program's contact.
-CalculiX's road turns (half: half of the
-tyre, which a half turn about the vertical makes whole), or moves along, back, across and back (all
-of it). The stiffnesses are those at a constant height of the axle.
+Meshes of SIZE (8, 6, 4) degrees at the patch, refined alike along the section, C3D20 and CGAX8;
+cord law, straight sides, friction and road alike (1e9 Pa/m across and along it). CalculiX gets
+the deflection that the bundled solver finds at 3 kN, on each mesh. The bundled solver's next
+loads show how the stiffness depends on the patch. CalculiX's road turns (half: half of the tyre,
+which a half turn about the vertical makes whole), or moves along, back, across and back (all of
+it). The stiffnesses are those at a constant height of the axle.
+
+Of an overlap at an increment's start CalculiX lets (T - t_end) / (T - t_start) be, T the end of the
+step: the road is softer and the patch a tenth larger in increments that end far from T. So the
+road moves in increments ever shorter and nearer to it.
 
 The moment is that of the forces at where the road's nodes then are. The road is an elastic block:
 where they were, the block's own stresses have a moment, of 9 kN m/rad at 1 mrad along a chord.
@@ -41,14 +44,14 @@ from tyrecal.tyre.values import with_values
 Array = np.ndarray
 LOADS_N, LIMIT_S = (3000.0, 3400.0, 3800.0), 7200.0
 SHIFT_M, TURN_RAD = 2e-4, 2e-3
-ALONG = (4, 2, 2, 1)
-ANGLES = Angles(16 / 3, 16.0, 36.0, 2.0)
 ROAD = Road(friction=5.0, normal=1e9, stick=1e9)
-# time at which the road has moved, and its motion there: y (along), z (across), turn about x. Until
-# time 2 it rests, as CalculiX lets go by then what sank in before
+Motion = tuple[float, float, float]  # of the road: y (along), z (across), turn about x
+END, LARGEST_INCREMENT = 40.0, 20.0  # of the step; the tyre is pressed at 1
+RESTS = (2.0, 0.1)  # how long before the end the tyre rests
+# how long before the end the road has moved, and how
 MOTIONS = {
-    "half": {3: (0.0, 0.0, TURN_RAD)},
-    "whole": {3: (SHIFT_M, 0.0, 0.0), 5: (0.0, SHIFT_M, 0.0)},
+    "half": [(0.005, (0.0, 0.0, TURN_RAD))],
+    "whole": [(0.01, (SHIFT_M, 0.0, 0.0)), (0.001, (0.0, 0.0, 0.0)), (0.0001, (0.0, SHIFT_M, 0.0))],
 }
 NAMES = {
     "half": {"torsional, Nm/°": np.pi / 180},
@@ -70,11 +73,20 @@ class Row:
     stiffness: dict[str, Array]
 
 
-def bundled() -> list[Row]:
+def mesh_of(size: float, whole: bool = False) -> Mesh:
+    """A mesh of ``size`` degrees at the patch."""
+    count = round(24 / size)
+    angles = Angles(size, 24.0, 36.0, 2.0, whole)
+    return Mesh("C3D20", size, (count, count, count, 1), angles)
+
+
+def bundled(size: float) -> list[Row]:
     """The bundled solver's tyre at `LOADS_N`."""
-    case = meshed(ALONG, (1, 1, 1, 1))
-    case = with_values(case, {"road.stiffness_Pa_per_m": ROAD.normal})
-    road = case.case.road.model_copy(update={"element_angles_deg": ANGLES.sizes()})
+    mesh = mesh_of(size)
+    case = meshed(mesh.along, mesh.rows)
+    own = {"road.stiffness_Pa_per_m": ROAD.normal, "road.friction": ROAD.friction}
+    case = with_values(case, own)
+    road = case.case.road.model_copy(update={"element_angles_deg": mesh.angles.sizes()})
     case = replace(case, case=case.case.model_copy(update={"road": road}))
     # the bundled solver's waves beyond the patch are finer than these elements anyway
     with common(), patch.object(tyre_design, "WAVES_OF_STIFFNESS", 0):
@@ -103,70 +115,68 @@ def road_nodes(text: str) -> tuple[list[str], Array]:
     return [number for number, *_ in lines], np.array([line[2:] for line in lines], float)
 
 
-def moving(text: str, motions: dict[int, tuple[float, float, float]]) -> str:
+def moving(text: str, motions: list[tuple[float, Motion]]) -> str:
     """The deck of one deflection, whose road then makes the motions."""
-    last = max(motions) + 1
     numbers, road = road_nodes(text)
-    moved = {when: places_at(road, motion) - road for when, motion in motions.items()}
+    times = [1.0, *(END - rest for rest in RESTS), *(END - left for left, _ in motions), END]
+    shifts = [0 * road] * (1 + len(RESTS))
+    shifts += [places_at(road, motion) - road for _, motion in motions] + [0 * road]
     tables, bounds = "", ""
     for k, number in enumerate(numbers):
         for dof in (2, 3):
-            at = dict.fromkeys(range(last + 1), 0.0)
-            at |= {when: float(shift[k, dof - 2]) for when, shift in moved.items()}
-            rows = "\n".join(f"{when}, {value!r}" for when, value in at.items())
-            tables += f"*AMPLITUDE, NAME=A{number}_{dof}\n{rows}\n"
+            rows = [f"{t!r}, {float(s[k, dof - 2])!r}" for t, s in zip(times, shifts, strict=True)]
+            tables += "\n".join([f"*AMPLITUDE, NAME=A{number}_{dof}", "0, 0", *rows]) + "\n"
             bounds += f"*BOUNDARY, AMPLITUDE=A{number}_{dof}\n{number}, {dof}, {dof}, 1.0\n"
-    points = "\n".join(map(str, range(1, last + 1)))
+    points = "\n".join(map(repr, times))
     for before, after in {
         "*BOUNDARY\nROAD, 2, 3\n": "",
         "*STEP, NLGEOM": tables + "*STEP, NLGEOM",
-        "1.0, 1.0, 2, 1.0": f"1.0, 1.0, {last}, 1.0",
+        "1.0, 1.0, 2, 1.0": f"1.0, 1.0, {END}, 1.0",
         "*TIME POINTS, NAME=DEFLECTIONS\n1\n": f"*TIME POINTS, NAME=DEFLECTIONS\n{points}\n",
-        "*STATIC\n0.1, 1,": f"*STATIC\n0.1, {last},",
+        "*STATIC\n0.1, 1,": f"*STATIC\n0.1, {END},",
         "NSET=ROAD, TOTALS=ONLY,": "NSET=ROAD,",
         "*NODE PRINT, NSET=RIM": bounds + "*NODE PRINT, NSET=RIM",
     }.items():
         assert text.count(before) == 1
         text = text.replace(before, after)
-    text, count = re.subn(r"(?m)^1, (-?\d.*)\n\*TIME", rf"1, \g<1>\n{last}, \g<1>\n*TIME", text)
+    text, count = re.subn(r"(?m)^1, (-?\d.*)\n\*TIME", rf"1, \g<1>\n{END}, \g<1>\n*TIME", text)
     assert count == 1
     return text
 
 
-def calculix(deflection_m: float, part: str, folder: Path) -> Row:
-    """CalculiX's tyre: force before its road moves, area and stiffnesses as it does."""
-    angles = replace(ANGLES, whole=part == "whole")
-    run, motions = Run(Mesh("C3D20", ANGLES.fine, ALONG, angles), ROAD), MOTIONS[part]
+def calculix(deflection_m: float, part: str, size: float, folder: Path) -> Row:
+    """CalculiX's tyre: force and area at the end, stiffnesses as its road moves."""
+    run, motions = Run(mesh_of(size, part == "whole"), ROAD, LARGEST_INCREMENT), MOTIONS[part]
     deck(run, (deflection_m,), inflated_radius(run, folder / "free", LIMIT_S), folder)
     job = folder / "press.inp"
     job.write_text(moving(job.read_text(), motions))
     run_press(folder, ["ccx"], LIMIT_S)
     _, road = road_nodes(job.read_text())
-    copies, at = (1 if part == "whole" else 2), {}
+    copies, at = (1 if part == "whole" else 2), []
+    still = (0.0, 0.0, 0.0)
+    places = [still, *(still for _ in RESTS), *(motion for _, motion in motions), still]
     text = (folder / "press.dat").read_text()
-    for when, rows in FORCES.findall(text):
+    for (_, rows), motion in zip(FORCES.findall(text), places, strict=True):
         f = copies * np.array([row.split()[1:] for row in rows.splitlines()], float)
-        y, z = places_at(road, motions.get(round(float(when)), (0.0, 0.0, 0.0))).T
-        moment = y @ f[:, 2] - z @ f[:, 1]
-        at[round(float(when))] = np.array([f[:, 1].sum(), f[:, 2].sum(), moment, -f[:, 0].sum()])
-    areas = {round(float(when)): copies * float(area) for when, area in AREAS.findall(text)}
+        y, z = places_at(road, motion).T
+        moment = (y * f[:, 2] - z * f[:, 1]).sum()
+        at.append(np.array([f[:, 1].sum(), f[:, 2].sum(), moment, -f[:, 0].sum()]))
+    areas = [copies * float(area) for _, area in AREAS.findall(text)]
     own = []
-    for when, motion in motions.items():
-        (k,) = np.flatnonzero(motion)
-        change = at[when] - (at[when - 1] + at[when + 1]) / 2
-        own.append(change[k] / motion[k])
-    area = float(np.mean([areas[when] for when in motions]))
-    return Row(deflection_m, float(at[2][3]), area, {part: np.array(own)})
+    for i, motion in enumerate(places):
+        for k in np.flatnonzero(motion):
+            own.append((at[i] - (at[i - 1] + at[i + 1]) / 2)[k] / motion[k])
+    return Row(deflection_m, float(at[-1][3]), areas[-1], {part: np.array(own)})
 
 
-def main(folder: Path, *parts: str) -> None:
-    ours = bundled()
-    for part in parts or MOTIONS:
-        start = time.perf_counter()
-        judge = calculix(ours[0].deflection_m, part, folder / part)
-        print(f"CalculiX takes {time.perf_counter() - start:.0f} s for the {part} tyre")
+def main(folder: Path, part: str, *sizes: str) -> None:
+    """Print a table for each size."""
+    for size in map(float, sizes):
+        start, ours = time.perf_counter(), bundled(size)
+        judge = calculix(ours[0].deflection_m, part, size, folder / f"{part}{size:g}")
+        print(f"{size:g} degrees, {part} tyre: {time.perf_counter() - start:.0f} s")
         print("| program | mm | N | cm2 |", " | ".join(NAMES[part]), "|")
-        print("|---" * (5 + len(NAMES[part]) - 1) + "|")
+        print("|---" * (4 + len(NAMES[part])) + "|")
         for name, row in [("CalculiX", judge), *(("bundled", row) for row in ours)]:
             cells = [1e3 * row.deflection_m, row.force_N, 1e4 * row.area_m2]
             cells += [*(row.stiffness[part] * [*NAMES[part].values()])]
