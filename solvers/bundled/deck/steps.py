@@ -63,8 +63,6 @@ class Deck:
     def __init__(self, texts: dict[str, str], job: str, oldjob: str | None):
         self.jobs = [oldjob, job] if oldjob else [job]
         self._keywords = {name: read_keywords(texts[name], name) for name in self.jobs}
-        for place, keywords in enumerate(self._keywords.values()):
-            check(keywords, place > 0)  # once: tangents change numbers alone
         for k in [] if oldjob else self._keywords[job]:
             if k.name == "SYMMETRIC MODEL GENERATION":
                 raise DeckError(k.place, "this job revolves a section job: name that with --oldjob")
@@ -77,7 +75,8 @@ class Deck:
         for place, name in enumerate(self.jobs):
             own = [(line, index, value) for job, line, index, value in tangents if job == name]
             keywords = self._keywords[name]
-            model, blocks = split_steps(seed(keywords, own) if own else keywords)
+            # what carries tangents has been read and judged without
+            model, blocks = split_steps(seed(keywords, own)) if own else check(keywords, place > 0)
             models.append(model)
             steps.append(_steps(model, blocks, place > 0))
         if len(models) > 1:
