@@ -246,10 +246,11 @@ def test_other_studies_take_such_a_case(case_in_states: Path, tmp_path: Path) ->
     assert run("fit", str(case_in_states), *common, "--jobs", "2") == 0
     assert (tmp_path / "fit_states.png").exists()
     ends = ["--from-kPa", "160", "--to-kPa", "240", "--steps", "2"]
+    common.append("--no-pictures")
     assert (
         run("sweep-pressure", str(case_in_states), *ends, "--fitted", str(tmp_path), *common) == 0
     )
-    assert run("modes", str(case_in_states), *common, "--no-pictures") == 0
+    assert run("modes", str(case_in_states), *common) == 0
     few = ["--draws", "2000"]  # which it says: 4
     assert run("sample", str(case_in_states), *few, *common) in (0, 4)
     drawn = json.loads((tmp_path / "sample.json").read_text())

@@ -11,6 +11,7 @@ import pytest
 from tyrecal.simulate.evaluate import evaluator as door_module
 
 from ..report.html import toy
+from ..report.html.conftest import drawn_once as drawn_once
 from ..studies.hertz import Hertz, coarser_case
 from .test_cli import run
 

@@ -1,11 +1,12 @@
 """Smoothness of footprints over the load: stiffness, area, length and width at close loads.
 
     python -m tests.studies.smooth_footprint [--mesh LEVEL] [--from N] [--to N] [--step N]
-        [--set NAME=VALUE ...] [--angles A1,A2,...]
+        [--set NAME=VALUE ...] [--angles A1,A2,...] [--rim]
 
 The main case, initial variables, all loads in one run. Printed per load, then how far stiffness and
 area are from a cubic of the load over any 2 kN, how far tangents, their means over a step, are from
 secants, and by how much length and width fall at most. ``--angles``: elements round the tyre.
+``--rim``: the stiffnesses of the rim on a held patch, too.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ import numpy as np
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.studies.footprint import footprint_row
+from tyrecal.studies.stiffness import LATERAL, LONGITUDINAL, TORSION
 from tyrecal.tyre.load import load_case
 from tyrecal.tyre.values import with_values
 
@@ -30,6 +32,7 @@ from ..conftest import CASES
 
 Array = np.ndarray
 WINDOW_N = 2000.0
+RIM = {"longitudinal": LONGITUDINAL, "lateral": LATERAL, "torsional": TORSION}
 
 
 def off_cubic(load: Array, y: Array) -> float:
@@ -51,6 +54,7 @@ def main() -> None:
     parser.add_argument("--step", type=float, default=50.0)
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE")
     parser.add_argument("--angles")
+    parser.add_argument("--rim", action="store_true")
     options = parser.parse_args()
     case = load_case(CASES / "p235_75r17.yaml")
     mesh = case.case.mesh.model_copy(update={"level": options.mesh})
@@ -64,7 +68,9 @@ def main() -> None:
     case = with_values(case, {k: float(v) for k, v in (s.split("=") for s in options.set)})
     loads = np.arange(options.first, options.to + 1e-6, options.step)
     began = time.process_time()
-    pressed = Evaluator(TyreDesign(case), "bundled").press({}, [float(load) for load in loads])
+    pressed = Evaluator(TyreDesign(case), "bundled").press(
+        {}, [float(load) for load in loads], rim_stiffness=options.rim
+    )
     section = TyreDesign(case).tyre.mesh
     rows = [footprint_row(pressed, each, section) for each in pressed.footprints]
     print("| load, N | deflection, mm | stiffness, N/mm | area, cm2 | length | width, mm |")
@@ -90,6 +96,9 @@ def main() -> None:
     tangent = (stiffness[1:] + stiffness[:-1]) / 2
     print(f"stiffness off a cubic: {100 * off_cubic(load, stiffness):.2f} %")
     print(f"area off a cubic: {100 * off_cubic(load, area):.2f} %")
+    for name, i in RIM.items() if options.rim else ():
+        k = np.array([np.asarray(each.rim_reactions)[i, i] for each in pressed.footprints])
+        print(f"{name} stiffness off a cubic: {100 * off_cubic(load, k):.2f} %")
     print(f"tangent off the secant: {100 * abs(tangent / secant - 1).max():.2f} %")
     print(f"length falls by {1e3 * max(0, -np.diff(length).min()):.3f} mm", end=", ")
     print(f"width by {1e3 * max(0, -np.diff(width).min()):.3f} mm")

@@ -297,8 +297,8 @@ def kinds(tmp_path_factory: pytest.TempPathFactory) -> Kinds:
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", NAMES)
 def test_no_mutated_input_breaks_anything(kind: str, kinds: Kinds) -> None:
-    results = list(trials(kinds, kind, list(range(12)), seed=2))
-    assert [each for each in results if each["fault"]] == [] and len(results) == 12
+    results = list(trials(kinds, kind, list(range(6)), seed=2))
+    assert [each for each in results if each["fault"]] == [] and len(results) == 6
 
 
 @pytest.mark.slow
