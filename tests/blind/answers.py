@@ -1,7 +1,7 @@
 """Answers of our own studies: with intervals for modes that were not measured.
 
-The n measured rows y and the m others y' are normal with covariance T, as in `reweighed`, and means
-mu and mu', the model at the prior's centre of x. Given y:
+The n measured rows y and the m others y' are normal with covariance T, as in `robustness`, and
+means mu and mu', the model at the prior's centre of x. Given y:
 
     E y' = mu' + T'n T_nn^-1 (y - mu),   var y' = T'' - T'n T_nn^-1 T_n'
 
@@ -23,10 +23,10 @@ from tyrecal.files import Json
 from tyrecal.measured.tables import read_measurements
 from tyrecal.studies.blind.answer import content_of, labels_at
 from tyrecal.studies.blind.protocol import Protocol
-from tyrecal.studies.diagnose.calibrated import likeliest
 from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
 from tyrecal.studies.diagnose.evidence import OUTSIDE, Hypothesis
-from tyrecal.studies.diagnose.reweighed import LinearFit, line_about
+from tyrecal.studies.diagnose.posteriors import likeliest
+from tyrecal.studies.diagnose.robustness import LinearFit, line_about
 from tyrecal.studies.inference.expansion import Expansion
 from tyrecal.studies.inference.inverse_problem import Assumed, InverseProblem
 from tyrecal.studies.inference.model import ModelRow, ResponseModel

@@ -15,7 +15,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.diagnosis import diagnose
-from tyrecal.studies.diagnose.label_swap import with_exchanged
+from tyrecal.studies.diagnose.labelings import with_exchanged
 from tyrecal.studies.diagnose.result import diagnosis_result
 from tyrecal.studies.diagnose.several import probabilities, weigh_hypotheses
 from tyrecal.studies.inference.damping import (

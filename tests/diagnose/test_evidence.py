@@ -10,8 +10,7 @@ from numpy.polynomial.hermite import hermgauss
 from scipy.stats import multivariate_normal
 
 from tyrecal.studies.diagnose.evidence import explain, families, grid, outside, refit
-from tyrecal.studies.diagnose.reweighed import Perturbation, lines, perturbed_evidence
-from tyrecal.studies.diagnose.robustness import _reevaluate
+from tyrecal.studies.diagnose.robustness import Perturbation, _reevaluate, lines, perturbed_evidence
 from tyrecal.studies.diagnose.several import weigh_hypotheses
 from tyrecal.studies.inference.expansion import expand
 from tyrecal.studies.inference.inverse_problem import Assumed, InverseProblem

@@ -9,7 +9,7 @@ import pytest
 
 from tyrecal.studies.diagnose.evidence import NONE, Hypothesis, explain, refit
 from tyrecal.studies.diagnose.gap import projection
-from tyrecal.studies.diagnose.label_swap import exchanged, with_exchanged
+from tyrecal.studies.diagnose.labelings import exchanged, with_exchanged
 from tyrecal.studies.diagnose.several import PRIOR_NONE, probabilities, weigh_hypotheses
 from tyrecal.studies.diagnose.verdict import decide
 from tyrecal.studies.inference.inverse_problem import Assumed, Toggle

@@ -15,8 +15,7 @@ from tyrecal.measured.measurement import Measurement
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.diagnosis import diagnose
 from tyrecal.studies.diagnose.evidence import OUTSIDE, PRIOR_OUTSIDE, explain, outside
-from tyrecal.studies.diagnose.label_swap import with_exchanged
-from tyrecal.studies.diagnose.labelings import Reading
+from tyrecal.studies.diagnose.labelings import Reading, with_exchanged
 from tyrecal.studies.diagnose.several import PRIOR_NONE, priors, weigh_hypotheses, with_sets
 from tyrecal.studies.inference.inverse_problem import Assumed, InverseProblem
 from tyrecal.studies.inference.observations import observe
@@ -24,6 +23,8 @@ from tyrecal.studies.inference.observations import observe
 from ..chance import Chance, generator
 from ..measured.test_measurements import GOOD, read
 from .toy import HERTZ, LABELS, Toy, problem
+
+Array = np.ndarray
 
 pytestmark = pytest.mark.numbers
 
@@ -157,10 +158,7 @@ def test_the_scatter_of_repeats_by_the_analysis_of_variance() -> None:
     assert observations.scatter**2 == pytest.approx((4 * pooled + squares) / (4 + 2) / 3)
 
 
-Array = np.ndarray
 A, B = Label(3, 0), Label(3, 1)
-
-
 SINGLE = Assumed(form=0.001, response_error=0.0, further=0.0)
 
 

@@ -14,9 +14,8 @@ from tyrecal.errors import InputError
 from tyrecal.report.diagnosis import page
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
-from tyrecal.studies.diagnose.calibrated import calibrated_variables
 from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
-from tyrecal.studies.diagnose.posteriors import constants_posterior
+from tyrecal.studies.diagnose.posteriors import calibrated_variables, constants_posterior
 from tyrecal.studies.diagnose.result import diagnosis_result
 from tyrecal.studies.diagnose.study import DiagnosedCase, study
 from tyrecal.studies.diagnose.verdict import no_gap_words

@@ -20,7 +20,7 @@ from tyrecal.studies.diagnose.evidence import (
     refit,
 )
 from tyrecal.studies.diagnose.gap import ResidualGroup, _chi2, _corrected, find_gap
-from tyrecal.studies.diagnose.label_swap import _near
+from tyrecal.studies.diagnose.labelings import _near
 from tyrecal.studies.diagnose.several import HIDDEN_PAIRS, priors, weigh_hypotheses
 from tyrecal.studies.diagnose.verdict import decide, no_gap_words
 from tyrecal.studies.diagnose.where import section_map

@@ -11,7 +11,7 @@ from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.diagnose.diagnosis import Diagnosis, diagnose
 from tyrecal.studies.diagnose.evidence import refit
-from tyrecal.studies.diagnose.label_swap import exchange_shifts, rows_if_exchanged, with_exchanged
+from tyrecal.studies.diagnose.labelings import exchange_shifts, rows_if_exchanged, with_exchanged
 from tyrecal.studies.inference.expansion import expand
 from tyrecal.studies.inference.inverse_problem import Assumed
 from tyrecal.studies.inference.model import Answer, EffectRange, Query

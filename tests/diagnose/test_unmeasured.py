@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from tyrecal.studies.diagnose.calibrated import likeliest
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE, Hypothesis, explain, outside, refit
+from tyrecal.studies.diagnose.posteriors import likeliest
 from tyrecal.studies.diagnose.several import weigh_hypotheses
 from tyrecal.studies.inference.inverse_problem import InverseProblem
 

@@ -43,7 +43,7 @@ from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.studies.diagnose import study as diagnosis
-from tyrecal.studies.diagnose.calibrated import calibrated_variables
+from tyrecal.studies.diagnose.posteriors import calibrated_variables
 from tyrecal.studies.fit.problem import Point, Problem
 from tyrecal.studies.fit.total_error import TotalError, total_error
 from tyrecal.studies.fit.uncertainty import uncertainty

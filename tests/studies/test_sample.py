@@ -55,6 +55,8 @@ from .test_posterior import (
     two_valleys,
 )
 
+Array = np.ndarray
+
 pytestmark = pytest.mark.numbers
 
 
@@ -224,9 +226,6 @@ def test_the_corner_picture_says_names_units_and_lines(
     with every_text_readable(monkeypatch) as texts:
         save(figure, tmp_path / f"{name}.png")
     assert {"A", "B", "A, mm²", "draws", "linear", "median", "90 %"} <= set(texts)
-
-
-Array = np.ndarray
 
 
 def test_the_box_grows_until_it_holds_the_posterior() -> None:

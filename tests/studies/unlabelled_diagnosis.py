@@ -30,13 +30,14 @@ from tyrecal.simulate.modes.label import Label
 from tyrecal.studies.blind.score import calibration_error, calibration_quantile, clopper_pearson
 from tyrecal.studies.diagnose.evidence import NONE, OUTSIDE
 from tyrecal.studies.diagnose.gap import projection
-from tyrecal.studies.diagnose.label_swap import exchanged, with_exchanged
 from tyrecal.studies.diagnose.labelings import (
     MAX_READINGS,
     MIN_READING_PROBABILITY,
     Reading,
     averaged,
+    exchanged,
     shares,
+    with_exchanged,
 )
 from tyrecal.studies.diagnose.several import weigh_hypotheses
 from tyrecal.studies.diagnose.verdict import decide

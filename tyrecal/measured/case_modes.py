@@ -30,14 +30,13 @@ from scipy.spatial import KDTree
 from ..errors import InputError
 from ..simulate.evaluate.results import HarmonicShape
 from ..simulate.modes.label import BELT, Mode, labelled
-from .covariance import MIN_SEEN
+from .covariance import MIN_SEEN, label_covariances
+from .labels import groups_alike, label_of_column, ln_density
 from .sensors import Sensors
 
 if TYPE_CHECKING:
     from ..simulate.evaluate.evaluator import Evaluator
     from ..tyre.case import LoadedCase
-from .covariance import label_covariances
-from .labels import groups_alike, label_of_column, ln_density
 
 Array = np.ndarray
 

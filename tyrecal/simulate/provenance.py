@@ -4,7 +4,9 @@ the hash of the tool's own sources, so that results of two editions are never mi
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from hashlib import sha256
+from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +18,6 @@ from ..version import __version__
 
 if TYPE_CHECKING:
     from .evaluate.solver import Solver
-from functools import lru_cache
-from importlib.resources import files
 
 KEY = "provenance"
 OneOrMore = float | Sequence[float]

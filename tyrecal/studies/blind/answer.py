@@ -19,9 +19,9 @@ from ...measured.tables import read_measurements
 from ...simulate.evaluate.evaluator import Evaluator
 from ...simulate.evaluate.pool import process_pool
 from ...tyre.case import LoadedCase
-from ..diagnose.calibrated import likeliest
 from ..diagnose.diagnosis import Diagnosis, diagnose
 from ..diagnose.evidence import NONE
+from ..diagnose.posteriors import likeliest
 from ..diagnose.result import diagnosis_result
 from ..fit.targets import labels_to_measure
 from ..inference.effect_ranges import effect_ranges

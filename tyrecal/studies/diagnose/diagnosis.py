@@ -21,8 +21,16 @@ from ..inference.regions import SectionPart
 from ..inference.separability import Separability, separate
 from .evidence import NONE, Hypothesis, quantile, refit
 from .gap import Gap, chi2_tail, find_gap, projection
-from .label_swap import exchange_shifts, exchanged, with_exchanged
-from .labelings import REFUTED, Reading, averaged, over_labels, shares
+from .labelings import (
+    REFUTED,
+    Reading,
+    averaged,
+    exchange_shifts,
+    exchanged,
+    over_labels,
+    shares,
+    with_exchanged,
+)
 from .next_measurement import SIZES, Choice, OtherStates, rank
 from .robustness import Robustness, robustness
 from .several import probabilities, weigh_hypotheses, with_sets

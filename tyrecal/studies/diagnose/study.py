@@ -33,13 +33,11 @@ from ..labelling.result import labels_posterior
 from ..labels import Labels
 from ..run_plan import PlannedState, RunPlan, runs_in_words
 from ..variable import read_variables
-from .calibrated import calibrated_variables
 from .diagnosis import Diagnosis, diagnose
 from .evidence import NONE
-from .label_swap import rows_if_exchanged
-from .labelings import Reading, likely, with_probabilities
+from .labelings import Reading, likely, rows_if_exchanged, with_probabilities
 from .next_measurement import OtherStates
-from .posteriors import section_posterior
+from .posteriors import calibrated_variables, section_posterior
 from .result import DiagnosisResult, diagnosis_result
 from .under_load import UnderLoad, Values, compare
 from .where import FieldValue

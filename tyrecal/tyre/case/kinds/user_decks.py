@@ -8,21 +8,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..mistakes import CaseData
-from ..schema import Case
-from .kind import TyreKind
-
-if TYPE_CHECKING:
-    from ...own_deck.own_deck import OwnDeck
-    from ...own_deck.own_decks import OwnDecks
-    from ...section.section import Section
-    from ..document import Document
 from ....errors import InputError
 from ...own_deck.own_deck import Units
 from ...own_deck.own_decks import OwnDecks
 from ..document import Document
-from ..mistakes import suggestion
-from .kind import Change
+from ..mistakes import CaseData, suggestion
+from ..schema import Case
+from .kind import Change, TyreKind
+
+if TYPE_CHECKING:
+    from ...own_deck.own_deck import OwnDeck
+    from ...section.section import Section
 
 # by default: the bundled solver computes section decks, ABAQUS those in three dimensions
 TIME_LIMITS_S = {"bundled": 300.0, "abaqus": 3600.0}
