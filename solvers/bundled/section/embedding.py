@@ -20,6 +20,7 @@ from .shapes import TYPES, ElementType
 
 Array = np.ndarray
 EXTERIOR = 0.05  # of the hosts' size that a node may lie outside them (ABAQUS' default)
+SAME_DISTANCE = 1e-12  # m: of less, rounding decides, which differs from processor to processor
 ROUNDOFF = 1e-6  # weights below it are zero (likewise)
 MAX_MAPPING_STEPS, XI_SETTLED = (
     20,
@@ -212,9 +213,9 @@ def _guest(
                 continue
             inside = TYPES[kind].clipped(xi)
             away = float(np.hypot(*(TYPES[kind].at(inside[None])[0][0] @ all_X[nodes] - place)))
-            if away < nearest - 1e-12:
+            if away < nearest - SAME_DISTANCE:
                 best, nearest = (TYPES[kind], nodes, xi), away
-    if best is None or nearest > tolerance:
+    if best is None or nearest > tolerance + SAME_DISTANCE:
         far = "in no host element" if best is None else f"{nearest:.3g} m outside its hosts"
         raise DeckError(
             row.place,
