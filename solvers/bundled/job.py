@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, partial
@@ -30,7 +30,6 @@ from .road.road_data import (
     LoadRequest,
     ModeRequest,
     RimRequest,
-    RoadData,
     TyreToPress,
     read_road,
 )
@@ -40,7 +39,6 @@ from .section.inflation import equilibrium
 from .section.loads import loads, pressures
 from .section.mesh import DeckMesh, read_mesh
 from .section.model import Model, build
-from .section.parts.pressure import Pressure
 from .section.stability import slower, stable_factor
 
 
@@ -134,7 +132,7 @@ class Job:
 
     def press(self, start: PressedStart | None = None) -> dict[str, Any]:
         """Footprints of a job with a road, one per step with a force on it, modes and slopes
-        there; ``start``: another tyre on the road, whose state begins the first load."""
+        there; ``start``: another tyre on the road, whose states begin the loads."""
         assert self.road is not None
         wanted: list[float] = []
         vibrations: dict[float, ModeRequest] = {}
@@ -181,7 +179,7 @@ class Job:
             {load: LoadRequest(vibrations.get(load), rim.get(load)) for load in wanted},
             self._check_time,
             self._inflated_tangents(inflated, last),
-            partial(pressed_start.begin, start, self._of_start) if start else None,
+            partial(pressed_start.begin, start) if start else None,
         )
         if self.tyre.request.cavity:
             result |= self._cavity(inflated.model, result)
@@ -195,17 +193,6 @@ class Job:
         model = self.tyre.models(None, step.long_term, False)
         acting = pressures(model, step)
         return last, TyreToPress(model, numbering(model, step), acting, self.tyre.U)
-
-    def _of_start(self, texts: Mapping[str, str]) -> tuple[Model, list[Pressure], RoadData]:
-        """Model, pressures and road of the tyre to start from. Raises DeckError."""
-        jobs = {name.removesuffix(".inp"): text for name, text in texts.items()}
-        oldjob, job = self.tyre.deck.jobs
-        other = Job(Deck(jobs, job, oldjob), Request())
-        assert other.road is not None
-        for step in other.steps:
-            step.held = other._off_road(step).held
-        _, tyre = other._on_road()
-        return tyre.model, tyre.loads, other.road
 
     def _off_road(self, step: DeckStep) -> DeckStep:
         """A step that holds all that it did but the road."""

@@ -11,7 +11,7 @@ from tyrecal_solvers.bundled.road.contact import Bound, Contact, FlatRoad
 from tyrecal_solvers.bundled.road.patch import patch
 from tyrecal_solvers.bundled.road.road_data import read_road
 from tyrecal_solvers.bundled.solid3d.circumference import Circumference, half_circle
-from tyrecal_solvers.bundled.solid3d.gmres import gmres
+from tyrecal_solvers.bundled.solid3d.gmres import gmres, gmres_together
 from tyrecal_solvers.language.text import DeckError, read_keywords
 
 from . import support
@@ -348,20 +348,28 @@ def test_gmres_solves(random: np.random.Generator, preconditioned: bool) -> None
     assert used < (15 if preconditioned else 60)
 
 
-def test_gmres_takes_the_first_direction_that_it_is_given(random: np.random.Generator) -> None:
-    A, b = np.diag(np.arange(1.0, 41.0)), random.normal(size=40)
-    M, calls = np.diag(1 / np.arange(1.0, 41.0)) + 1e-2, []
+def test_right_sides_together_are_solved_as_each_alone(random: np.random.Generator) -> None:
+    """Fewer calls, the same solutions, whether the first directions are known or not; the zero
+    right side is left out."""
+    A, M = np.diag(np.arange(1.0, 41.0)), np.diag(1 / np.arange(1.0, 41.0)) + 1e-2
+    rights, calls = [random.normal(size=40), np.zeros(40), np.ones(40)], list[list[int]]()
 
-    def precondition(v: np.ndarray) -> np.ndarray:
-        calls.append(1)
-        return np.asarray(M @ v)
+    def precondition(vectors: np.ndarray, which: list[int]) -> np.ndarray:
+        calls.append(which)
+        return vectors @ M.T
 
-    plain = gmres(lambda v: A @ v, precondition, b, 1e-8, 40)
-    count = len(calls)
-    given = gmres(lambda v: A @ v, precondition, b, 1e-8, 40, M @ b / np.linalg.norm(b))
-    assert len(calls) == 2 * count - 1
-    np.testing.assert_allclose(given[0], plain[0], rtol=1e-12, atol=1e-12)
-    assert given[1] == plain[1]
+    product = lambda vectors, which: vectors @ A.T
+    alone = [gmres(lambda v: A @ v, lambda v: M @ v, b, 1e-8, 40) for b in rights]
+    found, used, left = gmres_together(product, precondition, rights, 1e-8, 40)
+    assert used == len(calls) == max(each[1] for each in alone)
+    assert calls[0] == [0, 2] and left[1] == 0
+    first = np.stack([M @ b / (np.linalg.norm(b) or 1.0) for b in rights])
+    given = gmres_together(product, precondition, rights, 1e-8, 40, first)
+    assert len(calls) == 2 * used - 1
+    for i, (x, _, rest) in enumerate(alone):
+        np.testing.assert_allclose(found[i], x, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(given[0][i], x, rtol=1e-9, atol=1e-12)
+        assert left[i] == pytest.approx(rest, rel=1e-6, abs=1e-14)
 
 
 def test_gmres_ends_where_it_is_told(random: np.random.Generator) -> None:

@@ -268,7 +268,7 @@ def test_the_time_limit_passes(tmp_path: Path) -> None:
 def test_nothing_pickled_is_read(tmp_path: Path) -> None:
     """Whatever lies where results should: objects are refused, not made."""
     (tmp_path / "press.json").write_text('{"format": 1, "footprints": [], "cause": ""}')
-    plain = {name: np.arange(3.0) for name in ("nodes", "points", "angles", "inflated")}
+    plain = {name: np.arange(3.0) for name in ("nodes", "points", "angles")}
     np.savez(tmp_path / "press.npz", allow_pickle=True, **plain)
     assert set(footprint_job.read(tmp_path / "press")) == {"footprints", *plain}
     for name in plain:

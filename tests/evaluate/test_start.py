@@ -10,11 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.adapter import JOB, OLDJOB, PRESS
+from tyrecal_solvers.bundled.deck.start import PRESSED_FILE
 from tyrecal_solvers.bundled.job import run
 from tyrecal_solvers.bundled.road import footprint_job, pressed_start
-from tyrecal_solvers.bundled.road.contact_newton import FirstGuess
+from tyrecal_solvers.bundled.road.contact import Contact
+from tyrecal_solvers.bundled.road.contact_newton import ContactNewton, FirstGuess
+from tyrecal_solvers.bundled.road.contact_update import ContactUpdate
 from tyrecal_solvers.errors import Indefinite, Refused
 
+from tyrecal.simulate.deck.decks import PressedTyre
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 from tyrecal.simulate.evaluate import executor as executor_module
 from tyrecal.simulate.evaluate.evaluator import Evaluator, PressQuestion, Question, _key
@@ -56,8 +60,8 @@ def numbers(pressed: Pressed) -> bytes:
 def test_the_answer_is_that_from_nothing_and_its_bytes_depend_on_no_memory(
     case: LoadedCase, tmp_path: Path
 ) -> None:
-    """Within the tolerance of the out-of-balance force, 1e-8; run alone from its folder, with the
-    start's factor forgotten, the same bytes."""
+    """Within the tolerance of the out-of-balance force, 1e-8; run alone from its folder, the same
+    bytes."""
     base, values = start_values(case), moved(case)
     evaluator = Evaluator(TyreDesign(case), folder=tmp_path / "runs", keep=True)
     begun = evaluator.press(values, LOADS, base=base)
@@ -66,8 +70,7 @@ def test_the_answer_is_that_from_nothing_and_its_bytes_depend_on_no_memory(
     for name in ("deflection_m", "stiffness_N_per_m", "contact_area_m2"):
         one, other = (getattr(each.footprints[0], name) for each in (begun, cold))
         assert one == pytest.approx(other, rel=1e-6), name
-    pressed_start._FACTORS.clear()
-    (folder,) = (path.parent.parent for path in (tmp_path / "runs").rglob("start/pressed.npz"))
+    (folder,) = (path.parent for path in (tmp_path / "runs").rglob(PRESSED_FILE))
     alone = tmp_path / "alone"
     shutil.copytree(folder, alone)
     for made in (*alone.glob(f"{PRESS}.npz"), *alone.glob(f"{PRESS}.json")):
@@ -79,6 +82,15 @@ def test_the_answer_is_that_from_nothing_and_its_bytes_depend_on_no_memory(
     assert not (alone / f"{JOB}.inp").exists()
 
 
+def start_of(case: LoadedCase) -> PressedTyre:
+    """The tyre of a case on the road."""
+    evaluator, base = Evaluator(TyreDesign(case)), start_values(case)
+    evaluator.press(base, LOADS, base=base)
+    (tyre,) = evaluator.pressed_tyres.values()
+    assert tyre
+    return tyre
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("bad", ["unstable", "far away"])
 def test_a_bad_start_is_given_up(
@@ -87,20 +99,25 @@ def test_a_bad_start_is_given_up(
     """The answer is then that from nothing, to the byte."""
     base, values = start_values(case), moved(case)
     cold = numbers(Evaluator(TyreDesign(case)).press(values, LOADS))
-    pressed_start._FACTORS.clear()
-    own = pressed_start._factor
+    start, form, given = start_of(case), ContactNewton._form, list[float]()
 
-    def factor(*given: Any) -> Any:
-        if bad == "unstable":
+    def refused(work: ContactNewton, contact: Contact) -> ContactUpdate:
+        if not given:
+            given.append(work.load)
             raise Indefinite("no minimum")
-        return own(*given)
+        return form(work, contact)
 
-    def guess(load: float, parts: Any, deflection: float, *more: Any) -> FirstGuess:
-        return FirstGuess(load, -50 * parts, deflection, *more)
+    def guess(parts: Any, deflection: float) -> FirstGuess:
+        given.append(deflection)
+        return FirstGuess(-50 * parts, deflection)
 
-    monkeypatch.setattr(pressed_start, "_factor", factor)
-    monkeypatch.setattr(pressed_start, "FirstGuess", guess)
-    assert numbers(Evaluator(TyreDesign(case)).press(values, LOADS, base=base)) == cold
+    if bad == "unstable":
+        monkeypatch.setattr(ContactNewton, "_form", refused)
+    else:
+        monkeypatch.setattr(pressed_start, "FirstGuess", guess)
+    evaluator = Evaluator(TyreDesign(case))
+    evaluator.pressed_tyres[_key(TyreDesign(case, base)), tuple(LOADS)] = start
+    assert numbers(evaluator.press(values, LOADS, base=base)) == cold and given
 
 
 @pytest.mark.slow
@@ -147,14 +164,13 @@ def test_states_that_run_side_by_side_give_the_same_bytes(case: LoadedCase) -> N
 def test_a_start_that_is_not_the_one_named_is_refused(case: LoadedCase, tmp_path: Path) -> None:
     evaluator = Evaluator(TyreDesign(case), folder=tmp_path, keep=True)
     evaluator.press(moved(case), LOADS, base=start_values(case))
-    (start,) = tmp_path.rglob("start/pressed.npz")
-    inflate = start.with_name(f"{OLDJOB}.inp")
-    inflate.write_text(inflate.read_text().replace("CAVITY, P, 2", "CAVITY, P, 3"))
-    with pytest.raises(Refused, match="start is not the tyre that the deck names"):
-        run(start.parent.parent, PRESS, OLDJOB)
+    (start,) = tmp_path.rglob(PRESSED_FILE)
+    start.write_bytes(start.read_bytes() + b" ")
+    with pytest.raises(Refused, match="is not the state that the deck names"):
+        run(start.parent, PRESS, OLDJOB)
     start.unlink()
-    with pytest.raises(Refused, match=r"start/pressed.npz is not there"):
-        run(start.parent.parent, PRESS, OLDJOB)
+    with pytest.raises(Refused, match=r"start.npz is not next to it"):
+        run(start.parent, PRESS, OLDJOB)
 
 
 CASE = with_level(load_case(CASES / "p235_75r17.yaml"), "coarse")

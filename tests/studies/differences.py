@@ -72,7 +72,7 @@ class Answers:
 
     def of(self, trial: Path) -> dict[str, Any]:
         """The content of the diagnosis."""
-        answer = one_answer(self.model, self.rows, self.protocol, self.known, 0.0, trial)
+        answer = one_answer(self.model, self.rows, self.protocol, self.known, trial)
         content: dict[str, Any] = answer["diagnosis"]
         return content
 

@@ -5,7 +5,7 @@ height at a given load, preconditioned GMRES inside, loads one after the other.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from operator import attrgetter
 
@@ -15,7 +15,7 @@ from scipy.sparse import csr_matrix
 from ...errors import Indefinite, Inverted, NoEquilibrium
 from ..section.inflation import BUCKLING_STRAIN
 from ..section.parts.cords import NOT_COMPRESSED, CordsAtStations
-from ..solid3d.gmres import gmres
+from ..solid3d.gmres import gmres_together
 from ..solid3d.revolved import Revolved
 from .contact import Bound, Contact, FlatRoad
 from .contact_update import ContactUpdate
@@ -30,7 +30,6 @@ MAX_NEWTON = 40  # Newton iterations a load
 MAX_GMRES_BEFORE_NEW_FACTOR = 8
 MAX_GMRES = 60
 NEAR_LOAD = 2.0  # of a load, up to which Coulomb's friction is tried at once
-SAME_SHARE = 0.02  # of a load, up to which a first guess counts as one at this load
 SAME_FACTOR = 1.1  # of a load, up to which its preconditioner is worth keeping
 LINEAR_RTOL = 1e-2  # residual of the linear problem, relative
 SMOOTH_RTOL = 1e-5  # the same of derivatives, by which a fit descends
@@ -63,22 +62,32 @@ class PressedState:
     stiffness: float  # vertical, of the tangent, dF / d(deflection), N/m
     # displacements' parts and rise of the road, m/N, by a unit of half the road's force
     unit: tuple[Array, float]
+    # parts and rise of each of the derivatives that were wanted with it
+    derivatives: list[tuple[Array, float]]
 
 
 @dataclass(frozen=True)
 class FirstGuess:
-    """Where the first load begins."""
+    """Where a load begins."""
 
-    load: float  # N
-    moved: Array  # (2, f, q, 3): what the load adds to the inflated tyre's parts, m
+    parts: Array  # (2, f, q, 3), m
     deflection: float  # m
-    factor: ContactUpdate
-    share: float = 1.0  # of the load, at which this tyre has about this deflection
+
+
+@dataclass(frozen=True)
+class Equations:
+    """Linear equations of half the tyre: ``force`` (2, f, q, 3) on the parts and ``lacking`` on the
+    road (half its force), N."""
+
+    tangent: Tangent
+    force: Array
+    lacking: float
 
 
 class ContactNewton:
     """Presses a tyre from its inflated state ``U`` (k, n, 3) to rising loads; ``settled`` is called
-    with each state that slip is to count from."""
+    with each state that slip is to count from, solved with the equations that ``wanted`` gave for
+    its contact. ``guesses``: where loads (N) begin."""
 
     def __init__(
         self,
@@ -88,8 +97,10 @@ class ContactNewton:
         U: Array,
         check: Callable[[], None],
         settled: Callable[[ContactNewton, PressedState], None] = lambda work, state: None,
+        wanted: Callable[[ContactNewton, Contact], list[Equations]] = lambda work, contact: [],
     ):
-        self.tyre, self.symmetry, self.check, self.settled = tyre, symmetry, check, settled
+        self.tyre, self.symmetry, self.check = tyre, symmetry, check
+        self.settled, self.wanted = settled, wanted
         self.free_radius = road.height
         self.flat = self._flat_height(tyre.model.mesh.X, np.flatnonzero(~symmetry.free.any(1)))
         self.road = road
@@ -98,7 +109,7 @@ class ContactNewton:
         self.height = self.free_radius
         self.load = 0.0
         self._bound = road.forces(U, self.free_radius).bound(1.0)
-        self.first: FirstGuess | None = None
+        self.guesses: dict[float, FirstGuess] = {}
         self._order: Elimination | None = None  # from the tangents of the first preconditioner
         self._factor: ContactUpdate | None = None
         self._used = 0
@@ -225,29 +236,23 @@ class ContactNewton:
             raise NoEquilibrium("the friction did not settle")
         parts, height, contact = state
         self._bound = contact.bound(1.0)
-        unit = self._unit(contact)
+        unit, *derivatives = self._derivatives(contact)
         self._slope = -unit[0] / 2, -unit[1] / 2
-        return PressedState(parts, height, contact, 2 / unit[1], unit)
+        return PressedState(parts, height, contact, 2 / unit[1], unit, derivatives)
 
     def _from_first_guess(self, load: float) -> tuple[Array, float, Contact] | None:
-        """The equilibrium from the first guess; None where there is none, or it is a bad one."""
-        guess, self.first = self.first, None
-        if guess is None or self.load or load != guess.load:
+        """The equilibrium from the guess for a load; None where there is none, or it is a bad
+        one."""
+        guess = self.guesses.pop(load, None)
+        if guess is None:
             return None
-        self._factor, self._formed_at = guess.factor, load
+        self._factor, self._formed_at = None, load
         try:
-            parts, height = self.parts + guess.moved, self.free_radius - guess.deflection
-            if abs(guess.share - 1) > SAME_SHARE:
-                near = guess.share * load
-                parts, height, contact = self._iterate(parts, height, near, None, COULOMB_RTOL)
-                tangent = Tangent.of(contact, self.symmetry)
-                moved, rise, *_ = self.solve(tangent, 0 * parts, 1.0, LINEAR_RTOL)
-                parts = parts - (load - near) / 2 * moved
-                height -= (load - near) / 2 * rise
-            return self._iterate(parts, height, load, None, CONTACT_FORCE_RTOL)
+            height = self.free_radius - guess.deflection
+            return self._iterate(guess.parts, height, load, None, CONTACT_FORCE_RTOL)
         except (NoEquilibrium, Indefinite, Inverted):
-            log.info("%g N: the start was too far away, loaded from nothing", load)
-            self._factor, self._used, self._formed_at = None, 0, 0.0
+            log.info("%g N: the start was too far away, loaded from the state before", load)
+            self._factor, self._used, self._formed_at = None, 0, self.load
             return None
 
     def _by_coulomb(
@@ -323,61 +328,73 @@ class ContactNewton:
         self, contact: Contact, force: Array, lacking: float, tolerance: float
     ) -> tuple[Array, float]:
         """Newton's step of the parts and of the road's height."""
-        if self._used > MAX_GMRES_BEFORE_NEW_FACTOR:
+        fresh = self._factor is None or self._used > MAX_GMRES_BEFORE_NEW_FACTOR
+        if fresh:
             self._form(contact)
-        tangent = Tangent.of(contact, self.symmetry)
-        step, rise, self._used, left = self.solve(tangent, -force, -lacking, tolerance)
-        if not left <= MAX_LINEAR_RESIDUAL:
+        equations = [Equations(Tangent.of(contact, self.symmetry), -force, -lacking)]
+        steps, rises, self._used, left = self.solve(equations, tolerance)
+        if not fresh and not left[0] <= MAX_LINEAR_RESIDUAL:
+            self._form(contact)
+            steps, rises, self._used, left = self.solve(equations, tolerance)
+        if not left[0] <= MAX_LINEAR_RESIDUAL:
             raise NoEquilibrium("the tangent is too far from a stable one")
-        return step, rise
+        return steps[0], rises[0]
 
     def solve(
-        self, tangent: Tangent, force: Array, lacking: float, tolerance: float
-    ) -> tuple[Array, float, int, float]:
-        """Displacements' parts and rise of the road, m, that solve a tangent's equations for
-        ``force`` on the parts and ``lacking`` on the road (half its force), N; the iterations; and
-        the relative residual that is left."""
-        factor = self._factor or self._form(tangent.contact)
-        shape, scale = self.parts.shape, max(tangent.stiffness, 1.0) ** -0.5
-        right = np.append(force.ravel(), lacking * scale)
-        factor.to(self.symmetry.fold(tangent.touching))
-        # two right-hand sides at once cost little more than one: all wait for the factor's memory
-        answer, first = factor.solve(np.stack([tangent.by_height, force]))
-        schur = tangent.stiffness - float((tangent.of_force * answer).sum())
-        if not schur:
+        self, equations: Sequence[Equations], tolerance: float
+    ) -> tuple[list[Array], list[float], int, list[float]]:
+        """Displacements' parts and rises of the road, m, that solve equations of the first one's
+        tangent, or of that transposed; the iterations; and the relative residuals that are left."""
+        tangents, count = [each.tangent for each in equations], len(equations)
+        factor = self._factor or self._form(tangents[0].contact)
+        shape, scale = self.parts.shape, max(tangents[0].stiffness, 1.0) ** -0.5
+        rights = [np.append(e.force.ravel(), e.lacking * scale) for e in equations]
+        factor.to(self.symmetry.fold(tangents[0].touching))
+        # several right-hand sides at once cost little more than one: all wait for the memory
+        both = np.stack([t.by_height for t in tangents] + [e.force for e in equations])
+        turned = [t.turned for t in tangents]
+        answers, first = np.split(factor.solve(both, 2 * turned), [count])
+        schur = [
+            t.stiffness - float((t.of_force * y).sum())
+            for t, y in zip(tangents, answers, strict=True)
+        ]
+        if not all(schur):
             raise NoEquilibrium("no force answers to the road's height")
 
-        def product(v: Array) -> Array:
-            self.products += 1
-            parts, rise = v[:-1].reshape(shape), v[-1] * scale
-            V = self.symmetry.spread(parts)
-            image = self.symmetry.gather(
-                self.tyre.product(V) + (tangent.touching @ V.ravel()).reshape(V.shape)
-            )
-            image += tangent.by_height * rise
-            more = float((tangent.of_force * parts).sum()) + tangent.stiffness * rise
-            return np.append(image.ravel(), more * scale)
+        def product(vectors: Array, which: list[int]) -> Array:
+            images = []
+            for v, i in zip(vectors, which, strict=True):
+                self.products += 1
+                t, parts, rise = tangents[i], v[:-1].reshape(shape), v[-1] * scale
+                V = self.symmetry.spread(parts)
+                image = self.symmetry.gather(
+                    self.tyre.product(V) + (t.touching @ V.ravel()).reshape(V.shape)
+                )
+                image += t.by_height * rise
+                more = float((t.of_force * parts).sum()) + t.stiffness * rise
+                images.append(np.append(image.ravel(), more * scale))
+            return np.stack(images)
 
-        def precondition(v: Array, y: Array | None = None) -> Array:
-            y = factor.solve(v[:-1].reshape(shape)) if y is None else y
-            rise = (v[-1] / scale - float((tangent.of_force * y).sum())) / schur
-            return np.append((y - answer * rise).ravel(), rise / scale)
+        def bordered(i: int, v: Array, y: Array) -> Array:
+            rise = (v[-1] / scale - float((tangents[i].of_force * y).sum())) / schur[i]
+            return np.append((y - answers[i] * rise).ravel(), rise / scale)
 
-        size = float(np.linalg.norm(right)) or 1.0  # a number that moves nothing has no right side
-        begin = precondition(right, first) / size
-        solution, used, left = gmres(product, precondition, right, tolerance, MAX_GMRES, begin)
-        return solution[:-1].reshape(shape), float(solution[-1]) * scale, used, left
+        def precondition(vectors: Array, which: list[int]) -> Array:
+            ys = factor.solve(vectors[:, :-1].reshape(-1, *shape), [turned[i] for i in which])
+            return np.stack([bordered(*each) for each in zip(which, vectors, ys, strict=True)])
 
-    def solve_closely(
-        self, tangent: Tangent, force: Array, lacking: float, tolerance: float
-    ) -> tuple[Array, float, float]:
-        """Parts, rise and residual as `solve` has them, with a preconditioner of this state where
-        that of another one does not reach the ``tolerance``."""
-        parts, rise, _, left = self.solve(tangent, force, lacking, tolerance)
-        if left > tolerance:
-            self._form(tangent.contact)
-            parts, rise, _, left = self.solve(tangent, force, lacking, tolerance)
-        return parts, rise, left
+        # a number that moves nothing has no right side
+        begin = np.stack(
+            [
+                bordered(i, right, y) / (float(np.linalg.norm(right)) or 1.0)
+                for i, (right, y) in enumerate(zip(rights, first, strict=True))
+            ]
+        )
+        solutions, used, left = gmres_together(
+            product, precondition, rights, tolerance, MAX_GMRES, begin
+        )
+        rises = [float(x[-1]) * scale for x in solutions]
+        return [x[:-1].reshape(shape) for x in solutions], rises, used, left
 
     def _form(self, contact: Contact) -> ContactUpdate:
         """The preconditioner at the last state. Raises Indefinite; the one before is gone, as two
@@ -390,13 +407,23 @@ class ContactNewton:
         self._factor = ContactUpdate(Factor(self._order, tangents, stiffness))
         return self._factor
 
-    def _unit(self, contact: Contact) -> tuple[Array, float]:
-        """Displacements' parts and rise of the road, m/N, by a unit of half the road's force."""
+    def _derivatives(self, contact: Contact) -> list[tuple[Array, float]]:
+        """Displacements' parts and rise of the road, m/N, by a unit of half the road's force, and
+        the solutions of the equations that are wanted; by a preconditioner of this state where that
+        of another one does not suffice."""
         tangent = Tangent.of(contact, self.symmetry)
-        unit, rise, left = self.solve_closely(tangent, 0 * self.parts, 1.0, UNIT_RTOL)
-        if left > MAX_UNIT_RESIDUAL:
+        more = self.wanted(self, contact)
+        equations = [Equations(tangent, 0 * self.parts, 1.0), *more]
+        tolerance = SMOOTH_RTOL if more else UNIT_RTOL
+        parts, rises, _, left = self.solve(equations, tolerance)
+        if max(left) > tolerance:
+            self._form(contact)
+            parts, rises, _, left = self.solve(equations, tolerance)
+        if left[0] > MAX_UNIT_RESIDUAL:
             raise NoEquilibrium(f"the vertical stiffness was not found in {MAX_GMRES} iterations")
-        return unit, rise
+        if max(left[1:], default=0.0) > SMOOTH_RTOL:
+            raise NoEquilibrium(f"a derivative was not found in {MAX_GMRES} iterations")
+        return list(zip(parts, rises, strict=True))
 
 
 @dataclass(frozen=True)
@@ -409,6 +436,7 @@ class Tangent:
     by_height: Array  # (2, f, q, 3), N/m
     of_force: Array  # (2, f, q, 3), N/m
     stiffness: float  # N/m
+    turned: bool = False  # it is the transposed tangent
 
     @classmethod
     def of(cls, contact: Contact, symmetry: HalfTurn) -> Tangent:
@@ -419,5 +447,11 @@ class Tangent:
     @property
     def transposed(self) -> Tangent:
         """The tyre's part is symmetric."""
-        turned = csr_matrix(self.touching.T)
-        return replace(self, touching=turned, by_height=self.of_force, of_force=self.by_height)
+        return Tangent(
+            self.contact,
+            csr_matrix(self.touching.T),
+            self.of_force,
+            self.by_height,
+            self.stiffness,
+            not self.turned,
+        )

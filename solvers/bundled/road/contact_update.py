@@ -2,19 +2,18 @@
 
 Woodbury: with the factor's K = L L^T, and a change D of the contact stiffness at the dofs E,
 
-    (K + E D E^T)^-1 = L^-T (1 - Y (1 + D Y^T Y)^-1 D Y^T) L^-1,   Y = L^-1 E
+    (K + E D E^T)^-1 = L^-T (1 - Y M Y^T) L^-1,   M = (1 + D Y^T Y)^-1 D,   Y = L^-1 E
 
-E: unit columns, one for each of those dofs. Columns of Y are formed when the contact of a dof first
-changes, and kept.
+E: unit columns, one for each of those dofs; the transposed inverse has M^T. Columns of Y are formed
+when the contact of a dof first changes, and kept.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
+from scipy.linalg import solve
 from scipy.sparse import csr_matrix
 
 from .multifrontal import Factor
@@ -38,12 +37,6 @@ class ContactUpdate:
         self._compliance = np.zeros((0, 0))  # Y^T Y, m/N
         self._active = np.zeros(0, int)  # columns of Y whose contact has changed
 
-    def copy(self) -> ContactUpdate:
-        """A copy whose further columns are its own."""
-        other = copy(self)
-        other._column, other._blocks = self._column.copy(), list(self._blocks)
-        return other
-
     def to(self, contact: csr_matrix) -> None:
         """Replace the contact stiffness by ``contact`` (2 f q 3, 2 f q 3), N/m, between the parts
         of `HalfTurn`; it need not be symmetric."""
@@ -53,11 +46,9 @@ class ContactUpdate:
         dofs = np.flatnonzero(largest > MIN_STIFFNESS_CHANGE * abs(contact).max())
         self._form(dofs)
         self._active = self._column[dofs]
-        size = len(dofs)
-        self._D = change[dofs][:, dofs].toarray()  # D of the dofs that change, N/m
-        if size:
-            compliance = self._compliance[np.ix_(self._active, self._active)]
-            self._small = lu_factor(np.eye(size) + self._D @ compliance, check_finite=False)
+        D = change[dofs][:, dofs].toarray()  # of the dofs that change, N/m
+        compliance = self._compliance[np.ix_(self._active, self._active)]
+        self._small = solve(np.eye(len(dofs)) + D @ compliance, D, check_finite=False)
 
     def _form(self, dofs: Array) -> None:
         """Columns of Y for the dofs that lack them, and their part of Y^T Y."""
@@ -75,14 +66,17 @@ class ContactUpdate:
         self._compliance = np.block([[self._compliance, across[:before]], [across.T]])
         self._blocks.append(new)
 
-    def solve(self, right: Array) -> Array:
-        """The inverse times parts (..., 2, f, q, 3)."""
+    def solve(self, right: Array, transposed: Sequence[bool] | None = None) -> Array:
+        """The inverse times parts (..., 2, f, q, 3); ``transposed``: for each of these parts,
+        whether its inverse is the transposed one."""
         rows = right.reshape(-1, *right.shape[-4:])
         y = self.factor.forward(rows)
         if len(self._active):
             image = np.concatenate([_products(block, y) for block in self._blocks])[self._active]
+            turned = np.zeros(len(rows), bool) if transposed is None else np.array(transposed)
             share = np.zeros((len(self._compliance), len(rows)), np.float32)
-            share[self._active] = lu_solve(self._small, self._D @ image, check_finite=False)
+            small = np.where(turned, self._small.T @ image, self._small @ image)
+            share[self._active] = small
             start = 0
             for block in self._blocks:
                 part = share[start : start + block[-1].shape[1]]

@@ -4,7 +4,7 @@ JOB.json: pressure_Pa, mass_kg, free_radius_m, failure, cause, ``footprints`` [l
 (x down, y, z), deflection_m, stiffness_N_per_m, contact_area_m2]; where a request has sensitivities
 ``slopes``, by variable those of numbers; with a gas cavity_Hz of the
 cavity's first wave, free and in ``footprints`` (fore-aft, vertical). JOB.npz: nodes, points, angles
-of the whole tyre, the displacement of the inflated one, and per footprint i the arrays of its patch
+of the whole tyre, and per footprint i the arrays of its patch
 and the displacement, as NAME_i; where modes were asked for: mode_frequency_Hz (m,), mode_shape
 (m, ring, node, 3) at mode_node, modal mass 1 kg; where a material has a loss factor
 mode_damping_ratio (m,); with friction the patch's forces along the road in
@@ -66,8 +66,8 @@ def press(
     begin: Callable[[ContactNewton, Array], None] | None = None,
 ) -> dict[str, Any]:
     """Footprints at the loads (N) of ``requests``, which rise, with what is requested there, and
-    derivatives by the numbers of the deck that ``tangents`` are of; ``begin`` gives the first load
-    its guess, from the deck's node numbers (n,).
+    derivatives by the numbers of the deck that ``tangents`` are of; ``begin`` gives loads
+    their guesses, from the deck's node numbers (n,).
 
     Raises DeckError; RunFailed where not even the first load is reached.
     """
@@ -92,7 +92,7 @@ def press(
     slopes = Slopes(tangents, around, tread.connectivity, road)
     try:
         symmetry = HalfTurn(model.mesh, equations.equation < equations.size, around)
-        work = ContactNewton(tyre, symmetry, road, start, check, slopes.follow)
+        work = ContactNewton(tyre, symmetry, road, start, check, slopes.follow, slopes.wanted)
     except Refused as error:
         raise DeckError(WHOLE_DECK, f"a pressed tyre must be symmetric: {error}") from None
     if begin:
@@ -122,7 +122,6 @@ def press(
         log.info("load %d of %d is reached: %g N", *reached, load, extra={"loads": reached})
     return {
         "free_radius_m": work.free_radius,
-        "inflated": U,
         "angles": np.concatenate([rings, 2 * np.pi - rings[-2:0:-1]]),
         "footprints": footprints,
         "failure": failure,
@@ -285,7 +284,7 @@ def write(stem: Path, model: Model, result: dict[str, Any]) -> None:
     """Write STEM.json and STEM.npz."""
     numbers = np.array(list(model.mesh.index))
     arrays: dict[str, Any] = {"nodes": numbers, "points": model.mesh.X}
-    arrays |= {name: result[name] for name in ("angles", "inflated")}
+    arrays["angles"] = result["angles"]
     lines = []
     for i, footprint in enumerate(result["footprints"]):
         footprint = {**footprint, "node": numbers[footprint["node"]]}
@@ -309,7 +308,7 @@ def read(stem: Path) -> dict[str, Any]:
         stem.with_name(stem.name + ".json").read_text(encoding="utf-8")
     )
     with np.load(stem.with_name(stem.name + ".npz"), allow_pickle=False) as arrays:
-        for name in ("nodes", "points", "angles", "inflated"):
+        for name in ("nodes", "points", "angles"):
             answer[name] = arrays[name]
         for i, footprint in enumerate(answer["footprints"]):
             footprint["rim_N"] = np.array(footprint["rim_N"])

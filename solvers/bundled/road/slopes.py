@@ -23,12 +23,11 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import NoEquilibrium
 from ...language.text import COMPLEX_STEP
 from ..solid3d.circumference import HalfCircle
 from ..solid3d.revolved import Revolved
 from .contact import Contact, FlatRoad
-from .contact_newton import MAX_GMRES, SMOOTH_RTOL, ContactNewton, PressedState, Tangent
+from .contact_newton import ContactNewton, Equations, PressedState, Tangent
 from .patch import patch
 from .road_data import InflatedTangent
 from .tread import tread_of
@@ -53,21 +52,26 @@ class Slopes:
         """faces (e, a): nodes of the tread's line elements."""
         self.paths = {name: _Path(own, around, faces, road) for name, own in numbers.items()}
 
+    def wanted(self, work: ContactNewton, contact: Contact) -> list[Equations]:
+        """Equations of the derivatives at a contact: of w, and of each number's dy/dp."""
+        if not self.paths:
+            return []
+        tangent = Tangent.of(contact, work.symmetry)
+        unit = Equations(tangent.transposed, 0 * work.parts, 1.0)
+        return [unit, *(path.equations(work, tangent) for path in self.paths.values())]
+
     def follow(self, work: ContactNewton, state: PressedState) -> None:
-        """Follow the paths to the state from which slip counts next. Raises NoEquilibrium."""
-        if self.paths:
-            tangent = Tangent.of(state.contact, work.symmetry)
-        for path in self.paths.values():
-            path.follow(work, state, tangent)
+        """Follow the paths to the state from which slip counts next, which `wanted` was asked
+        for."""
+        for path, (parts, rise) in zip(self.paths.values(), state.derivatives[1:], strict=True):
+            path.follow(state.contact, work.symmetry.spread(parts), rise)
 
     def at(self, work: ContactNewton, state: PressedState, rings: Array) -> dict[str, Any]:
         """``slopes`` of a footprint's numbers at the last state followed to, whose patch is on
-        nodes at the angles ``rings``, by name; empty where none was requested. Raises
-        NoEquilibrium."""
+        nodes at the angles ``rings``, by name; empty where none was requested."""
         if not self.paths:
             return {}
-        tangent = Tangent.of(state.contact, work.symmetry).transposed
-        parts, lift = _solved(work, tangent, 0 * state.parts, 1.0)
+        parts, lift = state.derivatives[0]
         unit = work.symmetry.spread(parts), lift
         rates = {name: path.rates(work, state, unit, rings) for name, path in self.paths.items()}
         return {"slopes": rates}
@@ -86,23 +90,28 @@ class _Path:
         self.free_radius = self.height = float(self.dX[crown, 0] + own.U[crown, 0])
         self.U = np.multiply.outer(around.turn(0).real, own.U)
         self.elastic = 0 * road.elastic
+        self.last = {"U": self.U, "elastic": self.elastic, "height": self.height}
         # by name of a field of the road: its derivative; the road has the state of the load before
         self.since: dict[str, Array | float] = {}
 
-    def follow(self, work: ContactNewton, state: PressedState, tangent: Tangent) -> None:
-        """Follow the path from the state before to this one."""
-        contact = state.contact
-        self.since = {"U": self.U, "elastic": self.elastic, "height": self.height}
+    def equations(self, work: ContactNewton, tangent: Tangent) -> Equations:
+        """Of dy/dp at the tangent's contact, where slip counts from the state before."""
+        contact = tangent.contact
+        self.since, self.elastic = self.last, self.last["elastic"]
         self.U, self.height = 0 * self.U, 0.0
         step, (above, below) = self._beside(contact)
         force = self.tyre.residual(contact.U).imag / COMPLEX_STEP
         force += (above.field - below.field) / (2 * step)
         more = (above.force - below.force) / (2 * step)
-        parts, self.height = _solved(work, tangent, -work.symmetry.gather(force), more / 2)
-        self.U = work.symmetry.spread(parts)
+        return Equations(tangent, -work.symmetry.gather(force), more / 2)
+
+    def follow(self, contact: Contact, U: Array, height: float) -> None:
+        """Follow the path to the state of a contact, by dy/dp there."""
+        self.U, self.height = U, height
         step, (above, below) = self._beside(contact)
         slip = above.road.settled(above).elastic - below.road.settled(below).elastic
         self.elastic = slip / (2 * step)
+        self.last = {"U": self.U, "elastic": self.elastic, "height": self.height}
 
     def rates(
         self, work: ContactNewton, state: PressedState, unit: tuple[Array, float], rings: Array
@@ -144,14 +153,3 @@ class _Path:
             there = contact.U + move * self.U, contact.height + move * self.height
             beside.append(replace(road, **moved).forces(*there))
         return step, beside
-
-
-def _solved(
-    work: ContactNewton, tangent: Tangent, force: Array, lacking: float
-) -> tuple[Array, float]:
-    """Derivatives of the parts and of the road's height by a number that adds ``force`` (2, f, q,
-    3) to the parts and ``lacking`` to half the road's force, N. Raises NoEquilibrium."""
-    parts, rise, left = work.solve_closely(tangent, force, lacking, SMOOTH_RTOL)
-    if left > SMOOTH_RTOL:
-        raise NoEquilibrium(f"a derivative was not found in {MAX_GMRES} iterations")
-    return parts, rise

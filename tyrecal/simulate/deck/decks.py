@@ -119,17 +119,13 @@ class Design(Protocol):
 
 @dataclass(frozen=True)
 class PressedTyre:
-    """A tyre on the road, from which another one's first load begins: its design and decks, node
-    numbers (n,), displacements before the load (n, 3) and under it (ring, n, 3), m, load and
-    deflection."""
+    """A tyre on the road at q loads, at which another one's loads begin."""
 
     of: DesignKey
-    texts: Mapping[str, str]
     nodes: np.ndarray  # (n,) numbers
-    inflated: np.ndarray  # (n, 3) before the load, m
-    displacement: np.ndarray  # (rings, n, 3) under the load, m
-    load_N: float
-    deflection_m: float
+    displacement: np.ndarray  # (q, rings, n, 3) under the loads, m
+    load_N: np.ndarray  # (q,)
+    deflection_m: np.ndarray  # (q,)
 
 
 @dataclass(eq=False)

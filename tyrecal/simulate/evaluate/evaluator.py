@@ -100,8 +100,8 @@ class Evaluator:
     on_progress: Callable[[int, int], None] = field(default=_unwatched, repr=False)
     # of nominal designs: node numbers and displacements, see `_start_of`
     shapes: dict[DesignKey, Array] = field(default_factory=dict, repr=False)
-    # by design and load, N, see `_pressed`; None: it cannot bear the load
-    pressed_tyres: dict[tuple[DesignKey, float], PressedTyre | None] = field(
+    # by design and loads, N, see `_pressed`; None: it cannot bear the first load
+    pressed_tyres: dict[tuple[DesignKey, tuple[float, ...]], PressedTyre | None] = field(
         default_factory=dict, repr=False
     )
     _solver: Solver | None = field(default=None, repr=False)
@@ -195,7 +195,7 @@ class Evaluator:
     ) -> Pressed:
         """One design on the road at rising loads, as far as the solver gets, with so many ``modes``
         at each; gradients: names of variables whose slopes are wanted (`Footprint.slopes`); base:
-        values of the design whose state on the road begins the first load (None: the inflated
+        values of the design at whose states on the road the loads begin (None: the inflated
         tyre); rim_stiffness: that of the rim is wanted at each load, too;
         response: in place of modes, responses there.
 
@@ -225,35 +225,38 @@ class Evaluator:
         if answer.failed:
             answer = replace(answer, failed=_advised(answer.failed, design))
         if base:
-            self._remember(design, answer)
+            self._remember(design, loads, answer)
         return answer
 
     def _pressed(
         self, base: Mapping[str, float], loads: tuple[float, ...], gradients: tuple[str, ...]
     ) -> PressedTyre | None:
-        """The design ``base`` on the road, from which others begin at the first load. It is pressed
+        """The design ``base`` on the road, from which others begin at each load. It is pressed
         before them, so that their answers depend on no other question; with their ``gradients``, so
-        that its own answer is recorded only once. None where it cannot bear the load, or the solver
+        that its own answer is recorded only once. None where it bears no load, or the solver
         cannot begin from it."""
         if "pressed_start" not in self.solver.capabilities:
             return None
         design = self._with(base)
-        key = _key(design), loads[0]
+        key = _key(design), loads
         if key not in self.pressed_tyres:
             self.pressed_tyres[key] = None
             with contextlib.suppress(EvaluationFailed):
-                self._remember(design, self.press(base, loads, gradients=gradients))
+                self._remember(design, loads, self.press(base, loads, gradients=gradients))
         return self.pressed_tyres[key]
 
-    def _remember(self, design: Design, answer: Pressed) -> None:
+    def _remember(self, design: Design, loads: tuple[float, ...], answer: Pressed) -> None:
         """Keep a tyre on the road for those that begin from it."""
-        if answer.inflated is None:
+        if "pressed_start" not in self.solver.capabilities:
             return
-        first = answer.footprints[0]
-        texts = Decks(design, loads_N=(first.load_N,)).texts(self.solver.dialect)
-        place = first.displacement, first.load_N, first.deflection_m
-        tyre = PressedTyre(_key(design), texts, answer.nodes, answer.inflated, *place)
-        self.pressed_tyres[tyre.of, first.load_N] = tyre
+        at = answer.footprints
+        self.pressed_tyres[_key(design), loads] = PressedTyre(
+            _key(design),
+            answer.nodes,
+            np.array([each.displacement for each in at]),
+            np.array([each.load_N for each in at]),
+            np.array([each.deflection_m for each in at]),
+        )
 
     def needs_road(self, modes: bool = False, rim_stiffness: bool = False) -> None:
         """Raises DeckRefused where the solver cannot press a tyre on a road, or has no modes or
@@ -419,7 +422,8 @@ class Evaluator:
                 result, counts = answer
                 self.counts.add(counts)
                 if isinstance(result, Pressed) and questions[place].base:
-                    self._remember(self._with(questions[place].values), result)
+                    asked = questions[place]
+                    self._remember(self._with(asked.values), tuple(asked.loads_N), result)
                 yield result
             next(answers, None)  # to their end: workers of a loop that is cut off are ended
 

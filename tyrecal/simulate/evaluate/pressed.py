@@ -82,8 +82,6 @@ class Pressed:
     failed: EvaluationFailed | None = None  # why the load after the last footprint was not reached
     # of the first wave in the cavity before any load, where there is a gas
     cavity_Hz: float | None = None
-    # (n, 3) displacement without a load, m, of a solver that gives it
-    inflated: Array | None = None
 
 
 def pressed(
@@ -131,7 +129,6 @@ def pressed(
         if words
         else None,
         cavity_Hz=answer.get("cavity_Hz"),
-        inflated=answer.get("inflated"),
     )
 
 

@@ -74,9 +74,9 @@ def press_with_slopes(
     jobs: int,
 ) -> tuple[Array, Array]:
     """Quantities (targets,) of a design, none a mode, and their exact slopes (targets,
-    variables) by the variables ``names``; ``base``: the design from whose state on the road in the
-    first state all others begin. ``jobs`` states at a time. Raises EvaluationFailed,
-    DeckRefused."""
+    variables) by the variables ``names``; ``base``: the design at whose states the states begin,
+    or the design itself, whose other states begin at its first one. ``jobs`` states at a time.
+    Raises EvaluationFailed, DeckRefused."""
     quantities, slopes = np.empty(len(targets)), np.zeros((len(targets), len(names)))
     groups = {
         state: {i: t for i, t in enumerate(targets) if t.state.unloaded == state}
@@ -87,7 +87,10 @@ def press_with_slopes(
         loads = _loads(here)
         # a variable that sets a number of the state, such as the pressure, has no slope
         left = tuple(without(case, dict.fromkeys(names, 0.0), state.numbers(case)))
-        begin = _base(case, targets, loads, base)
+        first = next(iter(groups))
+        begin: dict[str, float] | None = (first if base == values else state).design(case, base)
+        if base == values and _loads(groups[first]) != loads:
+            begin = None
         design = state.design(case, values)
         questions.append(PressQuestion(design, loads, gradients=left, base=begin))
     answers = list(evaluator.press_all(questions, jobs))
@@ -103,19 +106,6 @@ def press_with_slopes(
             quantities[place] = quantity
             slopes[place] = [rates[v][name] if v in rates else 0.0 for v in names]
     return quantities, slopes
-
-
-def _base(
-    case: LoadedCase,
-    targets: Sequence[ValueTarget],
-    loads: Sequence[float],
-    values: Mapping[str, float],
-) -> dict[str, float] | None:
-    """The design ``values`` in the first state, from whose equilibrium those begin that have the
-    same first load (None: the others)."""
-    first = targets[0].state.unloaded
-    own = {i: t for i, t in enumerate(targets) if t.state.unloaded == first}
-    return first.design(case, values) if _loads(own)[:1] == list(loads[:1]) else None
 
 
 def _loads(targets: Placed) -> list[float]:
