@@ -360,14 +360,14 @@ def test_right_sides_together_are_solved_as_each_alone(random: np.random.Generat
 
     product = lambda vectors, which: vectors @ A.T
     alone = [gmres(lambda v: A @ v, lambda v: M @ v, b, 1e-8, 40) for b in rights]
-    found, used, left = gmres_together(product, precondition, rights, 1e-8, 40)
+    together, used, left = gmres_together(product, precondition, rights, 1e-8, 40)
     assert used == len(calls) == max(each[1] for each in alone)
     assert calls[0] == [0, 2] and left[1] == 0
     first = np.stack([M @ b / (np.linalg.norm(b) or 1.0) for b in rights])
     given = gmres_together(product, precondition, rights, 1e-8, 40, first)
     assert len(calls) == 2 * used - 1
     for i, (x, _, rest) in enumerate(alone):
-        np.testing.assert_allclose(found[i], x, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(together[i], x, rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(given[0][i], x, rtol=1e-9, atol=1e-12)
         assert left[i] == pytest.approx(rest, rel=1e-6, abs=1e-14)
 

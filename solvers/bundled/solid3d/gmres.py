@@ -92,5 +92,5 @@ class _Search:
         return self.left <= tolerance or self.whole
 
     def solution(self) -> Array:
-        """Of the least residual (size,)."""
+        """The vector (size,) of the least residual."""
         return np.asarray(sum(c * z for c, z in zip(self.y, self.ahead, strict=True)))

@@ -422,8 +422,8 @@ class Evaluator:
                 result, counts = answer
                 self.counts.add(counts)
                 if isinstance(result, Pressed) and questions[place].base:
-                    asked = questions[place]
-                    self._remember(self._with(asked.values), tuple(asked.loads_N), result)
+                    question = questions[place]
+                    self._remember(self._with(question.values), tuple(question.loads_N), result)
                 yield result
             next(answers, None)  # to their end: workers of a loop that is cut off are ended
 
