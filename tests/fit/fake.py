@@ -163,6 +163,7 @@ class Linear:
     """Residuals J x - y within a box; ``wall``: x that have no solution."""
 
     targets: tuple[Target, ...] = ()
+    in_sigmas = False
 
     def __init__(self, J: Array, y: Array, box: float = 10.0):
         self.J, self.y = J, y

@@ -38,6 +38,7 @@ from .targets import (
     KNOWLEDGE_SIGMA,
     Target,
     ValueTarget,
+    objective_unit,
     read_damping_targets,
     read_known,
     read_mass_targets,
@@ -138,6 +139,7 @@ class Problem:
         self.others = [*self.road, *self.mass, *self.damping, *self.known]
         self.measured: list[Target | ValueTarget] = [*self.targets, *self.others]
         self.scale = np.array([each.scale for each in self.measured])
+        self.in_sigmas = objective_unit(case) == "sigma"  # the objective
         self.labels: dict[TyreState, list[Label]] = {}
         for target in self.targets:
             self.labels.setdefault(target.state, []).append(target.label)
