@@ -21,7 +21,7 @@ MAX_DESIGNS = 100  # evaluated in one search
 # Hz, or standard deviations: an objective below every measurement's resolution, an exact fit
 EXACT = 1e-3
 # standard deviations: what is left to gain moves a variable by this part of its standard error at
-# most, and is not worth another design once a step has gained nothing
+# most, and is not worth another design once a step has not halved it
 NEGLIGIBLE = 0.05
 MIN_OBJECTIVE_GAIN = 1e-9  # of the squared objective: a smaller gain is none
 NO_GAIN = 1e-6  # share of the squared objective: below, a whole step gains nothing
@@ -114,8 +114,8 @@ class CrossingWatch:
     def judge(self, point: Point, there: Point) -> str:
         """Take in a step from ``point`` to ``there``; why the search ends with it, else ""."""
         reached = min(point, there, key=lambda p: p.objective)
-        lost = there.objective > point.objective
-        if lost and point.objective <= NEGLIGIBLE and self.problem.in_sigmas:
+        creeps = reached.objective > 0.5 * point.objective and (there.x != point.x).any()
+        if creeps and point.objective <= NEGLIGIBLE and self.problem.in_sigmas:
             return CONVERGED
         side = order(self.problem, reached)
         back = self.known is not None and side == order(self.problem, self.known)
