@@ -26,7 +26,7 @@ MODES_AT_LOAD_S = 30.0  # in addition, for the modes at each load
 RIM_AT_LOAD_S = 30.0  # in addition, for the stiffness of the rim at each load
 # Seconds of an evaluation without a road, and more of them for each unknown of the section
 UNLOADED_S, UNLOADED_PER_UNKNOWN_S = 0.015, 2.4e-5
-MEMORY_BYTES, PROCESS_BYTES = 2.5e9, 1.5e8  # the latter of a process without any
+MEMORY_BYTES, PROCESS_BYTES = 3.3e9, 1.5e8  # the latter of a process without any
 SENSITIVITY_SHARE = 0.08  # of a press, for the exact sensitivities by one variable
 UNLOADED_SENSITIVITY_SHARE = 0.15  # of an evaluation without a road, for the same
 DESIGNS_OF_FIT = {"slsqp": 20, "gauss-newton": 7}  # of a start, about
@@ -119,9 +119,7 @@ class RunPlan:
     @property
     def memory_bytes(self) -> float | None:
         """Likely memory of all that run side by side; None: not known."""
-        factors = 1 + (self.designs * len(self.states) > 1)  # the first design's, too
-        factors *= self.on_road
-        of_one = factors * 1e-9 * self._entries * MEMORY_BYTES + PROCESS_BYTES
+        of_one = self.on_road * 1e-9 * self._entries * MEMORY_BYTES + PROCESS_BYTES
         return self.at_once * of_one if self.is_timed else None
 
     @property
