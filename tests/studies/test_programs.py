@@ -16,12 +16,13 @@ from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.tyre.case import LoadedCase, with_level
 from tyrecal.tyre.effects.edit import changed, with_part
 from tyrecal.tyre.load import load_case
+from tyrecal.tyre.section.size import parse_size
 
 from ..chance import Chance
 from ..conftest import CASES
 from ..solvers.press_deck import Angles, press_texts
 from ..solvers.test_press_deck import coarse_case
-from . import deck_numbers, own_deck_fuzz, sizes_calculix, tables, wrinkles
+from . import deck_numbers, drawn_tyres, own_deck_fuzz, sizes_calculix, tables, wrinkles
 from .belts import COMMANDS, counts, failures, with_belts
 from .calculix import ROOT
 from .directions import outcome
@@ -49,6 +50,33 @@ def test_working_belts_are_turned_to_their_own_sides(size: str) -> None:
         kept = layer.angle_deg
         new = (66.0 if kept < 90 else 114.0) if name in working else kept
         assert angles[name] == pytest.approx(new)
+
+
+def test_drawn_tyres_differ_within_their_ranges() -> None:
+    size = parse_size("205/60R15")
+    own = by_size("205/60R15").case
+    cases = [drawn_tyres.drawn(size, np.random.default_rng(key)).case for key in range(3)]
+    assert len({case.pressure_kPa for case in cases}) == 3
+    for case in cases:
+        assert 0.8 <= case.pressure_kPa / own.pressure_kPa <= 1.2
+        assert 60 <= case.rebar_layers["belt_1"].angle_deg <= 74
+
+
+def test_drawn_tyres_are_counted() -> None:
+    """A tyre whose load was not reached counts as such, with its reason."""
+    point = {"load_N": 3e3, "changed": 2, "stiffness": 0.001, "area": -0.06}
+    lines = [
+        {"size": "A", "cubic_percent": 0.25, "slopes": [point, {**point, "changed": 0}]},
+        {"size": "B", "failed": "no_equilibrium: the carcass buckles"},
+    ]
+    counted = list(drawn_tyres.table(lines))
+    assert counted[:3] == [
+        "1 of 2 drawn tyres pressed at all loads",
+        "B: no_equilibrium: the carcass buckles",
+        "stiffness off a cubic: median 0.25, worst 0.25 %, 1 of 1 within 0.5 %",
+    ]
+    assert counted[3] == "2 points, cords change between slack and taut in 1"
+    assert counted[5].endswith("6.00 % in the median, 6.00 % at worst, 0 of 2 within 5 %")
 
 
 def test_a_tyre_on_calculix_has_deviations_or_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
