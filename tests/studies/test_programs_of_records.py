@@ -291,3 +291,10 @@ def test_how_the_answers_of_two_commits_differ(tmp_path: Path) -> None:
         "a: e0, e1",
     ]
     assert "0.250" in changes(tmp_path / "other", tmp_path / "first")
+
+
+def test_slopes_by_differences_lead_to_the_same_verdicts() -> None:
+    lines = [json.loads(x) for x in (BENCHMARKS / "differences.jsonl").read_text().splitlines()]
+    assert len({line["trial"] for line in lines}) == 40
+    assert all(line["exact"] == line["differences"] for line in lines)
+    assert max(line["off"] for line in lines) <= 0.05
