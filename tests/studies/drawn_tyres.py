@@ -1,6 +1,6 @@
 """Drawn tyres by `init` pressed on the road: how many, how smoothly, and with which slopes.
 
-    python -m tests.studies.drawn_tyres [COUNT] [SEED] >> drawn_tyres.jsonl    # coarse mesh
+    python -m tests.studies.drawn_tyres [COUNT] [SEED] [FIRST] >> drawn_tyres.jsonl    # coarse mesh
     python -m tests.studies.drawn_tyres tests/benchmarks/drawn_tyres.jsonl
 
 Ten sizes in turn, each with gauges, belts, areas of cords, moduli of rubber and a pressure drawn. A
@@ -161,10 +161,10 @@ def table(lines: Sequence[dict[str, Any]]) -> Iterator[str]:
             )
 
 
-def main(count: int, seed: int) -> None:
-    """Print the lines, and the counts to stderr."""
+def main(count: int, seed: int, first: int) -> None:
+    """Print the lines of tyres from the ``first`` on, and the counts to stderr."""
     lines = []
-    for k in range(count):
+    for k in range(first, first + count):
         code = SIZES[k % len(SIZES)]
         random = np.random.default_rng([seed, k])
         line = {"size": code, "seed": seed, "number": k, **line_of(parse_size(code), random)}
@@ -178,4 +178,4 @@ if __name__ == "__main__":
         print("\n".join(table([json.loads(x) for x in Path(sys.argv[1]).read_text().splitlines()])))
     else:
         given = [int(x) for x in sys.argv[1:]]
-        main(*given, *(50, 1)[len(given) :])
+        main(*given, *(50, 1, 0)[len(given) :])
