@@ -95,7 +95,7 @@ class _Path:
         self.since: dict[str, Array | float] = {}
 
     def equations(self, work: ContactNewton, tangent: Tangent) -> Equations:
-        """The equations of dy/dp at the tangent's contact, where slip counts from the state before."""
+        """Equations for dy/dp at the tangent's contact, where slip counts from the state before."""
         contact = tangent.contact
         self.since, self.elastic = self.last, self.last["elastic"]
         self.U, self.height = 0 * self.U, 0.0
