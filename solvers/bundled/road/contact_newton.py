@@ -411,21 +411,28 @@ class ContactNewton:
 
     def _derivatives(self, contact: Contact) -> list[tuple[Array, float]]:
         """Displacements' parts and rise of the road, m/N, by a unit of half the road's force, and
-        the solutions of the equations that are wanted; by a preconditioner of this state where that
-        of another one does not suffice."""
+        the solutions of the equations that are wanted; the former the same whatever is wanted."""
         tangent = Tangent.of(contact, self.symmetry)
-        more = self.wanted(self, contact)
-        equations = [Equations(tangent, 0 * self.parts, 1.0), *more]
-        tolerance = SMOOTH_RTOL if more else UNIT_RTOL
+        unit, left = self._solved([Equations(tangent, 0 * self.parts, 1.0)], UNIT_RTOL)
+        if left > MAX_UNIT_RESIDUAL:
+            raise NoEquilibrium(f"the vertical stiffness was not found in {MAX_GMRES} iterations")
+        wanted, left = self._solved(self.wanted(self, contact), SMOOTH_RTOL)
+        if left > SMOOTH_RTOL:
+            raise NoEquilibrium(f"a derivative was not found in {MAX_GMRES} iterations")
+        return [*unit, *wanted]
+
+    def _solved(
+        self, equations: Sequence[Equations], tolerance: float
+    ) -> tuple[list[tuple[Array, float]], float]:
+        """Parts and rises that solve equations, and the largest residual, with a preconditioner of
+        this state where that of another one does not reach the ``tolerance``."""
+        if not equations:
+            return [], 0.0
         parts, rises, _, left = self.solve(equations, tolerance)
         if max(left) > tolerance:
-            self._form(contact)
+            self._form(equations[0].tangent.contact)
             parts, rises, _, left = self.solve(equations, tolerance)
-        if left[0] > MAX_UNIT_RESIDUAL:
-            raise NoEquilibrium(f"the vertical stiffness was not found in {MAX_GMRES} iterations")
-        if max(left[1:], default=0.0) > SMOOTH_RTOL:
-            raise NoEquilibrium(f"a derivative was not found in {MAX_GMRES} iterations")
-        return list(zip(parts, rises, strict=True))
+        return list(zip(parts, rises, strict=True)), max(left)
 
 
 @dataclass(frozen=True)

@@ -53,17 +53,17 @@ class Slopes:
         self.paths = {name: _Path(own, around, faces, road) for name, own in numbers.items()}
 
     def wanted(self, work: ContactNewton, contact: Contact) -> list[Equations]:
-        """Equations of the derivatives at a contact: of w, and of each number's dy/dp."""
+        """Equations of the derivatives at a contact: of each number's dy/dp, and of w."""
         if not self.paths:
             return []
         tangent = Tangent.of(contact, work.symmetry)
         unit = Equations(tangent.transposed, 0 * work.parts, 1.0)
-        return [unit, *(path.equations(work, tangent) for path in self.paths.values())]
+        return [*(path.equations(work, tangent) for path in self.paths.values()), unit]
 
     def follow(self, work: ContactNewton, state: PressedState) -> None:
         """Follow the paths to the state from which slip counts next, which `wanted` was asked
         for."""
-        for path, (parts, rise) in zip(self.paths.values(), state.derivatives[1:], strict=True):
+        for path, (parts, rise) in zip(self.paths.values(), state.derivatives[:-1], strict=True):
             path.follow(state.contact, work.symmetry.spread(parts), rise)
 
     def at(self, work: ContactNewton, state: PressedState, rings: Array) -> dict[str, Any]:
@@ -71,7 +71,7 @@ class Slopes:
         nodes at the angles ``rings``, by name; empty where none was requested."""
         if not self.paths:
             return {}
-        parts, lift = state.derivatives[0]
+        parts, lift = state.derivatives[-1]
         unit = work.symmetry.spread(parts), lift
         rates = {name: path.rates(work, state, unit, rings) for name, path in self.paths.items()}
         return {"slopes": rates}
