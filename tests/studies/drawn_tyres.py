@@ -23,7 +23,6 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -34,13 +33,12 @@ from tyrecal.simulate.evaluate.evaluator import Evaluator
 from tyrecal.simulate.evaluate.failure import EvaluationFailed
 from tyrecal.simulate.evaluate.pressed import Footprint
 from tyrecal.tyre.case import LoadedCase, start_values, with_level
-from tyrecal.tyre.case.new_case import from_size
-from tyrecal.tyre.load import load_case
 from tyrecal.tyre.section.from_size import usual
 from tyrecal.tyre.section.size import TyreSize, parse_size
 
 from .belts import ANGLES_DEG, with_belts
 from .sizes_calculix import SIZES
+from .wrinkles import by_size
 
 Array = np.ndarray
 GAUGES = {"crown": 0.15, "sidewall": 0.2, "bead": 0.1, "belt": 0.05}  # relative, either side
@@ -59,11 +57,7 @@ def drawn(size: TyreSize, random: np.random.Generator) -> LoadedCase:
         name: getattr(own, name) * (1 + random.uniform(-share, share))
         for name, share in GAUGES.items()
     }
-    draft = from_size(size, lengths, None, "tyre")
-    with TemporaryDirectory() as folder:
-        Path(folder, draft.file).write_bytes(draft.content)
-        Path(folder, "tyre.yaml").write_text(draft.text)
-        case = with_level(load_case(Path(folder, "tyre.yaml")), "coarse")
+    case = with_level(by_size(size.text, lengths), "coarse")
     pressure_kPa = case.case.pressure_kPa * random.uniform(*PRESSURES)
     return with_belts(case, random.uniform(*ANGLES_DEG), pressure_kPa)
 

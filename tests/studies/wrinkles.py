@@ -16,6 +16,7 @@ With --tension_only no cord bears compression, which is what ever finer wrinkles
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -77,9 +78,9 @@ def told(case: LoadedCase, pressure_kPa: float) -> str:
     return " | ".join(f"{modes[label]:.2f}" if label in modes else "-" for label in LABELS)
 
 
-def by_size(code: str) -> LoadedCase:
-    """Case that `tyrecal init` writes for a size code."""
-    draft = from_size(parse_size(code), {}, None, "tyre")
+def by_size(code: str, lengths: Mapping[str, float] | None = None) -> LoadedCase:
+    """Case that `tyrecal init` writes for a size code; lengths: its own gauges, m."""
+    draft = from_size(parse_size(code), lengths or {}, None, "tyre")
     with TemporaryDirectory() as folder:
         Path(folder, draft.file).write_bytes(draft.content)
         Path(folder, "tyre.yaml").write_text(draft.text)

@@ -248,13 +248,13 @@ class ContactNewton:
         guess = self.guesses.pop(load, None)
         if guess is None:
             return None
-        self._factor, self._formed_at = None, load
+        self._factor = None
         try:
             height = self.free_radius - guess.deflection
             return self._iterate(guess.parts, height, load, None, CONTACT_FORCE_RTOL)
         except (NoEquilibrium, Indefinite, Inverted):
             log.info("%g N: the start was too far away, loaded from the state before", load)
-            self._factor, self._used, self._formed_at = None, 0, self.load
+            self._factor = None
             return None
 
     def _by_coulomb(

@@ -75,8 +75,7 @@ class ContactUpdate:
             image = np.concatenate([_products(block, y) for block in self._blocks])[self._active]
             turned = np.zeros(len(rows), bool) if transposed is None else np.array(transposed)
             share = np.zeros((len(self._compliance), len(rows)), np.float32)
-            small = np.where(turned, self._small.T @ image, self._small @ image)
-            share[self._active] = small
+            share[self._active] = np.where(turned, self._small.T @ image, self._small @ image)
             start = 0
             for block in self._blocks:
                 part = share[start : start + block[-1].shape[1]]

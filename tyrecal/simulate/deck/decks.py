@@ -121,7 +121,6 @@ class Design(Protocol):
 class PressedTyre:
     """A tyre on the road at q loads, at which another one's loads begin."""
 
-    of: DesignKey
     nodes: np.ndarray  # (n,) numbers
     displacement: np.ndarray  # (q, rings, n, 3) under the loads, m
     load_N: np.ndarray  # (q,)

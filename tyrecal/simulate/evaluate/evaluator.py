@@ -251,7 +251,6 @@ class Evaluator:
             return
         at = answer.footprints
         self.pressed_tyres[_key(design), loads] = PressedTyre(
-            _key(design),
             answer.nodes,
             np.array([each.displacement for each in at]),
             np.array([each.load_N for each in at]),
