@@ -27,7 +27,8 @@ from ...language.text import COMPLEX_STEP
 from ..solid3d.circumference import HalfCircle
 from ..solid3d.revolved import Revolved
 from .contact import Contact, FlatRoad
-from .contact_newton import ContactNewton, Equations, PressedState, Tangent
+from .contact_newton import ContactNewton, PressedState
+from .contact_tangent import Equations, Tangent
 from .patch import patch
 from .road_data import InflatedTangent
 from .tread import tread_of
