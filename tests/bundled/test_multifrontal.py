@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from scipy.sparse import bsr_matrix, csr_array, csr_matrix
+from scipy.sparse import bsr_matrix, csr_array, csr_matrix, triu
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from tyrecal_solvers.bundled.road.contact_update import ContactUpdate
 from tyrecal_solvers.bundled.road.half_turn_symmetry import HalfTurn
@@ -327,6 +327,19 @@ def test_one_node_in_the_middle_of_the_patch(inflated: Inflated) -> None:
     x = problem.random()[0]
     expected = problem.factor.solve(x)
     np.testing.assert_allclose(touching.solve(x), expected, atol=1e-3 * abs(expected).max())
+
+
+def test_the_transposed_inverse_is_the_adjoint(inflated: Inflated) -> None:
+    """x . S y = S^T x . y of a contact that is not symmetric, both in one call."""
+    problem = Problem(inflated)
+    contact = problem.folded(road_blocks(inflated, 1e6, 0.1))
+    touching = ContactUpdate(problem.factor)
+    touching.to(csr_matrix(contact + 0.5 * triu(contact, 1)))
+    x, y = problem.random()[0], np.roll(problem.random()[0], 1, axis=1)
+    y, x = touching.solve(touching.solve(y)), touching.solve(x)  # of moderate stiffness
+    Sy, Sx, Tx = touching.solve(np.stack([y, x, x]), [False, False, True])
+    assert (x * Sy).sum() == pytest.approx((Tx * y).sum(), rel=1e-4)
+    assert abs(Tx - Sx).max() > 1e-4 * abs(Sx).max()
 
 
 @pytest.mark.slow
