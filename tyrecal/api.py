@@ -157,7 +157,7 @@ def fit_case(
     ``fixed`` holds variables at values, or at their start where it is a name or several. ``free``
     frees uncertain numbers, one or several, within what is known of them. ``prior`` includes what
     is known of the variables, the section and the constants.
-    ``method`` is "slsqp" (SciPy's) or "gauss-newton", which needs about a third of the designs.
+    ``method`` is "slsqp" (SciPy's) or "gauss-newton", which needs about half the designs.
     ``result`` holds what fit.json does, ``provenance`` too, ``fitted`` the design: ``values``,
     ``objective`` in Hz, ``modes`` by label and, of targets in several states, ``states``: modes of
     each. ``left_out`` lists the measurements that are no targets.

@@ -49,7 +49,7 @@ class Numbers:
     type=OneOf(["slsqp", "gauss-newton"]),
     default="slsqp",
     show_default=True,
-    help="Method: SciPy's SLSQP, or damped Gauss-Newton, which needs about a third of the designs"
+    help="Method: SciPy's SLSQP, or damped Gauss-Newton, which needs about half the designs"
     " (for slow solvers).",
 )
 @option(

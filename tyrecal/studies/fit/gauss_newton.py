@@ -4,8 +4,7 @@ Each step minimises a model of second order of the residuals, with the curvature
 seen so far show, within the bounds. Steps are damped as Levenberg and Marquardt's
 are, by how much of the promised decrease comes true (Nocedal and Wright, Numerical Optimization,
 ch. 10). An ``edge`` bounds steps where the two [0, 0] modes change labels (`crossing`). With three
-variables it needs a third of the designs of SLSQP, or fewer, because it knows each residual's
-slopes and not their sum alone.
+variables it needs half the designs of SLSQP, because it knows each residual's slopes at every step.
 
     r(x + d) ~ r + J d + d^T C d / 2
 
@@ -29,6 +28,7 @@ from .search import (
     DAMPING,
     EXACT,
     MAX_DESIGNS,
+    MIN_DAMPING,
     MIN_OBJECTIVE_GAIN,
     NO_LOWER,
     USED_UP,
@@ -40,7 +40,6 @@ from .search import (
 )
 
 Array = np.ndarray
-MIN_DAMPING = 1e-6  # mu over the mean diagonal of J^T J, at last
 GOOD_GAIN, POOR_GAIN = 0.7, 0.25  # shares of a promised decrease: above mu falls, below it rises
 HALVINGS = 5  # of a step towards a design without a solution
 

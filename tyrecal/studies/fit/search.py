@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from ...simulate.evaluate.failure import EvaluationFailed
 from .crossing import MIXED, TELLING, Crossing, crossing, gap, order, pair_clarity
@@ -26,6 +27,7 @@ NEGLIGIBLE = 0.05
 MIN_OBJECTIVE_GAIN = 1e-9  # of the squared objective: a smaller gain is none
 NO_GAIN = 1e-6  # share of the squared objective: below, a whole step gains nothing
 DAMPING = 0.01  # share of the mean diagonal of J^T J that is added to it at the start of a search
+MIN_DAMPING = 1e-6  # the same, at last
 CROSSING_ROOM = 0.1  # of the [0, 0] modes' gap, from a bounded step to where labels change
 STALL_RTOL = 3e-4  # of the objective, less than CROSSING_ROOM costs: not worth another step
 ALONG_RTOL = 0.1  # of the gradient: as much along the crossing counts as none
@@ -97,6 +99,13 @@ def has_nothing_to_gain(problem: Problem, point: Point) -> bool:
     J = point.jacobian[:, ~_pushes_against_bound(problem, point)]
     left = point.residuals - J @ np.linalg.lstsq(J, point.residuals, rcond=None)[0]
     return bool(point.objective**2 - left @ left <= NO_GAIN * point.objective**2)
+
+
+def promises_half(problem: Problem, point: Point) -> bool:
+    """Whether Gauss and Newton's step within the bounds promises to halve the squared objective."""
+    room = problem.lower - point.x, problem.upper - point.x
+    ahead = 2 * lsq_linear(point.jacobian, -point.residuals, room).cost
+    return bool(ahead <= 0.5 * point.objective**2)
 
 
 @dataclass

@@ -7,8 +7,9 @@ this scaling its first steps lead to the bounds. The bounds and the crossing of 
 are linear inequalities.
 
 A design that cannot be evaluated has an infinite objective, from which SLSQP's line search steps
-back. It is started again, from the best design, where a step has found the crossing in its way or
-the line search has come to an end.
+back. It is started again, from the best design, where a step has found the crossing in its way, the
+line search has come to an end, or J^T J there promises to halve F^2: SLSQP sees the gradient alone,
+and creeps in a valley that the residuals' slopes show.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from .search import (
     DAMPING,
     EXACT,
     MAX_DESIGNS,
+    MIN_DAMPING,
     MIN_OBJECTIVE_GAIN,
     NO_LOWER,
     USED_UP,
@@ -31,6 +33,7 @@ from .search import (
     Descent,
     has_nothing_to_gain,
     is_converged,
+    promises_half,
     room_to_move,
 )
 
@@ -39,22 +42,30 @@ MIN_CHANGE = 1e-15  # of F^2 / (2 F0^2), by which SLSQP stops: the gradient ends
 
 
 class _Run:
-    """One run of SLSQP from ``best``, which it moves; ``left``: designs that it may evaluate.
+    """One run of SLSQP from ``best``, which it moves; ``left``: designs that it may evaluate;
+    overshot, failed: whether one of its designs was no lower, or could not be evaluated.
 
     ``objective`` and ``gradient`` end the run before SLSQP's own criteria do: they raise
     StopIteration with the reason in words, without one if another run may go on."""
 
     def __init__(
-        self, problem: Problem, start: Point, tolerance: float, watch: CrossingWatch, left: int
+        self,
+        problem: Problem,
+        start: Point,
+        tolerance: float,
+        watch: CrossingWatch,
+        left: int,
+        damping: float,
     ):
         self.problem, self.tolerance, self.watch, self.left = problem, tolerance, watch, left
         self.start = self.best = start
         H = start.jacobian.T @ start.jacobian
-        H[np.diag_indices(len(H))] += DAMPING * np.trace(H) / len(H)
+        H[np.diag_indices(len(H))] += damping * np.trace(H) / len(H)
         self.F0 = max(start.objective, EXACT)
         self.T = self.F0 * np.linalg.inv(np.linalg.cholesky(H)).T  # dx/dy (variables, variables)
         self.edge = watch.edge
         self.now: Point | None = None
+        self.overshot = self.failed = False
 
     def descend(self) -> str:
         """Run SLSQP; why the search ends, "" where another run may go on from ``best``."""
@@ -87,8 +98,10 @@ class _Run:
         except EvaluationFailed:
             if self.left <= 0:
                 raise StopIteration(USED_UP) from None
+            self.failed = True
             return np.inf
         end = self.watch.judge(self.best, point)
+        self.overshot |= point.objective > self.best.objective
         self.best = min(self.best, point, key=lambda p: p.objective)
         if end or self.left <= 0:
             raise StopIteration(end or USED_UP)
@@ -99,12 +112,15 @@ class _Run:
 
     def gradient(self, y: Array) -> Array:
         """Gradient (v,) of (F / F0)^2 / 2 by y at a design that SLSQP accepts. Raises StopIteration
-        if it is no lower than the one accepted before."""
+        if it is no lower than the one accepted before, or a run from there promises more."""
         try:
             point = self.evaluate(y)
         except EvaluationFailed:  # the line search has given up
             raise StopIteration from None
         if self.now and point.objective >= self.now.objective:
+            raise StopIteration
+        free = not self.edge and not self.failed
+        if self.now and free and promises_half(self.problem, point):
             raise StopIteration
         self.now = point
         return self.T.T @ point.jacobian.T @ point.residuals / self.F0**2
@@ -114,9 +130,9 @@ def descend(
     problem: Problem, point: Point, tolerance: float, known: Point | None = None
 ) -> Descent:
     """Lower the objective from ``point``; ``known``: see `CrossingWatch`."""
-    watch, left = CrossingWatch(problem, known), MAX_DESIGNS
+    watch, left, damping = CrossingWatch(problem, known), MAX_DESIGNS, DAMPING
     while not is_converged(problem, point, tolerance):
-        run = _Run(problem, point, tolerance, watch, left)
+        run = _Run(problem, point, tolerance, watch, left, damping)
         end = run.descend()
         gain = point.objective**2 - run.best.objective**2
         point, left = run.best, run.left
@@ -128,4 +144,6 @@ def descend(
             end = CONVERGED if has_nothing_to_gain(problem, point) else NO_LOWER
         if end:
             return Descent(point, end, watch.edge)
+        # as Gauss and Newton's method is damped
+        damping = 4 * damping if run.overshot else max(0.1 * damping, MIN_DAMPING)
     return Descent(point, CONVERGED)
