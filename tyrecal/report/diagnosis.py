@@ -17,6 +17,7 @@ from ..studies.diagnose.study import DiagnosedCase
 from ..studies.diagnose.under_load import LoadedRow
 from ..studies.diagnose.verdict import NAMED, NO_GAP, UNDECIDED, no_gap_words
 from ..studies.fit.result import OTHER_RESIDUALS
+from ..studies.inference.compressed_cords import compressed_layers
 from ..studies.inference.damping import DAMPING_FORM
 from ..tyre.footprint_quantities import FOOTPRINT_QUANTITIES
 from ..units import display_unit, in_engineers_units, signed
@@ -489,6 +490,8 @@ def _assumptions(study: DiagnosedCase) -> Iterator[str]:
             " in every single mode"
         )
     form += "; smooth over the pressure"
+    if slack := compressed_layers(d.sources):
+        form += f". Slack cords of {', '.join(slack)} bear none to all of their compression"
     ranges = d.problem.ranges
     laws = sorted({span.response_error for span in ranges.values()})
     law = f"{100 * laws[0]:g} to {100 * laws[-1]:g}" if a.response_error is None and laws else "0"

@@ -49,7 +49,7 @@ RISE, SHORTEST_m = 1e3, 1e-9  # of a residual in a step, which is halved else
 HELP = (500.0, 50.0, 5.0, 0.5, 0.0)  # of the pressure: slack cords do not bear yet
 QUADRATURE = 6
 CELL = ("C10", "D1", "density", "dynamic_C10", "hoop_Pa", "lining")
-LINE = ("stiffness", "angle", "area_density", "prestrain")  # of the line above a cell
+LINE = ("stiffness", "angle", "area_density", "prestrain", "slack")  # of the line above a cell
 logging.disable(logging.INFO)  # of the compiler
 
 
@@ -157,7 +157,9 @@ class Tyre:
         strain = {"nominal": ufl.sqrt(ufl.dot(q, q)) - 1, "logarithmic": ufl.ln(ufl.dot(q, q)) / 2}[
             cord_law
         ]
-        lines = both["stiffness"] * (strain - both["prestrain"]) ** 2 / 2
+        more = strain - both["prestrain"]
+        bears = ufl.conditional(ufl.gt(more, 0.0), 1.0, 1.0 - both["slack"])
+        lines = bears * both["stiffness"] * more**2 / 2
         inside = rubber(F, {**d, "C01": 0.0}, volume_law) + hoop
         return inside * self.R * self.dx + self._on_lines(lines)
 

@@ -41,13 +41,15 @@ class Compound:
 @dataclass(frozen=True)
 class Cords:
     """Cords of a ply: E A / spacing, N/m; radians from the meridian; kg/m2; textile ones soften
-    with temperature; prestrain: strain from the built state at which they bear nothing."""
+    with temperature; prestrain: strain from the built state at which they bear nothing; slack: they
+    bear no compression."""
 
     stiffness: float
     angle: float
     area_density: float
     textile: bool
     prestrain: float = 0.0
+    slack: bool = False
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,11 @@ def tyre_of(case: LoadedCase, mould: Mould, columns: list[int]) -> Tyre:
             wires = E * per_m * length, density * per_m * length
         else:
             cords[name] = Cords(
-                E * per_m, radians(layer.angle_deg), density * per_m, TEXTILE_Pa > E
+                E * per_m,
+                radians(layer.angle_deg),
+                density * per_m,
+                TEXTILE_Pa > E,
+                slack=not cord.bears_compression,
             )
     shift = 1e3 * (c.pressure_kPa - case.file_data["pressure_kPa"])
     rim = c.rim
@@ -249,7 +255,7 @@ def _on_lines(tyre: Tyre, mesh: Mesh, kelvin: float) -> dict[str, list[float]]:
     m, marks, s = tyre.mould, mesh.section.marks, mesh.middle
     table = {
         key: np.zeros((mesh.rows, len(s)))
-        for key in ("stiffness", "angle", "area_density", "prestrain")
+        for key in ("stiffness", "angle", "area_density", "prestrain", "slack")
     }
     radius = mesh.section.points[1, 1::2, 0]
     fan = (m.rim[0] / radius) ** tyre.fan
@@ -269,6 +275,7 @@ def _on_lines(tyre: Tyre, mesh: Mesh, kelvin: float) -> dict[str, list[float]]:
         table["angle"][row, there] = cords.angle
         table["area_density"][row, there] = cords.area_density * share
         table["prestrain"][row, there] = cords.prestrain
+        table["slack"][row, there] = cords.slack
     if tyre.cap:
         row, there = m.lines.index("cap") - 1, s < m.cap
         table["stiffness"][row, there] += tyre.cap * np.where(s > 0.8 * m.cap, 1.3, 1.0)[there]

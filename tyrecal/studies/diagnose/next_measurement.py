@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...simulate.modes.label import Label
+from ..inference.compressed_cords import COMPRESSION
 from ..inference.expansion import EffectResponse
 from ..inference.inverse_problem import InverseProblem, Toggle
 from ..inference.model import Answer, ModelRow, Query, ResponseModel
@@ -179,7 +180,7 @@ def rank(
     offered: list[tuple[str, float, CandidateRows]] = []
     of_section = [k for k, name in enumerate(sources) if name.startswith(SECTION)]
     for k, source in enumerate(sources):
-        if k not in of_section:
+        if not source.startswith((SECTION, COMPRESSION)):
             words = f"measure separately: {source.replace('_', ' ')}"
             offered.append((words, COST_HOURS["check"], with_readings(problem, now, of, [], [k])))
     ids = list(dict.fromkeys(id for each in of.values() for id in each))

@@ -24,6 +24,7 @@ import numpy as np
 from ...files import Json
 from ...tyre.case import LoadedCase
 from ...tyre.effects.parts import rim_edge, stations
+from ..inference.compressed_cords import COMPRESSION
 from ..inference.inverse_problem import InverseProblem
 from ..inference.model import ModelRow
 from ..inference.observations import Observable, Observations
@@ -114,7 +115,7 @@ def constants_posterior(diagnosis: Diagnosis) -> list[ConstantShift]:
     shifts = [
         ConstantShift(name, float(z))
         for name, z in zip(diagnosis.sources, G.T @ inverse @ r, strict=True)
-        if not name.startswith(SECTION)
+        if not name.startswith((SECTION, COMPRESSION))
     ]
     return sorted(shifts, key=lambda each: -abs(each.shift_in_sd))
 

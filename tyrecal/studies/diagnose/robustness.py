@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..inference.compressed_cords import COMPRESSION
 from ..inference.inverse_problem import Added, InverseProblem
 from ..inference.observations import DampingRatios
 from ..inference.section_fields import SECTION
@@ -231,11 +232,16 @@ def _changes(problem: InverseProblem, sources: Sequence[str]) -> Iterator[Pertur
     rows = problem.observations.rows
     every = np.ones(len(rows), bool)
     of_section = [k for k, name in enumerate(sources) if name.startswith(SECTION)]
+    slack = [k for k, name in enumerate(sources) if name.startswith(COMPRESSION)]
     constants = {
-        name.replace("_", " "): [k] for k, name in enumerate(sources) if k not in of_section
+        name.replace("_", " "): [k]
+        for k, name in enumerate(sources)
+        if k not in (*of_section, *slack)
     }
     if len(constants) > 1:
         constants["all constants"] = [k for (k,) in constants.values()]
+    if slack:
+        constants["what compressed cords bear"] = slack
     if of_section:
         constants["the section"] = of_section
         yield Perturbation("the section taken as exact", _scaled(problem, of_section, 0.0), every)

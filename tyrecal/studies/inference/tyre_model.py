@@ -24,6 +24,7 @@ from ...tyre.state import TyreState
 from ...tyre.values import with_values
 from .answer_rows import AnswerRows, ln_frequency
 from .between import Between
+from .compressed_cords import by_share, slack_layers, sources_of, with_compression
 from .cord_coupling import cord_coupling
 from .covariance import MATERIAL_LAWS
 from .damping import loss_deviations, losses_in_words, with_losses, with_twice_the_loss
@@ -48,7 +49,8 @@ class TyreModel:
     """ln f of the modes ``rows`` (label, where), and ln mass where the label is None.
 
     case: its variables are x; found: sources of error; ranges: effects that may be evaluated;
-    jobs: evaluations at a time; damped: whether damping ratios are wanted, for which compounds
+    slack: layers whose cords bear no compression, where effects are weighed; jobs: evaluations at
+    a time; damped: whether damping ratios are wanted, for which compounds
     without a loss factor get one. Where the solver gives no exact slopes, they are differences.
     """
 
@@ -85,7 +87,12 @@ class TyreModel:
         self._labels = labels
         self.designs = designs = ModelDesigns(case, values_of(case, own_sources))
         self.variables: Sequence[str] = designs.names
-        self.sources: Sequence[str] = [source.name for source in own_sources]
+        self.slack = slack_layers(case) if ranges else []
+        self._pressures = sorted({s.with_defaults(case).pressure_kPa or 0.0 for s in self.states})
+        self.sources: Sequence[str] = [
+            *(source.name for source in own_sources),
+            *(name for layer in self.slack for name in sources_of(layer, self._pressures)),
+        ]
         self.material_laws = 0.0 if known_from(case) == "exact" else MATERIAL_LAWS
         self.start, self.spread = designs.start, designs.spread
         self._slopeless = {id for id, span in ranges.items() if not self._has_slopes(id, span)}
@@ -97,6 +104,7 @@ class TyreModel:
         self._plain_answers: dict[bytes, Answer] = {}
         self._known_shares: dict[str, Array] = {}  # see `_loss_shares`
         self._known_parts: list[tuple[Array, list[SectionPart]]] = []
+        self._known_compression: list[tuple[Array, Array]] = []
 
     def __getstate__(self) -> dict[str, object]:
         """In a worker, one evaluation at a time: the other workers have trials of their own."""
@@ -167,6 +175,8 @@ class TyreModel:
         runs = sum(1 if exact else 1 + len(names) for _, names in wanted)
         if self.has_uncertain_compounds and any(map(_needs_constants, points)):
             runs += len(self.states) * (1 + count_numbers(self.case))
+        if self.slack and any(map(_needs_constants, points)):
+            runs += len(self.states) * (1 + len(self.slack))
         return runs
 
     @property
@@ -259,7 +269,34 @@ class TyreModel:
             shares = self._loss_shares(point.x, answer.damping)
             each = [np.outer(shares[name], own) for name, own in self._deviations.items()]
             answer = replace(answer, losses=np.sum(each, axis=0))
-        return self._asked_rows(replace(answer, constants=constants))
+        answer = self._asked_rows(replace(answer, constants=constants))
+        if self.slack and answer.constants is not None:
+            both = [answer.constants, self._compression(point.x)]
+            answer = replace(answer, constants=np.hstack(both))
+        return answer
+
+    def _compression(self, x: Array) -> Array:
+        """Columns (n, k) of the layers of slack cords at x, or next to it. Of a layer with which no
+        tyre is stable there, if it bears compression: those known before, else 0."""
+        for there, columns in self._known_compression:
+            if abs(x - there).max() < SAME_PARTS:
+                return columns
+        own, plain = with_values(self.case, self.designs.values(x)), self.values_at(x)
+        states = [state_of(w) if label else TyreState(0.0) for label, w in self.rows]
+        kPa = np.array([s.with_defaults(own).pressure_kPa or 0.0 for s in states])
+        count = 1 + len(self._pressures)
+        before = [columns for _, columns in self._known_compression[-1:]]
+        columns = before[0].copy() if before else np.zeros((len(kPa), count * len(self.slack)))
+        for k, layer in enumerate(self.slack):
+            case = with_compression(own, layer)
+            other = TyreModel(case, self.evaluator, self.rows, [], {}, self.jobs)
+            try:
+                shift = other.values_at(x) - plain
+            except EvaluationFailed:
+                continue
+            columns[:, count * k : count * (k + 1)] = by_share(shift, kPa, self._pressures)
+        self._known_compression.append((np.array(x), columns))
+        return columns
 
     def _loss_shares(self, x: Array, damping: Array) -> Mapping[str, Array]:
         """Share (n,) of each compound in the loss of the modes, where it was first wanted.

@@ -210,10 +210,10 @@ def _readings(
         if id in ids
     ]
     fields = [k for k, name in enumerate(model.sources) if name.startswith(SECTION)]
-    shows = np.zeros((len(readings) + len(fields), len(own_sources)))
+    shows = np.zeros((len(readings) + len(fields), len(model.sources)))
     for i, (_, id) in enumerate(readings):
         steps = [source.steps.get(EFFECT_PATH + id, 0.0) for source in own_sources]
-        shows[i] = np.array(steps) / _far(model, id)
+        shows[i, : len(steps)] = np.array(steps) / _far(model, id)
     shows[range(len(readings), len(shows)), fields] = 1.0
     return shows, [*readings, *[("cut", "")] * len(fields)]
 
