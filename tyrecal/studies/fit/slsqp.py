@@ -8,8 +8,8 @@ are linear inequalities.
 
 A design that cannot be evaluated has an infinite objective, from which SLSQP's line search steps
 back. It is started again, from the best design, where a step has found the crossing in its way, the
-line search has come to an end, or J^T J there promises to halve F^2: SLSQP sees the gradient alone,
-and creeps in a valley that the residuals' slopes show.
+line search has come to an end, or J^T J there promises to halve F^2 and no step since the start
+was too long: SLSQP sees the gradient alone, and creeps in a valley that the residuals' slopes show.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ MIN_CHANGE = 1e-15  # of F^2 / (2 F0^2), by which SLSQP stops: the gradient ends
 
 class _Run:
     """One run of SLSQP from ``best``, which it moves; ``left``: designs that it may evaluate;
-    overshot, failed: whether one of its designs was no lower, or could not be evaluated.
+    overshot: whether one of its designs was no lower, or could not be evaluated.
 
     ``objective`` and ``gradient`` end the run before SLSQP's own criteria do: they raise
     StopIteration with the reason in words, without one if another run may go on."""
@@ -65,7 +65,7 @@ class _Run:
         self.T = self.F0 * np.linalg.inv(np.linalg.cholesky(H)).T  # dx/dy (variables, variables)
         self.edge = watch.edge
         self.now: Point | None = None
-        self.overshot = self.failed = False
+        self.overshot = False
 
     def descend(self) -> str:
         """Run SLSQP; why the search ends, "" where another run may go on from ``best``."""
@@ -98,7 +98,7 @@ class _Run:
         except EvaluationFailed:
             if self.left <= 0:
                 raise StopIteration(USED_UP) from None
-            self.failed = True
+            self.overshot = True
             return np.inf
         end = self.watch.judge(self.best, point)
         self.overshot |= point.objective > self.best.objective
@@ -119,7 +119,7 @@ class _Run:
             raise StopIteration from None
         if self.now and point.objective >= self.now.objective:
             raise StopIteration
-        free = not self.edge and not self.failed
+        free = not self.edge and not self.overshot
         if self.now and free and promises_half(self.problem, point):
             raise StopIteration
         self.now = point
@@ -144,6 +144,6 @@ def descend(
             end = CONVERGED if has_nothing_to_gain(problem, point) else NO_LOWER
         if end:
             return Descent(point, end, watch.edge)
-        # as Gauss and Newton's method is damped
-        damping = 4 * damping if run.overshot else max(0.1 * damping, MIN_DAMPING)
+        if not run.overshot:
+            damping = max(0.1 * damping, MIN_DAMPING)
     return Descent(point, CONVERGED)
