@@ -16,7 +16,7 @@ import numpy as np
 
 from ...tyre.case import LoadedCase
 from ...tyre.case.schema import Cord
-from ...tyre.effects.edit import changed, with_part
+from ...tyre.effects.edit import changed, unused, with_part
 
 Array = np.ndarray
 SHARE_SD = 1 / sqrt(6)  # standard deviation of either half
@@ -33,7 +33,7 @@ def slack_layers(case: LoadedCase) -> list[str]:
 def with_compression(case: LoadedCase, name: str) -> LoadedCase:
     """The case where one layer's cords bear compression, the others of their material as before."""
     layer = case.case.rebar_layers[name]
-    own = f"{layer.material}_of_{name}"
+    own = unused(f"{layer.material}_of_{name}", case.case.materials)
     cord = with_part(case.case.materials[layer.material], bears_compression=True)
     layers = {**case.case.rebar_layers, name: with_part(layer, material=own)}
     return changed(case, materials={**case.case.materials, own: cord}, rebar_layers=layers)

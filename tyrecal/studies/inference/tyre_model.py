@@ -48,10 +48,10 @@ QueryKey = tuple[bytes, tuple[tuple[str, float], ...], bool]  # of an evaluation
 class TyreModel:
     """ln f of the modes ``rows`` (label, where), and ln mass where the label is None.
 
-    case: its variables are x; found: sources of error; ranges: effects that may be evaluated;
-    slack: layers whose cords bear no compression, where effects are weighed; jobs: evaluations at
-    a time; damped: whether damping ratios are wanted, for which compounds
-    without a loss factor get one. Where the solver gives no exact slopes, they are differences.
+    case: its variables are x; found: sources of error; ranges: effects that may be evaluated, for
+    which what slack cords bear is a source of error, too; jobs: evaluations at a time; damped:
+    whether damping ratios are wanted, for which compounds without a loss factor get one. Where the
+    solver gives no exact slopes, they are differences.
     """
 
     def __init__(
@@ -87,11 +87,11 @@ class TyreModel:
         self._labels = labels
         self.designs = designs = ModelDesigns(case, values_of(case, own_sources))
         self.variables: Sequence[str] = designs.names
-        self.slack = slack_layers(case) if ranges else []
+        self._slack = slack_layers(case) if ranges else []
         self._pressures = sorted({s.with_defaults(case).pressure_kPa or 0.0 for s in self.states})
         self.sources: Sequence[str] = [
             *(source.name for source in own_sources),
-            *(name for layer in self.slack for name in sources_of(layer, self._pressures)),
+            *(name for layer in self._slack for name in sources_of(layer, self._pressures)),
         ]
         self.material_laws = 0.0 if known_from(case) == "exact" else MATERIAL_LAWS
         self.start, self.spread = designs.start, designs.spread
@@ -175,8 +175,8 @@ class TyreModel:
         runs = sum(1 if exact else 1 + len(names) for _, names in wanted)
         if self.has_uncertain_compounds and any(map(_needs_constants, points)):
             runs += len(self.states) * (1 + count_numbers(self.case))
-        if self.slack and any(map(_needs_constants, points)):
-            runs += len(self.states) * (1 + len(self.slack))
+        if self._slack and any(map(_needs_constants, points)):
+            runs += len(self.states) * (1 + len(self._slack))
         return runs
 
     @property
@@ -270,7 +270,7 @@ class TyreModel:
             each = [np.outer(shares[name], own) for name, own in self._deviations.items()]
             answer = replace(answer, losses=np.sum(each, axis=0))
         answer = self._asked_rows(replace(answer, constants=constants))
-        if self.slack and answer.constants is not None:
+        if self._slack and answer.constants is not None:
             both = [answer.constants, self._compression(point.x)]
             answer = replace(answer, constants=np.hstack(both))
         return answer
@@ -286,8 +286,8 @@ class TyreModel:
         kPa = np.array([s.with_defaults(own).pressure_kPa or 0.0 for s in states])
         count = 1 + len(self._pressures)
         before = [columns for _, columns in self._known_compression[-1:]]
-        columns = before[0].copy() if before else np.zeros((len(kPa), count * len(self.slack)))
-        for k, layer in enumerate(self.slack):
+        columns = before[0].copy() if before else np.zeros((len(kPa), count * len(self._slack)))
+        for k, layer in enumerate(self._slack):
             case = with_compression(own, layer)
             other = TyreModel(case, self.evaluator, self.rows, [], {}, self.jobs)
             try:
