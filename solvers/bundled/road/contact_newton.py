@@ -42,6 +42,9 @@ FRICTION_BOUND_RTOL = 0.1  # the same, before the friction's bounds are taken an
 SOFT_ELASTIC_SLIP = 1e-4  # m: an elastic slip that is no obstacle
 ELASTIC_SLIP_FACTOR = 0.3  # from one elastic slip to the next smaller one
 MIN_STEP_LENGTH = 1 / 64  # step of the line search
+# the same with Coulomb's friction, which has no energy: there a larger residual is borne, as stick
+# and slip change
+MIN_COULOMB_LENGTH = 1 / 4
 FIRST_COMPLIANCE = 1e-6  # m/N of deflection to begin with: it must touch, and stay small
 # logarithmic compression above which cords are named as the cause: a truck's belt of 72 degrees
 # gives way at 6e-4
@@ -50,8 +53,8 @@ MIN_LOAD_STEP = 1 / 16  # share of a load's increase, below which it counts as u
 # of the way down to the rim that a load would need at the last one's stiffness, beyond which it is
 # not tried: no tyre stiffens as much
 MAX_PREDICTED_WAY = 4.0
-# of the section's height that a stiff tyre (`FIRST_COMPLIANCE`) goes down in one step
-MAX_DEFLECTION_STEP = 0.1
+# of the way down to the rim, at which the first load begins at most
+MAX_FIRST_DEFLECTION = 0.1
 
 
 @dataclass
@@ -116,10 +119,7 @@ class ContactNewton:
         Raises NoEquilibrium, also where the road has come to the rim.
         """
         self._check_reach(load)
-        step = min(
-            load - self.load,
-            MAX_DEFLECTION_STEP * (self.free_radius - self.flat) / FIRST_COMPLIANCE,
-        )
+        step = load - self.load
         smallest = MIN_LOAD_STEP * step
         while True:
             self.check()
@@ -201,31 +201,20 @@ class ContactNewton:
         return self.tyre.potential() + contact.energy + load / 2 * height
 
     def _newton(self, load: float) -> PressedState:
-        """Solve with Coulomb's friction from where the last load's stiffness points; where that
-        does not converge, with Tresca's friction, with the last normal forces, to where it does."""
+        """Solve from the guess for a load or, without a good one, from where the last load's
+        stiffness points."""
         state = self._from_first_guess(load)
-        parts, height = self.parts, self.height
-        self._stale = self._factor is not None and load > SAME_FACTOR * self._formed_at
-        if self._slope:
-            parts = parts + (load - self.load) * self._slope[0]
-            height += (load - self.load) * self._slope[1]
-        else:
-            height -= FIRST_COMPLIANCE * load
-        if not state and load <= NEAR_LOAD * self.load:
-            state = self._by_coulomb(parts, height, load)
-        bound, reached = self._bound, FRICTION_BOUND_RTOL
-        for _ in range(MAX_NEWTON):
-            if state:
-                break
-            parts, height, contact = self._solve_tresca(parts, height, load, bound, reached)
-            bound = contact.bound(self.road.share(contact.points, height)[0])
-            if reached > COULOMB_RTOL:
-                reached = COULOMB_RTOL  # what newly touches had no friction yet
-                continue
-            state = self._by_coulomb(parts, height, load)
-            reached = max(0.1 * reached, CONTACT_FORCE_RTOL)
         if not state:
-            raise NoEquilibrium("the friction did not settle")
+            parts, height = self.parts, self.height
+            self._stale = self._factor is not None and load > SAME_FACTOR * self._formed_at
+            if self._slope:
+                parts = parts + (load - self.load) * self._slope[0]
+                height += (load - self.load) * self._slope[1]
+            else:
+                deepest = MAX_FIRST_DEFLECTION * (self.free_radius - self.flat)
+                height -= min(FIRST_COMPLIANCE * load, deepest)
+            near = load <= NEAR_LOAD * self.load
+            state = self._with_friction(parts, height, load, self._bound, near)
         parts, height, contact = state
         self._bound = contact.bound(1.0)
         unit, *derivatives = self._derivatives(contact)
@@ -241,11 +230,36 @@ class ContactNewton:
         self._factor = None
         try:
             height = self.free_radius - guess.deflection
-            return self._iterate(guess.parts, height, load, None, CONTACT_FORCE_RTOL)
+            contact = self.road.forces(self.symmetry.spread(guess.parts), height)
+            return self._with_friction(guess.parts, height, load, self._limit(contact), near=True)
         except (NoEquilibrium, Indefinite, Inverted):
             log.info("%g N: the start was too far away, loaded from the state before", load)
             self._factor = None
             return None
+
+    def _limit(self, contact: Contact) -> Bound:
+        """Limit of the friction of a step to a contact."""
+        return contact.bound(self.road.share(contact.points, contact.height)[0])
+
+    def _with_friction(
+        self, parts: Array, height: float, load: float, bound: Bound, near: bool
+    ) -> tuple[Array, float, Contact]:
+        """The equilibrium with Coulomb's friction, tried at once where it is ``near``; where that
+        does not converge, Tresca's friction, with the last normal forces, comes to where it
+        does."""
+        if near and (state := self._by_coulomb(parts, height, load)):
+            return state
+        reached = FRICTION_BOUND_RTOL
+        for _ in range(MAX_NEWTON):
+            parts, height, contact = self._solve_tresca(parts, height, load, bound, reached)
+            bound = self._limit(contact)
+            if reached > COULOMB_RTOL:
+                reached = COULOMB_RTOL  # what newly touches had no friction yet
+                continue
+            if state := self._by_coulomb(parts, height, load):
+                return state
+            reached = max(0.1 * reached, CONTACT_FORCE_RTOL)
+        raise NoEquilibrium("the friction did not settle")
 
     def _by_coulomb(
         self, parts: Array, height: float, load: float
@@ -275,8 +289,8 @@ class ContactNewton:
     def _iterate(
         self, parts: Array, height: float, load: float, bound: Bound | None, tolerance: float
     ) -> tuple[Array, float, Contact]:
-        """Newton's method, with an energy line search where the friction is bounded; with
-        Coulomb's friction it is left as soon as it does not converge."""
+        """Newton's method, with a line search of the energy where the friction is bounded; with
+        Coulomb's friction, of the residual, and left as soon as it does not converge."""
         force, lacking, contact = self._state(parts, height, load, bound)
         size = float(np.hypot(np.linalg.norm(force), lacking))
         setbacks = 0
@@ -301,9 +315,14 @@ class ContactNewton:
                 try:
                     force, lacking, contact = self._state(*ahead, load, bound)
                     size = float(np.hypot(np.linalg.norm(force), lacking))
-                    if bound is None or size < 0.5 * before:
+                    if size < 0.5 * before:
                         break
-                    if self._energy(contact, load, ahead[1]) <= energy + 1e-4 * length * slope:
+                    if bound:
+                        low = energy + 1e-4 * length * slope
+                        enough = self._energy(contact, load, ahead[1]) <= low
+                    else:
+                        enough = size < before or length <= MIN_COULOMB_LENGTH
+                    if enough:
                         break
                 except Inverted:
                     pass
