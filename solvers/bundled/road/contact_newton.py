@@ -119,7 +119,8 @@ class ContactNewton:
         Raises NoEquilibrium, also where the road has come to the rim.
         """
         self._check_reach(load)
-        step = load - self.load
+        # no step is larger than what would press the stiffest tyre flat
+        step = min(load - self.load, (self.free_radius - self.flat) / FIRST_COMPLIANCE)
         smallest = MIN_LOAD_STEP * step
         while True:
             self.check()
