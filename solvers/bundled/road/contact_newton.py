@@ -13,10 +13,9 @@ import numpy as np
 
 from ...errors import Indefinite, Inverted, NoEquilibrium
 from ..section.parts.cords import NOT_COMPRESSED, CordsAtStations
-from ..solid3d.gmres import gmres_together
 from ..solid3d.revolved import Revolved
 from .contact import Bound, Contact, FlatRoad
-from .contact_tangent import Equations, Tangent
+from .contact_tangent import MAX_GMRES, Equations, Tangent, solve
 from .contact_update import ContactUpdate
 from .half_turn_symmetry import HalfTurn
 from .multifrontal import Elimination, Factor
@@ -27,7 +26,6 @@ CONTACT_FORCE_RTOL = 1e-8  # out-of-balance force over the load
 MAX_NEWTON = 40  # Newton iterations a load
 # GMRES iterations of a step, after which the preconditioner is formed anew
 MAX_GMRES_BEFORE_NEW_FACTOR = 8
-MAX_GMRES = 60
 NEAR_LOAD = 2.0  # of a load, up to which Coulomb's friction is tried at once
 SAME_FACTOR = 1.1  # of a load, up to which its preconditioner is worth keeping
 LINEAR_RTOL = 1e-2  # residual of the linear problem, relative
@@ -111,7 +109,7 @@ class ContactNewton:
         self._stale = False  # the preconditioner is of a load that was much smaller
         self._formed_at = 0.0  # its load, N
         self._slope: tuple[Array, float] | None = None  # of parts and height by the load
-        self.factorisations = self.products = self.iterations = 0
+        self.factorisations = self.iterations = 0
 
     def to(self, load: float) -> PressedState:
         """The equilibrium at ``load`` (N), in smaller steps where need be.
@@ -344,69 +342,20 @@ class ContactNewton:
         if fresh:
             self._form(contact)
         equations = [Equations(Tangent.of(contact, self.symmetry), -force, -lacking)]
-        steps, rises, self._used, left = self.solve(equations, tolerance)
+        steps, rises, self._used, left = self._solve(equations, tolerance)
         if not fresh and not left[0] <= MAX_LINEAR_RESIDUAL:
             self._form(contact)
-            steps, rises, self._used, left = self.solve(equations, tolerance)
+            steps, rises, self._used, left = self._solve(equations, tolerance)
         if not left[0] <= MAX_LINEAR_RESIDUAL:
             raise NoEquilibrium("the tangent is too far from a stable one")
         return steps[0], rises[0]
 
-    def solve(
+    def _solve(
         self, equations: Sequence[Equations], tolerance: float
     ) -> tuple[list[Array], list[float], int, list[float]]:
-        """Displacements' parts and rises of the road, m, that solve equations of the first one's
-        tangent, or of that transposed; the iterations; and the relative residuals that are left."""
-        tangents, count = [each.tangent for each in equations], len(equations)
-        factor = self._factor or self._form(tangents[0].contact)
-        shape, scale = self.parts.shape, max(tangents[0].stiffness, 1.0) ** -0.5
-        rights = [np.append(e.force.ravel(), e.lacking * scale) for e in equations]
-        factor.to(self.symmetry.fold(tangents[0].touching))
-        # several right-hand sides at once cost little more than one: all wait for the memory
-        both = np.stack([t.by_height for t in tangents] + [e.force for e in equations])
-        turned = [t.turned for t in tangents]
-        answers, first = np.split(factor.solve(both, 2 * turned), [count])
-        schur = [
-            t.stiffness - float((t.of_force * y).sum())
-            for t, y in zip(tangents, answers, strict=True)
-        ]
-        if not all(schur):
-            raise NoEquilibrium("no force answers to the road's height")
-
-        def product(vectors: Array, which: list[int]) -> Array:
-            images = []
-            for v, i in zip(vectors, which, strict=True):
-                self.products += 1
-                t, parts, rise = tangents[i], v[:-1].reshape(shape), v[-1] * scale
-                V = self.symmetry.spread(parts)
-                image = self.symmetry.gather(
-                    self.tyre.product(V) + (t.touching @ V.ravel()).reshape(V.shape)
-                )
-                image += t.by_height * rise
-                more = float((t.of_force * parts).sum()) + t.stiffness * rise
-                images.append(np.append(image.ravel(), more * scale))
-            return np.stack(images)
-
-        def bordered(i: int, v: Array, y: Array) -> Array:
-            rise = (v[-1] / scale - float((tangents[i].of_force * y).sum())) / schur[i]
-            return np.append((y - answers[i] * rise).ravel(), rise / scale)
-
-        def precondition(vectors: Array, which: list[int]) -> Array:
-            ys = factor.solve(vectors[:, :-1].reshape(-1, *shape), [turned[i] for i in which])
-            return np.stack([bordered(*each) for each in zip(which, vectors, ys, strict=True)])
-
-        # a number that moves nothing has no right side
-        begin = np.stack(
-            [
-                bordered(i, right, y) / (float(np.linalg.norm(right)) or 1.0)
-                for i, (right, y) in enumerate(zip(rights, first, strict=True))
-            ]
-        )
-        solutions, used, left = gmres_together(
-            product, precondition, rights, tolerance, MAX_GMRES, begin
-        )
-        rises = [float(x[-1]) * scale for x in solutions]
-        return [x[:-1].reshape(shape) for x in solutions], rises, used, left
+        """`solve` with the preconditioner at hand, or else one of this state."""
+        factor = self._factor or self._form(equations[0].tangent.contact)
+        return solve(self.tyre, self.symmetry, factor, equations, tolerance)
 
     def _form(self, contact: Contact) -> ContactUpdate:
         """The preconditioner at the last state. Raises Indefinite; the one before is gone, as two
@@ -438,8 +387,8 @@ class ContactNewton:
         this state where that of another one does not reach the ``tolerance``."""
         if not equations:
             return [], 0.0
-        parts, rises, _, left = self.solve(equations, tolerance)
+        parts, rises, _, left = self._solve(equations, tolerance)
         if max(left) > tolerance:
             self._form(equations[0].tangent.contact)
-            parts, rises, _, left = self.solve(equations, tolerance)
+            parts, rises, _, left = self._solve(equations, tolerance)
         return list(zip(parts, rises, strict=True)), max(left)
