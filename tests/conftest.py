@@ -30,7 +30,7 @@ if threading.current_thread() is threading.main_thread():
 
 ROOT = Path(__file__).parents[1]
 CASES = ROOT / "cases"
-SOLVED_ONCE = ("cli", "deck", "diagnose", "effects", "fit", "plan")  # folders whose tests only need a tyre's answers
+SOLVED_ONCE = ("cli", "deck", "effects", "fit")  # folders whose tests only need a tyre's answers
 
 
 @pytest.fixture(autouse=True)
