@@ -161,8 +161,8 @@ def test_the_evidence_is_the_integral_over_what_couples(z: float) -> None:
     p = problem(toy, toy.coupled(z))
     zeta = (np.arange(80) + 0.5) / 20
     added, start = p.added({}, 1), np.zeros((1, 3))
-    fine = [refit_at(p, replace(p, zeta=at), added, None, start, 10) for at in zeta.tolist()]
-    ln, prior = np.array([each.ln_evidence[0] for each in fine]), -(zeta**2) / 2
+    at = [replace(p, zeta=each) for each in zeta.tolist()]
+    ln, prior = refit_at(p, at, added, None, start, 10).ln_evidence[:, 0], -(zeta**2) / 2
     known = np.logaddexp.reduce(ln + prior) - np.logaddexp.reduce(prior)
     assert refit(p, {}, 1).ln_evidence[0] == pytest.approx(known, abs=0.2)
     assert refit(by_slopes(p), {}, 1).ln_evidence[0] < known - 2 or z < 1

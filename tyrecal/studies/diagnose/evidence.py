@@ -37,6 +37,7 @@ SHARP_FALL = 2.0  # fall of ln Z from the best point to a neighbour above which 
 MAX_ZOOMS = 6  # refinements of a grid about its best point
 REFIT_STEPS = 16  # Gauss-Newton steps, halved if the misfit rises, of a model quadratic in x
 COUPLED_STEPS = 8  # further steps if near modes are coupled
+REFITS_AT_ONCE = 256  # that share each step: more would take memory and no less time
 REFITTED = 1e-6  # expected fall of the misfit below which a re-fit has converged
 FAR_BELOW, ABOVE_POINTS = 20.0, 1.0  # limits of a spline in ln Z: below and above its best point
 # standard deviations of shifts of ln f by causes outside the catalogue
@@ -162,15 +163,18 @@ def refit(
     added = problem.added(effects, count)
     if near is None or not problem.integrand:
         start = np.zeros((count, len(problem.centre))) if near is None else near
-        plain = refit_at(problem, problem, added, extra, start, REFIT_STEPS)
+        plain = refit_at(problem, [problem], added, extra, start, REFIT_STEPS)
         if not problem.integrand:
-            return plain
-        near = plain.d
+            return Fitted(*(part[0] for part in plain))
+        near = plain.d[0]
     points = list(among) if among else list(range(len(problem.integrand)))
+    at_once = max(REFITS_AT_ONCE // count, 1)
+    groups = [points[i : i + at_once] for i in range(0, len(points), at_once)]
     results = [
-        refit_at(problem, problem.integrand[k], added, extra, near, COUPLED_STEPS) for k in points
+        refit_at(problem, [problem.integrand[k] for k in some], added, extra, near, COUPLED_STEPS)
+        for some in groups
     ]
-    ln, d, chi2, covariance = (np.array([each[part] for each in results]) for part in range(4))
+    ln, d, chi2, covariance = (np.concatenate(part) for part in [*zip(*results, strict=True)][:4])
     zeta, total = rule()[0], over_zeta(ln, among)
     ln_prior = -(zeta[points, None] ** 2) / 2
     best, every = np.argmax(ln + ln_prior, axis=0), np.arange(count)
@@ -196,36 +200,39 @@ def over_zeta(ln: Array, among: Mapping[int, float] | None = None) -> Array:
 
 
 def model_of(
-    problem: InverseProblem, at: InverseProblem, added: Added
+    problem: InverseProblem, at: Sequence[InverseProblem], added: Added
 ) -> Callable[[Array], tuple[Array, Array, Array]]:
-    """The model as a function of d = x - x0 (q, v): eta (q, n), d eta / dx (q, n, v) and ln p of
-    the labels (q,).
+    """The model as a function of d = x - x0 (k, q, v): eta (k, q, n), d eta / dx (k, q, n, v) and
+    ln p of the labels (k, q).
 
-    Effects are ``added`` to uncoupled modes; then modes are coupled with the zeta of ``at``.
+    Effects are ``added`` to uncoupled modes; then modes are coupled with the zeta of each of the k
+    problems ``at``.
     """
     eta0, J0 = problem.plain(np.zeros_like(problem.centre))
     H = problem.expansion.hessian[problem.places]
     by_variable = H.transpose(2, 0, 1).reshape(len(problem.centre), -1)
+    zeta = np.array([each.zeta for each in at])[:, None, None]
 
     def model(d: Array) -> tuple[Array, Array, Array]:
-        bent = (d @ by_variable).reshape(added.tilt.shape)
-        eta = eta0 + added.shift + ((J0 + bent / 2 + added.tilt) @ d[:, :, None])[:, :, 0]
-        return at.coupled(eta, J0 + bent + added.tilt)
+        bent = (d @ by_variable).reshape(len(d), *added.tilt.shape)
+        eta = eta0 + added.shift + ((J0 + bent / 2 + added.tilt) @ d[..., None])[..., 0]
+        return problem.veering.coupled(eta, J0 + bent + added.tilt, zeta)
 
     return model
 
 
 def refit_at(
     problem: InverseProblem,
-    at: InverseProblem,
+    at: Sequence[InverseProblem],
     added: Added,
     extra: Array | None,
     d: Array,
     steps: int,
 ) -> Fitted:
-    """x re-fitted from x0 + d (q, v) at the zeta of ``at``; other arguments as in `model_of`."""
+    """x re-fitted from x0 + d (q, v) at the zeta of each of k problems ``at``, all arrays with k
+    before q; other arguments as in `model_of`."""
     y, model = problem.observations.y, model_of(problem, at, added)
-    S = at.sigma + problem.response_covariance(at.with_mixed_laws(added))
+    S = np.stack([p.sigma + problem.response_covariance(p.with_mixed_laws(added)) for p in at])
     if extra is not None:
         S = S + extra
     inverse = np.linalg.inv(S)
@@ -233,16 +240,18 @@ def refit_at(
     centre = problem.centre - problem.expansion.x0
     information = np.diag(problem.spread**-2.0)
     best: tuple[Array, ...] | None = None
-    share = np.ones(len(d))
+    d = np.broadcast_to(d, (len(at), *d.shape))
+    share = np.ones(d.shape[:2])
     while True:
         eta, J, ln_label = model(d)
         r = y - eta
-        weighted = inverse @ np.concatenate([J, r[:, :, None]], 2)
-        both = weighted.transpose(0, 2, 1) @ J
-        chi2, off = (weighted[:, :, -1] * r).sum(1), (d - centre) / problem.spread
-        slope = both[:, -1] - off / problem.spread
-        misfit = chi2 + (off**2).sum(1)
-        here: tuple[Array, ...] = (misfit, d, chi2, ln_label, both[:, :-1] + information, slope)
+        weighted = inverse @ np.concatenate([J, r[..., None]], -1)
+        both = weighted.swapaxes(-1, -2) @ J
+        chi2, off = (weighted[..., -1] * r).sum(-1), (d - centre) / problem.spread
+        slope = both[..., -1, :] - off / problem.spread
+        misfit = chi2 + (off**2).sum(-1)
+        normal = both[..., :-1, :] + information
+        here: tuple[Array, ...] = (misfit, d, chi2, ln_label, normal, slope)
         if best is not None:  # where the misfit rose, from the best point half as far
             rose = here[0] > best[0]
             share = np.where(rose, share / 2, 1.0)
@@ -250,18 +259,21 @@ def refit_at(
                 new[rose] = old[rose]
         best = here
         _, d, chi2, ln_label, normal, slope = best
-        step = share[:, None] * np.linalg.solve(normal, slope[:, :, None])[:, :, 0]
-        if not steps or (step * slope).sum(1).max() < REFITTED:
+        step = share[..., None] * np.linalg.solve(normal, slope[..., None])[..., 0]
+        if not steps or (step * slope).sum(-1).max() < REFITTED:
             break
         d, steps = d + step, steps - 1
     off = (d - centre) / problem.spread
     _, ln_normal = np.linalg.slogdet(normal * np.outer(problem.spread, problem.spread))
     n = len(y)
-    ln_evidence = -(chi2 + ln_det + n * np.log(2 * np.pi) + (off**2).sum(1) + ln_normal) / 2
+    ln_evidence = -(chi2 + ln_det + n * np.log(2 * np.pi) + (off**2).sum(-1) + ln_normal) / 2
     ln_evidence += problem.splits.ln_likelihood(added.split) + ln_label
     if problem.damping:
-        ln_evidence += problem.damping.ln_likelihood(added.damping, d, normal)
-    return Fitted(ln_evidence, d, chi2, np.linalg.inv(normal), np.zeros((len(d), 0)))
+        damping = added.damping
+        ln_evidence += [
+            problem.damping.ln_likelihood(damping, *each) for each in zip(d, normal, strict=True)
+        ]
+    return Fitted(ln_evidence, d, chi2, np.linalg.inv(normal), np.zeros((*chi2.shape, 0)))
 
 
 class Family(NamedTuple):

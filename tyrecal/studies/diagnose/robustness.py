@@ -116,13 +116,12 @@ def lines(
     that start from x - x0 = near (q, v); the rest as in `refit`."""
     added, result = problem.added(effects, len(near)), []
     places: list[int | None] = [*(among or range(len(problem.integrand)))]
-    for k in places or [None]:
-        at = problem if k is None else problem.integrand[k]
-        fitted = refit_at(problem, at, added, extra, near, COUPLED_STEPS)
-        line = line_about(problem, added, fitted.d, k)
+    at = [problem if k is None else problem.integrand[k] for k in places or [None]]
+    fitted = refit_at(problem, at, added, extra, near, COUPLED_STEPS)
+    for k, d, covariance in zip(places or [None], fitted.d, fitted.covariance, strict=True):
+        line = line_about(problem, added, d, k)
         if problem.damping:
-            information = np.linalg.inv(fitted.covariance)
-            ln = problem.damping.ln_likelihood(added.damping, fitted.d, information)
+            ln = problem.damping.ln_likelihood(added.damping, d, np.linalg.inv(covariance))
             line = replace(line, ln_damping=ln)
         result.append(line)
     return result
@@ -131,7 +130,7 @@ def lines(
 def line_about(problem: InverseProblem, added: Added, d: Array, place: int | None) -> LinearFit:
     """About x - x0 = d (q, v), with what effects add."""
     at = problem if place is None else problem.integrand[place]
-    eta, J, ln_label = model_of(problem, at, added)(d)
+    eta, J, ln_label = (each[0] for each in model_of(problem, [at], added)(d[None]))
     back = d - (problem.centre - problem.expansion.x0)
     residual = problem.observations.y - eta + (J @ back[:, :, None])[:, :, 0]
     # with their standard deviations transformed to the coupled modes
@@ -321,7 +320,7 @@ def _reevaluate_outside(
     concern only rows that are left out, such as the misreading of their label, do not count."""
     extra = np.array([family.extra for family in families(problem)])
     added, start = problem.added({}, len(extra)), np.zeros((len(extra), len(problem.centre)))
-    near = refit_at(problem, problem, added, extra, start, REFIT_STEPS).d
+    near = refit_at(problem, [problem], added, extra, start, REFIT_STEPS).d[0]
     fits, result = lines(problem, {}, near, extra=extra), []
     for other in changes:
         if other.parts_near_modes:

@@ -151,24 +151,15 @@ class InverseProblem:
     def plain(self, d: Array) -> tuple[Array, Array]:
         """eta (n,) and J = d eta / dx (n, v) at x0 + d without any effect, switched or not."""
         eta, jacobian = self.expansion.plain(self.expansion.x0 + d)
-        eta, jacobian, _ = self.coupled(eta[None, self.places], jacobian[None, self.places])
-        return eta[0], jacobian[0]
+        eta, jacobian, _ = self.veering.coupled(eta[self.places], jacobian[self.places], self.zeta)
+        return eta, jacobian
 
     def predicted(self, effects: Mapping[str, Array], d: Array) -> Array:
         """eta (q, n) at x0 + d (q, v) with effects, each (q,)."""
         plain = replace(self, zeta=0.0)
         shift, tilt, *_ = plain.added(effects, len(d))
         eta = np.array([plain.plain(each)[0] for each in d]) + shift
-        return self.coupled(eta + np.einsum("qnv,qv->qn", tilt, d), tilt)[0]
-
-    def coupled(self, eta: Array, jacobian: Array) -> tuple[Array, Array, Array]:
-        """eta (q, n) and J (q, n, v) of uncoupled modes as those of coupled ones, and ln
-        probability (q,) of their labels."""
-        if not self.zeta:
-            return eta, jacobian, np.zeros(len(eta))
-        eta, own, part, ln_label = self.veering.mixed(eta, self.zeta)
-        partners = jacobian[:, self.veering.partner]
-        return eta, own[:, :, None] * jacobian + part[:, :, None] * partners, ln_label
+        return self.veering.coupled(eta + np.einsum("qnv,qv->qn", tilt, d), tilt, self.zeta)[0]
 
     def added(self, effects: Mapping[str, Array], count: int) -> Added:
         """Contribution of effects, each (count,). Squares of splits add up, each counted from the

@@ -61,27 +61,37 @@ class Veering:
         """Whether any pair is near enough to matter."""
         return bool(self.size.any())
 
-    def mixed(self, eta: Array, zeta: float) -> tuple[Array, Array, Array, Array]:
-        """ln f (q, n) of coupled modes from ``eta`` (q, n) of uncoupled ones; their derivatives by
-        the row's and by the partner's eta (q, n); ln probability (q,) of the labels, larger with
-        the share of the label's uncoupled mode."""
+    def coupled(
+        self, eta: Array, jacobian: Array, zeta: Array | float
+    ) -> tuple[Array, Array, Array]:
+        """eta (..., n) and J (..., n, v) of uncoupled modes as those of coupled ones, and ln
+        probability (...) of their labels."""
+        if not np.any(zeta):
+            return eta, jacobian, np.zeros(eta.shape[:-1])
+        eta, own, part, ln_label = self.mixed(eta, zeta)
+        partners = jacobian[..., self.partner, :]
+        return eta, own[..., None] * jacobian + part[..., None] * partners, ln_label
+
+    def mixed(self, eta: Array, zeta: Array | float) -> tuple[Array, Array, Array, Array]:
+        """ln f (..., n) of coupled modes from ``eta`` (..., n) of uncoupled ones; their derivatives
+        by the row's and by the partner's eta (..., n); ln probability (...) of the labels, larger
+        with the share of the label's uncoupled mode. zeta: a number, or one that broadcasts."""
         on = np.flatnonzero(self.size)
         q, mate, scale = zeta * self.size[on], self.partner[on], self.scale[on]
-        there = np.where(mate >= 0, eta[:, mate], self.other[on])
-        a, b = (np.exp(2 * np.clip(ln_f - scale, -1, 1)) for ln_f in (eta[:, on], there))
+        there = np.where(mate >= 0, eta[..., mate], self.other[on])
+        a, b = (np.exp(2 * np.clip(ln_f - scale, -1, 1)) for ln_f in (eta[..., on], there))
         delta = (a - b) / 2
         D = np.sqrt(delta**2 + q**2)
         side = np.where(mate >= 0, self.side[on], np.where(delta < 0, -1.0, 1.0))
         eigenvalues = (a + b) / 2 + self.rise[on] * zeta**2 + side * D
         share = (1 + side * delta / np.maximum(D, 1e-300)) / 2  # of the row's uncoupled mode
         each = np.log(MISLABELLED + (1 - MISLABELLED) * share)
-        ln_label = each.sum(1) / max(
-            len(on), 1
-        )  # one label decides the other, so their mean counts
+        # one label decides the other, so their mean counts
+        ln_label = each.sum(-1) / max(len(on), 1)
         ln_f, own, part = eta.copy(), np.ones_like(eta), np.zeros_like(eta)
-        ln_f[:, on] = scale + np.log(np.maximum(eigenvalues, 1e-6)) / 2
-        own[:, on] = share * a / eigenvalues
-        part[:, on] = np.where(mate >= 0, (1 - share) * b / eigenvalues, 0.0)
+        ln_f[..., on] = scale + np.log(np.maximum(eigenvalues, 1e-6)) / 2
+        own[..., on] = share * a / eigenvalues
+        part[..., on] = np.where(mate >= 0, (1 - share) * b / eigenvalues, 0.0)
         return ln_f, own, part, ln_label
 
     def weights(self, y: Array, zeta: float) -> Array:
