@@ -1,13 +1,14 @@
 """Drawn tyres by `init` pressed on the road: how many, how smoothly, and with which slopes.
 
-    python -m tests.studies.drawn_tyres [COUNT] [SEED] [FIRST] >> drawn_tyres.jsonl    # coarse mesh
+    python -m tests.studies.drawn_tyres [COUNT] [SEED] [FIRST] [A1,A2,...] >> drawn_tyres.jsonl
     python -m tests.studies.drawn_tyres tests/benchmarks/drawn_tyres.jsonl
 
-Ten sizes in turn, each with gauges, belts, areas of cords, moduli of rubber and a pressure drawn. A
-line of JSON says why one of eight loads up to the rated one was not reached; how far the stiffness
-is from a fitted cubic of the load; how far the slopes of stiffness and area at two loads, along a
-drawn direction of the variables' logarithms, are from central differences of whole presses; and how
-many points of cords are slack on one side of these and taut on the other at the higher load.
+Ten sizes in turn, coarse mesh, each with gauges, belts, areas of cords, moduli of rubber and a
+pressure drawn; A1, A2, ...: other elements round half the tyre, degrees. A line of JSON says why
+one of eight loads up to the rated one was not reached; how far the stiffness is from a fitted cubic
+of the load; how far the slopes of stiffness and area at two loads, along a drawn direction of the
+variables' logarithms, are from central differences of whole presses; and how many points of cords
+are slack on one side of these and taut on the other at the higher load.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -50,8 +52,9 @@ STEP = 5e-3  # of the logarithms
 QUANTITIES = {"stiffness": "stiffness_N_per_m", "area": "contact_area_m2"}
 
 
-def drawn(size: TyreSize, random: np.random.Generator) -> LoadedCase:
-    """A tyre of the size, coarse mesh; its variables as `init` writes them."""
+def drawn(size: TyreSize, random: np.random.Generator, angles: Sequence[float] = ()) -> LoadedCase:
+    """A tyre of the size, coarse mesh; its variables as `init` writes them. angles: of the elements
+    round half of it, degrees, where not `init`'s."""
     own = usual(size)
     lengths = {
         name: getattr(own, name) * (1 + random.uniform(-share, share))
@@ -59,7 +62,11 @@ def drawn(size: TyreSize, random: np.random.Generator) -> LoadedCase:
     }
     case = with_level(by_size(size.text, lengths), "coarse")
     pressure_kPa = case.case.pressure_kPa * random.uniform(*PRESSURES)
-    return with_belts(case, random.uniform(*ANGLES_DEG), pressure_kPa)
+    case = with_belts(case, random.uniform(*ANGLES_DEG), pressure_kPa)
+    if not angles:
+        return case
+    road = case.case.road.model_copy(update={"element_angles_deg": list(angles)})
+    return replace(case, case=case.case.model_copy(update={"road": road}))
 
 
 @contextmanager
@@ -78,9 +85,9 @@ def watched_cords() -> Iterator[list[Array]]:
         LogarithmicCord.force = force  # type: ignore[method-assign]
 
 
-def line_of(size: TyreSize, random: np.random.Generator) -> dict[str, Any]:
+def line_of(size: TyreSize, random: np.random.Generator, angles: list[float]) -> dict[str, Any]:
     """The results of one drawn tyre."""
-    case = drawn(size, random)
+    case = drawn(size, random, angles)
     evaluator = Evaluator(TyreDesign(case))
     start = {
         name: value * math.exp(random.uniform(-VARIABLES, VARIABLES))
@@ -155,13 +162,18 @@ def table(lines: Sequence[dict[str, Any]]) -> Iterator[str]:
             )
 
 
-def main(count: int, seed: int, first: int) -> None:
+def main(count: int, seed: int, first: int, angles: list[float]) -> None:
     """Print the lines of tyres from the ``first`` on, and the counts to stderr."""
     lines = []
     for k in range(first, first + count):
         code = SIZES[k % len(SIZES)]
         random = np.random.default_rng([seed, k])
-        line = {"size": code, "seed": seed, "number": k, **line_of(parse_size(code), random)}
+        line = {
+            "size": code,
+            "seed": seed,
+            "number": k,
+            **line_of(parse_size(code), random, angles),
+        }
         lines.append(line)
         print(json.dumps(line), flush=True)
     print("\n".join(table(lines)), file=sys.stderr)
@@ -171,5 +183,6 @@ if __name__ == "__main__":
     if sys.argv[1:] and Path(sys.argv[1]).is_file():
         print("\n".join(table([json.loads(x) for x in Path(sys.argv[1]).read_text().splitlines()])))
     else:
-        given = [int(x) for x in sys.argv[1:]]
-        main(*given, *(50, 1, 0)[len(given) :])
+        given = [int(x) for x in sys.argv[1:4]]
+        around = [float(x) for x in "".join(sys.argv[4:]).split(",") if x]
+        main(*given, *(50, 1, 0)[len(given) :], around)
