@@ -80,6 +80,12 @@ def test_time_that_ran_out_is_not_on_record(tmp_path: Path) -> None:
             lambda answer: answer["footprints"][0].update(road_N=float("nan")),
             "road_N: holds a number that is not finite",
         ),
+        (
+            lambda answer: answer["footprints"][0].update(
+                displacement_slopes=np.zeros((1, 2, 3, 3))
+            ),
+            "slopes of a displacement are not this tyre's",
+        ),
     ],
 )
 def test_answers_that_are_not_whole(change: Any, words: str, tmp_path: Path) -> None:

@@ -92,6 +92,26 @@ def start_of(case: LoadedCase) -> PressedTyre:
 
 
 @pytest.mark.slow
+def test_a_start_is_predicted_to_first_order(case: LoadedCase) -> None:
+    """What is left of a change by 1 % is a twentieth of it at most, and quadratic in the change."""
+    evaluator, base = Evaluator(TyreDesign(case)), start_values(case)
+    evaluator.press(base, LOADS, gradients=tuple(base), base=base)
+    (tyre,) = evaluator.pressed_tyres.values()
+    assert tyre is not None
+    left = []
+    for share in (1.01, 1.02):
+        values = {name: share * x for name, x in base.items()}
+        (own,) = evaluator.press(values, LOADS).footprints
+        predicted = tyre.predicted(values)
+        left.append(abs(own.displacement - predicted.displacement[0]).max())
+        assert left[-1] < 0.05 * abs(own.displacement - tyre.displacement[0]).max()
+        moved = own.deflection_m - tyre.deflection_m[0]
+        assert predicted.deflection_m[0] == pytest.approx(own.deflection_m, abs=0.05 * abs(moved))
+    assert left[1] == pytest.approx(4 * left[0], rel=0.25)
+    assert (tyre.predicted(base).displacement == tyre.displacement).all()
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("bad", ["unstable", "far away"])
 def test_a_bad_start_is_given_up(
     case: LoadedCase, bad: str, monkeypatch: pytest.MonkeyPatch
@@ -116,7 +136,7 @@ def test_a_bad_start_is_given_up(
     else:
         monkeypatch.setattr(pressed_start, "FirstGuess", guess)
     evaluator = Evaluator(TyreDesign(case))
-    evaluator.pressed_tyres[_key(TyreDesign(case, base)), tuple(LOADS)] = start
+    evaluator.pressed_tyres[_key(TyreDesign(case, base)), tuple(LOADS), ()] = start
     assert numbers(evaluator.press(values, LOADS, base=base)) == cold and given
 
 

@@ -2,7 +2,8 @@
 
 JOB.json: pressure_Pa, mass_kg, free_radius_m, failure, cause, ``footprints`` [load_N, road_N, rim_N
 (x down, y, z), deflection_m, stiffness_N_per_m, contact_area_m2]; where a request has sensitivities
-``slopes``, by variable those of numbers; with a gas cavity_Hz of the
+``slopes``, by variable those of numbers, and in JOB.npz those of the displacement as
+displacement_slopes (variable, ring, node, 3); with a gas cavity_Hz of the
 cavity's first wave, free and in ``footprints`` (fore-aft, vertical). JOB.npz: nodes, points, angles
 of the whole tyre, and per footprint i the arrays of its patch
 and the displacement, as NAME_i; where modes were asked for: mode_frequency_Hz (m,), mode_shape
@@ -55,6 +56,7 @@ MODE_ARRAYS = (
     *("mode_frequency_Hz", "mode_node", "mode_shape", "mode_damping_ratio"),
     *("mode_traction_N", "sliding_frequency_Hz", "sliding_shape"),
 )
+FIELDS = (*PATCH_ARRAYS, "displacement", "displacement_slopes", "rim_reactions", *MODE_ARRAYS)
 
 
 def press(
@@ -104,6 +106,9 @@ def press(
             state = work.to(load)
             footprint = _footprint(work, state, load, rings)
             footprint |= slopes.at(work, state, rings)
+            if "displacement_slopes" in footprint:
+                each = [_whole(work.symmetry, rings, U) for U in footprint["displacement_slopes"]]
+                footprint["displacement_slopes"] = np.array(each, np.float32)
             if request.rim:
                 footprint |= _rim_reactions(work, state, request.rim)
             if request.modes:
@@ -139,8 +144,6 @@ def _footprint(
     contact = state.contact
     other = symmetry.other
     displacement = _at(around, angles, U)
-    turned = np.empty_like(displacement)
-    turned[:, other] = displacement * HALF_TURN
     half = patch(contact, work.tyre.model.mesh.X, angles)
     size, force = half.area.copy(), half.force.copy()
     # ring 0 belongs to both halves: each node there meets its own image
@@ -177,8 +180,16 @@ def _footprint(
         "contact_width_m": half.width,
         "pressure_Pa": both(force[:, 0] / size),
         "traction_Pa": both(force[:, 1:] / size[:, None], -1.0),
-        "displacement": np.concatenate([displacement, turned[1:-1][::-1]]),
+        "displacement": _whole(symmetry, angles, U),
     }
+
+
+def _whole(symmetry: HalfTurn, angles: Array, U: Array) -> Array:
+    """A field (k, n, 3) of one half at its angles, and of the other half beyond."""
+    half = _at(symmetry.around, angles, U)
+    turned = np.empty_like(half)
+    turned[:, symmetry.other] = half * HALF_TURN
+    return np.concatenate([half, turned[1:-1][::-1]])
 
 
 def _pressed(work: ContactNewton, state: PressedState, tyre: Revolved) -> TyreOnRoad:
@@ -291,7 +302,7 @@ def write(stem: Path, model: Model, result: dict[str, Any]) -> None:
         if "mode_node" in footprint:
             footprint["mode_node"] = numbers[footprint["mode_node"]]
         responses = [name for name in footprint if name.startswith(RESPONSE)]
-        for name in (*PATCH_ARRAYS, "displacement", "rim_reactions", *MODE_ARRAYS, *responses):
+        for name in (*FIELDS, *responses):
             if name in footprint:
                 arrays[f"{name}_{i}"] = footprint.pop(name)
         lines.append({**footprint, "rim_N": footprint["rim_N"].tolist()})
@@ -312,7 +323,7 @@ def read(stem: Path) -> dict[str, Any]:
             answer[name] = arrays[name]
         for i, footprint in enumerate(answer["footprints"]):
             footprint["rim_N"] = np.array(footprint["rim_N"])
-            for name in (*PATCH_ARRAYS, "displacement", "rim_reactions", *MODE_ARRAYS):
+            for name in FIELDS:
                 if f"{name}_{i}" in arrays:
                     footprint[name] = arrays[f"{name}_{i}"]
             of_response = [name for name in arrays if name.startswith(RESPONSE)]

@@ -5,9 +5,10 @@ Each begins with a comment that says what it is of.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from math import inf
 from typing import Any, Protocol
 
@@ -125,6 +126,18 @@ class PressedTyre:
     displacement: np.ndarray  # (q, rings, n, 3) under the loads, m
     load_N: np.ndarray  # (q,)
     deflection_m: np.ndarray  # (q,)
+    # by variable: its value, and the derivatives of displacement and deflection by it
+    slopes: Mapping[str, tuple[float, np.ndarray, np.ndarray]] = field(default_factory=dict)
+
+    def predicted(self, values: Mapping[str, float]) -> PressedTyre:
+        """The tyre with other values of its variables, to first order in their logarithms."""
+        displacement, deflection = self.displacement, self.deflection_m
+        for name, (value, by_displacement, by_deflection) in self.slopes.items():
+            ratio = values.get(name, value) / value if value else 1.0
+            change = value * math.log(ratio) if ratio > 0 else 0.0
+            displacement = displacement + change * by_displacement
+            deflection = deflection + change * by_deflection
+        return replace(self, displacement=displacement, deflection_m=deflection)
 
 
 @dataclass(eq=False)

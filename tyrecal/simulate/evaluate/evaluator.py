@@ -30,6 +30,8 @@ DIFFERENCE_STEP = 1e-4  # of a logarithm: best between truncation and most solve
 MODES_ON_TOP = 3  # times the time limit of a load, where modes are sought there too
 T = TypeVar("T")
 Array = np.ndarray
+# what a tyre on the road was asked for: its design, its loads, N, and the variables of its slopes
+PressedKey = tuple[DesignKey, tuple[float, ...], tuple[str, ...]]
 RESPONDS_NOT = {"frequency_modulus", "cavity", "coupled", "rotation"}  # needs of a tyre
 
 
@@ -100,10 +102,8 @@ class Evaluator:
     on_progress: Callable[[int, int], None] = field(default=_unwatched, repr=False)
     # of nominal designs: node numbers and displacements, see `_start_of`
     shapes: dict[DesignKey, Array] = field(default_factory=dict, repr=False)
-    # by design and loads, N, see `_pressed`; None: it cannot bear the first load
-    pressed_tyres: dict[tuple[DesignKey, tuple[float, ...]], PressedTyre | None] = field(
-        default_factory=dict, repr=False
-    )
+    # see `_pressed`; None: it cannot bear the first load
+    pressed_tyres: dict[PressedKey, PressedTyre | None] = field(default_factory=dict, repr=False)
     _solver: Solver | None = field(default=None, repr=False)
 
     @property
@@ -207,6 +207,7 @@ class Evaluator:
         start = None
         if base and not (vibrates or rim_stiffness) and _key(self._with(base)) != _key(design):
             start = self._pressed(base, loads, gradients)
+            start = start and start.predicted(design.values)
         decks = Decks(
             design,
             gradients,
@@ -225,7 +226,7 @@ class Evaluator:
         if answer.failed:
             answer = replace(answer, failed=_advised(answer.failed, design))
         if base:
-            self._remember(design, loads, answer)
+            self._remember((_key(design), loads, gradients), answer)
         return answer
 
     def _pressed(
@@ -238,23 +239,34 @@ class Evaluator:
         if "pressed_start" not in self.solver.capabilities:
             return None
         design = self._with(base)
-        key = _key(design), loads
+        key = _key(design), loads, gradients
         if key not in self.pressed_tyres:
             self.pressed_tyres[key] = None
             with contextlib.suppress(EvaluationFailed):
-                self._remember(design, loads, self.press(base, loads, gradients=gradients))
+                self._remember(key, self.press(base, loads, gradients=gradients))
         return self.pressed_tyres[key]
 
-    def _remember(self, design: Design, loads: tuple[float, ...], answer: Pressed) -> None:
+    def _remember(self, key: PressedKey, answer: Pressed) -> None:
         """Keep a tyre on the road for those that begin from it."""
         if "pressed_start" not in self.solver.capabilities:
             return
         at = answer.footprints
-        self.pressed_tyres[_key(design), loads] = PressedTyre(
+        values, moved = dict(key[0][2]), [each.displacement_slopes for each in at]
+        slopes = {
+            name: (
+                values[name],
+                np.array([each[i] for each in moved if each is not None]),
+                np.array([each.slopes[name]["deflection_m"] for each in at]),
+            )
+            for i, name in enumerate(at[0].slopes)
+            if all(each is not None for each in moved)
+        }
+        self.pressed_tyres[key] = PressedTyre(
             answer.nodes,
             np.array([each.displacement for each in at]),
             np.array([each.load_N for each in at]),
             np.array([each.deflection_m for each in at]),
+            slopes,
         )
 
     def needs_road(self, modes: bool = False, rim_stiffness: bool = False) -> None:
@@ -422,7 +434,8 @@ class Evaluator:
                 self.counts.add(counts)
                 if isinstance(result, Pressed) and questions[place].base:
                     question = questions[place]
-                    self._remember(self._with(question.values), tuple(question.loads_N), result)
+                    key = _key(self._with(question.values)), tuple(question.loads_N)
+                    self._remember((*key, tuple(question.gradients)), result)
                 yield result
             next(answers, None)  # to their end: workers of a loop that is cut off are ended
 

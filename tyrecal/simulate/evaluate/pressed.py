@@ -65,6 +65,8 @@ class Footprint:
     cavity_Hz: of.HertzPair | None = None
     # by variable and name, derivatives of the numbers above by the requested variables
     slopes: Mapping[str, Mapping[str, of.Finite]] = field(default_factory=dict)
+    # (variable, ring, node, 3) in the order of ``slopes``, of a solver that begins at other states
+    displacement_slopes: of.Shapes3D | None = None
 
 
 @dataclass(frozen=True)

@@ -157,6 +157,9 @@ class _Pressed(_Tyre):
                 and set(map(int, each.node)) <= set(map(int, self.nodes))
             ):
                 raise ValueError("a patch is not on this tyre")
+            moved = each.displacement_slopes
+            if moved is not None and _shape(moved)[:3] != (len(each.slopes), rings, nodes):
+                raise ValueError("slopes of a displacement are not this tyre's")
             if each.response is not None:
                 _Response.model_validate(each.response)
             # (m,), (j,) and (m, ring, j, 3)
