@@ -84,7 +84,7 @@ def test_time_that_ran_out_is_not_on_record(tmp_path: Path) -> None:
             lambda answer: answer["footprints"][0].update(
                 displacement_slopes=np.zeros((1, 2, 3, 3))
             ),
-            "slopes of a displacement are not this tyre's",
+            "sensitivities of a displacement are not this tyre's",
         ),
     ],
 )

@@ -93,7 +93,7 @@ def start_of(case: LoadedCase) -> PressedTyre:
 
 @pytest.mark.slow
 def test_a_start_is_predicted_to_first_order(case: LoadedCase) -> None:
-    """What is left of a change by 1 % is a twentieth of it at most, and quadratic in the change."""
+    """A change by 1 % leaves a twentieth of it at most, and quadratically in the change."""
     evaluator, base = Evaluator(TyreDesign(case)), start_values(case)
     evaluator.press(base, LOADS, gradients=tuple(base), base=base)
     (tyre,) = evaluator.pressed_tyres.values()

@@ -159,7 +159,7 @@ class _Pressed(_Tyre):
                 raise ValueError("a patch is not on this tyre")
             moved = each.displacement_slopes
             if moved is not None and _shape(moved)[:3] != (len(each.slopes), rings, nodes):
-                raise ValueError("slopes of a displacement are not this tyre's")
+                raise ValueError("sensitivities of a displacement are not this tyre's")
             if each.response is not None:
                 _Response.model_validate(each.response)
             # (m,), (j,) and (m, ring, j, 3)
