@@ -34,7 +34,6 @@ from ..section.band import Numbering
 from ..section.model import Model
 from ..section.parts.elastic import Elastic
 from ..section.parts.rubber import Hourglass
-from ..section.symmetry import HALF_TURN
 from ..solid3d.circumference import WAVE_BY_ELEMENTS, HalfCircle, half_circle, waves_beyond
 from ..solid3d.revolved import Revolved
 from .contact import flat_road
@@ -106,9 +105,6 @@ def press(
             state = work.to(load)
             footprint = _footprint(work, state, load, rings)
             footprint |= slopes.at(work, state, rings)
-            if "displacement_slopes" in footprint:
-                each = [_whole(work.symmetry, rings, U) for U in footprint["displacement_slopes"]]
-                footprint["displacement_slopes"] = np.array(each, np.float32)
             if request.rim:
                 footprint |= _rim_reactions(work, state, request.rim)
             if request.modes:
@@ -139,11 +135,11 @@ def _footprint(
 ) -> dict[str, Any]:
     """One load's results on the whole tyre, whose other half is this one's half turn; ``angles``
     of the rings."""
-    symmetry, around = work.symmetry, work.symmetry.around
+    symmetry = work.symmetry
     U = symmetry.spread(state.parts)
     contact = state.contact
     other = symmetry.other
-    displacement = _at(around, angles, U)
+    displacement = symmetry.whole(U, angles)
     half = patch(contact, work.tyre.model.mesh.X, angles)
     size, force = half.area.copy(), half.force.copy()
     # ring 0 belongs to both halves: each node there meets its own image
@@ -160,7 +156,7 @@ def _footprint(
     across = X[nodes, 1] + u[:, 2]
     residual = work.tyre.residual(U)
     held = ~symmetry.free
-    turn = around.turn(1)[:, None]
+    turn = symmetry.around.turn(1)[:, None]
     at_rim = residual * held
     # the half turn cancels what the two halves bear along and across
     down = float((turn.real * at_rim[..., 0] - turn.imag * at_rim[..., 1]).sum())
@@ -180,16 +176,8 @@ def _footprint(
         "contact_width_m": half.width,
         "pressure_Pa": both(force[:, 0] / size),
         "traction_Pa": both(force[:, 1:] / size[:, None], -1.0),
-        "displacement": _whole(symmetry, angles, U),
+        "displacement": displacement,
     }
-
-
-def _whole(symmetry: HalfTurn, angles: Array, U: Array) -> Array:
-    """A field (k, n, 3) of one half at its angles, and of the other half beyond."""
-    half = _at(symmetry.around, angles, U)
-    turned = np.empty_like(half)
-    turned[:, symmetry.other] = half * HALF_TURN
-    return np.concatenate([half, turned[1:-1][::-1]])
 
 
 def _pressed(work: ContactNewton, state: PressedState, tyre: Revolved) -> TyreOnRoad:
@@ -227,10 +215,14 @@ def _modes(
     start = lowest_of_all(vibration, wanted.count + 2 * SPARE, work.check)
     modes = loaded_modes(pressed, holds, start, wanted.count, wanted.wheel_kg, work.release_factor)
     arrays = {"mode_node": wanted.nodes}
+    symmetries = {parity: work.symmetry.of_parity(parity) for parity in (1, -1)}
     for name, each in zip(("mode", "sliding"), modes, strict=False):
-        shapes = np.array([_at(work.symmetry.around, angles, shape) for shape in each.shapes])
-        turned = each.parity[:, None, None, None] * (HALF_TURN * shapes)[:, :, work.symmetry.other]
-        whole = np.concatenate([shapes, turned[:, 1:-1][:, ::-1]], 1)
+        whole = np.array(
+            [
+                symmetries[parity].whole(shape, angles)
+                for parity, shape in zip(each.parity, each.shapes, strict=True)
+            ]
+        )
         arrays[f"{name}_frequency_Hz"] = np.sqrt(each.eigenvalues) / (2 * np.pi)
         arrays[f"{name}_shape"] = whole[:, :, wanted.nodes]
     if wanted.model.lossy:
@@ -284,11 +276,6 @@ def _traction(around: HalfCircle, forces: Array) -> float:
     c, s = np.cos(around.angles)[:, None], np.sin(around.angles)[:, None]
     r, theta, z = np.moveaxis(forces[:nodes], -1, 0)
     return 2 * float(np.hypot(s * r + c * theta, z).sum())
-
-
-def _at(around: HalfCircle, angles: Array, U: Array) -> Array:
-    """Values (a, n, 3) of a field (k, n, 3) at angles."""
-    return np.asarray((around.at(angles) @ U.reshape(len(U), -1)).reshape(-1, *U.shape[1:]))
 
 
 def write(stem: Path, model: Model, result: dict[str, Any]) -> None:

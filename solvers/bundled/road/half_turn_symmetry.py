@@ -20,7 +20,7 @@ from scipy.sparse import csr_matrix
 
 from ...errors import Refused
 from ..section.mesh import DeckMesh
-from ..section.symmetry import MIRROR_SIGNS, SAME_PLACE, mirror_images
+from ..section.symmetry import HALF_TURN, MIRROR_SIGNS, SAME_PLACE, mirror_images
 from ..solid3d.circumference import HalfCircle
 
 Array = np.ndarray
@@ -75,6 +75,13 @@ class HalfTurn:
         U[:, self.beyond] = self.parity * MIRROR_SIGNS * there
         U[:, self.nodes] = here  # nodes of the middle keep the sum
         return U
+
+    def whole(self, U: Array, angles: Array) -> Array:
+        """Values (2 a - 2, n, 3) of a field (k, n, 3) of one half at ``angles`` (a,), rad, which
+        rise from 0 to pi, and of the other half beyond."""
+        half = (self.around.at(angles) @ U.reshape(len(U), -1)).reshape(-1, *self.shape[1:])
+        beyond = self.parity * HALF_TURN * half[1:-1, self.other]
+        return np.concatenate([half, beyond[::-1]])
 
     def gather(self, F: Array) -> Array:
         """Transpose of `spread`: forces F (k, n, 3) on the two parts, zero on what is held."""

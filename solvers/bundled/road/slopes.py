@@ -69,15 +69,15 @@ class Slopes:
 
     def at(self, work: ContactNewton, state: PressedState, rings: Array) -> dict[str, Any]:
         """``slopes`` of a footprint's numbers at the last state followed to, whose patch is on
-        nodes at the angles ``rings``, by name, and those of its displacements (v, k, n, 3), in the
-        names' order; empty where none was requested."""
+        nodes at the angles ``rings``, by name, and those of the whole tyre's displacements (v,
+        ring, n, 3), in the names' order; empty where none was requested."""
         if not self.paths:
             return {}
         parts, lift = state.derivatives[-1]
         unit = work.symmetry.spread(parts), lift
         rates = {name: path.rates(work, state, unit, rings) for name, path in self.paths.items()}
-        moved = np.array([path.U for path in self.paths.values()])
-        return {"slopes": rates, "displacement_slopes": moved}
+        moved = [work.symmetry.whole(path.U, rings) for path in self.paths.values()]
+        return {"slopes": rates, "displacement_slopes": np.array(moved, np.float32)}
 
 
 class _Path:

@@ -168,13 +168,8 @@ def refit(
             return Fitted(*(part[0] for part in plain))
         near = plain.d[0]
     points = list(among) if among else list(range(len(problem.integrand)))
-    at_once = max(REFITS_AT_ONCE // count, 1)
-    groups = [points[i : i + at_once] for i in range(0, len(points), at_once)]
-    results = [
-        refit_at(problem, [problem.integrand[k] for k in some], added, extra, near, COUPLED_STEPS)
-        for some in groups
-    ]
-    ln, d, chi2, covariance = (np.concatenate(part) for part in [*zip(*results, strict=True)][:4])
+    at = [problem.integrand[k] for k in points]
+    ln, d, chi2, covariance, _ = refit_at(problem, at, added, extra, near, COUPLED_STEPS)
     zeta, total = rule()[0], over_zeta(ln, among)
     ln_prior = -(zeta[points, None] ** 2) / 2
     best, every = np.argmax(ln + ln_prior, axis=0), np.arange(count)
@@ -229,8 +224,22 @@ def refit_at(
     d: Array,
     steps: int,
 ) -> Fitted:
-    """x re-fitted from x0 + d (q, v) at the zeta of each of k problems ``at``, all arrays with k
-    before q; other arguments as in `model_of`."""
+    """x re-fitted from x0 + d (q, v) at the zeta of each of k problems ``at``, some of these in the
+    same steps; all arrays with k before q; other arguments as in `model_of`."""
+    most = max(REFITS_AT_ONCE // len(d), 1)
+    groups = [at[i : i + most] for i in range(0, len(at), most)]
+    fitted = [_refit_together(problem, some, added, extra, d, steps) for some in groups]
+    return Fitted(*map(np.concatenate, zip(*fitted, strict=True)))
+
+
+def _refit_together(
+    problem: InverseProblem,
+    at: Sequence[InverseProblem],
+    added: Added,
+    extra: Array | None,
+    d: Array,
+    steps: int,
+) -> Fitted:
     y, model = problem.observations.y, model_of(problem, at, added)
     S = np.stack([p.sigma + problem.response_covariance(p.with_mixed_laws(added)) for p in at])
     if extra is not None:
