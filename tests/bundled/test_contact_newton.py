@@ -214,6 +214,36 @@ def test_an_unstable_tangent_has_no_preconditioner(
         press.to(60.0)
 
 
+@pytest.mark.parametrize(
+    ("turns", "steps"),
+    [((), [100.0]), ((1,), [100.0]), ((1, 2), [50.0, 100.0]), ((0,), [50.0, 100.0])],
+)
+def test_an_unstable_tangent_far_from_equilibrium_is_stepped_back_from(
+    solid: Round, monkeypatch: pytest.MonkeyPatch, turns: tuple[int, ...], steps: list[float]
+) -> None:
+    """Where one has no preconditioner the state before it gives it, and the load is reached at
+    once; where that has none either, or none is before it, the load is halved."""
+    monkeypatch.setattr(contact_newton, "MAX_GMRES_BEFORE_NEW_FACTOR", -1)  # one at each step
+    form, heights, reached = ContactNewton._form, list[float](), list[float]()
+
+    def unstable(press: ContactNewton, contact: Any) -> Any:
+        heights.append(contact.height)
+        if len(heights) - 1 in turns:
+            raise Indefinite("unstable")
+        return form(press, contact)
+
+    monkeypatch.setattr(ContactNewton, "_form", unstable)
+    press = solid.press(LENGTHS, 1e10)
+    monkeypatch.setattr(press, "settled", lambda work, state: reached.append(work.load))
+    state = press.to(100.0)
+    assert reached == steps
+    assert (heights[2] == heights[0]) == (1 in turns)
+    monkeypatch.setattr(ContactNewton, "_form", form)
+    plain = solid.press(LENGTHS, 1e10).to(100.0)
+    assert state.height == pytest.approx(plain.height, rel=1e-8)
+    assert state.stiffness == pytest.approx(plain.stiffness, rel=1e-6)
+
+
 def test_time_is_looked_at_before_every_iteration(solid: Round) -> None:
     looks: list[int] = []
     press = solid.press(LENGTHS, 1e10, check=lambda: looks.append(1))
@@ -259,12 +289,12 @@ def test_a_step_with_coulombs_friction_is_halved_for_a_smaller_residual(
 
     def step(*_: object) -> tuple[Array, float]:
         if len(lengths) > 1:
-            raise Indefinite  # the first step has been taken
+            raise NoEquilibrium("the first step has been taken")
         return 0 * press.parts, 1.0
 
     monkeypatch.setattr(press, "_state", state)
     monkeypatch.setattr(press, "_step", step)
-    with pytest.raises(Indefinite):
+    with pytest.raises(NoEquilibrium):
         press._iterate(press.parts, 0.0, 100.0, None, 1e-8)
     assert lengths == tried
 

@@ -293,34 +293,45 @@ class ContactNewton:
         force, lacking, contact = self._state(parts, height, load, bound)
         size = float(np.hypot(np.linalg.norm(force), lacking))
         setbacks = 0
+        before: tuple[Array, float] | None = None
         for _ in range(MAX_NEWTON):
             self.check()
             if size <= tolerance * load:
                 return parts, height, contact
             rough = size > COULOMB_RTOL * load
-            if bound is None and self._stale and not rough:
-                self._form(contact)
             self.iterations += 1
             residual = size / load
             log.debug("%g N: Newton iteration %d, residual %.2g", load, self.iterations, residual)
             energy = self._energy(contact, load, height) if bound else 0.0
-            step, rise = self._step(
-                contact, force, lacking, ROUGH_LINEAR_RTOL if rough else LINEAR_RTOL
-            )
+            try:
+                if bound is None and self._stale and not rough:
+                    self._form(contact)
+                step, rise = self._step(
+                    contact, force, lacking, ROUGH_LINEAR_RTOL if rough else LINEAR_RTOL
+                )
+            except Indefinite:  # far from equilibrium: the preconditioner of the state before it
+                if before is None:
+                    raise
+                (parts, height), before = before, None
+                force, lacking, contact = self._state(parts, height, load, bound)
+                size = float(np.hypot(np.linalg.norm(force), lacking))
+                self._form(contact)
+                continue
+            before = parts, height
             slope = float((force * step).sum() + lacking * rise)
-            length, before = 1.0, size
+            length, size_before = 1.0, size
             while True:
                 ahead = parts + length * step, height + length * rise
                 try:
                     force, lacking, contact = self._state(*ahead, load, bound)
                     size = float(np.hypot(np.linalg.norm(force), lacking))
-                    if size < 0.5 * before:
+                    if size < 0.5 * size_before:
                         break
                     if bound:
                         low = energy + 1e-4 * length * slope
                         enough = self._energy(contact, load, ahead[1]) <= low
                     else:
-                        enough = size < before or length <= MIN_COULOMB_LENGTH
+                        enough = size < size_before or length <= MIN_COULOMB_LENGTH
                     if enough:
                         break
                 except Inverted:
@@ -329,7 +340,7 @@ class ContactNewton:
                 if length < MIN_STEP_LENGTH:
                     raise NoEquilibrium("the line search found no lower energy")
             parts, height = ahead
-            setbacks += size > 0.5 * before
+            setbacks += size > 0.5 * size_before
             if bound is None and setbacks > MAX_SETBACKS:
                 break
         raise NoEquilibrium(f"Newton's method did not converge in {MAX_NEWTON} iterations")
@@ -361,7 +372,7 @@ class ContactNewton:
         """The preconditioner at the last state. Raises Indefinite; the one before is gone, as two
         at a time would double the memory."""
         self.factorisations += 1
-        self._stale, self._factor, self._formed_at = False, None, self.load
+        self._stale, self._factor, self._formed_at, self._used = False, None, self.load, 0
         stiffness = self.symmetry.fold(contact.matrix(positive=True))
         tangents = self.tyre.tangents(np.float32)
         self._order = self._order or Elimination(tangents, self.symmetry)
