@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.road import contact_newton, footprint_job
-from tyrecal_solvers.bundled.road.contact_newton import ContactNewton
+from tyrecal_solvers.bundled.road.contact_newton import ContactNewton, PressedState
 from tyrecal_solvers.bundled.road.road_data import LoadRequest, TyreToPress
 from tyrecal_solvers.errors import Indefinite, NoEquilibrium, RunFailed
 from tyrecal_solvers.language.text import DeckError
@@ -214,34 +215,55 @@ def test_an_unstable_tangent_has_no_preconditioner(
         press.to(60.0)
 
 
-@pytest.mark.parametrize(
-    ("turns", "steps"),
-    [((), [100.0]), ((1,), [100.0]), ((1, 2), [50.0, 100.0]), ((0,), [50.0, 100.0])],
-)
-def test_an_unstable_tangent_far_from_equilibrium_is_stepped_back_from(
-    solid: Round, monkeypatch: pytest.MonkeyPatch, turns: tuple[int, ...], steps: list[float]
-) -> None:
-    """Where one has no preconditioner the state before it gives it, and the load is reached at
-    once; where that has none either, or none is before it, the load is halved."""
-    monkeypatch.setattr(contact_newton, "MAX_GMRES_BEFORE_NEW_FACTOR", -1)  # one at each step
-    form, heights, reached = ContactNewton._form, list[float](), list[float]()
+def pressed_past(
+    unstable: Sequence[int], solid: Round, monkeypatch: pytest.MonkeyPatch
+) -> tuple[PressedState, list[float], list[float]]:
+    """The state at 100 N where preconditioners with these numbers cannot be formed, one for each
+    step; the loads on the way, and the road's heights of all preconditioners."""
+    form, heights, loads = ContactNewton._form, list[float](), list[float]()
 
-    def unstable(press: ContactNewton, contact: Any) -> Any:
+    def formed(press: ContactNewton, contact: Any) -> Any:
         heights.append(contact.height)
-        if len(heights) - 1 in turns:
+        if len(heights) - 1 in unstable:
             raise Indefinite("unstable")
         return form(press, contact)
 
-    monkeypatch.setattr(ContactNewton, "_form", unstable)
-    press = solid.press(LENGTHS, 1e10)
-    monkeypatch.setattr(press, "settled", lambda work, state: reached.append(work.load))
-    state = press.to(100.0)
-    assert reached == steps
-    assert (heights[2] == heights[0]) == (1 in turns)
-    monkeypatch.setattr(ContactNewton, "_form", form)
+    with monkeypatch.context() as patch:
+        patch.setattr(contact_newton, "MAX_GMRES_BEFORE_NEW_FACTOR", -1)
+        patch.setattr(ContactNewton, "_form", formed)
+        press = solid.press(LENGTHS, 1e10)
+        patch.setattr(press, "settled", lambda work, state: loads.append(work.load))
+        return press.to(100.0), loads, heights
+
+
+@pytest.mark.parametrize(
+    ("unstable", "loads"),
+    [((), [100.0]), ((1,), [100.0]), ((1, 2), [50.0, 100.0]), ((0,), [50.0, 100.0])],
+)
+def test_an_unstable_tangent_far_from_equilibrium_is_stepped_back_from(
+    solid: Round, monkeypatch: pytest.MonkeyPatch, unstable: tuple[int, ...], loads: list[float]
+) -> None:
+    """Where one has no preconditioner the state before it gives it, and the load is reached at
+    once; where that has none either, or none is before it, the load is halved."""
+    state, reached, heights = pressed_past(unstable, solid, monkeypatch)
+    assert reached == loads
+    assert (heights[2] == heights[0]) == (1 in unstable)
     plain = solid.press(LENGTHS, 1e10).to(100.0)
     assert state.height == pytest.approx(plain.height, rel=1e-8)
     assert state.stiffness == pytest.approx(plain.stiffness, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_a_load_that_is_reached_past_an_unstable_state_is_a_stable_one(
+    solid: Round, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is halved where its tangent has no preconditioner; else that is not looked at."""
+    state, _, heights = pressed_past((1,), solid, monkeypatch)
+    last = len(heights) - 1
+    assert heights[last] == state.height
+    assert pressed_past((1, last), solid, monkeypatch)[1] == [50.0, 100.0]
+    state, _, heights = pressed_past((), solid, monkeypatch)
+    assert heights[-1] != state.height
 
 
 def test_time_is_looked_at_before_every_iteration(solid: Round) -> None:

@@ -108,6 +108,7 @@ class ContactNewton:
         self._used = 0
         self._stale = False  # the preconditioner is of a load that was much smaller
         self._formed_at = 0.0  # its load, N
+        self._stepped_back = False  # from a state whose tangent was not positive definite
         self._slope: tuple[Array, float] | None = None  # of parts and height by the load
         self.factorisations = self.iterations = 0
 
@@ -120,11 +121,14 @@ class ContactNewton:
         # no step is larger than what would press the stiffest tyre flat
         step = min(load - self.load, (self.free_radius - self.flat) / FIRST_COMPLIANCE)
         smallest = MIN_LOAD_STEP * step
+        self._stepped_back = False
         while True:
             self.check()
             target = min(self.load + step, load)
             try:
                 state = self._newton(target)
+                if target == load and self._stepped_back:
+                    self._form(state.contact)  # what comes after an unstable state must be stable
             except (NoEquilibrium, Indefinite, Inverted) as error:
                 step /= 2
                 self._factor = None
@@ -312,7 +316,7 @@ class ContactNewton:
             except Indefinite:  # far from equilibrium: the preconditioner of the state before it
                 if before is None:
                     raise
-                (parts, height), before = before, None
+                (parts, height), before, self._stepped_back = before, None, True
                 force, lacking, contact = self._state(parts, height, load, bound)
                 size = float(np.hypot(np.linalg.norm(force), lacking))
                 self._form(contact)
