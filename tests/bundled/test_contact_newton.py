@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tyrecal_solvers.bundled.road import contact_newton, footprint_job
-from tyrecal_solvers.bundled.road.contact_newton import ContactNewton, PressedState
+from tyrecal_solvers.bundled.road.contact_newton import ContactNewton, Imbalance, PressedState
 from tyrecal_solvers.bundled.road.road_data import LoadRequest, TyreToPress
 from tyrecal_solvers.errors import Indefinite, NoEquilibrium, RunFailed
 from tyrecal_solvers.language.text import DeckError
@@ -143,9 +143,9 @@ def test_two_presses_give_the_same_bits(solid: Round, friction: float) -> None:
 def test_off_the_road_there_is_no_step(solid: Round) -> None:
     """Newton's step has overshot to where nothing touches: a smaller load is tried."""
     press = solid.press(LENGTHS, 1e10)
-    force, lacking, contact = press._state(press.parts, press.height + 0.01, 100.0, None)
+    lifted = press._state(press.parts, press.height + 0.01, 100.0, None)
     with pytest.raises(NoEquilibrium, match="no force answers"):
-        press._step(contact, force, lacking, 1e-6)
+        press._step(lifted, 1e-6)
 
 
 def test_nearly_the_same_load_again(solid: Round) -> None:
@@ -191,7 +191,7 @@ def test_after_many_iterations_the_preconditioner_is_formed_anew(
     press.to(50.0)
     state = press._state(press.parts, press.height, 51.0, None)
     before, press._used = press.factorisations, used
-    press._step(state[2], *state[:2], 1e-2)
+    press._step(state, 1e-2)
     assert press.factorisations == before + formed and press._used < 15
 
 
@@ -305,9 +305,9 @@ def test_a_step_with_coulombs_friction_is_halved_for_a_smaller_residual(
     press, lengths = solid.press(LENGTHS, 1e10, 0.5), list[float]()
     contact = press.road.forces(press.symmetry.spread(press.parts), press.height)
 
-    def state(parts: Array, height: float, *_: object) -> tuple[Array, float, object]:
+    def state(parts: Array, height: float, *_: object) -> Imbalance:
         lengths.append(height)
-        return 0 * parts, residual[height], contact
+        return Imbalance(0 * parts, residual[height], contact)
 
     def step(*_: object) -> tuple[Array, float]:
         if len(lengths) > 1:

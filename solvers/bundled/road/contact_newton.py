@@ -8,6 +8,7 @@ import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -75,6 +76,18 @@ class FirstGuess:
 
     parts: Array  # (2, f, q, 3), m
     deflection: float  # m
+
+
+class Imbalance(NamedTuple):
+    """The forces that are out of balance at a state."""
+
+    force: Array  # on the parts (2, f, q, 3), N
+    lacking: float  # half the load less the contact's, N
+    contact: Contact
+
+    @property
+    def size(self) -> float:
+        return float(np.hypot(np.linalg.norm(self.force), self.lacking))
 
 
 class ContactNewton:
@@ -189,15 +202,12 @@ class ContactNewton:
         factor, self._factor = self._factor, None
         return factor
 
-    def _state(
-        self, parts: Array, height: float, load: float, bound: Bound | None
-    ) -> tuple[Array, float, Contact]:
-        """Residuals: forces on the parts, and half the load less the contact's."""
+    def _state(self, parts: Array, height: float, load: float, bound: Bound | None) -> Imbalance:
         U = self.symmetry.spread(parts)
         forces = self.tyre.residual(U)
         contact = self.road.forces(U, height, bound)
         force = self.symmetry.gather(forces + contact.field)
-        return force, (load - contact.force) / 2, contact
+        return Imbalance(force, (load - contact.force) / 2, contact)
 
     def _energy(self, contact: Contact, load: float, height: float) -> float:
         """Potential of half the tyre, its road and its load at the last state, J."""
@@ -294,48 +304,41 @@ class ContactNewton:
     ) -> tuple[Array, float, Contact]:
         """Newton's method, with a line search of the energy where the friction is bounded; with
         Coulomb's friction, of the residual, and left as soon as it does not converge."""
-        force, lacking, contact = self._state(parts, height, load, bound)
-        size = float(np.hypot(np.linalg.norm(force), lacking))
-        setbacks = 0
-        before: tuple[Array, float] | None = None
+        here, before, setbacks = self._state(parts, height, load, bound), None, 0
         for _ in range(MAX_NEWTON):
             self.check()
-            if size <= tolerance * load:
-                return parts, height, contact
-            rough = size > COULOMB_RTOL * load
+            if here.size <= tolerance * load:
+                return parts, height, here.contact
+            rough = here.size > COULOMB_RTOL * load
             self.iterations += 1
-            residual = size / load
+            residual = here.size / load
             log.debug("%g N: Newton iteration %d, residual %.2g", load, self.iterations, residual)
-            energy = self._energy(contact, load, height) if bound else 0.0
+            energy = self._energy(here.contact, load, height) if bound else 0.0
             try:
                 if bound is None and self._stale and not rough:
-                    self._form(contact)
-                step, rise = self._step(
-                    contact, force, lacking, ROUGH_LINEAR_RTOL if rough else LINEAR_RTOL
-                )
+                    self._form(here.contact)
+                step, rise = self._step(here, ROUGH_LINEAR_RTOL if rough else LINEAR_RTOL)
             except Indefinite:  # far from equilibrium: the preconditioner of the state before it
                 if before is None:
                     raise
                 (parts, height), before, self._stepped_back = before, None, True
-                force, lacking, contact = self._state(parts, height, load, bound)
-                size = float(np.hypot(np.linalg.norm(force), lacking))
-                self._form(contact)
+                here = self._state(parts, height, load, bound)
+                self._form(here.contact)
                 continue
             before = parts, height
-            slope = float((force * step).sum() + lacking * rise)
-            length, size_before = 1.0, size
+            slope = float((here.force * step).sum() + here.lacking * rise)
+            length = 1.0
             while True:
                 ahead = parts + length * step, height + length * rise
                 try:
-                    force, lacking, contact = self._state(*ahead, load, bound)
-                    size = float(np.hypot(np.linalg.norm(force), lacking))
-                    if size < 0.5 * size_before:
+                    there = self._state(*ahead, load, bound)
+                    if there.size < 0.5 * here.size:
                         break
                     if bound:
                         low = energy + 1e-4 * length * slope
-                        enough = self._energy(contact, load, ahead[1]) <= low
+                        enough = self._energy(there.contact, load, ahead[1]) <= low
                     else:
-                        enough = size < size_before or length <= MIN_COULOMB_LENGTH
+                        enough = there.size < here.size or length <= MIN_COULOMB_LENGTH
                     if enough:
                         break
                 except Inverted:
@@ -344,22 +347,22 @@ class ContactNewton:
                 if length < MIN_STEP_LENGTH:
                     raise NoEquilibrium("the line search found no lower energy")
             parts, height = ahead
-            setbacks += size > 0.5 * size_before
+            setbacks += there.size > 0.5 * here.size
+            here = there
             if bound is None and setbacks > MAX_SETBACKS:
                 break
         raise NoEquilibrium(f"Newton's method did not converge in {MAX_NEWTON} iterations")
 
-    def _step(
-        self, contact: Contact, force: Array, lacking: float, tolerance: float
-    ) -> tuple[Array, float]:
+    def _step(self, here: Imbalance, tolerance: float) -> tuple[Array, float]:
         """Newton's step of the parts and of the road's height."""
         fresh = self._factor is None or self._used > MAX_GMRES_BEFORE_NEW_FACTOR
         if fresh:
-            self._form(contact)
-        equations = [Equations(Tangent.of(contact, self.symmetry), -force, -lacking)]
+            self._form(here.contact)
+        tangent = Tangent.of(here.contact, self.symmetry)
+        equations = [Equations(tangent, -here.force, -here.lacking)]
         steps, rises, self._used, left = self._solve(equations, tolerance)
         if not fresh and not left[0] <= MAX_LINEAR_RESIDUAL:
-            self._form(contact)
+            self._form(here.contact)
             steps, rises, self._used, left = self._solve(equations, tolerance)
         if not left[0] <= MAX_LINEAR_RESIDUAL:
             raise NoEquilibrium("the tangent is too far from a stable one")
