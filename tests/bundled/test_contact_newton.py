@@ -266,6 +266,29 @@ def test_a_load_that_is_reached_past_an_unstable_state_is_a_stable_one(
     assert heights[-1] != state.height
 
 
+def test_of_a_load_that_is_not_taken_nothing_is_left(
+    solid: Round, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The next try starts along the slope of the last load, with its bounds of friction."""
+    press, newton = solid.press(LENGTHS, 1e10, 0.5), ContactNewton._newton
+    press.to(50.0)
+    known = press._slope, press._bound
+
+    def unstable(*given: object) -> None:
+        raise Indefinite("unstable")
+
+    def past_an_unstable_state(load: float) -> PressedState:
+        state, press._stepped_back = newton(press, load), True
+        monkeypatch.setattr(press, "_form", unstable)
+        assert press._slope is not known[0] and press._bound is not known[1]
+        return state
+
+    monkeypatch.setattr(press, "_newton", past_an_unstable_state)
+    with pytest.raises(NoEquilibrium, match="no equilibrium between 50 and"):
+        press.to(60.0)
+    assert press._slope is known[0] and press._bound is known[1] and press.load == 50.0
+
+
 def test_time_is_looked_at_before_every_iteration(solid: Round) -> None:
     looks: list[int] = []
     press = solid.press(LENGTHS, 1e10, check=lambda: looks.append(1))

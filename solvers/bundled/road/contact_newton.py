@@ -137,14 +137,14 @@ class ContactNewton:
         self._stepped_back = False
         while True:
             self.check()
-            target = min(self.load + step, load)
+            target, known = min(self.load + step, load), (self._bound, self._slope)
             try:
                 state = self._newton(target)
                 if target == load and self._stepped_back:
                     self._form(state.contact)  # what comes after an unstable state must be stable
             except (NoEquilibrium, Indefinite, Inverted) as error:
                 step /= 2
-                self._factor = None
+                self._factor, (self._bound, self._slope) = None, known
                 if step < smallest:
                     raise NoEquilibrium(
                         f"no equilibrium between {self.load:.4g} and {target:.4g} N"
