@@ -251,7 +251,8 @@ class Evaluator:
         if "pressed_start" not in self.solver.capabilities:
             return
         at = answer.footprints
-        values, moved = dict(key[0][2]), [each.displacement_slopes for each in at]
+        (_, _, of_design), _, _ = key
+        values, moved = dict(of_design), [each.displacement_slopes for each in at]
         slopes = {
             name: (
                 values[name],
@@ -434,8 +435,8 @@ class Evaluator:
                 self.counts.add(counts)
                 if isinstance(result, Pressed) and questions[place].base:
                     question = questions[place]
-                    key = _key(self._with(question.values)), tuple(question.loads_N)
-                    self._remember((*key, tuple(question.gradients)), result)
+                    loads, gradients = tuple(question.loads_N), tuple(question.gradients)
+                    self._remember((_key(self._with(question.values)), loads, gradients), result)
                 yield result
             next(answers, None)  # to their end: workers of a loop that is cut off are ended
 

@@ -227,19 +227,10 @@ def refit_at(
     """x re-fitted from x0 + d (q, v) at the zeta of each of k problems ``at``, some of these in the
     same steps; all arrays with k before q; other arguments as in `model_of`."""
     most = max(REFITS_AT_ONCE // len(d), 1)
-    groups = [at[i : i + most] for i in range(0, len(at), most)]
-    fitted = [_refit_together(problem, some, added, extra, d, steps) for some in groups]
-    return Fitted(*map(np.concatenate, zip(*fitted, strict=True)))
-
-
-def _refit_together(
-    problem: InverseProblem,
-    at: Sequence[InverseProblem],
-    added: Added,
-    extra: Array | None,
-    d: Array,
-    steps: int,
-) -> Fitted:
+    if len(at) > most:
+        groups = [at[i : i + most] for i in range(0, len(at), most)]
+        fitted = [refit_at(problem, some, added, extra, d, steps) for some in groups]
+        return Fitted(*map(np.concatenate, zip(*fitted, strict=True)))
     y, model = problem.observations.y, model_of(problem, at, added)
     S = np.stack([p.sigma + problem.response_covariance(p.with_mixed_laws(added)) for p in at])
     if extra is not None:
