@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -216,15 +216,15 @@ def test_an_unstable_tangent_has_no_preconditioner(
 
 
 def pressed_past(
-    unstable: Sequence[int], solid: Round, monkeypatch: pytest.MonkeyPatch
-) -> tuple[PressedState, list[float], list[float]]:
-    """The state at 100 N where preconditioners with these numbers cannot be formed, one for each
-    step; the loads on the way, and the road's heights of all preconditioners."""
-    form, heights, loads = ContactNewton._form, list[float](), list[float]()
+    unstable: Callable[[int], bool], solid: Round, monkeypatch: pytest.MonkeyPatch
+) -> tuple[PressedState, list[float], list[bool]]:
+    """The state at 100 N where true preconditioners with these numbers cannot be formed, one for
+    each step; the loads on the way, and whether each preconditioner was of a steadied tangent."""
+    form, steadied, loads = ContactNewton._form, list[bool](), list[float]()
 
     def formed(press: ContactNewton, contact: Any) -> Any:
-        heights.append(contact.height)
-        if len(heights) - 1 in unstable:
+        steadied.append(press._steadied)
+        if unstable(len(steadied) - 1) and not press._steadied:
             raise Indefinite("unstable")
         return form(press, contact)
 
@@ -233,37 +233,43 @@ def pressed_past(
         patch.setattr(ContactNewton, "_form", formed)
         press = solid.press(LENGTHS, 1e10)
         patch.setattr(press, "settled", lambda work, state: loads.append(work.load))
-        return press.to(100.0), loads, heights
+        return press.to(100.0), loads, steadied
 
 
-@pytest.mark.parametrize(
-    ("unstable", "loads"),
-    [((), [100.0]), ((1,), [100.0]), ((1, 2), [50.0, 100.0]), ((0,), [50.0, 100.0])],
-)
-def test_an_unstable_tangent_far_from_equilibrium_is_stepped_back_from(
-    solid: Round, monkeypatch: pytest.MonkeyPatch, unstable: tuple[int, ...], loads: list[float]
+@pytest.mark.parametrize("unstable", [(), (0,), (2,), (4,)])
+def test_a_steadied_tangent_leads_past_unstable_states(
+    solid: Round, monkeypatch: pytest.MonkeyPatch, unstable: tuple[int, ...]
 ) -> None:
-    """Where one has no preconditioner the state before it gives it, and the load is reached at
-    once; where that has none either, or none is before it, the load is halved."""
-    state, reached, heights = pressed_past(unstable, solid, monkeypatch)
-    assert reached == loads
-    assert (heights[2] == heights[0]) == (1 in unstable)
+    """To the same state, by no smaller load, and only where it is needed."""
+    state, reached, steadied = pressed_past(unstable.__contains__, solid, monkeypatch)
+    assert reached == [100.0]
+    assert [steadied[i + 1] for i in unstable] == [True] * len(unstable)
+    assert any(steadied) == bool(unstable) and not steadied[-1]
     plain = solid.press(LENGTHS, 1e10).to(100.0)
     assert state.height == pytest.approx(plain.height, rel=1e-8)
     assert state.stiffness == pytest.approx(plain.stiffness, rel=1e-6)
 
 
-@pytest.mark.slow
-def test_a_load_that_is_reached_past_an_unstable_state_is_a_stable_one(
-    solid: Round, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("unstable", [3, 4])
+def test_after_some_steps_the_true_tangent_is_tried(
+    solid: Round, monkeypatch: pytest.MonkeyPatch, unstable: int
 ) -> None:
-    """It is halved where its tangent has no preconditioner; else that is not looked at."""
-    state, _, heights = pressed_past((1,), solid, monkeypatch)
-    last = len(heights) - 1
-    assert heights[last] == state.height
-    assert pressed_past((1, last), solid, monkeypatch)[1] == [50.0, 100.0]
-    state, _, heights = pressed_past((), solid, monkeypatch)
-    assert heights[-1] != state.height
+    """And kept where it is stable by then."""
+    monkeypatch.setattr(contact_newton, "STEADIED_STEPS", 2)
+    _, _, steadied = pressed_past(lambda i: i < unstable, solid, monkeypatch)
+    assert steadied[:5] == [False, True, True, False, unstable == 4]
+
+
+@pytest.mark.parametrize("most", [2, pytest.param(99, marks=pytest.mark.slow)])
+def test_no_state_that_is_not_stable_is_a_result(
+    solid: Round, monkeypatch: pytest.MonkeyPatch, most: int
+) -> None:
+    """Where no true tangent is stable a steadied one reaches the force, but not the load, which is
+    given up after so many states, or at a sixteenth of it."""
+    monkeypatch.setattr(contact_newton, "MAX_UNSTABLE", most)
+    last = "100" if most == 2 else "6"
+    with pytest.raises(NoEquilibrium, match=f"no equilibrium between 0 and {last}"):
+        pressed_past(lambda i: True, solid, monkeypatch)
 
 
 def test_of_a_load_that_is_not_taken_nothing_is_left(
@@ -277,13 +283,13 @@ def test_of_a_load_that_is_not_taken_nothing_is_left(
     def unstable(*given: object) -> None:
         raise Indefinite("unstable")
 
-    def past_an_unstable_state(load: float) -> PressedState:
-        state, press._stepped_back = newton(press, load), True
+    def without_a_slope(load: float) -> PressedState:
+        newton(press, load)
         monkeypatch.setattr(press, "_form", unstable)
         assert press._slope is not known[0] and press._bound is not known[1]
-        return state
+        raise Indefinite("unstable")
 
-    monkeypatch.setattr(press, "_newton", past_an_unstable_state)
+    monkeypatch.setattr(press, "_newton", without_a_slope)
     with pytest.raises(NoEquilibrium, match="no equilibrium between 50 and"):
         press.to(60.0)
     assert press._slope is known[0] and press._bound is known[1] and press.load == 50.0

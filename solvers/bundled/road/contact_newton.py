@@ -35,6 +35,8 @@ UNIT_RTOL = 1e-4  # the same of the vertical stiffness, which is off by about it
 MAX_UNIT_RESIDUAL = 1e-3  # of the same
 ROUGH_LINEAR_RTOL = 0.3  # residual of the linear problem as long as the contact changes much
 MAX_LINEAR_RESIDUAL = 0.5  # more is left only of a tangent that is far from a stable one
+STEADIED_STEPS = 8  # steps with a steadied tangent, before the true one is tried
+MAX_UNSTABLE = 16  # states on the way to a load that are not stable, before it is given up
 MAX_SETBACKS = 5  # steps that may fail to halve the residual, with Coulomb's friction
 COULOMB_RTOL = 1e-2  # residual over the load, before Coulomb's friction is tried
 FRICTION_BOUND_RTOL = 0.1  # the same, before the friction's bounds are taken anew
@@ -121,7 +123,8 @@ class ContactNewton:
         self._used = 0
         self._stale = False  # the preconditioner is of a load that was much smaller
         self._formed_at = 0.0  # its load, N
-        self._stepped_back = False  # from a state whose tangent was not positive definite
+        self._steadied = False  # the tangent is without what lets cords buckle
+        self._unstable = 0  # states on the way to the load that were not stable
         self._slope: tuple[Array, float] | None = None  # of parts and height by the load
         self.factorisations = self.iterations = 0
 
@@ -134,18 +137,16 @@ class ContactNewton:
         # no step is larger than what would press the stiffest tyre flat
         step = min(load - self.load, (self.free_radius - self.flat) / FIRST_COMPLIANCE)
         smallest = MIN_LOAD_STEP * step
-        self._stepped_back = False
+        self._unstable = 0
         while True:
             self.check()
             target, known = min(self.load + step, load), (self._bound, self._slope)
             try:
                 state = self._newton(target)
-                if target == load and self._stepped_back:
-                    self._form(state.contact)  # what comes after an unstable state must be stable
             except (NoEquilibrium, Indefinite, Inverted) as error:
                 step /= 2
                 self._factor, (self._bound, self._slope) = None, known
-                if step < smallest:
+                if step < smallest or self._unstable > MAX_UNSTABLE:
                     raise NoEquilibrium(
                         f"no equilibrium between {self.load:.4g} and {target:.4g} N"
                         f"{self.depth()}: {self._buckling() or error}"
@@ -171,11 +172,14 @@ class ContactNewton:
                     f" at its stiffness there it would go down by {1e3 * down:.0f} mm"
                 )
 
+    @property
+    def _cords(self) -> list[CordsAtStations]:
+        return [part for part in self.tyre.parts if isinstance(part, CordsAtStations)]
+
     def _buckling(self) -> str:
         """The cords that are compressed most at the last state, in words; "": none by much."""
-        parts = [part for part in self.tyre.parts if isinstance(part, CordsAtStations)]
         lowest = min(
-            (part.most_compressed() for part in parts),
+            (part.most_compressed() for part in self._cords),
             key=attrgetter("strain"),
             default=NOT_COMPRESSED,
         )
@@ -259,7 +263,8 @@ class ContactNewton:
     ) -> tuple[Array, float, Contact]:
         """The equilibrium with Coulomb's friction, tried at once where it is ``near``; where that
         does not converge, Tresca's friction, with the last normal forces, comes to where it
-        does."""
+        does. Past a state that is not stable a steadied tangent leads."""
+        self._steady(False)
         if near and (state := self._by_coulomb(parts, height, load)):
             return state
         reached = FRICTION_BOUND_RTOL
@@ -271,6 +276,8 @@ class ContactNewton:
                 continue
             if state := self._by_coulomb(parts, height, load):
                 return state
+            if self._steadied and reached == CONTACT_FORCE_RTOL:
+                raise Indefinite("the tangent stiffness is not positive definite")
             reached = max(0.1 * reached, CONTACT_FORCE_RTOL)
         raise NoEquilibrium("the friction did not settle")
 
@@ -278,10 +285,22 @@ class ContactNewton:
         self, parts: Array, height: float, load: float
     ) -> tuple[Array, float, Contact] | None:
         """The equilibrium, None where Newton's method does not converge from there."""
+        self._steady(False)
         try:
             return self._iterate(parts, height, load, None, CONTACT_FORCE_RTOL)
+        except Indefinite:
+            self._steady(True)
         except NoEquilibrium:
-            return None
+            pass
+        return None
+
+    def _steady(self, on: bool) -> None:
+        """Go on with the tangent that lets no cord buckle, or with the true one."""
+        if on != self._steadied:
+            self._unstable += on
+            for part in self._cords:
+                part.steady(on)
+            self._steadied, self._factor = on, None
 
     def _solve_tresca(
         self, parts: Array, height: float, load: float, bound: Bound, tolerance: float
@@ -304,11 +323,14 @@ class ContactNewton:
     ) -> tuple[Array, float, Contact]:
         """Newton's method, with a line search of the energy where the friction is bounded; with
         Coulomb's friction, of the residual, and left as soon as it does not converge."""
-        here, before, setbacks = self._state(parts, height, load, bound), None, 0
+        here, setbacks = self._state(parts, height, load, bound), 0
+        first, steadied_at = 1.0, self.iterations
         for _ in range(MAX_NEWTON):
             self.check()
             if here.size <= tolerance * load:
                 return parts, height, here.contact
+            if self._steadied and self.iterations >= steadied_at + STEADIED_STEPS:
+                self._steady(False)
             rough = here.size > COULOMB_RTOL * load
             self.iterations += 1
             residual = here.size / load
@@ -318,16 +340,15 @@ class ContactNewton:
                 if bound is None and self._stale and not rough:
                     self._form(here.contact)
                 step, rise = self._step(here, ROUGH_LINEAR_RTOL if rough else LINEAR_RTOL)
-            except Indefinite:  # far from equilibrium: the preconditioner of the state before it
-                if before is None:
+            except Indefinite:
+                if bound is None or self._steadied or self._unstable > MAX_UNSTABLE:
                     raise
-                (parts, height), before, self._stepped_back = before, None, True
-                here = self._state(parts, height, load, bound)
-                self._form(here.contact)
+                self._steady(True)
+                steadied_at = self.iterations
                 continue
-            before = parts, height
             slope = float((here.force * step).sum() + here.lacking * rise)
-            length = 1.0
+            # away from a saddle of the energy, which falls faster with every step
+            length = first if self._steadied else 1.0
             while True:
                 ahead = parts + length * step, height + length * rise
                 try:
@@ -346,7 +367,7 @@ class ContactNewton:
                 length /= 2
                 if length < MIN_STEP_LENGTH:
                     raise NoEquilibrium("the line search found no lower energy")
-            parts, height = ahead
+            parts, height, first = *ahead, 2 * length
             setbacks += there.size > 0.5 * here.size
             here = there
             if bound is None and setbacks > MAX_SETBACKS:

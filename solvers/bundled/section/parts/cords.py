@@ -13,6 +13,9 @@ derivative of that energy jumps at lambda = 1. In a coarse mesh the frequencies 
 to 10 % with it, when one point next to the rim goes slack. Real cords are not that straight: within
 the logarithmic strain -w to w the stiffness grows smoothly, by the share x^2 (3 - 2 x) of E A / s
 with x = (ln(lambda) + w) / 2w. Outside, W is that of a slack cord or, less a constant, a taut one.
+
+In compression W'/lambda is negative, so that a layer buckles where the rubber does not hold it. A
+steadied tangent has 0 there. The forces are the same: it leads past such a state to a stable one.
 """
 
 from __future__ import annotations
@@ -40,6 +43,7 @@ class LogarithmicCord(EnergyLaw):
     stiffness: Array  # E A / s, N/m
     tension: float = 0.0  # artificial, N/m, of slack cords at the start: in the tangent only
     compressed: Array | float = 1.0  # share of the stiffness that it has in compression: 1 or 0
+    steadied: bool = False  # the tangent leaves out the compression by which cords buckle
 
     def _borne(self, strain: Array, order: int) -> Array:
         """W / (E A / s) (p,), or its first or second derivative by the logarithmic strain (p,):
@@ -68,7 +72,8 @@ class LogarithmicCord(EnergyLaw):
         borne, slope = self._borne(strain, 1), self._borne(strain, 2)
         along = self.stiffness * (slope - 2 * borne) / length**4
         D = along[:, None, None] * z[:, :, None] * z[:, None, :]
-        D += (self.stiffness * borne / length**2)[:, None, None] * np.eye(3)
+        across = np.maximum(borne, 0.0) if self.steadied else borne
+        D += (self.stiffness * across / length**2)[:, None, None] * np.eye(3)
         if self.tension:
             D[:, range(3), range(3)] += self.tension
         return D * np.reshape(weights, (-1, 1, 1))
@@ -97,6 +102,13 @@ class CordsAtStations(ElasticAtStations):
     def __init__(self, part: Cords, nodes: int):
         super().__init__(part, nodes)
         self._layers = part.layers
+
+    def steady(self, on: bool) -> None:
+        """Whether the tangent leaves out compression, at the last state, too."""
+        own, last = self._law, self.law
+        assert isinstance(own, LogarithmicCord) and isinstance(last, LogarithmicCord)
+        self._law, self.law = replace(own, steadied=on), replace(last, steadied=on)
+        self._A = None
 
     def most_compressed(self) -> CompressedCords:
         """The lowest strain of cords that bear compression."""
