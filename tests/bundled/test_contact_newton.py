@@ -272,6 +272,26 @@ def test_no_state_that_is_not_stable_is_a_result(
         pressed_past(lambda i: True, solid, monkeypatch)
 
 
+def test_a_guess_that_comes_to_an_unstable_state_is_a_bad_one(
+    solid: Round, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Past that it may find another equilibrium: the answer is bit by bit that without a guess."""
+    cold, form = solid.press(LENGTHS, 1e10).to(100.0), ContactNewton._form
+    press, steadied = solid.press(LENGTHS, 1e10), list[bool]()
+
+    def formed(press: ContactNewton, contact: Any) -> Any:
+        steadied.append(press._steadied)
+        if len(steadied) == 1:
+            raise Indefinite("unstable")
+        return form(press, contact)
+
+    monkeypatch.setattr(ContactNewton, "_form", formed)
+    deflection = 1.1 * (press.free_radius - cold.height)
+    press.guesses[100.0] = contact_newton.FirstGuess(cold.parts, deflection)
+    np.testing.assert_array_equal(press.to(100.0).parts, cold.parts)
+    assert len(steadied) > 1 and not any(steadied)
+
+
 def test_of_a_load_that_is_not_taken_nothing_is_left(
     solid: Round, monkeypatch: pytest.MonkeyPatch
 ) -> None:

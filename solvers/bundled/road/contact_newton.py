@@ -124,7 +124,7 @@ class ContactNewton:
         self._stale = False  # the preconditioner is of a load that was much smaller
         self._formed_at = 0.0  # its load, N
         self._steadied = False  # the tangent is without what lets cords buckle
-        self._unstable = 0  # states on the way to the load that were not stable
+        self._passes = 0  # states on the way to the load that need not be stable
         self._slope: tuple[Array, float] | None = None  # of parts and height by the load
         self.factorisations = self.iterations = 0
 
@@ -137,7 +137,7 @@ class ContactNewton:
         # no step is larger than what would press the stiffest tyre flat
         step = min(load - self.load, (self.free_radius - self.flat) / FIRST_COMPLIANCE)
         smallest = MIN_LOAD_STEP * step
-        self._unstable = 0
+        self._passes = MAX_UNSTABLE
         while True:
             self.check()
             target, known = min(self.load + step, load), (self._bound, self._slope)
@@ -146,7 +146,7 @@ class ContactNewton:
             except (NoEquilibrium, Indefinite, Inverted) as error:
                 step /= 2
                 self._factor, (self._bound, self._slope) = None, known
-                if step < smallest or self._unstable > MAX_UNSTABLE:
+                if step < smallest or not self._passes:
                     raise NoEquilibrium(
                         f"no equilibrium between {self.load:.4g} and {target:.4g} N"
                         f"{self.depth()}: {self._buckling() or error}"
@@ -244,7 +244,8 @@ class ContactNewton:
         guess = self.guesses.pop(load, None)
         if guess is None:
             return None
-        self._factor = None
+        # past an unstable state it may come to another equilibrium than the path from the last load
+        self._factor, passes, self._passes = None, self._passes, 0
         try:
             height = self.free_radius - guess.deflection
             contact = self.road.forces(self.symmetry.spread(guess.parts), height)
@@ -253,6 +254,8 @@ class ContactNewton:
             log.info("%g N: the start was too far away, loaded from the state before", load)
             self._factor = None
             return None
+        finally:
+            self._passes = passes
 
     def _limit(self, contact: Contact) -> Bound:
         """Limit of the friction of a step to a contact."""
@@ -295,9 +298,12 @@ class ContactNewton:
         return None
 
     def _steady(self, on: bool) -> None:
-        """Go on with the tangent that lets no cord buckle, or with the true one."""
+        """Go on with the tangent that lets no cord buckle, or with the true one. Raises Indefinite
+        where that was done too often."""
         if on != self._steadied:
-            self._unstable += on
+            if on and not self._passes:
+                raise Indefinite("the tangent stiffness is not positive definite")
+            self._passes -= on
             for part in self._cords:
                 part.steady(on)
             self._steadied, self._factor = on, None
@@ -341,7 +347,7 @@ class ContactNewton:
                     self._form(here.contact)
                 step, rise = self._step(here, ROUGH_LINEAR_RTOL if rough else LINEAR_RTOL)
             except Indefinite:
-                if bound is None or self._steadied or self._unstable > MAX_UNSTABLE:
+                if bound is None or self._steadied:
                     raise
                 self._steady(True)
                 steadied_at = self.iterations
