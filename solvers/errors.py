@@ -1,4 +1,4 @@
-"""Exceptions of the solvers: two trees, and two states from which Newton's method steps back.
+"""Exceptions of the solvers: two trees, and two states that Newton's method must avoid.
 
     Refused                     an option, or a request, that the solver cannot honour
         DeckError               a deck that it cannot, with its line

@@ -260,6 +260,19 @@ def test_after_some_steps_the_true_tangent_is_tried(
     assert steadied[:5] == [False, True, True, False, unstable == 4]
 
 
+@pytest.mark.slow
+def test_a_load_that_is_reached_past_an_unstable_state_is_a_stable_one(
+    solid: Round, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is halved where its own tangent has no preconditioner; else that is not looked at."""
+    _, reached, steadied = pressed_past((2,).__contains__, solid, monkeypatch)
+    last = len(steadied) - 1
+    assert reached == [100.0] and not steadied[last]
+    assert pressed_past((2, last).__contains__, solid, monkeypatch)[1] == [50.0, 100.0]
+    many = len(pressed_past(().__contains__, solid, monkeypatch)[2])
+    assert pressed_past((many,).__contains__, solid, monkeypatch)[1] == [100.0]
+
+
 @pytest.mark.parametrize("most", [2, pytest.param(99, marks=pytest.mark.slow)])
 def test_no_state_that_is_not_stable_is_a_result(
     solid: Round, monkeypatch: pytest.MonkeyPatch, most: int
@@ -275,7 +288,7 @@ def test_no_state_that_is_not_stable_is_a_result(
 def test_a_guess_that_comes_to_an_unstable_state_is_a_bad_one(
     solid: Round, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Past that it may find another equilibrium: the answer is bit by bit that without a guess."""
+    """Past that it may find another equilibrium: the answer is that without a guess."""
     cold, form = solid.press(LENGTHS, 1e10).to(100.0), ContactNewton._form
     press, steadied = solid.press(LENGTHS, 1e10), list[bool]()
 

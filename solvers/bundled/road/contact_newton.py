@@ -124,7 +124,7 @@ class ContactNewton:
         self._stale = False  # the preconditioner is of a load that was much smaller
         self._formed_at = 0.0  # its load, N
         self._steadied = False  # the tangent is without what lets cords buckle
-        self._passes = 0  # states on the way to the load that need not be stable
+        self._unstable_left = 0  # unstable states that may still come on the way to the load
         self._slope: tuple[Array, float] | None = None  # of parts and height by the load
         self.factorisations = self.iterations = 0
 
@@ -137,7 +137,7 @@ class ContactNewton:
         # no step is larger than what would press the stiffest tyre flat
         step = min(load - self.load, (self.free_radius - self.flat) / FIRST_COMPLIANCE)
         smallest = MIN_LOAD_STEP * step
-        self._passes = MAX_UNSTABLE
+        self._unstable_left = MAX_UNSTABLE
         while True:
             self.check()
             target, known = min(self.load + step, load), (self._bound, self._slope)
@@ -146,7 +146,7 @@ class ContactNewton:
             except (NoEquilibrium, Indefinite, Inverted) as error:
                 step /= 2
                 self._factor, (self._bound, self._slope) = None, known
-                if step < smallest or not self._passes:
+                if step < smallest or not self._unstable_left:
                     raise NoEquilibrium(
                         f"no equilibrium between {self.load:.4g} and {target:.4g} N"
                         f"{self.depth()}: {self._buckling() or error}"
@@ -234,6 +234,8 @@ class ContactNewton:
             state = self._with_friction(parts, height, load, self._bound, near)
         parts, height, contact = state
         self._bound = contact.bound(1.0)
+        if self._unstable_left < MAX_UNSTABLE:
+            self._factor = None  # what comes after an unstable state must be stable: formed anew
         unit, *derivatives = self._derivatives(contact)
         self._slope = -unit[0] / 2, -unit[1] / 2
         return PressedState(parts, height, contact, 2 / unit[1], unit, derivatives)
@@ -244,18 +246,19 @@ class ContactNewton:
         guess = self.guesses.pop(load, None)
         if guess is None:
             return None
+        self._factor = None
         # past an unstable state it may come to another equilibrium than the path from the last load
-        self._factor, passes, self._passes = None, self._passes, 0
+        left, self._unstable_left = self._unstable_left, 0
         try:
             height = self.free_radius - guess.deflection
             contact = self.road.forces(self.symmetry.spread(guess.parts), height)
             return self._with_friction(guess.parts, height, load, self._limit(contact), near=True)
         except (NoEquilibrium, Indefinite, Inverted):
-            log.info("%g N: the start was too far away, loaded from the state before", load)
+            log.info("%g N: no stable state from the start, loaded from the state before", load)
             self._factor = None
             return None
         finally:
-            self._passes = passes
+            self._unstable_left = left
 
     def _limit(self, contact: Contact) -> Bound:
         """Limit of the friction of a step to a contact."""
@@ -279,7 +282,7 @@ class ContactNewton:
                 continue
             if state := self._by_coulomb(parts, height, load):
                 return state
-            if self._steadied and reached == CONTACT_FORCE_RTOL:
+            if self._steadied and reached < 2 * CONTACT_FORCE_RTOL:
                 raise Indefinite("the tangent stiffness is not positive definite")
             reached = max(0.1 * reached, CONTACT_FORCE_RTOL)
         raise NoEquilibrium("the friction did not settle")
@@ -287,7 +290,9 @@ class ContactNewton:
     def _by_coulomb(
         self, parts: Array, height: float, load: float
     ) -> tuple[Array, float, Contact] | None:
-        """The equilibrium, None where Newton's method does not converge from there."""
+        """The equilibrium; None where Newton's method does not converge from there, or the true
+        tangent is not positive definite: then the steadied one is on. Raises Indefinite where it
+        may not be."""
         self._steady(False)
         try:
             return self._iterate(parts, height, load, None, CONTACT_FORCE_RTOL)
@@ -299,14 +304,16 @@ class ContactNewton:
 
     def _steady(self, on: bool) -> None:
         """Go on with the tangent that lets no cord buckle, or with the true one. Raises Indefinite
-        where that was done too often."""
-        if on != self._steadied:
-            if on and not self._passes:
+        where no more unstable states may come."""
+        if on == self._steadied:
+            return
+        if on:
+            if not self._unstable_left:
                 raise Indefinite("the tangent stiffness is not positive definite")
-            self._passes -= on
-            for part in self._cords:
-                part.steady(on)
-            self._steadied, self._factor = on, None
+            self._unstable_left -= 1
+        for part in self._cords:
+            part.steady(on)
+        self._steadied, self._factor = on, None  # a preconditioner belongs to its tangent
 
     def _solve_tresca(
         self, parts: Array, height: float, load: float, bound: Bound, tolerance: float
@@ -328,7 +335,8 @@ class ContactNewton:
         self, parts: Array, height: float, load: float, bound: Bound | None, tolerance: float
     ) -> tuple[Array, float, Contact]:
         """Newton's method, with a line search of the energy where the friction is bounded; with
-        Coulomb's friction, of the residual, and left as soon as it does not converge."""
+        Coulomb's friction, of the residual, and left as soon as it does not converge. Raises
+        Indefinite: with Coulomb's friction at once, else where the steadied tangent is so, too."""
         here, setbacks = self._state(parts, height, load, bound), 0
         first, steadied_at = 1.0, self.iterations
         for _ in range(MAX_NEWTON):
@@ -353,7 +361,7 @@ class ContactNewton:
                 steadied_at = self.iterations
                 continue
             slope = float((here.force * step).sum() + here.lacking * rise)
-            # away from a saddle of the energy, which falls faster with every step
+            # away from a saddle the energy falls faster with every step: by ever longer ones
             length = first if self._steadied else 1.0
             while True:
                 ahead = parts + length * step, height + length * rise
@@ -373,7 +381,8 @@ class ContactNewton:
                 length /= 2
                 if length < MIN_STEP_LENGTH:
                     raise NoEquilibrium("the line search found no lower energy")
-            parts, height, first = *ahead, 2 * length
+            parts, height = ahead
+            first = 2 * length if self._steadied else 1.0
             setbacks += there.size > 0.5 * here.size
             here = there
             if bound is None and setbacks > MAX_SETBACKS:

@@ -15,7 +15,8 @@ the logarithmic strain -w to w the stiffness grows smoothly, by the share x^2 (3
 with x = (ln(lambda) + w) / 2w. Outside, W is that of a slack cord or, less a constant, a taut one.
 
 In compression W'/lambda is negative, so that a layer buckles where the rubber does not hold it. A
-steadied tangent has 0 there. The forces are the same: it leads past such a state to a stable one.
+steadied tangent has 0 for W'/lambda there, and W'' along the cord as before. The forces are the
+same: it leads past such a state to a stable one.
 """
 
 from __future__ import annotations
@@ -70,9 +71,9 @@ class LogarithmicCord(EnergyLaw):
         length = stretch(z)
         strain = np.log(length)
         borne, slope = self._borne(strain, 1), self._borne(strain, 2)
-        along = self.stiffness * (slope - 2 * borne) / length**4
-        D = along[:, None, None] * z[:, :, None] * z[:, None, :]
         across = np.maximum(borne, 0.0) if self.steadied else borne
+        along = self.stiffness * (slope - (borne + across)) / length**4
+        D = along[:, None, None] * z[:, :, None] * z[:, None, :]
         D += (self.stiffness * across / length**2)[:, None, None] * np.eye(3)
         if self.tension:
             D[:, range(3), range(3)] += self.tension
@@ -97,14 +98,14 @@ class Cords(Elastic):
 
 
 class CordsAtStations(ElasticAtStations):
-    """Cords at every station, which can tell where they are compressed most."""
+    """Cords at every station: where they are compressed most, and a steadied tangent."""
 
     def __init__(self, part: Cords, nodes: int):
         super().__init__(part, nodes)
         self._layers = part.layers
 
     def steady(self, on: bool) -> None:
-        """Whether the tangent leaves out compression, at the last state, too."""
+        """Leave compression out of the tangent, at the last state, too, or take it in again."""
         own, last = self._law, self.law
         assert isinstance(own, LogarithmicCord) and isinstance(last, LogarithmicCord)
         self._law, self.law = replace(own, steadied=on), replace(last, steadied=on)
