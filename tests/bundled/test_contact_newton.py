@@ -464,6 +464,21 @@ def test_how_far_down_is_told_in_words(solid: Round) -> None:
     assert press.depth() == " (13 of 40 mm down to the rim)"
 
 
+def test_a_time_limit_names_the_cords_that_buckle(
+    solid: Round, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where a state on the way was unstable, before the first load, too; else only the load."""
+    press = solid.press(LENGTHS, 1e10)
+    monkeypatch.setattr(press, "_buckling", lambda: "the cords of layer A buckle")
+    assert press.progress() == ""
+    press._steady(True)
+    assert press.progress() == ": the cords of layer A buckle"
+    press.to(50.0)
+    assert press.progress().startswith(" after 50 N (0 of ")
+    press._steady(True)
+    assert press.progress().endswith(" mm down to the rim): the cords of layer A buckle")
+
+
 @pytest.mark.parametrize(("most_N", "reached"), [(101.0, 2), (26.0, 8), (12.6, 16), (12.4, 0)])
 def test_a_load_is_reached_in_up_to_sixteen_steps(
     solid: Round, monkeypatch: pytest.MonkeyPatch, most_N: float, reached: int

@@ -124,7 +124,7 @@ class ContactNewton:
         self._stale = False  # the preconditioner is of a load that was much smaller
         self._formed_at = 0.0  # its load, N
         self._steadied = False  # the tangent is without what lets cords buckle
-        self._unstable_left = 0  # unstable states that may still come on the way to the load
+        self._unstable_left = MAX_UNSTABLE  # that may still come on the way to the load
         self._slope: tuple[Array, float] | None = None  # of parts and height by the load
         self.factorisations = self.iterations = 0
 
@@ -191,6 +191,12 @@ class ContactNewton:
         """How far down the last load reached has pressed the tyre, in words; "" before any."""
         down, most = self.free_radius - self.height, self.free_radius - self.flat
         return f" ({1e3 * down:.0f} of {1e3 * most:.0f} mm down to the rim)" if self.load else ""
+
+    def progress(self) -> str:
+        """After which load, and with which cords buckled on the way on, in words; "" at first."""
+        reached = f" after {self.load:.4g} N{self.depth()}" if self.load else ""
+        buckled = self._buckling() if self._unstable_left < MAX_UNSTABLE else ""
+        return f"{reached}: {buckled}" if buckled else reached
 
     @staticmethod
     def _flat_height(X: Array, held: Array) -> float:

@@ -112,8 +112,8 @@ def press(
                 footprint |= vibrating(work, state, request.modes, equations, U, rings)
         except (RunFailed, np.linalg.LinAlgError) as error:
             cause = getattr(error, "cause", "crashed")
-            if cause == "timed_out" and work.load:
-                error = RunFailed(cause, f"{error} after {work.load:.4g} N{work.depth()}")
+            if cause == "timed_out":
+                error = RunFailed(cause, f"{error}{work.progress()}")
             if not footprints:
                 raise error from None
             failure = str(error)
