@@ -25,6 +25,7 @@ from tyrecal_solvers.bundled.section.model import Model
 from tyrecal_solvers.bundled.section.parts.pressure import Pressure
 from tyrecal_solvers.bundled.solid3d.circumference import HalfCircle, half_circle
 from tyrecal_solvers.bundled.solid3d.revolved import Revolved
+from tyrecal_solvers.errors import RunFailed
 
 from tyrecal.tyre.case import LoadedCase
 from tyrecal.tyre.load import load_case
@@ -161,6 +162,26 @@ def coarse_case(**road: object) -> LoadedCase:
             }
         ),
     )
+
+
+class Late:
+    """A clock that stops the work at the n-th look."""
+
+    def __init__(self, looks: int):
+        self.left = looks
+
+    def __call__(self) -> None:
+        self.left -= 1
+        if self.left < 0:
+            raise RunFailed("timed_out", "the time limit passed")
+
+
+GRADED = np.radians([3.0] * 6 + [12.0, 30.0, 60.0, 60.0])  # elements of the solid ring
+
+
+def solid_ring() -> Round:
+    """A rubber ring on a hub."""
+    return ring((0.05, 0.08, 0.1), 0.02, 2, support.Rubber())
 
 
 LENGTHS = np.radians([5.0] * 4 + [20.0] * 8)

@@ -1,55 +1,36 @@
-"""A ring pressed on the road by Newton's method: steps, slopes, time, what a job tells of it."""
+"""A ring pressed on the road by Newton's method: steps, unstable states, slopes, time."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
-from tyrecal_solvers.bundled.road import contact_newton, footprint_job
+from tyrecal_solvers.bundled.road import contact_newton
 from tyrecal_solvers.bundled.road.contact_newton import ContactNewton, Imbalance, PressedState
-from tyrecal_solvers.bundled.road.road_data import LoadRequest, TyreToPress
 from tyrecal_solvers.errors import Indefinite, NoEquilibrium, RunFailed
-from tyrecal_solvers.language.text import DeckError
 
-from . import support
-from .contact import Round, ring
+from .contact import GRADED, Late, Round, solid_ring
 
 Array = np.ndarray
 
 
-class Late:
-    """A clock that stops the work at the n-th look."""
-
-    def __init__(self, looks: int):
-        self.left = looks
-
-    def __call__(self) -> None:
-        self.left -= 1
-        if self.left < 0:
-            raise RunFailed("timed_out", "the time limit passed")
-
-
 @pytest.fixture(scope="module")
 def solid() -> Round:
-    return ring((0.05, 0.08, 0.1), 0.02, 2, support.Rubber())
-
-
-LENGTHS = np.radians([3.0] * 6 + [12.0, 30.0, 60.0, 60.0])
+    return solid_ring()
 
 
 @pytest.mark.slow
 def test_a_first_load_out_of_reach_fails(solid: Round) -> None:
     for load in (1e7, 2e4):
         with pytest.raises(NoEquilibrium, match="flat on its rim"):
-            solid.press(LENGTHS, 1e10).to(load)
+            solid.press(GRADED, 1e10).to(load)
 
 
 def test_a_clock_that_runs_out_between_loads(solid: Round) -> None:
-    """The loads reached before stay, in `ContactNewton` and in the job."""
-    press = solid.press(LENGTHS, 1e10)
+    """The loads reached before stay."""
+    press = solid.press(GRADED, 1e10)
     first = press.to(50.0)
     press.check = Late(1)
     with pytest.raises(RunFailed):
@@ -58,82 +39,11 @@ def test_a_clock_that_runs_out_between_loads(solid: Round) -> None:
     np.testing.assert_array_equal(press.parts, first.parts)
 
 
-def footprints(work: Round, clock: Late, loads: list[float]) -> dict[str, Any]:
-    road = footprint_job.RoadData("1", "TREAD", 1e10, 0.0, 1e-5, LENGTHS)
-    equations = support.numbering(work.model, ~work.free)
-    inflated = TyreToPress(work.model, equations, work.loads, work.U)
-    return footprint_job.press(inflated, road, dict.fromkeys(loads, LoadRequest()), clock)
-
-
-def test_nodes_that_bear_less_than_a_newton_belong_to_the_patch(solid: Round) -> None:
-    (footprint,) = footprints(solid, Late(1000), [0.5])["footprints"]
-    assert footprint["pressure_Pa"] @ footprint["area_m2"] == pytest.approx(0.5, rel=1e-6)
-    assert (footprint["pressure_Pa"] > 0).all() and len(footprint["node"]) > 1
-
-
-def test_each_load_that_is_reached_is_told(
-    solid: Round, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The solver reports each load, the share of a load that takes several steps, and each
-    iteration for --verbose."""
-    newton = ContactNewton._newton
-
-    def in_two_steps(press: ContactNewton, load: float) -> Any:
-        if load == 150.0 and press.load == 50.0:
-            raise NoEquilibrium("too much")
-        return newton(press, load)
-
-    monkeypatch.setattr(ContactNewton, "_newton", in_two_steps)
-    with caplog.at_level("DEBUG", "tyrecal_solvers"):
-        footprints(solid, Late(1000), [50.0, 150.0])
-    iterations = [each for each in caplog.records if each.levelname == "DEBUG"]
-    assert caplog.records[0] is iterations[0]
-    assert re.match(r"50 N: Newton iteration 1, residual \S+$", iterations[0].getMessage())
-    first, halfway, last = (each for each in caplog.records if each not in iterations)
-    messages = [(each.getMessage(), each.__dict__.get("loads")) for each in (first, last)]
-    assert messages[0] == ("load 1 of 2 is reached: 50 N", (1, 2))
-    assert messages[1] == ("load 2 of 2 is reached: 150 N", (2, 2))
-    assert re.match(r"100 of 150 N are reached \(\d+ of \d+ mm down", halfway.getMessage())
-
-
-def test_elements_with_hourglass_stiffness_are_not_pressed() -> None:
-    linear = ring((0.05, 0.08, 0.1), 0.02, 2, support.Rubber(), quadratic=False)
-    with pytest.raises(DeckError, match=r"CGAX4R cannot be pressed on a road.*: take CGAX8R"):
-        footprints(linear, Late(1000), [50.0])
-
-
-def test_footprints_before_the_time_limit_stay(solid: Round) -> None:
-    """The job keeps the loads that were reached in time, and says why there are no more."""
-    unhurried = Late(1000)
-    wanted = footprints(solid, unhurried, [50.0])
-    result = footprints(solid, Late(1000 - unhurried.left + 2), [50.0, 200.0])
-    assert result["cause"] == "timed_out" and "time limit" in result["failure"]
-    assert [f["load_N"] for f in result["footprints"]] == [50.0]
-    assert result["footprints"][0]["deflection_m"] == wanted["footprints"][0]["deflection_m"]
-    assert wanted["cause"] == wanted["failure"] == ""
-    with pytest.raises(RunFailed):
-        footprints(solid, Late(2), [50.0, 200.0])
-
-
-def test_nodes_of_the_middle_plane_count_for_both_halves(solid: Round) -> None:
-    """Equal elements round the patch: nodes at its middle and one element on stand for equal areas
-    with much the same pressure, which falls from the middle on."""
-    (f,) = footprints(solid, Late(1000), [200.0])["footprints"]
-    at = lambda ring: {n: i for i, n in enumerate(f["node"]) if f["ring"][i] == ring}
-    own = {i: at(2)[n] for n, i in at(0).items()}
-    here = np.array([f["area_m2"][i] for i in at(0).values()])
-    there = np.array([f["area_m2"][own[i]] for i in at(0).values()])
-    np.testing.assert_allclose(here, there, rtol=0.02)
-    for i, j in own.items():
-        assert 0.8 < f["pressure_Pa"][j] / f["pressure_Pa"][i] < 1.0
-    assert len(set(zip(f["ring"], f["node"], strict=True))) == len(f["ring"])
-
-
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 def test_two_presses_give_the_same_bits(solid: Round, friction: float) -> None:
     runs: list[ContactNewton] = []
     for _ in range(2):
-        runs.append(solid.press(LENGTHS, 1e10, friction))
+        runs.append(solid.press(GRADED, 1e10, friction))
         for load in (50.0, 100.0):
             runs[-1].to(load)
     np.testing.assert_array_equal(runs[0].parts, runs[1].parts)
@@ -142,7 +52,7 @@ def test_two_presses_give_the_same_bits(solid: Round, friction: float) -> None:
 
 def test_off_the_road_there_is_no_step(solid: Round) -> None:
     """Newton's step has overshot to where nothing touches: a smaller load is tried."""
-    press = solid.press(LENGTHS, 1e10)
+    press = solid.press(GRADED, 1e10)
     lifted = press._state(press.parts, press.height + 0.01, 100.0, None)
     with pytest.raises(NoEquilibrium, match="no force answers"):
         press._step(lifted, 1e-6)
@@ -150,7 +60,7 @@ def test_off_the_road_there_is_no_step(solid: Round) -> None:
 
 def test_nearly_the_same_load_again(solid: Round) -> None:
     """A start that is in equilibrium already needs no step, and has its stiffness all the same."""
-    press = solid.press(LENGTHS, 1e10)
+    press = solid.press(GRADED, 1e10)
     first = press.to(50.0)
     again = press.to(50.0 * (1 + 1e-9))
     assert again.height == pytest.approx(first.height, rel=1e-9)
@@ -163,14 +73,14 @@ def test_a_stiffness_that_is_not_found_is_no_number(
 ) -> None:
     monkeypatch.setattr(contact_newton, "MAX_UNIT_RESIDUAL", 1e-30)
     with pytest.raises(NoEquilibrium, match="vertical stiffness was not found in 60 iterations"):
-        solid.press(LENGTHS, 1e10).to(50.0)
+        solid.press(GRADED, 1e10).to(50.0)
 
 
 def test_a_little_more_load_is_one_step_along_the_slope(solid: Round) -> None:
     """1 % more: what the slope by the load leaves is of second order, and what one step of Newton's
     method leaves of that of fourth, so two do, with the preconditioner of the load before; without
     the slope it takes several. A fifth more has one of its own."""
-    press = solid.press(LENGTHS, 1e10)
+    press = solid.press(GRADED, 1e10)
     states = [press.to(load) for load in (198.0, 200.0)]
     before = press.iterations, press.factorisations
     states.append(press.to(202.0))
@@ -187,7 +97,7 @@ def test_a_little_more_load_is_one_step_along_the_slope(solid: Round) -> None:
 def test_after_many_iterations_the_preconditioner_is_formed_anew(
     solid: Round, used: int, formed: int
 ) -> None:
-    press = solid.press(LENGTHS, 1e10)
+    press = solid.press(GRADED, 1e10)
     press.to(50.0)
     state = press._state(press.parts, press.height, 51.0, None)
     before, press._used = press.factorisations, used
@@ -199,7 +109,7 @@ def test_an_unstable_tangent_has_no_preconditioner(
     solid: Round, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The one before is let go first, as memory holds but one: the load is not reached."""
-    press = solid.press(LENGTHS, 1e10)
+    press = solid.press(GRADED, 1e10)
     contact = press.to(50.0).contact
     alive: list[bool] = []
 
@@ -231,7 +141,7 @@ def pressed_past(
     with monkeypatch.context() as patch:
         patch.setattr(contact_newton, "MAX_GMRES_BEFORE_NEW_FACTOR", -1)
         patch.setattr(ContactNewton, "_form", formed)
-        press = solid.press(LENGTHS, 1e10)
+        press = solid.press(GRADED, 1e10)
         patch.setattr(press, "settled", lambda work, state: loads.append(work.load))
         return press.to(100.0), loads, steadied
 
@@ -245,7 +155,7 @@ def test_a_steadied_tangent_leads_past_unstable_states(
     assert reached == [100.0]
     assert [steadied[i + 1] for i in unstable] == [True] * len(unstable)
     assert any(steadied) == bool(unstable) and not steadied[-1]
-    plain = solid.press(LENGTHS, 1e10).to(100.0)
+    plain = solid.press(GRADED, 1e10).to(100.0)
     assert state.height == pytest.approx(plain.height, rel=1e-8)
     assert state.stiffness == pytest.approx(plain.stiffness, rel=1e-6)
 
@@ -289,8 +199,8 @@ def test_a_guess_that_comes_to_an_unstable_state_is_a_bad_one(
     solid: Round, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Past that it may find another equilibrium: the answer is that without a guess."""
-    cold, form = solid.press(LENGTHS, 1e10).to(100.0), ContactNewton._form
-    press, steadied = solid.press(LENGTHS, 1e10), list[bool]()
+    cold, form = solid.press(GRADED, 1e10).to(100.0), ContactNewton._form
+    press, steadied = solid.press(GRADED, 1e10), list[bool]()
 
     def formed(press: ContactNewton, contact: Any) -> Any:
         steadied.append(press._steadied)
@@ -309,7 +219,7 @@ def test_of_a_load_that_is_not_taken_nothing_is_left(
     solid: Round, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The next try starts along the slope of the last load, with its bounds of friction."""
-    press, newton = solid.press(LENGTHS, 1e10, 0.5), ContactNewton._newton
+    press, newton = solid.press(GRADED, 1e10, 0.5), ContactNewton._newton
     press.to(50.0)
     known = press._slope, press._bound
 
@@ -330,7 +240,7 @@ def test_of_a_load_that_is_not_taken_nothing_is_left(
 
 def test_time_is_looked_at_before_every_iteration(solid: Round) -> None:
     looks: list[int] = []
-    press = solid.press(LENGTHS, 1e10, check=lambda: looks.append(1))
+    press = solid.press(GRADED, 1e10, check=lambda: looks.append(1))
     press.to(50.0)
     looks.clear()
     before = press.iterations
@@ -343,7 +253,7 @@ def test_friction_that_does_not_converge_is_left_soon(
     solid: Round, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The iteration ends one step after the last that may fail to halve the residual."""
-    press = solid.press(LENGTHS, 1e10, 0.5)
+    press = solid.press(GRADED, 1e10, 0.5)
     press.to(50.0)
     monkeypatch.setattr(press, "_step", lambda *given: (0 * press.parts, 0.0))
     before = press.iterations
@@ -364,7 +274,7 @@ def test_a_step_with_coulombs_friction_is_halved_for_a_smaller_residual(
     solid: Round, monkeypatch: pytest.MonkeyPatch, residual: dict[float, float], tried: list[float]
 ) -> None:
     """Twice at most: where points begin to slide the residual may have to grow."""
-    press, lengths = solid.press(LENGTHS, 1e10, 0.5), list[float]()
+    press, lengths = solid.press(GRADED, 1e10, 0.5), list[float]()
     contact = press.road.forces(press.symmetry.spread(press.parts), press.height)
 
     def state(parts: Array, height: float, *_: object) -> Imbalance:
@@ -387,7 +297,7 @@ def test_a_step_with_coulombs_friction_is_halved_for_a_smaller_residual(
 def test_a_load_begins_at_its_guess(solid: Round, monkeypatch: pytest.MonkeyPatch) -> None:
     """At once, however large it is, and by Tresca's friction where Coulomb's does not converge."""
     load, begun = 3000.0, list[tuple[bool, float]]()
-    cold = solid.press(LENGTHS, 1e10, 0.5)
+    cold = solid.press(GRADED, 1e10, 0.5)
     state = cold.to(load)
     settle = ContactNewton._iterate
 
@@ -398,7 +308,7 @@ def test_a_load_begins_at_its_guess(solid: Round, monkeypatch: pytest.MonkeyPatc
         return settle(self, parts, height, N, *rest)
 
     monkeypatch.setattr(ContactNewton, "_iterate", note)
-    press = solid.press(LENGTHS, 1e10, 0.5)
+    press = solid.press(GRADED, 1e10, 0.5)
     deflection = 1.1 * (press.free_radius - state.height)
     press.guesses[load] = contact_newton.FirstGuess(state.parts, deflection)
     warm = press.to(load)
@@ -413,7 +323,7 @@ def test_the_line_search_asks_for_a_ten_thousandth_of_the_slope(
     solid: Round, monkeypatch: pytest.MonkeyPatch, share: float, words: str
 ) -> None:
     """An energy that falls by a share of what the forces on the parts and on the road tell."""
-    press = solid.press(LENGTHS, 1e10)
+    press = solid.press(GRADED, 1e10)
     press.to(50.0)
     parts, height = press.parts, press.height - 1e-5
     force, lacking, _ = press._state(parts, height, 100.0, press._bound)
@@ -429,7 +339,7 @@ def test_a_load_starts_along_the_slope_of_the_last_one(
     solid: Round, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The first one by a micrometre per newton."""
-    press = solid.press(LENGTHS, 1e10)
+    press = solid.press(GRADED, 1e10)
     started: list[tuple[Array, float]] = []
     settle = ContactNewton._iterate
 
@@ -458,7 +368,7 @@ def test_how_far_down_is_told_in_words(solid: Round) -> None:
     )
     assert ContactNewton._flat_height(X, np.array([1, 2])) == pytest.approx(0.21)
     assert ContactNewton._flat_height(X[3:], np.array([], int)) == pytest.approx(0.01)
-    press = solid.press(LENGTHS, 1e10)
+    press = solid.press(GRADED, 1e10)
     assert press.depth() == ""
     press.flat, press.height, press.load = press.free_radius - 0.04, press.free_radius - 0.013, 1.0
     assert press.depth() == " (13 of 40 mm down to the rim)"
@@ -468,7 +378,7 @@ def test_a_time_limit_names_the_cords_that_buckle(
     solid: Round, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where a state on the way was unstable, before the first load, too; else only the load."""
-    press = solid.press(LENGTHS, 1e10)
+    press = solid.press(GRADED, 1e10)
     monkeypatch.setattr(press, "_buckling", lambda: "the cords of layer A buckle")
     assert press.progress() == ""
     press._steady(True)
@@ -484,7 +394,7 @@ def test_a_load_is_reached_in_up_to_sixteen_steps(
     solid: Round, monkeypatch: pytest.MonkeyPatch, most_N: float, reached: int
 ) -> None:
     """Steps are halved until Newton's method finds a state; time is looked at before each."""
-    press, looks = solid.press(LENGTHS, 1e10), []
+    press, looks = solid.press(GRADED, 1e10), []
     monkeypatch.setattr(press, "check", lambda: looks.append(1))
     first, taken = press.to(50.0), []
 
@@ -509,9 +419,9 @@ def test_a_load_is_reached_in_up_to_sixteen_steps(
 
 def test_a_much_larger_load_after_a_small_one(solid: Round) -> None:
     """A hundred times the load: the same as at once."""
-    press = solid.press(LENGTHS, 1e10)
+    press = solid.press(GRADED, 1e10)
     press.to(5.0)
-    state, direct = press.to(500.0), solid.press(LENGTHS, 1e10).to(500.0)
+    state, direct = press.to(500.0), solid.press(GRADED, 1e10).to(500.0)
     assert state.height == pytest.approx(direct.height, rel=1e-8)
     np.testing.assert_allclose(state.parts, direct.parts, atol=1e-6 * abs(direct.parts).max())
 
@@ -523,7 +433,7 @@ def test_a_much_larger_load_after_a_small_one(solid: Round) -> None:
 def test_friction_of_any_size_converges(solid: Round, friction: float, slip: float) -> None:
     """The iteration converges from a soft to a hard stick, and with more friction than rubber
     has."""
-    press = solid.press(LENGTHS, 1e10, friction, slip)
+    press = solid.press(GRADED, 1e10, friction, slip)
     press.to(50.0)
     state = press.to(100.0)
     assert state.contact.force == pytest.approx(100.0, rel=1e-7)
@@ -534,7 +444,7 @@ def test_friction_of_any_size_converges(solid: Round, friction: float, slip: flo
 def test_a_ring_is_pressed_in_the_middle(solid: Round) -> None:
     """A ring without cords is mirrored in both planes, so the second part of the fold stays
     zero."""
-    press = solid.press(LENGTHS, 1e10, 0.5)
+    press = solid.press(GRADED, 1e10, 0.5)
     press.to(50.0)
     state = press.to(100.0)
     assert abs(state.parts[1]).max() < 1e-9 * abs(state.parts[0]).max()
@@ -545,7 +455,7 @@ def test_a_ring_is_pressed_in_the_middle(solid: Round) -> None:
 @pytest.mark.slow
 def test_a_softer_road_gives_more(solid: Round) -> None:
     """The overclosure is a spring in series: at 1e12 Pa/m it no longer matters."""
-    heights = {k: solid.press(LENGTHS, k).to(100.0).height for k in (1e9, 1e10, 1e11, 1e12)}
+    heights = {k: solid.press(GRADED, k).to(100.0).height for k in (1e9, 1e10, 1e11, 1e12)}
     given = [heights[1e12] - heights[k] for k in (1e9, 1e10, 1e11)]
     assert given[0] > given[1] > given[2] > 0
     assert given[1] < 0.2 * given[0] and given[2] < 0.2 * given[1]

@@ -1,4 +1,4 @@
-"""The inflated tyre pressed on the road, through its decks: equilibrium, symmetry, refusals."""
+"""The inflated tyre pressed on the road, by its decks: equilibrium, symmetry, refusals; a ring."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ import pytest
 from tyrecal_solvers.bundled import job
 from tyrecal_solvers.bundled.road import footprint_job
 from tyrecal_solvers.bundled.road.contact_newton import ContactNewton
-from tyrecal_solvers.bundled.road.road_data import read_road
-from tyrecal_solvers.errors import RunFailed
+from tyrecal_solvers.bundled.road.road_data import LoadRequest, TyreToPress, read_road
+from tyrecal_solvers.errors import NoEquilibrium, RunFailed
 from tyrecal_solvers.language.text import DeckError, read_keywords
 
 from tyrecal.simulate.deck.decks import Decks
 from tyrecal.simulate.deck.tyre_design import TyreDesign
 
 from . import support
-from .contact import ANGLES, coarse_case
+from .contact import ANGLES, GRADED, Late, Round, coarse_case, ring, solid_ring
 
 Array = np.ndarray
 LOADS = (1000.0, 2000.0)
@@ -304,3 +304,79 @@ def test_the_contact_has_the_properties_that_its_pair_names() -> None:
         for k in (at, after)
     ]
     assert road[0] and road[1] and road[0].friction == road[1].friction == 0.5
+
+
+@pytest.fixture(scope="module")
+def solid() -> Round:
+    return solid_ring()
+
+
+def footprints(work: Round, clock: Late, loads: list[float]) -> dict[str, Any]:
+    road = footprint_job.RoadData("1", "TREAD", 1e10, 0.0, 1e-5, GRADED)
+    equations = support.numbering(work.model, ~work.free)
+    inflated = TyreToPress(work.model, equations, work.loads, work.U)
+    return footprint_job.press(inflated, road, dict.fromkeys(loads, LoadRequest()), clock)
+
+
+def test_nodes_that_bear_less_than_a_newton_belong_to_the_patch(solid: Round) -> None:
+    (footprint,) = footprints(solid, Late(1000), [0.5])["footprints"]
+    assert footprint["pressure_Pa"] @ footprint["area_m2"] == pytest.approx(0.5, rel=1e-6)
+    assert (footprint["pressure_Pa"] > 0).all() and len(footprint["node"]) > 1
+
+
+def test_each_load_that_is_reached_is_told(
+    solid: Round, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The solver reports each load, the share of a load that takes several steps, and each
+    iteration for --verbose."""
+    newton = ContactNewton._newton
+
+    def in_two_steps(press: ContactNewton, load: float) -> Any:
+        if load == 150.0 and press.load == 50.0:
+            raise NoEquilibrium("too much")
+        return newton(press, load)
+
+    monkeypatch.setattr(ContactNewton, "_newton", in_two_steps)
+    with caplog.at_level("DEBUG", "tyrecal_solvers"):
+        footprints(solid, Late(1000), [50.0, 150.0])
+    iterations = [each for each in caplog.records if each.levelname == "DEBUG"]
+    assert caplog.records[0] is iterations[0]
+    assert re.match(r"50 N: Newton iteration 1, residual \S+$", iterations[0].getMessage())
+    first, halfway, last = (each for each in caplog.records if each not in iterations)
+    messages = [(each.getMessage(), each.__dict__.get("loads")) for each in (first, last)]
+    assert messages[0] == ("load 1 of 2 is reached: 50 N", (1, 2))
+    assert messages[1] == ("load 2 of 2 is reached: 150 N", (2, 2))
+    assert re.match(r"100 of 150 N are reached \(\d+ of \d+ mm down", halfway.getMessage())
+
+
+def test_elements_with_hourglass_stiffness_are_not_pressed() -> None:
+    linear = ring((0.05, 0.08, 0.1), 0.02, 2, support.Rubber(), quadratic=False)
+    with pytest.raises(DeckError, match=r"CGAX4R cannot be pressed on a road.*: take CGAX8R"):
+        footprints(linear, Late(1000), [50.0])
+
+
+def test_footprints_before_the_time_limit_stay(solid: Round) -> None:
+    """The job keeps the loads that were reached in time, and says why there are no more."""
+    unhurried = Late(1000)
+    wanted = footprints(solid, unhurried, [50.0])
+    result = footprints(solid, Late(1000 - unhurried.left + 2), [50.0, 200.0])
+    assert result["cause"] == "timed_out" and "time limit" in result["failure"]
+    assert [f["load_N"] for f in result["footprints"]] == [50.0]
+    assert result["footprints"][0]["deflection_m"] == wanted["footprints"][0]["deflection_m"]
+    assert wanted["cause"] == wanted["failure"] == ""
+    with pytest.raises(RunFailed):
+        footprints(solid, Late(2), [50.0, 200.0])
+
+
+def test_nodes_of_the_middle_plane_count_for_both_halves(solid: Round) -> None:
+    """Equal elements round the patch: nodes at its middle and one element on stand for equal areas
+    with much the same pressure, which falls from the middle on."""
+    (f,) = footprints(solid, Late(1000), [200.0])["footprints"]
+    at = lambda ring: {n: i for i, n in enumerate(f["node"]) if f["ring"][i] == ring}
+    own = {i: at(2)[n] for n, i in at(0).items()}
+    here = np.array([f["area_m2"][i] for i in at(0).values()])
+    there = np.array([f["area_m2"][own[i]] for i in at(0).values()])
+    np.testing.assert_allclose(here, there, rtol=0.02)
+    for i, j in own.items():
+        assert 0.8 < f["pressure_Pa"][j] / f["pressure_Pa"][i] < 1.0
+    assert len(set(zip(f["ring"], f["node"], strict=True))) == len(f["ring"])
